@@ -1,0 +1,1 @@
+"""What both sides of a flight log share: atmosphere, gusts, sensors, actuators, the short period."""

@@ -1,0 +1,119 @@
+"""Gust severity: standard deviations and scale lengths of named levels over altitude."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from airtruth.errors import ConfigurationError, choices
+from airtruth.units import FT, KT
+
+
+class GustScales(NamedTuple):
+    """Standard deviations [m/s] and scale lengths [m] of u and w."""
+
+    sigma_u_m_s: float
+    sigma_w_m_s: float
+    length_u_m: float
+    length_w_m: float
+
+
+LEVELS: Final = ("light", "moderate", "severe")
+
+# NASA TM-4511 "severe" at full scale as tabulated in NASA GTM_DesignSim: altitude [ft], Lu, Lw [m],
+# sigma_u, sigma_w [m/s]; the levels multiply sigma. As shipped, the GTM's severe has the gains of
+# moderate in u and w; here it is the table itself.
+_GTM_TABLE: Final = np.array(
+    [
+        [800.0, 168.661, 151.864, 3.8162, 3.6184],
+        [1226.0, 300.0, 300.0, 4.3845, 4.39],
+        [2000.0, 300.0, 300.0, 4.39, 4.39],
+        [7000.0, 911.218, 840.419, 5.8294, 4.7754],
+    ]
+)
+_GTM_GAINS: Final = {"light": (0.2, 0.17), "moderate": (0.4, 0.34), "severe": (1.0, 1.0)}
+
+_MIL_W20_KT: Final = {"light": 15.0, "moderate": 30.0, "severe": 45.0}
+# MIL-F-8785C, figure 7: sigma [ft/s] over altitude [ft] at a probability of exceedance of 1e-2 (light),
+# 1e-3 (moderate) and 1e-5 (severe), as read off in JSBSim's FGWinds.
+_MIL_ALTITUDE_FT: Final = (500.0, 1750.0, 3750.0, 7500.0, 15e3, 25e3, 35e3, 45e3, 55e3, 65e3, 75e3, 80e3)
+_MIL_SIGMA_FT_S: Final = {
+    "light": (6.6, 6.9, 7.4, 6.7, 4.6, 2.7, 0.4, 0.0, 0.0, 0.0, 0.0, 0.0),
+    "moderate": (8.6, 9.6, 10.6, 10.1, 8.0, 6.6, 5.0, 4.2, 2.7, 0.0, 0.0, 0.0),
+    "severe": (15.6, 17.6, 23.0, 23.6, 22.1, 20.0, 16.0, 15.1, 12.1, 7.9, 6.2, 5.1),
+}
+
+
+def _gtm(level: str, altitude_ft: float) -> GustScales:
+    length_u, length_w, sigma_u, sigma_w = (
+        float(np.interp(altitude_ft, _GTM_TABLE[:, 0], _GTM_TABLE[:, column])) for column in (1, 2, 3, 4)
+    )
+    gain_u, gain_w = _GTM_GAINS[level]
+    return GustScales(gain_u * sigma_u, gain_w * sigma_w, length_u, length_w)
+
+
+def _mil_f_8785c(level: str, altitude_ft: float) -> GustScales:
+    """Low-altitude model (3.7.3.4) to 1000 ft, medium and high (3.7.2) from 2000 ft, linear between."""
+    low = min(altitude_ft, 1000.0)
+    ratio = 0.177 + 0.000823 * low
+    sigma_w = 0.1 * _MIL_W20_KT[level] * KT
+    near = np.array([sigma_w / ratio**0.4, sigma_w, low / ratio**1.2 * FT, low * FT])
+    sigma = float(np.interp(max(altitude_ft, 2000.0), _MIL_ALTITUDE_FT, _MIL_SIGMA_FT_S[level])) * FT
+    far = np.array([sigma, sigma, 1750.0 * FT, 1750.0 * FT])
+    share = min(max((altitude_ft - 1000.0) / 1000.0, 0.0), 1.0)
+    return GustScales(*((1.0 - share) * near + share * far).tolist())
+
+
+@dataclass(frozen=True)
+class Figures:
+    """A source of gust figures: its function of level and altitude [ft], and the range it covers [ft]."""
+
+    scales: Callable[[str, float], GustScales]
+    lowest_ft: float
+    highest_ft: float
+
+
+FIGURES: Final[dict[str, Figures]] = {
+    "gtm": Figures(_gtm, 800.0, 7000.0),
+    "mil-f-8785c": Figures(_mil_f_8785c, 10.0, 80000.0),
+}
+
+
+def gust_scales(figures: str, level: str, altitude_m: float, factor: float = 1.0) -> GustScales:
+    """Standard deviations and scale lengths of a named severity.
+
+    Parameters
+    ----------
+    figures : key of `FIGURES`; "gtm" is the full-scale table of the GTM simulator, "mil-f-8785c" the
+        specification (altitude above the ground below 2000 ft).
+    level : one of `LEVELS`.
+    altitude_m : altitude [m].
+    factor : multiplies both standard deviations.
+
+    Raises
+    ------
+    ConfigurationError
+        If a name is not known, or the altitude is outside the range of the figures.
+    """
+    if figures not in FIGURES:
+        raise ConfigurationError(f"gust figures {figures!r} are not known; {choices(figures, FIGURES)}")
+    if level not in LEVELS:
+        raise ConfigurationError(f"gust level {level!r} is not known; {choices(level, LEVELS)}")
+    source = FIGURES[figures]
+    altitude_ft = altitude_m / FT
+    tolerance_ft = 1e-6
+    if not source.lowest_ft - tolerance_ft <= altitude_ft <= source.highest_ft + tolerance_ft:
+        raise ConfigurationError(
+            f"gust figures {figures!r} cover {source.lowest_ft:g} to {source.highest_ft:g} ft "
+            f"({source.lowest_ft * FT:.0f} to {source.highest_ft * FT:.0f} m), not {altitude_ft:.0f} ft; "
+            f"fly inside that range, choose other figures ({', '.join(sorted(FIGURES))}), "
+            "or state sigma and length yourself"
+        )
+    s = source.scales(level, altitude_ft)
+    return GustScales(factor * s.sigma_u_m_s, factor * s.sigma_w_m_s, s.length_u_m, s.length_w_m)
+
+
+__all__ = ["FIGURES", "LEVELS", "Figures", "GustScales", "gust_scales"]

@@ -1,0 +1,95 @@
+"""What the paper prints for a method, with the Monte Carlo standard error that it does not print."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from airtruth.physics import short_period
+from airtruth.report import published
+from airtruth.report.published import ESTIMATED, Printed, PublishedColumn
+from airtruth.report.statistics import Array, MethodStatistics
+
+SIX: Final = "six"
+"""Stands for the parameter where a statistic covers all six derivatives."""
+
+RUNS: Final = ""
+"""Stands for the parameter where a statistic is about the runs."""
+
+Key = tuple[str, str]
+"""Parameter and statistic."""
+
+Beside = Mapping[Key, tuple[Printed, float]]
+"""Printed figure and its Monte Carlo standard error."""
+
+
+def published_figures(column: PublishedColumn, runs: int, ours: MethodStatistics) -> dict[Key, tuple[Printed, float]]:
+    """Printed figures of a column, and the RMSE that follows from them.
+
+    The paper prints means and standard deviations s over n runs. Their standard errors are taken as
+    s/sqrt(n) and s/sqrt(2(n - 1)), the latter exact to first order for normal estimates. That of
+    RelErr follows from s by the delta method, with our correlation between the six estimates; that of
+    the mean number of iterations from our spread of iterations over n runs. The RMSE is
+    sqrt((mean - truth)^2 + s^2 (n - 1)/n).
+
+    Parameters
+    ----------
+    column : the paper's column.
+    runs : n, its number of runs.
+    ours : statistics of the method that it is compared with.
+    """
+    truth = published.load().truth
+    found: dict[Key, tuple[Printed, float]] = {}
+    for name in ESTIMATED:
+        mean, std = column.mean[name], column.std[name]
+        bias, s2 = mean.value - truth[name].value, std.value**2
+        rmse = math.sqrt(bias**2 + s2 * (runs - 1) / runs)
+        found[name, "mean"] = mean, std.value / math.sqrt(runs)
+        found[name, "std"] = std, std.value / math.sqrt(2.0 * (runs - 1))
+        found[name, "rmse"] = (
+            Printed(rmse, math.hypot(mean.unit * bias, std.unit * std.value) / rmse),
+            math.sqrt((2.0 * s2**2 + 4.0 * bias**2 * s2) / runs) / (2.0 * rmse),
+        )
+    found[SIX, "relerr_pct"] = column.relerr_pct, _relerr_se_pct(column, runs, ours.correlation)
+    for name, relerr in column.relerr_modal_pct.items():
+        se = 100.0 * column.std[name].value / math.sqrt(runs) / truth[name].value
+        found[name, "relerr_pct"] = relerr, se
+    if column.iterations:
+        se = float(ours.iterations.se) * math.sqrt(ours.counts.used / runs)
+        found[RUNS, "iterations"] = column.iterations, se
+    return found
+
+
+def published_ratio(
+    column: PublishedColumn, reference: PublishedColumn, runs: int, ours: tuple[float, float], our_runs: int
+) -> tuple[Printed, float]:
+    """Ratio of two printed RelErr.
+
+    The paper flies every method on the same runs, but prints no correlation between methods; the
+    relative standard error is ours, scaled to the paper's number of runs.
+
+    Parameters
+    ----------
+    column, reference : numerator and denominator.
+    runs, our_runs : number of runs of the paper and of ours.
+    ours : our ratio and its standard error.
+    """
+    ratio = column.relerr_pct.value / reference.relerr_pct.value
+    relative_unit = math.hypot(
+        column.relerr_pct.unit / column.relerr_pct.value, reference.relerr_pct.unit / reference.relerr_pct.value
+    )
+    relative_se = ours[1] / ours[0] * math.sqrt(our_runs / runs)
+    return Printed(ratio, ratio * relative_unit), ratio * relative_se
+
+
+def _relerr_se_pct(column: PublishedColumn, runs: int, correlation: Array) -> float:
+    names = short_period.PARAMETERS
+    truth = published.load().truth
+    target = np.array([truth[name].value for name in names])
+    bias = np.array([column.mean[name].value for name in names]) - target
+    std = np.array([column.std[name].value for name in names])
+    weighted = bias / np.linalg.norm(bias) * std
+    return 100.0 * math.sqrt(weighted @ correlation @ weighted / runs) / float(np.linalg.norm(target))
