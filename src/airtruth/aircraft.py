@@ -16,7 +16,14 @@ from airtruth.signals import SIGNALS
 
 FILE: Final = "aircraft.toml"
 
-_SENSOR_DIMENSIONS: Final = {"lag": "time", "delay": "time", "hold": "time", "x": "length", "z": "length", "scale": "ratio"}
+_SENSOR_DIMENSIONS: Final = {
+    "lag": "time",
+    "delay": "time",
+    "hold": "time",
+    "x": "length",
+    "z": "length",
+    "scale": "ratio",
+}
 
 
 class Sensor(Strict):
@@ -233,7 +240,9 @@ def find(name: str | Path, near: Path | None = None) -> Path:
     known = {p.parent.name for root in roots if root.is_dir() for p in root.glob(f"*/{FILE}")}
     if path.is_dir():
         raise AircraftError(f"{path}: no {FILE} in this folder; see docs/aircraft.md for a minimal one")
-    raise AircraftError(f"aircraft {str(name)!r} not found; {choices(path.name, known)}; or give a folder that holds {FILE}")
+    raise AircraftError(
+        f"aircraft {str(name)!r} not found; {choices(path.name, known)}; or give a folder that holds {FILE}"
+    )
 
 
 def shipped_roots() -> list[Path]:
@@ -306,4 +315,15 @@ def _constants(file: AircraftFile, model: Constants | None) -> Constants:
     return constants
 
 
-__all__ = ["FILE", "Actuator", "Aircraft", "AircraftFile", "Sensor", "find", "load", "read_file", "sensor_tables", "shipped_roots"]
+__all__ = [
+    "FILE",
+    "Actuator",
+    "Aircraft",
+    "AircraftFile",
+    "Sensor",
+    "find",
+    "load",
+    "read_file",
+    "sensor_tables",
+    "shipped_roots",
+]

@@ -54,14 +54,18 @@ def probe(folder: Path, jsbsim_json: str) -> Constants:
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=_TIMEOUT_S, check=False)
     except subprocess.TimeoutExpired:
-        raise AircraftError(f"{folder}: JSBSim did not finish loading the model within {_TIMEOUT_S:.0f} s") from None
+        raise AircraftError(
+            f"{folder}: JSBSim did not finish loading the model within {_TIMEOUT_S:.0f} s"
+        ) from None
     lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
     answer: dict[str, Any] = json.loads(lines[-1]) if lines else {}
     if "error" in answer:
         raise AircraftError(f"{folder}: {answer['error']}")
     if done.returncode != 0 or "constants" not in answer:
         said = "\n  ".join((done.stderr + done.stdout).strip().splitlines()[-6:])
-        raise AircraftError(f"{folder}: JSBSim died while loading the model (exit {done.returncode}); it said:\n  {said}")
+        raise AircraftError(
+            f"{folder}: JSBSim died while loading the model (exit {done.returncode}); it said:\n  {said}"
+        )
     return Constants.model_validate(answer["constants"])
 
 
@@ -83,7 +87,9 @@ def _load(folder: Path, table: dict[str, Any]) -> dict[str, Any]:
     xml = aircraft / table["model"] / f"{table['model']}.xml"
     if not xml.is_file():
         known = {p.name for p in aircraft.iterdir() if (p / f"{p.name}.xml").is_file()}
-        return {"error": f"jsbsim.model: no {table['model']}.xml below {aircraft}; {choices(table['model'], known)}"}
+        return {
+            "error": f"jsbsim.model: no {table['model']}.xml below {aircraft}; {choices(table['model'], known)}"
+        }
     try:
         fdm = jsbsim.FGFDMExec(str(root))
         fdm.set_debug_level(0)
@@ -92,6 +98,7 @@ def _load(folder: Path, table: dict[str, Any]) -> dict[str, Any]:
         fdm.set_systems_path(str(systems))
         if not fdm.load_model(table["model"]):
             return {"error": f"JSBSim refused {xml}; it said the reason above"}
+        fdm.disable_output()
         manager = fdm.get_property_manager()
         missing = [p for p in _named(table) if not manager.hasNode(p)]
         if missing:

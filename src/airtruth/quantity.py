@@ -6,7 +6,7 @@ std = 0.3, source = "..." }``. In a campaign the unit ends the key, ``eas_kt = 7
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
@@ -45,7 +45,9 @@ def _from_table(dimension: str) -> BeforeValidator:
         table = dict(raw)
         unit = table.pop("unit", "" if dimension == "ratio" else None)
         if unit not in UNITS[dimension]:
-            raise ValueError(f"unit {unit!r} is not a unit of {dimension.replace('_', ' ')}; {_units(dimension)}")
+            raise ValueError(
+                f"unit {unit!r} is not a unit of {dimension.replace('_', ' ')}; {_units(dimension)}"
+            )
         factor = UNITS[dimension][unit]
         for key in ("value", "std"):
             if isinstance(table.get(key), int | float):
@@ -83,7 +85,9 @@ def table_in(dimension: str, raw: Any) -> Quantity:
     return converted if isinstance(converted, Quantity) else Quantity.model_validate(converted)
 
 
-def keys_to_si(raw: Mapping[str, Any], dimensions: Mapping[str, str]) -> dict[str, Any]:
+def keys_to_si(
+    raw: Mapping[str, Any], dimensions: Mapping[str, str], fields: Iterable[str]
+) -> dict[str, Any]:
     """Rename ``eas_kt = 75`` to ``eas = 38.58`` for every name in ``dimensions``.
 
     Parameters
@@ -91,27 +95,42 @@ def keys_to_si(raw: Mapping[str, Any], dimensions: Mapping[str, str]) -> dict[st
     raw : table as read.
     dimensions : bare name -> dimension. Numbers, and the numbers in lists and tables (distributions),
         are multiplied by the unit's factor.
+    fields : every bare name that the table knows.
 
     Raises
     ------
     ValueError
-        If a key is one of the names with a unit of another dimension, or is given twice.
+        If keys are unknown, have a unit of another dimension, or are given twice; names them all.
     """
+    known = set(fields)
     result: dict[str, Any] = {}
+    problems: list[str] = []
     for key, value in raw.items():
         name = _longest_name(key, dimensions)
         if name is None:
+            if key not in known:
+                problems.append(f"{key}: unknown key; {choices(key, _keys(known, dimensions))}")
             result[key] = value
             continue
         dimension = dimensions[name]
         unit = key[len(name) + 1 :] if key != name else ""
         if unit not in UNITS[dimension]:
-            allowed = ", ".join(f"{name}_{u}" if u else name for u in UNITS[dimension])
-            raise ValueError(f"{key}: {unit or 'no unit'!r} is not a unit of {dimension.replace('_', ' ')}; write {allowed}")
-        if name in result:
-            raise ValueError(f"{key}: {name} is given twice, in two units")
-        result[name] = _scaled(value, UNITS[dimension][unit])
+            allowed = [f"{name}_{u}" if u else name for u in UNITS[dimension]]
+            problems.append(
+                f"{key}: {unit or 'no unit'!r} is not a unit of {dimension.replace('_', ' ')}; write {', '.join(allowed)}"
+            )
+        elif name in result:
+            problems.append(f"{key}: {name} is given twice, in two units")
+        else:
+            result[name] = _scaled(value, UNITS[dimension][unit])
+    if problems:
+        raise ValueError("; ".join(problems))
     return result
+
+
+def _keys(fields: Iterable[str], dimensions: Mapping[str, str]) -> list[str]:
+    """Keys as a user writes them, with the first unit that the dimension has."""
+    return [f"{n}_{next(iter(UNITS[dimensions[n]]))}" if n in dimensions else n for n in fields]
 
 
 def _longest_name(key: str, dimensions: Mapping[str, str]) -> str | None:
@@ -135,44 +154,33 @@ def _scaled(value: Any, factor: float) -> Any:
     return value
 
 
-def explain(error: ValidationError, model: type[BaseModel], names: Mapping[str, str] | None = None) -> list[str]:
+def explain(error: ValidationError, model: type[BaseModel]) -> list[str]:
     """One sentence per problem of a file: its path, what is wrong, and the allowed or nearest names.
 
     Parameters
     ----------
     error : what pydantic found, all of it.
     model : the model that was read.
-    names : bare name -> dimension of the keys that carry units, so that hints show a unit.
     """
     sentences = []
     for item in error.errors():
         path = ".".join(str(part) for part in item["loc"]) or "(top level)"
         message = item["msg"].removeprefix("Value error, ")
         if item["type"] == "extra_forbidden":
-            allowed = _fields_at(model, item["loc"][:-1], names or {})
-            message = f"unknown key; {choices(str(item['loc'][-1]), allowed)}"
+            message = f"unknown key; {choices(str(item['loc'][-1]), _fields_at(model, item['loc'][:-1]))}"
         elif item["type"] not in ("value_error", "missing"):
             message = f"{message} (found {item['input']!r})"
         sentences.append(f"{path}: {message}")
     return sentences
 
 
-def _fields_at(model: type[BaseModel], path: tuple[int | str, ...], names: Mapping[str, str]) -> list[str]:
+def _fields_at(model: type[BaseModel], path: tuple[int | str, ...]) -> list[str]:
     current: type[BaseModel] | None = model
     for part in path:
-        if current is None:
-            return []
-        field = current.model_fields.get(str(part))
-        if field is None:
-            continue  # an index into a list or a key of a mapping: the model stays that of its items
-        current = _model_of(field.annotation)
-    if current is None:
-        return []
-    result = []
-    for name in current.model_fields:
-        units = [u for u in UNITS[names[name]]] if name in names else [""]
-        result.append(f"{name}_{units[0]}" if units[0] else name)
-    return result
+        field = current.model_fields.get(str(part)) if current else None
+        if field is not None:  # else an index into a list or a key of a mapping: its items' model stays
+            current = _model_of(field.annotation)
+    return [f.alias or name for name, f in current.model_fields.items()] if current else []
 
 
 def _model_of(annotation: Any) -> type[BaseModel] | None:

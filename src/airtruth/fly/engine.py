@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import jsbsim
+
 from airtruth.aircraft import Aircraft, JsbsimModel
 from airtruth.aircraft_probe import model_root
 from airtruth.errors import AircraftError
@@ -19,7 +21,9 @@ from airtruth.units import FT, KT, SLUG
 
 AB3: Final = 4.0  # JSBSim's number for third-order Adams-Bashforth
 _INTEGRATORS: Final = tuple(
-    f"simulation/integrator/{order}/{kind}" for order in ("rate", "position") for kind in ("rotational", "translational")
+    f"simulation/integrator/{order}/{kind}"
+    for order in ("rate", "position")
+    for kind in ("rotational", "translational")
 )
 _PLANET: Final = Path(__file__).with_name("flat_planet.xml")
 
@@ -73,9 +77,6 @@ class Executive:
     """
 
     def __init__(self, aircraft: Aircraft, dt_s: float) -> None:
-        os.environ.setdefault("JSBSIM_DEBUG", "0")
-        import jsbsim
-
         self.model = jsbsim_model(aircraft)
         self.dt_s = dt_s
         root, folder, engine, systems = model_root(aircraft.folder, self.model.root)
@@ -88,6 +89,7 @@ class Executive:
         self.fdm.set_systems_path(str(systems))
         if not self.fdm.load_model(self.model.model):
             raise AircraftError(f"{aircraft.folder}: JSBSim refused the model {self.model.model!r}")
+        _no_files(self.fdm)
         self._manager = self.fdm.get_property_manager()
         self._propulsion = self.fdm.get_propulsion()
         self._has_engines = self._propulsion.get_num_engines() > 0
@@ -112,7 +114,9 @@ class Executive:
         """Bound nodes of several properties."""
         return [self.node(name) for name in names]
 
-    def initialise(self, condition: Condition, alpha_rad: float, controls: Controls, q_rad_s: float = 0.0) -> None:
+    def initialise(
+        self, condition: Condition, alpha_rad: float, controls: Controls, q_rad_s: float = 0.0
+    ) -> None:
         """Put the aircraft into a state with lags, filters and engines settled, at time zero."""
         fdm = self.fdm
         fdm.set_trim_status(True)  # actuators pass their input through
@@ -137,7 +141,9 @@ class Executive:
 
     def hold(self, controls: Controls) -> None:
         """Write the controls, the throttle's trim included."""
-        self.fdm[self.model.elevator.command] = controls.elevator_command_rad * self.model.elevator.command_per_rad
+        self.fdm[self.model.elevator.command] = (
+            controls.elevator_command_rad * self.model.elevator.command_per_rad
+        )
         for name in (*self.model.throttle.command, *self.model.throttle.trim):
             self.fdm[name] = controls.throttle
 
@@ -169,6 +175,36 @@ class Executive:
         )
 
 
+class _Silent(jsbsim.FGLogger):  # type: ignore[misc]
+    """JSBSim writes its messages to stdout, which is the result's; the probe has shown them already."""
+
+    def set_level(self, level: object) -> None:
+        """Pass over."""
+
+    def message(self, message: str) -> None:
+        """Pass over."""
+
+    def file_location(self, filename: str, line: int) -> None:
+        """Pass over."""
+
+    def format(self, format: object) -> None:
+        """Pass over."""
+
+    def flush(self) -> None:
+        """Pass over."""
+
+
+jsbsim.set_logger(_Silent())
+
+
+def _no_files(fdm: Any) -> None:
+    """Some models write files of their own at every start: send them nowhere."""
+    number = 0
+    while fdm.set_output_filename(number, os.devnull):
+        number += 1
+    fdm.disable_output()
+
+
 def jsbsim_model(aircraft: Aircraft) -> JsbsimModel:
     """The JSBSim part of an aircraft.
 
@@ -178,5 +214,7 @@ def jsbsim_model(aircraft: Aircraft) -> JsbsimModel:
         If aircraft.toml has no [jsbsim] table.
     """
     if aircraft.file.jsbsim is None:
-        raise AircraftError(f"{aircraft.folder}: aircraft.toml has no [jsbsim] table, so there is nothing to fly")
+        raise AircraftError(
+            f"{aircraft.folder}: aircraft.toml has no [jsbsim] table, so there is nothing to fly"
+        )
     return aircraft.file.jsbsim

@@ -17,7 +17,12 @@ from airtruth.units import FT, SLUG
 
 Array = NDArray[np.float64]
 
-_INTEGRATORS: Final = ("rate/rotational", "rate/translational", "position/rotational", "position/translational")
+_INTEGRATORS: Final = (
+    "rate/rotational",
+    "rate/translational",
+    "position/rotational",
+    "position/translational",
+)
 _MAX_ALPHA_RAD: Final = 1.5
 
 
@@ -116,7 +121,8 @@ class Flight:
             "az_m_s2": fz * (SLUG * FT / mass),
             "q_dot_rad_s2": q_dot,
             "elevator_rad": surface * self._elevator.surface_rad,
-            "elevator_command_rad": self.trim.controls.elevator_command_rad + inputs.command_rad[:: self._record_every],
+            "elevator_command_rad": self.trim.controls.elevator_command_rad
+            + inputs.command_rad[:: self._record_every],
             "throttle": np.full(len(v), self.trim.controls.throttle),
             "altitude_m": atmosphere.geopotential_m(height * FT),
             "density_kg_m3": density * (SLUG / FT**3),
@@ -131,7 +137,9 @@ class Flight:
         fdm.reset_to_initial_conditions(2)  # a reset without run_ic, which settle() does
         for name, value in executive.model.set.items():
             fdm[name] = value
-        executive.hold(Controls(controls.elevator_command_rad + float(inputs.command_rad[0]), controls.throttle))
+        executive.hold(
+            Controls(controls.elevator_command_rad + float(inputs.command_rad[0]), controls.throttle)
+        )
         self._engage(inputs)
         for setter, values in zip(setters[1:], series[1:], strict=True):
             setter(values[0])
@@ -166,7 +174,9 @@ class Flight:
         ]
         if inputs.gust_q_rad_s is not None:
             if self._rotary is None:
-                raise ConfigurationError("the aircraft has no property for a rotary gust (jsbsim.rotary_gust)")
+                raise ConfigurationError(
+                    "the aircraft has no property for a rotary gust (jsbsim.rotary_gust)"
+                )
             pairs.append((self._rotary, inputs.gust_q_rad_s))
         if self._augmentation is not None and inputs.q_error_rad_s is not None:
             pairs.append((self._augmentation.q_error, inputs.q_error_rad_s))
@@ -179,7 +189,9 @@ class Flight:
         if inputs.damper_gain_s == 0.0 and inputs.attitude_gain == 0.0:
             return
         if self._augmentation is None:
-            raise ConfigurationError("the aircraft has no pitch augmentation (jsbsim.augmentation in aircraft.toml)")
+            raise ConfigurationError(
+                "the aircraft has no pitch augmentation (jsbsim.augmentation in aircraft.toml)"
+            )
         fdm, names = self._executive.fdm, self._augmentation
         fdm[names.damper_gain] = inputs.damper_gain_s
         fdm[names.attitude_gain] = inputs.attitude_gain

@@ -84,7 +84,12 @@ def _probe(executive: Executive, trim: Trim, d_alpha: float, d_elevator: float, 
 
 
 def _one_sided(
-    executive: Executive, trim: Trim, origin: Array, s: short_period.Scale, steps: tuple[float, float, float], side: float
+    executive: Executive,
+    trim: Trim,
+    origin: Array,
+    s: short_period.Scale,
+    steps: tuple[float, float, float],
+    side: float,
 ) -> Array:
     d_alpha, d_elevator, d_q = (side * h for h in steps)
     by_alpha = (_probe(executive, trim, d_alpha, 0.0, 0.0) - origin) / d_alpha

@@ -13,7 +13,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from airtruth.errors import ConfigurationError, choices
 
@@ -69,7 +68,9 @@ def sample(manoeuvre: Manoeuvre, t_s: Array) -> Array:
         If the kind is unknown, or an edge does not lie on the grid of ``t_s``.
     """
     if manoeuvre.kind not in KINDS:
-        raise ConfigurationError(f"manoeuvre {manoeuvre.kind!r} is not known; {choices(manoeuvre.kind, KINDS)}")
+        raise ConfigurationError(
+            f"manoeuvre {manoeuvre.kind!r} is not known; {choices(manoeuvre.kind, KINDS)}"
+        )
     return KINDS[manoeuvre.kind](manoeuvre, t_s)
 
 
@@ -124,7 +125,9 @@ def _multisine(m: Manoeuvre, t_s: Array) -> Array:
     2012, "Flight maneuver design for efficient aerodynamic modeling"). Parts take every n-th harmonic:
     they share no frequency and so are orthogonal over the length.
     """
-    harmonics = np.arange(np.ceil(m.lowest_hz * m.length_s - 1e-9), np.floor(m.highest_hz * m.length_s + 1e-9) + 1)
+    harmonics = np.arange(
+        np.ceil(m.lowest_hz * m.length_s - 1e-9), np.floor(m.highest_hz * m.length_s + 1e-9) + 1
+    )
     harmonics = harmonics[harmonics > 0][m.part :: m.parts]
     if len(harmonics) == 0:
         raise ConfigurationError(
@@ -134,13 +137,17 @@ def _multisine(m: Manoeuvre, t_s: Array) -> Array:
     phases = _low_peak_phases(harmonics)
     tau = (t_s - m.start_s) / m.length_s
     inside = (tau > -1e-9) & (tau < 1.0 + 1e-9)
-    wave = np.cos(2.0 * np.pi * np.outer(tau + _zero_crossing(harmonics, phases), harmonics) + phases).sum(axis=1)
-    grid = np.linspace(0.0, 1.0, 40 * int(harmonics[-1]) + 1)
+    wave = np.cos(2.0 * np.pi * np.outer(tau + _zero_crossing(harmonics, phases), harmonics) + phases).sum(
+        axis=1
+    )
+    grid = np.linspace(0.0, 1.0, 400 * int(harmonics[-1]) + 1)
     peak = np.abs(np.cos(2.0 * np.pi * np.outer(grid, harmonics) + phases).sum(axis=1)).max()
     return np.asarray(np.where(inside, m.amplitude_rad / peak * wave, 0.0))
 
 
 def _low_peak_phases(harmonics: Array) -> Array:
+    from scipy.optimize import minimize  # slow to import, and only multisines need it
+
     n = len(harmonics)
     start = -np.pi * np.arange(n) * np.arange(1, n + 1) / n
     grid = np.linspace(0.0, 1.0, 8 * int(harmonics[-1]), endpoint=False)

@@ -15,7 +15,12 @@ from airtruth.units import DEG, FT, KT
 
 Array = NDArray[np.float64]
 
-TOLERANCE: Final = 1e-9  # on u_dot, w_dot [m/s2] and q_dot [rad/s2]
+TOLERANCE: Final = 1e-6
+"""Largest residual that counts as trimmed, in u_dot, w_dot [m/s2] and q_dot [rad/s2].
+
+The iteration goes on to `_AIM`; a model with a piston engine or rounded tables of its own stops earlier.
+"""
+_AIM: Final = 1e-11
 _START: Final = ((4.0, 0.0, 0.4), (8.0, 0.0, 0.7), (1.0, 0.0, 0.2), (12.0, 0.0, 0.6))  # deg, rad, -
 _STEPS: Final = np.array([1e-5, 1e-5, 1e-4])
 _ITERATIONS: Final = 40
@@ -45,7 +50,9 @@ class Trim:
     residual: float
 
 
-def trim(aircraft: Aircraft, condition: Condition, dt_s: float = 1.0 / 200.0, tolerance: float = TOLERANCE) -> Trim:
+def trim(
+    aircraft: Aircraft, condition: Condition, dt_s: float = 1.0 / 200.0, tolerance: float = TOLERANCE
+) -> Trim:
     """Solve u_dot = w_dot = q_dot = 0 for angle of attack, elevator and throttle by Newton's method.
 
     Parameters
@@ -64,7 +71,7 @@ def trim(aircraft: Aircraft, condition: Condition, dt_s: float = 1.0 / 200.0, to
     best: tuple[float, Array] | None = None
     for start in _START:
         x = np.array([start[0] * DEG, start[1], start[2]])
-        x, size = _newton(executive, condition, x, tolerance)
+        x, size = _newton(executive, condition, x)
         if best is None or size < best[0]:
             best = (size, x)
         if size <= tolerance:
@@ -82,15 +89,20 @@ def _residual(executive: Executive, condition: Condition, x: Array) -> Array:
     return np.array([r.u_dot_m_s2, r.w_dot_m_s2, r.q_dot_rad_s2])
 
 
-def _newton(executive: Executive, condition: Condition, x: Array, tolerance: float) -> tuple[Array, float]:
+def _newton(executive: Executive, condition: Condition, x: Array) -> tuple[Array, float]:
     """Newton with one-sided differences and step halving; piecewise-linear tables may need the halving."""
     low, high = _LIMITS
     r = _residual(executive, condition, x)
     for _ in range(_ITERATIONS):
-        if not np.all(np.isfinite(r)) or np.max(np.abs(r)) <= 0.01 * tolerance:
+        if not np.all(np.isfinite(r)) or np.max(np.abs(r)) <= _AIM:
             break
         steps = np.where(x + _STEPS > high, -_STEPS, _STEPS)
-        jacobian = np.column_stack([(_residual(executive, condition, x + h) - r) / s for h, s in zip(np.diag(steps), steps, strict=True)])
+        jacobian = np.column_stack(
+            [
+                (_residual(executive, condition, x + h) - r) / s
+                for h, s in zip(np.diag(steps), steps, strict=True)
+            ]
+        )
         change = np.linalg.lstsq(jacobian, -r, rcond=1e-12)[0]
         for _ in range(8):
             tried = np.clip(x + change, low, high)

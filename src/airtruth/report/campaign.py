@@ -85,7 +85,9 @@ def read_campaign(folder: Path) -> Campaign:
         A column is missing, or truth and estimates do not hold the same runs.
     """
     if not folder.is_dir():
-        raise StoreError(f"{folder}: no such campaign folder; `airtruth fly CAMPAIGN.toml --out {folder}` makes it")
+        raise StoreError(
+            f"{folder}: no such campaign folder; `airtruth fly CAMPAIGN.toml --out {folder}` makes it"
+        )
     fly = f"`airtruth fly CAMPAIGN.toml --out {folder}`"
     identify = f"`airtruth identify {folder} --aircraft AIRCRAFT`"
     truth_path, estimates_path = folder / TRUTH, folder / ESTIMATES
@@ -98,12 +100,23 @@ def read_campaign(folder: Path) -> Campaign:
     methods = _strings(estimates_table, "method")
     rows = _strings(estimates_table, "run_id")
     matched = _match(run_ids, flown, rows, methods, estimates_path, identify)
-    name, title, gust = _describe(folder)
+    described = _describe(folder)
+    if described.get("runs", len(run_ids)) != len(run_ids):
+        raise LogError(
+            f"{truth_path}: holds {len(run_ids)} of the {described['runs']} runs that {DESCRIPTION} plans; "
+            f"{fly} flies the rest"
+        )
+    name = str(described.get("name", folder.resolve().name))
+    if Path(name).name != name:
+        raise StoreError(
+            f"{folder / DESCRIPTION}: name {name!r} cannot be part of a file's name; leave out '/'"
+        )
+    gust = described.get("gust")
     return Campaign(
         folder=folder,
         name=name,
-        title=title,
-        gust=gust,
+        title=str(described.get("title", name)),
+        gust=gust if isinstance(gust, dict) else {},
         run_ids=run_ids,
         flown=flown,
         truth=truth,
@@ -118,7 +131,8 @@ def _read(path: Path, needed: Iterable[str], maker: str, optional: Iterable[str]
         columns = pq.read_schema(path).names
         missing = [name for name in needed if name not in columns]
         if not missing:
-            return pq.read_table(path, columns=[*needed, *(n for n in optional if n in columns)])
+            wanted = [*needed, *(name for name in optional if name in columns)]
+            return pq.read_table(path, columns=wanted, page_checksum_verification=True)
     except (pa.ArrowException, OSError) as error:
         raise StoreError(f"{path}: not a readable Parquet file ({error}); {maker} writes it anew") from error
     told = "; ".join(_missing(name, columns) for name in missing)
@@ -180,7 +194,9 @@ def _match(
         ):
             if wrong.any():
                 runs = _some(np.array(run_ids)[wrong])
-                raise LogError(f"{path}: method {method!r}: {runs} {told}; identify the whole campaign: {maker}")
+                raise LogError(
+                    f"{path}: method {method!r}: {runs} {told}; identify the whole campaign: {maker}"
+                )
         matched[method] = (own, at[own])
     if not matched:
         raise LogError(f"{path}: holds no estimate; {maker} writes it")
@@ -209,20 +225,19 @@ def _method(table: pa.Table, rows: NDArray[np.int64], runs: NDArray[np.int64], t
     )
 
 
-def _describe(folder: Path) -> tuple[str, str, Mapping[str, object]]:
+def _describe(folder: Path) -> Mapping[str, object]:
     path = folder / DESCRIPTION
-    name = folder.resolve().name
     if not path.is_file():
-        return name, name, {}
+        return {}
     try:
-        raw: Any = json.loads(path.read_text(encoding="utf-8"))
+        described: Any = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise StoreError(f"{path}: not readable JSON ({error}); mend it, or remove it to use the folder's name") from error
-    if not isinstance(raw, dict):
+        raise StoreError(
+            f"{path}: not readable JSON ({error}); mend it, or remove it to use the folder's name"
+        ) from error
+    if not isinstance(described, dict):
         raise StoreError(f'{path}: holds no JSON object; expected {{"name": ..., "title": ..., ...}}')
-    gust = raw.get("gust")
-    name = str(raw.get("name", name))
-    return name, str(raw.get("title", name)), gust if isinstance(gust, dict) else {}
+    return described
 
 
 def _strings(table: pa.Table, name: str) -> list[str]:

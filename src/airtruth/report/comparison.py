@@ -26,7 +26,9 @@ Beside = Mapping[Key, tuple[Printed, float]]
 """Printed figure and its Monte Carlo standard error."""
 
 
-def published_figures(column: PublishedColumn, runs: int, ours: MethodStatistics) -> dict[Key, tuple[Printed, float]]:
+def published_figures(
+    column: PublishedColumn, runs: int, ours: MethodStatistics
+) -> dict[Key, tuple[Printed, float]]:
     """Printed figures of a column, and the RMSE that follows from them.
 
     The paper prints means and standard deviations s over n runs. Their standard errors are taken as
@@ -64,25 +66,33 @@ def published_figures(column: PublishedColumn, runs: int, ours: MethodStatistics
 
 
 def published_ratio(
-    column: PublishedColumn, reference: PublishedColumn, runs: int, ours: tuple[float, float], our_runs: int
+    column: PublishedColumn,
+    reference: PublishedColumn,
+    runs: int,
+    ours: MethodStatistics,
+    our_reference: MethodStatistics,
 ) -> tuple[Printed, float]:
-    """Ratio of two printed RelErr.
+    """Ratio of two printed RelErr and its standard error.
 
-    The paper flies every method on the same runs, but prints no correlation between methods; the
-    relative standard error is ours, scaled to the paper's number of runs.
+    The paper flies every method on the same runs, but prints no correlation between methods: that of
+    our two RelErr stands in, with the paper's own standard errors (delta method on the logarithm).
 
     Parameters
     ----------
     column, reference : numerator and denominator.
-    runs, our_runs : number of runs of the paper and of ours.
-    ours : our ratio and its standard error.
+    runs : number of runs of the paper.
+    ours, our_reference : statistics of the methods that they are compared with.
     """
-    ratio = column.relerr_pct.value / reference.relerr_pct.value
-    relative_unit = math.hypot(
-        column.relerr_pct.unit / column.relerr_pct.value, reference.relerr_pct.unit / reference.relerr_pct.value
-    )
-    relative_se = ours[1] / ours[0] * math.sqrt(our_runs / runs)
-    return Printed(ratio, ratio * relative_unit), ratio * relative_se
+    parts = [
+        (c.relerr_pct.value, c.relerr_pct.unit, _relerr_se_pct(c, runs, s.correlation))
+        for c, s in ((column, ours), (reference, our_reference))
+    ]
+    (a, unit_a, se_a), (b, unit_b, se_b) = parts
+    lengths = float(np.linalg.norm(ours.influence) * np.linalg.norm(our_reference.influence))
+    common = float(ours.influence @ our_reference.influence) / lengths if lengths > 0.0 else 0.0
+    variance = (se_a / a) ** 2 + (se_b / b) ** 2 - 2.0 * common * se_a * se_b / (a * b)
+    ratio = a / b
+    return Printed(ratio, ratio * math.hypot(unit_a / a, unit_b / b)), ratio * math.sqrt(max(variance, 0.0))
 
 
 def _relerr_se_pct(column: PublishedColumn, runs: int, correlation: Array) -> float:

@@ -66,9 +66,9 @@ def lay_out(table: Table) -> Grid:
         Group("RelErr [%] (standard error)", tuple(_relative_errors(table))),
         Group("Runs", tuple(_runs(table))),
         Group("Root mean square error (standard error)", tuple(_rmse(table)), supplement=True),
-        Group("Coverage of the 95 % intervals [%] (standard error)", tuple(_coverage(table)), supplement=True),
+        Group("Coverage of the intervals [%] (standard error)", tuple(_coverage(table)), supplement=True),
     ]
-    if _has_outliers(table):
+    if _medians_matter(table):
         heading = "Median (scaled median absolute deviation)"
         groups.append(Group(heading, tuple(_medians(table)), supplement=True))
     return Grid(
@@ -172,9 +172,13 @@ def _theirs(entry: Entry, decimals: int | None = None) -> str:
     return f"{entry.published.value:.{decimals}f}"
 
 
-def _has_outliers(table: Table) -> bool:
+def _medians_matter(table: Table) -> bool:
+    """Whether a method has outliers, or finite estimates that its means leave out."""
     six = slice(len(short_period.PARAMETERS))
-    return any(bool((s.std.value > OUTLIERS * s.mad)[six].any()) for s in table.statistics.values())
+    return any(
+        s.counts.not_converged > 0 or bool((s.std.value > OUTLIERS * s.mad)[six].any())
+        for s in table.statistics.values()
+    )
 
 
 def _notes(table: Table) -> Iterator[str]:
@@ -184,14 +188,14 @@ def _notes(table: Table) -> Iterator[str]:
         "RelErr = ||mean - truth||/||truth|| over the six derivatives; 'if unbiased': its root mean "
         "square for an estimator of this spread without any bias."
     )
-    gust = ", ".join(f"{key} {value}" for key, value in table.campaign.gust.items())
+    gust = ", ".join(f"{key} {_plain(value)}" for key, value in table.campaign.gust.items())
     yield f"Campaign: {table.campaign.title}" + (f"; gust: {gust}." if gust else ".")
     if table.spec.published:
         yield from _published_notes(table)
-    if _has_outliers(table):
+    if _medians_matter(table):
         yield (
-            f"Outliers: a standard deviation exceeds {OUTLIERS} times the robust spread; medians are over "
-            "every finite estimate, converged or not."
+            "Medians are over every finite estimate, converged or not; they are shown where a standard "
+            f"deviation exceeds {OUTLIERS} times the robust spread or an estimate did not converge."
         )
     for method, s in table.statistics.items():
         if s.counts.reasons:
@@ -204,13 +208,12 @@ def _notes(table: Table) -> Iterator[str]:
 def _published_notes(table: Table) -> Iterator[str]:
     paper = published.load()
     printed = paper.tables[table.spec.published or ""]
-    compared = [
-        e for e in table.entries.values() if e.statistic in PRINTED_STATISTICS and math.isfinite(e.z)
-    ]
+    compared = [e for e in table.entries.values() if e.statistic in PRINTED_STATISTICS and math.isfinite(e.z)]
     differing = sum(e.differs for e in compared)
     yield (
         f"Published: {paper.source} ({printed.name}, {printed.runs} runs); rows 'from published' are "
-        "computed from its figures. The number of iterations depends on a tolerance that it gives as 1 to 5 %."
+        "computed from its figures. The number of iterations depends on a tolerance, which it gives as "
+        "1 to 5 %."
     )
     yield (
         f"{MARK} |z| > {THRESHOLD:g}: differs from the published figure by more than {THRESHOLD:g} combined "
@@ -218,9 +221,7 @@ def _published_notes(table: Table) -> Iterator[str]:
         f"rounding of its digits). {differing} of {len(compared)} printed figures differ; "
         f"{CHANCE * len(compared):.1f} would by chance."
     )
-    ranked = [
-        table.entries[m, SIX, "relerr_pct"] for m in table.methods if printed.column(m)
-    ]
+    ranked = [table.entries[m, SIX, "relerr_pct"] for m in table.methods if printed.column(m)]
     ours = sorted((e for e in ranked if math.isfinite(e.value)), key=lambda e: e.value)
     theirs = sorted(ranked, key=lambda e: e.published.value if e.published else math.inf)
     yield (
@@ -232,3 +233,12 @@ def _published_notes(table: Table) -> Iterator[str]:
 def _label(printed: published.PublishedTable, method: str) -> str:
     column = printed.column(method)
     return column.label if column else method
+
+
+def _plain(setting: object) -> str:
+    """A campaign's setting in words: a plain value, or a distribution with its figures."""
+    if not isinstance(setting, dict):
+        return str(setting)
+    if set(setting) == {"value"}:
+        return str(setting["value"])
+    return " ".join(f"{key} {_plain(value)}" for key, value in setting.items() if value is not None)

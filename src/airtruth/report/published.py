@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import cache
@@ -23,6 +23,18 @@ DECIMALS: Final[Mapping[str, int]] = {
     "CLalpha": 3, "CLq": 2, "CLde": 3, "Cmalpha": 3, "Cmq": 2, "Cmde": 3, "wn_rad_s": 3, "zeta": 3,
 }  # fmt: skip
 """Decimals to which the paper prints its true values."""
+
+SYMBOLS: Final[Mapping[str, str]] = {
+    "CLalpha": r"$C_{L\alpha}$",
+    "CLq": r"$C_{Lq}$",
+    "CLde": r"$C_{L\delta_e}$",
+    "Cmalpha": r"$C_{m\alpha}$",
+    "Cmq": r"$C_{mq}$",
+    "Cmde": r"$C_{m\delta_e}$",
+    "wn_rad_s": r"$\omega_n$ [rad/s]",
+    "zeta": r"$\zeta$",
+}
+"""The figures' symbols, as LaTeX and matplotlib read them."""
 
 
 @dataclass(frozen=True)
@@ -124,11 +136,6 @@ def load() -> Published:
             if name.startswith("table")
         },
     )
-
-
-def relative_error_pct(means: Sequence[float], truth: Sequence[float]) -> float:
-    """Relative error 100 ||means - truth||/||truth|| [%], 2-norm (the tables' RelErr)."""
-    return 100.0 * math.dist(means, truth) / math.hypot(*truth)
 
 
 def _printed(figure: Decimal | int) -> Printed:

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from airtruth.report.layout import MARK, Grid, Group, Row
+from airtruth.report.published import SYMBOLS
 from airtruth.report.tables import Table
 
 WIDTH: Final = 120
@@ -28,17 +29,6 @@ CSV_COLUMNS: Final = (
     "published_standard_error",
     "difference_in_standard_errors",
 )
-
-_SYMBOLS: Final = {
-    "CLalpha": r"$C_{L_\alpha}$",
-    "CLq": r"$C_{L_q}$",
-    "CLde": r"$C_{L_{\delta_e}}$",
-    "Cmalpha": r"$C_{m_\alpha}$",
-    "Cmq": r"$C_{m_q}$",
-    "Cmde": r"$C_{m_{\delta_e}}$",
-    "wn_rad_s": r"$\omega_n$ [rad/s]",
-    "zeta": r"$\zeta$",
-}
 
 _SPECIAL: Final = str.maketrans(
     {
@@ -177,12 +167,12 @@ def _md_row(cells: Iterable[str], escape: bool = True) -> str:
 
 
 def _tex(words: str) -> str:
-    return words.translate(_SPECIAL).replace(MARK, "$^{*}$")
+    return words.translate(_SPECIAL).replace("$|$$|$", r"$\|$").replace(MARK, "$^{*}$")
 
 
 def _tex_cells(row: Row) -> Iterator[str]:
     label, *cells = row
     name = label.strip()
-    yield (r"\quad " if label.startswith(" ") else "") + _SYMBOLS.get(name, _tex(name))
+    yield (r"\quad " if label.startswith(" ") else "") + SYMBOLS.get(name, _tex(name))
     for cell in cells:
         yield re.sub(r"(?<![\w.])-(?=\d)", "$-$", _tex(cell))

@@ -147,7 +147,11 @@ def rms(errors: Array) -> Figure:
 
 
 def share(hits: Array) -> Figure:
-    """Share of rows that are 1, not 0; standard error of Agresti and Coull (1998), which is not 0 at 0 or 1."""
+    """Share of rows that are 1, not 0, over the rows.
+
+    The standard error is that of Agresti and Coull (The American Statistician 52, 1998), for two more
+    hits and two more misses: unlike sqrt(p (1 - p)/n) it is not 0 where every row or none is a hit.
+    """
     n = len(hits)
     if n == 0:
         return _unknown(hits)

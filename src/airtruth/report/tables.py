@@ -177,7 +177,7 @@ def evaluate(spec: TableSpec, campaign: Campaign) -> Table:
         figures = dict(_figures(stats[method]))
         if spec.reference in stats and method != spec.reference:
             figures[SIX, "relerr_ratio"] = _ratio(stats[method], stats[spec.reference])
-        beside = _beside(spec, method, stats[method], figures)
+        beside = _beside(spec, method, stats)
         entries += [
             Entry(method, parameter, statistic, value, se, *beside.get((parameter, statistic), ()))
             for (parameter, statistic), (value, se) in figures.items()
@@ -236,20 +236,14 @@ def _ratio(own: MethodStatistics, reference: MethodStatistics) -> tuple[float, f
     return statistics.ratio(own.relerr.value, own.influence, reference.relerr.value, reference.influence)
 
 
-def _beside(
-    spec: TableSpec,
-    method: str,
-    stats: MethodStatistics,
-    figures: Mapping[comparison.Key, tuple[float, float]],
-) -> comparison.Beside:
+def _beside(spec: TableSpec, method: str, stats: Mapping[str, MethodStatistics]) -> comparison.Beside:
     table = published.load().tables[spec.published] if spec.published else None
     column = table.column(method) if table else None
     if table is None or column is None:
         return {}
-    beside = comparison.published_figures(column, table.runs, stats)
+    beside = comparison.published_figures(column, table.runs, stats[method])
     reference = table.column(spec.reference)
-    if reference and (SIX, "relerr_ratio") in figures:
-        ours = figures[SIX, "relerr_ratio"]
-        ratio = comparison.published_ratio(column, reference, table.runs, ours, stats.counts.used)
-        beside[SIX, "relerr_ratio"] = ratio
+    if reference and spec.reference in stats:
+        pair = stats[method], stats[spec.reference]
+        beside[SIX, "relerr_ratio"] = comparison.published_ratio(column, reference, table.runs, *pair)
     return beside

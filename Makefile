@@ -1,0 +1,44 @@
+# Every target does its own set-up; it needs Python 3.11 or newer, make and the package index.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+JOBS ?= $(shell nproc 2>/dev/null || echo 2)
+OUT ?= out
+CAMPAIGNS := light light-fit moderate moderate-fit
+
+.PHONY: help setup campaign campaign-quick test lint bench clean
+
+help: ## list the targets
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
+
+setup: $(READY) ## make the virtual environment
+
+$(READY): requirements.lock pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	touch $@
+
+campaign: $(READY) ## fly data/campaigns, identify, print the paper's tables, draw the figures (into out/)
+	$(BIN)/python scripts/campaign.py --out $(OUT) --jobs $(JOBS)
+
+campaign-quick: $(READY) ## the same with a tenth of the runs
+	$(BIN)/python scripts/campaign.py --out $(OUT)/quick --jobs $(JOBS) --quick
+
+test: $(READY) lint ## lint, type-check and run every test
+	$(BIN)/python -m pytest -n $(JOBS) --dist loadgroup
+
+lint: $(READY) ## ruff, mypy --strict, the import contract
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(READY) ## ratios against bare baselines and peers
+	$(BIN)/python benchmarks/bench_fly.py
+	$(BIN)/python benchmarks/bench_identify.py
+
+clean: ## remove the environment, caches and output
+	rm -rf $(VENV) $(OUT) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,5 @@
+"""python -m airtruth"""
+
+from airtruth.cli import main
+
+main()

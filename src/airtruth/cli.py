@@ -1,0 +1,133 @@
+"""The command line: thin; scientific imports happen inside the commands, so --help is quick."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from airtruth.errors import AirtruthError
+
+app = typer.Typer(
+    name="airtruth",
+    help="Fly a flight test in JSBSim, identify the aircraft from its logs, close the loop with measured data.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+INTERRUPTED = 130
+FAILED_RUNS = 1
+
+Quiet = Annotated[bool, typer.Option("--quiet", help="No progress and no summary on stderr.")]
+
+
+def main() -> None:
+    """Entry point: known errors become one message on stderr and an exit code."""
+    try:
+        app()
+    except AirtruthError as error:
+        print(f"airtruth: {error}", file=sys.stderr)
+        sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        print("airtruth: interrupted; the same command resumes", file=sys.stderr)
+        sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+
+
+@app.callback(invoke_without_command=True)
+def _root(version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False) -> None:
+    if version:
+        from airtruth import __version__
+
+        print(__version__)
+        raise typer.Exit
+
+
+@app.command(epilog="Example: airtruth fly data/campaigns/light.toml --out out/light --jobs 2")
+def fly(
+    campaign: Annotated[
+        Path, typer.Argument(metavar="CAMPAIGN.toml", help="Campaign file, see docs/campaigns.md.")
+    ],
+    out: Annotated[
+        Path, typer.Option(help="Folder of the campaign; the same command resumes what is there.")
+    ],
+    jobs: Annotated[
+        int, typer.Option(min=1, help="Processes; the logs do not depend on it.")
+    ] = os.cpu_count() or 1,
+    seed: Annotated[int | None, typer.Option(min=0, help="In place of the file's seed.")] = None,
+    runs: Annotated[int | None, typer.Option(min=1, help="In place of the file's number of runs.")] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Check and print the plan, fly nothing.")
+    ] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Fly a campaign in JSBSim and write its flight logs."""
+    from airtruth.fly import campaign as flying
+    from airtruth.fly import plan as planning
+
+    plan = planning.make(campaign, seed, runs)
+    if dry_run:
+        print(planning.describe(plan))
+        return
+    with _progress("fly", "runs", quiet) as advance:
+        summary = flying.fly(plan, out, jobs, advance)
+    print(f"{summary.runs} runs in {out} ({summary.flown_now} flown now, {len(summary.failures)} failed)")
+    if summary.failures:
+        for failure in summary.failures[:5]:
+            print(f"airtruth: {failure.run_id} failed: {failure.reason}", file=sys.stderr)
+        if len(summary.failures) > 5:
+            print(
+                f"airtruth: and {len(summary.failures) - 5} more, see {out / flying.MANIFEST}",
+                file=sys.stderr,
+            )
+        raise typer.Exit(FAILED_RUNS)
+
+
+@contextmanager
+def _progress(verb: str, things: str, quiet: bool) -> Iterator[Callable[[int, int, int], None]]:
+    """A bar with rate and time left on stderr, where that is a terminal."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda done, total, failed: None
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        ProgressColumn,
+        Task,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+    from rich.text import Text
+
+    class Rate(ProgressColumn):
+        def render(self, task: Task) -> Text:
+            return Text(f"{task.speed:.0f} {things}/s" if task.speed else "")
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        Rate(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task(verb, total=None)
+
+        def advance(done: int, total: int, failed: int) -> None:
+            bar.update(
+                task, completed=done, total=total, description=f"{verb} ({failed} failed)" if failed else verb
+            )
+
+        yield advance

@@ -1,0 +1,115 @@
+"""The iteration of the instrumental variables, run by run or jointly over runs.
+
+Source: M. Brunot, "An Instrumental Variable Approach for Aircraft Identification", eq. (9) and III.D.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.identify.normal import normal_equations, solve
+from airtruth.identify.problem import Equations
+from airtruth.identify.results import Status
+
+Array = NDArray[np.float64]
+
+LARGEST: Final = 1e6
+"""A derivative beyond this is taken as diverged: the largest plausible one, CLq, is of order 100."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """theta (runs, 6), status (runs,) and iterations (runs,); one row if joint."""
+
+    theta: Array
+    status: NDArray[np.int8]
+    iterations: NDArray[np.int32]
+
+
+def least_squares(problem: Equations, factors: Array, intercept: bool, joint: bool) -> Outcome:
+    """Solve once, with instruments that do not depend on theta (eq. 5).
+
+    Parameters
+    ----------
+    problem : regression whose moments ignore theta.
+    factors : (runs, 4) from `airtruth.identify.rows.row_factors`.
+    intercept : whether a constant is free in each equation of each run.
+    joint : whether all runs share one theta.
+    """
+    runs = factors.shape[0]
+    moments = problem.moments(np.full((runs, 6), np.nan), np.arange(runs))
+    theta = _solution(moments, factors, intercept, joint)
+    status = np.where(np.isfinite(theta).all(axis=1), Status.CONVERGED, Status.SINGULAR).astype(np.int8)
+    return Outcome(theta, status, np.zeros(theta.shape[0], dtype=np.int32))
+
+
+def iterate(
+    problem: Equations,
+    factors: Array,
+    start: Array,
+    intercept: bool,
+    tolerance: float,
+    maximum_iterations: int,
+    joint: bool,
+) -> Outcome:
+    """Repeat eq. (9) until ||theta_i - theta_(i-1)|| <= tolerance ||theta_i|| (2-norm over the six).
+
+    A run leaves the iteration by its own criterion: its result does not depend on the others.
+
+    Parameters
+    ----------
+    problem, factors, intercept, joint : as in `least_squares`.
+    start : (runs, 6), or (1, 6) if joint; runs whose start is not finite end as singular.
+    tolerance, maximum_iterations : as in `airtruth.identify.options.Options`.
+    """
+    theta = start.copy()
+    units = theta.shape[0]
+    runs = factors.shape[0]
+    status = np.full(units, Status.MAXIMUM_ITERATIONS, dtype=np.int8)
+    iterations = np.zeros(units, dtype=np.int32)
+    status[~np.isfinite(theta).all(axis=1)] = Status.SINGULAR
+    if joint:
+        if problem.failed.any():
+            status[:] = Status.ACTUATOR
+    else:
+        status[problem.failed] = Status.ACTUATOR
+    active = np.flatnonzero(status == Status.MAXIMUM_ITERATIONS)
+    for _ in range(maximum_iterations):
+        if active.size == 0:
+            break
+        members = np.arange(runs) if joint else active
+        previous = np.broadcast_to(theta, (runs, 6)) if joint else theta[active]
+        usable = problem.usable(previous, members)
+        if joint:
+            usable = np.array([bool(usable.all())])
+        status[active[~usable]] = Status.UNSTABLE
+        active = active[usable]
+        if active.size == 0:
+            break
+        if not joint:
+            members, previous = active, theta[active]
+        new = _solution(problem.moments(previous, members), factors[members], intercept, joint)
+        change = np.linalg.norm(new - theta[active], axis=1)
+        iterations[active] += 1
+        theta[active] = new
+        singular = ~np.isfinite(new).all(axis=1)
+        diverged = ~singular & (np.abs(new) > LARGEST).any(axis=1)
+        converged = ~singular & ~diverged & (change <= tolerance * np.linalg.norm(new, axis=1))
+        status[active[singular]] = Status.SINGULAR
+        status[active[diverged]] = Status.DIVERGED
+        status[active[converged]] = Status.CONVERGED
+        active = active[~(singular | diverged | converged)]
+    lost = ~np.isin(status, (Status.CONVERGED, Status.MAXIMUM_ITERATIONS))
+    theta[lost] = np.nan
+    return Outcome(theta, status, iterations)
+
+
+def _solution(moments: Array, factors: Array, intercept: bool, joint: bool) -> Array:
+    matrix, right = normal_equations(moments, factors, intercept)
+    if joint:
+        matrix, right = matrix.sum(axis=0, keepdims=True), right.sum(axis=0, keepdims=True)
+    return solve(matrix, right)

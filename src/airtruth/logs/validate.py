@@ -1,0 +1,227 @@
+"""The gate of the flight log: what breaks the contract is found once, all of it, and named."""
+
+from __future__ import annotations
+
+import difflib
+from collections import Counter
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.errors import LogError
+from airtruth.logs.flight_log import FlightLog
+from airtruth.signals import REQUIRED, SIGNALS
+
+Index = NDArray[np.int64]
+
+MINIMUM_SAMPLES: Final = 20
+"""Shortest run that is accepted: below it the zero-phase filters and six free parameters have no meaning."""
+JITTER: Final = 0.01
+"""Largest deviation of a time step from the run's own, and of a rate from the stated one, relative."""
+
+_SHOWN: Final = 3  # runs named per problem
+_GAP: Final = 1.5  # steps
+_POSITIVE: Final = ("airspeed_m_s", "density_kg_m3")
+
+
+def validate(log: FlightLog, *, minimum_samples: int = MINIMUM_SAMPLES, source: str = "flight log") -> None:
+    """Raise one error that lists everything in which a log breaks the contract.
+
+    Looked for: a missing channel, a run in two places, too few samples, times that are not finite,
+    increasing and uniform, gaps, a rate other than the metadata's, values that are not finite, beyond
+    the limits of `airtruth.signals.SIGNALS` (degrees for radians are recognised so), or not positive
+    where they must be. Columns outside the vocabulary are not judged.
+
+    Parameters
+    ----------
+    log : the log.
+    minimum_samples : shortest run that is accepted.
+    source : name of the log in the message, its file usually.
+
+    Raises
+    ------
+    LogError
+        If anything is wrong.
+    """
+    problems = list(_structure(log))
+    if not problems:
+        problems = [*_missing(log), *_runs(log, minimum_samples), *_time(log), *_values(log)]
+    if problems:
+        count = f"{len(problems)} problems" if len(problems) > 1 else "1 problem"
+        raise LogError("\n  - ".join([f"{source}: {count}", *problems]))
+
+
+def _structure(log: FlightLog) -> Iterator[str]:
+    rows = len(log.t_s)
+    offsets = log.offsets
+    if (
+        len(offsets) != len(log.run_ids) + 1
+        or offsets[0] != 0
+        or offsets[-1] != rows
+        or (np.diff(offsets) < 0).any()
+    ):
+        yield (
+            f"offsets do not divide {rows} rows into {len(log.run_ids)} runs; "
+            "they are the first row of each run, and the number of rows"
+        )
+    elif not log.run_ids:
+        yield "the log holds no run; fly or import it again"
+    for name, values in log.channels.items():
+        if values.shape != (rows,):
+            yield f"{name}: shape {values.shape} where t_s has {rows} rows; give one value per row"
+
+
+def _missing(log: FlightLog) -> Iterator[str]:
+    present = [name for name in log.channels if name not in SIGNALS]
+    for name in REQUIRED:
+        if name not in log.channels:
+            near = difflib.get_close_matches(name, present, n=1, cutoff=0.5)
+            step = f"the nearest column is {near[0]!r}: map it" if near else "map a column to it"
+            yield f"{name}: required channel is missing ({SIGNALS[name].description}); {step} on import"
+    if "density_kg_m3" not in log.channels and "altitude_m" not in log.channels:
+        yield "density_kg_m3 or altitude_m: one of the two is required, both are missing; map one on import"
+
+
+def _runs(log: FlightLog, minimum_samples: int) -> Iterator[str]:
+    counts = Counter(log.run_ids)
+    if len(counts) < len(log.run_ids):
+        names = _listed([repr(name) for name, count in counts.items() if count > 1], "run")
+        yield f"run_id: {names} in more than one place; sort by run_id and t_s, or rename the runs"
+    lengths = np.diff(log.offsets)
+    short = np.flatnonzero(lengths < minimum_samples)
+    if len(short):
+        which = [f"{log.run_ids[run]!r} ({lengths[run]})" for run in short]
+        yield f"too few samples, below {minimum_samples}, in {_listed(which, 'run')}; leave them out"
+
+
+def _time(log: FlightLog) -> Iterator[str]:
+    lengths = np.diff(log.offsets)
+    if not np.isfinite(log.t_s).all():
+        bad = np.flatnonzero(~np.isfinite(log.t_s))
+        where = _where(log, bad, with_time=False)
+        yield f"t_s: {len(bad)} values are NaN or infinite, {where}; repair them or cut the run there"
+        return
+    timed = np.flatnonzero(lengths >= 2)
+    first, last = log.offsets[timed], log.offsets[timed + 1] - 1
+    period = (log.t_s[last] - log.t_s[first]) / (lengths[timed] - 1)
+    if len(log.t_s) > 1:
+        steps = np.diff(log.t_s)
+        nominal = np.zeros(len(log.run_ids))
+        nominal[timed] = period
+        nominal = np.repeat(nominal, lengths)[:-1]
+        wrong = ~((steps > 0.0) & (np.abs(steps - nominal) <= JITTER * nominal))
+        ends = log.offsets[1:-1]
+        wrong[ends[(ends > 0) & (ends < len(log.t_s))] - 1] = False  # from run to run
+        if wrong.any():
+            runs = np.unique(np.searchsorted(log.offsets, np.flatnonzero(wrong), side="right") - 1)
+            yield from _irregular(log, runs)
+            regular = ~np.isin(timed, runs)
+            timed, period = timed[regular], period[regular]
+    yield from _rate(log, timed, period)
+
+
+def _irregular(log: FlightLog, runs: Index) -> Iterator[str]:
+    """Sort the runs whose steps differ into times that go back, gaps and unequal steps."""
+    back: list[int] = []
+    gaps: list[int] = []
+    uneven: list[int] = []
+    for run in runs:
+        rows = log.rows(run)
+        steps = np.diff(log.t_s[rows])
+        step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+        late = rows.start + 1  # the row at which a step ends
+        back.extend(late + np.flatnonzero(steps <= 0))
+        gaps.extend(late + np.flatnonzero(steps > _GAP * step))
+        uneven.extend(
+            late
+            + np.flatnonzero((steps > 0) & (steps <= _GAP * step) & (np.abs(steps - step) > JITTER * step))
+        )
+    if back:
+        yield f"t_s: does not increase {_where(log, np.array(back))}; sort by t_s and drop repeated samples"
+    if gaps:
+        longest = max(float(log.t_s[row] - log.t_s[row - 1]) for row in gaps)
+        yield (
+            f"t_s: {len(gaps)} gap{'s' * (len(gaps) > 1)}, the longest {longest:.3g} s, "
+            f"{_where(log, np.array(gaps))}; "
+            "split the run there into two runs, or resample it on import"
+        )
+    if uneven:
+        yield (
+            f"t_s: steps differ by more than {JITTER:.0%} {_where(log, np.array(uneven))}; "
+            "resample to a uniform rate on import"
+        )
+
+
+def _rate(log: FlightLog, runs: Index, period: NDArray[np.float64]) -> Iterator[str]:
+    if "sample_rate_hz" not in log.metadata:
+        return
+    stated = log.metadata["sample_rate_hz"]
+    if isinstance(stated, bool) or not isinstance(stated, int | float) or not stated > 0:
+        yield f"metadata: sample_rate_hz is {stated!r}, not a positive number; correct it or leave it out"
+        return
+    off = np.abs(period * stated - 1.0) > JITTER
+    if off.any():
+        which = [
+            f"{log.run_ids[run]!r} ({1 / step:.6g} Hz)"
+            for run, step in zip(runs[off], period[off], strict=True)
+        ]
+        found = _listed(which, "run")
+        yield f"t_s: not the {stated:g} Hz of the metadata (sample_rate_hz) in {found}; correct either"
+
+
+def _values(log: FlightLog) -> Iterator[str]:
+    for name, values in log.channels.items():
+        if name not in SIGNALS or not len(values):
+            continue
+        signal = SIGNALS[name]
+        low, high = float(values.min()), float(values.max())  # NaN if any is
+        inside = -signal.limit <= low and high <= signal.limit
+        if inside and (low > 0.0 or name not in _POSITIVE):
+            continue
+        finite = np.isfinite(values)
+        if not finite.all():
+            bad = np.flatnonzero(~finite)
+            yield (
+                f"{name}: {len(bad)} values are NaN or infinite, {_where(log, bad)}; "
+                "cut the run there, or leave the channel out if it is optional"
+            )
+        beyond = finite & (np.abs(values) > signal.limit)
+        if beyond.any():
+            peak = float(np.abs(values[finite]).max())
+            yield (
+                f"{name}: up to {peak:.4g} {signal.unit}, beyond +-{signal.limit:g}, "
+                f"{_where(log, np.flatnonzero(beyond))}; {_remedy(signal.dimension, signal.unit)}"
+            )
+        below = finite & (values <= 0.0)
+        if name in _POSITIVE and below.any():
+            yield f"{name}: not positive {_where(log, np.flatnonzero(below))}; cut the run there"
+
+
+def _remedy(dimension: str, unit: str) -> str:
+    if dimension in ("angle", "angular_rate"):
+        wrong = unit.replace("rad", "deg")
+        return f"this looks like {wrong} in place of {unit}: state the unit {wrong} in the import mapping"
+    return "state the right unit in the import mapping"
+
+
+def _where(log: FlightLog, rows: Index, *, with_time: bool = True) -> str:
+    """Runs that hold the rows, with the first row in each, counted from the start of the run."""
+    run_of = np.searchsorted(log.offsets, rows, side="right") - 1
+    runs, first = np.unique(run_of, return_index=True)
+    places = []
+    for run, index in zip(runs[:_SHOWN], first[:_SHOWN], strict=True):
+        row = int(rows[index])
+        time = f", t {log.t_s[row]:.6g} s" if with_time else ""
+        places.append(f"{log.run_ids[run]!r} (row {row - int(log.offsets[run])}{time})")
+    return f"in {_listed(places, 'run', len(runs))}"
+
+
+def _listed(items: list[str], noun: str, count: int | None = None) -> str:
+    count = len(items) if count is None else count
+    more = f" and {count - _SHOWN} more" if count > _SHOWN else ""
+    return f"{count} {noun}{'s' if count > 1 else ''}: {', '.join(items[:_SHOWN])}{more}"
+
+
+__all__ = ["JITTER", "MINIMUM_SAMPLES", "validate"]

@@ -1,0 +1,151 @@
+"""Flight records of the linear short period, exact to rounding, for tests.
+
+The elevator is a 5 Hz first-order servo behind a held command; air moves in Dryden gusts; the dynamic
+pressure is constant, so that the model of the estimators is true. Everything is stepped by the matrix
+exponential of the whole system, inputs held (command) or linear (gusts) over a step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import expm
+
+from airtruth.logs.flight_log import Batch, FlightLog
+from airtruth.physics import dryden
+from airtruth.physics.short_period import Scale, scale, system
+from airtruth.units import DEG, G0
+
+# Derivatives printed as true in the paper (table 1); GTM geometry and condition (NASA GTM_DesignSim).
+THETA = np.array([4.793, 30.79, 0.480, -1.789, -41.41, -1.787])
+AIRSPEED_M_S = 42.85
+DENSITY_KG_M3 = 0.9931
+SERVO_RAD_S = 2.0 * np.pi * 5.0
+# One sigma of the GTM's sensors: alpha, q, az, elevator.
+NOISE = (0.031 * DEG, 0.3857 * DEG, 0.0082 * G0, 0.01 * DEG)
+# GTM's figures for light gusts at 7000 ft: sigma_u, sigma_w [m/s], Lu, Lw [m].
+LIGHT = (1.166, 0.812, 911.0, 840.0)
+
+
+@dataclass(frozen=True)
+class Constants:
+    wing_area_m2: float = 0.54830
+    chord_m: float = 0.27898
+    mass_kg: float = 26.195
+    inertia_yy_kg_m2: float = 6.314
+
+
+GTM = Constants()
+
+
+def gtm_scale(shape: tuple[int, ...] = ()) -> Scale:
+    return scale(
+        GTM.wing_area_m2,
+        GTM.chord_m,
+        GTM.mass_kg,
+        GTM.inertia_yy_kg_m2,
+        np.full(shape, AIRSPEED_M_S),
+        np.full(shape, DENSITY_KG_M3),
+    )
+
+
+def doublet(t_s, start_s=1.0, step_s=0.5):
+    """One up and down, from a slightly early clock so that a step belongs to the sample it falls on."""
+    t = t_s + 1e-9
+    up = (t >= start_s) & (t < start_s + step_s)
+    down = (t >= start_s + step_s) & (t < start_s + 2.0 * step_s)
+    return up.astype(float) - down.astype(float)
+
+
+def fly(
+    runs=1,
+    rate_hz=50,
+    duration_s=5.0,
+    theta=THETA,
+    amplitude_rad=2.0 * DEG,
+    delay_s=0.0,
+    gust=0.0,
+    u_gust=True,
+    noise=0.0,
+    seed=0,
+    shape=doublet,
+    alpha_trim_rad=5.56 * DEG,
+    first_s=0.0,
+) -> Batch:
+    """Runs of a record; ``gust`` times the light level, ``noise`` times the sensors' own.
+
+    ``first_s`` cuts the start of the record away, so that it begins in motion.
+    """
+    fine = 200 if 200 % rate_hz == 0 else rate_hz
+    dt = 1.0 / fine
+    samples = round(duration_s * fine)
+    t = np.arange(samples) * dt
+    s = gtm_scale()
+    a, b = system(theta, s)
+    matrix = np.zeros((3, 3))
+    matrix[:2, :2], matrix[:2, 2], matrix[2, 2] = a, b, -SERVO_RAD_S
+    inputs = np.zeros((3, 3))  # command, alpha of the gust, u gust
+    inputs[2, 0] = SERVO_RAD_S
+    inputs[:2, 1] = a[:, 0]
+    inputs[0, 2] = -2.0 * G0 / AIRSPEED_M_S**2
+    big = np.zeros((9, 9))
+    big[:3, :3], big[:3, 3:6], big[3:6, 6:] = matrix * dt, inputs * dt, np.eye(3)
+    exponential = expm(big)
+    step, held, late = exponential[:3, :3], exponential[:3, 3:6], exponential[:3, 6:]
+
+    rng = np.random.default_rng(seed)
+    air = np.zeros((runs, samples, 2))
+    if gust > 0.0:
+        model = dryden.Dryden(
+            LIGHT[0] * gust * u_gust + 1e-9, LIGHT[1] * gust, LIGHT[2], LIGHT[3], AIRSPEED_M_S, None
+        )
+        discrete = dryden.discretise(model, dt)
+        air = dryden.simulate(discrete, rng.normal(size=(runs, samples, discrete.phi.shape[-1])), "rest")
+    command = np.broadcast_to(amplitude_rad * shape(t - delay_s), (runs, samples))
+    drive = np.stack([command, air[:, :, 1] / AIRSPEED_M_S, air[:, :, 0]], axis=2)
+    state = np.zeros((runs, samples, 3))
+    for k in range(samples - 1):
+        now, then = drive[:, k], drive[:, k + 1].copy()
+        then[:, 0] = now[:, 0]
+        state[:, k + 1] = state[:, k] @ step.T + now @ (held - late).T + then @ late.T
+    alpha = state[:, :, 0] + drive[:, :, 1]
+    q, de = state[:, :, 1], state[:, :, 2]
+    force = theta[0] * alpha + s.half_chord_time * theta[1] * q + theta[2] * de
+    az = -s.normal * force - G0 * (1.0 + 2.0 * air[:, :, 0] / AIRSPEED_M_S)
+    sigma = [noise * n for n in NOISE]
+    signals = [alpha + alpha_trim_rad, q, az, de + 0.1 * DEG]
+    alpha, q, az, de = (x + n * rng.normal(size=x.shape) for x, n in zip(signals, sigma, strict=True))
+    keep = slice(round(first_s * fine), None, fine // rate_hz)
+    channels = {
+        "airspeed_m_s": np.full_like(alpha, AIRSPEED_M_S),
+        "alpha_rad": alpha,
+        "q_rad_s": q,
+        "az_m_s2": az,
+        "elevator_rad": de,
+        "elevator_command_rad": amplitude_rad * shape(t) + np.full_like(alpha, 0.1 * DEG),
+        "density_kg_m3": np.full_like(alpha, DENSITY_KG_M3),
+    }
+    channels = {name: np.ascontiguousarray(values[:, keep]) for name, values in channels.items()}
+    t = np.tile(t[keep] - t[keep][0], (runs, 1))
+    return Batch(tuple(f"run-{i:04d}" for i in range(runs)), 1.0 / rate_hz, t, channels)
+
+
+def as_log(*parts: Batch) -> FlightLog:
+    """Batches as one log, runs renamed so that no two share a name."""
+    names = tuple(f"b{i}-{name}" for i, part in enumerate(parts) for name in part.run_ids)
+    lengths = [part.t_s.shape[1] for part in parts for _ in part.run_ids]
+    return FlightLog(
+        metadata={},
+        run_ids=names,
+        offsets=np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
+        t_s=np.concatenate([part.t_s.ravel() for part in parts]),
+        channels={
+            name: np.concatenate([part.channels[name].ravel() for part in parts])
+            for name in parts[0].channels
+        },
+    )
+
+
+def with_channel(batch: Batch, name: str, values) -> Batch:
+    return replace(batch, channels={**batch.channels, name: np.ascontiguousarray(values)})

@@ -1,0 +1,63 @@
+"""The manifest survives a killed writer and reports other damage."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from airtruth.errors import StoreError
+from airtruth.logs import manifest
+
+RECORDS: list[dict[str, object]] = [{"chunk": 0, "runs": ["a", "b"]}, {"chunk": 1, "état": "ok"}, {}]
+
+
+def test_round_trip(tmp_path: Path) -> None:
+    path = tmp_path / "manifest.jsonl"
+    assert manifest.read(path) == []
+    manifest.append(path, RECORDS[0])
+    manifest.append(path, *RECORDS[1:])
+    assert manifest.read(path) == RECORDS
+    assert path.read_bytes().count(b"\n") == 3
+
+
+@given(st.integers(0, 200))
+def test_cut_anywhere_loses_the_last_records_only(tmp_path_factory: pytest.TempPathFactory, cut: int) -> None:
+    path = tmp_path_factory.mktemp("cut") / "manifest.jsonl"
+    manifest.append(path, *RECORDS)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) - cut] if cut else whole)
+    kept = manifest.read(path)
+    assert kept == RECORDS[: len(kept)]
+    manifest.append(path, {"after": True})
+    assert manifest.read(path) == [*kept, {"after": True}]
+
+
+def test_a_long_torn_line_is_cut(tmp_path: Path) -> None:
+    path = tmp_path / "manifest.jsonl"
+    path.write_bytes(b'{"a": 1}\n{"b": "' + b"x" * 10000)
+    manifest.append(path, {"c": 2})
+    assert manifest.read(path) == [{"a": 1}, {"c": 2}]
+    path.write_bytes(b"y" * 10000)
+    manifest.append(path, {"c": 3})
+    assert manifest.read(path) == [{"c": 3}]
+
+
+def test_other_damage_is_reported(tmp_path: Path) -> None:
+    path = tmp_path / "manifest.jsonl"
+    path.write_bytes(b'{"a": 1}\n{"b": \n[1, 2]\n{"c": 1}\n\xff\xfe\n{"torn')
+    with pytest.raises(
+        StoreError, match=r"manifest\.jsonl: line 2 is not JSON .*line 3 is not a JSON object; line 5"
+    ):
+        manifest.read(path)
+
+
+def test_unwritable_folder(tmp_path: Path) -> None:
+    with pytest.raises(
+        StoreError, match=r"nowhere/m\.jsonl: not written; the folder does not exist: create it"
+    ):
+        manifest.append(tmp_path / "nowhere" / "m.jsonl", {})
+    with pytest.raises(StoreError, match="cannot be read"):
+        manifest.read(tmp_path)

@@ -1,0 +1,215 @@
+"""Each step of a sensor against its analytic effect."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.integrate import quad
+
+from airtruth.physics import sensors
+from airtruth.physics.sensors import SensorModel, measure
+
+Array = NDArray[np.float64]
+DT = 0.005
+T = np.arange(1000) * DT
+
+
+def reading(model: SensorModel, truth: Array, dt: float = DT) -> Array:
+    return measure(model, truth[None, :], dt, np.zeros((1, truth.size)))[0]
+
+
+def test_the_default_sensor_copies() -> None:
+    truth = np.random.default_rng(0).standard_normal((3, 50))
+    seen = measure(SensorModel(), truth, DT, np.ones_like(truth))
+    np.testing.assert_array_equal(seen, truth)
+    assert not np.shares_memory(seen, truth)
+
+
+def test_the_truth_is_left_alone() -> None:
+    truth = np.random.default_rng(0).standard_normal((3, 50))
+    before = truth.copy()
+    model = SensorModel(0.1, 0.2, 1.1, 0.01, 0.007, 0.05, -1.0, 1.0, 0.02)
+    measure(model, truth, DT, np.ones_like(truth))
+    np.testing.assert_array_equal(truth, before)
+
+
+def test_scale_bias_and_noise() -> None:
+    truth = np.random.default_rng(0).standard_normal((2, 50))
+    normals = np.random.default_rng(1).standard_normal((2, 50))
+    seen = measure(SensorModel(noise_std=0.3, bias=-0.5, scale=1.1), truth, DT, normals)
+    np.testing.assert_allclose(seen, 1.1 * truth - 0.5 + 0.3 * normals, rtol=0, atol=1e-15)
+
+
+def test_lag_of_a_ramp() -> None:
+    """A ramp from rest is linear between samples: x = t gives y = t - tau (1 - exp(-t/tau)), exactly."""
+    tau = 0.04
+    np.testing.assert_allclose(sensors.lag(T, DT, tau), T + tau * np.expm1(-T / tau), rtol=0, atol=1e-13)
+
+
+@given(st.floats(1e-4, 10.0))
+def test_lag_has_unit_gain_and_starts_in_equilibrium(tau: float) -> None:
+    np.testing.assert_allclose(sensors.lag(np.full(300, 3.7), DT, tau), 3.7, rtol=1e-12)
+
+
+def test_lag_of_a_sinusoid() -> None:
+    """Gain 1/sqrt(1 + (w tau)^2) and phase -atan(w tau), times that of interpolation, sinc^2(w dt/2)."""
+    tau, omega = 0.1, 2 * np.pi * 3.0
+    y = sensors.lag(np.sin(omega * T), DT, tau)
+    late = 20 * tau < T
+    basis = np.stack([np.sin(omega * T[late]), np.cos(omega * T[late])], axis=1)
+    found = np.linalg.lstsq(basis, y[late], rcond=None)[0] @ [1, 1j]
+    expected = 1 / (1 + 1j * omega * tau)
+    # linear interpolation passes (sin(x)/x)^2, x = omega dt/2, and images at the sampling frequency
+    # multiples k, which fold onto the samples: sum of sinc^2 (1/(1 + j (omega + k omega_s) tau))
+    k = np.arange(-20000, 20001)
+    w = omega + k * 2 * np.pi / DT
+    folded = np.sum((np.sin(omega * DT / 2) / (w * DT / 2)) ** 2 / (1 + 1j * w * tau))
+    assert found == pytest.approx(folded, abs=1e-8)
+    assert abs(found) == pytest.approx(abs(expected), rel=1e-3)
+    assert np.angle(found) == pytest.approx(np.angle(expected), abs=1e-3)
+
+
+def test_delay_of_whole_samples_is_exact() -> None:
+    x = np.random.default_rng(0).standard_normal((2, 40))
+    for whole in (1, 3, 39, 40, 100):
+        y = sensors.delay(x, DT, whole * DT)
+        np.testing.assert_array_equal(y[:, whole:], x[:, : max(40 - whole, 0)])
+        np.testing.assert_array_equal(y[:, :whole], np.broadcast_to(x[:, :1], (2, min(whole, 40))))
+    np.testing.assert_array_equal(
+        sensors.delay(x, 0.02, 0.06), sensors.delay(x, 1.0, 3.0)
+    )  # 0.06/0.02 < 3 in binary
+
+
+@given(st.floats(0.0, 0.1), st.floats(0.5, 20.0))
+def test_fractional_delay_error_bound(delay: float, omega: float) -> None:
+    """Linear interpolation of a sinusoid errs by at most (omega dt)^2/8."""
+    y = sensors.delay(np.sin(omega * T), DT, delay)
+    late = delay + DT < T
+    assert np.abs(y - np.sin(omega * (T - delay)))[late].max() <= (omega * DT) ** 2 / 8 + 1e-8
+
+
+def test_delay_of_a_ramp_is_exact() -> None:
+    y = sensors.delay(1.0 + T, DT, 0.0123)
+    np.testing.assert_allclose(y, 1.0 + np.maximum(T - 0.0123, 0.0), rtol=0, atol=1e-12)
+
+
+def test_hold_at_a_divisor_of_the_rate() -> None:
+    """theta of the GTM: 50 Hz held on 200 Hz samples."""
+    x = np.arange(12.0)
+    np.testing.assert_array_equal(sensors.hold(x, 0.005, 0.02), [0, 0, 0, 0, 4, 4, 4, 4, 8, 8, 8, 8])
+
+
+def test_hold_between_samples_takes_the_last_one() -> None:
+    """Updates at 0, 2.5, 5, 7.5 samples: the sample at or before."""
+    x = np.arange(10.0)
+    np.testing.assert_array_equal(sensors.hold(x, 1.0, 2.5), [0, 0, 0, 2, 2, 5, 5, 5, 7, 7])
+
+
+def test_hold_shorter_than_a_sample_does_nothing() -> None:
+    np.testing.assert_array_equal(reading(SensorModel(hold_s=0.004), np.sin(T)), np.sin(T))
+
+
+@given(st.floats(1e-3, 1.0))
+def test_quantisation(quantum: float) -> None:
+    x = np.linspace(-3, 3, 501)
+    y = reading(SensorModel(quantum=quantum), x)
+    assert np.abs(y - x).max() <= quantum / 2 * (1 + 1e-9)
+    np.testing.assert_allclose(y / quantum, np.round(y / quantum), rtol=0, atol=1e-9)
+
+
+def test_saturation() -> None:
+    np.testing.assert_array_equal(
+        reading(SensorModel(minimum=-1.0, maximum=0.5), np.array([-2.0, -1.0, 0.2, 0.9])),
+        [-1.0, -1.0, 0.2, 0.5],
+    )
+
+
+def test_order_of_the_steps() -> None:
+    """Lag, delay, scale, bias, noise, hold, quantum, saturation, written out by hand."""
+    rng = np.random.default_rng(4)
+    truth, normals = np.cumsum(rng.standard_normal((2, 200)), axis=1), rng.standard_normal((2, 200))
+    model = SensorModel(
+        noise_std=0.2,
+        bias=0.7,
+        scale=0.9,
+        lag_s=0.02,
+        delay_s=0.012,
+        quantum=0.1,
+        minimum=-2.0,
+        maximum=3.0,
+        hold_s=0.02,
+    )
+    y = 0.9 * sensors.delay(sensors.lag(truth, DT, 0.02), DT, 0.012) + 0.7 + 0.2 * normals
+    y = np.clip(np.round(sensors.hold(y, DT, 0.02) / 0.1) * 0.1, -2.0, 3.0)
+    np.testing.assert_array_equal(measure(model, truth, DT, normals), y)
+
+
+def test_noise_statistics() -> None:
+    """Standard deviation within 4 standard errors, std/sqrt(2 n), and no correlation between samples."""
+    n = 200_000
+    y = measure(
+        SensorModel(noise_std=0.3857), np.zeros((1, n)), DT, np.random.default_rng(0).standard_normal((1, n))
+    )
+    assert y.std() == pytest.approx(0.3857, rel=4 / np.sqrt(2 * n))
+    assert abs(np.corrcoef(y[0, 1:], y[0, :-1])[0, 1]) < 4 / np.sqrt(n)
+
+
+def test_arms_against_rotated_frames() -> None:
+    """Position of a sensor r = p + R(theta) (x, z), differentiated twice numerically, against the arms.
+
+    Earth axes x forward, z down; pitch nose-up turns body x towards -z: R = [[c, s], [-s, c]].
+    """
+    x, z = 0.7, -0.2
+
+    def theta(t: float) -> float:
+        return 0.1 + 0.3 * np.sin(2.0 * t) + 0.05 * t
+
+    def position(t: float) -> Array:
+        c, s = np.cos(theta(t)), np.sin(theta(t))
+        centre = np.array([40 * t + 0.5 * np.sin(t), 0.3 * np.cos(3 * t)])
+        return centre + np.array([[c, s], [-s, c]]) @ [x, z]
+
+    def centre_acceleration(t: float) -> Array:
+        return np.array([-0.5 * np.sin(t), -2.7 * np.cos(3 * t)])
+
+    t, h = 0.83, 1e-3
+    weights = np.array([-1, 16, -30, 16, -1]) / (12 * h * h)  # fourth order
+    sensor = sum(w * position(t + k * h) for w, k in zip(weights, range(-2, 3), strict=True))
+    c, s = np.cos(theta(t)), np.sin(theta(t))
+    to_body = np.array([[c, -s], [s, c]])
+    ax, az = to_body @ centre_acceleration(t)
+    q = 0.6 * np.cos(2.0 * t) + 0.05
+    q_dot = -1.2 * np.sin(2.0 * t)
+    at_sensor = to_body @ sensor
+    assert sensors.accelerometer_ax(ax, q, q_dot, x, z) == pytest.approx(at_sensor[0], abs=1e-7)
+    assert sensors.accelerometer_az(az, q_dot, x, q, z) == pytest.approx(at_sensor[1], abs=1e-7)
+
+
+def test_vane_arm() -> None:
+    """Hand value: q 0.2 rad/s, 13 m ahead, V 100 m/s lowers alpha by 0.026 rad; exact: atan((w - q x)/u)."""
+    assert sensors.vane_alpha(0.05, 0.2, 13.0, 100.0) == pytest.approx(0.05 - 0.026, abs=1e-15)
+    exact = np.arctan2(100 * np.sin(0.05) - 0.02 * 13.0, 100 * np.cos(0.05))
+    assert sensors.vane_alpha(0.05, 0.02, 13.0, 100.0) == pytest.approx(exact, abs=1e-5)
+
+
+def test_lag_against_the_convolution_integral() -> None:
+    """y(t) of a random piecewise linear input by quadrature over each interval."""
+    rng = np.random.default_rng(8)
+    x, tau = rng.standard_normal(6), 0.011
+    t = np.arange(6) * DT
+
+    def exact(end: int) -> float:
+        total = x[0] * np.exp(-t[end] / tau)  # equilibrium before
+        for i in range(end):
+            total += quad(
+                lambda s, i=i: np.interp(s, t, x) * np.exp(-(t[end] - s) / tau) / tau,
+                t[i],
+                t[i + 1],
+                epsabs=1e-14,
+            )[0]
+        return float(total)
+
+    np.testing.assert_allclose(sensors.lag(x, DT, tau), [exact(i) for i in range(6)], rtol=0, atol=1e-12)
