@@ -93,6 +93,56 @@ def fly(
         raise typer.Exit(FAILED_RUNS)
 
 
+@app.command(epilog="Example: airtruth identify out/light --aircraft gtm --method iv-f1 --method ls")
+def identify(
+    logs: Annotated[list[Path], typer.Argument(metavar="DIR|LOG...", help="Campaign folders or flight logs.")],
+    aircraft: Annotated[str, typer.Option(metavar="A", help="Folder with aircraft.toml, or a shipped name.")],
+    method: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Estimator, may be repeated; see docs/methods.md.")
+    ] = None,
+    joint: Annotated[bool, typer.Option("--joint", help="One estimate for all runs together.")] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="Parquet file of the estimates; DIR/estimates.parquet for one DIR.")
+    ] = None,
+    trim: Annotated[str, typer.Option(help="intercept: a free constant; mean: of the first --trim-window-s.")] = "intercept",
+    trim_window_s: Annotated[float, typer.Option(help="Window before the manoeuvre [s], for --trim mean.")] = 1.0,
+    condition: Annotated[
+        str, typer.Option(help="Airspeed and density of a record: motion, record or window, see docs/methods.md.")
+    ] = "motion",
+    covariance: Annotated[str, typer.Option(help="printed, white, coloured, corrected or none.")] = "corrected",
+    tolerance: Annotated[float, typer.Option(help="Relative change at which an estimator has converged.")] = 0.01,
+    json_: Annotated[bool, typer.Option("--json", help="Print the rows as JSON.")] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Estimate the six short-period derivatives of every run."""
+    from airtruth import aircraft as planes
+    from airtruth.identify import Options, as_text, identify_files, overview
+    from airtruth.logs.store import write_table
+
+    options = Options(
+        trim=trim, trim_window_s=trim_window_s, condition=condition, covariance=covariance, tolerance=tolerance
+    )
+    if out is None and len(logs) == 1 and (logs[0] / "logs").is_dir():
+        out = logs[0] / "estimates.parquet"
+    plane = planes.load(aircraft)
+    with _progress("identify", "files", quiet) as advance:
+        estimates = identify_files(logs, plane, method or ["iv-f1"], options, joint, advance)
+    if out is not None:
+        write_table(out, estimates)
+    print(estimates.to_json(orient="records", indent=1) if json_ else as_text(overview(estimates)))
+
+
+@app.command(epilog="Example: airtruth tables out/light out/moderate --out out/tables")
+def tables(
+    folders: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Identified campaign folders.")],
+    out: Annotated[Path, typer.Option(help="Folder of the tables (.md, .csv, .tex).")],
+) -> None:
+    """Write the paper's tables from identified campaigns, beside the printed figures."""
+    from airtruth.report import write_tables
+
+    print(write_tables(folders, out).text)
+
+
 @contextmanager
 def _progress(verb: str, things: str, quiet: bool) -> Iterator[Callable[[int, int, int], None]]:
     """A bar with rate and time left on stderr, where that is a terminal."""

@@ -20,7 +20,7 @@ from typing import Final
 import pandas as pd
 
 from airtruth.errors import ConfigurationError, StoreError
-from airtruth.fly.chunk import Outcome, Pilot
+from airtruth.fly.chunk import Outcome, Pilot, truth_row
 from airtruth.fly.plan import Plan, settings_json
 from airtruth.logs import manifest, store
 
@@ -219,7 +219,7 @@ def _alone(plan: Plan, out: Path, chunk: int) -> list[Outcome]:
                 return pool.submit(_work, chunk, out / "logs", out / _PARTS).result()
         except BrokenProcessPool:
             continue
-    return _given_up(plan, chunk)
+    return _given_up(plan, out, chunk)
 
 
 @contextmanager
@@ -241,10 +241,12 @@ def _pool(plan: Plan, processes: int) -> Iterator[ProcessPoolExecutor]:
             worker.join()
 
 
-def _given_up(plan: Plan, chunk: int) -> list[Outcome]:
+def _given_up(plan: Plan, out: Path, chunk: int) -> list[Outcome]:
     reason = f"the process that flew this chunk of runs died {_ATTEMPTS + 1} times (killed, out of memory, or a crash in JSBSim)"
-    ids = plan.table.loc[plan.table["chunk"] == chunk, "run_id"]
-    return [Outcome(run_id, "failed", reason) for run_id in ids]
+    rows = plan.table[plan.table["chunk"] == chunk].to_dict("records")
+    truth = pd.DataFrame([truth_row({str(k): v for k, v in row.items()}, None) for row in rows])
+    store.write_table(out / _PARTS / f"{chunk:05d}.parquet", truth)
+    return [Outcome(row["run_id"], "failed", reason) for row in rows]
 
 
 _pilot: Pilot | None = None

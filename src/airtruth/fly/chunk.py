@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
@@ -25,6 +26,7 @@ from airtruth.physics import dryden
 from airtruth.physics.short_period import MODAL, PARAMETERS
 
 Array = NDArray[np.float64]
+Row = dict[str, Any]
 
 _CACHED_CONDITIONS: Final = 4
 LOG_SCHEMA: Final = 1
@@ -72,18 +74,18 @@ class Pilot:
         StoreError
             If a file cannot be written.
         """
-        rows = self.plan.table[self.plan.table["chunk"] == number]
+        rows = self.plan.table[self.plan.table["chunk"] == number].to_dict("records")
         outcomes, truth_rows, flown = [], [], []
-        for _, row in rows.iterrows():
+        for row in rows:
             try:
                 prepared = self._prepare(condition(row))
                 channels = self._fly(prepared, row)
                 outcomes.append(Outcome(row["run_id"], "ok"))
                 flown.append((row, channels))
-                truth_rows.append(_truth(row, prepared, "ok"))
+                truth_rows.append(truth_row(row, prepared))
             except AirtruthError as error:
                 outcomes.append(Outcome(row["run_id"], "failed", str(error)))
-                truth_rows.append(_truth(row, None, "failed"))
+                truth_rows.append(truth_row(row, None))
         if flown:
             store.write_log(
                 logs / f"{number:05d}.parquet", self._log([r for r, _ in flown], [c for _, c in flown])
@@ -106,7 +108,7 @@ class Pilot:
             self._prepared.popitem(last=False)
         return found
 
-    def _fly(self, prepared: Prepared, row: pd.Series) -> dict[str, Array]:
+    def _fly(self, prepared: Prepared, row: Row) -> dict[str, Array]:
         plan = self.plan
         gust = self._gust(prepared.trim, row)
         manoeuvre = plan.manoeuvres[int(row["manoeuvre"])]
@@ -116,7 +118,7 @@ class Pilot:
             command_rad=amplitude * self._shapes[int(row["manoeuvre"])],
             gust_u_m_s=gust[:, 0],
             gust_w_m_s=gust[:, 1],
-            gust_q_rad_s=gust[:, 2] if plan.campaign.gust.rotary else None,
+            gust_q_rad_s=-gust[:, 2] if plan.campaign.gust.rotary else None,
             damper_gain_s=gains.damper_gain_s,
             attitude_gain=gains.attitude_gain,
             surface=manoeuvre.surface,
@@ -129,26 +131,21 @@ class Pilot:
             )
         return prepared.flight.fly(inputs)
 
-    def _gust(self, at: Trim, row: pd.Series) -> Array:
-        gust = self.plan.campaign.gust
-        if row["sigma_u_m_s"] == 0.0 and row["sigma_w_m_s"] == 0.0:
-            return np.zeros((self.plan.samples, 3))
-        discrete = dryden.discretise(
-            dryden.Dryden(
-                sigma_u_m_s=float(row["sigma_u_m_s"]),
-                sigma_w_m_s=float(row["sigma_w_m_s"]),
-                length_u_m=float(row["length_u_m"]),
-                length_w_m=float(row["length_w_m"]),
-                airspeed_m_s=at.airspeed_m_s,
-                span_m=self.plan.aircraft.constants.span_m if gust.rotary else None,
-            ),
-            self.plan.dt_s,
+    def _gust(self, at: Trim, row: Row) -> Array:
+        gust, samples = self.plan.campaign.gust, self.plan.samples
+        sigma_u, sigma_w = float(row["sigma_u_m_s"]), float(row["sigma_w_m_s"])
+        if sigma_u == 0.0 and sigma_w == 0.0:
+            return np.zeros((samples, 3))
+        span = self.plan.aircraft.constants.span_m if gust.rotary else None
+        unit = _unit_gust(
+            float(row["length_u_m"]), float(row["length_w_m"]), at.airspeed_m_s, span, self.plan.dt_s
         )
-        states = discrete.phi.shape[-1]
-        normals = streams.normals(self.plan.seed, int(row["run"]), streams.GUST, self.plan.samples * states)
-        return dryden.simulate(discrete, normals.reshape(1, -1, states), gust.start)[0]
+        states = unit.phi.shape[-1]
+        normals = streams.normals(self.plan.seed, int(row["run"]), streams.GUST, samples * states)
+        velocities = dryden.simulate(unit, normals.reshape(1, samples, states), gust.start)[0]
+        return np.asarray(velocities * np.array([sigma_u, sigma_w, sigma_w])[: velocities.shape[1]])
 
-    def _error(self, channel: str, row: pd.Series) -> Array:
+    def _error(self, channel: str, row: Row) -> Array:
         """Noise and bias that the augmentation's own sensor adds, the same as in the log."""
         sensor = self._models.get(channel)
         if sensor is None:
@@ -156,7 +153,7 @@ class Pilot:
         noise = streams.normals(self.plan.seed, int(row["run"]), streams.SENSORS[channel], self.plan.samples)
         return sensor.bias + sensor.noise_std * noise
 
-    def _log(self, rows: list[pd.Series], channels: list[dict[str, Array]]) -> FlightLog:
+    def _log(self, rows: list[Row], channels: list[dict[str, Array]]) -> FlightLog:
         plan, every = self.plan, self._record_every
         truth = {name: np.stack([c[name] for c in channels]) for name in channels[0]}
         noise = {
@@ -179,14 +176,22 @@ class Pilot:
         )
 
 
+@lru_cache(maxsize=64)
+def _unit_gust(
+    length_u: float, length_w: float, airspeed: float, span: float | None, dt_s: float
+) -> dryden.DiscreteGust:
+    """Gusts of unit standard deviation; the rotary gust goes with w."""
+    return dryden.discretise(dryden.Dryden(1.0, 1.0, length_u, length_w, airspeed, span), dt_s)
+
+
 def _log_metadata(plan: Plan) -> Mapping[str, object]:
     """What a log says of itself: nothing of gusts, draws or the truth."""
     return {"schema": LOG_SCHEMA, "aircraft": plan.aircraft.name, "sample_rate_hz": plan.campaign.log_hz}
 
 
-def _truth(row: pd.Series, prepared: Prepared | None, status: str) -> dict[str, object]:
-    """One row of truth.parquet: the declared derivatives at the run's own trim, and its air."""
-    result: dict[str, object] = {"run_id": row["run_id"], "status": status}
+def truth_row(row: Row, prepared: Prepared | None) -> dict[str, object]:
+    """One row of truth.parquet: the declared derivatives at the run's own trim, and its air; None: it failed."""
+    result: dict[str, object] = {"run_id": row["run_id"], "status": "ok" if prepared else "failed"}
     sides = {"": "plus", "_minus": "minus", "_central": "central"}
     for suffix, side in sides.items():
         values = getattr(prepared.linear, side) if prepared else np.full(len(PARAMETERS), np.nan)

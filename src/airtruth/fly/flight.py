@@ -34,7 +34,7 @@ class Inputs:
     ----------
     command_rad : elevator command, deviation from trim [rad].
     gust_u_m_s, gust_w_m_s : velocity of the air along the flight direction and downward [m/s].
-    gust_q_rad_s : rotary gust [rad/s], or None.
+    gust_q_rad_s : rotation of the air, nose-up positive, -dw/dx [rad/s], or None.
     q_error_rad_s, theta_error_rad : sensor errors fed into the augmentation, or None.
     damper_gain_s, attitude_gain : gains of the augmentation [s], [-].
     surface : the command drives the surface itself, past the actuator.

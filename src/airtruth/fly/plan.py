@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
@@ -111,7 +112,7 @@ def make(path: Path, seed: int | None = None, runs: int | None = None) -> Plan:
     return plan
 
 
-def condition(row: pd.Series) -> Condition:
+def condition(row: Mapping[str, Any]) -> Condition:
     """Flight condition of one run of the table."""
     return Condition(float(row["eas_m_s"]), float(row["altitude_m"]), float(row["gamma_rad"]))
 
@@ -232,7 +233,7 @@ def _nominal_trims(plan: Plan, problems: list[str]) -> list[Trim]:
     median = (table["eas_m_s"] - table["eas_m_s"].median()).abs().idxmin()
     row = table.loc[0 if constant else median]
     try:
-        return [trim(plan.aircraft, condition(row), plan.dt_s)]
+        return [trim(plan.aircraft, condition(row.to_dict()), plan.dt_s)]
     except AirtruthError as error:
         problems.append(f"condition: {error}")
         return []

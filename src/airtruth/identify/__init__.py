@@ -6,6 +6,7 @@ from airtruth.identify.condition import AircraftConstants
 from airtruth.identify.covariance import COVARIANCES
 from airtruth.identify.diagnostics import Diagnostics, diagnose, residuals
 from airtruth.identify.estimate import identify_batch, identify_joint, identify_log
+from airtruth.identify.files import identify_files, overview
 from airtruth.identify.methods import METHODS, Method
 from airtruth.identify.options import AuxiliaryModel, Options
 from airtruth.identify.results import SENTENCES, Estimates, Quantities, Status, estimates_table, quantities
@@ -35,9 +36,11 @@ __all__ = [
     "estimates_table",
     "identify_actuator",
     "identify_batch",
+    "identify_files",
     "identify_joint",
     "identify_log",
     "linear_auxiliary",
+    "overview",
     "quantities",
     "residuals",
     "srivc",

@@ -50,7 +50,7 @@ def write_log(
     StoreError
         If the file cannot be written.
     """
-    fields = [pa.field(RUN_ID, pa.dictionary(pa.int32(), pa.string())), _field(TIME, "float64")]
+    fields = [pa.field(RUN_ID, pa.string()), _field(TIME, "float64")]
     fields += [_field(name, dtype) for name in log.channels]
     document = json.dumps({"schema": SCHEMA, **log.metadata}, allow_nan=False).encode()
     schema = pa.schema(fields, metadata={KEY: document})
@@ -153,11 +153,8 @@ def _writer(file: BinaryIO, schema: pa.Schema) -> Any:
 def _group(log: FlightLog, runs: Sequence[int], schema: pa.Schema) -> pa.Table:
     lengths = np.diff(log.offsets)[runs]
     rows = np.concatenate([np.arange(log.offsets[r], log.offsets[r + 1]) for r in runs])
-    indices = pa.array(np.repeat(np.arange(len(runs), dtype=np.int32), lengths))
-    arrays = [
-        pa.DictionaryArray.from_arrays(indices, pa.array([log.run_ids[r] for r in runs])),
-        log.t_s[rows],
-    ]
+    names = np.repeat(np.array([log.run_ids[r] for r in runs], dtype=object), lengths)
+    arrays = [pa.array(names, pa.string()), log.t_s[rows]]
     arrays += [
         values[rows].astype(schema.field(n).type.to_pandas_dtype()) for n, values in log.channels.items()
     ]

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import lfilter
 
 Array = NDArray[np.float64]
 
@@ -87,6 +86,8 @@ def lag(x: Array, dt_s: float, lag_s: float) -> Array:
     x : (..., samples).
     dt_s, lag_s : sample period and time constant [s].
     """
+    from scipy.signal import lfilter  # slow to import, and few sensors lag
+
     r = dt_s / lag_s
     e = np.exp(-r)
     mean = -np.expm1(-r) / r  # (1 - e)/r
