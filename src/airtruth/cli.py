@@ -109,6 +109,9 @@ def identify(
     condition: Annotated[
         str, typer.Option(help="Airspeed and density of a record: motion, record or window, see docs/methods.md.")
     ] = "motion",
+    airspeed_m_s: Annotated[
+        float | None, typer.Option(help="True airspeed to use in place of the measured one [m/s].")
+    ] = None,
     covariance: Annotated[str, typer.Option(help="printed, white, coloured, corrected or none.")] = "corrected",
     tolerance: Annotated[float, typer.Option(help="Relative change at which an estimator has converged.")] = 0.01,
     json_: Annotated[bool, typer.Option("--json", help="Print the rows as JSON.")] = False,
@@ -120,7 +123,12 @@ def identify(
     from airtruth.logs.store import write_table
 
     options = Options(
-        trim=trim, trim_window_s=trim_window_s, condition=condition, covariance=covariance, tolerance=tolerance
+        trim=trim,
+        trim_window_s=trim_window_s,
+        condition=condition,
+        airspeed_m_s=airspeed_m_s,
+        covariance=covariance,
+        tolerance=tolerance,
     )
     if out is None and len(logs) == 1 and (logs[0] / "logs").is_dir():
         out = logs[0] / "estimates.parquet"

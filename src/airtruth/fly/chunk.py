@@ -79,7 +79,7 @@ class Pilot:
         for row in rows:
             try:
                 prepared = self._prepare(condition(row))
-                channels = self._fly(prepared, row)
+                channels = self.channels(row)
                 outcomes.append(Outcome(row["run_id"], "ok"))
                 flown.append((row, channels))
                 truth_rows.append(truth_row(row, prepared))
@@ -108,8 +108,16 @@ class Pilot:
             self._prepared.popitem(last=False)
         return found
 
-    def _fly(self, prepared: Prepared, row: Row) -> dict[str, Array]:
+    def channels(self, row: Row) -> dict[str, Array]:
+        """Fly one run of the table; its noise-free channels, as `Flight.fly` returns them.
+
+        Raises
+        ------
+        TrimError, FlightError
+            If the run's condition cannot be trimmed, or the flight leaves the simulation's range.
+        """
         plan = self.plan
+        prepared = self._prepare(condition(row))
         gust = self._gust(prepared.trim, row)
         manoeuvre = plan.manoeuvres[int(row["manoeuvre"])]
         amplitude = 1.0 if manoeuvre.kind == "replay" else float(row["amplitude_rad"])
