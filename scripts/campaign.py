@@ -48,7 +48,9 @@ ROOT = Path(__file__).resolve().parents[1]
 
 def main() -> int:
     """Run it all; 0, or the exit code of the step that failed."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--out", type=Path, default=Path("out"))
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--quick", action="store_true", help="a tenth of the runs")
@@ -95,19 +97,30 @@ def draw(out: Path, gtm: aircraft.Aircraft) -> list[Path]:
     folder.mkdir(exist_ok=True)
     log = read_log(log_paths(out / "moderate")[0])
     batch = next(batches(log))
-    drawn = {"flight.png": figures.flight(batch.t_s[0], flight_versions(batch, gtm), "One flight in moderate turbulence")}
+    drawn = {
+        "flight.png": figures.flight(
+            batch.t_s[0], flight_versions(batch, gtm), "One flight in moderate turbulence"
+        )
+    }
     at = trim(gtm, plan.condition(plan.make(ROOT / "data/campaigns/light.toml").table.loc[0].to_dict()))
     linear = linearise(gtm, at)
     a, b = short_period.system(linear.plus, linear.scale)
     drawn["figure1.png"] = figures.filters(a, b, "Dynamic filters (the paper's Fig. 1)")
     light = next(batches(read_log(log_paths(out / "light-fit")[-1])))
-    drawn["figure4.png"] = figures.outputs(light.t_s[0, 1:-1], output_fits(light, gtm), "Outputs (the paper's Fig. 4)")
+    drawn["figure4.png"] = figures.outputs(
+        light.t_s[0, 1:-1], output_fits(light, gtm), "Outputs (the paper's Fig. 4)"
+    )
     printed = published.load()
     for name in CAMPAIGNS:
-        tables = [printed.tables[t] for t in (("table1", "table2") if name.startswith("light") else ("table3",))]
+        tables = [
+            printed.tables[t] for t in (("table1", "table2") if name.startswith("light") else ("table3",))
+        ]
         campaign = read_campaign(out / name)
         drawn[f"estimates-{name}.png"] = distribution.estimates(
-            campaign, ("ls", "iv-lowpass", "iv-f1", "iv-f2"), printed=tables, title=f"Estimates, campaign {name}"
+            campaign,
+            ("ls", "iv-lowpass", "iv-f1", "iv-f2"),
+            printed=tables,
+            title=f"Estimates, campaign {name}",
         )
     for name, figure in drawn.items():
         style.save(figure, folder / name)
@@ -135,7 +148,9 @@ def flight_versions(batch: Batch, gtm: aircraft.Aircraft) -> dict[str, dict[str,
 
 def output_fits(batch: Batch, gtm: aircraft.Aircraft) -> dict[str, figures.OutputFit]:
     """Low-passed outputs of the last run against those of its LS and IV(f1) estimates."""
-    last = Batch(batch.run_ids[-1:], batch.dt_s, batch.t_s[-1:], {n: v[-1:] for n, v in batch.channels.items()})
+    last = Batch(
+        batch.run_ids[-1:], batch.dt_s, batch.t_s[-1:], {n: v[-1:] for n, v in batch.channels.items()}
+    )
     fits = {}
     for name in ("ls", "iv-f1"):
         estimates = replace(identify_batch(last, gtm, name, PAPER), method="ls")

@@ -126,7 +126,7 @@ class JsbsimModel(Strict):
     throttle: ThrottleProperties = ThrottleProperties()
     augmentation: AugmentationProperties | None = None
     rotary_gust: str | None = None
-    set: dict[str, float] = {}
+    set: dict[str, float] = Field(default_factory=dict)
 
 
 class AircraftFile(Strict):
@@ -139,7 +139,7 @@ class AircraftFile(Strict):
     mass: MassProperties | None = None
     jsbsim: JsbsimModel | None = None
     elevator_actuator: Actuator | None = None
-    sensors: dict[str, Sensor] = {}
+    sensors: dict[str, Sensor] = Field(default_factory=dict)
 
     @field_validator("sensors", mode="before")
     @classmethod

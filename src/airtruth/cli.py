@@ -95,25 +95,37 @@ def fly(
 
 @app.command(epilog="Example: airtruth identify out/light --aircraft gtm --method iv-f1 --method ls")
 def identify(
-    logs: Annotated[list[Path], typer.Argument(metavar="DIR|LOG...", help="Campaign folders or flight logs.")],
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="DIR|LOG...", help="Campaign folders or flight logs.")
+    ],
     aircraft: Annotated[str, typer.Option(metavar="A", help="Folder with aircraft.toml, or a shipped name.")],
     method: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="Estimator, may be repeated; see docs/methods.md.")
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Estimator, may be repeated; see docs/methods.md."),
     ] = None,
     joint: Annotated[bool, typer.Option("--joint", help="One estimate for all runs together.")] = False,
     out: Annotated[
         Path | None, typer.Option(help="Parquet file of the estimates; DIR/estimates.parquet for one DIR.")
     ] = None,
-    trim: Annotated[str, typer.Option(help="intercept: a free constant; mean: of the first --trim-window-s.")] = "intercept",
-    trim_window_s: Annotated[float, typer.Option(help="Window before the manoeuvre [s], for --trim mean.")] = 1.0,
+    trim: Annotated[
+        str, typer.Option(help="intercept: a free constant; mean: of the first --trim-window-s.")
+    ] = "intercept",
+    trim_window_s: Annotated[
+        float, typer.Option(help="Window before the manoeuvre [s], for --trim mean.")
+    ] = 1.0,
     condition: Annotated[
-        str, typer.Option(help="Airspeed and density of a record: motion, record or window, see docs/methods.md.")
+        str,
+        typer.Option(help="Airspeed and density of a record: motion, record or window, see docs/methods.md."),
     ] = "motion",
     airspeed_m_s: Annotated[
         float | None, typer.Option(help="True airspeed to use in place of the measured one [m/s].")
     ] = None,
-    covariance: Annotated[str, typer.Option(help="printed, white, coloured, corrected or none.")] = "corrected",
-    tolerance: Annotated[float, typer.Option(help="Relative change at which an estimator has converged.")] = 0.01,
+    covariance: Annotated[
+        str, typer.Option(help="printed, white, coloured, corrected or none.")
+    ] = "corrected",
+    tolerance: Annotated[
+        float, typer.Option(help="Relative change at which an estimator has converged.")
+    ] = 0.01,
     json_: Annotated[bool, typer.Option("--json", help="Print the rows as JSON.")] = False,
     quiet: Quiet = False,
 ) -> None:

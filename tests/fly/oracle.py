@@ -6,6 +6,7 @@ Shares no code with airtruth or JSBSim beyond the numbers in gtm.xml; constants 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +30,9 @@ def tables() -> dict[str, RegularGridInterpolator]:
         table = function.find("product/table")
         if not name.startswith("aero/coefficient/") or table is None:
             continue
-        lines = [[float(x) for x in line.split()] for line in table.findtext("tableData").strip().splitlines()]
+        lines = [
+            [float(x) for x in line.split()] for line in table.findtext("tableData").strip().splitlines()
+        ]
         if len(lines[0]) == 2 and len(lines[1]) == 2:
             data = np.array(lines)
             found[name.split("/")[-1]] = RegularGridInterpolator((data[:, 0],), data[:, 1])
@@ -61,7 +64,11 @@ def accelerations(tab, u, w, q, theta, height, elevator, lever):
     force = 0.5 * rho * v**2 * S
     a, e, r = np.rad2deg(alpha), np.rad2deg(elevator), q * C / (2 * v)
     cx, cz, cm = (
-        float(tab[f"{c}-static"]([a])[0] + tab[f"{c}-elevator"]([(a, e)])[0] + tab[f"{c}-pitch-rate"]([(a, r)])[0])
+        float(
+            tab[f"{c}-static"]([a])[0]
+            + tab[f"{c}-elevator"]([(a, e)])[0]
+            + tab[f"{c}-pitch-rate"]([(a, r)])[0]
+        )
         for c in ("CX", "CZ", "Cm")
     )
     thrust = 2 * max(0.0, gross_thrust(lever) * pressure - 0.010 * force)
@@ -81,7 +88,9 @@ def servo(t: float, trim_elevator: float, amplitude: float, start: float, step: 
     """Exact response of the first-order servo to a doublet, after the delay."""
     tau = t - DELAY - start
     steps = ((0.0, 1.0), (step, -2.0), (2 * step, 1.0))
-    return trim_elevator + amplitude * sum(s * (1 - np.exp(-SERVO * (tau - t0))) for t0, s in steps if tau > t0)
+    return trim_elevator + amplitude * sum(
+        s * (1 - np.exp(-SERVO * (tau - t0))) for t0, s in steps if tau > t0
+    )
 
 
 def doublet(trim, amplitude: float, start: float, step: float, times: np.ndarray) -> dict[str, np.ndarray]:
@@ -91,19 +100,22 @@ def doublet(trim, amplitude: float, start: float, step: float, times: np.ndarray
 
     def rates(t, x):
         u, w, q, theta, h = x
-        u_dot, w_dot, q_dot, *_ = accelerations(tab, u, w, q, theta, h, servo(t, elevator, amplitude, start, step), lever)
+        u_dot, w_dot, q_dot, *_ = accelerations(
+            tab, u, w, q, theta, h, servo(t, elevator, amplitude, start, step), lever
+        )
         return [u_dot, w_dot, q_dot, q, u * np.sin(theta) - w * np.cos(theta)]
 
     x = np.array([v * np.cos(alpha), v * np.sin(alpha), 0.0, alpha, height])
     states = [x]
     edges = {start + DELAY + k * step for k in range(3)}
-    for t0, t1 in zip(times[:-1], times[1:], strict=True):
-        for left, right in zip(*(lambda p: (p[:-1], p[1:]))(sorted({t0, t1, *(e for e in edges if t0 < e < t1)})), strict=True):
+    for t0, t1 in pairwise(times):
+        for left, right in pairwise(sorted({t0, t1, *(e for e in edges if t0 < e < t1)})):
             x = solve_ivp(rates, (left, right), x, method="DOP853", rtol=1e-9, atol=1e-11).y[:, -1]
         states.append(x)
     y = np.array(states).T
     specific = [
-        accelerations(tab, *y[:4, i], y[4, i], servo(t, elevator, amplitude, start, step), lever)[3:] for i, t in enumerate(times)
+        accelerations(tab, *y[:4, i], y[4, i], servo(t, elevator, amplitude, start, step), lever)[3:]
+        for i, t in enumerate(times)
     ]
     return {
         "airspeed_m_s": np.hypot(y[0], y[1]),

@@ -13,7 +13,9 @@ T = np.arange(2001) / 200.0
 
 def test_doublet_levels_and_half_values_at_edges():
     u = sample(Manoeuvre("doublet", 2.0, start_s=1.0, step_s=0.5), T)
-    np.testing.assert_array_equal(u[[199, 200, 201, 299, 300, 301, 399, 400, 401]], [0, 1, 2, 2, 0, -2, -2, -1, 0])
+    np.testing.assert_array_equal(
+        u[[199, 200, 201, 299, 300, 301, 399, 400, 401]], [0, 1, 2, 2, 0, -2, -2, -1, 0]
+    )
 
 
 def test_3211_signs_and_lengths():
@@ -68,7 +70,9 @@ def test_sweep_stays_in_its_band():
 
 
 def test_replay_interpolates_and_holds():
-    m = Manoeuvre("replay", start_s=2.0, times_s=np.array([7.0, 8.0, 9.0]), values_rad=np.array([0.0, 1.0, 0.5]))
+    m = Manoeuvre(
+        "replay", start_s=2.0, times_s=np.array([7.0, 8.0, 9.0]), values_rad=np.array([0.0, 1.0, 0.5])
+    )
     u = sample(m, T)
     np.testing.assert_allclose(np.interp([1.0, 2.5, 3.0, 3.5, 6.0], T, u), [0.0, 0.5, 1.0, 0.75, 0.5])
     assert end_s(m) == 4.0

@@ -76,7 +76,9 @@ def test_trim_on_a_slope(gtm, paper_condition, path_deg):
 
 @pytest.mark.parametrize("eas_kt", [15.0, 400.0])
 def test_untrimmable_condition_says_what_and_where(gtm, eas_kt):
-    with pytest.raises(TrimError, match=rf"gtm cannot be trimmed at EAS {eas_kt:.1f} kt.*residual.*Choose another speed"):
+    with pytest.raises(
+        TrimError, match=rf"gtm cannot be trimmed at EAS {eas_kt:.1f} kt.*residual.*Choose another speed"
+    ):
         trim(gtm, Condition(eas_kt * KT, 7000 * FT))
 
 

@@ -21,7 +21,7 @@ import pandas as pd
 
 from airtruth.errors import ConfigurationError, StoreError
 from airtruth.fly.chunk import Outcome, Pilot, truth_row
-from airtruth.fly.plan import Plan, settings_json
+from airtruth.fly.plan import Plan, rows, settings_json
 from airtruth.logs import manifest, store
 
 MANIFEST: Final = "manifest.jsonl"
@@ -243,10 +243,10 @@ def _pool(plan: Plan, processes: int) -> Iterator[ProcessPoolExecutor]:
 
 def _given_up(plan: Plan, out: Path, chunk: int) -> list[Outcome]:
     reason = f"the process that flew this chunk of runs died {_ATTEMPTS + 1} times (killed, out of memory, or a crash in JSBSim)"
-    rows = plan.table[plan.table["chunk"] == chunk].to_dict("records")
-    truth = pd.DataFrame([truth_row({str(k): v for k, v in row.items()}, None) for row in rows])
+    given_up = rows(plan, chunk)
+    truth = pd.DataFrame([truth_row(row, None) for row in given_up])
     store.write_table(out / _PARTS / f"{chunk:05d}.parquet", truth)
-    return [Outcome(row["run_id"], "failed", reason) for row in rows]
+    return [Outcome(row["run_id"], "failed", reason) for row in given_up]
 
 
 _pilot: Pilot | None = None

@@ -62,7 +62,9 @@ class Choice(Strict):
 
     def draw(self, rng: np.random.Generator, runs: int) -> Array:
         """(runs,) values."""
-        return np.asarray(self.choose)[np.floor(rng.random(runs) * len(self.choose)).astype(int)]
+        return np.asarray(self.choose, dtype=np.float64)[
+            np.floor(rng.random(runs) * len(self.choose)).astype(int)
+        ]
 
 
 Distribution = Constant | Normal | Uniform | Choice
@@ -190,7 +192,7 @@ class SensorTable(Table):
     """Sensors of the aircraft, or none (ideal), or with the stated entries of a channel in place of its own."""
 
     ideal: bool = False
-    channel: dict[str, dict[str, Any]] = {}
+    channel: dict[str, dict[str, Any]] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _valid(self) -> SensorTable:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import pandas as pd
@@ -18,7 +18,7 @@ from airtruth.fly import manoeuvres, measure, streams
 from airtruth.fly.engine import Condition
 from airtruth.fly.flight import Flight, Inputs
 from airtruth.fly.linearise import Linearisation, linearise
-from airtruth.fly.plan import Plan, condition
+from airtruth.fly.plan import Plan, Row, condition, rows
 from airtruth.fly.trim import Trim, trim
 from airtruth.logs import store
 from airtruth.logs.flight_log import FlightLog
@@ -26,7 +26,6 @@ from airtruth.physics import dryden
 from airtruth.physics.short_period import MODAL, PARAMETERS
 
 Array = NDArray[np.float64]
-Row = dict[str, Any]
 
 _CACHED_CONDITIONS: Final = 4
 LOG_SCHEMA: Final = 1
@@ -63,8 +62,8 @@ class Pilot:
         )
         self._models = models
         self._prepared: OrderedDict[Condition, Prepared] = OrderedDict()
-        self._time = np.arange(plan.samples) * plan.dt_s
-        self._shapes = [manoeuvres.sample(m, self._time) for m in plan.manoeuvres]
+        time = np.arange(plan.samples, dtype=np.float64) * plan.dt_s
+        self._shapes = [manoeuvres.sample(m, time) for m in plan.manoeuvres]
 
     def fly_chunk(self, number: int, logs: Path, truths: Path) -> list[Outcome]:
         """Fly one chunk, write its log and its truth, and say what became of each run.
@@ -74,9 +73,8 @@ class Pilot:
         StoreError
             If a file cannot be written.
         """
-        rows = self.plan.table[self.plan.table["chunk"] == number].to_dict("records")
         outcomes, truth_rows, flown = [], [], []
-        for row in rows:
+        for row in rows(self.plan, number):
             try:
                 prepared = self._prepare(condition(row))
                 channels = self.channels(row)
@@ -161,14 +159,14 @@ class Pilot:
         noise = streams.normals(self.plan.seed, int(row["run"]), streams.SENSORS[channel], self.plan.samples)
         return sensor.bias + sensor.noise_std * noise
 
-    def _log(self, rows: list[Row], channels: list[dict[str, Array]]) -> FlightLog:
+    def _log(self, flown: list[Row], channels: list[dict[str, Array]]) -> FlightLog:
         plan, every = self.plan, self._record_every
         truth = {name: np.stack([c[name] for c in channels]) for name in channels[0]}
-        noise = {
+        noise: dict[str, Array] = {
             name: np.stack(
                 [
                     streams.normals(plan.seed, int(r["run"]), streams.SENSORS[name], plan.samples)[::every]
-                    for r in rows
+                    for r in flown
                 ]
             )
             for name in self._noisy
@@ -177,9 +175,9 @@ class Pilot:
         samples = logged["alpha_rad"].shape[1]
         return FlightLog(
             metadata=_log_metadata(plan),
-            run_ids=tuple(r["run_id"] for r in rows),
-            offsets=np.arange(len(rows) + 1, dtype=np.int64) * samples,
-            t_s=np.tile(np.arange(samples) / plan.campaign.log_hz, len(rows)),
+            run_ids=tuple(r["run_id"] for r in flown),
+            offsets=np.arange(len(flown) + 1, dtype=np.int64) * samples,
+            t_s=np.tile(np.arange(samples) / plan.campaign.log_hz, len(flown)),
             channels={name: values.ravel() for name, values in logged.items()},
         )
 

@@ -175,7 +175,7 @@ class Executive:
         )
 
 
-class _Silent(jsbsim.FGLogger):  # type: ignore[misc]
+class _Silent(jsbsim.FGLogger):
     """JSBSim writes its messages to stdout, which is the result's; the probe has shown them already."""
 
     def set_level(self, level: object) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -141,8 +142,8 @@ class Flight:
             Controls(controls.elevator_command_rad + float(inputs.command_rad[0]), controls.throttle)
         )
         self._engage(inputs)
-        for setter, values in zip(setters[1:], series[1:], strict=True):
-            setter(values[0])
+        for setter, first_value in zip(setters[1:], (values[0] for values in series[1:]), strict=True):
+            setter(first_value)
         executive.settle()
         fdm.set_trim_status(inputs.surface)  # trim status lets actuators pass their input through
         for kind in _INTEGRATORS:  # a reset restores Euler
@@ -161,7 +162,7 @@ class Flight:
             extend([get() for get in gets])
         return np.array(records).reshape(-1, len(gets)).T
 
-    def _inputs(self, inputs: Inputs) -> tuple[list[object], list[list[float]]]:
+    def _inputs(self, inputs: Inputs) -> tuple[list[Callable[[float], None]], list[list[float]]]:
         """Setters and their values at every step; the elevator first."""
         executive, elevator = self._executive, self._elevator
         absolute = self.trim.controls.elevator_command_rad + inputs.command_rad

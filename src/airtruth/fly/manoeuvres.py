@@ -115,7 +115,7 @@ def _rise(t_s: Array, edge: float, dt: float) -> Array:
             f"the manoeuvre has an edge at {edge:g} s, which is not on the simulation's grid of {dt * 1e3:g} ms; "
             f"move it to {near:g} s, or change simulation_hz"
         )
-    return np.heaviside(np.arange(len(t_s)) - round(index), 0.5)
+    return np.asarray(np.heaviside(np.arange(len(t_s)) - round(index), 0.5))
 
 
 def _multisine(m: Manoeuvre, t_s: Array) -> Array:

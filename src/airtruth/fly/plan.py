@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -26,6 +25,8 @@ from airtruth.physics.gust_figures import gust_scales
 from airtruth.units import DEG
 
 Array = NDArray[np.float64]
+Row = dict[str, Any]
+"""One row of a run table: column -> value."""
 
 _LARGEST_CHUNK: Final = 100
 _CHUNKS: Final = 32  # a small campaign is cut into about this many, so that both cores stay busy
@@ -112,7 +113,13 @@ def make(path: Path, seed: int | None = None, runs: int | None = None) -> Plan:
     return plan
 
 
-def condition(row: Mapping[str, Any]) -> Condition:
+def rows(plan: Plan, chunk: int) -> list[Row]:
+    """Rows of one chunk of the run table."""
+    chosen = plan.table[plan.table["chunk"] == chunk]
+    return [{str(key): value for key, value in row.items()} for row in chosen.to_dict("records")]
+
+
+def condition(row: Row) -> Condition:
     """Flight condition of one run of the table."""
     return Condition(float(row["eas_m_s"]), float(row["altitude_m"]), float(row["gamma_rad"]))
 
@@ -204,8 +211,8 @@ def _digest(campaign: Campaign, aircraft: Aircraft, manoeuvres: tuple[Manoeuvre,
 
 def _check(plan: Plan, path: Path) -> None:
     """Everything that can be known to fail before flying; all problems at once."""
-    problems = []
-    t = np.arange(plan.samples) * plan.dt_s
+    problems: list[str] = []
+    t = np.arange(plan.samples, dtype=np.float64) * plan.dt_s
     nominal = _nominal_trims(plan, problems)
     for number, (manoeuvre, table) in enumerate(zip(plan.manoeuvres, plan.campaign.manoeuvre, strict=True)):
         where = f"manoeuvre.{number}"
@@ -227,13 +234,13 @@ def _check(plan: Plan, path: Path) -> None:
 
 
 def _nominal_trims(plan: Plan, problems: list[str]) -> list[Trim]:
-    """Trims of the first run, the fastest and the slowest; a draw in a tail may still fail in flight."""
+    """The trim of the run of median airspeed; a draw in a tail may still fail in flight."""
     table = plan.table
     constant = all(table[name].nunique() == 1 for name in ("eas_m_s", "altitude_m", "gamma_rad"))
-    median = (table["eas_m_s"] - table["eas_m_s"].median()).abs().idxmin()
-    row = table.loc[0 if constant else median]
+    median = int(np.argmin(np.abs(table["eas_m_s"].to_numpy() - table["eas_m_s"].median())))
+    row = {str(key): value for key, value in table.iloc[0 if constant else median].items()}
     try:
-        return [trim(plan.aircraft, condition(row.to_dict()), plan.dt_s)]
+        return [trim(plan.aircraft, condition(row), plan.dt_s)]
     except AirtruthError as error:
         problems.append(f"condition: {error}")
         return []

@@ -14,7 +14,7 @@ from airtruth.identify.estimate import identify_joint, identify_log
 from airtruth.identify.methods import method
 from airtruth.identify.options import Options
 from airtruth.identify.results import estimates_table
-from airtruth.identify.summary import Table
+from airtruth.identify.summary import Cell, Table
 from airtruth.logs.flight_log import batches
 from airtruth.logs.store import log_paths, read_log
 from airtruth.physics.short_period import MODAL, PARAMETERS
@@ -81,7 +81,7 @@ def identify_files(
 def overview(estimates: pd.DataFrame) -> Table:
     """Estimates of contract 2 as a table for people: one run with its intervals, or the spread over runs."""
     names = [*PARAMETERS, *MODAL]
-    rows = []
+    rows: list[tuple[Cell, ...]] = []
     for name, table in estimates.groupby("method", sort=False):
         good = table[table["converged"]]
         if len(table) == 1:
