@@ -62,9 +62,9 @@ class Choice(Strict):
 
     def draw(self, rng: np.random.Generator, runs: int) -> Array:
         """(runs,) values."""
-        return np.asarray(self.choose, dtype=np.float64)[
-            np.floor(rng.random(runs) * len(self.choose)).astype(int)
-        ]
+        picked = np.floor(rng.random(runs) * len(self.choose)).astype(np.int64)
+        values: Array = np.array(self.choose, dtype=np.float64).take(picked)
+        return values
 
 
 Distribution = Constant | Normal | Uniform | Choice
