@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -36,7 +35,6 @@ class Constants(Strict):
     cg_fraction: float = 0.25
 
 
-@lru_cache(maxsize=32)
 def probe(folder: Path, jsbsim_json: str) -> Constants:
     """Load the model that aircraft.toml names and return its constants.
 

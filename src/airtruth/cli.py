@@ -36,9 +36,10 @@ def main() -> None:
     except AirtruthError as error:
         print(f"airtruth: {error}", file=sys.stderr)
         sys.exit(error.exit_code)
-    except KeyboardInterrupt:
-        print("airtruth: interrupted; the same command resumes", file=sys.stderr)
-        sys.exit(INTERRUPTED)
+    except SystemExit as end:  # typer turns Ctrl-C into this
+        if end.code == INTERRUPTED:
+            print("airtruth: interrupted; the same command resumes", file=sys.stderr)
+        raise
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)

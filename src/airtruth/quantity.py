@@ -6,7 +6,7 @@ std = 0.3, source = "..." }``. In a campaign the unit ends the key, ``eas_kt = 7
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
@@ -85,52 +85,37 @@ def table_in(dimension: str, raw: Any) -> Quantity:
     return converted if isinstance(converted, Quantity) else Quantity.model_validate(converted)
 
 
-def keys_to_si(
-    raw: Mapping[str, Any], dimensions: Mapping[str, str], fields: Iterable[str]
-) -> dict[str, Any]:
+def keys_to_si(raw: Mapping[str, Any], dimensions: Mapping[str, str]) -> dict[str, Any]:
     """Rename ``eas_kt = 75`` to ``eas = 38.58`` for every name in ``dimensions``.
 
     Parameters
     ----------
-    raw : table as read.
+    raw : table as read. Keys that are no such name, or whose unit is of another dimension, stay as they
+        are, for the model to refuse and `explain` to explain.
     dimensions : bare name -> dimension. Numbers, and the numbers in lists and tables (distributions),
         are multiplied by the unit's factor.
-    fields : every bare name that the table knows.
 
     Raises
     ------
     ValueError
-        If keys are unknown, have a unit of another dimension, or are given twice; names them all.
+        If a quantity is given twice, in two units.
     """
-    known = set(fields)
     result: dict[str, Any] = {}
-    problems: list[str] = []
     for key, value in raw.items():
         name = _longest_name(key, dimensions)
+        unit = "" if name is None else key[len(name) + 1 :]
         if name is None:
-            if key not in known:
-                problems.append(f"{key}: unknown key; {choices(key, _keys(known, dimensions))}")
             result[key] = value
-            continue
-        dimension = dimensions[name]
-        unit = key[len(name) + 1 :] if key != name else ""
-        if unit not in UNITS[dimension]:
-            allowed = [f"{name}_{u}" if u else name for u in UNITS[dimension]]
-            problems.append(
-                f"{key}: {unit or 'no unit'!r} is not a unit of {dimension.replace('_', ' ')}; write {', '.join(allowed)}"
-            )
+        elif unit not in UNITS[dimensions[name]]:
+            result[key if unit else key + _NO_UNIT] = value  # not the field's own name, so it is refused
         elif name in result:
-            problems.append(f"{key}: {name} is given twice, in two units")
+            raise ValueError(f"{key}: {name} is given twice, in two units")
         else:
-            result[name] = _scaled(value, UNITS[dimension][unit])
-    if problems:
-        raise ValueError("; ".join(problems))
+            result[name] = _scaled(value, UNITS[dimensions[name]][unit])
     return result
 
 
-def _keys(fields: Iterable[str], dimensions: Mapping[str, str]) -> list[str]:
-    """Keys as a user writes them, with the first unit that the dimension has."""
-    return [f"{n}_{next(iter(UNITS[dimensions[n]]))}" if n in dimensions else n for n in fields]
+_NO_UNIT = "_?"
 
 
 def _longest_name(key: str, dimensions: Mapping[str, str]) -> str | None:
@@ -162,25 +147,49 @@ def explain(error: ValidationError, model: type[BaseModel]) -> list[str]:
     error : what pydantic found, all of it.
     model : the model that was read.
     """
+    items = error.errors()
+    unknown = [
+        (item["loc"][:-1], str(item["loc"][-1])) for item in items if item["type"] == "extra_forbidden"
+    ]
     sentences = []
-    for item in error.errors():
-        path = ".".join(str(part) for part in item["loc"]) or "(top level)"
+    for item in items:
+        table, key = item["loc"][:-1], str(item["loc"][-1]) if item["loc"] else ""
+        path = ".".join(str(part) for part in item["loc"]).removesuffix(_NO_UNIT) or "(top level)"
         message = item["msg"].removeprefix("Value error, ")
+        if item["type"] == "missing" and any(
+            at == table and name.startswith(f"{key}_") for at, name in unknown
+        ):
+            continue  # it is there, with a unit that the other sentence is about
         if item["type"] == "extra_forbidden":
-            message = f"unknown key; {choices(str(item['loc'][-1]), _fields_at(model, item['loc'][:-1]))}"
+            message = _explain_key(key, _model_at(model, table))
         elif item["type"] not in ("value_error", "missing"):
             message = f"{message} (found {item['input']!r})"
         sentences.append(f"{path}: {message}")
     return sentences
 
 
-def _fields_at(model: type[BaseModel], path: tuple[int | str, ...]) -> list[str]:
+def _explain_key(key: str, model: type[BaseModel] | None) -> str:
+    dimensions: Mapping[str, str] = getattr(model, "dimensions", {})
+    name = _longest_name(key, dimensions)
+    if name is not None:
+        unit, dimension = key[len(name) + 1 :], dimensions[name]
+        allowed = ", ".join(f"{name}_{u}" if u else name for u in UNITS[dimension])
+        found = (
+            "no unit is stated" if unit == "?" else f"{unit!r} is not a unit of {dimension.replace('_', ' ')}"
+        )
+        return f"{found}; write {allowed}"
+    fields = [field.alias or name for name, field in model.model_fields.items()] if model else []
+    shown = [f"{n}_{next(iter(UNITS[dimensions[n]]))}" if n in dimensions else n for n in fields]
+    return f"unknown key; {choices(key, shown)}"
+
+
+def _model_at(model: type[BaseModel], path: tuple[int | str, ...]) -> type[BaseModel] | None:
     current: type[BaseModel] | None = model
     for part in path:
         field = current.model_fields.get(str(part)) if current else None
         if field is not None:  # else an index into a list or a key of a mapping: its items' model stays
             current = _model_of(field.annotation)
-    return [f.alias or name for name, f in current.model_fields.items()] if current else []
+    return current
 
 
 def _model_of(annotation: Any) -> type[BaseModel] | None:

@@ -52,7 +52,19 @@ def resume(folder):
 
 
 # Renames: plan 1, campaign.json 2, then for each chunk its log and its truth (3 to 8), truth.parquet 9.
-@pytest.mark.parametrize("moment", [(1, "before"), (1, "after"), (2, "before"), (3, "before"), (4, "before"), (6, "after"), (9, "before"), (9, "after")])  # fmt: skip
+@pytest.mark.parametrize(
+    "moment",
+    [
+        (1, "before"),
+        (1, "after"),
+        (2, "before"),
+        (3, "before"),
+        (4, "before"),
+        (6, "after"),
+        (9, "before"),
+        (9, "after"),
+    ],
+)
 def test_killed_at_a_rename(short, tmp_path, moment):
     file, out = write(tmp_path / "campaign.toml", **SHORT), tmp_path / "out"
     arguments = ["fly", file, "--out", out, "--jobs", "1"]
@@ -70,8 +82,11 @@ def flying(folder, jobs=2):
     file = write(folder / "campaign.toml", **LONG)
     process = subprocess.Popen(
         [sys.executable, "-m", "airtruth", "fly", file, "--out", folder / "out", "--jobs", str(jobs)],
-        start_new_session=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+        start_new_session=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
     try:
         yield process
     finally:
@@ -112,6 +127,7 @@ def test_workers_die_with_their_parent_and_leave_nothing(long, tmp_path):
         workers = children(process.pid)
         assert len(workers) == 2
         process.kill()
+        process.wait()
         resume(tmp_path)  # at once, while the orphans may still write
         wait_until(lambda: not any(map(alive, workers)), patience_s=20.0)
     assert not leftovers(tmp_path / "out")

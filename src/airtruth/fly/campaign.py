@@ -82,6 +82,7 @@ def fly(
             flown += int(sizes[chunk])
             progress(flown, len(plan.table), len(failures))
         _merge_truth(out)
+        _clean(out)  # what an orphan of a killed process may have left meanwhile
     return Summary(len(plan.table), flown - before, tuple(sorted(failures, key=lambda o: o.run_id)))
 
 
@@ -97,21 +98,40 @@ def _claim(plan: Plan, out: Path) -> None:
                     f"asked for {plan.campaign.name!r}, {plan.campaign.runs} runs, seed {plan.seed}), or the campaign file or "
                     "the aircraft changed since; choose another --out, or remove the folder"
                 )
-            return
-        if out.is_dir() and any(out.iterdir()):
-            raise ConfigurationError(f"{out}: is not empty and holds no campaign; choose another --out")
-        (out / "logs").mkdir(parents=True, exist_ok=True)
+        else:
+            if out.is_dir() and any(not _half_claimed(path) for path in out.iterdir()):
+                raise ConfigurationError(f"{out}: is not empty and holds no campaign; choose another --out")
+            out.mkdir(parents=True, exist_ok=True)
+            store.write_text(settings, settings_json(plan))
+        (out / "logs").mkdir(exist_ok=True)
         (out / _PARTS).mkdir(exist_ok=True)
     except (OSError, ValueError) as error:
         raise StoreError(f"{out}: cannot be used as a campaign's folder ({error})") from None
-    store.write_table(out / PLAN, plan.table)
-    store.write_text(settings, settings_json(plan))
+    if not _readable(out / PLAN):
+        store.write_table(out / PLAN, plan.table)
+
+
+def _half_claimed(path: Path) -> bool:
+    """Whether a process that was killed while it claimed the folder left this."""
+    return path.name.startswith(f".{SETTINGS}.") and path.name.endswith(".tmp")
+
+
+def _readable(table: Path) -> bool:
+    try:
+        store.read_table(table)
+    except StoreError:
+        return False
+    return True
 
 
 @contextmanager
 def _lock(out: Path) -> Iterator[None]:
     """One process at a time; the lock goes with the process, however it ends."""
-    with (out / ".lock").open("w") as file:
+    try:
+        file = (out / ".lock").open("w")
+    except OSError as error:
+        raise StoreError(f"{out}: cannot be written ({error.strerror}); choose another --out") from None
+    with file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
@@ -135,17 +155,18 @@ def _finished_chunks(plan: Plan, out: Path) -> dict[int, list[Outcome]]:
         outcome = Outcome(str(record["run_id"]), str(record["status"]), str(record["reason"]))
         found.setdefault(int(str(record["chunk"])), {})[outcome.run_id] = outcome
     expected = plan.table["chunk"].value_counts()
+    truth = _readable(out / TRUTH)
     return {
         chunk: list(outcomes.values())
         for chunk, outcomes in found.items()
-        if len(outcomes) == expected.get(chunk, -1) and _whole(out, chunk, outcomes.values())
+        if len(outcomes) == expected.get(chunk, -1) and _whole(out, chunk, outcomes.values(), truth)
     }
 
 
-def _whole(out: Path, chunk: int, outcomes: Iterable[Outcome]) -> bool:
+def _whole(out: Path, chunk: int, outcomes: Iterable[Outcome], truth: bool) -> bool:
     flown = [o for o in outcomes if o.status == "ok"]
     try:
-        if not (out / TRUTH).exists():
+        if not truth:
             store.read_metadata(out / _PARTS / f"{chunk:05d}.parquet")
         if flown:
             store.read_metadata(out / "logs" / f"{chunk:05d}.parquet")
@@ -160,7 +181,7 @@ def _merge_truth(out: Path) -> None:
     if not parts:
         return
     frames = [store.read_table(part) for part in parts]
-    if (out / TRUTH).exists():
+    if _readable(out / TRUTH):
         frames.insert(0, store.read_table(out / TRUTH))
     truth = pd.concat(frames).drop_duplicates("run_id", keep="last").sort_values("run_id", kind="stable")
     store.write_table(out / TRUTH, truth.reset_index(drop=True))

@@ -50,6 +50,12 @@ class Uniform(Strict):
     low: float
     high: float
 
+    @model_validator(mode="after")
+    def _ordered(self) -> Uniform:
+        if self.low > self.high:
+            raise ValueError(f"low = {self.low:g} is above high = {self.high:g}")
+        return self
+
     def draw(self, rng: np.random.Generator, runs: int) -> Array:
         """(runs,) values."""
         return self.low + (self.high - self.low) * rng.random(runs)
@@ -111,8 +117,7 @@ class Table(Strict):
     @model_validator(mode="before")
     @classmethod
     def _to_si(cls, raw: Any) -> Any:
-        fields = [field.alias or name for name, field in cls.model_fields.items()]
-        return qt.keys_to_si(raw, cls.dimensions, fields) if isinstance(raw, Mapping) else raw
+        return qt.keys_to_si(raw, cls.dimensions) if isinstance(raw, Mapping) else raw
 
 
 class ConditionTable(Table):
@@ -261,8 +266,8 @@ class Campaign(Table):
         return self
 
 
-def read(path: Path) -> Campaign:
-    """Read and validate a campaign file.
+def read(path: Path, changes: Mapping[str, Any] | None = None) -> Campaign:
+    """Read and validate a campaign file, its top-level keys replaced by ``changes``.
 
     Raises
     ------
@@ -280,7 +285,7 @@ def read(path: Path) -> Campaign:
     except tomllib.TOMLDecodeError as error:
         raise ConfigurationError(f"{path}: not valid TOML: {error}") from None
     try:
-        return Campaign.model_validate(raw)
+        return Campaign.model_validate(raw | dict(changes or {}))
     except ValidationError as error:
         problems = qt.explain(error, Campaign)
         raise ConfigurationError(f"{path}: {len(problems)} problem(s)\n  " + "\n  ".join(problems)) from None

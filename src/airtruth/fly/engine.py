@@ -25,6 +25,7 @@ _INTEGRATORS: Final = tuple(
     for order in ("rate", "position")
     for kind in ("rotational", "translational")
 )
+_ENGINE_ROUNDS: Final = 4  # a piston engine's thrust stands still after two
 _PLANET: Final = Path(__file__).with_name("flat_planet.xml")
 
 
@@ -77,6 +78,7 @@ class Executive:
     """
 
     def __init__(self, aircraft: Aircraft, dt_s: float) -> None:
+        self.aircraft = aircraft
         self.model = jsbsim_model(aircraft)
         self.dt_s = dt_s
         root, folder, engine, systems = model_root(aircraft.folder, self.model.root)
@@ -95,8 +97,16 @@ class Executive:
         self._has_engines = self._propulsion.get_num_engines() > 0
         for name in _INTEGRATORS:
             self.node(name).set_double_value(AB3)
+        self.configure()
+
+    def configure(self) -> None:
+        """Write the properties that aircraft.toml sets (engines running, gear up ...)."""
         for name, value in self.model.set.items():
             self.fdm[name] = value
+
+    def renewed(self) -> Executive:
+        """An executive in which nothing has run: itself, or a new one if it has engines, whose state stays."""
+        return Executive(self.aircraft, self.dt_s) if self._has_engines else self
 
     def node(self, name: str) -> Any:
         """Bound property node; unlike JSBSim's own setters it never creates a property.
@@ -151,8 +161,10 @@ class Executive:
         """Run the initial conditions and, where there are engines, bring them to their steady state."""
         self.fdm.run_ic()
         if self._has_engines:
-            self._propulsion.get_steady_state()
             self.fdm.suspend_integration()
+            for _ in range(_ENGINE_ROUNDS):
+                self.fdm.run()  # engines see the controls of the frame before
+                self._propulsion.get_steady_state()
             self.fdm.run()
             self.fdm.resume_integration()
 

@@ -79,12 +79,16 @@ class Flight:
         self.trim = trim
         self._record_every = record_every
         self._executive = Executive(aircraft, dt_s)
-        self._executive.initialise(trim.condition, trim.alpha_rad, trim.controls)
-        model = self._executive.model
+        self._start()
+
+    def _start(self) -> None:
+        executive, trim = self._executive, self.trim
+        executive.initialise(trim.condition, trim.alpha_rad, trim.controls)
+        model = executive.model
         self._elevator = model.elevator
         self._augmentation = model.augmentation
         self._rotary = model.rotary_gust
-        self._read = self._executive.nodes([*READ, model.elevator.surface])
+        self._read = executive.nodes([*READ, model.elevator.surface])
 
     def fly(self, inputs: Inputs) -> dict[str, Array]:
         """Fly one run.
@@ -130,14 +134,17 @@ class Flight:
         }
 
     def _simulate(self, inputs: Inputs) -> Array:
+        renewed = self._executive.renewed()
+        if renewed is not self._executive:
+            self._executive = renewed
+            self._start()
         executive, trim = self._executive, self.trim
         fdm = executive.fdm
         controls = trim.controls
         setters, series = self._inputs(inputs)
         fdm.set_trim_status(True)
         fdm.reset_to_initial_conditions(2)  # a reset without run_ic, which settle() does
-        for name, value in executive.model.set.items():
-            fdm[name] = value
+        executive.configure()
         executive.hold(
             Controls(controls.elevator_command_rad + float(inputs.command_rad[0]), controls.throttle)
         )

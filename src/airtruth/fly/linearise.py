@@ -75,6 +75,7 @@ def linearise(
 
 def _probe(executive: Executive, trim: Trim, d_alpha: float, d_elevator: float, d_q: float) -> Array:
     """[alpha_dot, q_dot, elevator] in a state off the trim."""
+    executive = executive.renewed()
     alpha = trim.alpha_rad + d_alpha
     controls = Controls(trim.controls.elevator_command_rad + d_elevator, trim.controls.throttle)
     executive.initialise(trim.condition, alpha, controls, d_q)

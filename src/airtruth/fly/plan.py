@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,6 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from airtruth import __version__
 from airtruth.aircraft import Aircraft, Sensor, load
 from airtruth.errors import AirtruthError, ConfigurationError
 from airtruth.fly import campaign_file, streams
@@ -22,7 +24,7 @@ from airtruth.fly.trim import Trim, trim
 from airtruth.logs.store import read_log
 from airtruth.physics import actuators, atmosphere
 from airtruth.physics.gust_figures import gust_scales
-from airtruth.units import DEG
+from airtruth.units import DEG, KT
 
 Array = NDArray[np.float64]
 Row = dict[str, Any]
@@ -84,9 +86,8 @@ def make(path: Path, seed: int | None = None, runs: int | None = None) -> Plan:
     ConfigurationError, StoreError, AircraftError, TrimError
         If the campaign cannot be flown as written; nominal conditions are trimmed here.
     """
-    campaign = campaign_file.read(path)
     changes = {k: v for k, v in (("seed", seed), ("runs", runs)) if v is not None}
-    campaign = campaign.model_copy(update=changes)
+    campaign = campaign_file.read(path, changes)
     aircraft = load(campaign.aircraft, near=path.parent)
     model = jsbsim_model(aircraft)
     if campaign.gust.rotary and model.rotary_gust is None:
@@ -98,8 +99,11 @@ def make(path: Path, seed: int | None = None, runs: int | None = None) -> Plan:
         raise ConfigurationError(
             f"{path}: augmentation: {aircraft.name} has no [jsbsim.augmentation] in its aircraft.toml"
         )
-    table = _run_table(campaign, campaign.seed)
-    manoeuvres = tuple(_manoeuvre(m, path.parent) for m in campaign.manoeuvre)
+    try:
+        table = _run_table(campaign, campaign.seed)
+        manoeuvres = tuple(_manoeuvre(m, path.parent) for m in campaign.manoeuvre)
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{path}: {error}") from None
     plan = Plan(
         campaign=campaign,
         aircraft=aircraft,
@@ -135,12 +139,19 @@ def _run_table(campaign: Campaign, seed: int) -> pd.DataFrame:
     wind = draw("wind", campaign.wind.along_track)
     altitude = draw("altitude", campaign.condition.altitude)
     eas = draw("eas", campaign.condition.eas)
+    factor = draw("gust factor", campaign.gust.factor)
+    if eas.min() <= 0.0:
+        raise ConfigurationError(
+            f"condition.eas: {eas.min() / KT:g} kt is drawn; an airspeed must be positive"
+        )
+    if factor.min() < 0.0:
+        raise ConfigurationError(f"gust.factor: {factor.min():g} is drawn; a factor must not be negative")
     if campaign.wind.keeps == "ground_speed":
         density = atmosphere.density_kg_m3(atmosphere.geopotential_m(altitude))
         eas = eas - wind * np.sqrt(density / atmosphere.RHO0_KG_M3)
     kind = number % len(campaign.manoeuvre)
     amplitudes = np.stack([draw(f"amplitude {k}", m.amplitude) for k, m in enumerate(campaign.manoeuvre)])
-    gusts = _gust_columns(campaign, altitude, draw("gust factor", campaign.gust.factor))
+    gusts = _gust_columns(campaign, altitude, factor)
     return pd.DataFrame(
         {
             "run": number,
@@ -198,6 +209,7 @@ def _manoeuvre(table: ManoeuvreTable, folder: Path) -> Manoeuvre:
 
 def _digest(campaign: Campaign, aircraft: Aircraft, manoeuvres: tuple[Manoeuvre, ...]) -> str:
     content = hashlib.sha256(campaign.model_dump_json(by_alias=True).encode())
+    content.update(f"{__version__} {version('jsbsim')} {version('numpy')}".encode())
     for file in sorted(
         p for p in aircraft.folder.rglob("*") if p.is_file() and p.suffix in (".xml", ".toml")
     ):

@@ -23,6 +23,7 @@ The iteration goes on to `_AIM`; a model with a piston engine or rounded tables 
 _AIM: Final = 1e-11
 _START: Final = ((4.0, 0.0, 0.4), (8.0, 0.0, 0.7), (1.0, 0.0, 0.2), (12.0, 0.0, 0.6))  # deg, rad, -
 _STEPS: Final = np.array([1e-5, 1e-5, 1e-4])
+_LARGEST_STEP: Final = np.array([4.0 * DEG, 0.2, 0.15])  # an engine's thrust is flat near full throttle
 _ITERATIONS: Final = 40
 _LIMITS: Final = (np.array([-20.0 * DEG, -1.2, 0.0]), np.array([40.0 * DEG, 1.2, 1.0]))
 
@@ -84,6 +85,7 @@ def trim(
 
 
 def _residual(executive: Executive, condition: Condition, x: Array) -> Array:
+    executive = executive.renewed()
     executive.initialise(condition, float(x[0]), Controls(float(x[1]), float(x[2])))
     r = executive.respond()
     return np.array([r.u_dot_m_s2, r.w_dot_m_s2, r.q_dot_rad_s2])
@@ -104,6 +106,7 @@ def _newton(executive: Executive, condition: Condition, x: Array) -> tuple[Array
             ]
         )
         change = np.linalg.lstsq(jacobian, -r, rcond=1e-12)[0]
+        change /= max(1.0, float(np.max(np.abs(change) / _LARGEST_STEP)))
         for _ in range(8):
             tried = np.clip(x + change, low, high)
             r_tried = _residual(executive, condition, tried)
@@ -117,17 +120,19 @@ def _newton(executive: Executive, condition: Condition, x: Array) -> tuple[Array
 
 
 def _result(executive: Executive, condition: Condition, x: Array) -> Trim:
-    r = _residual(executive, condition, x)
+    executive = executive.renewed()
+    executive.initialise(condition, float(x[0]), Controls(float(x[1]), float(x[2])))
+    at = executive.respond()
     airspeed, density, mass = executive.surroundings()
     return Trim(
         condition=condition,
         alpha_rad=float(x[0]),
-        elevator_rad=executive.respond().elevator_rad,
+        elevator_rad=at.elevator_rad,
         controls=Controls(float(x[1]), float(x[2])),
         airspeed_m_s=airspeed,
         density_kg_m3=density,
         mass_kg=mass,
-        residual=float(np.max(np.abs(r))),
+        residual=max(abs(at.u_dot_m_s2), abs(at.w_dot_m_s2), abs(at.q_dot_rad_s2)),
     )
 
 

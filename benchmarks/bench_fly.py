@@ -1,0 +1,179 @@
+"""What flying costs: ratios measured side by side, so that the machine cancels out.
+
+python benchmarks/bench_fly.py [--full]    --full: 3000 runs for the two processes, 10,000 for the memory
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+CAMPAIGN = Path(__file__).resolve().parents[1] / "data" / "campaigns" / "light.toml"
+BARS = {"overhead": 1.5, "speed-up": 1.8, "help": 0.5, "memory": 1.1}
+RUNS_PER_CHUNK = 100
+CHUNKS = 6
+
+
+def overhead() -> float:
+    """CPU per step of campaign chunks (gusts, sensors, Parquet, all) over that of a bare run() loop."""
+    from airtruth.fly import plan
+    from airtruth.fly.chunk import Pilot
+    from airtruth.fly.engine import Executive
+    from airtruth.fly.trim import trim
+
+    made = plan.make(CAMPAIGN, runs=RUNS_PER_CHUNK * 32)  # from 3200 runs on, a chunk has 100
+    steps = RUNS_PER_CHUNK * (made.samples - 1)
+    pilot = Pilot(made)
+    at = trim(made.aircraft, plan.condition(made.table.iloc[0].to_dict()), made.dt_s)
+    bare = Executive(made.aircraft, made.dt_s)
+    bare.initialise(at.condition, at.alpha_rad, at.controls)
+    bare.fdm.set_trim_status(False)
+    run = bare.fdm.run
+
+    with tempfile.TemporaryDirectory() as folder:
+
+        def chunk(number: int) -> float:
+            start = time.process_time()
+            outcomes = pilot.fly_chunk(number, Path(folder), truths)
+            assert all(o.status == "ok" for o in outcomes)
+            assert len(outcomes) == RUNS_PER_CHUNK
+            return time.process_time() - start
+
+        def loop() -> float:
+            start = time.process_time()
+            for _ in range(steps):
+                run()
+            return time.process_time() - start
+
+        truths = Path(folder) / "truth"
+        truths.mkdir()
+        chunk(0)
+        loop()
+        pairs = []
+        for number in range(1, CHUNKS + 1):
+            pairs.append((chunk(number), loop()) if number % 2 else (loop(), chunk(number))[::-1])
+    ratios = sorted(a / b for a, b in pairs)
+    medians = [1e6 * statistics.median(p) / steps for p in zip(*pairs, strict=True)]
+    print(
+        f"  campaign {medians[0]:.2f} us, bare run() {medians[1]:.2f} us CPU a step; ratio {ratios[0]:.2f} to {ratios[-1]:.2f}"
+    )
+    return statistics.median(ratios)
+
+
+def machine() -> float:
+    """How much more two processes get done than one when they share nothing: 2 on an idle machine."""
+    spin = "import time; t = time.perf_counter(); sum(range(60_000_000)); print(time.perf_counter() - t)"
+
+    def seconds(count: int) -> float:
+        command = [sys.executable, "-c", spin]
+        running = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(count)]
+        return max(float(process.communicate()[0]) for process in running)
+
+    return (
+        2.0
+        * statistics.median(seconds(1) for _ in range(3))
+        / statistics.median(seconds(2) for _ in range(3))
+    )
+
+
+def speed_up(runs: int) -> float:
+    """Wall time of a campaign with one process over that with two."""
+    print(
+        f"  two processes that share nothing get {machine():.2f} times the work of one done (2: idle machine)"
+    )
+    print(f"  {runs} runs; load average before: {os.getloadavg()[0]:.2f}")
+    seconds = {}
+    for jobs in (1, 2):
+        with tempfile.TemporaryDirectory() as folder:
+            command = [
+                sys.executable,
+                "-m",
+                "airtruth",
+                "fly",
+                CAMPAIGN,
+                "--runs",
+                runs,
+                "--jobs",
+                jobs,
+                "--out",
+                folder,
+            ]
+            start = time.perf_counter()
+            subprocess.run([str(c) for c in command], check=True, stdout=subprocess.DEVNULL)
+            seconds[jobs] = time.perf_counter() - start
+            print(f"  {jobs} process(es): {seconds[jobs]:.1f} s, {runs / seconds[jobs]:.0f} runs/s")
+    return seconds[1] / seconds[2]
+
+
+def peak_memory(runs: int) -> float:
+    """Peak resident memory [MB] of a fresh process that flies all chunks of a campaign, as a worker does."""
+    command = [sys.executable, __file__, "--worker", str(runs)]
+    return float(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
+def worker(runs: int) -> None:
+    """Fly every chunk and print the peak memory [MB]."""
+    from airtruth.fly import plan
+    from airtruth.fly.chunk import Pilot
+
+    made = plan.make(CAMPAIGN, runs=runs)
+    pilot = Pilot(made)
+    with tempfile.TemporaryDirectory() as logs, tempfile.TemporaryDirectory() as truths:
+        for chunk in sorted(made.table["chunk"].unique()):
+            pilot.fly_chunk(int(chunk), Path(logs), Path(truths))
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+
+
+def help_s() -> float:
+    """Median wall time of --help [s]."""
+    seconds = []
+    for _ in range(7):
+        start = time.perf_counter()
+        subprocess.run([sys.executable, "-m", "airtruth", "--help"], check=True, stdout=subprocess.DEVNULL)
+        seconds.append(time.perf_counter() - start)
+    return statistics.median(seconds)
+
+
+def report(name: str, value: float, ok: bool, bar: str) -> None:
+    """One line of the result."""
+    print(f"{name:<44} {value:8.2f}   bar: {bar:<14} {'met' if ok else 'MISSED'}")
+
+
+def main(full: bool) -> None:
+    """Print every figure beside its bar."""
+    seconds = help_s()
+    report("--help [s]", seconds, seconds < BARS["help"], f"under {BARS['help']}")
+    ratio = overhead()
+    report(
+        "CPU a step over a bare run() loop", ratio, ratio <= BARS["overhead"], f"at most {BARS['overhead']}"
+    )
+    sizes = (100, 1000, 10_000) if full else (100, 1000)
+    peaks = [peak_memory(runs) for runs in sizes]
+    print(
+        "  peak of a worker: "
+        + ", ".join(f"{n} runs {mb:.0f} MB" for n, mb in zip(sizes, peaks, strict=True))
+    )
+    growth = peaks[-1] / peaks[0]
+    report(
+        f"memory, {sizes[-1]} runs over 100", growth, growth <= BARS["memory"], f"at most {BARS['memory']}"
+    )
+    gain = speed_up(3000 if full else 1000)
+    print(
+        f"  two processes that share nothing, once more: {machine():.2f} times; below 1.9 the next line says nothing"
+    )
+    report("two processes over one", gain, gain >= BARS["speed-up"], f"at least {BARS['speed-up']}")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--full", action="store_true")
+    parser.add_argument("--worker", type=int, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    worker(arguments.worker) if arguments.worker else main(arguments.full)
