@@ -184,9 +184,7 @@ def _integrate(
         state[0], state[1], state[2], state[3] = trim[0], trim[1], 0.0, trim[3]
         for k in range(elevator.shape[1]):
             now = elevator[r, k]
-            _rates(
-                state, now, trim, shift[r], v_axis, alpha_axis, elevator_axis, q_axis, values, rate[0]
-            )
+            _rates(state, now, trim, shift[r], v_axis, alpha_axis, elevator_axis, q_axis, values, rate[0])
             out[r, :4, k] = state
             out[r, 4:, k] = rate[0, 4:]
             if k + 1 == elevator.shape[1]:
