@@ -7,7 +7,7 @@ JOBS ?= $(shell nproc 2>/dev/null || echo 2)
 OUT ?= out
 CAMPAIGNS := light light-fit moderate moderate-fit
 
-.PHONY: help setup campaign campaign-quick test lint bench clean
+.PHONY: help setup campaign campaign-quick study test lint bench clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -26,6 +26,11 @@ campaign: $(READY) ## fly data/campaigns, identify, print the paper's tables, dr
 campaign-quick: $(READY) ## the same with a tenth of the runs
 	$(BIN)/python scripts/campaign.py --out $(OUT)/quick --jobs $(JOBS) --quick
 
+study: $(READY) ## every cause behind docs/paper.md and docs/closed_loop.md, off and on (about ten minutes)
+	$(BIN)/python scripts/paper_study.py --out $(OUT)/study --jobs $(JOBS)
+	$(BIN)/python scripts/closed_loop_study.py
+	$(BIN)/python scripts/foreign_aircraft.py
+
 test: $(READY) lint ## lint, type-check and run every test
 	$(BIN)/python -m pytest -n $(JOBS) --dist loadgroup
 
@@ -38,6 +43,7 @@ lint: $(READY) ## ruff, mypy --strict, the import contract
 bench: $(READY) ## ratios against bare baselines and peers
 	$(BIN)/python benchmarks/bench_fly.py
 	$(BIN)/python benchmarks/bench_identify.py
+	$(BIN)/python benchmarks/bench_filter_error.py
 
 clean: ## remove the environment, caches and output
 	rm -rf $(VENV) $(OUT) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

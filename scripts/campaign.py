@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airtruth import aircraft
 from airtruth.errors import AirtruthError
@@ -43,6 +44,7 @@ METHODS = {
 PAPER = Options(airspeed_m_s=42.852)
 """As the paper: the dynamic pressure is that of the trim. The trim itself is a free constant (docs/paper.md)."""
 QUICK_DIVISOR = 10
+FIGURE_4_S = (1.0, 7.0)
 ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -107,8 +109,10 @@ def draw(out: Path, gtm: aircraft.Aircraft) -> list[Path]:
     a, b = short_period.system(linear.plus, linear.scale)
     drawn["figure1.png"] = figures.filters(a, b, "Dynamic filters (the paper's Fig. 1)")
     light = next(batches(read_log(log_paths(out / "light-fit")[-1])))
+    t = light.t_s[0, 1:-1]
+    shown = (t >= FIGURE_4_S[0]) & (t <= FIGURE_4_S[1])
     drawn["figure4.png"] = figures.outputs(
-        light.t_s[0, 1:-1], output_fits(light, gtm), "Outputs (the paper's Fig. 4)"
+        t[shown], output_fits(light, gtm, shown), "Outputs (the paper's Fig. 4)"
     )
     printed = published.load()
     for name in CAMPAIGNS:
@@ -146,7 +150,9 @@ def flight_versions(batch: Batch, gtm: aircraft.Aircraft) -> dict[str, dict[str,
     }
 
 
-def output_fits(batch: Batch, gtm: aircraft.Aircraft) -> dict[str, figures.OutputFit]:
+def output_fits(
+    batch: Batch, gtm: aircraft.Aircraft, shown: NDArray[np.bool_]
+) -> dict[str, figures.OutputFit]:
     """Low-passed outputs of the last run against those of its LS and IV(f1) estimates."""
     last = Batch(
         batch.run_ids[-1:], batch.dt_s, batch.t_s[-1:], {n: v[-1:] for n, v in batch.channels.items()}
@@ -158,7 +164,9 @@ def output_fits(batch: Batch, gtm: aircraft.Aircraft) -> dict[str, figures.Outpu
         measured = residuals(last, gtm, nothing, PAPER)[0]
         error = residuals(last, gtm, estimates, PAPER)[0]
         bound = 3.0 * error.std(axis=1, keepdims=True)
-        fits[{"ls": "LS", "iv-f1": "IV(f1)"}[name]] = figures.OutputFit(measured, measured - error, bound)
+        fits[{"ls": "LS", "iv-f1": "IV(f1)"}[name]] = figures.OutputFit(
+            measured[:, shown], (measured - error)[:, shown], bound
+        )
     return fits
 
 

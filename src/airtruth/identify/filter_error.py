@@ -1,0 +1,195 @@
+"""Filter error: the derivatives by maximum likelihood, with the turbulence in the model.
+
+Kalman innovations of the linear short period in Dryden gusts (`airtruth.identify.predictor`), their
+likelihood maximised by scoring with a Levenberg-Marquardt damping. Output biases and initial states are
+each record's own and exact at every step; noise and gust levels are known, or estimated about declared
+values. Without gusts it is output error.
+
+Source: R. E. Maine and K. W. Iliff, "Identification of Dynamic Systems", NASA RP-1138 (1985).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.identify.condition import AircraftConstants, observe
+from airtruth.identify.filter_options import CHANNELS, FilterOptions, free_parameters
+from airtruth.identify.filter_search import Fit, Scored, search
+from airtruth.identify.intersample import servo_bend
+from airtruth.identify.kalman import score_runs
+from airtruth.identify.options import Options
+from airtruth.identify.predictor import Layout, layout, short_period
+from airtruth.identify.results import JOINT, Estimates
+from airtruth.logs.flight_log import Batch
+from airtruth.physics.short_period import PARAMETERS, Scale
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Records:
+    """Runs of one length as the filter reads them.
+
+    Attributes
+    ----------
+    dt_s : sample period [s].
+    y : (runs, samples, outputs) relative to the first sample.
+    u, bend : (runs, samples, inputs) elevator relative to its first sample, and mean over the cell that
+        ends at a sample less the mean of its two samples [rad].
+    layout : the predictor's arrays.
+    scale : factors of shape (runs,).
+    """
+
+    dt_s: float
+    y: Array
+    u: Array
+    bend: Array
+    layout: Layout
+    scale: Scale
+
+
+def records(batch: Batch, constants: AircraftConstants, options: FilterOptions) -> Records:
+    """Signals and predictor of a batch; nothing is checked.
+
+    The elevator between samples has the area of the cubic through the four nearest samples, and the
+    corners of a first-order servo behind a held command where the record shows one
+    (`airtruth.identify.intersample`).
+    """
+    condition = Options(condition=options.condition, airspeed_m_s=options.airspeed_m_s)
+    scale = observe(batch, constants, condition).scale
+    y = np.stack([batch.channels[CHANNELS[name]] for name in options.outputs], axis=2)
+    elevator = batch.channels["elevator_rad"]
+    u = elevator - elevator[:, :1]
+    bend = servo_bend(u)
+    edge = np.concatenate([u[:, :1], u, u[:, -1:]], axis=1)
+    bend[:, 1:] += (edge[:, 1:-2] + edge[:, 2:-1] - edge[:, :-3] - edge[:, 3:]) / 24.0
+    predictor = short_period(scale, options.length_u_m, options.length_w_m, options.outputs)
+    return Records(
+        dt_s=batch.dt_s,
+        y=y - y[:, :1],
+        u=np.ascontiguousarray(u[:, :, None]),
+        bend=np.ascontiguousarray(bend[:, :, None]),
+        layout=layout(predictor, y.shape[0]),
+        scale=scale,
+    )
+
+
+def fit(batch: Batch, constants: AircraftConstants, start: Array, options: FilterOptions) -> Estimates:
+    """Estimate the six derivatives of each run; nothing is checked.
+
+    A result does not depend on the other runs of the batch.
+
+    Parameters
+    ----------
+    batch : runs of one length and sample period, with density, airspeed, the outputs and the elevator.
+    constants : aircraft, any object with wing_area_m2, chord_m, mass_kg, inertia_yy_kg_m2.
+    start : (runs, 6) where to begin, such as the estimates of iv-f1; a row that is not finite has no
+        estimate (DIVERGED).
+    options : declared noise and air, and how to search.
+    """
+    data = records(batch, constants, options)
+    free = free_parameters(options)
+
+    def evaluate(z: Array, active: Ints) -> Scored:
+        return scored(data, z, active, free)
+
+    found = search(evaluate, start, options)
+    return _estimates(found, batch.run_ids, data.scale, options)
+
+
+def fit_joint(
+    parts: Sequence[Batch], constants: AircraftConstants, start: Array, options: FilterOptions
+) -> Estimates:
+    """One estimate for all runs together: derivatives and levels are shared, nothing is checked.
+
+    Flight condition, biases and initial states stay each run's own. All runs are held in memory.
+
+    Parameters
+    ----------
+    parts : batches; lengths and rates may differ.
+    constants, options : as in `fit`.
+    start : (6,) where to begin.
+    """
+    data = [records(batch, constants, options) for batch in parts]
+    free = free_parameters(options)
+
+    def evaluate(z: Array, active: Ints) -> Scored:
+        cost, gradient, information = (
+            np.zeros(1),
+            np.zeros((1, free.size)),
+            np.zeros((1, free.size, free.size)),
+        )
+        for part in data:
+            runs = part.y.shape[0]
+            c, g, i = scored(part, np.repeat(z, runs, axis=0), np.arange(runs), free)
+            cost += c.sum()
+            gradient += g.sum(axis=0)
+            information += i.sum(axis=0)
+        return cost, gradient, information
+
+    found = search(evaluate, start[None, :], options)
+    scale = Scale(
+        *(
+            np.concatenate([getattr(part.scale, name) for part in data]).mean(keepdims=True)
+            for name in Scale.__dataclass_fields__
+        )
+    )
+    return _estimates(found, (JOINT,), scale, options)
+
+
+def scored(data: Records, z: Array, active: Ints, free: Ints) -> Scored:
+    """Negative log-likelihood, gradient and information of the runs ``active``, no prior.
+
+    Parameters
+    ----------
+    z : (active, parameters) derivatives, then logarithms of the levels.
+    active, free : runs; parameters to differentiate for.
+
+    Returns
+    -------
+    (active,), (active, free), (active, free, free).
+    """
+    cost = np.empty(active.size)
+    gradient = np.zeros((active.size, free.size))
+    information = np.zeros((active.size, free.size, free.size))
+    a = data.layout
+    score_runs(
+        np.ascontiguousarray(z),
+        active,
+        free,
+        a.place,
+        a.coefficient,
+        a.logarithmic,
+        a.moves,
+        a.precision,
+        a.sizes,
+        data.y,
+        data.u,
+        data.bend,
+        data.dt_s,
+        cost,
+        gradient,
+        information,
+    )
+    return cost, gradient, information
+
+
+def _estimates(found: Fit, run_ids: tuple[str, ...], scale: Scale, options: FilterOptions) -> Estimates:
+    six = len(PARAMETERS)
+    gusts = options.sigma_u_m_s > 0.0 or options.sigma_w_m_s > 0.0
+    return Estimates(
+        method="filter-error" if gusts else "output-error",
+        run_ids=run_ids,
+        theta=found.z[:, :six],
+        covariance=found.covariance[:, :six, :six],
+        covariance_name="fisher",
+        status=found.status,
+        iterations=found.iterations,
+        scale=scale,
+        confidence=options.confidence,
+    )

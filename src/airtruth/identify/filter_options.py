@@ -1,0 +1,104 @@
+"""What a user declares to filter error: noise of the sensors, the air, and how to search."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.errors import ConfigurationError
+from airtruth.identify.options import Options
+from airtruth.physics.short_period import PARAMETERS
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+CHANNELS: Final = {
+    "alpha": "alpha_rad",
+    "q": "q_rad_s",
+    "az": "az_m_s2",
+    "airspeed": "airspeed_m_s",
+}
+"""Output of the predictor -> column of the log."""
+
+
+@dataclass(frozen=True)
+class FilterOptions:
+    """Declared noise and air, and how to search.
+
+    Attributes
+    ----------
+    alpha_std_rad, q_std_rad_s, az_std_m_s2 : standard deviation of the sensors' white noise per sample.
+    sigma_u_m_s, sigma_w_m_s : standard deviations of the gusts [m/s]; both 0 is output error.
+    length_u_m, length_w_m : their scale lengths [m].
+    airspeed_std_m_s : noise of the airspeed [m/s]; None does not use airspeed as an output.
+    level_prior : standard deviation of the logarithm of each level about its declared value [-]; None
+        takes the declared values as known. A level declared 0 stays 0.
+    tolerance : a fit has converged once a step would move it by less than this many standard errors,
+        all parameters together; that last step is taken.
+    maximum_iterations : steps after which a fit is reported as not converged.
+    condition, airspeed_m_s : flight condition, as in `airtruth.identify.Options`.
+    confidence : probability of the intervals [-].
+    """
+
+    alpha_std_rad: float
+    q_std_rad_s: float
+    az_std_m_s2: float
+    sigma_u_m_s: float
+    sigma_w_m_s: float
+    length_u_m: float
+    length_w_m: float
+    airspeed_std_m_s: float | None = None
+    level_prior: float | None = 0.2
+    tolerance: float = 0.02
+    maximum_iterations: int = 50
+    condition: str = "motion"
+    airspeed_m_s: float | None = None
+    confidence: float = 0.95
+
+    def __post_init__(self) -> None:
+        """Refuse values that mean nothing.
+
+        Raises
+        ------
+        ConfigurationError
+            Naming the option, its value and what is allowed.
+        """
+        positive = ("alpha_std_rad", "q_std_rad_s", "az_std_m_s2", "length_u_m", "length_w_m", "tolerance")
+        for name in (*positive, "airspeed_std_m_s", "level_prior", "sigma_u_m_s", "sigma_w_m_s"):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            zero = name.startswith("sigma")
+            if not (value >= 0.0 if zero else value > 0.0) or value == np.inf:
+                raise ConfigurationError(
+                    f"filter option {name} = {value!r}: must be {'at least' if zero else 'above'} 0 and finite"
+                )
+        if self.maximum_iterations < 1:
+            raise ConfigurationError(
+                f"filter option maximum_iterations = {self.maximum_iterations!r}: must be at least 1"
+            )
+        Options(condition=self.condition, airspeed_m_s=self.airspeed_m_s, confidence=self.confidence)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Outputs of the predictor that are compared with the log."""
+        return ("alpha", "q", "az") if self.airspeed_std_m_s is None else tuple(CHANNELS)
+
+    @property
+    def levels(self) -> Array:
+        """(2 + outputs,) declared sigma_u, sigma_w [m/s] and noise of each output, as in the predictor."""
+        noise = [self.alpha_std_rad, self.q_std_rad_s, self.az_std_m_s2]
+        if self.airspeed_std_m_s is not None:
+            noise.append(self.airspeed_std_m_s)
+        return np.array([self.sigma_u_m_s, self.sigma_w_m_s, *noise])
+
+
+def free_parameters(options: FilterOptions) -> Ints:
+    """Indices of what is estimated: the derivatives, and the levels unless known or 0."""
+    six = np.arange(len(PARAMETERS))
+    if options.level_prior is None:
+        return six
+    return np.concatenate([six, len(PARAMETERS) + np.flatnonzero(options.levels > 0.0)])
