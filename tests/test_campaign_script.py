@@ -11,7 +11,13 @@ ROOT = Path(__file__).resolve().parents[1]
 
 @pytest.mark.slow
 def test_quick_campaign_ends_in_tables_and_figures_and_resumes(tmp_path):
-    command = [sys.executable, str(ROOT / "scripts" / "campaign.py"), "--quick", "--out", str(tmp_path / "out")]
+    command = [
+        sys.executable,
+        str(ROOT / "scripts" / "campaign.py"),
+        "--quick",
+        "--out",
+        str(tmp_path / "out"),
+    ]
     first = subprocess.run(command, capture_output=True, text=True, check=False)
     assert first.returncode == 0, first.stderr
     for heading in ("Table 1.", "Table 2.", "Table 3."):
@@ -19,7 +25,13 @@ def test_quick_campaign_ends_in_tables_and_figures_and_resumes(tmp_path):
     tables = {p.name for p in (tmp_path / "out" / "tables").iterdir()}
     assert {"table1.md", "table2.csv", "table3.tex", "table1-fit.md", "table3-fit.csv"} <= tables
     figures = {p.name for p in (tmp_path / "out" / "figures").iterdir()}
-    assert {"flight.png", "figure1.png", "figure4.png", "estimates-light.png", "estimates-moderate-fit.png"} <= figures
+    assert {
+        "flight.png",
+        "figure1.png",
+        "figure4.png",
+        "estimates-light.png",
+        "estimates-moderate-fit.png",
+    } <= figures
     again = subprocess.run(command, capture_output=True, text=True, check=False)
     assert "(0 flown now, 0 failed)" in again.stdout
     assert again.stdout.split("Table 1.")[1:] == first.stdout.split("Table 1.")[1:]
