@@ -25,22 +25,9 @@ from airtruth.identify import Options, identify_batch, identify_files, residuals
 from airtruth.logs.flight_log import Batch, batches
 from airtruth.logs.store import log_paths, read_log, write_table
 from airtruth.physics import short_period
-from airtruth.report import distribution, figures, published, style, write_tables
+from airtruth.report import TABLES, distribution, figures, published, read_campaign, style, write_tables
 
 CAMPAIGNS = ("light", "light-fit", "moderate", "moderate-fit")
-METHODS = {
-    "light": (
-        "ls",
-        "iv-lowpass",
-        "iv-reference",
-        "iv-reference-regressor",
-        "iv-actuator",
-        "iv-actuator-regressor",
-        "iv-f1",
-        "iv-f2",
-    ),
-    "moderate": ("ls", "iv-lowpass", "iv-f1", "iv-f2"),
-}
 PAPER = Options(airspeed_m_s=42.852)
 """As the paper: the dynamic pressure is that of the trim. The trim itself is a free constant (docs/paper.md)."""
 QUICK_DIVISOR = 10
@@ -83,7 +70,7 @@ def report(out: Path) -> int:
     gtm = aircraft.load(ROOT / "aircraft" / "gtm")
     for name in CAMPAIGNS:
         print(f"identify {name}", file=sys.stderr)
-        estimates = identify_files([out / name], gtm, METHODS[name.split("-")[0]], PAPER)
+        estimates = identify_files([out / name], gtm, shown_methods(name), PAPER)
         write_table(out / name / "estimates.parquet", estimates)
     tables = write_tables([out / name for name in CAMPAIGNS], out / "tables")
     print(tables.text)
@@ -91,10 +78,14 @@ def report(out: Path) -> int:
     return 0
 
 
+def shown_methods(name: str) -> list[str]:
+    """Methods of the tables that a campaign, or the one that it is a variant of, appears in."""
+    columns = [m for spec in TABLES.values() if spec.campaign == name.split("-")[0] for m in spec.columns]
+    return list(dict.fromkeys(columns))
+
+
 def draw(out: Path, gtm: aircraft.Aircraft) -> list[Path]:
     """The figures: one flight, the filters (Fig. 1), the outputs (Fig. 4), the estimates' spread."""
-    from airtruth.report import read_campaign
-
     folder = out / "figures"
     folder.mkdir(exist_ok=True)
     log = read_log(log_paths(out / "moderate")[0])

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-import tomllib
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -40,10 +39,8 @@ METHODS = ("iv-f1", "ls")
 CMQ = PARAMETERS.index("Cmq")
 IN_FILE = {"c172x": (-12.4, -5.2, 3.9, 1.7), "T38": (-18.0, -9.0, 0.0, 0.0)}
 """Cmq, Cm alpha-dot, CLq, CL alpha-dot, per c/(2V), as the wheel's XML files state them."""
-BOTH_ENGINES = """
-[jsbsim.throttle]
-command = ["fcs/throttle-cmd-norm", "fcs/throttle-cmd-norm[1]"]
-"""
+SECOND_THROTTLE = ', "fcs/throttle-cmd-norm[1]"'
+"""What T38's aircraft.toml lacks when one of its two engines is left alone."""
 
 
 @dataclass(frozen=True)
@@ -56,10 +53,10 @@ class Flown:
     linear: Linearisation
 
 
-def copy(name: str, target: Path, edit: Edit | None = None, settings: str = "", more: str = "") -> Path:
+def copy(name: str, target: Path, edit: Edit | None = None, settings: str = "", without: str = "") -> Path:
     """Folder of an aircraft of this repository below ``target``, its wheel model copied where it is edited.
 
-    settings : entries added to jsbsim.set, as TOML; more : tables appended to aircraft.toml, unless there.
+    settings : entries added to jsbsim.set, as TOML; without : text taken out of aircraft.toml.
     """
     folder = target / "aircraft" / name
     shutil.copytree(ROOT / "aircraft" / name, folder)
@@ -75,9 +72,7 @@ def copy(name: str, target: Path, edit: Edit | None = None, settings: str = "", 
         tree = ET.parse(model)
         edit(tree.getroot())
         tree.write(model)
-    if "throttle" not in tomllib.loads(text)["jsbsim"]:
-        text += more
-    path.write_text(text)
+    path.write_text(text.replace(without, ""))
     return folder
 
 
@@ -211,11 +206,10 @@ def main() -> None:
             name: str,
             edit: Edit | None = None,
             settings: str = "",
-            more: str = BOTH_ENGINES,
+            without: str = "",
             changes: dict[str, object] | None = None,
         ) -> Flown:
-            wanted = more if name == "T38" else ""
-            folder = copy(name, Path(scratch) / str(next(counter)), edit, settings, wanted)
+            folder = copy(name, Path(scratch) / str(next(counter)), edit, settings, without)
             return fly(name, folder, changes)
 
         print(HEADER + " |\n|---|---|---|---|---|---|")
@@ -229,7 +223,7 @@ def main() -> None:
                 f"{c['airspeed_m_s'].min():.2f} to {c['airspeed_m_s'].max():.2f} m/s | | | | |"
             )
         print("\n" + HEADER + " |\n|---|---|---|---|---|---|")
-        row("T38, one throttle of two", made("T38", more=""))
+        row("T38, one throttle of two", made("T38", without=SECOND_THROTTLE))
         row("T38, no Cm alpha-dot", made("T38", without_functions("aero/coefficient/Cmadot")))
         row("f16, 0.05 deg", made("f16", changes={"amplitude_deg": 0.05}))
         row("f16, 3-2-1-1", made("f16", changes={"kind": '"3211"'}))

@@ -14,7 +14,7 @@ MOMENT = slice(3, 6)
 
 
 def flown(name, tmp_path, **changes):
-    folder = foreign.copy(name, tmp_path, more=foreign.BOTH_ENGINES if name == "T38" else "", **changes)
+    folder = foreign.copy(name, tmp_path, **changes)
     return foreign.fly(name, folder)
 
 

@@ -28,7 +28,6 @@ from airtruth.physics.short_period import MODAL, PARAMETERS
 Array = NDArray[np.float64]
 
 _CACHED_CONDITIONS: Final = 4
-LOG_SCHEMA: Final = 1
 
 
 @dataclass(frozen=True)
@@ -192,7 +191,7 @@ def _unit_gust(
 
 def _log_metadata(plan: Plan) -> Mapping[str, object]:
     """What a log says of itself: nothing of gusts, draws or the truth."""
-    return {"schema": LOG_SCHEMA, "aircraft": plan.aircraft.name, "sample_rate_hz": plan.campaign.log_hz}
+    return {"aircraft": plan.aircraft.name, "sample_rate_hz": plan.campaign.log_hz}
 
 
 def truth_row(row: Row, prepared: Prepared | None) -> dict[str, object]:

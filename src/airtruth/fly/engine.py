@@ -19,7 +19,7 @@ from airtruth.aircraft_probe import model_root
 from airtruth.errors import AircraftError
 from airtruth.units import FT, KT, SLUG
 
-AB3: Final = 4.0  # JSBSim's number for third-order Adams-Bashforth
+_AB3: Final = 4.0  # JSBSim's number for third-order Adams-Bashforth
 _INTEGRATORS: Final = tuple(
     f"simulation/integrator/{order}/{kind}"
     for order in ("rate", "position")
@@ -95,9 +95,13 @@ class Executive:
         self._manager = self.fdm.get_property_manager()
         self._propulsion = self.fdm.get_propulsion()
         self._has_engines = self._propulsion.get_num_engines() > 0
-        for name in _INTEGRATORS:
-            self.node(name).set_double_value(AB3)
+        self.choose_integrator()
         self.configure()
+
+    def choose_integrator(self) -> None:
+        """Third-order Adams-Bashforth throughout; a reset restores Euler."""
+        for name in _INTEGRATORS:
+            self.fdm[name] = _AB3
 
     def configure(self) -> None:
         """Write the properties that aircraft.toml sets (engines running, gear up ...)."""

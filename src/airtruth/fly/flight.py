@@ -11,19 +11,13 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import ConfigurationError, FlightError
-from airtruth.fly.engine import AB3, Controls, Executive
+from airtruth.fly.engine import Controls, Executive
 from airtruth.fly.trim import Trim
 from airtruth.physics import atmosphere
 from airtruth.units import FT, SLUG
 
 Array = NDArray[np.float64]
 
-_INTEGRATORS: Final = (
-    "rate/rotational",
-    "rate/translational",
-    "position/rotational",
-    "position/translational",
-)
 _MAX_ALPHA_RAD: Final = 1.5
 
 
@@ -153,8 +147,7 @@ class Flight:
             setter(first_value)
         executive.settle()
         fdm.set_trim_status(inputs.surface)  # trim status lets actuators pass their input through
-        for kind in _INTEGRATORS:  # a reset restores Euler
-            fdm[f"simulation/integrator/{kind}"] = AB3
+        executive.choose_integrator()
 
         gets = [node.get_double_value for node in self._read]
         records = [get() for get in gets]
