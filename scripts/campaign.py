@@ -80,7 +80,7 @@ def report(out: Path) -> int:
 
 def shown_methods(name: str) -> list[str]:
     """Methods of the tables that a campaign, or the one that it is a variant of, appears in."""
-    columns = [m for spec in TABLES.values() if spec.campaign == name.split("-")[0] for m in spec.columns]
+    columns = [m for spec in TABLES.values() if spec.campaign == name.split("-")[0] for m in spec.methods]
     return list(dict.fromkeys(columns))
 
 

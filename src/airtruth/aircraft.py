@@ -12,6 +12,7 @@ from airtruth import quantity as qt
 from airtruth.aircraft_probe import Constants, probe
 from airtruth.errors import AircraftError, choices
 from airtruth.quantity import Quantity, Strict
+from airtruth.physics.short_period import PARAMETERS
 from airtruth.signals import SIGNALS
 
 FILE: Final = "aircraft.toml"
@@ -130,7 +131,12 @@ class JsbsimModel(Strict):
 
 
 class AircraftFile(Strict):
-    """aircraft.toml."""
+    """aircraft.toml.
+
+    derivatives: the six short-period derivatives about the CG, by the names of
+    `airtruth.physics.short_period.PARAMETERS`, with their uncertainty. Where there is a JSBSim model its
+    own values count, and only the ratio std/value is taken from here.
+    """
 
     schema_: Literal[1] = Field(default=1, alias="schema")
     name: str = Field(pattern=r"^[A-Za-z0-9_.-]+$")
@@ -139,7 +145,16 @@ class AircraftFile(Strict):
     mass: MassProperties | None = None
     jsbsim: JsbsimModel | None = None
     elevator_actuator: Actuator | None = None
+    derivatives: dict[str, qt.Ratio] = Field(default_factory=dict)
     sensors: dict[str, Sensor] = Field(default_factory=dict)
+
+    @field_validator("derivatives")
+    @classmethod
+    def _known_derivatives(cls, value: dict[str, Quantity]) -> dict[str, Quantity]:
+        for name in value:
+            if name not in PARAMETERS:
+                raise ValueError(f"{name!r} is not a derivative; {choices(name, PARAMETERS)}")
+        return value
 
     @field_validator("sensors", mode="before")
     @classmethod

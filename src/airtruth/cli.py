@@ -94,6 +94,28 @@ def fly(
         raise typer.Exit(FAILED_RUNS)
 
 
+@app.command(epilog="Example: airtruth plan data/campaigns/light.toml --pressure measured")
+def plan(
+    campaign: Annotated[
+        Path, typer.Argument(metavar="CAMPAIGN.toml", help="Campaign file, see docs/campaigns.md.")
+    ],
+    records: Annotated[
+        int | None, typer.Option(min=1, help="Number of records, in place of the file's number of runs.")
+    ] = None,
+    pressure: Annotated[
+        str, typer.Option(help="constant: nothing is taken from the airspeed; measured: it is used.")
+    ] = "constant",
+    json_: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Say how well a campaign can tell the six derivatives, before it is flown."""
+    from airtruth.fly import plan as planning
+    from airtruth.identify import as_text
+    from airtruth.report import forecast as forecasts
+
+    made = forecasts.forecast(planning.make(campaign), records, pressure)
+    print(forecasts.as_json(made) if json_ else as_text(forecasts.as_table(made)))
+
+
 @app.command(epilog="Example: airtruth identify out/light --aircraft gtm --method iv-f1 --method ls")
 def identify(
     logs: Annotated[
@@ -121,6 +143,12 @@ def identify(
     airspeed_m_s: Annotated[
         float | None, typer.Option(help="True airspeed to use in place of the measured one [m/s].")
     ] = None,
+    pressure: Annotated[
+        str,
+        typer.Option(
+            help="Dynamic pressure: constant over a record, measured at each sample, or the method's own."
+        ),
+    ] = "method",
     covariance: Annotated[
         str, typer.Option(help="printed, white, coloured, corrected or none.")
     ] = "corrected",
@@ -140,6 +168,7 @@ def identify(
         trim_window_s=trim_window_s,
         condition=condition,
         airspeed_m_s=airspeed_m_s,
+        pressure=pressure,
         covariance=covariance,
         tolerance=tolerance,
     )
@@ -153,6 +182,51 @@ def identify(
     print(estimates.to_json(orient="records", indent=1) if json_ else as_text(overview(estimates)))
 
 
+@app.command(
+    epilog="Example: airtruth trace data/undeclared/elevator-delay.parquet --aircraft gtm --out out/trace"
+)
+def trace(
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG...", help="Flight logs of one aircraft, or folders of them.")
+    ],
+    aircraft: Annotated[str, typer.Option(metavar="A", help="The declared aircraft: a folder, or a shipped name.")],
+    out: Annotated[Path, typer.Option(help="Folder of trace.json, figures and the updated aircraft.")],
+    model: Annotated[
+        str, typer.Option(help="aircraft: forces probed in JSBSim; linear: the linear short-period model.")
+    ] = "aircraft",
+    hold_out: Annotated[
+        list[str] | None,
+        typer.Option(metavar="RUN_ID", help="Run kept for the report alone; may be repeated. Default: every third."),
+    ] = None,
+    jobs: Annotated[int, typer.Option(min=1, help="Threads; the answer does not depend on it.")] = os.cpu_count()
+    or 1,
+    seed: Annotated[int, typer.Option(min=0, help="Of the draws behind p-values.")] = 0,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(metavar="KEY", help="Candidate, may be repeated; default: all of `airtruth effects`."),
+    ] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print trace.json.")] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Name the effect that a declared aircraft lacks, add it, and report the error before and after."""
+    import json
+
+    from airtruth.report import as_trace_text, write_trace_figures
+    from airtruth.trace import TraceOptions, run
+
+    options = TraceOptions(
+        model=model,
+        hold_out=None if hold_out is None else tuple(hold_out),
+        threads=jobs,
+        seed=seed,
+        effects=None if effect is None else tuple(effect),
+    )
+    with _status("trace", quiet) as advance:
+        found = run(logs, aircraft, options, out, advance)
+        write_trace_figures(found, out)
+    print(json.dumps(found.answer, indent=1) if json_ else as_trace_text(found.answer))
+
+
 @app.command(epilog="Example: airtruth tables out/light out/moderate --out out/tables")
 def tables(
     folders: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Identified campaign folders.")],
@@ -162,6 +236,101 @@ def tables(
     from airtruth.report import write_tables
 
     print(write_tables(folders, out).text)
+
+
+@app.command(epilog="Example: airtruth effects elevator_delay")
+def effects(
+    name: Annotated[list[str] | None, typer.Argument(metavar="[NAME]...", help="Only these.")] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """List and explain the effects that can be flown and traced."""
+    from airtruth.effects import library, listing
+
+    chosen = [e for n in name for e in library.named(n)] if name else list(library.EFFECTS.values())
+    print(listing.as_json(chosen) if json_ else listing.as_text(chosen))
+
+
+@app.command(
+    name="import", epilog="Example: airtruth import flight7.mat --mapping flight7.toml --out flight7.parquet"
+)
+def import_(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help=".csv, .txt, .mat, .parquet or .ulg.")],
+    mapping: Annotated[
+        Path | None,
+        typer.Option(metavar="MAP.toml", help="Which column is which channel, see docs/measured.md."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="LOG.parquet", help="Flight log to write.")] = None,
+    guess: Annotated[
+        bool, typer.Option("--guess", help="Print a mapping to start from, import nothing.")
+    ] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Write the log although its mapping contradicts physics.")
+    ] = False,
+) -> None:
+    """Bring a measured log of another format under the log contract."""
+    from airtruth.errors import ConfigurationError
+    from airtruth.logs import importers
+
+    if guess:
+        print(importers.guess_mapping(file), end="")
+        return
+    if mapping is None or out is None:
+        raise ConfigurationError(
+            "import needs --mapping MAP.toml and --out LOG.parquet; "
+            f"`airtruth import --guess {file}` prints a mapping to start from"
+        )
+    from airtruth.logs.store import write_log
+
+    imported = importers.import_log(file, mapping, force=force)
+    write_log(out, imported.log, dtype="float64")
+    for problem in imported.problems:
+        print(f"airtruth: {problem.sentence}", file=sys.stderr)
+    log = imported.log
+    print(f"{len(log.run_ids)} runs, {len(log.t_s)} rows in {out}: {', '.join(log.channels)}")
+
+
+@app.command(epilog="Example: airtruth check flight7.parquet --aircraft totter")
+def check(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="Flight log, or folder of logs.")],
+    aircraft: Annotated[
+        str | None, typer.Option(metavar="A", help="Aircraft whose declared sensors are taken as known.")
+    ] = None,
+    run: Annotated[
+        list[str] | None, typer.Option(metavar="RUN_ID", help="Only this run, may be repeated.")
+    ] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Judge the channels of a log against each other: biases, scales, arms, delays."""
+    import json
+
+    from airtruth import aircraft as planes
+    from airtruth.identify import as_text, kinematics, kinematics_report
+    from airtruth.logs.store import log_paths, read_log
+
+    declared = kinematics.declared_errors(planes.load(aircraft)) if aircraft else {}
+    answers = []
+    for path in log_paths(log):
+        answer = kinematics.check_kinematics(read_log(path, run_ids=run), declared)
+        answers.append({"file": str(path), **answer.as_dict()})
+        if not json_:
+            print("\n\n".join(as_text(table) for table in kinematics_report.tables(answer)))
+    if json_:
+        print(json.dumps(answers[0] if len(answers) == 1 else answers, indent=1))
+
+
+@contextmanager
+def _status(verb: str, quiet: bool) -> Iterator[Callable[[str], None]]:
+    """A line on stderr that says what is being done; one line each where that is no terminal."""
+    if quiet:
+        yield lambda what: None
+        return
+    if not sys.stderr.isatty():
+        yield lambda what: print(f"airtruth {verb}: {what}", file=sys.stderr, flush=True)
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status(verb) as status:
+        yield lambda what: status.update(f"{verb}: {what}")
 
 
 @contextmanager

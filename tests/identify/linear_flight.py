@@ -2,7 +2,8 @@
 
 The elevator is a 5 Hz first-order servo behind a held command; air moves in Dryden gusts; the dynamic
 pressure is constant, so that the model of the estimators is true. Everything is stepped by the matrix
-exponential of the whole system, inputs held (command) or linear (gusts) over a step.
+exponential of the whole system, inputs held (command) or linear (gusts) over a step. With ``acting`` the
+dynamic pressure follows the u gust in every term instead, by Runge and Kutta's fourth-order steps.
 """
 
 from __future__ import annotations
@@ -72,10 +73,15 @@ def fly(
     shape=doublet,
     alpha_trim_rad=5.56 * DEG,
     first_s=0.0,
+    acting=False,
+    airspeed_std_m_s=None,
+    wind=None,
 ) -> Batch:
     """Runs of a record; ``gust`` times the light level, ``noise`` times the sensors' own.
 
-    ``first_s`` cuts the start of the record away, so that it begins in motion.
+    ``first_s`` cuts the start of the record away, so that it begins in motion. ``acting``: the pressure
+    follows the gust. ``airspeed_std_m_s``: the airspeed is measured, with this noise; None logs its mean.
+    ``wind``: t [s] -> head wind [m/s] that builds up besides the gusts; it needs ``acting`` and is measured.
     """
     fine = 200 if 200 % rate_hz == 0 else rate_hz
     dt = 1.0 / fine
@@ -102,6 +108,9 @@ def fly(
         )
         discrete = dryden.discretise(model, dt)
         air = dryden.simulate(discrete, rng.normal(size=(runs, samples, discrete.phi.shape[-1])), "rest")
+    if wind is not None:
+        air[:, :, 0] += wind(t)
+        airspeed_std_m_s = airspeed_std_m_s or 0.0
     command = np.broadcast_to(amplitude_rad * shape(t - delay_s), (runs, samples))
     drive = np.stack([command, air[:, :, 1] / AIRSPEED_M_S, air[:, :, 0]], axis=2)
     state = np.zeros((runs, samples, 3))
@@ -110,15 +119,24 @@ def fly(
         then[:, 0] = now[:, 0]
         state[:, k + 1] = state[:, k] @ step.T + now @ (held - late).T + then @ late.T
     alpha = state[:, :, 0] + drive[:, :, 1]
+    if acting:
+        alpha, state[:, :, 1], az = _acting(theta, s, state[:, :, 2], air, dt)
     q, de = state[:, :, 1], state[:, :, 2]
-    force = theta[0] * alpha + s.half_chord_time * theta[1] * q + theta[2] * de
-    az = -s.normal * force - G0 * (1.0 + 2.0 * air[:, :, 0] / AIRSPEED_M_S)
+    if not acting:
+        force = theta[0] * alpha + s.half_chord_time * theta[1] * q + theta[2] * de
+        az = -s.normal * force - G0 * (1.0 + 2.0 * air[:, :, 0] / AIRSPEED_M_S)
     sigma = [noise * n for n in NOISE]
     signals = [alpha + alpha_trim_rad, q, az, de + 0.1 * DEG]
     alpha, q, az, de = (x + n * rng.normal(size=x.shape) for x, n in zip(signals, sigma, strict=True))
+    airspeed = np.full_like(alpha, AIRSPEED_M_S)
+    if airspeed_std_m_s is not None:
+        # a stream of its own: the other channels do not depend on it
+        airspeed += air[:, :, 0] + airspeed_std_m_s * np.random.default_rng([seed, 1]).normal(
+            size=alpha.shape
+        )
     keep = slice(round(first_s * fine), None, fine // rate_hz)
     channels = {
-        "airspeed_m_s": np.full_like(alpha, AIRSPEED_M_S),
+        "airspeed_m_s": airspeed,
         "alpha_rad": alpha,
         "q_rad_s": q,
         "az_m_s2": az,
@@ -129,6 +147,44 @@ def fly(
     channels = {name: np.ascontiguousarray(values[:, keep]) for name, values in channels.items()}
     t = np.tile(t[keep] - t[keep][0], (runs, 1))
     return Batch(tuple(f"run-{i:04d}" for i in range(runs)), 1.0 / rate_hz, t, channels)
+
+
+def _acting(theta, s, de, air, dt):
+    """alpha at the vane, q and az with dynamic pressure (V + u)^2 rho/2 in every term, elevator given.
+
+    The elevator between samples is that of the servo: its value in the middle of a step lies
+    exp(-dt/2 tau) of the way back from the command, of which the ends of the step tell.
+    """
+    rho = np.exp(-SERVO_RAD_S * dt)
+    command = (de[:, 1:] - rho * de[:, :-1]) / (1.0 - rho)
+    middle = command + np.sqrt(rho) * (de[:, :-1] - command)
+
+    def coefficients(x, u, w, elevator):
+        v = AIRSPEED_M_S + u
+        alpha, half = x[0] + w / v, GTM.chord_m / (2.0 * v) * x[1]
+        return (
+            (v / AIRSPEED_M_S) ** 2,
+            theta[0] * alpha + theta[1] * half + theta[2] * elevator,
+            theta[3] * alpha + theta[4] * half + theta[5] * elevator,
+        )
+
+    def rate(x, u, w, elevator):
+        ratio, lift, moment = coefficients(x, u, w, elevator)
+        surplus = ratio * (G0 + s.normal * lift) - G0
+        return np.stack([x[1] - surplus / AIRSPEED_M_S, ratio * s.moment * moment])
+
+    runs, samples = de.shape
+    x = np.zeros((2, runs, samples))
+    for k in range(samples - 1):
+        now, then = (air[:, k, 0], air[:, k, 1]), (air[:, k + 1, 0], air[:, k + 1, 1])
+        between = tuple(0.5 * (a + b) for a, b in zip(now, then, strict=True))
+        k1 = rate(x[:, :, k], *now, de[:, k])
+        k2 = rate(x[:, :, k] + 0.5 * dt * k1, *between, middle[:, k])
+        k3 = rate(x[:, :, k] + 0.5 * dt * k2, *between, middle[:, k])
+        k4 = rate(x[:, :, k] + dt * k3, *then, de[:, k + 1])
+        x[:, :, k + 1] = x[:, :, k] + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    ratio, lift, _ = coefficients(x, air[:, :, 0], air[:, :, 1], de)
+    return x[0] + air[:, :, 1] / (AIRSPEED_M_S + air[:, :, 0]), x[1], -ratio * (G0 + s.normal * lift)
 
 
 def as_log(*parts: Batch) -> FlightLog:

@@ -51,4 +51,5 @@ def test_mass_and_inertia_scale_what_they_must(mass, inertia):
 def test_a_larger_manoeuvre_of_the_same_shape_changes_nothing_without_noise(name):
     a = identify_batch(fly(amplitude_rad=0.01), GTM, name, PLAIN).theta
     b = identify_batch(fly(amplitude_rad=0.05), GTM, name, PLAIN).theta
-    np.testing.assert_allclose(b, a, rtol=1e-8)
+    # a likelihood stops within its tolerance, and its prior of the levels has a size
+    np.testing.assert_allclose(b, a, rtol=1e-4 if name in ("filter-error", "output-error") else 1e-8)

@@ -88,7 +88,7 @@ def test_the_identified_actuator_stands_in_for_the_surface(method):
     assert np.abs(bias_percent(fly(), method) - bias_percent(fly(), "iv-lowpass")).max() < 0.3
 
 
-@pytest.mark.parametrize("method", [m for m in METHODS if m != "ls"])
+@pytest.mark.parametrize("method", [m for m in METHODS if m != "ls" and METHODS[m].pose])
 def test_an_auxiliary_model_may_be_passed_in(method):
     """The linear model as a callable gives what the built-in one gives; another one is really used."""
     batch = fly(runs=2, gust=1.0, noise=1.0, seed=8)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -9,10 +10,19 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_serializer,
+    field_validator,
+    model_validator,
+)
 
 from airtruth import quantity as qt
 from airtruth.aircraft import Sensor, sensor_tables
+from airtruth.effects.change import Change
 from airtruth.errors import ConfigurationError, StoreError, choices
 from airtruth.fly.manoeuvres import KINDS
 from airtruth.physics.gust_figures import FIGURES, LEVELS
@@ -226,6 +236,43 @@ class AugmentationTable(Table):
     attitude_gain: float = 0.0
 
 
+class EffectTable(Strict):
+    """An effect that is flown: name, variant and the values of its parameters, in the effect's own units."""
+
+    model_config = ConfigDict(
+        allow_inf_nan=True, ser_json_inf_nan="strings"
+    )  # a neutral bandwidth is infinite
+    name: str
+    variant: str = ""
+    parameters: dict[str, float] = Field(default_factory=dict)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _gather(cls, raw: Any) -> Any:
+        if not isinstance(raw, Mapping) or not isinstance(raw.get("name"), str) or "parameters" in raw:
+            return raw
+        from airtruth.effects import library  # loads what other packages bring: only for who asks
+
+        own = {key: raw[key] for key in ("name", "variant") if key in raw}
+        try:
+            effect = library.chosen(raw["name"], str(raw.get("variant", "")))
+            values = effect.read({k: v for k, v in raw.items() if k not in own})
+        except ConfigurationError as error:
+            raise ValueError(str(error)) from None
+        return {"name": effect.name, "variant": effect.variant, "parameters": values}
+
+    @field_serializer("parameters", when_used="json")
+    def _finite(self, values: dict[str, float]) -> dict[str, float | str]:
+        """JSON has no infinity."""
+        return {name: value if math.isfinite(value) else str(value) for name, value in values.items()}
+
+    def change(self) -> Change:
+        """What it changes."""
+        from airtruth.effects import library
+
+        return library.chosen(self.name, self.variant).change(self.parameters)
+
+
 class Campaign(Table):
     """A campaign file, in SI."""
 
@@ -245,6 +292,7 @@ class Campaign(Table):
     wind: WindTable = WindTable()
     sensors: SensorTable = SensorTable()
     augmentation: AugmentationTable = AugmentationTable()
+    effect: tuple[EffectTable, ...] = ()
 
     @field_validator("manoeuvre", mode="before")
     @classmethod

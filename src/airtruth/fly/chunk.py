@@ -20,6 +20,7 @@ from airtruth.fly.flight import Flight, Inputs
 from airtruth.fly.linearise import Linearisation, linearise
 from airtruth.fly.plan import Plan, Row, condition, rows
 from airtruth.fly.trim import Trim, trim
+from airtruth.fly.with_effects import EFFECTS
 from airtruth.logs import store
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics import dryden
@@ -222,4 +223,6 @@ def truth_row(row: Row, prepared: Prepared | None) -> dict[str, object]:
         "length_w_m",
     ):
         result[name] = float(row[name])
+    if EFFECTS in row:
+        result[EFFECTS] = row[EFFECTS]
     return result

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from airtruth import __version__
 from airtruth.aircraft import Aircraft, Sensor, load
+from airtruth.effects.neutral import fitted
 from airtruth.errors import AirtruthError, ConfigurationError
-from airtruth.fly import campaign_file, streams
+from airtruth.fly import campaign_file, streams, with_effects
 from airtruth.fly.campaign_file import NO_GUST, Campaign, ManoeuvreTable
 from airtruth.fly.engine import Condition, jsbsim_model
 from airtruth.fly.manoeuvres import Manoeuvre, end_s, sample
@@ -40,12 +41,12 @@ class Plan:
 
     Attributes
     ----------
-    campaign, aircraft : what to fly.
+    campaign, aircraft : what to fly; the aircraft has the campaign's effects written in.
     seed : of every draw.
     sensors : channel -> sensor, the campaign's entries applied.
     manoeuvres : alternatives; run k flies number ``table.manoeuvre[k]``, scaled to its amplitude.
     table : one row per run: run, run_id, chunk, eas_m_s, altitude_m, gamma_rad, wind_m_s, manoeuvre,
-        amplitude_rad, sigma_u_m_s, sigma_w_m_s, length_u_m, length_w_m.
+        amplitude_rad, sigma_u_m_s, sigma_w_m_s, length_u_m, length_w_m, and effects where there are any.
     digest : fingerprint of all of this; tells two campaigns apart.
     """
 
@@ -100,18 +101,22 @@ def make(path: Path, seed: int | None = None, runs: int | None = None) -> Plan:
             f"{path}: augmentation: {aircraft.name} has no [jsbsim.augmentation] in its aircraft.toml"
         )
     try:
+        effects = with_effects.read(campaign)
         table = _run_table(campaign, campaign.seed)
+        table = with_effects.state(with_effects.in_the_air(table, effects), campaign)
+        flown = with_effects.aircraft(aircraft, effects, campaign.simulation_hz)
+        sensors = fitted(campaign.sensors.apply(aircraft.file.sensors), effects.sensors)
         manoeuvres = tuple(_manoeuvre(m, path.parent) for m in campaign.manoeuvre)
     except ConfigurationError as error:
         raise ConfigurationError(f"{path}: {error}") from None
     plan = Plan(
         campaign=campaign,
-        aircraft=aircraft,
+        aircraft=flown,
         seed=campaign.seed,
-        sensors=campaign.sensors.apply(aircraft.file.sensors),
+        sensors=sensors,
         manoeuvres=manoeuvres,
         table=table,
-        digest=_digest(campaign, aircraft, manoeuvres),
+        digest=_digest(campaign, flown, manoeuvres),
     )
     _check(plan, path)
     return plan
@@ -293,7 +298,7 @@ def describe(plan: Plan) -> str:
     c, t = plan.campaign, plan.table
     lines = [
         f"campaign   {c.name}{': ' + c.title if c.title else ''}",
-        f"aircraft   {plan.aircraft.name} ({plan.aircraft.folder})",
+        f"aircraft   {plan.aircraft.name} ({'with effects' if c.effect else plan.aircraft.folder})",
         f"runs       {c.runs} of {c.duration:g} s, simulated at {c.simulation_hz:g} Hz, logged at {c.log_hz:g} Hz",
         f"files      {t['chunk'].nunique()} of up to {int(t['chunk'].value_counts().max())} runs",
         f"seed       {plan.seed}",
@@ -309,6 +314,7 @@ def describe(plan: Plan) -> str:
         low, high = t[name].min(), t[name].max()
         lines.append(f"{label:<14} {low:.4g}" + (f" to {high:.4g}" if high > low else ""))
     lines.append("manoeuvres " + ", ".join(m.kind for m in plan.manoeuvres))
+    lines += [f"effect     {with_effects.text(effect)}" for effect in c.effect]
     return "\n".join(lines)
 
 

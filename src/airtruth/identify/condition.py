@@ -8,10 +8,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airtruth.identify.methods import COMMAND
 from airtruth.identify.options import Options
 from airtruth.identify.prefilter import butterworth, zero_phase
-from airtruth.identify.problem import Observation
+from airtruth.identify.pressure import NO_LEFT, divide, ratios
+from airtruth.identify.problem import COMMAND, Observation
 from airtruth.identify.rows import row_factors
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.atmosphere import density_kg_m3
@@ -41,23 +41,25 @@ class AircraftConstants(Protocol):
         """Pitch inertia Iyy [kg m2]."""
 
 
+def density_of(batch: Batch) -> Array:
+    """Air density (runs, samples) [kg/m3]: measured, or from altitude_m through the standard atmosphere."""
+    channels = batch.channels
+    if "density_kg_m3" in channels:
+        return channels["density_kg_m3"]
+    return np.asarray(density_kg_m3(channels["altitude_m"]))
+
+
 def flight_condition(
     batch: Batch, constants: AircraftConstants, options: Options, pitch_rate: Array
 ) -> Scale:
     """Factors (runs,) of a constant airspeed and density, by ``options.condition``.
-
-    Density comes from density_kg_m3, or from altitude_m through the standard atmosphere.
 
     Parameters
     ----------
     batch, constants, options : runs, aircraft, choices.
     pitch_rate : (runs, samples) low-passed q [rad/s].
     """
-    channels = batch.channels
-    airspeed = channels["airspeed_m_s"]
-    density = (
-        channels["density_kg_m3"] if "density_kg_m3" in channels else density_kg_m3(channels["altitude_m"])
-    )
+    airspeed, density = batch.channels["airspeed_m_s"], density_of(batch)
     if options.condition == "motion":
         weight = (pitch_rate - pitch_rate.mean(axis=1, keepdims=True)) ** 2
         total = weight.sum(axis=1, keepdims=True)
@@ -86,6 +88,12 @@ def window_samples(options: Options, dt_s: float) -> int:
     return max(1, round(options.trim_window_s / dt_s))
 
 
+def ratios_of(batch: Batch, constants: AircraftConstants, condition: Scale) -> tuple[Array, Array]:
+    """Measured airspeed and dynamic pressure over those of the flight condition, (runs, samples) each."""
+    airspeed = batch.channels["airspeed_m_s"]
+    return ratios(airspeed, density_of(batch), constants.wing_area_m2, constants.mass_kg, condition)
+
+
 @njit(cache=True)
 def _stack(alpha: Array, q: Array, az: Array, elevator: Array, gravity: float, signals: Array) -> None:
     for r in range(alpha.shape[0]):
@@ -102,12 +110,20 @@ def observe(batch: Batch, constants: AircraftConstants, options: Options) -> Obs
     alpha = channels["alpha_rad"]
     signals = np.empty((alpha.shape[0], 4, alpha.shape[1]))
     _stack(alpha, channels["q_rad_s"], channels["az_m_s2"], channels["elevator_rad"], G0, signals)
-    smooth = zero_phase(signals, butterworth(options.cutoff_hz, options.order, batch.dt_s))
+    sos = butterworth(options.cutoff_hz, options.order, batch.dt_s)
+    smooth = zero_phase(signals, sos)
     condition = flight_condition(batch, constants, options, smooth[:, 1])
+    left = left_smooth = NO_LEFT
+    if options.pressure == "measured":
+        v, p = ratios_of(batch, constants, condition)
+        left = divide(signals, v, p, condition.airspeed_m_s, batch.dt_s)
+        smooth, left_smooth = zero_phase(signals, sos), zero_phase(left, sos)
     return Observation(
         dt_s=batch.dt_s,
         signals=signals,
         smooth=smooth,
+        left=left,
+        left_smooth=left_smooth,
         command=channels.get(COMMAND),
         scale=condition,
         factors=row_factors(condition),

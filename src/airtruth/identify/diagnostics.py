@@ -19,10 +19,10 @@ from scipy.stats import chi2
 
 from airtruth.identify.condition import AircraftConstants, observe
 from airtruth.identify.covariance import correction
-from airtruth.identify.estimate import chunks
-from airtruth.identify.methods import method
+from airtruth.identify.methods import method, regression
 from airtruth.identify.options import Options
 from airtruth.identify.projection import Projected, project
+from airtruth.identify.regression import chunks
 from airtruth.identify.results import Estimates
 from airtruth.logs.flight_log import Batch
 
@@ -91,7 +91,7 @@ def diagnose(
     first = 0
     for part in chunks(batch):
         observation = observe(part, constants, options)
-        problem = chosen.pose(observation, options)
+        problem = regression(chosen)(observation, options)
         size = len(part.run_ids)
         theta = estimates.theta[first : first + size]
         known = np.flatnonzero(np.isfinite(theta).all(axis=1))
@@ -143,7 +143,7 @@ def residuals(
     first = 0
     for part in chunks(batch):
         observation = observe(part, constants, options)
-        problem = chosen.pose(observation, options)
+        problem = regression(chosen)(observation, options)
         theta = estimates.theta[first : first + len(part.run_ids)]
         known = np.flatnonzero(np.isfinite(theta).all(axis=1))
         rows = problem.rows(theta[known], known)

@@ -2,33 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from typing import Final
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from airtruth.identify.checks import check_batch, check_log
-from airtruth.identify.condition import AircraftConstants, observe
-from airtruth.identify.covariance import COVARIANCES, sandwich
-from airtruth.identify.iterate import Outcome, iterate, least_squares
-from airtruth.identify.lowpass import ls_problem
-from airtruth.identify.methods import Method, method
+from airtruth.identify.condition import AircraftConstants
+from airtruth.identify.methods import method, regression
 from airtruth.identify.options import Options
-from airtruth.identify.problem import Equations, Observation, Problem
-from airtruth.identify.projection import project
-from airtruth.identify.results import JOINT, Estimates, Status, estimates_table
+from airtruth.identify.regression import regress_batch, regress_joint
+from airtruth.identify.results import Estimates, estimates_table
 from airtruth.logs.flight_log import Batch, FlightLog, batches
-from airtruth.physics.short_period import Scale
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
-
-CHUNK_SAMPLES: Final = 32_000
-"""Samples per channel worked on at a time: bounds memory and keeps the arrays in the cache."""
 
 
 def identify_batch(
@@ -52,33 +37,18 @@ def identify_batch(
     """
     options = options or Options()
     chosen = method(name)
-    intercept = options.trim == "intercept"
-    outcomes, covariances, scales = [], [], []
-    for part in chunks(batch):
-        observation = observe(part, constants, options)
-        problem, outcome = _solve(observation, chosen, options)
-        outcomes.append(outcome)
-        scales.append(observation.scale)
-        covariances.append(_covariance(problem, outcome, observation.factors, intercept, options))
-    return Estimates(
-        method=name,
-        run_ids=batch.run_ids,
-        theta=np.concatenate([o.theta for o in outcomes]),
-        covariance=np.concatenate(covariances),
-        covariance_name=options.covariance,
-        status=np.concatenate([o.status for o in outcomes]),
-        iterations=np.concatenate([o.iterations for o in outcomes]),
-        scale=_joined(scales),
-        confidence=options.confidence,
-    )
+    if chosen.estimate is not None:
+        return chosen.estimate(batch, constants, options)
+    return regress_batch(batch, constants, name, regression(chosen) if chosen.iterates else None, options)
 
 
 def identify_joint(
     parts: Sequence[Batch], constants: AircraftConstants, name: str, options: Options | None = None
 ) -> Estimates:
-    """One estimate for all runs together: their normal equations are summed; nothing is checked.
+    """One estimate for all runs together; nothing is checked.
 
-    Trim, flight condition and filters stay each run's own. All runs are held in memory.
+    The normal equations of all runs are summed. Trim, flight condition and filters stay each run's own.
+    All runs are held in memory.
 
     Parameters
     ----------
@@ -92,31 +62,9 @@ def identify_joint(
     """
     options = options or Options()
     chosen = method(name)
-    intercept = options.trim == "intercept"
-    observations = [observe(part, constants, options) for batch in parts for part in chunks(batch)]
-    factors = np.concatenate([o.factors for o in observations])
-    starts = [ls_problem(o, options) for o in observations]
-    joint = _together(starts)
-    outcome = least_squares(joint, factors, intercept, joint=True)
-    problems = starts
-    if chosen.iterates:
-        problems = [chosen.pose(o, options) for o in observations]
-        outcome = _iterate(_together(problems), factors, outcome.theta, options, joint=True)
-    covariance = np.full((1, 6, 6), np.nan)
-    if options.covariance != "none" and np.isfinite(outcome.theta).all():
-        covariance = _joint_covariance(problems, observations, outcome.theta, intercept, options)
-    scale = _joined([o.scale for o in observations])
-    return Estimates(
-        method=name,
-        run_ids=(JOINT,),
-        theta=outcome.theta,
-        covariance=covariance,
-        covariance_name=options.covariance,
-        status=outcome.status,
-        iterations=outcome.iterations,
-        scale=Scale(*(getattr(scale, f).mean(keepdims=True) for f in Scale.__dataclass_fields__)),
-        confidence=options.confidence,
-    )
+    if chosen.estimate_joint is not None:
+        return chosen.estimate_joint(parts, constants, options)
+    return regress_joint(parts, constants, name, regression(chosen) if chosen.iterates else None, options)
 
 
 def identify_log(
@@ -161,95 +109,3 @@ def identify_log(
     column = {m.name: i for i, m in enumerate(chosen)}
     rank = table["run_id"].map(order) * len(chosen) + table["method"].map(column)
     return table.iloc[np.argsort(rank.to_numpy(), kind="stable")].reset_index(drop=True)
-
-
-def chunks(batch: Batch) -> Iterator[Batch]:
-    """Pieces of a batch with at most `CHUNK_SAMPLES` samples per channel, or one run."""
-    size = max(1, CHUNK_SAMPLES // batch.t_s.shape[1])
-    for first in range(0, len(batch.run_ids), size):
-        part = slice(first, first + size)
-        yield replace(
-            batch,
-            run_ids=batch.run_ids[part],
-            t_s=batch.t_s[part],
-            channels={name: values[part] for name, values in batch.channels.items()},
-        )
-
-
-def _solve(observation: Observation, chosen: Method, options: Options) -> tuple[Problem, Outcome]:
-    problem = ls_problem(observation, options)
-    factors = observation.factors
-    outcome = least_squares(problem, factors, options.trim == "intercept", joint=False)
-    if chosen.iterates:
-        problem = chosen.pose(observation, options)
-        outcome = _iterate(problem, factors, outcome.theta, options, joint=False)
-    return problem, outcome
-
-
-def _iterate(problem: Equations, factors: Array, start: Array, options: Options, joint: bool) -> Outcome:
-    return iterate(
-        problem,
-        factors,
-        start,
-        options.trim == "intercept",
-        options.tolerance,
-        options.maximum_iterations,
-        joint,
-    )
-
-
-def _covariance(
-    problem: Problem, outcome: Outcome, factors: Array, intercept: bool, options: Options
-) -> Array:
-    covariance = np.full((factors.shape[0], 6, 6), np.nan)
-    if options.covariance == "none":
-        return covariance
-    known = np.flatnonzero(np.isin(outcome.status, (Status.CONVERGED, Status.MAXIMUM_ITERATIONS)))
-    known = known[problem.usable(outcome.theta[known], known)]
-    theta = outcome.theta[known]
-    projected = project(problem.rows(theta, known), theta, factors[known], intercept)
-    parts = COVARIANCES[options.covariance](projected, factors[known], projected.e.shape[2])
-    covariance[known] = sandwich(parts)
-    return covariance
-
-
-def _joint_covariance(
-    problems: Sequence[Problem],
-    observations: Sequence[Observation],
-    theta: Array,
-    intercept: bool,
-    options: Options,
-) -> Array:
-    samples = sum(o.signals.shape[0] * o.signals.shape[2] for o in observations)
-    bread, meat = np.zeros((1, 6, 6)), np.zeros((1, 6, 6))
-    for problem, observation in zip(problems, observations, strict=True):
-        runs = observation.factors.shape[0]
-        every = np.repeat(theta, runs, axis=0)
-        rows = problem.rows(every, np.arange(runs))
-        projected = project(rows, every, observation.factors, intercept)
-        b, m = COVARIANCES[options.covariance](projected, observation.factors, samples)
-        bread += b.sum(axis=0)
-        meat += m.sum(axis=0)
-    return sandwich((bread, meat))
-
-
-def _together(problems: Sequence[Problem]) -> Equations:
-    """Equations of several observations as one; they are only ever asked for all runs."""
-    ends = np.cumsum([p.failed.size for p in problems])
-    spans = [slice(end - p.failed.size, end) for p, end in zip(problems, ends, strict=True)]
-
-    def moments(theta: Array, active: Ints) -> Array:
-        return np.concatenate(
-            [p.moments(theta[s], np.arange(p.failed.size)) for p, s in zip(problems, spans, strict=True)]
-        )
-
-    def usable(theta: Array, active: Ints) -> Bools:
-        return np.concatenate(
-            [p.usable(theta[s], np.arange(p.failed.size)) for p, s in zip(problems, spans, strict=True)]
-        )
-
-    return Equations(moments, usable, np.concatenate([p.failed for p in problems]))
-
-
-def _joined(scales: Sequence[Scale]) -> Scale:
-    return Scale(*(np.concatenate([getattr(s, f) for s in scales]) for f in Scale.__dataclass_fields__))

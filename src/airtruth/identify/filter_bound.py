@@ -20,7 +20,7 @@ from scipy.linalg import solve_discrete_lyapunov
 from airtruth.errors import ConfigurationError, choices
 from airtruth.identify.condition import AircraftConstants
 from airtruth.identify.filter_error import records
-from airtruth.identify.filter_options import FilterOptions, free_parameters
+from airtruth.identify.filter_options import FilterOptions, declared_values, free_parameters
 from airtruth.identify.kalman_step import TINY, assemble, step
 from airtruth.identify.predictor import Layout
 from airtruth.logs.flight_log import Batch
@@ -192,8 +192,8 @@ def experiment_bound(
     if start not in STARTS:
         raise ConfigurationError(f"gust start {start!r} is not known; {choices(start, STARTS)}")
     data = records(batch, constants, options)
-    with np.errstate(divide="ignore"):  # a level of 0 stays so
-        z = np.concatenate([theta, np.log(options.levels)])
+    z = declared_values(options, options.levels[None, :])[0]
+    z[: theta.size] = theta
     free = free_parameters(options)
     n = data.layout.sizes[0]
     result = np.empty((data.y.shape[0], 6, 6))

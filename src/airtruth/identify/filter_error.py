@@ -12,23 +12,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.identify.condition import AircraftConstants, observe
 from airtruth.identify.filter_options import CHANNELS, FilterOptions, free_parameters
+from airtruth.identify.filter_pressure import products, with_pressure, with_trim_moment
 from airtruth.identify.filter_search import Fit, Scored, search
 from airtruth.identify.intersample import servo_bend
 from airtruth.identify.kalman import score_runs
 from airtruth.identify.options import Options
-from airtruth.identify.predictor import Layout, layout, short_period
+from airtruth.identify.predictor import Layout, Term, extended, layout, short_period
 from airtruth.identify.results import JOINT, Estimates
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.short_period import PARAMETERS, Scale
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+MOMENT_NOISE: Final = "noise_moment"
+_FLOOR: Final = 1e-5
+"""Noise that every output has, over its spread: without any, a record without noise has no likelihood."""
 
 
 @dataclass(frozen=True)
@@ -66,20 +72,39 @@ def records(batch: Batch, constants: AircraftConstants, options: FilterOptions) 
     elevator = batch.channels["elevator_rad"]
     u = elevator - elevator[:, :1]
     bend = servo_bend(u)
+    predictor = short_period(scale, options.length_u_m, options.length_w_m, options.outputs)
+    u, bend = u[:, :, None], bend[:, :, None]
+    if options.pressure == "measured":
+        more = products(batch, constants, scale)
+        servo = np.zeros_like(more)
+        u, bend = np.concatenate([u, more], axis=2), np.concatenate([bend, servo], axis=2)
+        predictor = with_pressure(predictor, scale, batch, constants)
+    if options.moment_noise > 0.0:
+        noise = (MOMENT_NOISE,)
+        predictor = extended(predictor, [Term("Q", "q", "", 1.0, noise * 2)], (), (), noise, noise)
+    if options.trim_moment_prior is not None:
+        predictor = with_trim_moment(predictor, scale)
+    floor = _FLOOR * y.std(axis=1)
+    least = [Term("R", name, "", floor[:, i] ** 2) for i, name in enumerate(options.outputs)]
     edge = np.concatenate([u[:, :1], u, u[:, -1:]], axis=1)
     bend[:, 1:] += (edge[:, 1:-2] + edge[:, 2:-1] - edge[:, :-3] - edge[:, 3:]) / 24.0
-    predictor = short_period(scale, options.length_u_m, options.length_w_m, options.outputs)
     return Records(
         dt_s=batch.dt_s,
         y=y - y[:, :1],
-        u=np.ascontiguousarray(u[:, :, None]),
-        bend=np.ascontiguousarray(bend[:, :, None]),
-        layout=layout(predictor, y.shape[0]),
+        u=np.ascontiguousarray(u),
+        bend=np.ascontiguousarray(bend),
+        layout=layout(extended(predictor, least), y.shape[0]),
         scale=scale,
     )
 
 
-def fit(batch: Batch, constants: AircraftConstants, start: Array, options: FilterOptions) -> Estimates:
+def fit(
+    batch: Batch,
+    constants: AircraftConstants,
+    start: Array,
+    options: FilterOptions,
+    levels: Array | None = None,
+) -> Estimates:
     """Estimate the six derivatives of each run; nothing is checked.
 
     A result does not depend on the other runs of the batch.
@@ -91,14 +116,17 @@ def fit(batch: Batch, constants: AircraftConstants, start: Array, options: Filte
     start : (runs, 6) where to begin, such as the estimates of iv-f1; a row that is not finite has no
         estimate (DIVERGED).
     options : declared noise and air, and how to search.
+    levels : (runs, levels) declared levels of each run; None: those of the options. What the options
+        declare 0 stays 0.
     """
     data = records(batch, constants, options)
     free = free_parameters(options)
+    each = np.tile(options.levels, (start.shape[0], 1)) if levels is None else levels
 
     def evaluate(z: Array, active: Ints) -> Scored:
         return scored(data, z, active, free)
 
-    found = search(evaluate, start, options)
+    found = search(evaluate, start, each, options)
     return _estimates(found, batch.run_ids, data.scale, options)
 
 
@@ -132,7 +160,7 @@ def fit_joint(
             information += i.sum(axis=0)
         return cost, gradient, information
 
-    found = search(evaluate, start[None, :], options)
+    found = search(evaluate, start[None, :], options.levels[None, :], options)
     scale = Scale(
         *(
             np.concatenate([getattr(part.scale, name) for part in data]).mean(keepdims=True)

@@ -5,6 +5,7 @@ Source: M. Brunot, "An Instrumental Variable Approach for Aircraft Identificatio
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,6 +17,8 @@ from airtruth.identify.problem import Equations
 from airtruth.identify.results import Status
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 LARGEST: Final = 1e6
 """A derivative beyond this is taken as diverged: the largest plausible one, CLq, is of order 100."""
@@ -66,33 +69,61 @@ def iterate(
     start : (runs, 6), or (1, 6) if joint; runs whose start is not finite end as singular.
     tolerance, maximum_iterations : as in `airtruth.identify.options.Options`.
     """
+
+    def step(theta: Array, members: Ints) -> Array:
+        return _solution(problem.moments(theta, members), factors[members], intercept, joint)
+
+    return repeat(
+        step, problem.usable, problem.failed, start, factors.shape[0], tolerance, maximum_iterations, joint
+    )
+
+
+def repeat(
+    step: Callable[[Array, Ints], Array],
+    usable: Callable[[Array, Ints], Bools],
+    failed: Bools,
+    start: Array,
+    runs: int,
+    tolerance: float,
+    maximum_iterations: int,
+    joint: bool,
+) -> Outcome:
+    """Iterate any step towards its fixed point, run by run or jointly.
+
+    Parameters
+    ----------
+    step : (theta (active, 6), active) -> the next theta, (active, 6) or (1, 6) if joint.
+    usable, failed : as in `airtruth.identify.problem.Equations`.
+    start, tolerance, maximum_iterations : as in `iterate`.
+    runs : number of runs.
+    joint : whether all runs share one theta.
+    """
     theta = start.copy()
     units = theta.shape[0]
-    runs = factors.shape[0]
     status = np.full(units, Status.MAXIMUM_ITERATIONS, dtype=np.int8)
     iterations = np.zeros(units, dtype=np.int32)
     status[~np.isfinite(theta).all(axis=1)] = Status.SINGULAR
     if joint:
-        if problem.failed.any():
+        if failed.any():
             status[:] = Status.ACTUATOR
     else:
-        status[problem.failed] = Status.ACTUATOR
+        status[failed] = Status.ACTUATOR
     active = np.flatnonzero(status == Status.MAXIMUM_ITERATIONS)
     for _ in range(maximum_iterations):
         if active.size == 0:
             break
         members = np.arange(runs) if joint else active
         previous = np.broadcast_to(theta, (runs, 6)) if joint else theta[active]
-        usable = problem.usable(previous, members)
+        simulable = usable(previous, members)
         if joint:
-            usable = np.array([bool(usable.all())])
-        status[active[~usable]] = Status.UNSTABLE
-        active = active[usable]
+            simulable = np.array([bool(simulable.all())])
+        status[active[~simulable]] = Status.UNSTABLE
+        active = active[simulable]
         if active.size == 0:
             break
         if not joint:
             members, previous = active, theta[active]
-        new = _solution(problem.moments(previous, members), factors[members], intercept, joint)
+        new = step(previous, members)
         change = np.linalg.norm(new - theta[active], axis=1)
         iterations[active] += 1
         theta[active] = new

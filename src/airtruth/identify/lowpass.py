@@ -14,7 +14,7 @@ from airtruth.identify import rows as layout
 from airtruth.identify.auxiliary import bounded, respond, state_matrices
 from airtruth.identify.options import Options
 from airtruth.identify.prefilter import butterworth, zero_phase
-from airtruth.identify.problem import NOT_MADE, Observation, Problem, made_by, origin_of
+from airtruth.identify.problem import NOT_MADE, Observation, Problem, made_by, origin_of, relative
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -22,7 +22,7 @@ Bools = NDArray[np.bool_]
 
 
 @njit(cache=True)
-def _fill(smooth: Array, origin: Array, dt_s: float, rows: Array) -> None:
+def _fill(smooth: Array, origin: Array, left: Array, dt_s: float, rows: Array) -> None:
     last = smooth.shape[2] - 1
     half = 0.5 / dt_s
     for r in range(smooth.shape[0]):
@@ -37,6 +37,11 @@ def _fill(smooth: Array, origin: Array, dt_s: float, rows: Array) -> None:
             w[7, k - 1] = half * (alpha[k + 1] - alpha[k - 1]) - (q[k] - oq)
             w[8, k - 1] = half * (q[k + 1] - q[k - 1])
             w[9, k - 1] = az[k] - on
+        if left.shape[0] > 0:
+            x, y, to_lift, to_moment = left[r, 0], left[r, 1], left[r, 2], left[r, 3]
+            for k in range(1, last):
+                w[7, k - 1] = half * (x[k + 1] - x[k - 1]) + to_lift[k]
+                w[8, k - 1] = half * (y[k + 1] - y[k - 1]) + to_moment[k]
 
 
 def least_squares_rows(observation: Observation) -> Array:
@@ -47,7 +52,8 @@ def least_squares_rows(observation: Observation) -> Array:
     """
     smooth = observation.smooth
     rows = np.empty((smooth.shape[0], layout.COUNT, smooth.shape[2] - 2))
-    _fill(smooth, origin_of(smooth, observation.window), observation.dt_s, rows)
+    left = relative(observation.left_smooth, observation.window)
+    _fill(smooth, origin_of(smooth, observation.window), left, observation.dt_s, rows)
     return rows
 
 

@@ -5,7 +5,7 @@ Source of all: M. Brunot, "An Instrumental Variable Approach for Aircraft Identi
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,27 +13,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError, choices
+from airtruth.identify import frequency, refined
 from airtruth.identify.actuator import estimated_elevator
+from airtruth.identify.condition import AircraftConstants
 from airtruth.identify.dynamic import dynamic_problem, f1_numerator, f2_numerator
+from airtruth.identify.filter_method import (
+    estimate_filter_error,
+    estimate_output_error,
+    joint_filter_error,
+    joint_output_error,
+)
 from airtruth.identify.lowpass import iv_problem, ls_problem
 from airtruth.identify.options import Options
-from airtruth.identify.problem import Observation, Problem
+from airtruth.identify.problem import COMMAND, Observation, Problem
+from airtruth.identify.results import Estimates
+from airtruth.logs.flight_log import Batch
 
 Array = NDArray[np.float64]
-
-COMMAND: Final = "elevator_command_rad"
 
 
 @dataclass(frozen=True)
 class Method:
-    """An estimator.
+    """An estimator: a regression that the common iteration solves, or functions of its own.
 
     Attributes
     ----------
     name : what --method takes.
     title : how tables print it.
-    source : equations of the paper.
-    pose : (observation, options) -> the regression that the iteration solves.
+    source : equations of the paper, or another source.
+    pose : (observation, options) -> the regression that the iteration solves; None where the method
+        estimates by itself.
+    estimate : (batch, constants, options) -> estimates of each run; in place of ``pose``.
+    estimate_joint : (batches, constants, options) -> one estimate for all runs; goes with ``estimate``.
     iterates : whether the instruments depend on theta; otherwise one solution is all.
     channels : columns needed besides those that every log has.
     """
@@ -41,7 +52,9 @@ class Method:
     name: str
     title: str
     source: str
-    pose: Callable[[Observation, Options], Problem]
+    pose: Callable[[Observation, Options], Problem] | None = None
+    estimate: Callable[[Batch, AircraftConstants, Options], Estimates] | None = None
+    estimate_joint: Callable[[Sequence[Batch], AircraftConstants, Options], Estimates] | None = None
     iterates: bool = True
     channels: tuple[str, ...] = ()
 
@@ -109,8 +122,53 @@ METHODS: Final[dict[str, Method]] = {
         ),
         Method("iv-f1", "IV(f1)", "eqs (7), (9), (11)", _f1),
         Method("iv-f2", "IV(f2)", "eqs (8), (9), (11)", _f2),
+        Method(
+            "iv-refined",
+            "IV refined",
+            "eq. (4); P. C. Young, 2011, ch. 7",
+            estimate=refined.estimate,
+            estimate_joint=refined.estimate_joint,
+        ),
+        Method(
+            "frequency",
+            "Frequency",
+            "Klein and Morelli, 2006, 7.2",
+            estimate=frequency.estimate,
+            estimate_joint=frequency.estimate_joint,
+        ),
+        Method(
+            "filter-error",
+            "Filter error",
+            "Maine and Iliff, NASA RP-1138",
+            estimate=estimate_filter_error,
+            estimate_joint=joint_filter_error,
+        ),
+        Method(
+            "output-error",
+            "Output error",
+            "Maine and Iliff, NASA RP-1138",
+            estimate=estimate_output_error,
+            estimate_joint=joint_output_error,
+        ),
     )
 }
+
+
+def regression(chosen: Method) -> Callable[[Observation, Options], Problem]:
+    """What poses the method's regression.
+
+    Raises
+    ------
+    ConfigurationError
+        If the method solves none.
+    """
+    if chosen.pose is None:
+        others = ", ".join(m.name for m in METHODS.values() if m.pose is not None)
+        raise ConfigurationError(
+            f"method {chosen.name} solves no filtered regression that could be looked into; "
+            f"use one of {others}"
+        )
+    return chosen.pose
 
 
 def method(name: str) -> Method:

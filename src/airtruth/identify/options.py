@@ -21,6 +21,7 @@ alpha [rad], q [rad/s] and, where it is not the input (a simulated loop moves it
 
 TRIMS: Final = ("intercept", "mean")
 CONDITIONS: Final = ("motion", "record", "window")
+PRESSURES: Final = ("method", "constant", "measured")
 COVARIANCE_NAMES: Final = ("none", "printed", "white", "coloured", "corrected")
 
 
@@ -44,6 +45,11 @@ class Options:
         something moved), or plain ("record"), or over the trim "window".
     airspeed_m_s : true airspeed to use in place of the measured one [m/s], as the paper does; None
         measures it.
+    pressure : dynamic pressure and airspeed in the regressors: "constant" over the record, as the paper
+        has it, or "measured" at each sample (`airtruth.identify.pressure`); "method" is what the method has
+        as its own: measured for iv-refined and frequency, constant for the others.
+    band_hz : lower and upper end of the frequencies that "frequency" uses [Hz]; None leaves the choice to
+        the data (`airtruth.identify.frequency.band_of`).
     confidence : probability of the intervals [-].
     auxiliary : model that makes the instruments; None is the linear short-period model.
     """
@@ -57,6 +63,8 @@ class Options:
     trim_window_s: float = 1.0
     condition: str = "motion"
     airspeed_m_s: float | None = None
+    pressure: str = "method"
+    band_hz: tuple[float, float] | None = None
     confidence: float = 0.95
     auxiliary: AuxiliaryModel | None = None
 
@@ -72,6 +80,7 @@ class Options:
             ("trim", TRIMS),
             ("covariance", COVARIANCE_NAMES),
             ("condition", CONDITIONS),
+            ("pressure", PRESSURES),
         ):
             value = getattr(self, name)
             if value not in allowed:
@@ -86,6 +95,15 @@ class Options:
             value = getattr(self, name)
             if value is not None and not low < value < high:
                 raise ConfigurationError(f"option {name} = {value!r}: must lie between {low:g} and {high:g}")
+        if self.band_hz is not None and not 0.0 < self.band_hz[0] < self.band_hz[1] < np.inf:
+            raise ConfigurationError(
+                f"option band_hz = {self.band_hz!r}: must be a lower and a higher frequency, both above 0"
+            )
+        if self.pressure == "measured" and self.airspeed_m_s is not None:
+            raise ConfigurationError(
+                f"option airspeed_m_s = {self.airspeed_m_s:g} takes the place of the measured airspeed, which "
+                "pressure = 'measured' asks for: leave one of them out"
+            )
         for name in ("order", "maximum_iterations"):
             if getattr(self, name) < 1:
                 raise ConfigurationError(f"option {name} = {getattr(self, name)!r}: must be at least 1")

@@ -179,14 +179,18 @@ def extended(
     states: Sequence[str] = (),
     inputs: Sequence[str] = (),
     parameters: Sequence[str] = (),
+    logarithmic: Sequence[str] = (),
 ) -> Predictor:
-    """The predictor with more terms, and the states (free to start anywhere), inputs and parameters they use."""
+    """The predictor with more terms, and the states (free to start anywhere), inputs and parameters they use.
+
+    ``logarithmic`` are those of the parameters that are estimated by their logarithm.
+    """
     return Predictor(
         states=(*predictor.states, *states),
         inputs=(*predictor.inputs, *inputs),
         outputs=predictor.outputs,
         parameters=(*predictor.parameters, *parameters),
-        logarithmic=predictor.logarithmic,
+        logarithmic=(*predictor.logarithmic, *logarithmic),
         terms=(*predictor.terms, *terms),
         start=predictor.start,
     )

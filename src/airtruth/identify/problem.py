@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,8 @@ from airtruth.physics.short_period import Scale
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+
+COMMAND: Final = "elevator_command_rad"
 
 NOT_MADE = np.empty((0, 3, 0))
 """Instruments that a kernel makes itself, by the linear auxiliary model."""
@@ -28,6 +31,9 @@ class Observation:
     dt_s : sample period [s].
     signals : (runs, 4, samples) alpha [rad], q [rad/s], az [g], elevator [rad].
     smooth : (runs, 4, samples) the same after the low-pass.
+    left, left_smooth : (runs, 4, samples) left sides of lift and moment where the dynamic pressure is the
+        measured one, from `airtruth.identify.pressure.divide`, q and az of ``signals`` then being divided
+        too; without runs where it is constant.
     command : (runs, samples) elevator command [rad], or None.
     scale : factors of shape (runs,).
     factors : (runs, 4) from `airtruth.identify.rows.row_factors`.
@@ -38,6 +44,8 @@ class Observation:
     dt_s: float
     signals: Array
     smooth: Array
+    left: Array
+    left_smooth: Array
     command: Array | None
     scale: Scale
     factors: Array
@@ -98,6 +106,11 @@ def take(scale: Scale, index: Ints) -> Scale:
         normal=scale.normal[index],
         half_chord_time=scale.half_chord_time[index],
     )
+
+
+def relative(left: Array, window: int) -> Array:
+    """Left sides (runs, 4, samples) of an observation as deviations, by `origin_of`; none stay none."""
+    return left - origin_of(left, window)[:, :, None] if left.shape[0] > 0 else left
 
 
 def origin_of(signals: Array, window: int) -> Array:

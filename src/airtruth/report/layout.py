@@ -66,6 +66,7 @@ def lay_out(table: Table) -> Grid:
         Group("RelErr [%] (standard error)", tuple(_relative_errors(table))),
         Group("Runs", tuple(_runs(table))),
         Group("Root mean square error (standard error)", tuple(_rmse(table)), supplement=True),
+        Group(f"The same / {table.spec.reference}", tuple(_rmse_ratios(table)), supplement=True),
         Group("Coverage of the intervals [%] (standard error)", tuple(_coverage(table)), supplement=True),
     ]
     if _medians_matter(table):
@@ -118,6 +119,15 @@ def _relative_errors(table: Table) -> Iterator[Row]:
 def _rmse(table: Table) -> Iterator[Row]:
     for name in ESTIMATED:
         yield from _beside(table, name, "rmse", name, DECIMALS[name])
+
+
+def _rmse_ratios(table: Table) -> Iterator[Row]:
+    """Each method's RMSE over that of the reference, where the table has methods beyond the paper's."""
+    if table.spec.reference not in table.methods or set(table.methods).isdisjoint(table.spec.further):
+        return
+    for name in ESTIMATED:
+        own = table.entries[table.spec.reference, name, "rmse"].value
+        yield name, "", *(number(table.entries[m, name, "rmse"].value / own, 2) for m in table.methods)
 
 
 def _coverage(table: Table) -> Iterator[Row]:

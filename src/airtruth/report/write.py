@@ -95,7 +95,7 @@ def _pairs(specs: Sequence[TableSpec], campaigns: Sequence[Campaign]) -> Iterato
             if tables.shows(spec, campaign) and not campaign.estimates.keys().isdisjoint(spec.columns):
                 yield spec, campaign
     for campaign in campaigns:
-        shown = {method for spec in specs if tables.shows(spec, campaign) for method in spec.columns}
+        shown = {method for spec in specs if tables.shows(spec, campaign) for method in spec.methods}
         if not campaign.estimates.keys() <= shown:
             yield tables.all_methods(campaign), campaign
 

@@ -1,0 +1,269 @@
+"""How much the records of a trial tell of an effect, and what error the truth itself leaves on them.
+
+The noncentrality of a trial's effect is |(1 - P) W d|^2: d the difference of alpha, q and az between twins
+flown in calm air with and without the effect, for an effect that grows smoothly an eighth of it times eight,
+since a tracer's refit is not linear where this projection is; W whitens gust response and sensor noise, by a vector
+autoregression fitted to gust-only flights of the truth (Luetkepohl, New Introduction to Multiple Time Series
+Analysis, 2005, section 3.2); P projects on what a tracer refits: biases and initial state of every record,
+and derivatives, mass, inertia and CG with their declared uncertainty as prior rows. Records that a tracer
+holds out do not count. What gusts tell of an effect besides the manoeuvre is not in it, so in rough air it is
+a lower bound for effects of the vane.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blind import gusts, sensors, surface
+from blind.aircraft_xml import nuisances
+from blind.draw import Trial, fly_record, stream, truth_of
+from blind.figures import (
+    CHANNELS,
+    DEG,
+    DERIVATIVES,
+    HELD_OUT,
+    LENGTH_M,
+    LOG_STEP_S,
+    NOISE,
+    QUANTUM,
+    SIGMA_M_S,
+    SPAN_M,
+    STEP_S,
+)
+from blind.flight import Model, Truth
+from blind.truths import EFFECTS, Added, Parts, shrunk
+
+Array = NDArray[np.float64]
+
+ORDER: Final = 10
+"""Of the autoregression; 0.2 s."""
+_COARSE_S: Final = 0.004
+_GUST_FLIGHTS: Final = 6
+_GUST_FLIGHT_S: Final = 30.0
+_SETTLE_S: Final = 4.0
+_SHARE: Final = 0.125
+_STATE_SHIFT: Final = 5  # samples: 0.1 s
+
+
+@dataclass(frozen=True)
+class Whitener:
+    """e[t] = root^-1 (y[t] - sum_k coefficients[k] y[t-1-k]); coefficients (order, m, m), root (m, m) lower."""
+
+    coefficients: Array
+    root: Array
+
+    def __call__(self, y: Array) -> Array:
+        """(..., samples, m) -> (..., samples - order, m)."""
+        order = len(self.coefficients)
+        e = y[..., order:, :].copy()
+        for k, a in enumerate(self.coefficients):
+            e -= y[..., order - 1 - k : y.shape[-2] - 1 - k, :] @ a.T
+        return np.asarray(np.linalg.solve(self.root, e[..., None])[..., 0])
+
+
+def autoregression(series: Sequence[Array], order: int = ORDER) -> Whitener:
+    """Least-squares vector autoregression of series (samples, m), each about its mean."""
+    centred = [s - s.mean(axis=0) for s in series]
+    now = np.concatenate([s[order:] for s in centred])
+    past = np.concatenate(
+        [np.hstack([s[order - 1 - k : len(s) - 1 - k] for k in range(order)]) for s in centred]
+    )
+    solution = np.linalg.lstsq(past, now, rcond=None)[0]
+    residual = now - past @ solution
+    covariance = residual.T @ residual / (len(now) - past.shape[1])
+    m = now.shape[1]
+    return Whitener(solution.T.reshape(m, order, m).transpose(1, 0, 2).copy(), np.linalg.cholesky(covariance))
+
+
+def noncentrality(d: Array, free: Array, prior: Array) -> float:
+    """Squared length of a whitened difference that nothing refitted can take up.
+
+    Parameters
+    ----------
+    d : (n,) whitened difference.
+    free : (n, f) whitened directions without a prior.
+    prior : (n, p) whitened directions per prior standard deviation.
+    """
+    top = np.hstack([free, prior])
+    rows = np.zeros((prior.shape[1], top.shape[1]))
+    rows[:, free.shape[1] :] = np.eye(prior.shape[1])
+    x = np.vstack([top, rows])
+    target = np.concatenate([d, np.zeros(len(rows))])
+    scale = np.linalg.norm(x, axis=0)
+    x = x / np.where(scale > 0.0, scale, 1.0)
+    left = target - x @ np.linalg.lstsq(x, target, rcond=1e-10)[0]
+    return float(left @ left)
+
+
+def stacked(clean: Mapping[str, Array]) -> Array:
+    """alpha, q, az side by side, (samples, 3)."""
+    return np.column_stack([clean[name] for name in CHANNELS])
+
+
+def noise_model(trial: Trial, air: str) -> Whitener:
+    """Whitener of gust response and sensor noise, by flights of the trial's aircraft without effect or input."""
+    truth, parts = truth_of(trial, (), _COARSE_S)
+    rest = surface.Manoeuvre("doublet", 0.0, 1.0, 0.5)
+    series = []
+    still = stacked(fly_record(truth, parts, rest, _GUST_FLIGHT_S, 0.2)) if air == "calm" else None
+    for index in range(_GUST_FLIGHTS):
+        rng = stream(trial.seed, trial.number, 300 + index)
+        if still is None:
+            count = round((_SETTLE_S + _GUST_FLIGHT_S) / _COARSE_S) + 1
+            gust = gusts.synthesise(
+                trial.spectrum,
+                SIGMA_M_S[air],
+                LENGTH_M,
+                truth.airspeed_m_s,
+                SPAN_M,
+                _COARSE_S,
+                count,
+                rng,
+            )
+            if not trial.rotary:
+                gust[2] = 0.0
+            y = stacked(fly_record(truth, parts, rest, _GUST_FLIGHT_S, _SETTLE_S, gust))
+        else:
+            y = still
+        series.append(y + _noise(trial.noise, len(y), rng))
+    return autoregression(series)
+
+
+def _noise(kind: str, count: int, rng: np.random.Generator) -> Array:
+    columns = []
+    for name in CHANNELS:
+        column = sensors.noise(name, kind, count, rng)
+        if kind == "quantised" and name in QUANTUM:
+            column += QUANTUM[name] * rng.uniform(-0.5, 0.5, count)
+        columns.append(column)
+    return np.column_stack(columns)
+
+
+@dataclass(frozen=True)
+class Directions:
+    """What a tracer may refit, whitened: (n, f) free, (n, p) per prior standard deviation."""
+
+    free: Array
+    prior: Array
+
+
+def fitted(trial: Trial) -> list[int]:
+    """Records that are not held out."""
+    return [k for k in range(len(trial.manoeuvres)) if k not in HELD_OUT]
+
+
+def responses(trial: Trial, effects: Sequence[Added], step_s: float, model: Model | None = None) -> Array:
+    """Noise-free alpha, q, az of the fitted records in calm air, (records, samples, 3)."""
+    if model is None:
+        truth, parts = truth_of(trial, effects, step_s)
+    else:
+        truth, parts = Truth(model, step_s), Parts()
+    return np.array(
+        [stacked(fly_record(truth, parts, trial.manoeuvres[k], trial.duration_s, 0.2)) for k in fitted(trial)]
+    )
+
+
+def initial_states(truth: Truth, samples: int) -> Array:
+    """Two responses that span those of the initial state, (2, samples, 3)."""
+    every = round(LOG_STEP_S / truth.step_s)
+    steps = (samples + _STATE_SHIFT) * every
+    still = np.zeros(steps)
+    moved = sensors.measured(truth.fly(still, None, 0.3 * DEG), (), 0.0, 0.0, truth.step_s)
+    rest = sensors.measured(truth.fly(still, None, 0.0), (), 0.0, 0.0, truth.step_s)
+    y = stacked(moved) - stacked(rest)
+    return np.array([y[:samples], y[_STATE_SHIFT : _STATE_SHIFT + samples]])
+
+
+def directions(trial: Trial, whiten: Whitener) -> Directions:
+    """Biases, initial states, derivatives, mass, inertia and CG of a trial."""
+    base = responses(trial, (), _COARSE_S, Model(trial.body))
+    records, samples, m = base.shape
+    states = whiten(initial_states(Truth(Model(trial.body), _COARSE_S), samples))
+    constants = whiten(np.eye(m)[:, None, :].repeat(samples, axis=1))
+    own = np.concatenate([states, constants]).reshape(len(states) + m, -1).T
+    free = np.kron(np.eye(records), own)
+    columns = []
+    for step, part in nuisances(trial.body).values():
+        moved = responses(trial, (), _COARSE_S, Model(step))
+        columns.append(whiten(moved - base).ravel() / part)
+    return Directions(free, np.column_stack(columns))
+
+
+def lambdas(trial: Trial) -> dict[str, float]:
+    """Noncentrality of each effect of the trial, the others being there."""
+    if not trial.effects:
+        return {}
+    whiten = noise_model(trial, trial.air)
+    along = directions(trial, whiten)
+    everything = (*trial.effects, *trial.clutter)
+    result = {}
+    for effect in trial.effects:
+        others = tuple(e for e in everything if e is not effect)
+        d = whiten(difference(trial, effect, others)).ravel()
+        result[effect.key] = noncentrality(d, along.free, along.prior)
+    return result
+
+
+def difference(trial: Trial, effect: Added, others: Sequence[Added] = ()) -> Array:
+    """What an effect adds to alpha, q and az beside others, calm air, (records, samples, 3)."""
+    if effect.key == "airspeed_scale":
+        return _airspeed(trial, effect.values["factor"])
+    share = _SHARE if EFFECTS[effect.key].smooth else 1.0
+    full = responses(trial, (*others, shrunk(effect, share)), STEP_S)
+    return (full - responses(trial, others, STEP_S)) / share
+
+
+def _airspeed(trial: Trial, factor: float) -> Array:
+    """What a wrong airspeed does to alpha, q and az as a tracer predicts them, to first order.
+
+    It reads q_bar as factor^2 and the rate terms' q_bar/V as factor times what they are, so the aircraft looks
+    to it as one with derivatives divided by these; the 1/V of the kinematics is left out.
+    """
+    errors = dict(trial.body.derivatives)
+    for name in DERIVATIVES:
+        power = 1.0 if name.endswith("q") else 2.0
+        errors[name] = errors.get(name, 0.0) - _SHARE * power * (factor - 1.0)
+    seen = replace(trial.body, derivatives=errors)
+    moved = responses(trial, (), _COARSE_S, Model(seen))
+    return (moved - responses(trial, (), _COARSE_S, Model(trial.body))) / _SHARE
+
+
+def oracle(trial: Trial, records: Sequence[Array]) -> dict[str, dict[str, float]]:
+    """Free-run error of the truth on the held-out records, biases and initial state free; and their size.
+
+    Parameters
+    ----------
+    records : (samples, 3) logged alpha, q, az of every record.
+
+    Returns
+    -------
+    dict
+        "free_run" and "signal": channel -> rms over the held-out records.
+    """
+    truth, parts = truth_of(trial, (*trial.effects, *trial.clutter))
+    samples = len(records[0])
+    states = initial_states(truth, samples)
+    weight = 1.0 / np.array([NOISE[name] for name in CHANNELS])
+    columns = np.concatenate([states, np.eye(3)[:, None, :].repeat(samples, axis=1)])
+    x = (columns * weight).reshape(len(columns), -1).T
+    errors, signals = [], []
+    for k in HELD_OUT:
+        y = stacked(fly_record(truth, parts, trial.manoeuvres[k], trial.duration_s, 0.2))
+        gap = ((records[k] - y) * weight).ravel()
+        left = gap - x @ np.linalg.lstsq(x, gap, rcond=None)[0]
+        errors.append(left.reshape(samples, 3) / weight)
+        signals.append(records[k] - records[k].mean(axis=0))
+    return {
+        kind: dict(zip(CHANNELS, np.sqrt(np.mean(np.square(values), axis=(0, 1))).tolist(), strict=True))
+        for kind, values in (("free_run", errors), ("signal", signals))
+    }
+
+
+def measured(trial: Trial, records: Sequence[Array]) -> dict[str, Any]:
+    """What the scoring needs of the truth."""
+    return {"lambda": lambdas(trial), "oracle": oracle(trial, records)}

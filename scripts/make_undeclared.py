@@ -1,0 +1,93 @@
+"""Flies data/undeclared: eight small flight tests of a GTM that is not quite the declared one, and their key.
+
+    python scripts/make_undeclared.py [--data DIR] [--key FILE]
+
+The logs tell nothing of what was flown; tests/trace/undeclared_key.toml does, and is for tests alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from blind import draw, information
+from blind.draw import Trial
+from blind.figures import DEG, ROOT
+from blind.truths import Added
+
+from airtruth.logs.store import write_log, write_text
+
+SEED: Final = 16
+FLOWN: Final[dict[str, tuple[str, str, tuple[Added, ...]]]] = {
+    "a": ("single", "light", (Added("elevator_delay", {"delay_s": 0.0085}),)),
+    "b": ("single", "light", (Added("vane_arm", {"x_m": 1.1}),)),
+    "c": ("single", "calm", (Added("downwash_lag", {"Cmalphadot": -30.0}),)),
+    "d": (
+        "single",
+        "light",
+        (Added("cm_alpha_nonlinear:break", {"dCmalpha": -0.5, "at_alpha_rad": 6.1 * DEG}),),
+    ),
+    "e": ("single", "moderate", (Added("accelerometer_arm", {"x_m": 0.45}),)),
+    "f": ("null", "light", ()),
+    "g": ("off-library", "light", (Added("separation_switch", {"dCm": -0.010}),)),
+    "h": (
+        "pair",
+        "light",
+        (Added("gyro_lag", {"tau_s": 0.009}), Added("elevator_asymmetry", {"dCmde": 0.45})),
+    ),
+}
+_HEAD: Final = """# What scripts/make_undeclared.py flew into data/undeclared; read by tests alone.
+# lambda: noncentrality of each effect in the records that are not held out (docs/blind.md).
+"""
+
+
+def trial(name: str) -> Trial:
+    """The trial behind one log."""
+    composition, air, effects = FLOWN[name]
+    number = sorted(FLOWN).index(name)
+    return replace(
+        draw.draw(SEED, number, "null"), composition=composition, air=air, effects=effects, duration_s=6.0
+    )
+
+
+def _values(values: Mapping[str, float]) -> str:
+    return "{ " + ", ".join(f"{name} = {value!r}" for name, value in values.items()) + " }"
+
+
+def entry(name: str) -> str:
+    """TOML of one log's truth."""
+    t = trial(name)
+    strength = information.lambdas(t)
+    lines = [
+        f"[{name}]",
+        f'composition = "{t.composition}"',
+        f'air = "{t.air}"',
+        f'spectrum = "{t.spectrum}"',
+    ]
+    lines += [f'noise = "{t.noise}"', f"rotary = {str(t.rotary).lower()}"]
+    for effect in t.effects:
+        lines += ["", f"[[{name}.effects]]", f'name = "{effect.key}"', f"lambda = {strength[effect.key]:.0f}"]
+        lines += [f"parameters = {_values(effect.values)}"]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Write logs and key."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--data", type=Path, default=ROOT / "data" / "undeclared")
+    parser.add_argument("--key", type=Path, default=ROOT / "tests" / "trace" / "undeclared_key.toml")
+    arguments = parser.parse_args()
+    for folder in (arguments.data, arguments.key.parent):
+        folder.mkdir(parents=True, exist_ok=True)
+    for name in FLOWN:
+        write_log(arguments.data / f"{name}.parquet", draw.fly(trial(name)))
+    write_text(arguments.key, _HEAD + "\n" + "\n".join(entry(name) for name in FLOWN))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,68 @@
+"""The library of effects as text and as JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+import textwrap
+from collections.abc import Iterable
+from dataclasses import asdict
+from typing import Any, Final
+
+from airtruth.effects.effect import Effect, Parameter
+
+_WIDTH: Final = 100
+
+
+def as_text(effects: Iterable[Effect]) -> str:
+    """One paragraph per effect: its parameters, what it is, and what tells it from its look-alikes."""
+    return "\n\n".join(_paragraph(effect) for effect in effects)
+
+
+def as_json(effects: Iterable[Effect]) -> str:
+    """A list of effects with all their entries; an infinite number is null."""
+    return json.dumps([_entry(effect) for effect in effects], indent=1)
+
+
+def _paragraph(effect: Effect) -> str:
+    lines = [f"{effect.key}  ({effect.where})"]
+    lines += [f"  {_parameter(p)}" for p in effect.parameters]
+    for label, text in (("", effect.explanation), ("source: ", effect.source), ("splits: ", effect.splits)):
+        if text:
+            lines += textwrap.wrap(label + text, _WIDTH, initial_indent="  ", subsequent_indent="  ")
+    return "\n".join(lines)
+
+
+def _parameter(p: Parameter) -> str:
+    unit = "" if p.unit == "-" else f" {p.unit}"
+    parts = [f"{p.low:g} to {p.high:g}{unit}"]
+    if p.place:
+        parts.append("a place")
+    else:
+        parts += [f"neutral {p.neutral:g}", f"matters from {_material(p)}"]
+    return f"{p.name}: {p.meaning}; {', '.join(parts)}"
+
+
+def _material(p: Parameter) -> str:
+    """The smallest material value as people state it: below a limit, or away from neutral."""
+    unit = "" if p.unit == "-" else f" {p.unit}"
+    if p.reciprocal:
+        return f"{p.value(p.material):.3g}{unit} down"
+    return f"{'' if p.one_sided else '+-'}{p.material:.3g}{unit}"
+
+
+def _entry(effect: Effect) -> dict[str, Any]:
+    return {
+        "key": effect.key,
+        "name": effect.name,
+        "variant": effect.variant,
+        "where": effect.where,
+        "parameters": [
+            {k: None if isinstance(v, float) and math.isinf(v) else v for k, v in asdict(p).items()}
+            for p in effect.parameters
+        ],
+        "channels": list(effect.channels),
+        "explanation": effect.explanation,
+        "source": effect.source,
+        "splits": effect.splits,
+    }

@@ -1,0 +1,452 @@
+"""Maximum a posteriori of derivatives, levels, biases, initial states and an effect's sizes over several records.
+
+Scoring (Fisher information, differences for tangents) with a Levenberg-Marquardt damping; what belongs to
+one record alone is eliminated record by record. Innovations that are not white are whitened by a vector
+autoregression whose order the data choose.
+
+Source: R. E. Maine and K. W. Iliff, NASA RP-1138 (1985); H. Luetkepohl, New Introduction to Multiple Time
+Series Analysis (2005), 3.2 and 4.3, for the autoregression and its order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.effects.change import Change
+from airtruth.effects.effect import Effect
+from airtruth.trace.lower import lower
+from airtruth.trace.model import (
+    LOCAL_STEP,
+    SHARED_STEP,
+    External,
+    L,
+    S,
+    Settings,
+    local_prior,
+    respond,
+    shared_prior,
+    start,
+)
+from airtruth.trace.records import Record
+
+Array = NDArray[np.float64]
+
+ITERATIONS: Final = 30
+_ENOUGH: Final = 0.002
+"""A fit has converged once a step would gain less than this in log-likelihood: 0.06 standard errors."""
+_STALE: Final = 1.0
+"""Gain in log-likelihood below which derivatives are made anew."""
+_ORDERS: Final = 6
+_LEVELS: Final = (6, 7, 8)
+_SIGMA: Final = 9
+_ROUGH_M_S: Final = 1.0
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """The declared aircraft and some effects of free size.
+
+    Attributes
+    ----------
+    declared : what aircraft.toml says of the sensors.
+    effects : the effects; none is the null hypothesis.
+    """
+
+    declared: Change
+    effects: tuple[Effect, ...] = ()
+
+    @cached_property
+    def parameters(self) -> tuple[tuple[int, int], ...]:
+        """(effect, parameter) of each place in the vector of sizes."""
+        return tuple((i, j) for i, e in enumerate(self.effects) for j in range(len(e.parameters)))
+
+    def values(self, sizes: Array) -> list[dict[str, float]]:
+        """Parameters of each effect, in their own units."""
+        found: list[dict[str, float]] = [{} for _ in self.effects]
+        for size, (i, j) in zip(sizes, self.parameters, strict=True):
+            p = self.effects[i].parameters[j]
+            found[i][p.name] = p.value(float(size))
+        return found
+
+    def change(self, sizes: Array) -> Change:
+        """All that the hypothesis changes at these sizes."""
+        total = self.declared
+        for effect, values in zip(self.effects, self.values(sizes), strict=True):
+            total = total + effect.change(values)
+        return total
+
+    def plus(self, effect: Effect) -> Hypothesis:
+        """The hypothesis with one effect more."""
+        return replace(self, effects=(*self.effects, effect))
+
+
+@dataclass(frozen=True)
+class Point:
+    """Values of all free parameters: shared (9,), local (records, 10), sizes (k,)."""
+
+    shared: Array
+    local: Array
+    sizes: Array
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """Whitened innovations of one record and their derivatives.
+
+    Attributes
+    ----------
+    r : (samples, 3) whitened innovations.
+    logdet : log|S|.
+    t : (parameters, samples, 3) derivatives of the whitened innovations at fixed whitener; order: shared,
+        sizes, local.
+    w : (parameters, 3, 3) whitened derivatives of S.
+    white : (3, 3).
+    """
+
+    r: Array
+    logdet: float
+    t: Array
+    w: Array
+    white: Array
+
+
+@dataclass(frozen=True)
+class Whitener:
+    """Vector autoregression of whitened innovations: r_k - sum A_j r_(k-j), times the inverse root of what is left.
+
+    Attributes
+    ----------
+    coefficients : (order, 3, 3); root : (3, 3).
+    """
+
+    coefficients: Array
+    root: Array
+
+    def apply(self, x: Array) -> Array:
+        """Filter (..., samples, 3) along the samples; the first ones pass with the root alone."""
+        if self.coefficients.shape[0] == 0:
+            return x
+        out = x.copy()
+        for j, a in enumerate(self.coefficients, start=1):
+            out[..., j:, :] -= x[..., :-j, :] @ a.T
+        return np.asarray(out @ self.root.T)
+
+
+NO_WHITENER: Final = Whitener(np.zeros((0, 3, 3)), np.eye(3))
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Where the posterior is largest.
+
+    Attributes
+    ----------
+    hypothesis, point : what was fitted and where it ended.
+    cost : negative log-posterior, constants left out; likelihood : (records,) negative log-likelihood of each record.
+    tangents : of each record at ``point``.
+    whitener : of the innovations.
+    covariance : (9 + k, 9 + k) of shared parameters and sizes, local ones free.
+    converged : whether the search ended by its tolerance.
+    """
+
+    hypothesis: Hypothesis
+    point: Point
+    cost: float
+    likelihood: Array
+    tangents: tuple[Tangent, ...]
+    whitener: Whitener
+    covariance: Array
+    converged: bool
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Records, what is declared of them, and how many threads work on them."""
+
+    records: tuple[Record, ...]
+    settings: Settings
+    threads: int = 1
+
+    def each(self, function, arguments: Sequence[object]) -> list:  # type: ignore[no-untyped-def, type-arg]
+        """The function of each argument, in order."""
+        if self.threads <= 1 or len(arguments) <= 1:
+            return [function(a) for a in arguments]
+        with ThreadPoolExecutor(self.threads) as pool:
+            return list(pool.map(function, arguments))
+
+
+def tangent(
+    problem: Problem,
+    index: int,
+    hypothesis: Hypothesis,
+    point: Point,
+    local_only: bool = False,
+    old: Tangent | None = None,
+) -> Tangent | None:
+    """Innovations of one record and their derivatives by one-sided differences; None where the motion is lost.
+
+    Parameters
+    ----------
+    local_only : differentiate for the record's own parameters alone.
+    old : derivatives at a point nearby, whitened anew and kept for all but the sizes.
+    """
+    record, settings = problem.records[index], problem.settings
+    low = lower(hypothesis.change(point.sizes))
+    base = respond(record, settings, low, point.shared, point.local[index])
+    if not np.isfinite(base.logdet):
+        return None
+    k = len(point.sizes)
+    t = np.zeros((S + k + L, *base.e.shape))
+    w = np.zeros((S + k + L, 3, 3))
+
+    def put(at: int, moved: object, h: float) -> None:
+        t[at] = (moved.e - base.e) @ base.white.T / h  # type: ignore[attr-defined]
+        w[at] = base.white @ ((moved.covariance - base.covariance) / h) @ base.white.T  # type: ignore[attr-defined]
+
+    if old is not None:
+        turn = np.linalg.solve(old.white.T, base.white.T)
+        t[:] = old.t @ turn
+        w[:] = turn.T @ old.w @ turn
+    if not local_only:
+        for i in range(S if old is None else 0):
+            shared = point.shared.copy()
+            shared[i] += SHARED_STEP[i]
+            put(i, respond(record, settings, low, shared, point.local[index]), SHARED_STEP[i])
+        for i in range(k):
+            effect, j = hypothesis.parameters[i]
+            p = hypothesis.effects[effect].parameters[j]
+            h = 0.02 * p.step if abs(point.sizes[i]) > p.step else p.step
+            sizes = point.sizes.copy()
+            sizes[i] += h
+            moved = respond(record, settings, hypothesis.change(sizes), point.shared, point.local[index])
+            put(S + i, moved, h)
+    for i in range(L if old is None else 0):
+        local = point.local[index].copy()
+        local[i] += LOCAL_STEP[i]
+        put(S + k + i, respond(record, settings, low, point.shared, local), LOCAL_STEP[i])
+    if not (np.isfinite(t).all() and np.isfinite(w).all()):
+        return None
+    return Tangent(base.e @ base.white.T, base.logdet, t, w, base.white)
+
+
+def parts(tangent_: Tangent, whitener: Whitener, levels: bool) -> tuple[float, Array, Array]:
+    """Negative log-likelihood, gradient and information (parameters,) of one record.
+
+    Parameters
+    ----------
+    levels : whether noise and gust levels count; an autoregression is made at fixed levels.
+    """
+    r, t = whitener.apply(tangent_.r), whitener.apply(tangent_.t)
+    samples = r.shape[0]
+    flat = t.reshape(t.shape[0], -1)
+    gradient = flat @ r.ravel()
+    information = flat @ flat.T
+    if levels:
+        moment = tangent_.r.T @ tangent_.r
+        gradient = gradient + 0.5 * (
+            samples * np.trace(tangent_.w, axis1=1, axis2=2) - np.einsum("pij,ij->p", tangent_.w, moment)
+        )
+        information = information + 0.5 * samples * np.einsum("pij,qij->pq", tangent_.w, tangent_.w)
+    cost = 0.5 * samples * tangent_.logdet + 0.5 * float(r.ravel() @ r.ravel())
+    return cost, gradient, information
+
+
+def fit(
+    problem: Problem,
+    hypothesis: Hypothesis,
+    begin: Point,
+    whitener: Whitener = NO_WHITENER,
+    iterations: int = ITERATIONS,
+    free_levels: bool = True,
+    rival: float = np.inf,
+) -> Fit | None:
+    """The largest posterior from a start; None where not even the start can be evaluated.
+
+    Parameters
+    ----------
+    rival : cost of a better hypothesis: the search ends early once it is plainly out of reach.
+    whitener : an autoregression that is held; with one, levels should not be free.
+    free_levels : whether noise and gust levels are fitted.
+    """
+    point, damping = begin, 1e-3
+    current = _evaluate(problem, hypothesis, point, whitener, free_levels)
+    if current is None:
+        return None
+    converged, fresh = False, True
+    for _ in range(iterations):
+        cost, pieces, tangents = current
+        step, gain = _step(problem, hypothesis, point, pieces, damping, free_levels)
+        if gain < _ENOUGH and fresh:
+            converged = True
+            break
+        trial = _moved(hypothesis, point, step)
+        tried = _evaluate(problem, hypothesis, trial, whitener, free_levels, tangents)
+        better = -np.inf if tried is None else cost - tried[0]
+        if tried is not None and better > -1e-9:
+            point, current, damping = trial, tried, max(damping * 0.1, 1e-9)
+            behind = tried[0] - rival
+            if (better < 0.01 and fresh) or (behind > 20.0 and 4.0 * better < behind):
+                converged = True
+                break
+            fresh = False
+        else:
+            damping = max(damping * 20.0, 1e-3)
+        if not fresh and better < _STALE:
+            # derivatives of an earlier point have done what they can
+            anew = _evaluate(problem, hypothesis, point, whitener, free_levels)
+            if anew is None:
+                break
+            current, fresh, damping = anew, True, min(damping, 1e-3)
+        if damping > 1e7:
+            break
+    if not fresh:
+        current = _evaluate(problem, hypothesis, point, whitener, free_levels) or current
+    cost, pieces, tangents = current
+    covariance = _covariance(problem, hypothesis, pieces, free_levels)
+    likelihood = np.array([p[0] for p in pieces])
+    return Fit(hypothesis, point, cost, likelihood, tangents, whitener, covariance, converged)
+
+
+def begin(problem: Problem, hypothesis: Hypothesis) -> Point:
+    """Where a search begins without anything known: motions fitted with the levels held in rough air."""
+    local = np.stack([start(record, problem.settings) for record in problem.records])
+    local[:, _SIGMA] = np.log(_ROUGH_M_S)
+    point = Point(np.zeros(S), local, np.zeros(len(hypothesis.parameters)))
+    found = fit(problem, hypothesis, point, iterations=4, free_levels=False)
+    return point if found is None else found.point
+
+
+def autoregression(tangents: Sequence[Tangent]) -> Whitener:
+    """Vector autoregression of the innovations of all records, its order by Schwarz's criterion."""
+    total = sum(t.r.shape[0] - _ORDERS for t in tangents)
+    best: tuple[float, Whitener] | None = None
+    for order in range(_ORDERS + 1):
+        left, right = [], []
+        for t in tangents:
+            n = t.r.shape[0]
+            right.append(t.r[_ORDERS:])
+            left.append(np.concatenate([t.r[_ORDERS - j : n - j] for j in range(1, order + 1)], axis=1) if order else np.zeros((n - _ORDERS, 0)))
+        x, y = np.concatenate(left), np.concatenate(right)
+        b = np.linalg.lstsq(x, y, rcond=None)[0] if order else np.zeros((0, 3))
+        residual = y - x @ b
+        sigma = residual.T @ residual / total
+        criterion = total * float(np.linalg.slogdet(sigma)[1]) + np.log(total) * 9.0 * order
+        if best is None or criterion < best[0]:
+            coefficients = b.T.reshape(3, order, 3).transpose(1, 0, 2) if order else np.zeros((0, 3, 3))
+            root = np.linalg.inv(np.linalg.cholesky(sigma)) if order else np.eye(3)
+            best = (criterion, Whitener(np.ascontiguousarray(coefficients), root))
+    assert best is not None
+    return best[1]
+
+
+def _evaluate(  # type: ignore[no-untyped-def]
+    problem: Problem,
+    hypothesis: Hypothesis,
+    point: Point,
+    whitener: Whitener,
+    levels: bool,
+    old: Sequence[Tangent] | None = None,
+):
+    def one(index: object) -> tuple[Tangent, tuple[float, Array, Array]] | None:
+        i = int(index)  # type: ignore[call-overload]
+        found = tangent(problem, i, hypothesis, point, old=None if old is None else old[i])
+        return None if found is None else (found, parts(found, whitener, levels))
+
+    done = problem.each(one, range(len(problem.records)))
+    if any(d is None for d in done):
+        return None
+    pieces = [d[1] for d in done]
+    cost = sum(p[0] for p in pieces) + _prior_cost(problem, point)
+    if not np.isfinite(cost):
+        return None
+    return cost, pieces, tuple(d[0] for d in done)
+
+
+def _prior_cost(problem: Problem, point: Point) -> float:
+    total = 0.5 * float(point.shared @ shared_prior(problem.records[0], problem.settings) @ point.shared)
+    for record, local in zip(problem.records, point.local, strict=True):
+        middle, precision = local_prior(record, problem.settings)
+        off = local - middle
+        total += 0.5 * float(off @ precision @ off)
+    return total
+
+
+def reduced(problem: Problem, point: Point, k: int, pieces, levels: bool, damping: float = 0.0):  # type: ignore[no-untyped-def]
+    """Gradient and information of shared parameters and sizes with the local ones eliminated.
+
+    Returns
+    -------
+    gradient (9 + k,), information, and of each record what back-substitution needs; priors included.
+    """
+    m = S + k
+    gradient, information = np.zeros(m), np.zeros((m, m))
+    information[:S, :S] = shared_prior(problem.records[0], problem.settings)
+    gradient[:S] = information[:S, :S] @ point.shared
+    back = []
+    for record, local, (_, g, h) in zip(problem.records, point.local, pieces, strict=True):
+        middle, precision = local_prior(record, problem.settings)
+        h_ll = h[m:, m:] + precision
+        g_l = g[m:] + precision @ (local - middle)
+        h_sl = h[:m, m:].copy()
+        if not levels:
+            h_ll[_SIGMA], h_ll[:, _SIGMA], h_ll[_SIGMA, _SIGMA] = 0.0, 0.0, 1.0
+            g_l[_SIGMA] = 0.0
+            h_sl[:, _SIGMA] = 0.0
+        h_ll[np.diag_indices(L)] *= 1.0 + damping
+        solved = np.linalg.solve(h_ll, np.column_stack([g_l, h_sl.T]))
+        gradient += g[:m] - h_sl @ solved[:, 0]
+        information += h[:m, :m] - h_sl @ solved[:, 1:]
+        back.append((h_ll, solved))
+    if not levels:
+        for i in _LEVELS:
+            information[i], information[:, i] = 0.0, 0.0
+            information[i, i] = 1.0
+            gradient[i] = 0.0
+    return gradient, information, back
+
+
+def _step(problem: Problem, hypothesis: Hypothesis, point: Point, pieces, damping: float, levels: bool):  # type: ignore[no-untyped-def]
+    k = len(point.sizes)
+    gradient, information, back = reduced(problem, point, k, pieces, levels, damping)
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-30))
+    normal = information / np.outer(scale, scale) + damping * np.eye(len(scale))
+    shared = -np.linalg.solve(normal, gradient / scale) / scale
+    local = np.stack([-(solved[:, 0] + solved[:, 1:] @ shared) for _, solved in back])
+    local[:, _SIGMA] = np.clip(local[:, _SIGMA], -1.0, 1.0)
+    gain = float(-gradient @ shared) + sum(
+        float(solved[:, 0] @ h_ll @ solved[:, 0]) for h_ll, solved in back
+    )
+    return Point(shared[:S], local, shared[S:]), 0.5 * gain
+
+
+def _moved(hypothesis: Hypothesis, point: Point, step: Point) -> Point:
+    """The step taken, sizes held to their plausible ranges."""
+    sizes = point.sizes + step.sizes
+    for i, (effect, j) in enumerate(hypothesis.parameters):
+        p = hypothesis.effects[effect].parameters[j]
+        ends = sorted((p.size(p.low), p.size(p.high)))
+        if p.one_sided:
+            ends[0] = max(ends[0], 0.0) if p.reciprocal else max(ends[0], p.size(p.low))
+        room = 0.25 * (ends[1] - ends[0])
+        sizes[i] = min(max(sizes[i], max(ends[0], point.sizes[i] - room)), min(ends[1], point.sizes[i] + room))
+    shared = point.shared + np.concatenate([step.shared[:6], np.clip(step.shared[6:], -1.0, 1.0)])
+    return Point(shared, point.local + step.local, sizes)
+
+
+def _covariance(problem: Problem, hypothesis: Hypothesis, pieces, levels: bool) -> Array:  # type: ignore[no-untyped-def]
+    k = len(hypothesis.parameters)
+    empty = Point(np.zeros(S), np.stack([local_prior(r, problem.settings)[0] for r in problem.records]), np.zeros(k))
+    _, information, _ = reduced(problem, empty, k, pieces, levels)
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-30))
+    normal = information / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
+    return np.asarray(np.linalg.inv(normal) / np.outer(scale, scale))
+
+
+__all__ = ["External", "Fit", "Hypothesis", "NO_WHITENER", "Point", "Problem", "Tangent", "Whitener", "autoregression", "begin", "fit", "parts", "reduced", "tangent"]

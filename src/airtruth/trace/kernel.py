@@ -1,0 +1,524 @@
+"""The declared aircraft in gusts as a filter: nonlinear in the motion, with the steady gain of its linearisation.
+
+State x: alpha over ground [rad], q [rad/s], two Dryden states of unit variance, states of effects, states
+of lagging sensors. Airspeed, density and pitch attitude are measured and enter as known series; the air's
+alpha is alpha + w/V. Between samples the motion is integrated by the classical Runge-Kutta method, whose
+weights are Simpson's: the middle value of an input carries its area. Sensor lags are integrated exactly for
+a signal linear over half a step; a delayed output is the motion integrated back by the delay.
+
+Forces: tables F = A(alpha, elevator, q) q_bar + B(alpha, elevator, q) of X, Z, M about a trim, increments of
+the derivatives, and the terms of `airtruth.effects.change`. Equations of motion: see
+`airtruth.physics.longitudinal`; Dryden form: MIL-F-8785C, 3.7.1.2; gain: R. E. Maine and K. W. Iliff, NASA
+RP-1138 (1985).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from airtruth.identify.kalman_step import riccati, step
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+OUTPUTS: Final = 3
+CORE: Final = 4
+_W1: Final = math.sqrt(1.5)
+_W2: Final = math.sqrt(1.5) * (1.0 / math.sqrt(3.0) - 1.0)
+
+# places in the vector of constants
+AREA, CHORD, MASS, INERTIA, GRAVITY, ALPHA0, DE0, LENGTH_W, SIGMA_W = range(9)
+# factors and shifts of declared quantities
+F_MASS, F_INERTIA, F_ELEVATOR, CG, THRUST_ARM, THRUST = range(6)
+
+
+@njit(cache=True, nogil=True)
+def cell(axis: Array, x: float) -> tuple[int, float]:
+    """Lower point of the cell that holds x and the share of the cell below x; the end cells go on outside."""
+    low, high = 0, axis.size - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if axis[middle] <= x:
+            low = middle
+        else:
+            high = middle
+    return low, (x - axis[low]) / (axis[low + 1] - axis[low])
+
+
+@njit(cache=True, nogil=True)
+def rates(
+    x: Array,
+    de: float,
+    v: float,
+    qbar: float,
+    theta: float,
+    lift_more: float,
+    moment_more: float,
+    constants: Array,
+    declared: Array,
+    increments: Array,
+    alpha_axis: Array,
+    de_axis: Array,
+    q_axis: Array,
+    values: Array,
+    aero_index: Ints,
+    aero_value: Array,
+    state_index: Ints,
+    state_value: Array,
+    out: Array,
+) -> float:
+    """x' of the motion, the gusts and the effects' states into ``out``; returns az at the CG [m/s2].
+
+    Parameters
+    ----------
+    lift_more, moment_more : increments of CL and Cm [-].
+    increments : (6,) of CLalpha, CLq, CLde, Cmalpha, Cmq, Cmde about the trim [-].
+    """
+    sigma, length = constants[SIGMA_W], constants[LENGTH_W]
+    alpha = x[0] + sigma * (_W1 * x[2] + _W2 * x[3]) / v
+    q = x[1]
+    surface = constants[DE0] + declared[F_ELEVATOR] * (de - constants[DE0])
+    i, si = cell(alpha_axis, alpha)
+    j, sj = cell(de_axis, surface)
+    n, sn = cell(q_axis, q)
+    fx = fz = fm = 0.0
+    for a in range(2):
+        wa = si if a else 1.0 - si
+        for b in range(2):
+            wb = wa * (sj if b else 1.0 - sj)
+            for c in range(2):
+                w = wb * (sn if c else 1.0 - sn)
+                f = values[i + a, j + b, n + c]
+                fx += w * (f[0] * qbar + f[3])
+                fz += w * (f[1] * qbar + f[4])
+                fm += w * (f[2] * qbar + f[5])
+    force = qbar * constants[AREA]
+    chord = constants[CHORD]
+    half = 0.5 * chord / v
+    qhat = q * half
+    d_alpha, d_de = alpha - constants[ALPHA0], surface - constants[DE0]
+    lift = lift_more + increments[0] * d_alpha + increments[1] * qhat + increments[2] * d_de
+    moment = moment_more + increments[3] * d_alpha + increments[4] * qhat + increments[5] * d_de
+    mass = constants[MASS] * declared[F_MASS]
+    inertia = constants[INERTIA] * declared[F_INERTIA]
+    # alpha' before the terms that need it
+    first = q + (
+        (fz - force * lift) * math.cos(alpha) - fx * math.sin(alpha)
+    ) / (mass * v) + constants[GRAVITY] * math.cos(theta - x[0]) / v
+    for t in range(aero_index.shape[0]):
+        signal = aero_index[t, 1]
+        if signal == 0:
+            s = alpha
+        elif signal == 1:
+            s = surface
+        elif signal == 2:
+            s = qhat
+        elif signal == 3:
+            s = first * half
+        else:
+            s = x[CORE + signal - 4]
+        s -= aero_value[t, 1]
+        shape = aero_index[t, 2]
+        if shape == 1:
+            s = s * s
+        elif shape == 2:
+            s = max(0.0, s)
+        elif shape == 3:
+            s = min(0.0, s)
+        if aero_index[t, 0] == 0:
+            lift += aero_value[t, 0] * s
+        else:
+            moment += aero_value[t, 0] * s
+    fz -= force * lift
+    fm += force * chord * (moment - declared[CG] * fz / force) + declared[THRUST] * declared[THRUST_ARM]
+    az = fz / mass
+    out[0] = q + (fz * math.cos(alpha) - fx * math.sin(alpha)) / (mass * v) + constants[GRAVITY] * math.cos(theta - x[0]) / v
+    out[1] = fm / inertia
+    a = v / length
+    out[2] = -a * x[2]
+    out[3] = a * (x[2] - x[3])
+    at = CORE
+    for k in range(state_index.shape[0]):
+        signal = state_index[k, 1]
+        if signal == 0:
+            s = alpha
+        elif signal == 1:
+            s = surface
+        elif signal == 2:
+            s = qhat
+        else:
+            s = out[0] * half
+        if state_index[k, 0] == 0:
+            out[at] = (s - x[at]) / state_value[k, 0]
+            at += 1
+        else:
+            wn = 1.0 / state_value[k, 0]
+            out[at] = x[at + 1]
+            out[at + 1] = wn * wn * (s - x[at]) - 2.0 * state_value[k, 1] * wn * x[at + 1]
+            at += 2
+    return az
+
+
+@njit(cache=True, nogil=True)
+def outputs(x: Array, rate: Array, az: float, v: float, constants: Array, arms: Array, scales: Array, y: Array) -> None:
+    """What the sensors would read without bias, lag and noise: alpha [rad], q [rad/s], az [m/s2]."""
+    alpha = x[0] + constants[SIGMA_W] * (_W1 * x[2] + _W2 * x[3]) / v
+    y[0] = scales[0] * (alpha - x[1] * arms[0] / v)
+    y[1] = scales[1] * x[1]
+    y[2] = scales[2] * (az - arms[2] * rate[1])
+
+
+@njit(cache=True, nogil=True)
+def linear(
+    x: Array,
+    de: float,
+    v: float,
+    qbar: float,
+    theta: float,
+    motion: int,
+    lags: Array,
+    constants: Array,
+    declared: Array,
+    increments: Array,
+    alpha_axis: Array,
+    de_axis: Array,
+    q_axis: Array,
+    values: Array,
+    aero_index: Ints,
+    aero_value: Array,
+    state_index: Ints,
+    state_value: Array,
+    arms: Array,
+    scales: Array,
+    a: Array,
+    c: Array,
+) -> None:
+    """A and C of the motion, effects' states and lagging sensors about a state, by central differences."""
+    n = x.size
+    a[:] = 0.0
+    c[:] = 0.0
+    up, down = np.empty(n), np.empty(n)
+    y_up, y_down = np.empty(OUTPUTS), np.empty(OUTPUTS)
+    moved = x.copy()
+    for j in range(motion):
+        # wide enough to average a table's break, so that the gain does not jump with the reference
+        h = 0.01
+        if j == 1:
+            h = 0.05
+        if j == 2 or j == 3:
+            h = 0.1
+        moved[j] = x[j] + h
+        az_up = rates(moved, de, v, qbar, theta, 0.0, 0.0, constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, up)  # fmt: skip
+        outputs(moved, up, az_up, v, constants, arms, scales, y_up)
+        moved[j] = x[j] - h
+        az_down = rates(moved, de, v, qbar, theta, 0.0, 0.0, constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, down)  # fmt: skip
+        outputs(moved, down, az_down, v, constants, arms, scales, y_down)
+        moved[j] = x[j]
+        for i in range(motion):
+            a[i, j] = (up[i] - down[i]) / (2.0 * h)
+        for i in range(OUTPUTS):
+            c[i, j] = (y_up[i] - y_down[i]) / (2.0 * h)
+    at = motion
+    for i in range(OUTPUTS):
+        if lags[i] > 0.0:
+            for j in range(n):
+                a[at, j] = c[i, j] / lags[i]
+                c[i, j] = 0.0
+            a[at, at] = -1.0 / lags[i]
+            c[i, at] = 1.0
+            at += 1
+
+
+@njit(cache=True, nogil=True)
+def gain(
+    a: Array, c: Array, v: float, delays: Array, constants: Array, variance: Array, dt_s: float
+) -> tuple[Array, Array, Array, float]:
+    """Steady gain K of the update, whitener W with W S W' = I, S itself, and log|S| (nan where there is none)."""
+    n = a.shape[0]
+    c = c.copy()
+    for i in range(OUTPUTS):
+        if delays[i] != 0.0:  # y(t - d) = C exp(-A d) x: a short series
+            row = c[i].copy()
+            term = row.copy()
+            for k in range(1, 6):
+                term = np.dot(term, a) * (-delays[i] / k)
+                row = row + term
+            c[i] = row
+    system = np.zeros((n, n + 1))
+    system[:, :n] = a
+    process = np.zeros(n)
+    process[2] = 2.0 * v / constants[LENGTH_W]
+    phi, noise = np.empty((n, n)), np.empty((n, n))
+    early, late = np.empty((n, 1)), np.empty((n, 1))
+    step(system, process, n, dt_s, phi, early, late, noise)
+    white = np.zeros((OUTPUTS, OUTPUTS))
+    k_gain = np.zeros((n, OUTPUTS))
+    s = np.zeros((OUTPUTS, OUTPUTS))
+    if not (np.isfinite(phi).all() and np.isfinite(noise).all()):
+        return k_gain, white, s, np.nan
+    p = riccati(phi, c, noise, variance)
+    pc = np.dot(p, np.ascontiguousarray(c.T))
+    s = np.dot(c, pc)
+    for i in range(OUTPUTS):
+        s[i, i] += variance[i]
+    if not np.isfinite(s).all():
+        return k_gain, white, s, np.nan
+    lower = np.zeros((OUTPUTS, OUTPUTS))
+    logdet = 0.0
+    for i in range(OUTPUTS):
+        for j in range(i + 1):
+            total = s[i, j]
+            for k in range(j):
+                total -= lower[i, k] * lower[j, k]
+            if i == j:
+                if not total > 0.0:
+                    return k_gain, white, s, np.nan
+                lower[i, i] = math.sqrt(total)
+                logdet += math.log(total)
+            else:
+                lower[i, j] = total / lower[j, j]
+    white = np.linalg.inv(lower)
+    k_gain = np.dot(pc, np.dot(np.ascontiguousarray(white.T), white))
+    return k_gain, white, s, logdet
+
+
+@njit(cache=True, nogil=True)
+def innovations(
+    y: Array,
+    de: Array,
+    v: Array,
+    density: Array,
+    theta: Array,
+    lift_more: Array,
+    moment_more: Array,
+    output_more: Array,
+    dt_s: float,
+    sub: int,
+    start: Array,
+    bias: Array,
+    offset: Array,
+    k_gain: Array,
+    motion: int,
+    lags: Array,
+    delays: Array,
+    constants: Array,
+    declared: Array,
+    increments: Array,
+    alpha_axis: Array,
+    de_axis: Array,
+    q_axis: Array,
+    values: Array,
+    aero_index: Ints,
+    aero_value: Array,
+    state_index: Ints,
+    state_value: Array,
+    arms: Array,
+    scales: Array,
+    e: Array,
+) -> bool:
+    """Innovations (samples, 3) of one record into ``e``; False if the motion leaves all bounds.
+
+    Parameters
+    ----------
+    y : (samples, 3) alpha [rad], q [rad/s], az [m/s2].
+    de, v, density, theta, lift_more, moment_more : on the fine grid, ``sub`` (even) cells per sample.
+    output_more : (samples, 3) added to the outputs.
+    start : (4,) initial alpha, q and gusts; bias : (3,) of the outputs; offset : (2,) CL, Cm.
+    k_gain : (states, 3) of the update; zeros for a free run.
+    motion : states of motion, gusts and effects.
+    lags, delays, arms, scales : (3,) of the sensors.
+    """
+    n = k_gain.shape[0]
+    samples = y.shape[0]
+    h = 2.0 * dt_s / sub
+    x = np.zeros(n)
+    x[:CORE] = start
+    rate, tried = np.zeros((4, n)), np.zeros(n)
+    out, last, first = np.zeros(OUTPUTS), np.zeros(OUTPUTS), np.zeros(2)
+    back, back_rate = np.zeros(n), np.zeros((4, n))
+    # effects' states begin in equilibrium with the first state
+    at = CORE
+    for k in range(state_index.shape[0]):
+        signal = state_index[k, 1]
+        alpha = x[0]
+        surface = constants[DE0] + declared[F_ELEVATOR] * (de[0] - constants[DE0])
+        s = alpha
+        if signal == 1:
+            s = surface
+        elif signal >= 2:
+            s = 0.0
+        x[at] = s
+        at += 1 if state_index[k, 0] == 0 else 2
+    for k in range(samples):
+        f = k * sub
+        qbar = 0.5 * density[f] * v[f] * v[f]
+        az = rates(x, de[f], v[f], qbar, theta[f], offset[0] + lift_more[f], offset[1] + moment_more[f], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, rate[0])  # fmt: skip
+        outputs(x, rate[0], az, v[f], constants, arms, scales, out)
+        at = motion
+        for i in range(OUTPUTS):
+            value = out[i]
+            if lags[i] > 0.0:
+                if k == 0:
+                    x[at] = out[i]
+                value = x[at]
+                at += 1
+            elif delays[i] != 0.0:
+                # integrate back by the delay: whole and part steps of the fine grid's pairs
+                steps = max(1, int(math.ceil(abs(delays[i]) / h - 1e-9)))
+                hb = -delays[i] / steps
+                back[:] = x
+                position = float(f)
+                fine = dt_s / sub
+                for _ in range(steps):
+                    for stage in range(4):
+                        share = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
+                        where = position + share * hb / fine
+                        where = min(max(where, 0.0), float(de.size - 1))
+                        low = min(int(where), de.size - 2)
+                        part = where - low
+                        de_b = de[low] + part * (de[low + 1] - de[low])
+                        v_b = v[low] + part * (v[low + 1] - v[low])
+                        rho_b = density[low] + part * (density[low + 1] - density[low])
+                        th_b = theta[low] + part * (theta[low + 1] - theta[low])
+                        for m in range(motion):
+                            tried[m] = back[m] + (share * hb * back_rate[stage - 1, m] if stage > 0 else 0.0)
+                        rates(tried, de_b, v_b, 0.5 * rho_b * v_b * v_b, th_b, offset[0] + lift_more[low], offset[1] + moment_more[low], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, back_rate[stage])  # fmt: skip
+                    for m in range(motion):
+                        slope = back_rate[0, m] + 2.0 * back_rate[1, m] + 2.0 * back_rate[2, m] + back_rate[3, m]
+                        back[m] += hb / 6.0 * slope
+                    position += hb / fine
+                where = min(max(position, 0.0), float(de.size - 1))
+                low = min(int(where), de.size - 2)
+                part = where - low
+                de_b = de[low] + part * (de[low + 1] - de[low])
+                v_b = v[low] + part * (v[low + 1] - v[low])
+                rho_b = density[low] + part * (density[low + 1] - density[low])
+                th_b = theta[low] + part * (theta[low + 1] - theta[low])
+                az_b = rates(back, de_b, v_b, 0.5 * rho_b * v_b * v_b, th_b, offset[0] + lift_more[low], offset[1] + moment_more[low], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, back_rate[0])  # fmt: skip
+                outputs(back, back_rate[0], az_b, v_b, constants, arms, scales, last)
+                value = last[i]
+            e[k, i] = y[k, i] - value - bias[i] - output_more[k, i]
+        if k + 1 == samples:
+            break
+        for i in range(n):
+            total = 0.0
+            for m in range(OUTPUTS):
+                total += k_gain[i, m] * e[k, m]
+            x[i] += total
+            if not abs(x[i]) < 1e6:
+                return False
+        for pair in range(sub // 2):
+            f = k * sub + 2 * pair
+            for stage in range(4):
+                share = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
+                g = f + (0 if stage == 0 else (2 if stage == 3 else 1))
+                for m in range(motion):
+                    tried[m] = x[m] + (share * h * rate[stage - 1, m] if stage > 0 else 0.0)
+                qbar = 0.5 * density[g] * v[g] * v[g]
+                az = rates(tried, de[g], v[g], qbar, theta[g], offset[0] + lift_more[g], offset[1] + moment_more[g], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, rate[stage])  # fmt: skip
+                if stage == 0 and motion < n:
+                    outputs(tried, rate[0], az, v[g], constants, arms, scales, last)
+                    first[0], first[1] = rate[0, 0], rate[0, 1]
+            for m in range(motion):
+                slope = rate[0, m] + 2.0 * rate[1, m] + 2.0 * rate[2, m] + rate[3, m]
+                x[m] += h / 6.0 * slope
+            if motion < n:
+                g = f + 2
+                qbar = 0.5 * density[g] * v[g] * v[g]
+                az = rates(x, de[g], v[g], qbar, theta[g], offset[0] + lift_more[g], offset[1] + moment_more[g], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, rate[0])  # fmt: skip
+                outputs(x, rate[0], az, v[g], constants, arms, scales, out)
+                at = motion
+                for i in range(OUTPUTS):
+                    if lags[i] > 0.0:
+                        # two half steps; in between the motion's own curvature (cubic through values and slopes)
+                        middle = 0.5 * (last[i] + out[i])
+                        if i < 2:
+                            middle += scales[i] * h / 8.0 * (first[i] - rate[0, i])
+                        r = 0.5 * h / lags[i]
+                        decay = math.exp(-r)
+                        mean = (1.0 - decay) / r
+                        x[at] = decay * x[at] + (mean - decay) * last[i] + (1.0 - mean) * middle
+                        x[at] = decay * x[at] + (mean - decay) * middle + (1.0 - mean) * out[i]
+                        at += 1
+    return True
+
+
+@njit(cache=True, nogil=True)
+def evaluate(
+    y: Array,
+    de: Array,
+    v: Array,
+    density: Array,
+    theta: Array,
+    lift_more: Array,
+    moment_more: Array,
+    output_more: Array,
+    reference: Array,
+    dt_s: float,
+    sub: int,
+    start: Array,
+    bias: Array,
+    offset: Array,
+    variance: Array,
+    free_run: bool,
+    lags: Array,
+    delays: Array,
+    constants: Array,
+    declared: Array,
+    increments: Array,
+    alpha_axis: Array,
+    de_axis: Array,
+    q_axis: Array,
+    values: Array,
+    aero_index: Ints,
+    aero_value: Array,
+    state_index: Ints,
+    state_value: Array,
+    arms: Array,
+    scales: Array,
+    e: Array,
+    white: Array,
+    s: Array,
+) -> float:
+    """Innovations of one record into ``e``, whitener and covariance into ``white`` and ``s``; log|S|, nan on failure.
+
+    Parameters
+    ----------
+    reference : alpha [rad], elevator [rad], airspeed [m/s], density [kg/m3], theta [rad] at which the gain is made.
+    free_run : no gain: the residuals of a simulation; ``white`` and ``s`` are left alone.
+    others : as in `innovations`.
+    """
+    motion = CORE
+    for k in range(state_index.shape[0]):
+        motion += 1 if state_index[k, 0] == 0 else 2
+    n = motion
+    for i in range(OUTPUTS):
+        if lags[i] > 0.0:
+            n += 1
+    k_gain = np.zeros((n, OUTPUTS))
+    logdet = 0.0
+    if not free_run:
+        x = np.zeros(n)
+        x[0] = reference[0]
+        at = CORE
+        for k in range(state_index.shape[0]):
+            if state_index[k, 1] == 0:
+                x[at] = reference[0]
+            elif state_index[k, 1] == 1:
+                x[at] = reference[1]
+            at += 1 if state_index[k, 0] == 0 else 2
+        a, c = np.empty((n, n)), np.empty((OUTPUTS, n))
+        speed = reference[2]
+        linear(x, reference[1], speed, 0.5 * reference[3] * speed * speed, reference[4], motion, lags, constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, arms, scales, a, c)  # fmt: skip
+        k_gain, w, cov, logdet = gain(a, c, speed, delays, constants, variance, dt_s)
+        if not math.isfinite(logdet):
+            return np.nan
+        white[:] = w
+        s[:] = cov
+    sound = innovations(y, de, v, density, theta, lift_more, moment_more, output_more, dt_s, sub, start, bias, offset, k_gain, motion, lags, delays, constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, arms, scales, e)  # fmt: skip
+    return logdet if sound else np.nan

@@ -1,0 +1,255 @@
+"""A record, a change and a vector of parameters in; innovations and their covariance out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.aircraft import Aircraft
+from airtruth.effects.change import AeroTerm, Change, SensorTerm
+from airtruth.trace.kernel import evaluate
+from airtruth.trace.lower import CHANNELS, Lowered, lower
+from airtruth.trace.records import FINE, Record, nodes
+from airtruth.trace.surface import through
+from airtruth.units import G0
+
+Array = NDArray[np.float64]
+
+SHARED: Final = ("CLalpha", "CLq", "CLde", "Cmalpha", "Cmq", "Cmde", "log_noise_alpha", "log_noise_q", "log_noise_az")
+"""Parameters that all records share: increments of the derivatives [-], logarithms of noise over declared."""
+LOCAL: Final = ("alpha0", "q0", "w1", "w2", "bias_alpha", "bias_q", "bias_az", "CL0", "Cm0", "log_sigma_w")
+"""Parameters of one record: initial state, sensors' biases, trim coefficients, logarithm of the gust [m/s]."""
+S, L = len(SHARED), len(LOCAL)
+SHARED_STEP: Final = np.array([1e-3, 1e-1, 1e-3, 1e-4, 1e-2, 1e-4, 1e-4, 1e-4, 1e-4])
+LOCAL_STEP: Final = np.array([1e-5, 1e-4, 1e-3, 1e-3, 1e-5, 1e-4, 1e-3, 1e-5, 1e-6, 1e-4])
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is declared of sensors and air.
+
+    Attributes
+    ----------
+    noise : (3,) standard deviation per sample of alpha [rad], q [rad/s], az [m/s2].
+    noise_prior : standard deviation of its logarithm.
+    bias_std : (3,) of the sensors' biases.
+    sigma_w_m_s, sigma_w_prior : middle of the prior of a record's gust level, and standard deviation of its
+        logarithm.
+    length_w_m : scale length of the vertical gust [m].
+    offset_std : (2,) of CL and Cm at trim, about those of the declared aircraft.
+    """
+
+    noise: Array
+    noise_prior: float
+    bias_std: Array
+    sigma_w_m_s: float
+    sigma_w_prior: float
+    length_w_m: float
+    offset_std: Array
+
+
+@dataclass(frozen=True)
+class External:
+    """Signals added to CL, Cm (points,) and to the outputs (samples, 3), for tests that name no effect."""
+
+    lift: Array
+    moment: Array
+    output: Array
+
+
+@dataclass(frozen=True)
+class Response:
+    """Innovations e (samples, 3), whitener W, covariance S (3, 3), log|S|; logdet is nan on failure."""
+
+    e: Array
+    white: Array
+    covariance: Array
+    logdet: float
+
+
+def declared_change(aircraft: Aircraft) -> Change:
+    """Position, lag, delay and scale of the sensors as aircraft.toml declares them."""
+    terms = []
+    for channel in CHANNELS:
+        sensor = aircraft.file.sensors.get(channel)
+        if sensor is None:
+            continue
+        for kind, value, neutral in (
+            ("arm", sensor.x.value, 0.0),
+            ("lag", sensor.lag.value, 0.0),
+            ("delay", sensor.delay.value, 0.0),
+            ("scale", sensor.scale.value, 1.0),
+        ):
+            if value != neutral:
+                terms.append(SensorTerm(channel, kind, value))  # type: ignore[arg-type]
+    return Change(sensors=tuple(terms))
+
+
+def respond(
+    record: Record,
+    settings: Settings,
+    change: Change | Lowered,
+    shared: Array,
+    local: Array,
+    external: External | None = None,
+    free_run: bool = False,
+) -> Response:
+    """Innovations, or with ``free_run`` the residuals of a simulation, of one record.
+
+    Parameters
+    ----------
+    shared : (9,) see `SHARED`; local : (10,) see `LOCAL`.
+    """
+    low = change if isinstance(change, Lowered) else lower(change)
+    s, plant = record.signals, record.plant
+    y, theta = s.y, s.theta_rad
+    if plant.alpha_shift_rad != 0.0:
+        y = y - np.array([plant.alpha_shift_rad, 0.0, 0.0])
+        theta = theta - plant.alpha_shift_rad
+    de, v = _input(low, "elevator_rad", s.elevator_rad, s), _input(low, "airspeed_m_s", s.airspeed_m_s, s)
+    if low.surface:
+        de = through(low.surface, de, s.dt_s / (s.sub * FINE))
+    de = nodes(de)
+    constants = plant.aircraft.constants
+    vector = np.array(
+        [
+            constants.wing_area_m2,
+            constants.chord_m,
+            constants.mass_kg,
+            constants.inertia_yy_kg_m2,
+            G0,
+            plant.trim_alpha_rad,
+            plant.trim_elevator_rad,
+            settings.length_w_m,
+            float(np.exp(local[9])),
+        ]
+    )
+    declared = np.append(low.declared, plant.thrust_n)
+    e = np.empty_like(y)
+    white, covariance = np.eye(3), np.eye(3)
+    points = de.size
+    if external is None:
+        none, still = _zeros(points), np.zeros_like(y)
+        lift_more, moment_more, output_more = none, none, still
+    else:
+        lift_more, moment_more, output_more = external.lift, external.moment, external.output
+    reference = np.array(
+        [y[:, 0].mean(), de.mean(), v.mean(), s.density_kg_m3.mean(), theta.mean()]
+    )
+    logdet = evaluate(
+        y,
+        de,
+        v,
+        s.density_kg_m3,
+        theta,
+        lift_more,
+        moment_more,
+        output_more,
+        reference,
+        s.dt_s,
+        s.sub,
+        local[:4],
+        local[4:7] + low.bias,
+        local[7:9],
+        (settings.noise * np.exp(shared[6:9])) ** 2,
+        free_run,
+        low.lags,
+        low.delays,
+        vector,
+        declared,
+        shared[:6],
+        plant.alpha_rad,
+        plant.elevator_rad,
+        plant.q_rad_s,
+        plant.values,
+        low.aero_index,
+        low.aero_value,
+        low.state_index,
+        low.state_value,
+        low.arms,
+        low.scales,
+        e,
+        white,
+        covariance,
+    )
+    return Response(e, white, covariance, logdet)
+
+
+def _input(low: Lowered, channel: str, x: Array, s: object) -> Array:
+    """An input as it was before its sensor's undeclared scale and bias."""
+    scale, bias = low.input_scale.get(channel, 1.0), low.input_bias.get(channel, 0.0)
+    return x if scale == 1.0 and bias == 0.0 else (x - bias) / scale
+
+
+_CACHE: dict[int, Array] = {}
+
+
+def _zeros(points: int) -> Array:
+    if points not in _CACHE:
+        _CACHE[points] = np.zeros(points)
+    return _CACHE[points]
+
+
+def start(record: Record, settings: Settings) -> Array:
+    """(10,) where the search for a record's own parameters begins."""
+    local = np.zeros(L)
+    y = record.signals.y
+    local[0] = y[: min(5, len(y)), 0].mean() - record.plant.alpha_shift_rad
+    local[1] = y[: min(5, len(y)), 1].mean()
+    local[9] = np.log(settings.sigma_w_m_s)
+    return local
+
+
+def local_prior(record: Record, settings: Settings) -> tuple[Array, Array]:
+    """Middle (10,) and precision (10, 10) of a record's own parameters."""
+    middle = start(record, settings)
+    std = np.concatenate(
+        [
+            [0.05, 0.2, 1.0, 1.0],
+            settings.bias_std,
+            settings.offset_std,
+            [settings.sigma_w_prior],
+        ]
+    )
+    precision = np.diag(std**-2.0)
+    # w1, w2 of a stationary gust of unit variance: covariance [[1, 1/2], [1/2, 1/2]]
+    precision[2:4, 2:4] = np.linalg.inv(np.array([[1.0, 0.5], [0.5, 0.5]]))
+    return middle, precision
+
+
+def shared_prior(record: Record, settings: Settings) -> Array:
+    """(9, 9) precision of the shared parameters about zero."""
+    precision = np.zeros((S, S))
+    precision[:6, :6] = np.linalg.inv(record.plant.derivative_cov)
+    precision[6:, 6:] = np.eye(3) * settings.noise_prior**-2
+    return precision
+
+
+def settings_of(aircraft: Aircraft, length_w_m: float) -> Settings:
+    """What aircraft.toml declares of the sensors, and where it is silent a judgement with a wide prior."""
+    noise = np.array([0.1 * np.pi / 180.0, 0.3 * np.pi / 180.0, 0.1])
+    bias = np.array([0.5 * np.pi / 180.0, 0.5 * np.pi / 180.0, 0.3])
+    prior = 0.1
+    for i, channel in enumerate(CHANNELS):
+        sensor = aircraft.file.sensors.get(channel)
+        if sensor is None or sensor.noise_std.value <= 0.0:
+            prior = 1.0
+            continue
+        # quantisation and white noise add
+        noise[i] = np.hypot(sensor.noise_std.value, sensor.quantum.value / np.sqrt(12.0))
+        bias[i] = max(abs(sensor.bias.value) * 2.0, bias[i])
+    return Settings(
+        noise=noise,
+        noise_prior=prior,
+        bias_std=bias,
+        sigma_w_m_s=0.2,
+        sigma_w_prior=1.5,
+        length_w_m=length_w_m,
+        offset_std=np.array([0.1, 0.03]),
+    )
+
+
+__all__ = ["AeroTerm", "External", "Response", "Settings", "declared_change", "local_prior", "replace", "respond", "settings_of", "shared_prior", "start"]

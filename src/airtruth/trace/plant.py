@@ -1,0 +1,205 @@
+"""The declared aircraft as forces over alpha, elevator and pitch rate: probed in JSBSim, or linear."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.aircraft import Aircraft
+from airtruth.errors import AircraftError
+from airtruth.fly.engine import Condition
+from airtruth.fly.linearise import linearise
+from airtruth.fly.probe import Grid, probe
+from airtruth.fly.trim import Trim, trim
+from airtruth.physics import short_period
+from airtruth.physics.short_period import PARAMETERS
+from airtruth.units import DEG, G0
+
+Array = NDArray[np.float64]
+
+RELATIVE_STD: Final = (0.05, 0.30, 0.10, 0.05, 0.15, 0.05)
+"""Uncertainty of a declared derivative that states none, over its value [-] (judgement)."""
+_LEAST_STD: Final = (0.05, 1.0, 0.02, 0.01, 0.5, 0.01)
+_SPEEDS: Final = np.array([0.97, 1.0, 1.03])
+
+
+@dataclass(frozen=True)
+class Plant:
+    """What the declared aircraft is to the filter, about one trim.
+
+    Attributes
+    ----------
+    alpha_rad, elevator_rad, q_rad_s : axes of the tables.
+    values : (alpha, elevator, q, 6) slope over dynamic pressure and constant part of X, Z [m2, N] and M [m3, N m].
+    trim_alpha_rad, trim_elevator_rad : about which increments of derivatives count.
+    alpha_shift_rad : taken from the measured alpha and theta (the linear model counts alpha from its trim).
+    thrust_n : net thrust at the trim, for its arm [N].
+    derivatives, derivative_cov : (6,) declared values and (6, 6) covariance, mass, inertia and CG
+        included.
+    trim : of the JSBSim aircraft, None for a linear one.
+    """
+
+    aircraft: Aircraft
+    alpha_rad: Array
+    elevator_rad: Array
+    q_rad_s: Array
+    values: Array
+    trim_alpha_rad: float
+    trim_elevator_rad: float
+    alpha_shift_rad: float
+    thrust_n: float
+    derivatives: Array
+    derivative_cov: Array
+    trim: Trim | None
+
+
+def trim_of(aircraft: Aircraft, airspeed_m_s: float, density_kg_m3: float, altitude_m: float, gamma_rad: float) -> Trim:
+    """The declared JSBSim aircraft's equilibrium at a measured airspeed.
+
+    Raises
+    ------
+    TrimError
+        If it cannot fly there.
+    """
+    eas = airspeed_m_s * float(np.sqrt(density_kg_m3 / 1.225))
+    return trim(aircraft, Condition(eas, altitude_m, gamma_rad))
+
+
+def probed(aircraft: Aircraft, at: Trim, alpha: tuple[float, float], elevator: tuple[float, float], q: float) -> Plant:
+    """Tables of the JSBSim aircraft over the stated ranges, on whole degrees where its own tables break.
+
+    Parameters
+    ----------
+    alpha, elevator : lowest and highest angle [rad]; q : largest pitch rate [rad/s].
+    """
+
+    def whole(low: float, high: float, step: float) -> Array:
+        first, last = np.floor(low / step) - 1.0, np.ceil(high / step) + 1.0
+        return np.arange(first, last + 1.0) * step
+
+    offset = at.controls.elevator_command_rad - at.elevator_rad
+    rates = np.linspace(-1.0, 1.0, 7) * max(q * 1.2, 0.05)
+    grid = Grid(
+        whole(alpha[0], alpha[1], DEG), whole(elevator[0] + offset, elevator[1] + offset, DEG), rates, _SPEEDS
+    )
+    model = probe(aircraft, at, grid)
+    tables = model.tables
+    pressure = 0.5 * at.density_kg_m3 * tables.airspeed_m_s**2
+    basis = np.column_stack([pressure, np.ones_like(pressure)])
+    flat = tables.values.reshape(len(pressure), -1)
+    fit = np.linalg.lstsq(basis, flat, rcond=None)[0].reshape(2, *tables.values.shape[1:])
+    declared = linearise(aircraft, at)
+    constants = aircraft.constants
+    i = int(np.argmin(np.abs(tables.alpha_rad - at.alpha_rad)))
+    j = int(np.argmin(np.abs(tables.elevator_rad - at.elevator_rad)))
+    k = int(np.argmin(np.abs(tables.q_rad_s)))
+    return Plant(
+        aircraft=aircraft,
+        alpha_rad=tables.alpha_rad,
+        elevator_rad=tables.elevator_rad,
+        q_rad_s=tables.q_rad_s,
+        values=np.ascontiguousarray(np.concatenate([fit[0], fit[1]], axis=-1)),
+        trim_alpha_rad=at.alpha_rad,
+        trim_elevator_rad=at.elevator_rad,
+        alpha_shift_rad=0.0,
+        thrust_n=float(max(fit[1][i, j, k, 0], 0.05 * constants.mass_kg * G0)),
+        derivatives=declared.central,
+        derivative_cov=declared_covariance(aircraft, declared.central),
+        trim=at,
+    )
+
+
+def linear(aircraft: Aircraft, derivatives: Array, airspeed_m_s: float, density_kg_m3: float, alpha: float, elevator: float) -> Plant:
+    """The linear short-period model about a measured trim, as tables of two points per axis.
+
+    Parameters
+    ----------
+    derivatives : (6,) declared.
+    alpha, elevator : the record's own trim [rad].
+    """
+    c = aircraft.constants
+    s, chord = c.wing_area_m2, c.chord_m
+    pressure = 0.5 * density_kg_m3 * airspeed_m_s**2
+    half = chord / (2.0 * airspeed_m_s)
+    axis = np.array([-1.0, 1.0])
+    values = np.zeros((2, 2, 2, 6))
+    for i, a in enumerate(axis):
+        for j, d in enumerate(axis):
+            for k, q in enumerate(axis):
+                x = np.array([a, q * half, d])
+                values[i, j, k, 1] = -s * float(derivatives[:3] @ x) - c.mass_kg * G0 / pressure
+                values[i, j, k, 2] = s * chord * float(derivatives[3:] @ x)
+    return Plant(
+        aircraft=aircraft,
+        alpha_rad=axis,
+        elevator_rad=axis + elevator,
+        q_rad_s=axis,
+        values=values,
+        trim_alpha_rad=0.0,
+        trim_elevator_rad=elevator,
+        alpha_shift_rad=alpha,
+        thrust_n=0.1 * c.mass_kg * G0,
+        derivatives=np.asarray(derivatives, dtype=np.float64),
+        derivative_cov=declared_covariance(aircraft, np.asarray(derivatives)),
+        trim=None,
+    )
+
+
+def declared_derivatives(aircraft: Aircraft, at: Trim | None) -> Array:
+    """(6,) of the JSBSim model at a trim, or as aircraft.toml states them.
+
+    Raises
+    ------
+    AircraftError
+        If neither is there.
+    """
+    if at is not None:
+        return linearise(aircraft, at).central
+    stated = aircraft.file.derivatives
+    missing = [name for name in PARAMETERS if name not in stated]
+    if missing:
+        raise AircraftError(
+            f"{aircraft.folder}: without a JSBSim model aircraft.toml needs [derivatives] with {', '.join(missing)}; "
+            "write what `airtruth identify` estimates there, each as { value = ..., std = ... }"
+        )
+    return np.array([stated[name].value for name in PARAMETERS])
+
+
+def declared_covariance(aircraft: Aircraft, derivatives: Array) -> Array:
+    """(6, 6) covariance of the derivatives as aircraft.toml declares it, with what mass, inertia and CG add.
+
+    A coefficient that acts on another mass or inertia looks like another coefficient: 1/m on the three of
+    lift, 1/Iyy on the three of moment; a CG aft by dx chords adds CLalpha dx, CLq dx, CLde dx to the moment.
+    """
+    stated = aircraft.file.derivatives
+    std = np.empty(6)
+    for i, name in enumerate(PARAMETERS):
+        quantity = stated.get(name)
+        relative = quantity.std / abs(quantity.value) if quantity and quantity.std > 0.0 else RELATIVE_STD[i]
+        std[i] = max(relative * abs(derivatives[i]), _LEAST_STD[i] * 0.1)
+    covariance = np.diag(std**2)
+    mass = aircraft.file.mass
+    if mass is not None:
+        for quantity, direction in (
+            (mass.mass, np.concatenate([derivatives[:3], np.zeros(3)])),
+            (mass.inertia_yy, np.concatenate([np.zeros(3), derivatives[3:]])),
+        ):
+            relative = quantity.std / quantity.value
+            covariance += relative**2 * np.outer(direction, direction)
+        shift = np.concatenate([np.zeros(3), derivatives[:3]])
+        covariance += mass.cg.std**2 * np.outer(shift, shift)
+    return covariance
+
+
+def scale_of(plant: Plant, airspeed_m_s: float, density_kg_m3: float) -> short_period.Scale:
+    """Factors of the linear model at a condition."""
+    c = plant.aircraft.constants
+    return short_period.scale(
+        c.wing_area_m2, c.chord_m, c.mass_kg, c.inertia_yy_kg_m2, airspeed_m_s, density_kg_m3
+    )
+
+
+__all__ = ["Plant", "declared_covariance", "declared_derivatives", "linear", "probed", "scale_of", "trim_of"]

@@ -1,0 +1,296 @@
+"""Scores: how much each effect would explain, every nuisance refitted, without refitting anything.
+
+With J the negative log-posterior at the null's optimum, g its slope in the effect's size and I the
+information, both with the nuisance eliminated, z = -g/sqrt(I) is standard normal under the null and has mean
+size sqrt(I) under the effect (C. R. Rao's score test; noncentral chi-square(1) in z^2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2, norm
+
+from airtruth.effects.effect import Effect
+from airtruth.trace.fit import Fit, Problem, Tangent, Whitener, parts, reduced
+from airtruth.trace.lower import lower
+from airtruth.trace.model import External, S, respond
+from airtruth.trace.records import nodes
+
+Array = NDArray[np.float64]
+
+PLACES: Final = 9
+_DRAWS: Final = 40_000
+_BASIS: Final = 5
+
+
+@dataclass(frozen=True)
+class Direction:
+    """One way to leave the null: an effect at one place."""
+
+    effect: Effect
+    places: tuple[float, ...]
+    step: float
+
+    def sizes(self, size: float) -> Array:
+        """Vector of the effect's parameters in their size coordinates."""
+        return np.array([size, *self.places])
+
+
+@dataclass(frozen=True)
+class Score:
+    """Score of one effect.
+
+    Attributes
+    ----------
+    effect : which.
+    z : signed root of the statistic, positive towards larger sizes, at the best place.
+    p_value : of the effect alone; one-sided sizes and the search for a place are allowed for.
+    size : what one step of scoring estimates; direction : the place it was made at.
+    information : of the size, nuisance eliminated.
+    index : of the direction in the table's matrix.
+    """
+
+    effect: Effect
+    z: float
+    p_value: float
+    size: float
+    direction: Direction
+    information: float
+    index: int
+
+
+@dataclass(frozen=True)
+class Table:
+    """Scores of all effects.
+
+    Attributes
+    ----------
+    scores : one per effect that could be tested.
+    information : (directions, directions) of unit sizes, nuisance eliminated: cosines and separations.
+    omnibus : statistic, degrees of freedom and p-value of the test that names no effect.
+    """
+
+    scores: tuple[Score, ...]
+    information: Array
+    omnibus: tuple[float, int, float]
+
+
+def directions(effect: Effect, null: Fit, problem: Problem) -> list[Direction]:
+    """The effect at the places to try: one if it has none, else a grid over what the records visited."""
+    first, *places = effect.parameters
+    if not places:
+        return [Direction(effect, (), first.step)]
+    place = places[0]
+    rest = tuple(p.size(p.neutral) for p in places[1:])
+    alpha = np.concatenate([r.signals.y[:, 0] - r.plant.alpha_shift_rad for r in problem.records])
+    low, high = np.quantile(alpha, [0.02, 0.98]) if place.unit == "rad" else (place.low, place.high)
+    low, high = max(low, place.low), min(high, place.high)
+    if not low < high:
+        low, high = place.low, place.high
+    return [Direction(effect, (float(x), *rest), first.step) for x in np.linspace(low, high, PLACES)]
+
+
+def table(null: Fit, problem: Problem, effects: Sequence[Effect], whitener: Whitener, seed: int) -> Table:
+    """Scores of the effects and the omnibus at the optimum of a null hypothesis.
+
+    Parameters
+    ----------
+    null : a fit; its tangents are reused.
+    whitener : autoregression of its innovations.
+    seed : of the draws that give p-values of effects with a place.
+    """
+    tried = [_audible(d, null, problem) for effect in effects for d in directions(effect, null, problem)]
+    generic = 4 * (_BASIS + 2)
+
+    def one(index: object) -> tuple[Tangent, Tangent]:
+        i = int(index)  # type: ignore[call-overload]
+        return _with(null, problem, i, tried), _with_generic(null, problem, i)
+
+    extended = problem.each(one, range(len(problem.records)))
+    k = len(null.point.sizes)
+    gradient, information = _projected(null, problem, [e[0] for e in extended], whitener, k, len(tried))
+    rng = np.random.default_rng([seed, len(tried), 7])
+    scores = []
+    at = 0
+    for effect in effects:
+        count = len(directions(effect, null, problem))
+        span = np.arange(at, at + count)
+        at += count
+        variance = np.diag(information)[span]
+        sound = variance > 0.0
+        if not sound.any():
+            continue
+        z = np.where(sound, -gradient[span] / np.sqrt(np.where(sound, variance, 1.0)), 0.0)
+        one_sided = effect.parameters[0].one_sided
+        best = int(np.argmax(z if one_sided else np.abs(z)))
+        p = _p_value(z, best, one_sided, information[np.ix_(span, span)], rng)
+        scores.append(
+            Score(
+                effect,
+                float(z[best]),
+                p,
+                float(z[best] / np.sqrt(variance[best])),
+                tried[span[best]],
+                float(variance[best]),
+                int(span[best]),
+            )
+        )
+    g, h = _projected(null, problem, [e[1] for e in extended], whitener, k, generic)
+    return Table(tuple(scores), information, _omnibus(g, h))
+
+
+def _audible(direction: Direction, null: Fit, problem: Problem) -> Direction:
+    """The direction with a step that can be seen: a limit does nothing until it is low enough."""
+    effect, first = direction.effect, direction.effect.parameters[0]
+    largest = max(abs(first.size(first.low)), abs(first.size(first.high)))
+    before = null.hypothesis.change(null.point.sizes)
+    if not (first.reciprocal and not first.time_constant):
+        return direction
+    step = direction.step
+
+    def moves(size: float) -> float:
+        change = before + effect.change(_values(replace(direction, step=size)))
+        total = 0.0
+        for record, local, tangent in zip(problem.records, null.point.local, null.tangents, strict=True):
+            moved = respond(record, problem.settings, change, null.point.shared, local)
+            total += float((((moved.e @ tangent.white.T) - tangent.r) ** 2).sum())
+        return total
+
+    while abs(step) < largest and moves(step) < 1.0:
+        step *= 1.5
+    return replace(direction, step=min(step, largest))
+
+
+def _values(d: Direction) -> dict[str, float]:
+    return {p.name: p.value(float(s)) for p, s in zip(d.effect.parameters, d.sizes(d.step), strict=True)}
+
+
+def holm(p_values: Sequence[float]) -> Array:
+    """Adjusted p-values (S. Holm, Scand. J. Statist. 6, 1979)."""
+    p = np.asarray(p_values, dtype=np.float64)
+    order = np.argsort(p, kind="stable")
+    adjusted = np.empty(p.size)
+    largest = 0.0
+    for rank, i in enumerate(order):
+        largest = max(largest, (p.size - rank) * p[i])
+        adjusted[i] = min(1.0, largest)
+    return adjusted
+
+
+def _p_value(z: Array, best: int, one_sided: bool, information: Array, rng: np.random.Generator) -> float:
+    top = z[best] if one_sided else abs(z[best])
+    single = float(norm.sf(top) if one_sided else 2.0 * norm.sf(top))
+    if z.size == 1:
+        return single
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    correlation = information / np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(correlation)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    draws = rng.standard_normal((_DRAWS, z.size)) @ root.T
+    largest = draws.max(axis=1) if one_sided else np.abs(draws).max(axis=1)
+    # beyond what draws resolve: the effective number of independent places, from a level they do resolve
+    level = float(np.quantile(largest, 0.99))
+    count = 0.01 / float(norm.sf(level) if one_sided else 2.0 * norm.sf(level))
+    if top > level:
+        return min(1.0, max(1.0, count) * single)
+    return float((np.count_nonzero(largest >= top) + 1) / (_DRAWS + 1))
+
+
+def _omnibus(gradient: Array, information: Array) -> tuple[float, int, float]:
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    kept = values > 1e-3 * values.max()
+    amounts = (vectors.T @ (gradient / scale))[kept] / np.sqrt(values[kept])
+    statistic, degrees = float(amounts @ amounts), int(kept.sum())
+    return statistic, degrees, float(chi2.sf(statistic, degrees))
+
+
+def _with(null: Fit, problem: Problem, index: int, tried: Sequence[Direction]) -> Tangent:
+    """The null's tangent of one record with the directions as further shared parameters."""
+    record, base, k = problem.records[index], null.tangents[index], len(null.point.sizes)
+    t = np.zeros((len(tried), *base.r.shape))
+    w = np.zeros((len(tried), 3, 3))
+    e = respond(record, problem.settings, null.hypothesis.change(null.point.sizes), null.point.shared, null.point.local[index])
+    before = null.hypothesis.change(null.point.sizes)
+    for i, d in enumerate(tried):
+        moved = respond(record, problem.settings, lower(before + d.effect.change(_values(d))), null.point.shared, null.point.local[index])
+        if not np.isfinite(moved.logdet):
+            continue
+        t[i] = (moved.e - e.e) @ base.white.T / d.step
+        w[i] = base.white @ ((moved.covariance - e.covariance) / d.step) @ base.white.T
+    return _insert(base, k, t, w)
+
+
+def _insert(base: Tangent, k: int, t: Array, w: Array) -> Tangent:
+    at = S + k
+    return Tangent(
+        base.r,
+        base.logdet,
+        np.concatenate([base.t[:at], t, base.t[at:]]),
+        np.concatenate([base.w[:at], w, base.w[at:]]),
+        base.white,
+    )
+
+
+def _with_generic(null: Fit, problem: Problem, index: int) -> Tangent:
+    """Directions that name no effect: unknown responses of lift, moment, alpha and q to the elevator.
+
+    Laguerre functions of the elevator's deflection (their pole at 6 rad/s), its square and the square of
+    its first filter, so that both memory and curvature are seen.
+    """
+    record, base, k = problem.records[index], null.tangents[index], len(null.point.sizes)
+    s = record.signals
+    elevator = nodes(s.elevator_rad)
+    basis = _laguerre(elevator - elevator[0], s.dt_s / s.sub)
+    low = lower(null.hypothesis.change(null.point.sizes))
+    e = respond(record, problem.settings, low, null.point.shared, null.point.local[index])
+    nothing, still = np.zeros(elevator.size), np.zeros_like(s.y)
+    t = []
+    for entry, unit in ((0, 1e-3), (1, 1e-4), (2, 1e-4), (3, 1e-4)):
+        for b in basis:
+            sampled = still.copy()
+            if entry >= 2:
+                sampled[:, entry - 2] = unit * b[:: s.sub]
+            more = External(unit * b if entry == 0 else nothing, unit * b if entry == 1 else nothing, sampled)
+            moved = respond(record, problem.settings, low, null.point.shared, null.point.local[index], more)
+            t.append((moved.e - e.e) @ base.white.T / unit)
+    return _insert(base, k, np.array(t), np.zeros((len(t), 3, 3)))
+
+
+def _laguerre(de: Array, dt_s: float, pole: float = 6.0) -> list[Array]:
+    from scipy.signal import lfilter
+
+    a = np.exp(-pole * dt_s)
+    size = max(float(np.abs(de).max()), 1e-9)
+    x = lfilter([1.0 - a], [1.0, -a], de / size)
+    found = [x]
+    for _ in range(_BASIS - 1):
+        found.append(lfilter([-a, 1.0], [1.0, -a], found[-1]))
+    return [*found, (de / size) ** 2, found[0] ** 2]
+
+
+def _projected(null: Fit, problem: Problem, tangents: Sequence[Tangent], whitener: Whitener, k: int, count: int):  # type: ignore[no-untyped-def]
+    """Gradient and information of the further directions, all nuisance eliminated, priors included."""
+    pieces = [parts(t, whitener, levels=False) for t in tangents]
+    gradient, information, _ = reduced(problem, null.point, k + count, pieces, levels=False)
+    m = S + k
+    nuisance = information[:m, :m]
+    scale = np.sqrt(np.maximum(np.diag(nuisance), 1e-30))
+    normal = nuisance / np.outer(scale, scale) + 1e-12 * np.eye(m)
+    across = information[m:, :m] / scale
+    solved = np.linalg.solve(normal, np.column_stack([gradient[:m] / scale, across.T]))
+    g = gradient[m:] - across @ solved[:, 0]
+    h = information[m:, m:] - across @ solved[:, 1:]
+    # what is left after a projection of nearly everything is rounding, not information
+    floor = 1e-8 * np.diag(information)[m:]
+    small = np.diag(h) < floor
+    h[small], h[:, small] = 0.0, 0.0
+    return g, h
+
+
+__all__ = ["Direction", "Score", "Table", "directions", "holm", "table"]

@@ -1,0 +1,76 @@
+"""What lies between the surface that is measured and the surface that the air sees, on a fine grid."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from airtruth.effects.change import SurfaceTerm
+
+Array = NDArray[np.float64]
+
+
+def through(terms: Sequence[SurfaceTerm], de: Array, dt_s: float) -> Array:
+    """The surface after delays, lags, rate limits and backlash, in the order given; each starts in equilibrium.
+
+    A delay is linear between the points of the grid; a lag is exact for a signal linear between them.
+
+    Parameters
+    ----------
+    terms : what lies in between.
+    de : (points,) surface [rad], every ``dt_s`` [s].
+    """
+    for term in terms:
+        if term.kind == "delay":
+            de = _delayed(de, term.value / dt_s)
+        elif term.kind == "lag" and term.value > 0.0:
+            de = _lagged(de, dt_s / term.value)
+        elif term.kind == "rate_limit" and math.isfinite(term.value):
+            de = _limited(de, term.value * dt_s)
+        elif term.kind == "backlash" and term.value > 0.0:
+            de = _slack(de, 0.5 * term.value)
+    return de
+
+
+@njit(cache=True, nogil=True)
+def _delayed(x: Array, points: float) -> Array:
+    out = np.empty_like(x)
+    last = x.size - 1
+    for k in range(x.size):
+        at = min(max(k - points, 0.0), float(last))
+        low = min(int(at), last - 1)
+        out[k] = x[low] + (at - low) * (x[low + 1] - x[low])
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _lagged(x: Array, r: float) -> Array:
+    out = np.empty_like(x)
+    decay = math.exp(-r)
+    mean = -math.expm1(-r) / r
+    out[0] = x[0]
+    for k in range(1, x.size):
+        out[k] = decay * out[k - 1] + (mean - decay) * x[k - 1] + (1.0 - mean) * x[k]
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _limited(x: Array, most: float) -> Array:
+    out = np.empty_like(x)
+    out[0] = x[0]
+    for k in range(1, x.size):
+        out[k] = out[k - 1] + min(max(x[k] - out[k - 1], -most), most)
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _slack(x: Array, half: float) -> Array:
+    out = np.empty_like(x)
+    out[0] = x[0]
+    for k in range(1, x.size):
+        out[k] = min(max(out[k - 1], x[k] - half), x[k] + half)
+    return out

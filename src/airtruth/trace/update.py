@@ -1,0 +1,62 @@
+"""The update: a copy of the declared aircraft with the accepted effects, and the refitted derivatives, in it."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from airtruth.aircraft import Aircraft
+from airtruth.effects.change import Change
+from airtruth.effects.writing import Corrections, write_aircraft
+from airtruth.physics.short_period import PARAMETERS
+from airtruth.trace.prepare import Case
+from airtruth.trace.search import Stage
+
+
+def accepted_change(stages: Sequence[Stage]) -> Change:
+    """What the accepted effects change at their estimated sizes."""
+    final = stages[-1].gls
+    total = Change()
+    for effect, values in zip(
+        final.hypothesis.effects, final.hypothesis.values(final.point.sizes), strict=True
+    ):
+        total = total + effect.change(values)
+    return total
+
+
+def write_update(case: Case, stages: Sequence[Stage], aircraft: Aircraft, out: Path, refitted: bool) -> str | None:
+    """Write the updated aircraft to OUT/aircraft/NAME; None where no effect was accepted.
+
+    An earlier update in that place is replaced. An aircraft without a JSBSim model takes effects of its
+    sensors only; others need a model first (`airtruth aircraft new`).
+
+    Parameters
+    ----------
+    refitted : write the increments of the derivatives too.
+
+    Raises
+    ------
+    AircraftError, StoreError
+        If the model cannot take the effect, or the folder cannot be written.
+    """
+    change = accepted_change(stages)
+    if change == Change():
+        return None
+    if aircraft.file.jsbsim is None and change.in_aircraft:
+        return None
+    folder = out / "aircraft" / aircraft.name
+    if folder.exists():
+        shutil.rmtree(folder)
+    plant = case.fitted.records[0].plant
+    increments = dict(zip(PARAMETERS, stages[-1].gls.point.shared[:6].tolist(), strict=True))
+    corrections = None
+    if refitted and plant.trim is not None and np.isfinite(list(increments.values())).all():
+        corrections = Corrections(increments, plant.trim_alpha_rad, plant.trim_elevator_rad)
+    names = ", ".join(e.key for e in stages[-1].gls.hypothesis.effects)
+    note = f"Traced from measured records: {names}."
+    if corrections is not None:
+        note += " Derivatives refitted: " + ", ".join(f"{k} {v:+.4g}" for k, v in increments.items()) + "."
+    return str(write_aircraft(aircraft, change, folder, note, corrections))

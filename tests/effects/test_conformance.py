@@ -1,0 +1,206 @@
+"""What every effect of the library keeps, those that other packages bring too."""
+
+import math
+
+import effect_flights as flights
+import numpy as np
+import pytest
+
+from airtruth.aircraft import Sensor
+from airtruth.effects.change import (
+    AIR,
+    DECLARED,
+    SENSOR_KINDS,
+    SHAPES,
+    SIGNALS,
+    STATE_KINDS,
+    SURFACE_KINDS,
+    Change,
+)
+from airtruth.effects.library import EFFECTS
+from airtruth.effects.neutral import effective, fitted
+from airtruth.errors import ConfigurationError
+from airtruth.fly import measure
+from airtruth.signals import SIGNALS as LOG_CHANNELS
+from airtruth.units import UNITS
+
+ALL = sorted(EFFECTS)
+DELAY = EFFECTS["elevator_delay"].change({"delay_s": 0.03})
+
+
+def values(effect, share):
+    """Parameter values at a multiple of the material size; places in the middle of their range."""
+    size, *places = effect.parameters
+    found = {p.name: 0.5 * (p.low + p.high) for p in places}
+    return {size.name: size.value(share * size.material)} | found
+
+
+def neutral(effect):
+    size, *_ = effect.parameters
+    return values(effect, 1.0) | {size.name: size.neutral}
+
+
+@pytest.mark.parametrize("key", ALL)
+def test_parameters_are_consistent(key):
+    effect = EFFECTS[key]
+    size, *places = effect.parameters
+    assert effect.key == key
+    assert not size.place
+    assert all(p.place for p in places)
+    assert effect.explanation.endswith(".")
+    assert effect.source
+    assert effect.where in ("surface", "dynamics", "declared", "sensor", "air")
+    assert set(effect.channels) <= set(LOG_CHANNELS)
+    assert len({p.name for p in effect.parameters}) == len(effect.parameters)
+    assert size.material > 0.0
+    for p in effect.parameters:
+        assert p.low < p.high
+        assert p.step > 0.0
+        assert p.prior_std is None or p.prior_std > 0.0
+        assert p.unit == "-" or any(p.unit in units for units in UNITS.values())
+        assert p.unit == "-" or p.name == "value" or p.name.endswith(f"_{p.unit}")
+        for value in np.linspace(p.low, p.high, 5):
+            if p.reciprocal and value <= 0.0:
+                continue
+            assert p.value(p.size(value)) == pytest.approx(value, rel=1e-12, abs=1e-15)
+    assert size.size(size.neutral) == 0.0
+    assert size.value(0.0) == size.neutral
+    assert size.one_sided or size.low < size.neutral < size.high
+    assert size.low <= size.value(size.material) <= size.high
+
+
+@pytest.mark.parametrize("key", ALL)
+def test_values_are_checked(key):
+    effect = EFFECTS[key]
+    good = values(effect, 1.0)
+    assert effect.read(good) == good
+    with pytest.raises(ConfigurationError, match=r"is missing \("):
+        effect.read({})
+    with pytest.raises(ConfigurationError, match=r"is not a parameter; .*allowed"):
+        effect.read(good | {"nonsense": 1.0})
+    name = effect.parameters[0].name
+    with pytest.raises(ConfigurationError, match="outside its range"):
+        effect.read(good | {name: 1e9})
+    with pytest.raises(ConfigurationError, match="has to be a number"):
+        effect.read(good | {name: "much"})
+    with pytest.raises(ConfigurationError, match="not a number"):
+        effect.change(good | {name: math.nan})
+
+
+@pytest.mark.parametrize("key", ALL)
+def test_change_is_in_plain_known_terms(key):
+    effect = EFFECTS[key]
+    change = effect.change(values(effect, 3.0))
+    assert change != Change()
+    assert effective(change) == change
+    signals = (*SIGNALS, *(s.name for s in change.states))
+    assert all(t.kind in SURFACE_KINDS for t in change.surface)
+    assert all(t.kind in STATE_KINDS and t.signal in SIGNALS and t.time_s > 0.0 for t in change.states)
+    assert all(t.coefficient in ("CL", "Cm") and t.shape in SHAPES for t in change.aero)
+    assert all(t.signal in signals for t in change.aero)
+    assert all(t.quantity in DECLARED for t in change.declared)
+    assert all(t.kind in SENSOR_KINDS and t.channel in LOG_CHANNELS for t in change.sensors)
+    assert all(t.level in AIR for t in change.air)
+
+
+@pytest.mark.parametrize("key", ALL)
+def test_neutral_changes_nothing(key):
+    effect = EFFECTS[key]
+    assert effective(effect.change(neutral(effect))) == Change()
+    assert effect.read(neutral(effect)) == neutral(effect)
+
+
+@pytest.mark.parametrize("key", ALL)
+def test_effects_compose(key):
+    effect = EFFECTS[key]
+    change = effect.change(values(effect, 3.0))
+    assert change + Change() == change == Change() + change
+    both = effective(change + DELAY)
+    assert both.surface == change.surface + DELAY.surface
+    assert (both.aero, both.declared, both.sensors, both.air) == (
+        change.aero,
+        change.declared,
+        change.sensors,
+        change.air,
+    )
+
+
+def test_a_written_aircraft_without_a_change_flies_the_same_bits(gtm, paper_condition, tmp_path):
+    plane = flights.changed(gtm, EFFECTS["mass_error"].change({"factor": 1.0}), tmp_path)
+    assert (plane.file, plane.constants) == (gtm.file, gtm.constants)
+    _, before = flights.fly(gtm, paper_condition)
+    _, after = flights.fly(plane, paper_condition)
+    for name, channel in before.items():
+        np.testing.assert_array_equal(after[name], channel)
+
+
+@pytest.fixture(scope="module")
+def plain(gtm, paper_condition):
+    return flights.fly(gtm, paper_condition)[1]
+
+
+def distance(flown, plain):
+    """Largest change of a channel's motion over that motion."""
+    found = []
+    for name in ("alpha_rad", "q_rad_s", "az_m_s2"):
+        motion = plain[name] - plain[name][0]
+        found.append(np.abs(flown[name] - flown[name][0] - motion).max() / np.abs(motion).max())
+    return max(found)
+
+
+IN_AIRCRAFT = [k for k in ALL if EFFECTS[k].change(values(EFFECTS[k], 1.0)).in_aircraft]
+
+
+@pytest.mark.parametrize("key", IN_AIRCRAFT)
+def test_written_effect_grows_from_nothing_and_composes(gtm, paper_condition, plain, tmp_path, key):
+    effect = EFFECTS[key]
+
+    def fly(change, name):
+        return flights.fly(flights.changed(gtm, change, tmp_path / name), paper_condition)[1]
+
+    material = fly(effect.change(values(effect, 3.0)), "material")
+    seen = distance(material, plain)
+    assert seen > 1e-4, "three times the material size does not move the aircraft"
+    assert distance(fly(effect.change(values(effect, 0.003)), "little"), plain) < 0.01 * seen + 1e-12
+    both = fly(effect.change(values(effect, 3.0)) + DELAY, "both")
+    assert distance(both, plain) > 0.5 * seen
+    assert distance(both, material) > 1e-3
+
+
+@pytest.mark.parametrize("key", [k for k in ALL if EFFECTS[k].where == "sensor"])
+def test_sensor_effect_shows_in_its_channel_alone(plain, key):
+    effect = EFFECTS[key]
+    truth = {name: channel[None] for name, channel in plain.items()}
+    terms = effect.change(values(effect, 3.0)).sensors
+    before = measure.log_channels(truth, {}, {}, 1 / 200, 4)
+    after = measure.log_channels(truth, fitted({}, terms), {}, 1 / 200, 4)
+    moved = {name for name in before if not np.array_equal(before[name], after[name])}
+    assert moved == {t.channel for t in terms}
+
+
+def test_sensor_terms_come_on_top_of_what_is_declared():
+    terms = tuple(
+        t
+        for name, amount in (
+            ("vane_scale", {"factor": 1.1}),
+            ("vane_bias", {"value": 0.01}),
+            ("vane_arm", {"x_m": 0.3}),
+            ("vane_lag", {"tau_s": 0.02}),
+            ("sensor_delay:alpha_rad", {"delay_s": 0.04}),
+        )
+        for t in EFFECTS[name].change(amount).sensors
+    )
+    declared = Sensor.model_validate(
+        {
+            "scale": {"value": 2.0},
+            "bias": {"value": -0.02},
+            "x": {"value": 1.0},
+            "delay": {"value": 0.01},
+            "noise_std": {"value": 0.001},
+        }
+    )
+    sensor = fitted({"alpha_rad": declared}, terms)["alpha_rad"]
+    found = [getattr(sensor, k).value for k in ("scale", "bias", "x", "lag", "delay", "noise_std")]
+    assert found == pytest.approx([2.2, -0.01, 1.3, 0.02, 0.05, 0.001], rel=1e-15)
+    with pytest.raises(ConfigurationError, match=r"may take off no more than"):
+        fitted({}, EFFECTS["vane_lag"].change({"tau_s": -0.1}).sensors)

@@ -1,0 +1,98 @@
+"""The library: contract names, variants, effects of other packages, and the command that lists them."""
+
+import json
+from dataclasses import replace
+from importlib.metadata import EntryPoint
+
+import fly_campaigns as campaigns
+import pytest
+
+from airtruth.effects import library
+from airtruth.errors import ConfigurationError
+
+CONTRACT = {
+    "elevator_delay": ["delay_s"],
+    "actuator_lag": ["bandwidth_hz"],
+    "rate_limit": ["rate_rad_s"],
+    "backlash": ["width_rad"],
+    "elevator_effectiveness": ["factor"],
+    "elevator_asymmetry": ["dCmde"],
+    "cm_alpha_nonlinear": ["dCmalpha", "at_alpha_rad", "Cmalpha2"],
+    "cl_alpha_nonlinear": ["dCLalpha", "at_alpha_rad", "CLalpha2"],
+    "downwash_lag": ["Cmalphadot"],
+    "thrust_moment": ["arm_m"],
+    "cg_shift": ["dx_mac"],
+    "inertia_error": ["factor"],
+    "mass_error": ["factor"],
+    "vane_arm": ["x_m"],
+    "vane_lag": ["tau_s"],
+    "gyro_lag": ["tau_s"],
+    "vane_scale": ["factor"],
+    "gyro_scale": ["factor"],
+    "accelerometer_scale": ["factor"],
+    "airspeed_scale": ["factor"],
+    "vane_bias": ["value"],
+    "gyro_bias": ["value"],
+    "accelerometer_bias": ["value"],
+    "accelerometer_arm": ["x_m"],
+    "sensor_delay": ["delay_s"] * 3,
+    "horizontal_gust": ["factor"],
+    "gust_level": ["factor"],
+}
+
+
+@pytest.mark.parametrize("name", CONTRACT)
+def test_contract_names_and_parameters(name):
+    assert [p.name for e in library.named(name) for p in e.parameters] == CONTRACT[name]
+
+
+def test_units_of_biases():
+    units = {
+        n: library.named(n)[0].parameters[0].unit for n in ("vane_bias", "gyro_bias", "accelerometer_bias")
+    }
+    assert units == {"vane_bias": "rad", "gyro_bias": "rad_s", "accelerometer_bias": "m_s2"}
+
+
+def test_variants():
+    assert {e.variant for e in library.named("sensor_delay")} == {"alpha_rad", "q_rad_s", "az_m_s2"}
+    assert library.chosen("sensor_delay", "q_rad_s").key == "sensor_delay:q_rad_s"
+
+
+class Brought(EntryPoint):
+    """An entry point whose object is at hand."""
+
+    def load(self):
+        return self.value
+
+
+def brought(thing):
+    return Brought(name="icing", value=thing, group=library.GROUP)
+
+
+def test_other_packages_bring_effects():
+    icing = replace(library.OWN[0], name="icing")
+    rime = replace(icing, name="rime")
+    found = library.merged(library.OWN, [brought(icing), brought([rime])])
+    assert list(found)[-2:] == ["icing", "rime"]
+    assert found["icing"] is icing
+
+
+def test_what_other_packages_must_not_bring():
+    with pytest.raises(ConfigurationError, match="gives int; it has to be"):
+        library.merged(library.OWN, [brought([3])])
+    with pytest.raises(ConfigurationError, match="'elevator_delay' exists already"):
+        library.merged(library.OWN, [brought(library.OWN[0])])
+
+
+def test_command_lists_all_or_some():
+    listed = json.loads(campaigns.command("effects", "--json").out)
+    assert [e["key"] for e in listed] == list(library.EFFECTS)
+    lag = next(e for e in listed if e["name"] == "actuator_lag")
+    assert lag["parameters"][0]["neutral"] is None  # infinite
+    text = campaigns.command("effects", "cm_alpha_nonlinear").out
+    assert text.startswith("cm_alpha_nonlinear:break  (dynamics)\n")
+    assert "cm_alpha_nonlinear:quadratic" in text
+    assert "at_alpha_rad" in text
+    wrong = campaigns.command("effects", "backlsh")
+    assert wrong.code == 2
+    assert "did you mean 'backlash'" in wrong.err

@@ -1,0 +1,110 @@
+"""Noncentrality and the truth's own error: cases whose value is known."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from airtruth.logs.store import read_log
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
+from blind import draw, information, scoring, trials
+from blind.aircraft_xml import Body
+from blind.figures import BODY, CHANNELS, NOISE
+from blind.truths import Added
+
+
+def test_noncentrality_of_a_sine_in_white_noise():
+    """n a^2/(2 sigma^2) over whole periods, whatever constant is free."""
+    n, a = 400, 0.3
+    d = a * np.sin(2.0 * np.pi * 5.0 * np.arange(n) / n)
+    ones = np.ones((n, 1))
+    assert information.noncentrality(d + 7.0, ones, np.zeros((n, 0))) == pytest.approx(n * a**2 / 2.0)
+    # a direction that is the effect itself, known to s: 1/(1/lambda + s^2), in units of the effect
+    s = 0.1
+    prior = s * d[:, None]
+    own = n * a**2 / 2.0
+    expected = 1.0 / (1.0 / own + s**2)
+    assert information.noncentrality(d, ones, prior) == pytest.approx(expected)
+    assert information.noncentrality(d, np.column_stack([ones, d]), prior) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_whitener_whitens_a_known_autoregression():
+    rng = np.random.default_rng(2)
+    a = np.array([[0.9, 0.1, 0.0], [0.0, 0.7, 0.2], [0.0, 0.0, -0.4]])
+    root = np.array([[1.0, 0.0, 0.0], [0.5, 0.8, 0.0], [0.1, -0.2, 0.5]])
+    y = np.zeros((20000, 3))
+    for t in range(1, len(y)):
+        y[t] = a @ y[t - 1] + root @ rng.standard_normal(3)
+    whiten = information.autoregression([y[:9000], y[9000:]], order=2)
+    # standard errors of about 1/sqrt(20000) = 0.007 times the ratio of scales
+    assert whiten.coefficients[0] == pytest.approx(a, abs=0.06)
+    assert whiten.coefficients[1] == pytest.approx(np.zeros((3, 3)), abs=0.06)
+    assert whiten.root @ whiten.root.T == pytest.approx(root @ root.T, abs=0.04)
+    e = whiten(y)
+    assert e.T @ e / len(e) == pytest.approx(np.eye(3), abs=0.04)
+    assert whiten(np.array([y[:50], y[50:100]])).shape == (2, 48, 3)
+
+
+@pytest.fixture(scope="module")
+def calm():
+    """A trial in calm air, white noise, no draws."""
+    return replace(
+        draw.draw(1, 0, "null"), air="calm", noise="white", body=Body(), duration_s=5.0, composition="single"
+    )
+
+
+def test_in_calm_air_the_whitener_divides_by_the_declared_noise(calm):
+    whiten = information.noise_model(calm, "calm")
+    declared = np.array([NOISE[name] for name in CHANNELS])
+    # 9000 samples: a standard error of about 0.01
+    assert whiten.root / declared[:, None] == pytest.approx(np.eye(3), abs=0.04)
+
+
+def test_what_is_declared_with_an_uncertainty_is_bounded_by_it(calm):
+    """An effect equal to k prior deviations of a nuisance: lambda at most k^2, whatever the records say."""
+    for key, values, std in (
+        ("inertia_error", {"factor": 1.15}, BODY["inertia"]),
+        ("mass_error", {"factor": 0.95}, BODY["mass"]),
+        ("cg_shift", {"dx_mac": 0.02}, BODY["cg"]),
+    ):
+        effect = Added(key, values)
+        size = values.get("factor", 1.0) - 1.0 if "factor" in values else values["dx_mac"]
+        value = information.lambdas(replace(calm, effects=(effect,)))[key]
+        assert 0.2 < value < 1.05 * (size / std) ** 2
+
+
+def test_noncentrality_grows_as_the_square_and_falls_with_gusts(calm):
+    def of(x_m, air):
+        effect = Added("vane_arm", {"x_m": x_m})
+        return information.lambdas(replace(calm, effects=(effect,), air=air))["vane_arm"]
+
+    assert of(0.4, "calm") / of(0.2, "calm") == pytest.approx(4.0, rel=0.02)
+    assert of(0.2, "moderate") < of(0.2, "light") < of(0.2, "calm")
+
+
+def test_the_truths_own_error_is_the_noise(tmp_path):
+    """A null in calm air: what its own model leaves is white noise of the declared size."""
+    numbers = [k for k in range(40) if (t := draw.draw(2, k, "null")).air == "calm" and t.noise == "white"]
+    trial = draw.draw(2, numbers[0], "null")
+    log = read_log(trials.frozen(2, numbers[:1], "null", tmp_path)[0] / "log.parquet")
+    assert log.metadata["aircraft"] == "gtm"
+    assert log.run_ids == ("r1", "r2", "r3", "r4", "r5", "r6")
+    records = [np.column_stack([log.channels[n][log.rows(k)] for n in CHANNELS]) for k in range(6)]
+    found = information.oracle(trial, records)
+    for name in CHANNELS:
+        assert found["free_run"][name] == pytest.approx(NOISE[name], rel=0.12)  # 500 samples a channel
+        assert found["signal"][name] > 3.0 * NOISE[name]
+
+
+def test_the_bound_is_the_power_of_a_two_sided_normal_test():
+    """Phi(sqrt(lambda) - z) + Phi(-sqrt(lambda) - z), z the quantile of 1 - level/2."""
+    from scipy.stats import norm
+
+    for value, level in ((4.0, 0.05), (16.0, 0.01), (30.0, 0.001)):
+        z = norm.isf(level / 2.0)
+        expected = norm.cdf(np.sqrt(value) - z) + norm.cdf(-np.sqrt(value) - z)
+        assert scoring.bound(value, level) == pytest.approx(expected, rel=1e-9)
+    assert scoring.bound(0.0, 0.01) == 0.01
