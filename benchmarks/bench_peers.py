@@ -34,7 +34,7 @@ from linear_flight import AIRSPEED_M_S, GTM, LIGHT, NOISE, THETA, fly, gtm_scale
 Array = NDArray[np.float64]
 
 GUST = 2.0
-RECORDS = 8
+RECORDS = 4
 CONSTANT = Options(pressure="constant")
 OURS = ("ls", "iv-f1", "iv-refined", "output-error", "filter-error")
 OUTPUTS = ("alpha", "q", "az")

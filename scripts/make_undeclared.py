@@ -23,8 +23,8 @@ from airtruth.logs.store import write_log, write_text
 SEED: Final = 16
 FLOWN: Final[dict[str, tuple[str, str, tuple[Added, ...]]]] = {
     "a": ("single", "light", (Added("elevator_delay", {"delay_s": 0.0085}),)),
-    "b": ("single", "light", (Added("vane_arm", {"x_m": 1.1}),)),
-    "c": ("single", "calm", (Added("downwash_lag", {"Cmalphadot": -30.0}),)),
+    "b": ("single", "light", (Added("vane_arm", {"x_m": 1.6}),)),
+    "c": ("single", "calm", (Added("downwash_lag", {"Cmalphadot": -34.0}),)),
     "d": (
         "single",
         "light",

@@ -116,13 +116,16 @@ def named_first(case: Case, key: str) -> bool:
 
 
 def p_value(case: Case, key: str) -> float | None:
-    """The score's p-value of an effect: that of its variant if it is listed, else the smallest of its name."""
+    """The score's p-value of an effect before any correction for their number: that of its variant if it is
+    listed, else the smallest of its name.
+    """
     listed: dict[str, float] = {}
     for c in case["answer"]["candidates"]:
-        if c.get("p_value") is None:
+        p = c.get("p_value_alone", c.get("p_value"))
+        if p is None:
             continue
         variant = c.get("variant", "")
-        listed[f"{c['name']}:{variant}" if variant else c["name"]] = float(c["p_value"])
+        listed[f"{c['name']}:{variant}" if variant else c["name"]] = float(p)
     if key in listed:
         return listed[key]
     return min((p for name, p in listed.items() if base(name) == base(key)), default=None)
@@ -165,8 +168,9 @@ def covered(case: Case) -> list[bool]:
     flags = []
     for name, value in effect["values"].items():
         interval = stated.get(name, {}).get("ci95")
-        if interval and None not in interval:
-            flags.append(bool(interval[0] <= value <= interval[1]))
+        if interval:
+            low, high = interval  # an end that is None is open
+            flags.append((low is None or low <= value) and (high is None or value <= high))
     return flags
 
 

@@ -124,10 +124,10 @@ def test_synthesised_gusts_have_the_spectrum_and_the_rotation(kind):
 def test_gust_variance_over_an_ensemble():
     rng = np.random.default_rng(9)
     values = [
-        gusts.synthesise("von_karman", (1.2, 0.8), LENGTH, V, SPAN_M, 0.01, 2, rng)[:2, 0] for _ in range(300)
+        gusts.synthesise("von_karman", (1.2, 0.8), LENGTH, V, SPAN_M, 0.01, 2, rng)[:2, 0] for _ in range(100)
     ]
-    # 300 independent samples: the variance has a relative deviation of sqrt(2/300) = 0.08
-    assert np.var(values, axis=0) == pytest.approx([1.2**2, 0.8**2], rel=0.3)
+    # 100 independent samples: the variance has a relative deviation of sqrt(2/100) = 0.14
+    assert np.var(values, axis=0) == pytest.approx([1.2**2, 0.8**2], rel=0.45)
 
 
 def test_noise_is_the_declared_one_in_each_kind():

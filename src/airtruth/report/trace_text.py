@@ -11,6 +11,7 @@ from airtruth.report.render import WIDTH, text
 from airtruth.report.trace_table import error_grid, figures
 
 MOST_CANDIDATES: Final = 8
+_PRINTED: Final = {"-": "", "1": "", "hz": "Hz", "rad_s": "rad/s", "m_s": "m/s", "m_s2": "m/s2", "kg_m2": "kg m2"}
 
 Answer = Mapping[str, Any]
 
@@ -26,7 +27,7 @@ def as_trace_text(answer: Answer) -> str:
         [verdict(answer), *textwrap.wrap(_freedom(answer), WIDTH)],
         *([effect_line(e), *effect_details(e)] for e in answer["effects"]),
         text(error_grid(answer)).rstrip("\n").splitlines(),
-        [f"Derivatives: {line}" if not i else line for i, line in enumerate(derivative_lines(answer))],
+        derivative_lines(answer),
         ["Candidates, most significant first:", *_candidate_lines(answer)],
         _wrapped("Smallest traceable sizes", "; ".join(detectable(answer)) + "."),
         _wrapped("Next flight", answer["next_flight"]),
@@ -80,7 +81,7 @@ def unit_of(name: str, parameter: str) -> str:
         return ""
     units = {p.name: p.unit for p in effect.parameters}
     found = units.get(parameter, "")
-    return "" if found in ("-", "1") else found
+    return _PRINTED.get(found, found)
 
 
 def effect_line(effect: Mapping[str, Any]) -> str:
@@ -119,7 +120,7 @@ def derivative_lines(answer: Answer) -> list[str]:
         lines.append("  " + stage.ljust(9) + "".join(figures(values[n], 4).rjust(12) for n in names)[3:])
     if std:
         lines.append("  " + "+-".ljust(9) + "".join(figures(std[n], 2).rjust(12) for n in names)[3:])
-    return ["1/rad, qhat = q c/(2V)", *lines]
+    return ["Derivatives [1/rad, rates as q c/(2V)]", *lines]
 
 
 def why_not(candidate: Mapping[str, Any], answer: Answer) -> str:
@@ -138,9 +139,8 @@ def detectable(answer: Answer) -> Iterator[str]:
         if name in with_variants:
             continue
         effect = EFFECTS.get(name)
-        first = effect.parameters[0] if effect else None
-        unit = f" {first.unit}" if first and first.unit not in ("-", "1", "") else ""
-        yield f"{name} {figures(value, 2)}{unit}"
+        unit = unit_of(name, effect.parameters[0].name) if effect else ""
+        yield f"{name} {figures(value, 2)} {unit}".rstrip()
 
 
 def _candidate_lines(answer: Answer) -> Iterator[str]:

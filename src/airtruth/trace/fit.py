@@ -334,7 +334,7 @@ def autoregression(tangents: Sequence[Tangent]) -> Whitener:
             right.append(t.r[_ORDERS:])
             left.append(np.concatenate([t.r[_ORDERS - j : n - j] for j in range(1, order + 1)], axis=1) if order else np.zeros((n - _ORDERS, 0)))
         x, y = np.concatenate(left), np.concatenate(right)
-        b = np.linalg.lstsq(x, y, rcond=None)[0] if order else np.zeros((0, 3))
+        b = np.linalg.solve(x.T @ x, x.T @ y) if order else np.zeros((0, 3))
         residual = y - x @ b
         sigma = residual.T @ residual / total
         criterion = total * float(np.linalg.slogdet(sigma)[1]) + np.log(total) * 9.0 * order

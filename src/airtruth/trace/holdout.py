@@ -144,8 +144,8 @@ def floor(record: Record, problem: Problem, low: Lowered, shared: Array, local: 
     x[0] = float(s.y[:, 0].mean()) - plant.alpha_shift_rad
     linear(
         x, float(s.elevator_rad.mean()), v, 0.5 * density * v * v, float(s.theta_rad.mean()) - plant.alpha_shift_rad, motion, np.zeros(3),
-        vector, np.append(low.declared, plant.thrust_n), shared[:6], plant.alpha_rad, plant.elevator_rad,
-        plant.q_rad_s, plant.values, low.aero_index, low.aero_value, low.state_index, low.state_value, low.arms,
+        vector, np.concatenate([low.declared, [plant.thrust_n], plant.constant]), shared[:6], plant.alpha_rad, plant.elevator_rad,
+        plant.qhat, plant.values, low.aero_index, low.aero_value, low.state_index, low.state_value, low.arms,
         low.scales, a, c,
     )  # fmt: skip
     process = np.zeros((n, n))

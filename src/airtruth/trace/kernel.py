@@ -6,7 +6,7 @@ alpha is alpha + w/V. Between samples the motion is integrated by the classical 
 weights are Simpson's: the middle value of an input carries its area. Sensor lags are integrated exactly for
 a signal linear over half a step; a delayed output is the motion integrated back by the delay.
 
-Forces: tables F = A(alpha, elevator, q) q_bar + B(alpha, elevator, q) of X, Z, M about a trim, increments of
+Forces: tables of X, Z, M over alpha, elevator and q c/(2V) times q_bar, the engines' constants, increments of
 the derivatives, and the terms of `airtruth.effects.change`. Equations of motion: see
 `airtruth.physics.longitudinal`; Dryden form: MIL-F-8785C, 3.7.1.2; gain: R. E. Maine and K. W. Iliff, NASA
 RP-1138 (1985).
@@ -34,7 +34,7 @@ _W2: Final = math.sqrt(1.5) * (1.0 / math.sqrt(3.0) - 1.0)
 # places in the vector of constants
 AREA, CHORD, MASS, INERTIA, GRAVITY, ALPHA0, DE0, LENGTH_W, SIGMA_W = range(9)
 # factors and shifts of declared quantities
-F_MASS, F_INERTIA, F_ELEVATOR, CG, THRUST_ARM, THRUST = range(6)
+F_MASS, F_INERTIA, F_ELEVATOR, CG, THRUST_ARM, THRUST, CONSTANT = range(7)
 
 
 @njit(cache=True, nogil=True)
@@ -83,9 +83,13 @@ def rates(
     alpha = x[0] + sigma * (_W1 * x[2] + _W2 * x[3]) / v
     q = x[1]
     surface = constants[DE0] + declared[F_ELEVATOR] * (de - constants[DE0])
+    force = qbar * constants[AREA]
+    chord = constants[CHORD]
+    half = 0.5 * chord / v
+    qhat = q * half
     i, si = cell(alpha_axis, alpha)
     j, sj = cell(de_axis, surface)
-    n, sn = cell(q_axis, q)
+    n, sn = cell(q_axis, qhat)
     fx = fz = fm = 0.0
     for a in range(2):
         wa = si if a else 1.0 - si
@@ -94,13 +98,12 @@ def rates(
             for c in range(2):
                 w = wb * (sn if c else 1.0 - sn)
                 f = values[i + a, j + b, n + c]
-                fx += w * (f[0] * qbar + f[3])
-                fz += w * (f[1] * qbar + f[4])
-                fm += w * (f[2] * qbar + f[5])
-    force = qbar * constants[AREA]
-    chord = constants[CHORD]
-    half = 0.5 * chord / v
-    qhat = q * half
+                fx += w * f[0]
+                fz += w * f[1]
+                fm += w * f[2]
+    fx = fx * qbar + declared[CONSTANT]
+    fz = fz * qbar + declared[CONSTANT + 1]
+    fm = fm * qbar + declared[CONSTANT + 2]
     d_alpha, d_de = alpha - constants[ALPHA0], surface - constants[DE0]
     lift = lift_more + increments[0] * d_alpha + increments[1] * qhat + increments[2] * d_de
     moment = moment_more + increments[3] * d_alpha + increments[4] * qhat + increments[5] * d_de
@@ -120,6 +123,8 @@ def rates(
             s = qhat
         elif signal == 3:
             s = first * half
+            if aero_index[t, 0] == 0:  # the term is part of the alpha' that it is in proportion to
+                s /= 1.0 + aero_value[t, 0] * half * force * math.cos(alpha) / (mass * v)
         else:
             s = x[CORE + signal - 4]
         s -= aero_value[t, 1]

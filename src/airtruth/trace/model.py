@@ -127,7 +127,7 @@ def respond(
             float(np.exp(local[9])),
         ]
     )
-    declared = np.append(low.declared, plant.thrust_n)
+    declared = np.concatenate([low.declared, [plant.thrust_n], plant.constant])
     e = np.empty_like(y)
     white, covariance = np.eye(3), np.eye(3)
     points = de.size
@@ -163,7 +163,7 @@ def respond(
         shared[:6],
         plant.alpha_rad,
         plant.elevator_rad,
-        plant.q_rad_s,
+        plant.qhat,
         plant.values,
         low.aero_index,
         low.aero_value,

@@ -32,8 +32,9 @@ class Plant:
 
     Attributes
     ----------
-    alpha_rad, elevator_rad, q_rad_s : axes of the tables.
-    values : (alpha, elevator, q, 6) slope over dynamic pressure and constant part of X, Z [m2, N] and M [m3, N m].
+    alpha_rad, elevator_rad, qhat : axes of the tables; qhat = q c/(2V).
+    values : (alpha, elevator, qhat, 3) X, Z [m2] and M [m3] of the air over the dynamic pressure.
+    constant : (3,) X, Z [N] and M [N m] that the dynamic pressure leaves alone: the engines'.
     trim_alpha_rad, trim_elevator_rad : about which increments of derivatives count.
     alpha_shift_rad : taken from the measured alpha and theta (the linear model counts alpha from its trim).
     thrust_n : net thrust at the trim, for its arm [N].
@@ -45,8 +46,9 @@ class Plant:
     aircraft: Aircraft
     alpha_rad: Array
     elevator_rad: Array
-    q_rad_s: Array
+    qhat: Array
     values: Array
+    constant: Array
     trim_alpha_rad: float
     trim_elevator_rad: float
     alpha_shift_rad: float
@@ -71,6 +73,8 @@ def trim_of(aircraft: Aircraft, airspeed_m_s: float, density_kg_m3: float, altit
 def probed(aircraft: Aircraft, at: Trim, alpha: tuple[float, float], elevator: tuple[float, float], q: float) -> Plant:
     """Tables of the JSBSim aircraft over the stated ranges, on whole degrees where its own tables break.
 
+    Forces of the air are taken to go with the dynamic pressure at equal qhat, those of the engines to stay.
+
     Parameters
     ----------
     alpha, elevator : lowest and highest angle [rad]; q : largest pitch rate [rad/s].
@@ -82,30 +86,27 @@ def probed(aircraft: Aircraft, at: Trim, alpha: tuple[float, float], elevator: t
 
     offset = at.controls.elevator_command_rad - at.elevator_rad
     rates = np.linspace(-1.0, 1.0, 7) * max(q * 1.2, 0.05)
-    grid = Grid(
-        whole(alpha[0], alpha[1], DEG), whole(elevator[0] + offset, elevator[1] + offset, DEG), rates, _SPEEDS
-    )
-    model = probe(aircraft, at, grid)
-    tables = model.tables
-    pressure = 0.5 * at.density_kg_m3 * tables.airspeed_m_s**2
-    basis = np.column_stack([pressure, np.ones_like(pressure)])
-    flat = tables.values.reshape(len(pressure), -1)
-    fit = np.linalg.lstsq(basis, flat, rcond=None)[0].reshape(2, *tables.values.shape[1:])
+    commands = whole(elevator[0] + offset, elevator[1] + offset, DEG)
+    tables = probe(aircraft, at, Grid(whole(alpha[0], alpha[1], DEG), commands, rates, np.ones(1))).tables
+    still = np.array([at.controls.elevator_command_rad])
+    speeds = probe(aircraft, at, Grid(np.array([at.alpha_rad]), still, np.zeros(1), _SPEEDS)).tables
+    pressures = 0.5 * at.density_kg_m3 * speeds.airspeed_m_s**2
+    basis = np.column_stack([pressures, np.ones_like(pressures)])
+    constant = np.linalg.lstsq(basis, speeds.values.reshape(len(pressures), 3), rcond=None)[0][1]
+    pressure = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2
     declared = linearise(aircraft, at)
     constants = aircraft.constants
-    i = int(np.argmin(np.abs(tables.alpha_rad - at.alpha_rad)))
-    j = int(np.argmin(np.abs(tables.elevator_rad - at.elevator_rad)))
-    k = int(np.argmin(np.abs(tables.q_rad_s)))
     return Plant(
         aircraft=aircraft,
         alpha_rad=tables.alpha_rad,
         elevator_rad=tables.elevator_rad,
-        q_rad_s=tables.q_rad_s,
-        values=np.ascontiguousarray(np.concatenate([fit[0], fit[1]], axis=-1)),
+        qhat=tables.q_rad_s * constants.chord_m / (2.0 * at.airspeed_m_s),
+        values=np.ascontiguousarray((tables.values[0] - constant) / pressure),
+        constant=constant,
         trim_alpha_rad=at.alpha_rad,
         trim_elevator_rad=at.elevator_rad,
         alpha_shift_rad=0.0,
-        thrust_n=float(max(fit[1][i, j, k, 0], 0.05 * constants.mass_kg * G0)),
+        thrust_n=float(max(constant[0], 0.05 * constants.mass_kg * G0)),
         derivatives=declared.central,
         derivative_cov=declared_covariance(aircraft, declared.central),
         trim=at,
@@ -123,21 +124,21 @@ def linear(aircraft: Aircraft, derivatives: Array, airspeed_m_s: float, density_
     c = aircraft.constants
     s, chord = c.wing_area_m2, c.chord_m
     pressure = 0.5 * density_kg_m3 * airspeed_m_s**2
-    half = chord / (2.0 * airspeed_m_s)
     axis = np.array([-1.0, 1.0])
-    values = np.zeros((2, 2, 2, 6))
+    values = np.zeros((2, 2, 2, 3))
     for i, a in enumerate(axis):
         for j, d in enumerate(axis):
             for k, q in enumerate(axis):
-                x = np.array([a, q * half, d])
+                x = np.array([a, q, d])
                 values[i, j, k, 1] = -s * float(derivatives[:3] @ x) - c.mass_kg * G0 / pressure
                 values[i, j, k, 2] = s * chord * float(derivatives[3:] @ x)
     return Plant(
         aircraft=aircraft,
         alpha_rad=axis,
         elevator_rad=axis + elevator,
-        q_rad_s=axis,
+        qhat=axis,
         values=values,
+        constant=np.zeros(3),
         trim_alpha_rad=0.0,
         trim_elevator_rad=elevator,
         alpha_shift_rad=alpha,

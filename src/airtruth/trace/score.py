@@ -24,7 +24,7 @@ from airtruth.trace.records import nodes
 Array = NDArray[np.float64]
 
 PLACES: Final = 9
-_DRAWS: Final = 40_000
+_DRAWS: Final = 20_000
 _BASIS: Final = 5
 
 
