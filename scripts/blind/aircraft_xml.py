@@ -63,6 +63,7 @@ SHAPES: Final = (
     "alpha-linear",
     "rate-linear",
     "elevator-linear",
+    "one",
 )
 
 
@@ -98,6 +99,8 @@ def _function(shape: str, at: float) -> str:
         return _product(elevator, f"<abs>{elevator}</abs>")
     if shape == "alpha-linear":
         return from_at
+    if shape == "one":
+        return _value(1.0)
     if shape == "rate-linear":
         return _property("aero/function/qhat")
     return elevator

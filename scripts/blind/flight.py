@@ -42,7 +42,6 @@ _INTEGRATORS: Final = tuple(
     for kind in ("rotational", "translational")
 )
 _AB3: Final = 4.0
-_EARTH_M: Final = 6356766.0  # ICAO Doc 7488, for geopotential altitude
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,17 @@
 """How much the records of a trial tell of an effect, and what error the truth itself leaves on them.
 
-The noncentrality of a trial's effect is |(1 - P) W d|^2: d the difference of alpha, q and az between twins
-flown in calm air with and without the effect, for an effect that grows smoothly an eighth of it times eight,
-since a tracer's refit is not linear where this projection is; W whitens gust response and sensor noise, by a vector
-autoregression fitted to gust-only flights of the truth (Luetkepohl, New Introduction to Multiple Time Series
-Analysis, 2005, section 3.2); P projects on what a tracer refits: biases and initial state of every record,
-and derivatives, mass, inertia and CG with their declared uncertainty as prior rows. Records that a tracer
-holds out do not count. What gusts tell of an effect besides the manoeuvre is not in it, so in rough air it is
-a lower bound for effects of the vane.
+The noncentrality of a trial's effect is |(1 - P) W d|^2.
+
+- d: difference of alpha, q and az between twins flown in calm air with and without the effect; for an effect
+  that grows smoothly, of an eighth of it times eight, as a refit is not linear where this projection is.
+- W whitens gust response and sensor noise, by a vector autoregression fitted to gust-only flights of the
+  truth (Luetkepohl, New Introduction to Multiple Time Series Analysis, 2005, section 3.2).
+- P projects on what a tracer refits: freely, biases and initial state of every record, and constants in CL
+  and Cm, which place the trim on tables that break; with their declared uncertainty as prior rows,
+  derivatives, mass, inertia and CG.
+
+Records that a tracer holds out do not count. What gusts tell of an effect besides the manoeuvre is not in
+it, so in rough air it is a lower bound for effects of the vane.
 """
 
 from __future__ import annotations
@@ -20,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blind import gusts, sensors, surface
-from blind.aircraft_xml import nuisances
+from blind.aircraft_xml import Shape, nuisances
 from blind.draw import Trial, fly_record, stream, truth_of
 from blind.figures import (
     CHANNELS,
@@ -47,6 +51,7 @@ _GUST_FLIGHTS: Final = 6
 _GUST_FLIGHT_S: Final = 30.0
 _SETTLE_S: Final = 4.0
 _SHARE: Final = 0.125
+_TRIMS: Final = (Shape("CL", "one", 0.01), Shape("Cm", "one", 0.003))
 _STATE_SHIFT: Final = 5  # samples: 0.1 s
 
 
@@ -180,7 +185,7 @@ def initial_states(truth: Truth, samples: int) -> Array:
 
 
 def directions(trial: Trial, whiten: Whitener) -> Directions:
-    """Biases, initial states, derivatives, mass, inertia and CG of a trial."""
+    """Biases, initial states, the trim, derivatives, mass, inertia and CG of a trial."""
     base = responses(trial, (), _COARSE_S, Model(trial.body))
     records, samples, m = base.shape
     states = whiten(initial_states(Truth(Model(trial.body), _COARSE_S), samples))
@@ -191,7 +196,11 @@ def directions(trial: Trial, whiten: Whitener) -> Directions:
     for step, part in nuisances(trial.body).values():
         moved = responses(trial, (), _COARSE_S, Model(step))
         columns.append(whiten(moved - base).ravel() / part)
-    return Directions(free, np.column_stack(columns))
+    trims = []
+    for shape in _TRIMS:
+        moved = responses(trial, (), _COARSE_S, Model(trial.body, (shape,)))
+        trims.append(whiten(moved - base).ravel())
+    return Directions(np.column_stack([free, *trims]), np.column_stack(columns))
 
 
 def lambdas(trial: Trial) -> dict[str, float]:

@@ -159,14 +159,25 @@ def median(values: Iterable[float | None]) -> tuple[float, int]:
     return (float(np.median(listed)) if listed else float("nan")), len(listed)
 
 
+def actual(case: Case) -> dict[str, float]:
+    """Parameters of a case's only effect against the declared aircraft: the truth's own draw is part of them."""
+    effect = effects(case)[0]
+    values = {name: float(value) for name, value in effect["values"].items()}
+    body = case["truth"]["trial"]["body"]
+    if effect["key"] in ("mass_error", "inertia_error"):
+        values["factor"] *= body[effect["key"].removesuffix("_error")]
+    if effect["key"] == "cg_shift":
+        values["dx_mac"] += body["cg"]
+    return values
+
+
 def covered(case: Case) -> list[bool]:
     """For each parameter of a single effect that is named first: whether its interval holds the truth."""
-    effect = effects(case)[0]
-    if not named_first(case, effect["key"]):
+    if not named_first(case, effects(case)[0]["key"]):
         return []
     stated = accepted(case)[0]["parameters"]
     flags = []
-    for name, value in effect["values"].items():
+    for name, value in actual(case).items():
         interval = stated.get(name, {}).get("ci95")
         if interval:
             low, high = interval  # an end that is None is open

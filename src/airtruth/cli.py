@@ -238,6 +238,19 @@ def tables(
     print(write_tables(folders, out).text)
 
 
+@app.command(epilog="Example: airtruth report out/trace --out out/trace/report.html")
+def report(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Folder of a trace or of an identified campaign, or estimates.")
+    ],
+    out: Annotated[Path, typer.Option(help="The page; its tables stand beside it as .csv and .tex.")],
+) -> None:
+    """Write one self-contained HTML page, and its tables as CSV and LaTeX."""
+    from airtruth.report import write_report
+
+    print("\n".join(str(path) for path in write_report(folder, out)))
+
+
 @app.command(epilog="Example: airtruth effects elevator_delay")
 def effects(
     name: Annotated[list[str] | None, typer.Argument(metavar="[NAME]...", help="Only these.")] = None,

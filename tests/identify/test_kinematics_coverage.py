@@ -9,7 +9,7 @@ from airtruth.identify.kinematics_fit import fit, instruments
 from airtruth.identify.kinematics_model import Record, predicted
 from airtruth.logs.store import iter_logs
 
-RUNS = 60
+RUNS = 40
 CAMPAIGN = """
 schema = 1
 name = "coverage"
@@ -65,8 +65,8 @@ def covered(equation, parts, errors):
     return np.mean([np.abs(f.value - truth) <= f.quantile * f.std for f in fits], axis=0), fits
 
 
-# 60 intervals of 95 %: fewer than 50 hits have a probability of 0.0006 (binomial)
-LEAST = 50 / RUNS
+# 40 intervals of 95 %: fewer than 33 hits have a probability of 0.0007 (binomial)
+LEAST = 33 / RUNS
 
 
 @pytest.mark.parametrize(

@@ -316,3 +316,19 @@ def test_wrong_use_is_refused(light, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(StoreError, match="cannot be made"):
         write_tables([light], tmp_path / "file")
+
+
+def test_methods_beyond_the_paper_are_further_columns_with_ratios(tmp_path):
+    """Errors of filter-error are half those of iv-f1, run by run: so is the RMSE, and no printed figure beside."""
+    values = synthetic.draw_paper("table3", synthetic.TABLE_3, 40, seed=9)
+    values["filter-error"] = synthetic.TRUTH + 0.5 * (values["iv-f1"] - synthetic.TRUTH)
+    folder = synthetic.write_campaign(
+        tmp_path / "moderate", synthetic.truth_columns(40), synthetic.estimate_columns(values)
+    )
+    table = evaluate(TABLES["table3"], read_campaign(folder))
+    assert table.methods == (*synthetic.TABLE_3, "filter-error")
+    assert table.absent == ()
+    assert table.entries["filter-error", "Cmq", "mean"].published is None
+    grid = layout.lay_out(table)
+    ratios = next(g for g in grid.groups if g.heading == "The same / iv-f1")
+    assert {row[-1] for row in ratios.rows} == {"0.50"}

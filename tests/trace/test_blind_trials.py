@@ -97,6 +97,7 @@ def case(composition, effects, answered, *, air="calm", verdict=None, provisiona
             "trial": {
                 "composition": composition,
                 "air": air,
+                "body": {"mass": 1.01, "inertia": 0.96, "cg": 0.004},
                 "effects": [{"key": k, "values": v} for k, v, _ in effects],
             },
             "lambda": {k: strength for k, _, strength in effects},
@@ -177,6 +178,20 @@ def test_scores_of_a_hand_made_set():
     row = next(r for r in s["detection"] if r["from"] == 60.0)
     assert (row["score"].hits, row["score"].count) == (2, 3)
     assert row["bound"] == pytest.approx(scoring.bound(100.0))
+
+
+def test_a_declared_quantity_is_covered_with_its_draw():
+    for key, parameters, expected in (
+        ("mass_error", {"factor": 1.1}, 1.1 * 1.01),
+        ("inertia_error", {"factor": 1.2}, 1.2 * 0.96),
+        ("cg_shift", {"dx_mac": 0.03}, 0.034),
+        ("vane_arm", {"x_m": 0.3}, 0.3),
+    ):
+        (name,) = parameters
+        answered = (key, {name: {"ci95": [expected - 1e-9, None]}}, [])
+        one = case("single", [(key, parameters, 50.0)], [answered])
+        assert scoring.actual(one)[name] == pytest.approx(expected)
+        assert scoring.covered(one) == [True]
 
 
 def test_the_p_value_is_that_of_the_variant():

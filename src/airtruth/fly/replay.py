@@ -1,7 +1,7 @@
 """A measured record flown again: the measured surface in JSBSim, at the measured airspeed.
 
 Free of each record are what the trace frees as well: initial angle of attack and pitch rate, an offset of the
-surface (the moment at trim) and a bias of each output. The air's velocity along the flight path takes up the
+surface (the moment at trim) and a bias of each output. The air's horizontal velocity takes up, step by step, the
 difference between the airspeed that the simulation would fly and the measured one, which carries the
 horizontal gusts; a change of that velocity is no force of its own.
 """
@@ -29,7 +29,6 @@ Array = NDArray[np.float64]
 
 STEP_S: Final = 0.005
 """Longest step of the simulation."""
-_AIRSPEED_PASSES: Final = 2
 _FIT_PASSES: Final = 2
 _STEPS: Final = np.array([2e-3, 1e-2, 5e-4])
 """Steps of initial alpha [rad], initial q [rad/s] and surface offset [rad] for differences."""
@@ -88,13 +87,9 @@ def replay(aircraft: Aircraft, at: Trim, track: Track) -> dict[str, Array]:
     free = np.array([_first(track, "alpha_rad", at.alpha_rad), _first(track, "q_rad_s", 0.0), 0.0])
     # the surface about the aircraft's own trim: the offset is free in any case
     free[2] = at.elevator_rad - float(np.mean(track.elevator_rad[: max(1, track.substeps * 5)]))
-    wind = np.zeros_like(track.airspeed_m_s)
-    for _ in range(_AIRSPEED_PASSES):
-        truth = _run(executive, at, track, free, wind)
-        wind = wind + truth["airspeed_m_s"] - track.airspeed_m_s
 
     def fly(x: Array) -> Array:
-        logged = _logged(aircraft, _run(executive, at, track, x, wind), track)
+        logged = _logged(aircraft, _run(executive, at, track, x), track)
         return np.stack([logged[n] for n in names])
 
     weight = np.array([[track.weight[n]] for n in names])
@@ -130,7 +125,7 @@ def _logged(aircraft: Aircraft, truth: Mapping[str, Array], track: Track) -> dic
     return {name: values[0] for name, values in logged.items()}
 
 
-def _run(executive: Executive, at: Trim, track: Track, free: Array, wind: Array) -> dict[str, Array]:
+def _run(executive: Executive, at: Trim, track: Track, free: Array) -> dict[str, Array]:
     """One simulation; channels at every step, at the CG, without sensors."""
     executive = executive.renewed()
     fdm, elevator = executive.fdm, executive.model.elevator
@@ -140,15 +135,20 @@ def _run(executive: Executive, at: Trim, track: Track, free: Array, wind: Array)
     fdm.reset_to_initial_conditions(2)  # time to zero; initialise() runs the initial conditions
     executive.configure()
     gust = executive.node("atmosphere/gust-north-fps")
-    gust.set_double_value(float(wind[0]) / FT)
+    gust.set_double_value((at.airspeed_m_s - float(track.airspeed_m_s[0])) / FT)
     executive.initialise(
         at.condition, float(free[0]), Controls(float(command[0]), at.controls.throttle), float(free[1])
     )
     executive.choose_integrator()
-    setters = (executive.node(elevator.command).set_double_value, gust.set_double_value)
-    series = (command * elevator.command_per_rad, wind / FT)
     gets = [node.get_double_value for node in executive.nodes([*READ, elevator.surface])]
-    columns = _stepped(fdm, gets, setters, series)
+    over_ground = executive.nodes(["velocities/v-north-fps", "velocities/v-down-fps"])
+    columns = _stepped(
+        fdm,
+        gets,
+        [node.get_double_value for node in over_ground],
+        (executive.node(elevator.command).set_double_value, gust.set_double_value),
+        (command * elevator.command_per_rad, track.airspeed_m_s / FT),
+    )
     v, alpha, theta, q, fx, fz, q_dot, height, density, surface = columns
     with np.errstate(over="ignore", invalid="ignore"):
         sound = np.isfinite(columns).all(axis=0) & (v > 0.0) & (np.abs(alpha) < _MOST_ALPHA_RAD)
@@ -174,11 +174,21 @@ def _run(executive: Executive, at: Trim, track: Track, free: Array, wind: Array)
     }
 
 
-def _stepped(fdm: Any, gets: Sequence[Any], setters: Sequence[Any], series: Sequence[Array]) -> Array:
+def _stepped(
+    fdm: Any,
+    gets: Sequence[Any],
+    over_ground: Sequence[Any],
+    setters: tuple[Any, Any],
+    series: tuple[Array, Array],
+) -> Array:
+    """What ``gets`` say at every step; setters and series: of the command, and of the air from the airspeed."""
+    north, down = over_ground
+    set_command, set_gust = setters
     records = [get() for get in gets]
-    for values in zip(*(values[1:].tolist() for values in series), strict=True):
-        for setter, value in zip(setters, values, strict=True):
-            setter(value)
+    for command, airspeed in zip(series[0][1:].tolist(), series[1][1:].tolist(), strict=True):
+        set_command(command)
+        sink = down()
+        set_gust(north() - math.sqrt(max(airspeed * airspeed - sink * sink, 0.0)))
         fdm.run()
         records.extend([get() for get in gets])
     return np.array(records).reshape(-1, len(gets)).T

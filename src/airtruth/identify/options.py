@@ -47,7 +47,7 @@ class Options:
         measures it.
     pressure : dynamic pressure and airspeed in the regressors: "constant" over the record, as the paper
         has it, or "measured" at each sample (`airtruth.identify.pressure`); "method" is what the method has
-        as its own: measured for iv-refined and frequency, constant for the others.
+        as its own: constant for ls and the IV methods of the paper, measured for the others.
     band_hz : lower and upper end of the frequencies that "frequency" uses [Hz]; None leaves the choice to
         the data (`airtruth.identify.frequency.band_of`).
     confidence : probability of the intervals [-].

@@ -6,6 +6,7 @@
 from typing import TYPE_CHECKING, Any
 
 from airtruth.report.campaign import Campaign, MethodEstimates, read_campaign
+from airtruth.report.html import write_report
 from airtruth.report.tables import TABLES, Entry, Table, TableSpec, evaluate
 from airtruth.report.trace_text import as_trace_text
 from airtruth.report.write import WrittenTables, write_tables
@@ -24,6 +25,7 @@ __all__ = [
     "as_trace_text",
     "evaluate",
     "read_campaign",
+    "write_report",
     "write_tables",
     "write_trace_figures",
 ]

@@ -151,7 +151,7 @@ def as_table(made: Forecast) -> Table:
         notes=(
             f"Gusts [m/s]: {gusts}. Kinds of runs evaluated: {made.kinds}.",
             "Cramer-Rao bound with noise levels, gust levels, biases and initial states unknown; "
-            "filter-error comes near it, the other methods do not (docs/plan.md).",
+            "filter-error comes nearest to it (docs/plan.md).",
         ),
     )
 

@@ -93,7 +93,7 @@ def _curve(ax: Axes, found: Trace, record: Record, terms: tuple[AeroTerm, ...]) 
     over = plant.alpha_rad if first.signal == "alpha" else plant.elevator_rad
     at = {"alpha": plant.trim_alpha_rad, "elevator": plant.trim_elevator_rad}
     fine = np.linspace(over[0], over[-1], 201)
-    middle = plant.values[:, :, int(np.argmin(np.abs(plant.q_rad_s)))]
+    middle = plant.values[:, :, int(np.argmin(np.abs(plant.qhat)))]
     other = plant.elevator_rad if first.signal == "alpha" else plant.alpha_rad
     j = int(np.argmin(np.abs(other - at["elevator" if first.signal == "alpha" else "alpha"])))
     slice_ = middle[:, j] if first.signal == "alpha" else middle[j]

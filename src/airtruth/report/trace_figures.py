@@ -100,7 +100,7 @@ def page(found: Trace, seen: Sight) -> Figure:
         _stages(axes[2, 1], answer)
         figure.suptitle(
             f"{verdict(answer)}\nRecord {seen.record.signals.run_id}, "
-            f"{'held out' if found.case.held else 'fitted'}",
+            f"{'held out' if found.case.held else 'fitted'}; shaded: two standard deviations of what gusts and sensors explain",
             fontsize=10.0,
         )
     return figure
@@ -110,11 +110,10 @@ def _residuals(axes: Sequence[Axes], seen: Sight, own: Assessment) -> None:
     for i, (ax, channel) in enumerate(zip(axes, CHANNELS, strict=True)):
         factor = shown(channel)[1]
         width = 2.0 * seen.floor[i] * factor
-        ax.axhspan(-width, width, color=style.SKY, alpha=0.25, lw=0.0, label="2σ of gusts and sensors")
+        ax.axhspan(-width, width, color=style.SKY, alpha=0.25, lw=0.0, zorder=0)
         ax.plot(seen.time_s, own.residual[:, i] * factor, color=style.BLUE, lw=0.9)
         ax.set_ylabel(_LABELS[channel])
         ax.margins(x=0.01)
-    axes[0].legend(loc="upper right", fontsize=7.5)
     axes[-1].set_xlabel("time [s]")
 
 
@@ -128,6 +127,7 @@ def _contribution(ax: Axes, found: Trace, seen: Sight) -> None:
         return
     for i, (channel, colour) in enumerate(zip(CHANNELS, style.PALETTE, strict=False)):
         ax.plot(seen.time_s, moved[:, i] / seen.floor[i], color=colour, lw=1.1, label=shown(channel)[0].split(" ")[0])
+    ax.margins(y=0.2)
     ax.legend(loc="upper right", fontsize=7.5, ncols=3)
 
 
@@ -144,9 +144,9 @@ def _stages(ax: Axes, answer: dict[str, Any]) -> None:
             ax.plot(x + offset, values, marker, color=colour, ms=4.5, label=label)
     ax.axhline(1.0, color=style.GREY, lw=0.8)
     ax.set_xticks(x, names)
-    ax.set_yscale("log")
     ax.set_ylabel("rms over the floor")
-    ax.legend(loc="upper right", fontsize=7.5)
+    ax.margins(y=0.25)
+    ax.legend(loc="upper right", fontsize=7.5, ncols=2)
 
 
 def scores(answer: dict[str, Any]) -> Figure:

@@ -90,12 +90,15 @@ def _campaigns(folders: Sequence[Path]) -> list[Campaign]:
 
 
 def _pairs(specs: Sequence[TableSpec], campaigns: Sequence[Campaign]) -> Iterator[tuple[TableSpec, Campaign]]:
-    for spec in specs:
-        for campaign in campaigns:
-            if tables.shows(spec, campaign) and not campaign.estimates.keys().isdisjoint(spec.columns):
-                yield spec, campaign
+    made = [
+        (spec, campaign)
+        for spec in specs
+        for campaign in campaigns
+        if tables.shows(spec, campaign) and not campaign.estimates.keys().isdisjoint(spec.columns)
+    ]
+    yield from made
     for campaign in campaigns:
-        shown = {method for spec in specs if tables.shows(spec, campaign) for method in spec.methods}
+        shown = {method for spec, shown_by in made if shown_by is campaign for method in spec.methods}
         if not campaign.estimates.keys() <= shown:
             yield tables.all_methods(campaign), campaign
 

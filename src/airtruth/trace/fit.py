@@ -89,7 +89,7 @@ class Hypothesis:
 
 @dataclass(frozen=True)
 class Point:
-    """Values of all free parameters: shared (9,), local (records, 10), sizes (k,)."""
+    """Values of all free parameters: shared (10,), local (records, 10), sizes (k,)."""
 
     shared: Array
     local: Array
@@ -152,7 +152,7 @@ class Fit:
     cost : negative log-posterior, constants left out; likelihood : (records,) negative log-likelihood of each record.
     tangents : of each record at ``point``.
     whitener : of the innovations.
-    covariance : (9 + k, 9 + k) of shared parameters and sizes, local ones free.
+    covariance : (10 + k, 10 + k) of shared parameters and sizes, local ones free.
     converged : whether the search ended by its tolerance.
     """
 
@@ -222,7 +222,7 @@ def tangent(
         for i in range(k):
             effect, j = hypothesis.parameters[i]
             p = hypothesis.effects[effect].parameters[j]
-            h = 0.02 * p.step if abs(point.sizes[i]) > p.step else p.step
+            h = 0.02 * p.step if p.place or abs(point.sizes[i]) > p.step else p.step
             sizes = point.sizes.copy()
             sizes[i] += h
             moved = respond(record, settings, hypothesis.change(sizes), point.shared, point.local[index])
@@ -297,13 +297,13 @@ def fit(
                 break
             fresh = False
         else:
-            damping = max(damping * 20.0, 1e-3)
+            damping = max(damping * 10.0, 1e-3)
         if not fresh and better < _STALE:
             # derivatives of an earlier point have done what they can
             anew = _evaluate(problem, hypothesis, point, whitener, free_levels)
             if anew is None:
                 break
-            current, fresh, damping = anew, True, min(damping, 1e-3)
+            current, fresh, damping = anew, True, 0.1 * damping
         if damping > 1e7:
             break
     if not fresh:
@@ -383,7 +383,7 @@ def reduced(problem: Problem, point: Point, k: int, pieces, levels: bool, dampin
 
     Returns
     -------
-    gradient (9 + k,), information, and of each record what back-substitution needs; priors included.
+    gradient (10 + k,), information, and of each record what back-substitution needs; priors included.
     """
     m = S + k
     gradient, information = np.zeros(m), np.zeros((m, m))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_lyapunov
 
 from airtruth.trace.fit import NO_WHITENER, Fit, Hypothesis, Point, Problem, parts, reduced, tangent
-from airtruth.trace.kernel import linear
+from airtruth.trace.kernel import CORE, linear
 from airtruth.trace.lower import Lowered, lower
 from airtruth.trace.model import LOCAL_STEP, S, local_prior, respond, shared_prior, start
 from airtruth.trace.records import Record
@@ -131,12 +131,13 @@ def floor(record: Record, problem: Problem, low: Lowered, shared: Array, local: 
     """What gusts and sensors explain of a free run: (3,) standard deviations."""
     settings, plant, s = problem.settings, record.plant, record.signals
     states = sum(1 if kind == 0 else 2 for kind in low.state_index[:, 0])
-    motion = 4 + states
+    motion = CORE + states
     n = motion
     c0 = plant.aircraft.constants
     vector = np.array(
         [c0.wing_area_m2, c0.chord_m, c0.mass_kg, c0.inertia_yy_kg_m2, 9.80665, plant.trim_alpha_rad,
-         plant.trim_elevator_rad, settings.length_w_m, float(np.exp(local[9]))]
+         plant.trim_elevator_rad, settings.length_w_m, float(np.exp(local[9])),
+         0.5 + shared[9], 4.0 * c0.span_m / (np.pi * float(s.airspeed_m_s.mean()))]
     )  # fmt: skip
     a, c = np.empty((n, n)), np.empty((3, n))
     v, density = float(s.airspeed_m_s.mean()), float(s.density_kg_m3.mean())

@@ -1,14 +1,15 @@
 """The declared aircraft in gusts as a filter: nonlinear in the motion, with the steady gain of its linearisation.
 
-State x: alpha over ground [rad], q [rad/s], two Dryden states of unit variance, states of effects, states
-of lagging sensors. Airspeed, density and pitch attitude are measured and enter as known series; the air's
-alpha is alpha + w/V. Between samples the motion is integrated by the classical Runge-Kutta method, whose
+State x: alpha over ground [rad], q [rad/s], two Dryden states of unit variance, the upward gust w as the tail
+meets it, states of effects, states of lagging sensors. Airspeed, density and pitch attitude are measured
+and enter as known series, and so does the speed over ground, which the gust along the path lacks. The
+air's alpha is theta - (theta - alpha) V_ground/V + w/V, its pitch rate q - (w - w_late)/(tau V), tau = 4 b/(pi V). Between samples the motion is integrated by the classical Runge-Kutta method, whose
 weights are Simpson's: the middle value of an input carries its area. Sensor lags are integrated exactly for
 a signal linear over half a step; a delayed output is the motion integrated back by the delay.
 
 Forces: tables of X, Z, M over alpha, elevator and q c/(2V) times q_bar, the engines' constants, increments of
 the derivatives, and the terms of `airtruth.effects.change`. Equations of motion: see
-`airtruth.physics.longitudinal`; Dryden form: MIL-F-8785C, 3.7.1.2; gain: R. E. Maine and K. W. Iliff, NASA
+`airtruth.physics.longitudinal`; Dryden form and rotary gust: MIL-F-8785C, 3.7.1.2; gain: R. E. Maine and K. W. Iliff, NASA
 RP-1138 (1985).
 """
 
@@ -27,12 +28,12 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 OUTPUTS: Final = 3
-CORE: Final = 4
+CORE: Final = 5
 _W1: Final = math.sqrt(1.5)
 _W2: Final = math.sqrt(1.5) * (1.0 / math.sqrt(3.0) - 1.0)
 
 # places in the vector of constants
-AREA, CHORD, MASS, INERTIA, GRAVITY, ALPHA0, DE0, LENGTH_W, SIGMA_W = range(9)
+AREA, CHORD, MASS, INERTIA, GRAVITY, ALPHA0, DE0, LENGTH_W, SIGMA_W, ROTARY, ROTARY_S = range(11)
 # factors and shifts of declared quantities
 F_MASS, F_INERTIA, F_ELEVATOR, CG, THRUST_ARM, THRUST, CONSTANT = range(7)
 
@@ -55,6 +56,7 @@ def rates(
     x: Array,
     de: float,
     v: float,
+    ground: float,
     qbar: float,
     theta: float,
     lift_more: float,
@@ -76,17 +78,21 @@ def rates(
 
     Parameters
     ----------
+    v, ground : speed through the air and over ground [m/s].
     lift_more, moment_more : increments of CL and Cm [-].
     increments : (6,) of CLalpha, CLq, CLde, Cmalpha, Cmq, Cmde about the trim [-].
     """
     sigma, length = constants[SIGMA_W], constants[LENGTH_W]
-    alpha = x[0] + sigma * (_W1 * x[2] + _W2 * x[3]) / v
+    gust = _W1 * x[2] + _W2 * x[3]
+    alpha = theta - (theta - x[0]) * ground / v + sigma * gust / v
     q = x[1]
+    late = (gust - x[4]) / constants[ROTARY_S]
+    q_air = q - constants[ROTARY] * sigma * late / v
     surface = constants[DE0] + declared[F_ELEVATOR] * (de - constants[DE0])
     force = qbar * constants[AREA]
     chord = constants[CHORD]
     half = 0.5 * chord / v
-    qhat = q * half
+    qhat = q_air * half
     i, si = cell(alpha_axis, alpha)
     j, sj = cell(de_axis, surface)
     n, sn = cell(q_axis, qhat)
@@ -112,7 +118,7 @@ def rates(
     # alpha' before the terms that need it
     first = q + (
         (fz - force * lift) * math.cos(alpha) - fx * math.sin(alpha)
-    ) / (mass * v) + constants[GRAVITY] * math.cos(theta - x[0]) / v
+    ) / (mass * ground) + constants[GRAVITY] * math.cos(theta - x[0]) / ground
     for t in range(aero_index.shape[0]):
         signal = aero_index[t, 1]
         if signal == 0:
@@ -142,11 +148,13 @@ def rates(
     fz -= force * lift
     fm += force * chord * (moment - declared[CG] * fz / force) + declared[THRUST] * declared[THRUST_ARM]
     az = fz / mass
-    out[0] = q + (fz * math.cos(alpha) - fx * math.sin(alpha)) / (mass * v) + constants[GRAVITY] * math.cos(theta - x[0]) / v
+    turn = (fz * math.cos(alpha) - fx * math.sin(alpha)) / (mass * ground)
+    out[0] = q + turn + constants[GRAVITY] * math.cos(theta - x[0]) / ground
     out[1] = fm / inertia
     a = v / length
     out[2] = -a * x[2]
     out[3] = a * (x[2] - x[3])
+    out[4] = late
     at = CORE
     for k in range(state_index.shape[0]):
         signal = state_index[k, 1]
@@ -170,9 +178,21 @@ def rates(
 
 
 @njit(cache=True, nogil=True)
-def outputs(x: Array, rate: Array, az: float, v: float, constants: Array, arms: Array, scales: Array, y: Array) -> None:
+def outputs(
+    x: Array,
+    rate: Array,
+    az: float,
+    v: float,
+    ground: float,
+    theta: float,
+    constants: Array,
+    arms: Array,
+    scales: Array,
+    y: Array,
+) -> None:
     """What the sensors would read without bias, lag and noise: alpha [rad], q [rad/s], az [m/s2]."""
-    alpha = x[0] + constants[SIGMA_W] * (_W1 * x[2] + _W2 * x[3]) / v
+    gust = constants[SIGMA_W] * (_W1 * x[2] + _W2 * x[3])
+    alpha = theta - (theta - x[0]) * ground / v + gust / v
     y[0] = scales[0] * (alpha - x[1] * arms[0] / v)
     y[1] = scales[1] * x[1]
     y[2] = scales[2] * (az - arms[2] * rate[1])
@@ -215,14 +235,14 @@ def linear(
         h = 0.01
         if j == 1:
             h = 0.05
-        if j == 2 or j == 3:
+        if j >= 2 and j < CORE:
             h = 0.1
         moved[j] = x[j] + h
-        az_up = rates(moved, de, v, qbar, theta, 0.0, 0.0, constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, up)  # fmt: skip
-        outputs(moved, up, az_up, v, constants, arms, scales, y_up)
+        az_up = rates(moved, de, v, v, qbar, theta, 0.0, 0.0, constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, up)  # fmt: skip
+        outputs(moved, up, az_up, v, v, theta, constants, arms, scales, y_up)
         moved[j] = x[j] - h
-        az_down = rates(moved, de, v, qbar, theta, 0.0, 0.0, constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, down)  # fmt: skip
-        outputs(moved, down, az_down, v, constants, arms, scales, y_down)
+        az_down = rates(moved, de, v, v, qbar, theta, 0.0, 0.0, constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, down)  # fmt: skip
+        outputs(moved, down, az_down, v, v, theta, constants, arms, scales, y_down)
         moved[j] = x[j]
         for i in range(motion):
             a[i, j] = (up[i] - down[i]) / (2.0 * h)
@@ -297,6 +317,7 @@ def innovations(
     y: Array,
     de: Array,
     v: Array,
+    ground: Array,
     density: Array,
     theta: Array,
     lift_more: Array,
@@ -342,7 +363,8 @@ def innovations(
     samples = y.shape[0]
     h = 2.0 * dt_s / sub
     x = np.zeros(n)
-    x[:CORE] = start
+    x[:4] = start
+    x[4] = _W1 * start[2] + _W2 * start[3]
     rate, tried = np.zeros((4, n)), np.zeros(n)
     out, last, first = np.zeros(OUTPUTS), np.zeros(OUTPUTS), np.zeros(2)
     back, back_rate = np.zeros(n), np.zeros((4, n))
@@ -362,8 +384,8 @@ def innovations(
     for k in range(samples):
         f = k * sub
         qbar = 0.5 * density[f] * v[f] * v[f]
-        az = rates(x, de[f], v[f], qbar, theta[f], offset[0] + lift_more[f], offset[1] + moment_more[f], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, rate[0])  # fmt: skip
-        outputs(x, rate[0], az, v[f], constants, arms, scales, out)
+        az = rates(x, de[f], v[f], ground[f], qbar, theta[f], offset[0] + lift_more[f], offset[1] + moment_more[f], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, rate[0])  # fmt: skip
+        outputs(x, rate[0], az, v[f], ground[f], theta[f], constants, arms, scales, out)
         at = motion
         for i in range(OUTPUTS):
             value = out[i]
@@ -388,11 +410,12 @@ def innovations(
                         part = where - low
                         de_b = de[low] + part * (de[low + 1] - de[low])
                         v_b = v[low] + part * (v[low + 1] - v[low])
+                        g_b = ground[low] + part * (ground[low + 1] - ground[low])
                         rho_b = density[low] + part * (density[low + 1] - density[low])
                         th_b = theta[low] + part * (theta[low + 1] - theta[low])
                         for m in range(motion):
                             tried[m] = back[m] + (share * hb * back_rate[stage - 1, m] if stage > 0 else 0.0)
-                        rates(tried, de_b, v_b, 0.5 * rho_b * v_b * v_b, th_b, offset[0] + lift_more[low], offset[1] + moment_more[low], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, back_rate[stage])  # fmt: skip
+                        rates(tried, de_b, v_b, g_b, 0.5 * rho_b * v_b * v_b, th_b, offset[0] + lift_more[low], offset[1] + moment_more[low], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, back_rate[stage])  # fmt: skip
                     for m in range(motion):
                         slope = back_rate[0, m] + 2.0 * back_rate[1, m] + 2.0 * back_rate[2, m] + back_rate[3, m]
                         back[m] += hb / 6.0 * slope
@@ -402,10 +425,11 @@ def innovations(
                 part = where - low
                 de_b = de[low] + part * (de[low + 1] - de[low])
                 v_b = v[low] + part * (v[low + 1] - v[low])
+                g_b = ground[low] + part * (ground[low + 1] - ground[low])
                 rho_b = density[low] + part * (density[low + 1] - density[low])
                 th_b = theta[low] + part * (theta[low + 1] - theta[low])
-                az_b = rates(back, de_b, v_b, 0.5 * rho_b * v_b * v_b, th_b, offset[0] + lift_more[low], offset[1] + moment_more[low], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, back_rate[0])  # fmt: skip
-                outputs(back, back_rate[0], az_b, v_b, constants, arms, scales, last)
+                az_b = rates(back, de_b, v_b, g_b, 0.5 * rho_b * v_b * v_b, th_b, offset[0] + lift_more[low], offset[1] + moment_more[low], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, back_rate[0])  # fmt: skip
+                outputs(back, back_rate[0], az_b, v_b, g_b, th_b, constants, arms, scales, last)
                 value = last[i]
             e[k, i] = y[k, i] - value - bias[i] - output_more[k, i]
         if k + 1 == samples:
@@ -425,9 +449,9 @@ def innovations(
                 for m in range(motion):
                     tried[m] = x[m] + (share * h * rate[stage - 1, m] if stage > 0 else 0.0)
                 qbar = 0.5 * density[g] * v[g] * v[g]
-                az = rates(tried, de[g], v[g], qbar, theta[g], offset[0] + lift_more[g], offset[1] + moment_more[g], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, rate[stage])  # fmt: skip
+                az = rates(tried, de[g], v[g], ground[g], qbar, theta[g], offset[0] + lift_more[g], offset[1] + moment_more[g], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, rate[stage])  # fmt: skip
                 if stage == 0 and motion < n:
-                    outputs(tried, rate[0], az, v[g], constants, arms, scales, last)
+                    outputs(tried, rate[0], az, v[g], ground[g], theta[g], constants, arms, scales, last)
                     first[0], first[1] = rate[0, 0], rate[0, 1]
             for m in range(motion):
                 slope = rate[0, m] + 2.0 * rate[1, m] + 2.0 * rate[2, m] + rate[3, m]
@@ -435,8 +459,8 @@ def innovations(
             if motion < n:
                 g = f + 2
                 qbar = 0.5 * density[g] * v[g] * v[g]
-                az = rates(x, de[g], v[g], qbar, theta[g], offset[0] + lift_more[g], offset[1] + moment_more[g], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, rate[0])  # fmt: skip
-                outputs(x, rate[0], az, v[g], constants, arms, scales, out)
+                az = rates(x, de[g], v[g], ground[g], qbar, theta[g], offset[0] + lift_more[g], offset[1] + moment_more[g], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, rate[0])  # fmt: skip
+                outputs(x, rate[0], az, v[g], ground[g], theta[g], constants, arms, scales, out)
                 at = motion
                 for i in range(OUTPUTS):
                     if lags[i] > 0.0:
@@ -458,6 +482,7 @@ def evaluate(
     y: Array,
     de: Array,
     v: Array,
+    ground: Array,
     density: Array,
     theta: Array,
     lift_more: Array,
@@ -525,5 +550,5 @@ def evaluate(
             return np.nan
         white[:] = w
         s[:] = cov
-    sound = innovations(y, de, v, density, theta, lift_more, moment_more, output_more, dt_s, sub, start, bias, offset, k_gain, motion, lags, delays, constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, arms, scales, e)  # fmt: skip
+    sound = innovations(y, de, v, ground, density, theta, lift_more, moment_more, output_more, dt_s, sub, start, bias, offset, k_gain, motion, lags, delays, constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, arms, scales, e)  # fmt: skip
     return logdet if sound else np.nan

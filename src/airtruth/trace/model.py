@@ -18,12 +18,14 @@ from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
-SHARED: Final = ("CLalpha", "CLq", "CLde", "Cmalpha", "Cmq", "Cmde", "log_noise_alpha", "log_noise_q", "log_noise_az")
-"""Parameters that all records share: increments of the derivatives [-], logarithms of noise over declared."""
+SHARED: Final = ("CLalpha", "CLq", "CLde", "Cmalpha", "Cmq", "Cmde", "log_noise_alpha", "log_noise_q", "log_noise_az", "rotary")
+"""Parameters that all records share: increments of the derivatives [-], logarithms of noise over declared, share of the
+rotary gust (1: all of the specification's; counted from 1/2)."""
 LOCAL: Final = ("alpha0", "q0", "w1", "w2", "bias_alpha", "bias_q", "bias_az", "CL0", "Cm0", "log_sigma_w")
 """Parameters of one record: initial state, sensors' biases, trim coefficients, logarithm of the gust [m/s]."""
+_ROTARY_STD: Final = 0.5
 S, L = len(SHARED), len(LOCAL)
-SHARED_STEP: Final = np.array([1e-3, 1e-1, 1e-3, 1e-4, 1e-2, 1e-4, 1e-4, 1e-4, 1e-4])
+SHARED_STEP: Final = np.array([1e-3, 1e-1, 1e-3, 1e-4, 1e-2, 1e-4, 1e-4, 1e-4, 1e-4, 1e-3])
 LOCAL_STEP: Final = np.array([1e-5, 1e-4, 1e-3, 1e-3, 1e-5, 1e-4, 1e-3, 1e-5, 1e-6, 1e-4])
 
 
@@ -101,7 +103,7 @@ def respond(
 
     Parameters
     ----------
-    shared : (9,) see `SHARED`; local : (10,) see `LOCAL`.
+    shared : (10,) see `SHARED`; local : (10,) see `LOCAL`.
     """
     low = change if isinstance(change, Lowered) else lower(change)
     s, plant = record.signals, record.plant
@@ -125,6 +127,8 @@ def respond(
             plant.trim_elevator_rad,
             settings.length_w_m,
             float(np.exp(local[9])),
+            0.5 + shared[9],
+            4.0 * constants.span_m / (np.pi * float(s.airspeed_m_s.mean())),
         ]
     )
     declared = np.concatenate([low.declared, [plant.thrust_n], plant.constant])
@@ -143,6 +147,7 @@ def respond(
         y,
         de,
         v,
+        s.ground_m_s,
         s.density_kg_m3,
         theta,
         lift_more,
@@ -221,10 +226,11 @@ def local_prior(record: Record, settings: Settings) -> tuple[Array, Array]:
 
 
 def shared_prior(record: Record, settings: Settings) -> Array:
-    """(9, 9) precision of the shared parameters about zero."""
+    """(10, 10) precision of the shared parameters about zero."""
     precision = np.zeros((S, S))
     precision[:6, :6] = np.linalg.inv(record.plant.derivative_cov)
-    precision[6:, 6:] = np.eye(3) * settings.noise_prior**-2
+    precision[6:9, 6:9] = np.eye(3) * settings.noise_prior**-2
+    precision[9, 9] = _ROTARY_STD**-2
     return precision
 
 

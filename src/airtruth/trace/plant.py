@@ -88,11 +88,7 @@ def probed(aircraft: Aircraft, at: Trim, alpha: tuple[float, float], elevator: t
     rates = np.linspace(-1.0, 1.0, 7) * max(q * 1.2, 0.05)
     commands = whole(elevator[0] + offset, elevator[1] + offset, DEG)
     tables = probe(aircraft, at, Grid(whole(alpha[0], alpha[1], DEG), commands, rates, np.ones(1))).tables
-    still = np.array([at.controls.elevator_command_rad])
-    speeds = probe(aircraft, at, Grid(np.array([at.alpha_rad]), still, np.zeros(1), _SPEEDS)).tables
-    pressures = 0.5 * at.density_kg_m3 * speeds.airspeed_m_s**2
-    basis = np.column_stack([pressures, np.ones_like(pressures)])
-    constant = np.linalg.lstsq(basis, speeds.values.reshape(len(pressures), 3), rcond=None)[0][1]
+    constant = engines(aircraft, at)
     pressure = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2
     declared = linearise(aircraft, at)
     constants = aircraft.constants
@@ -113,13 +109,32 @@ def probed(aircraft: Aircraft, at: Trim, alpha: tuple[float, float], elevator: t
     )
 
 
-def linear(aircraft: Aircraft, derivatives: Array, airspeed_m_s: float, density_kg_m3: float, alpha: float, elevator: float) -> Plant:
+def engines(aircraft: Aircraft, at: Trim) -> Array:
+    """X, Z [N] and M [N m] at a trim that do not go with the dynamic pressure (3,), by three airspeeds in JSBSim."""
+    still = np.array([at.controls.elevator_command_rad])
+    speeds = probe(aircraft, at, Grid(np.array([at.alpha_rad]), still, np.zeros(1), _SPEEDS)).tables
+    pressures = 0.5 * at.density_kg_m3 * speeds.airspeed_m_s**2
+    basis = np.column_stack([pressures, np.ones_like(pressures)])
+    fitted = np.linalg.lstsq(basis, speeds.values.reshape(len(pressures), 3), rcond=None)[0]
+    return np.asarray(fitted[1])
+
+
+def linear(
+    aircraft: Aircraft,
+    derivatives: Array,
+    airspeed_m_s: float,
+    density_kg_m3: float,
+    alpha: float,
+    elevator: float,
+    engine_moment: float = 0.0,
+) -> Plant:
     """The linear short-period model about a measured trim, as tables of two points per axis.
 
     Parameters
     ----------
     derivatives : (6,) declared.
     alpha, elevator : the record's own trim [rad].
+    engine_moment : pitching moment of the engines, which that of the air balances at trim [N m].
     """
     c = aircraft.constants
     s, chord = c.wing_area_m2, c.chord_m
@@ -131,14 +146,14 @@ def linear(aircraft: Aircraft, derivatives: Array, airspeed_m_s: float, density_
             for k, q in enumerate(axis):
                 x = np.array([a, q, d])
                 values[i, j, k, 1] = -s * float(derivatives[:3] @ x) - c.mass_kg * G0 / pressure
-                values[i, j, k, 2] = s * chord * float(derivatives[3:] @ x)
+                values[i, j, k, 2] = s * chord * float(derivatives[3:] @ x) - engine_moment / pressure
     return Plant(
         aircraft=aircraft,
         alpha_rad=axis,
         elevator_rad=axis + elevator,
         qhat=axis,
         values=values,
-        constant=np.zeros(3),
+        constant=np.array([0.0, 0.0, engine_moment]),
         trim_alpha_rad=0.0,
         trim_elevator_rad=elevator,
         alpha_shift_rad=alpha,

@@ -19,7 +19,7 @@ from airtruth.physics.gust_figures import gust_scales
 from airtruth.trace.fit import Hypothesis, Problem
 from airtruth.trace.model import Settings, declared_change, settings_of
 from airtruth.trace.options import TraceOptions
-from airtruth.trace.plant import Plant, declared_derivatives, linear, probed, trim_of
+from airtruth.trace.plant import Plant, declared_derivatives, engines, linear, probed, trim_of
 from airtruth.trace.records import FINE, Record, Signals, read
 from airtruth.units import DEG
 
@@ -159,12 +159,13 @@ def _plants(signals: Sequence[Signals], aircraft: Aircraft, model: str) -> list[
         if model == "linear":
             at = _trim(aircraft, members, speed, density) if aircraft.file.jsbsim is not None else None
             derivatives = declared_derivatives(aircraft, at)
+            moment = 0.0 if at is None else float(engines(aircraft, at)[2])
             for i in group:
                 s = signals[i]
                 head = max(3, int(0.1 / s.dt_s))
                 alpha = float(s.y[:head, 0].mean())
                 elevator = float(s.elevator_rad[: head * s.sub * FINE].mean())
-                found[i] = linear(aircraft, derivatives, speed, density, alpha, elevator)
+                found[i] = linear(aircraft, derivatives, speed, density, alpha, elevator, moment)
             continue
         at = _trim(aircraft, members, speed, density)
         alpha = (min(float(s.y[:, 0].min()) for s in members), max(float(s.y[:, 0].max()) for s in members))
@@ -213,6 +214,7 @@ def _halves(record: Record) -> tuple[Record, Record]:
             y=np.ascontiguousarray(s.y[first:last]),
             elevator_rad=s.elevator_rad[fine],
             airspeed_m_s=s.airspeed_m_s[points],
+            ground_m_s=s.ground_m_s[points],
             density_kg_m3=s.density_kg_m3[points],
             theta_rad=s.theta_rad[points],
         )

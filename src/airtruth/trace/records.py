@@ -15,6 +15,7 @@ from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.atmosphere import density_kg_m3
 from airtruth.trace.lower import CHANNELS
 from airtruth.trace.plant import Plant
+from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
@@ -35,7 +36,7 @@ class Signals:
     sub : cells of the filter's grid per sample, two per step of integration.
     y : (samples, 3) alpha [rad], q [rad/s], az [m/s2].
     elevator_rad : (fine points,) `FINE` cells to a cell of the filter's grid.
-    airspeed_m_s, density_kg_m3, theta_rad : (points,) on the filter's grid.
+    airspeed_m_s, ground_m_s, density_kg_m3, theta_rad : (points,) on the filter's grid; ground: speed without the gust.
     altitude_m : mean pressure altitude [m].
     """
 
@@ -45,6 +46,7 @@ class Signals:
     y: Array
     elevator_rad: Array
     airspeed_m_s: Array
+    ground_m_s: Array
     density_kg_m3: Array
     theta_rad: Array
     altitude_m: float
@@ -104,12 +106,27 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0) -> list[Signals]:
                 y=np.ascontiguousarray(y, dtype=np.float64),
                 elevator_rad=_elevator(_quiet(channels["elevator_rad"], dt, elevator_std_rad), sub * FINE),
                 airspeed_m_s=_fine(_smooth(channels["airspeed_m_s"], dt), sub),
+                ground_m_s=_fine(_ground(channels, theta, dt), sub),
                 density_kg_m3=_fine(_smooth(density, dt), sub),
                 theta_rad=_fine(theta, sub),
                 altitude_m=float(np.mean(altitude)),
             )
         )
     return found
+
+
+def _ground(channels: dict[str, Array], theta: Array, dt_s: float) -> Array:
+    """Speed as inertia has it: the integral of the acceleration along the path, plus the line that fits the airspeed.
+
+    The line takes up the accelerometer's bias and the steady wind; without ax, thrust less drag too.
+    """
+    alpha, v = channels["alpha_rad"], np.asarray(channels["airspeed_m_s"], dtype=np.float64)
+    along = -G0 * np.sin(theta - alpha)
+    if "ax_m_s2" in channels:
+        along = along + channels["ax_m_s2"] * np.cos(alpha) + channels["az_m_s2"] * np.sin(alpha)
+    speed = np.concatenate([[0.0], np.cumsum(0.5 * dt_s * (along[1:] + along[:-1]))])
+    line = np.vander(np.linspace(-1.0, 1.0, len(v)), 2)
+    return np.asarray(speed + line @ np.linalg.lstsq(line, v - speed, rcond=None)[0])
 
 
 def _quiet(elevator: Array, dt_s: float, std: float) -> Array:

@@ -14,6 +14,7 @@ from airtruth.trace import score
 from airtruth.trace.fit import Fit, Hypothesis, Problem, Whitener, autoregression, begin, fit
 from airtruth.trace.holdout import Assessment, floor, leave_one_out
 from airtruth.trace.lower import lower
+from airtruth.trace.model import S
 from airtruth.trace.score import Score, Table
 
 Array = NDArray[np.float64]
@@ -186,7 +187,7 @@ def _ends(effect: Effect) -> tuple[float, float]:
 def _outdone(s: Score, found: Fit, gain: float) -> Candidate:
     at = len(found.point.sizes) - len(s.effect.parameters)
     nothing = np.full(len(found.likelihood), np.nan)
-    size, std = float(found.point.sizes[at]), float(np.sqrt(found.covariance[9 + at, 9 + at]))
+    size, std = float(found.point.sizes[at]), float(np.sqrt(found.covariance[S + at, S + at]))
     return Candidate(s, found, gain, nothing, nothing, size, std, ("another effect explains more",))
 
 
@@ -195,7 +196,7 @@ def _candidate(
 ) -> Candidate:
     first = s.effect.parameters[0]
     at = len(null.point.sizes)
-    size, std = float(best.point.sizes[at]), float(np.sqrt(best.covariance[9 + at, 9 + at]))
+    size, std = float(best.point.sizes[at]), float(np.sqrt(best.covariance[S + at, S + at]))
     likelihood, assessed = leave_one_out(problem, best)
     likelihood_gain = reference[0] - likelihood
     low = lower(null.hypothesis.change(null.point.sizes))

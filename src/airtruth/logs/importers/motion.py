@@ -126,9 +126,9 @@ def path(log: FlightLog) -> Iterator[Problem]:
     seen = f"in {law} the records have {pitch:.3g} q and {heave:.3g} (az + g cos gamma)/V"
     certain = bool(agreement > CLEAR)
     both = nearest(pitch, _ANGLE)
-    if agreement < FAINT:
+    if agreement < FAINT:  # gusts that drown the manoeuvre look the same
         yield Problem(
-            True, "alpha_rad", f"alpha_rad does not follow {law} (squared correlation {agreement:.2f}): one of "
+            False, "alpha_rad", f"alpha_rad does not follow {law} (squared correlation {agreement:.2f}): one of "
             "alpha, q and az is another axis; map angle of attack, pitch rate and body z"
         )  # fmt: skip
     elif both and heave / pitch > 0.3:
@@ -153,7 +153,7 @@ def path(log: FlightLog) -> Iterator[Problem]:
             bool(speed.ratio > 1.0 and agreement > SURE and share > MOVED), "airspeed_m_s",
             f"{seen}: airspeed_m_s looks like {speed.found}; set channels.airspeed_m_s {speed.remedy}",
         )  # fmt: skip
-    elif abs(pitch - 1.0) > 2.0 * NEAR or abs(heave - 1.0) > 2.0 * NEAR:
+    elif certain and (abs(pitch - 1.0) > 2.0 * NEAR or abs(heave - 1.0) > 2.0 * NEAR):
         yield Problem(
             False, "alpha_rad", f"{seen}, both about 1 if units, axes and clocks agree; `airtruth check` says more"
         )  # fmt: skip
