@@ -1,6 +1,6 @@
 """Fly an aircraft folder in plain JSBSim through the measured elevator of a log, without airtruth.
 
-    python scripts/replay_plain.py out/trace/aircraft/gtm data/undeclared/elevator-delay.parquet --run r2
+    python scripts/replay_plain.py out/trace/aircraft/gtm data/undeclared/a.parquet
 
 A check from outside of what a trace reports: the model is loaded by JSBSim alone, the sensors of aircraft.toml
 (position, lag, delay, scale) are applied here, and initial angle of attack, initial pitch rate, an offset of
@@ -16,9 +16,9 @@ import tomllib
 from pathlib import Path
 
 os.environ["JSBSIM_DEBUG"] = "0"  # read when it is imported: no banner among the results
-import jsbsim  # noqa: E402
-import numpy as np  # noqa: E402
-import pyarrow.parquet as pq  # noqa: E402
+import jsbsim
+import numpy as np
+import pyarrow.parquet as pq
 
 FT, SLUG, KT = 0.3048, 14.593902937206364, 1852.0 / 3600.0
 UNITS = {
@@ -140,7 +140,9 @@ def fly(plane, at, trim, record, free):
 
 def sensed(sensors, channel, y, step):
     """Lag, delay and scale of a sensor."""
-    lag, delay, scale = (quantity(sensors, channel, n, d) for n, d in (("lag", 0.0), ("delay", 0.0), ("scale", 1.0)))
+    lag, delay, scale = (
+        quantity(sensors, channel, n, d) for n, d in (("lag", 0.0), ("delay", 0.0), ("scale", 1.0))
+    )
     if lag > 0.0:
         r = step / lag
         decay, mean = math.exp(-r), -math.expm1(-r) / r
@@ -200,12 +202,16 @@ def records(paths, wanted, plane):
                 inputs[name] = y / quantity(plane.sensors, name, "scale", 1.0)
             density = float(rows["density_kg_m3"].mean())
             eas = float(inputs["airspeed_m_s"].mean()) * math.sqrt(density / 1.225)
-            yield run_id, inputs | {
-                "dt_s": dt,
-                "steps": steps,
-                "measured": rows[list(CHANNELS)].to_numpy(float).T,
-                "condition": {"eas_m_s": eas, "altitude_m": float(rows["altitude_m"].mean())},
-            }
+            yield (
+                run_id,
+                inputs
+                | {
+                    "dt_s": dt,
+                    "steps": steps,
+                    "measured": rows[list(CHANNELS)].to_numpy(float).T,
+                    "condition": {"eas_m_s": eas, "altitude_m": float(rows["altitude_m"].mean())},
+                },
+            )
 
 
 def smooth(y, dt, cutoff_hz=5.0):
@@ -217,14 +223,18 @@ def smooth(y, dt, cutoff_hz=5.0):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("aircraft", type=Path, help="folder with aircraft.toml and its JSBSim model")
     parser.add_argument("logs", type=Path, nargs="+", help="flight logs (Parquet)")
     parser.add_argument("--run", action="append", help="run_id, may be repeated; default all")
     parser.add_argument("--json", action="store_true", help="print JSON")
     told = parser.parse_args()
     plane = Aircraft(told.aircraft)
-    squares = {run: (replay(plane, record) ** 2).mean(axis=1) for run, record in records(told.logs, told.run, plane)}
+    squares = {
+        run: (replay(plane, record) ** 2).mean(axis=1) for run, record in records(told.logs, told.run, plane)
+    }
     if not squares:
         raise SystemExit("no such run in these logs")
     rms = dict(zip(CHANNELS, np.sqrt(np.mean(list(squares.values()), axis=0)).tolist(), strict=True))

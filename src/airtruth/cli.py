@@ -183,7 +183,7 @@ def identify(
 
 
 @app.command(
-    epilog="Example: airtruth trace data/undeclared/elevator-delay.parquet --aircraft gtm --out out/trace"
+    epilog="Example: airtruth trace data/undeclared/a.parquet --aircraft gtm --out out/trace"
 )
 def trace(
     logs: Annotated[

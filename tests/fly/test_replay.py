@@ -49,7 +49,9 @@ def test_biases_initial_state_and_surface_offset_are_free(gtm, paper_trim, flown
     surface = flown["elevator_rad"] + 0.004
     again = replay(gtm, paper_trim, track(flown, outputs=outputs, elevator_rad=surface))
     for channel in CHANNELS:
-        assert np.sqrt(np.mean((again[channel] - outputs[channel]) ** 2)) < 0.01 * outputs[channel].std(), channel
+        assert np.sqrt(np.mean((again[channel] - outputs[channel]) ** 2)) < 0.01 * outputs[channel].std(), (
+            channel
+        )
 
 
 def test_a_late_surface_is_seen(gtm, paper_trim, flown):
@@ -60,7 +62,9 @@ def test_a_late_surface_is_seen(gtm, paper_trim, flown):
     assert np.sqrt(np.mean((again["q_rad_s"] - measured) ** 2)) > 0.1 * measured.std()
 
 
-@pytest.mark.parametrize(("dt_s", "steps"), [(0.02, 4), (0.01, 2), (0.005, 1), (0.04, 8), (1.0 / 60.0, 4), (0.001, 1)])
+@pytest.mark.parametrize(
+    ("dt_s", "steps"), [(0.02, 4), (0.01, 2), (0.005, 1), (0.04, 8), (1.0 / 60.0, 4), (0.001, 1)]
+)
 def test_substeps(dt_s, steps):
     """The fewest steps of at most 5 ms."""
     assert substeps(dt_s) == steps

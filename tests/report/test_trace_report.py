@@ -10,7 +10,9 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 from report_synthetic import TABLE_1, paper_campaign
+from typer.testing import CliRunner
 
+from airtruth import cli
 from airtruth.errors import StoreError
 from airtruth.fly import campaign, plan
 from airtruth.report import as_trace_text, write_report, write_trace_figures
@@ -60,7 +62,11 @@ def test_text_states_effect_errors_candidates_and_next_flight(answer):
     told = as_trace_text(answer)
     value = answer["effects"][0]["parameters"]["delay_s"]["value"]
     assert f"elevator_delay: delay_s = {value:.4f} +-" in told
-    for words in ("Traced: the declared aircraft lacks elevator_delay.", "Free run, held-out records", "Candidates"):
+    for words in (
+        "Traced: the declared aircraft lacks elevator_delay.",
+        "Free run, held-out records",
+        "Candidates",
+    ):
         assert words in told
     assert answer["next_flight"].split()[0] in told
     assert max(len(line) for line in told.splitlines()) <= 130
@@ -98,7 +104,14 @@ def test_effect_line_names_the_unit_and_takes_an_open_end(answer):
 
 @pytest.mark.parametrize(
     ("value", "told"),
-    [(0.020522, "0.0205"), (1606.3, "1606"), (2.45e-109, "2.45e-109"), (0.0, "0.00"), (float("inf"), "-"), (-1.786, "-1.79")],
+    [
+        (0.020522, "0.0205"),
+        (1606.3, "1606"),
+        (2.45e-109, "2.45e-109"),
+        (0.0, "0.00"),
+        (float("inf"), "-"),
+        (-1.786, "-1.79"),
+    ],
 )
 def test_significant_figures(value, told):
     assert figures(value) == told
@@ -115,14 +128,16 @@ def test_error_table_is_in_degrees_and_csv_in_si(answer):
         stated = answer["error"][r["stage"]][r["records"]][r["kind"]][r["channel"]]
         assert float(r["rms"]) == stated
     stages = {"declared", "before", "after", "floor"} | ({"control"} & answer["error"].keys())
-    assert {r["stage"] for r in rows} == stages and len(rows) == len(stages) * 2 * 2 * 3
+    assert {r["stage"] for r in rows} == stages
+    assert len(rows) == len(stages) * 2 * 2 * 3
 
 
 def test_replay_is_told_where_there_is_one(answer):
     answer["replay"] = {"declared": {"q_rad_s": 0.02}, "updated": {"q_rad_s": 0.01}}
     grid = error_grid(answer)
     row = next(r for r in grid.groups[-1].rows if r[0] == "q [deg/s]")
-    assert row[grid.header.index("declared")] == "1.15" and row[grid.header.index("after")] == "0.573"
+    assert row[grid.header.index("declared")] == "1.15"
+    assert row[grid.header.index("after")] == "0.573"
     assert "held_out,replay,q_rad_s,updated,0.01" in error_csv(answer)
 
 
@@ -136,9 +151,13 @@ def test_figures_are_written_whole_with_what_they_draw(found, tmp_path):
     assert {p.name for p in written} == {*PAGES, "record.csv", "error.csv"}
     assert {p.name for p in (tmp_path / "new").iterdir()} == {p.name for p in written}
     assert all((tmp_path / "new" / name).read_bytes().startswith(b"\x89PNG") for name in PAGES)
-    rows = list(csv.DictReader((tmp_path / "new" / "record.csv").open()))
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "new" / "record.csv").read_text())))
     seen = sight(trace)
-    assert {r["run_id"] for r in rows} == {seen.record.signals.run_id} <= set(trace.answer["records"]["held_out"])
+    assert (
+        {r["run_id"] for r in rows}
+        == {seen.record.signals.run_id}
+        <= set(trace.answer["records"]["held_out"])
+    )
     residual = np.array([float(r["q_rad_s_measured"]) - float(r["q_rad_s_free_run_after"]) for r in rows])
     assert np.sqrt(np.mean(residual**2)) == pytest.approx(seen.after.free_run[1], rel=1e-9)
 
@@ -181,9 +200,17 @@ def test_page_of_a_trace_stands_alone(found, tmp_path):
     out = tmp_path / "page" / "report.html"
     assert [p.name for p in write_report(folder, out)] == ["report.html", "report.csv", "report.tex"]
     page = read_page(out)
-    assert page.links == [] and len(page.images) == len(PAGES)
+    assert page.links == []
+    assert len(page.images) == len(PAGES)
     assert out.with_suffix(".csv").read_text() == error_csv(json.loads((folder / "trace.json").read_text()))
     assert r"\begin{tabular}" in out.with_suffix(".tex").read_text()
+
+
+def test_command_names_the_files_it_wrote(found, tmp_path):
+    out = tmp_path / "page.html"
+    ended = CliRunner().invoke(cli.app, ["report", str(found[1]), "--out", str(out)])
+    assert ended.exit_code == 0
+    assert ended.stdout.split() == [str(out.with_suffix(s)) for s in (".html", ".csv", ".tex")]
 
 
 def test_page_escapes_what_records_are_called(answer):
@@ -195,7 +222,9 @@ def test_page_of_a_campaign_and_of_estimates(tmp_path):
     folder = paper_campaign(tmp_path / "light", "light", "table1", TABLE_1, 40, 1)
     write_report(folder, tmp_path / "campaign.html")
     page = (tmp_path / "campaign.html").read_text()
-    assert "iv-lowpass" in page and "Cmalpha" in page and read_page(tmp_path / "campaign.html").links == []
+    assert "iv-lowpass" in page
+    assert "Cmalpha" in page
+    assert read_page(tmp_path / "campaign.html").links == []
     assert (tmp_path / "campaign.csv").read_text().startswith("table,campaign,parameter")
     write_report(folder / "estimates.parquet", tmp_path / "estimates.html")
     assert "iv-lowpass" in (tmp_path / "estimates.html").read_text()

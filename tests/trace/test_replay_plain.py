@@ -2,6 +2,7 @@
 
 import ast
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,7 @@ from airtruth.trace import TraceOptions, run
 from airtruth.trace.lower import CHANNELS
 from airtruth.trace.replay import flown_again
 
-SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
-sys.path.insert(0, str(SCRIPTS))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
 import replay_plain
 
 CAMPAIGN = """
@@ -68,25 +68,34 @@ def test_plain_jsbsim_flies_what_the_trace_reports(found):
     plane = replay_plain.Aircraft(Path(trace.answer["updated_aircraft"]))
     logs = sorted((folder / "flown" / "logs").glob("*.parquet"))
     (run_id, record), *none = replay_plain.records(logs, ["again-000003"], plane)
-    assert run_id == "again-000003" and not none
+    assert run_id == "again-000003"
+    assert not none
     rms = np.sqrt((replay_plain.replay(plane, record) ** 2).mean(axis=1))
     stated = trace.answer["error"]["after"]["held_out"]["free_run"]
-    # 6 % on the normal force, which follows every ripple of the airspeed; measured 0.1 to 4 %
-    np.testing.assert_allclose(rms, [stated[c] for c in CHANNELS], rtol=0.06)
+    # measured: 0.5 to 2.7 % on alpha and q, 2 to 5 % on az, which follows every ripple of the airspeed
+    np.testing.assert_allclose(rms, [stated[c] for c in CHANNELS], rtol=0.08)
 
 
 def test_house_replay_agrees_with_the_plain_one(found):
-    key, folder, trace = found
-    again = flown_again(trace.case, trace.stages, planes.load("gtm"), trace.answer["updated_aircraft"])
+    key, _, trace = found
+    again = flown_again(trace.case, trace.outcome, planes.load("gtm"), trace.answer["updated_aircraft"])
     assert set(again) == {"declared", "updated"}
     stated = trace.answer["error"]["after"]["held_out"]["free_run"]
-    np.testing.assert_allclose([again["updated"][c] for c in CHANNELS], [stated[c] for c in CHANNELS], rtol=0.08)
+    # measured: 0 to 2 %
+    np.testing.assert_allclose(
+        [again["updated"][c] for c in CHANNELS], [stated[c] for c in CHANNELS], rtol=0.05
+    )
     channel = "alpha_rad" if key == "vane_arm" else "q_rad_s"
     assert again["updated"][channel] < again["declared"][channel]
 
 
+def test_nothing_is_flown_again_for_a_linear_model(found):
+    _, _, trace = found
+    assert flown_again(replace(trace.case, model="linear"), trace.outcome, planes.load("gtm"), None) == {}
+
+
 def test_replay_needs_nothing_of_the_project():
-    tree = ast.parse((SCRIPTS / "replay_plain.py").read_text())
+    tree = ast.parse(Path(replay_plain.__file__).read_text())
     imports = [n for n in ast.walk(tree) if isinstance(n, ast.Import)]
     names = {a.name for n in imports for a in n.names}
     names |= {str(n.module) for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}

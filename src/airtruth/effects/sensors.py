@@ -154,6 +154,7 @@ EFFECTS: Final = (
     ),
     _lag("vane_lag", "alpha_rad", "Turbulence, or a declared arm."),
     _lag("gyro_lag", "q_rad_s", "theta as a second witness of q."),
+    _lag("accelerometer_lag", "az_m_s2", "A second accelerometer, or inertial lift from alpha."),
     _scale("vane_scale", "alpha_rad", 0.02, "az, or theta less flight path."),
     _scale("gyro_scale", "q_rad_s", 0.01, "theta as a second witness of q."),
     _scale("accelerometer_scale", "az_m_s2", 0.01, "Gravity at the trim: az of level flight is known."),

@@ -16,7 +16,15 @@ from airtruth.report import layout, render, tables
 from airtruth.report.campaign import ESTIMATES, TRUTH, Campaign, read_campaign
 from airtruth.report.layout import Grid
 from airtruth.report.trace_table import error_csv, error_grid, figures
-from airtruth.report.trace_text import derivative_lines, detectable, effect_details, effect_line, key, verdict, why_not
+from airtruth.report.trace_text import (
+    derivative_lines,
+    detectable,
+    effect_details,
+    effect_line,
+    key,
+    verdict,
+    why_not,
+)
 
 ANSWER: Final = "trace.json"
 PICTURES: Final = {
@@ -155,7 +163,9 @@ def _estimates_report(path: Path) -> Report:
     try:
         table = overview(pd.read_parquet(path))
     except (OSError, ValueError, KeyError) as error:
-        raise StoreError(f"{path}: is not a file of estimates ({error}); `airtruth identify` writes it") from None
+        raise StoreError(
+            f"{path}: is not a file of estimates ({error}); `airtruth identify` writes it"
+        ) from None
     grid = Grid(table.title, table.columns, (layout.Group("", _words(table.rows)),), table.notes)
     return Report(_page(path.stem, [as_html(table)]), as_csv(table), render.latex(grid, "estimates"))
 
@@ -170,7 +180,9 @@ def grid_html(grid: Grid) -> str:
     lines = [f"<table><thead><tr>{head}</tr></thead><tbody>"]
     for group in grid.groups:
         if group.heading:
-            lines.append(f'<tr class="group"><td colspan="{len(grid.header)}">{html.escape(group.heading)}</td></tr>')
+            lines.append(
+                f'<tr class="group"><td colspan="{len(grid.header)}">{html.escape(group.heading)}</td></tr>'
+            )
         for row in group.rows:
             lines.append("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>")
     lines.append("</tbody></table>")
@@ -179,7 +191,9 @@ def grid_html(grid: Grid) -> str:
 
 
 def _candidates(answer: Mapping[str, Any]) -> str:
-    lines = ["<table><thead><tr><th>effect</th><th>score</th><th>p (Holm)</th><th>outcome</th></tr></thead><tbody>"]
+    lines = [
+        "<table><thead><tr><th>effect</th><th>score</th><th>p (Holm)</th><th>outcome</th></tr></thead><tbody>"
+    ]
     for c in answer["candidates"]:
         cells = (figures(c["score"]), figures(c["p_value"], 2)) if c["testable"] else ("-", "-")
         numbers = "".join(f"<td>{cell}</td>" for cell in cells)

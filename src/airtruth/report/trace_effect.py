@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 
 _CURVES: Final = ("alpha", "elevator")
 _AROUND_S: Final = 2.5
+_EDGE_S: Final = 0.8
 
 
 def change_of(found: Trace) -> Change:
@@ -68,7 +69,9 @@ def draw_effect(ax: Axes, found: Trace, record: Record, own: Assessment, time_s:
     elif change.aero:
         _moment(ax, found, record, own, time_s)
     else:
-        ax.text(0.5, 0.5, "no effect accepted", transform=ax.transAxes, ha="center", va="center", color=style.GREY)
+        ax.text(
+            0.5, 0.5, "no effect accepted", transform=ax.transAxes, ha="center", va="center", color=style.GREY
+        )
         ax.set_title("the effect")
 
 
@@ -77,8 +80,8 @@ def _surface(ax: Axes, record: Record, change: Change) -> None:
     step = s.dt_s / (s.sub * FINE)
     air = through(change.surface, s.elevator_rad, step)
     time = np.arange(len(air)) * step
-    middle = float(time[int(np.argmax(np.abs(np.gradient(s.elevator_rad))))])
-    span = (time > middle - 0.4 * _AROUND_S) & (time < middle + 0.6 * _AROUND_S)
+    middle = float(time[int(np.argmax(np.abs(air - s.elevator_rad)))])
+    span = np.abs(time - middle) < 0.5 * _EDGE_S
     ax.plot(time[span], s.elevator_rad[span] / DEG, color=style.GREY, label="measured")
     ax.plot(time[span], air[span] / DEG, "--", color=style.VERMILLION, label="as the air sees it")
     ax.set(xlabel="time [s]", ylabel="elevator [deg]", title="the effect: surface")
@@ -112,7 +115,11 @@ def _curve(ax: Axes, found: Trace, record: Record, terms: tuple[AeroTerm, ...]) 
     ax.plot(fine * unit, declared, color=style.GREY, label="declared")
     ax.plot(fine * unit, before, ":", color=style.BLUE, label="before")
     ax.plot(fine * unit, after, "--", color=style.VERMILLION, label="after")
-    flown = record.signals.y[:, 0] - plant.alpha_shift_rad if first.signal == "alpha" else record.signals.elevator_rad
+    flown = (
+        record.signals.y[:, 0] - plant.alpha_shift_rad
+        if first.signal == "alpha"
+        else record.signals.elevator_rad
+    )
     ax.axvspan(flown.min() * unit, flown.max() * unit, color=style.SKY, alpha=0.2, lw=0.0, label="flown")
     ax.set(xlabel=f"{first.signal} [deg]", ylabel=first.coefficient, title=f"the effect: {first.coefficient}")
     ax.legend(loc="best", fontsize=7.5)
@@ -135,7 +142,9 @@ def _sensor(ax: Axes, found: Trace, record: Record, own: Assessment, change: Cha
     model = found.outcome.models["after"]
     i, factor = CHANNELS.index(channel), shown(channel)[1]
     full = model.hypothesis.change(model.sizes)
-    rest = Change(full.surface, full.states, full.aero, full.declared, model.hypothesis.declared.sensors, full.air)
+    rest = Change(
+        full.surface, full.states, full.aero, full.declared, model.hypothesis.declared.sensors, full.air
+    )
     with_ = _free_run(found, record, own, model, full)[:, i] * factor
     without = _free_run(found, record, own, model, rest)[:, i] * factor
     middle = float(time_s[int(np.argmax(np.abs(with_ - without)))])
@@ -157,7 +166,12 @@ def _declared(ax: Axes, found: Trace) -> None:
             ax.plot(value["value"], y, "o", color=style.VERMILLION)
             names.append(f"{effect['name']}\n{name} = {figures(value['value'])}")
             y += 1
-    neutral = {p.neutral for e in found.outcome.models["after"].hypothesis.effects for p in e.parameters if not p.place}
+    neutral = {
+        p.neutral
+        for e in found.outcome.models["after"].hypothesis.effects
+        for p in e.parameters
+        if not p.place
+    }
     for x in neutral - {float("inf")}:
         ax.axvline(x, color=style.GREY, lw=1.0, label="as declared")
     ax.set_yticks(range(y), names)
@@ -170,8 +184,16 @@ def _moment(ax: Axes, found: Trace, record: Record, own: Assessment, time_s: Arr
     """An effect with memory: the angle of attack of the free run with it and without."""
     model = found.outcome.models["after"]
     runs = {
-        "without the effect": (_free_run(found, record, own, model, model.hypothesis.declared), ":", style.BLUE),
-        "with the effect": (_free_run(found, record, own, model, model.hypothesis.change(model.sizes)), "--", style.VERMILLION),
+        "without the effect": (
+            _free_run(found, record, own, model, model.hypothesis.declared),
+            ":",
+            style.BLUE,
+        ),
+        "with the effect": (
+            _free_run(found, record, own, model, model.hypothesis.change(model.sizes)),
+            "--",
+            style.VERMILLION,
+        ),
     }
     factor = shown("q_rad_s")[1]
     ax.plot(time_s, record.signals.y[:, 1] * factor, ".", color=style.GREY, ms=2.5, label="measured")

@@ -29,7 +29,11 @@ Array = NDArray[np.float64]
 
 PAGES: Final = ("trace.png", "scores.png", "innovations.png")
 LEVEL: Final = 0.05
-_LABELS: Final = {"alpha_rad": "angle of attack\n[deg]", "q_rad_s": "pitch rate\n[deg/s]", "az_m_s2": "normal force\n[m/s²]"}
+_LABELS: Final = {
+    "alpha_rad": "angle of attack\n[deg]",
+    "q_rad_s": "pitch rate\n[deg/s]",
+    "az_m_s2": "normal force\n[m/s²]",
+}
 _WIDEST_SIGMA: Final = 40.0
 
 
@@ -74,7 +78,7 @@ def sight(found: Trace) -> Sight:
     record = problem.records[at]
     return Sight(
         record=record,
-        time_s=np.arange(record.samples) * record.signals.dt_s,
+        time_s=record.signals.dt_s * np.arange(record.samples, dtype=np.float64),
         stages=pair,
         before=assessed[pair[0]][at],
         after=assessed[pair[1]][at],
@@ -88,7 +92,9 @@ def page(found: Trace, seen: Sight) -> Figure:
     with style.applied():
         figure = style.new_figure(11.0, 6.6)
         axes = figure.subplots(3, 3)
-        for column, (name, own) in zip((0, 2), zip(seen.stages, (seen.before, seen.after), strict=True), strict=True):
+        for column, (name, own) in zip(
+            (0, 2), zip(seen.stages, (seen.before, seen.after), strict=True), strict=True
+        ):
             _residuals(axes[:, column], seen, own)
             axes[0, column].set_title(f"residual of the free run: {name}")
         for row in range(3):
@@ -126,7 +132,13 @@ def _contribution(ax: Axes, found: Trace, seen: Sight) -> None:
         ax.text(0.5, 0.5, "no effect", transform=ax.transAxes, ha="center", va="center", color=style.GREY)
         return
     for i, (channel, colour) in enumerate(zip(CHANNELS, style.PALETTE, strict=False)):
-        ax.plot(seen.time_s, moved[:, i] / seen.floor[i], color=colour, lw=1.1, label=shown(channel)[0].split(" ")[0])
+        ax.plot(
+            seen.time_s,
+            moved[:, i] / seen.floor[i],
+            color=colour,
+            lw=1.1,
+            label=shown(channel)[0].split(" ")[0],
+        )
     ax.margins(y=0.2)
     ax.legend(loc="upper right", fontsize=7.5, ncols=3)
 
@@ -156,7 +168,8 @@ def scores(answer: dict[str, Any]) -> Figure:
     leading = {key(e) for e in answer["effects"]}
     alike = {name for e in answer["effects"] for name in e["indistinguishable_from"]}
     colours = [
-        style.VERMILLION if key(c) in leading else style.ORANGE if c["name"] in alike else style.BLUE for c in rows
+        style.VERMILLION if key(c) in leading else style.ORANGE if c["name"] in alike else style.BLUE
+        for c in rows
     ]
     count = len(rows)
     needed = norm.isf(0.5 * LEVEL / (count - np.arange(count))) if count else np.zeros(0)
@@ -165,7 +178,9 @@ def scores(answer: dict[str, Any]) -> Figure:
         ax = figure.subplots()
         y = np.arange(count)
         ax.barh(y, sigma, color=colours, height=0.7)
-        ax.step(needed, y, where="mid", color=style.BLACK, lw=1.0, label=f"Holm, {100.0 * LEVEL:g} % over all")
+        ax.step(
+            needed, y, where="mid", color=style.BLACK, lw=1.0, label=f"Holm, {100.0 * LEVEL:g} % over all"
+        )
         ax.set_yticks(y, [key(c) for c in rows], fontsize=7.5)
         ax.set_ylim(count - 0.4, -0.6)
         ax.set_xlabel("significance of the score [σ of a normal]")
@@ -225,7 +240,10 @@ def record_csv(seen: Sight) -> str:
     first, second = seen.stages
     header = ["t_s", "run_id"]
     for channel in CHANNELS:
-        header += [f"{channel}_measured", *(f"{channel}_{kind}_{s}" for s in (first, second) for kind in ("free_run", "innovation"))]
+        header += [
+            f"{channel}_measured",
+            *(f"{channel}_{kind}_{s}" for s in (first, second) for kind in ("free_run", "innovation")),
+        ]
     writer.writerow(header)
     y = seen.record.signals.y
     for k, t in enumerate(seen.time_s):

@@ -49,7 +49,7 @@ def error_grid(answer: Answer) -> Grid:
         for which, where in SETS
         for kind, title in KINDS
     ]
-    if "replay" in answer:
+    if answer.get("replay"):
         groups.append(Group("Flown again in JSBSim, held-out records", tuple(_replayed(answer, found))))
     return Grid(
         title="Root mean square of the error",

@@ -11,7 +11,15 @@ from airtruth.report.render import WIDTH, text
 from airtruth.report.trace_table import error_grid, figures
 
 MOST_CANDIDATES: Final = 8
-_PRINTED: Final = {"-": "", "1": "", "hz": "Hz", "rad_s": "rad/s", "m_s": "m/s", "m_s2": "m/s2", "kg_m2": "kg m2"}
+_PRINTED: Final = {
+    "-": "",
+    "1": "",
+    "hz": "Hz",
+    "rad_s": "rad/s",
+    "m_s": "m/s",
+    "m_s2": "m/s2",
+    "kg_m2": "kg m2",
+}
 
 Answer = Mapping[str, Any]
 
@@ -42,7 +50,7 @@ def verdict(answer: Answer) -> str:
     """The verdict in one sentence."""
     anomaly, remaining = answer["anomaly"], answer["remaining"]
     effects = answer["effects"]
-    names = " and ".join(key(e) for e in effects)
+    names = " and ".join(", ".join(key(e) for e in effects).rsplit(", ", 1))
     if answer["verdict"] == "none":
         said = (
             f"None: the declared aircraft explains these records (p = {figures(anomaly['p_value'], 2)}); "
@@ -105,7 +113,11 @@ def effect_details(effect: Mapping[str, Any]) -> Iterator[str]:
         told += f"; 2 log L gained: {figures(gain)}"
     yield told + f"; {figures(effect['separation_sigma'])} sigma from the next effect"
     alike = effect["indistinguishable_from"]
-    yield f"  cannot be told from: {', '.join(alike)}" if alike else "  no other effect explains it as well"
+    yield (
+        f"  cannot be told from: {', '.join(alike)}"
+        if alike
+        else "  no other effect that passes every test explains it as well"
+    )
 
 
 def derivative_lines(answer: Answer) -> list[str]:
@@ -170,4 +182,13 @@ def _wrapped(heading: str, words: str) -> list[str]:
     return textwrap.wrap(f"{heading}: {words}", WIDTH, subsequent_indent="  ")
 
 
-__all__ = ["as_trace_text", "detectable", "effect_details", "effect_line", "key", "unit_of", "verdict", "why_not"]
+__all__ = [
+    "as_trace_text",
+    "detectable",
+    "effect_details",
+    "effect_line",
+    "key",
+    "unit_of",
+    "verdict",
+    "why_not",
+]

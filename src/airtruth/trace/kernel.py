@@ -3,7 +3,7 @@
 State x: alpha over ground [rad], q [rad/s], two Dryden states of unit variance, the upward gust w as the tail
 meets it, states of effects, states of lagging sensors. Airspeed, density and pitch attitude are measured
 and enter as known series, and so does the speed over ground, which the gust along the path lacks. The
-air's alpha is theta - (theta - alpha) V_ground/V + w/V, its pitch rate q - (w - w_late)/(tau V), tau = 4 b/(pi V). Between samples the motion is integrated by the classical Runge-Kutta method, whose
+air's alpha is theta - asin((V_ground sin(theta - alpha) - w)/V), its pitch rate q - (w - w_late)/(tau V), tau = 4 b/(pi V). Between samples the motion is integrated by the classical Runge-Kutta method, whose
 weights are Simpson's: the middle value of an input carries its area. Sensor lags are integrated exactly for
 a signal linear over half a step; a delayed output is the motion integrated back by the delay.
 
@@ -84,7 +84,8 @@ def rates(
     """
     sigma, length = constants[SIGMA_W], constants[LENGTH_W]
     gust = _W1 * x[2] + _W2 * x[3]
-    alpha = theta - (theta - x[0]) * ground / v + sigma * gust / v
+    sine = (math.sin(theta - x[0]) * ground - sigma * gust) / v
+    alpha = theta - math.asin(min(max(sine, -1.0), 1.0))
     q = x[1]
     late = (gust - x[4]) / constants[ROTARY_S]
     q_air = q - constants[ROTARY] * sigma * late / v
@@ -192,7 +193,8 @@ def outputs(
 ) -> None:
     """What the sensors would read without bias, lag and noise: alpha [rad], q [rad/s], az [m/s2]."""
     gust = constants[SIGMA_W] * (_W1 * x[2] + _W2 * x[3])
-    alpha = theta - (theta - x[0]) * ground / v + gust / v
+    sine = (math.sin(theta - x[0]) * ground - gust) / v
+    alpha = theta - math.asin(min(max(sine, -1.0), 1.0))
     y[0] = scales[0] * (alpha - x[1] * arms[0] / v)
     y[1] = scales[1] * x[1]
     y[2] = scales[2] * (az - arms[2] * rate[1])

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from airtruth import aircraft as planes
 from airtruth.aircraft import Aircraft, Sensor
 from airtruth.errors import FlightError, TrimError
+from airtruth.fly.engine import Condition
 from airtruth.fly.replay import Track, replay, substeps
 from airtruth.fly.trim import Trim, trim
+from airtruth.trace.answer import Outcome
 from airtruth.trace.holdout import floor
 from airtruth.trace.lower import CHANNELS, lower
 from airtruth.trace.prepare import Case
 from airtruth.trace.records import FINE, Record
-from airtruth.trace.search import Stage
 
 Array = NDArray[np.float64]
 
@@ -27,47 +28,60 @@ MOST_RECORDS: Final = 6
 
 
 def flown_again(
-    case: Case, stages: tuple[Stage, ...], aircraft: Aircraft, updated: str | Path | None
+    case: Case, outcome: Outcome, aircraft: Aircraft, updated: str | Path | None
 ) -> dict[str, dict[str, float]]:
     """Free runs of the records held out (fitted ones where none is) in JSBSim itself.
 
     Parameters
     ----------
-    case, stages : what was traced, and the rounds of the search.
+    case, outcome : what was traced, and its stages.
     aircraft : the declared one; updated : folder of the updated one, None without.
 
     Returns
     -------
     "declared" and, with an update, "updated" -> channel -> root mean square error [unit of the channel];
     empty for an aircraft without a JSBSim model, or where the motion leaves the simulation's range.
+
+    Raises
+    ------
+    AircraftError
+        If the updated aircraft cannot be read.
     """
     if aircraft.file.jsbsim is None or case.model != "aircraft":
         return {}
-    problem = case.held or case.fitted
     flying = {"declared": aircraft}
     if updated is not None:
         flying["updated"] = planes.load(updated)
-    null = stages[0].null
-    low = lower(null.hypothesis.change(null.point.sizes))
-    result = {}
-    for name, plane in flying.items():
-        trims: dict[object, Trim] = {}
-        squares = []
-        for i, record in enumerate(problem.records[:MOST_RECORDS]):
-            own = null.point.local[min(i, len(null.point.local) - 1)]
-            level = floor(record, problem, low, null.point.shared, own)
-            declared = record.plant.trim
-            assert declared is not None
-            try:
-                if declared.condition not in trims:
-                    trims[declared.condition] = declared if name == "declared" else trim(plane, declared.condition)
-                flown = replay(plane, trims[declared.condition], track(record, plane, level))
-            except (FlightError, TrimError):
-                return {}
-            residual = record.signals.y - np.stack([flown[c] for c in CHANNELS], axis=1)
-            squares.append((residual**2).mean(axis=0))
-        result[name] = dict(zip(CHANNELS, np.sqrt(np.mean(squares, axis=0)).tolist(), strict=True))
-    return result
+    levels = _levels(case, outcome)
+    try:
+        return {name: _errors(case, plane, levels) for name, plane in flying.items()}
+    except (FlightError, TrimError):
+        return {}
+
+
+def _levels(case: Case, outcome: Outcome) -> list[Array]:
+    """(3,) of each record: what gusts and sensors explain of its free run."""
+    problem = case.held or case.fitted
+    model = outcome.models["before"]
+    low = lower(model.hypothesis.change(model.sizes))
+    judged = (outcome.held if case.held else outcome.fitted)["before"]
+    pairs = zip(problem.records[:MOST_RECORDS], judged, strict=False)
+    return [floor(record, problem, low, model.shared, own.local) for record, own in pairs]
+
+
+def _errors(case: Case, aircraft: Aircraft, levels: list[Array]) -> dict[str, float]:
+    trims: dict[Condition, Trim] = {}
+    squares = []
+    for record, level in zip((case.held or case.fitted).records, levels, strict=False):
+        declared = record.plant.trim
+        assert declared is not None
+        at = declared.condition
+        if at not in trims:
+            trims[at] = trim(aircraft, at)
+        flown = replay(aircraft, trims[at], track(record, aircraft, level))
+        residual = record.signals.y - np.stack([flown[c] for c in CHANNELS], axis=1)
+        squares.append((residual**2).mean(axis=0))
+    return dict(zip(CHANNELS, np.sqrt(np.mean(squares, axis=0)).tolist(), strict=True))
 
 
 def track(record: Record, aircraft: Aircraft, weight: Array) -> Track:

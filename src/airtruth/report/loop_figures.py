@@ -1,0 +1,121 @@
+"""Figures of the loop: bias of every method before and after; one page over several traces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from airtruth.physics.short_period import PARAMETERS
+from airtruth.report import style
+from airtruth.report.loop import BARS, LoopTable, bias_pct
+from airtruth.report.published import SYMBOLS
+from airtruth.report.trace_effect import contribution
+from airtruth.report.trace_figures import Sight, sight
+from airtruth.report.trace_table import shown
+from airtruth.report.trace_text import key
+from airtruth.trace import Trace
+from airtruth.trace.lower import CHANNELS
+
+Array = NDArray[np.float64]
+
+SHOWN: Final = ("Cmalpha", "Cmq", "CLalpha")
+_WIDEST_PCT: Final = 30.0
+_STAGES: Final = (("before", style.VERMILLION, -0.16, "o"), ("after", style.BLUE, 0.16, "s"))
+
+
+def bias_figure(table: LoopTable) -> Figure:
+    """Bias of three derivatives by method, before and after, with two standard errors."""
+    methods = list(table.statistics)
+    with style.applied():
+        figure = style.new_figure(9.6, 1.3 + 0.34 * len(methods))
+        axes = np.atleast_1d(figure.subplots(1, len(SHOWN), sharey=True))
+        for ax, name in zip(axes, SHOWN, strict=True):
+            _bias_panel(ax, table, methods, name)
+        axes[0].set_yticks(range(len(methods)), methods)
+        axes[0].set_ylim(len(methods) - 0.5, -0.5)
+        style.legend_above(figure, axes[:1])
+    return figure
+
+
+def _bias_panel(ax: Axes, table: LoopTable, methods: list[str], name: str) -> None:
+    j = PARAMETERS.index(name)
+    limit = BARS.get(name)
+    if limit is not None:
+        ax.axvspan(-limit, limit, color=style.SKY, alpha=0.25, lw=0.0, label=f"{limit:g} %")
+    ax.axvline(0.0, color=style.BLACK, lw=1.0)
+    for stage, (label, colour, offset, marker) in enumerate(_STAGES):
+        found = [bias_pct(pair[stage], table.truth) for pair in table.statistics.values()]
+        x, se = np.array([b[j] for b, _ in found]), np.array([s[j] for _, s in found])
+        y = np.arange(len(methods)) + offset
+        inside = np.abs(x) <= _WIDEST_PCT
+        ax.errorbar(
+            x[inside], y[inside], xerr=2.0 * se[inside], fmt=marker, color=colour, ms=4.5, lw=1.0, label=label
+        )
+        for value, at in zip(x[~inside], y[~inside], strict=True):
+            edge = np.sign(value) * _WIDEST_PCT
+            ax.annotate(
+                f"{value:+.0f}",
+                (edge, at),
+                color=colour,
+                fontsize=7.5,
+                va="center",
+                ha="right" if value > 0 else "left",
+            )
+    widest = min(_WIDEST_PCT, 1.1 * max(abs(v) for v in ax.get_xlim()))
+    ax.set_xlim(-widest, widest)
+    ax.set_xlabel(f"bias of {SYMBOLS[name]} [%]")
+    ax.grid(axis="y", visible=False)
+    ax.tick_params(axis="y", length=0)
+
+
+def traces_page(found: Mapping[str, Trace]) -> Figure:
+    """One page over several traces: residual before, the effect, residual after, of one record and channel each.
+
+    The channel is that in which the effect shows most; all in standard deviations of what gusts and sensors explain.
+
+    Parameters
+    ----------
+    found : name of the log -> its trace.
+    """
+    with style.applied():
+        figure = style.new_figure(10.0, 0.8 + 1.15 * len(found))
+        axes = figure.subplots(len(found), 3, squeeze=False, sharex="row", sharey="row")
+        for row, (name, trace) in zip(axes, found.items(), strict=True):
+            _trace_row(row, name, trace, sight(trace))
+        for ax, title in zip(
+            axes[0], ("residual before", "the effect on the output", "residual after"), strict=True
+        ):
+            ax.set_title(title)
+        for ax in axes[-1]:
+            ax.set_xlabel("time [s]")
+        figure.suptitle(
+            "Free runs, in standard deviations of what gusts and sensors explain (shaded: two)", fontsize=10.0
+        )
+    return figure
+
+
+def _trace_row(row: NDArray[np.object_], name: str, trace: Trace, seen: Sight) -> None:
+    moved = contribution(trace, seen.record, seen.after)
+    strength = np.zeros(3) if moved is None else (moved**2).mean(axis=0) / seen.floor**2
+    i = int(np.argmax(strength))
+    before, after = (own.residual[:, i] / seen.floor[i] for own in (seen.before, seen.after))
+    middle = None if moved is None else moved[:, i] / seen.floor[i]
+    for ax, values, colour in zip(
+        row, (before, middle, after), (style.VERMILLION, style.GREEN, style.BLUE), strict=True
+    ):
+        ax.axhspan(-2.0, 2.0, color=style.SKY, alpha=0.25, lw=0.0, zorder=0)
+        if values is not None:
+            ax.plot(seen.time_s, values, color=colour, lw=0.9)
+        ax.margins(x=0.01)
+    names = ", ".join(key(e) for e in trace.answer["effects"]) or "no effect"
+    told = f"{trace.answer['verdict']}: {names}" if trace.answer["effects"] else trace.answer["verdict"]
+    row[1].text(0.02, 0.96, told, transform=row[1].transAxes, fontsize=7.5, va="top")
+    row[0].set_ylabel(f"{name}: {shown(CHANNELS[i])[0].split(' ')[0]} [σ]")
+
+
+__all__ = ["SHOWN", "bias_figure", "traces_page"]
