@@ -7,7 +7,7 @@ JOBS ?= $(shell nproc 2>/dev/null || echo 2)
 OUT ?= out
 CAMPAIGNS := light light-fit moderate moderate-fit
 
-.PHONY: help setup campaign campaign-quick study test lint bench clean
+.PHONY: help setup campaign campaign-quick loop study blind test lint bench clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -20,16 +20,22 @@ $(READY): requirements.lock pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@
 
-campaign: $(READY) ## fly data/campaigns, identify, print the paper's tables, draw the figures (into out/)
+campaign: $(READY) ## fly data/campaigns, identify, print the paper's tables, close the loop (into out/)
 	$(BIN)/python scripts/campaign.py --out $(OUT) --jobs $(JOBS)
 
 campaign-quick: $(READY) ## the same with a tenth of the runs
 	$(BIN)/python scripts/campaign.py --out $(OUT)/quick --jobs $(JOBS) --quick
 
+loop: $(READY) ## the paper's experiment through the loop: 2000 runs, every method before and after (five minutes)
+	$(BIN)/python scripts/paper_loop.py --out $(OUT)/loop-2000 --jobs $(JOBS) --affine 300
+
 study: $(READY) ## every cause behind docs/paper.md and docs/closed_loop.md, off and on (about ten minutes)
 	$(BIN)/python scripts/paper_study.py --out $(OUT)/study --jobs $(JOBS)
 	$(BIN)/python scripts/closed_loop_study.py
 	$(BIN)/python scripts/foreign_aircraft.py
+
+blind: $(READY) ## 200 flight tests that the tracer has not seen, scored against their truth
+	$(BIN)/python scripts/blind_trials.py --trials 200 --seed 1 --jobs $(JOBS) --out $(OUT)/blind
 
 test: $(READY) lint ## lint, type-check and run every test
 	$(BIN)/python -m pytest -n $(JOBS) --dist loadgroup

@@ -1,6 +1,8 @@
-"""make campaign: fly data/campaigns, identify, print the paper's tables, draw the figures.
+"""make campaign: fly data/campaigns, identify, print the paper's tables, draw the figures, close the loop.
 
-Every step is a command of airtruth or a call into it; a run that is interrupted resumes.
+The loop ends it: effects traced in the first runs of light-fit and every method before and after
+(scripts/paper_loop.py), and a trace of each flight test in data/undeclared. Every step is a command of
+airtruth or a call into it; a run that is interrupted resumes.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import paper_loop
 from numpy.typing import NDArray
 
 from airtruth import aircraft
@@ -24,17 +27,33 @@ from airtruth.fly.measure import LOGGED
 from airtruth.fly.trim import trim
 from airtruth.identify import Options, identify_batch, identify_files, residuals
 from airtruth.logs.flight_log import Batch, batches
-from airtruth.logs.store import log_paths, read_log, write_table
+from airtruth.logs.store import log_paths, read_log, read_table, write_table
 from airtruth.physics import short_period
-from airtruth.report import TABLES, distribution, figures, published, read_campaign, style, write_tables
+from airtruth.report import (
+    TABLES,
+    distribution,
+    figures,
+    published,
+    read_campaign,
+    style,
+    write_tables,
+    write_trace_figures,
+)
+from airtruth.report.loop_figures import traces_page
 from airtruth.report.tables import FURTHER
+from airtruth.report.traces import write_traces
+from airtruth.trace import TraceOptions, run
 
 CAMPAIGNS = ("light", "light-fit", "moderate", "moderate-fit")
 PAPER = Options(airspeed_m_s=42.852)
 """As the paper: the dynamic pressure is that of the trim. The trim itself is a free constant (docs/paper.md)."""
+LOOP_CAMPAIGN = "light-fit"
 QUICK_DIVISOR = 10
+QUICK_LOGS = ("d",)
+QUICK_TRACED = 4
 FIGURE_4_S = (1.0, 7.0)
 ROOT = Path(__file__).resolve().parents[1]
+GTM = ROOT / "aircraft" / "gtm"
 
 
 def main() -> int:
@@ -52,10 +71,12 @@ def main() -> int:
         if code:
             return code
     try:
-        return report(arguments.out)
+        report(arguments.out)
+        close_loop(arguments.out, arguments.jobs, arguments.quick)
     except AirtruthError as error:
         print(f"campaign: {error}", file=sys.stderr)
         return error.exit_code
+    return 0
 
 
 def fly(name: str, out: Path, jobs: int, quick: bool) -> int:
@@ -67,9 +88,9 @@ def fly(name: str, out: Path, jobs: int, quick: bool) -> int:
     return subprocess.run(command, check=False).returncode
 
 
-def report(out: Path) -> int:
+def report(out: Path) -> None:
     """Identify, tables and figures of flown campaigns."""
-    gtm = aircraft.load(ROOT / "aircraft" / "gtm")
+    gtm = aircraft.load(GTM)
     for name in CAMPAIGNS:
         print(f"identify {name}", file=sys.stderr)
         # the paper's methods at the trim's airspeed, those beyond it as they are by themselves
@@ -84,7 +105,27 @@ def report(out: Path) -> int:
     tables = write_tables([out / name for name in CAMPAIGNS], out / "tables")
     print(tables.text)
     print("Written: " + ", ".join(str(p) for p in [*tables.paths, *draw(out, gtm)]))
-    return 0
+
+
+def close_loop(out: Path, jobs: int, quick: bool) -> None:
+    """Trace, put the effects into the model, estimate again; then the flight tests of data/undeclared."""
+    print("close the loop", file=sys.stderr)
+    before = read_table(out / LOOP_CAMPAIGN / "estimates.parquet")
+    traced = QUICK_TRACED if quick else paper_loop.TRACED
+    closed = paper_loop.close(out / LOOP_CAMPAIGN, out / "loop", jobs, before, traced)
+    found = {}
+    for path in sorted((ROOT / "data" / "undeclared").glob("*.parquet")):
+        if quick and path.stem not in QUICK_LOGS:
+            continue
+        print(f"trace {path.stem}", file=sys.stderr)
+        folder = out / "trace" / path.stem
+        found[path.stem] = run([path], GTM, TraceOptions(threads=jobs), folder)
+        write_trace_figures(found[path.stem], folder)
+    text, paths = write_traces({name: trace.answer for name, trace in found.items()}, out / "trace")
+    style.save(traces_page(found), out / "trace" / "traces.png")
+    print(closed.text)
+    print(text)
+    print("Written: " + ", ".join(map(str, [*closed.paths, *paths, out / "trace" / "traces.png"])))
 
 
 def shown_methods(name: str) -> list[str]:

@@ -13,12 +13,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+import numpy as np
 from blind import draw, information
 from blind.draw import Trial
-from blind.figures import DEG, ROOT
+from blind.figures import CHANNELS, DEG, ROOT
 from blind.truths import Added
+from numpy.typing import NDArray
 
+from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.store import write_log, write_text
+
+Array = NDArray[np.float64]
 
 SEED: Final = 16
 FLOWN: Final[dict[str, tuple[str, str, tuple[Added, ...]]]] = {
@@ -41,6 +46,8 @@ FLOWN: Final[dict[str, tuple[str, str, tuple[Added, ...]]]] = {
 }
 _HEAD: Final = """# What scripts/make_undeclared.py flew into data/undeclared; read by tests alone.
 # lambda: noncentrality of each effect in the records that are not held out (docs/blind.md).
+# oracle: rms of the free run's error on the held-out records that the truth itself leaves, biases and initial
+# state free: what gusts and sensors do.
 """
 
 
@@ -57,10 +64,19 @@ def _values(values: Mapping[str, float]) -> str:
     return "{ " + ", ".join(f"{name} = {value!r}" for name, value in values.items()) + " }"
 
 
-def entry(name: str) -> str:
+def records(log: FlightLog) -> list[Array]:
+    """Logged alpha, q, az of each run, (samples, 3)."""
+    return [
+        np.column_stack([log.channels[name][log.rows(run)] for name in CHANNELS])
+        for run in range(len(log.run_ids))
+    ]
+
+
+def entry(name: str, log: FlightLog) -> str:
     """TOML of one log's truth."""
     t = trial(name)
     strength = information.lambdas(t)
+    oracle = information.oracle(t, records(log))["free_run"]
     lines = [
         f"[{name}]",
         f'composition = "{t.composition}"',
@@ -68,6 +84,7 @@ def entry(name: str) -> str:
         f'spectrum = "{t.spectrum}"',
     ]
     lines += [f'noise = "{t.noise}"', f"rotary = {str(t.rotary).lower()}"]
+    lines += [f"oracle = {_values({channel: float(f'{rms:.4g}') for channel, rms in oracle.items()})}"]
     for effect in t.effects:
         lines += ["", f"[[{name}.effects]]", f'name = "{effect.key}"', f"lambda = {strength[effect.key]:.0f}"]
         lines += [f"parameters = {_values(effect.values)}"]
@@ -84,9 +101,10 @@ def main() -> None:
     arguments = parser.parse_args()
     for folder in (arguments.data, arguments.key.parent):
         folder.mkdir(parents=True, exist_ok=True)
-    for name in FLOWN:
-        write_log(arguments.data / f"{name}.parquet", draw.fly(trial(name)))
-    write_text(arguments.key, _HEAD + "\n" + "\n".join(entry(name) for name in FLOWN))
+    logs = {name: draw.fly(trial(name)) for name in FLOWN}
+    for name, log in logs.items():
+        write_log(arguments.data / f"{name}.parquet", log)
+    write_text(arguments.key, _HEAD + "\n" + "\n".join(entry(name, log) for name, log in logs.items()))
 
 
 if __name__ == "__main__":

@@ -82,7 +82,9 @@ def fly(campaign: Path, out: Path, runs: int, jobs: int) -> None:
     flying.fly(planning.make(campaign, None, runs), out, jobs, lambda done, total, failed: None)
 
 
-def close(flights: Path, out: Path, jobs: int, before: pd.DataFrame | None = None) -> Loop:
+def close(
+    flights: Path, out: Path, jobs: int, before: pd.DataFrame | None = None, count: int = TRACED
+) -> Loop:
     """Trace the first runs of a flown campaign, estimate before and after, and write table and figure.
 
     Parameters
@@ -91,9 +93,10 @@ def close(flights: Path, out: Path, jobs: int, before: pd.DataFrame | None = Non
     out : folder of the result.
     jobs : processes.
     before : estimates without effects, made here if None.
+    count : runs that are traced.
     """
     paths = log_paths(flights)
-    found = run(leading(paths, TRACED), GTM, TraceOptions(model="linear", threads=jobs), out / "trace")
+    found = run(leading(paths, count), GTM, TraceOptions(model="linear", threads=jobs), out / "trace")
     traced = [r.signals.run_id for r in found.case.fitted.records]
     traced += [r.signals.run_id for r in found.case.held.records] if found.case.held else []
     notes = [f"Effects traced in {traced[0]} to {traced[-1]}, which are not judged. {verdict(found.answer)}"]

@@ -30,11 +30,12 @@ STAGES: Final = ("declared", "before", "after", "control", "floor")
 
 @dataclass(frozen=True)
 class Model:
-    """A stage: a hypothesis with its shared parameters and sizes."""
+    """A stage: a hypothesis with its shared parameters and sizes, and where the fitted records' own ones ended."""
 
     hypothesis: Hypothesis
     shared: Array
     sizes: Array
+    local: Array
 
 
 @dataclass(frozen=True)
@@ -64,26 +65,30 @@ def assessed(case: Case, stages: Sequence[Stage]) -> Outcome:
     # noise levels are those of the stage before: the declared ones would judge the declared model alone
     declared = np.concatenate([np.zeros(6), null.point.shared[6:]])
     models = {
-        "declared": Model(case.hypothesis, declared, nothing),
-        "before": Model(null.hypothesis, null.point.shared, null.point.sizes),
+        "declared": Model(case.hypothesis, declared, nothing, null.point.local),
+        "before": _model(null),
     }
     found = accepted(stages)
     if found:
-        models["after"] = Model(last.hypothesis, last.point.shared, last.point.sizes)
+        models["after"] = _model(last)
         first = stages[0]
         others = [c for c in first.candidates if c not in first.tied]
         if others:
-            runner = others[0].found
-            models["control"] = Model(runner.hypothesis, runner.point.shared, runner.point.sizes)
-    fitted = {name: _all(case.fitted, m, null) for name, m in models.items()}
-    held = {name: _all(case.held, m, None) for name, m in models.items()} if case.held else {}
+            models["control"] = _model(others[0].found)
+    fitted = {name: _all(case.fitted, m, fitted=True) for name, m in models.items()}
+    held = {name: _all(case.held, m, fitted=False) for name, m in models.items()} if case.held else {}
     return Outcome(models, fitted, held)
 
 
-def _all(problem: Problem, model: Model, start: Fit | None) -> list[Assessment]:
+def _model(found: Fit) -> Model:
+    point = found.point
+    return Model(found.hypothesis, point.shared, point.sizes, point.local)
+
+
+def _all(problem: Problem, model: Model, fitted: bool) -> list[Assessment]:
     def one(index: object) -> Assessment:
         i = int(index)  # type: ignore[call-overload]
-        own = start.point.local[i] if start is not None else None
+        own = model.local[i] if fitted else None
         return assess(problem, i, model.hypothesis, model.shared, model.sizes, own)
 
     return problem.each(one, range(len(problem.records)))
@@ -141,7 +146,11 @@ def _effect(stages: Sequence[Stage], number: int) -> dict[str, Any]:
     at = sum(len(e.parameters) for e in final.hypothesis.effects[:number])
     span = slice(at, at + len(effect.parameters))
     block = final.covariance[S:, S:][span, span]
-    rest = [c for c in stage.candidates if c is not best and c.score.effect.name != effect.name]
+    rest = [
+        c
+        for c in stage.candidates
+        if c is not best and c.score.effect.name != effect.name and c.gain <= best.gain
+    ]
     separation = math.sqrt(max(0.0, best.gain - rest[0].gain)) if rest else math.sqrt(max(0.0, best.gain))
     row = {
         "name": effect.name,

@@ -12,12 +12,12 @@ from scipy.linalg import solve_continuous_lyapunov
 from airtruth.trace.fit import NO_WHITENER, Fit, Hypothesis, Point, Problem, parts, reduced, tangent
 from airtruth.trace.kernel import CORE, linear
 from airtruth.trace.lower import Lowered, lower
-from airtruth.trace.model import LOCAL_STEP, S, local_prior, respond, shared_prior, start
+from airtruth.trace.model import LOCAL_STEP, L, S, local_prior, respond, shared_prior, start
 from airtruth.trace.records import Record
 
 Array = NDArray[np.float64]
 
-_ROUNDS: Final = 6
+_ROUNDS: Final = 10
 _MOTION: Final = (0, 1, 4, 5, 6, 7, 8)
 """Own parameters that a free run leaves free: initial alpha and q, biases, trim coefficients."""
 
@@ -51,22 +51,22 @@ def assess(problem: Problem, index: int, hypothesis: Hypothesis, shared: Array, 
     one = Problem((record,), settings)
     middle, precision = local_prior(record, settings)
     k = len(sizes)
-    best = np.inf
-    kept = own
-    damping = 1e-6
-    for _ in range(_ROUNDS if local is None else 3):
+    best, kept, damping = np.inf, own, 1e-6
+    step = np.zeros(L)
+    for _ in range(_ROUNDS):
         found = tangent(one, 0, hypothesis, Point(shared, own[None, :], sizes), local_only=True)
-        if found is None:
-            own = 0.5 * (own + kept)
+        cost = np.inf
+        if found is not None:
+            cost, gradient, information = parts(found, NO_WHITENER, levels=True)
+            off = own - middle
+            cost += 0.5 * float(off @ precision @ off)
+        if found is None or not cost < best:
+            step = 0.25 * step
+            own = kept + step
             continue
-        cost, gradient, information = parts(found, NO_WHITENER, levels=True)
-        off = own - middle
-        posterior = cost + 0.5 * float(off @ precision @ off)
-        if posterior < best:
-            kept, better = own, best - posterior
-            best = posterior
-            if better < 0.01:
-                break
+        better, best, kept = best - cost, cost, own
+        if better < 0.01:
+            break
         h = information[S + k :, S + k :] + precision
         g = gradient[S + k :] + precision @ off
         step = -np.linalg.solve(h + damping * np.diag(np.diag(h)), g)
@@ -145,7 +145,7 @@ def floor(record: Record, problem: Problem, low: Lowered, shared: Array, local: 
     x[0] = float(s.y[:, 0].mean()) - plant.alpha_shift_rad
     linear(
         x, float(s.elevator_rad.mean()), v, 0.5 * density * v * v, float(s.theta_rad.mean()) - plant.alpha_shift_rad, motion, np.zeros(3),
-        vector, np.concatenate([low.declared, [plant.thrust_n], plant.constant]), shared[:6], plant.alpha_rad, plant.elevator_rad,
+        vector, np.concatenate([low.declared, [plant.thrust_n], plant.constant * (1.0 + shared[10])]), shared[:6], plant.alpha_rad, plant.elevator_rad,
         plant.qhat, plant.values, low.aero_index, low.aero_value, low.state_index, low.state_value, low.arms,
         low.scales, a, c,
     )  # fmt: skip

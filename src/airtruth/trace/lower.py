@@ -49,7 +49,6 @@ class Lowered:
     arms: Array
     input_scale: dict[str, float]
     input_bias: dict[str, float]
-    input_delay: dict[str, float]
 
 
 def lower(change: Change) -> Lowered:
@@ -86,7 +85,6 @@ def lower(change: Change) -> Lowered:
     sensors = {kind: np.zeros(3) for kind in ("bias", "lag", "delay", "arm")} | {"scale": np.ones(3)}
     scale: dict[str, float] = {}
     bias: dict[str, float] = {}
-    delay: dict[str, float] = {}
     for sensor in change.sensors:
         if sensor.channel in CHANNELS:
             at = CHANNELS.index(sensor.channel)
@@ -98,11 +96,9 @@ def lower(change: Change) -> Lowered:
             scale[sensor.channel] = scale.get(sensor.channel, 1.0) * sensor.value
         elif sensor.kind == "bias":
             bias[sensor.channel] = bias.get(sensor.channel, 0.0) + sensor.value
-        elif sensor.kind in ("delay", "lag"):
-            delay[sensor.channel] = delay.get(sensor.channel, 0.0) + sensor.value
         else:
             raise ConfigurationError(
-                f"effect on {sensor.channel}: {sensor.kind!r}; {choices(sensor.kind, ('bias', 'scale', 'delay'))}"
+                f"effect on {sensor.channel}: {sensor.kind!r}; {choices(sensor.kind, ('bias', 'scale'))}"
             )
     return Lowered(
         surface=change.surface,
@@ -118,7 +114,6 @@ def lower(change: Change) -> Lowered:
         arms=sensors["arm"],
         input_scale=scale,
         input_bias=bias,
-        input_delay=delay,
     )
 
 

@@ -18,14 +18,14 @@ from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
-SHARED: Final = ("CLalpha", "CLq", "CLde", "Cmalpha", "Cmq", "Cmde", "log_noise_alpha", "log_noise_q", "log_noise_az", "rotary")
+SHARED: Final = ("CLalpha", "CLq", "CLde", "Cmalpha", "Cmq", "Cmde", "log_noise_alpha", "log_noise_q", "log_noise_az", "rotary", "thrust")
 """Parameters that all records share: increments of the derivatives [-], logarithms of noise over declared, share of the
-rotary gust (1: all of the specification's; counted from 1/2)."""
+rotary gust (1: all of the specification's; counted from 1/2), relative change of the engines' thrust."""
 LOCAL: Final = ("alpha0", "q0", "w1", "w2", "bias_alpha", "bias_q", "bias_az", "CL0", "Cm0", "log_sigma_w")
 """Parameters of one record: initial state, sensors' biases, trim coefficients, logarithm of the gust [m/s]."""
 _ROTARY_STD: Final = 0.5
 S, L = len(SHARED), len(LOCAL)
-SHARED_STEP: Final = np.array([1e-3, 1e-1, 1e-3, 1e-4, 1e-2, 1e-4, 1e-4, 1e-4, 1e-4, 1e-3])
+SHARED_STEP: Final = np.array([1e-3, 1e-1, 1e-3, 1e-4, 1e-2, 1e-4, 1e-4, 1e-4, 1e-4, 1e-3, 1e-3])
 LOCAL_STEP: Final = np.array([1e-5, 1e-4, 1e-3, 1e-3, 1e-5, 1e-4, 1e-3, 1e-5, 1e-6, 1e-4])
 
 
@@ -41,6 +41,7 @@ class Settings:
     sigma_w_m_s, sigma_w_prior : middle of the prior of a record's gust level, and standard deviation of its
         logarithm.
     length_w_m : scale length of the vertical gust [m].
+    thrust_std : relative standard deviation of the engines' thrust.
     offset_std : (2,) of CL and Cm at trim, about those of the declared aircraft.
     """
 
@@ -50,6 +51,7 @@ class Settings:
     sigma_w_m_s: float
     sigma_w_prior: float
     length_w_m: float
+    thrust_std: float
     offset_std: Array
 
 
@@ -103,7 +105,7 @@ def respond(
 
     Parameters
     ----------
-    shared : (10,) see `SHARED`; local : (10,) see `LOCAL`.
+    shared : (11,) see `SHARED`; local : (10,) see `LOCAL`.
     """
     low = change if isinstance(change, Lowered) else lower(change)
     s, plant = record.signals, record.plant
@@ -111,7 +113,7 @@ def respond(
     if plant.alpha_shift_rad != 0.0:
         y = y - np.array([plant.alpha_shift_rad, 0.0, 0.0])
         theta = theta - plant.alpha_shift_rad
-    de, v = _input(low, "elevator_rad", s.elevator_rad, s), _input(low, "airspeed_m_s", s.airspeed_m_s, s)
+    de, v = _input(low, "elevator_rad", s.elevator_rad), _input(low, "airspeed_m_s", s.airspeed_m_s)
     if low.surface:
         de = through(low.surface, de, s.dt_s / (s.sub * FINE))
     de = nodes(de)
@@ -131,7 +133,7 @@ def respond(
             4.0 * constants.span_m / (np.pi * float(s.airspeed_m_s.mean())),
         ]
     )
-    declared = np.concatenate([low.declared, [plant.thrust_n], plant.constant])
+    declared = np.concatenate([low.declared, [plant.thrust_n], plant.constant * (1.0 + shared[10])])
     e = np.empty_like(y)
     white, covariance = np.eye(3), np.eye(3)
     points = de.size
@@ -183,7 +185,7 @@ def respond(
     return Response(e, white, covariance, logdet)
 
 
-def _input(low: Lowered, channel: str, x: Array, s: object) -> Array:
+def _input(low: Lowered, channel: str, x: Array) -> Array:
     """An input as it was before its sensor's undeclared scale and bias."""
     scale, bias = low.input_scale.get(channel, 1.0), low.input_bias.get(channel, 0.0)
     return x if scale == 1.0 and bias == 0.0 else (x - bias) / scale
@@ -226,15 +228,16 @@ def local_prior(record: Record, settings: Settings) -> tuple[Array, Array]:
 
 
 def shared_prior(record: Record, settings: Settings) -> Array:
-    """(10, 10) precision of the shared parameters about zero."""
+    """(11, 11) precision of the shared parameters about zero."""
     precision = np.zeros((S, S))
     precision[:6, :6] = np.linalg.inv(record.plant.derivative_cov)
     precision[6:9, 6:9] = np.eye(3) * settings.noise_prior**-2
     precision[9, 9] = _ROTARY_STD**-2
+    precision[10, 10] = settings.thrust_std**-2
     return precision
 
 
-def settings_of(aircraft: Aircraft, length_w_m: float) -> Settings:
+def settings_of(aircraft: Aircraft, length_w_m: float, thrust_std: float) -> Settings:
     """What aircraft.toml declares of the sensors, and where it is silent a judgement with a wide prior."""
     noise = np.array([0.1 * np.pi / 180.0, 0.3 * np.pi / 180.0, 0.1])
     bias = np.array([0.5 * np.pi / 180.0, 0.5 * np.pi / 180.0, 0.3])
@@ -254,6 +257,7 @@ def settings_of(aircraft: Aircraft, length_w_m: float) -> Settings:
         sigma_w_m_s=0.2,
         sigma_w_prior=1.5,
         length_w_m=length_w_m,
+        thrust_std=thrust_std,
         offset_std=np.array([0.1, 0.03]),
     )
 

@@ -29,6 +29,8 @@ _SAME_SPEED: Final = 0.03
 _SAME_ALTITUDE_M: Final = 200.0
 _LEAST_SAMPLES: Final = 40
 _LEAST_ELEVATOR_RAD: Final = 0.1 * DEG
+_THRUST_STD: Final = 0.05
+_THRUST_UNKNOWN_STD: Final = 0.25
 _AIR: Final = "the level of the gusts is each record's own, and the measured airspeed carries the horizontal ones"
 
 
@@ -186,7 +188,11 @@ def _trim(aircraft: Aircraft, members: Sequence[Signals], speed: float, density:
     gamma = climb if abs(climb) > 1.0 * DEG else 0.0
     for tried in (gamma, 0.0):
         try:
-            return trim_of(aircraft, speed, density, s.altitude_m, tried)
+            at = trim_of(aircraft, speed, density, s.altitude_m, tried)
+            levers = [m.throttle for m in members if m.throttle is not None]
+            if levers:  # as it was set, not as the declared aircraft would need it
+                at = replace(at, controls=replace(at.controls, throttle=float(np.mean(levers))))
+            return at
         except TrimError as error:
             problem = error
     raise LogError(
@@ -198,7 +204,8 @@ def _trim(aircraft: Aircraft, members: Sequence[Signals], speed: float, density:
 def _settings(aircraft: Aircraft, signals: Sequence[Signals]) -> Settings:
     altitude = float(np.mean([s.altitude_m for s in signals]))
     scales = gust_scales("mil-f-8785c", "light", min(max(altitude, 30.0), 20000.0))
-    return settings_of(aircraft, scales.length_w_m)
+    known = all(s.throttle is not None for s in signals)
+    return settings_of(aircraft, scales.length_w_m, _THRUST_STD if known else _THRUST_UNKNOWN_STD)
 
 
 def _halves(record: Record) -> tuple[Record, Record]:

@@ -20,6 +20,7 @@ from airtruth.logs.validate import validate
 from airtruth.trace.answer import Outcome, answer, assessed
 from airtruth.trace.options import TraceOptions
 from airtruth.trace.prepare import Case, prepare
+from airtruth.trace.replay import flown_again
 from airtruth.trace.search import Stage, search
 from airtruth.trace.update import write_update
 
@@ -107,6 +108,7 @@ def run(
     if out is not None:
         advance("write the updated aircraft")
         found.answer["updated_aircraft"] = write_update(found.case, found.stages, plane, out, options.refitted)
+        found.answer["replay"] = flown_again(found.case, found.outcome, plane, found.answer["updated_aircraft"])
         atomic.make_folder(out)
         atomic.write_text(out / ANSWER, json.dumps(found.answer, indent=1, allow_nan=False) + "\n")
     return found
