@@ -99,6 +99,7 @@ def close(
     found = run(leading(paths, count), GTM, TraceOptions(model="linear", threads=jobs), out / "trace")
     traced = [r.signals.run_id for r in found.case.fitted.records]
     traced += [r.signals.run_id for r in found.case.held.records] if found.case.held else []
+    traced.sort()
     notes = [f"Effects traced in {traced[0]} to {traced[-1]}, which are not judged. {verdict(found.answer)}"]
     notes += [effect_line(e) for e in found.answer["effects"]]
     try:

@@ -175,8 +175,13 @@ def identify(
     if out is None and len(logs) == 1 and (logs[0] / "logs").is_dir():
         out = logs[0] / "estimates.parquet"
     plane = planes.load(aircraft)
+    notes: list[str] = []
     with _progress("identify", "files", quiet) as advance:
-        estimates = identify_files(logs, plane, method or ["iv-f1"], options, joint, advance)
+        estimates = identify_files(
+            logs, plane, method or ["iv-f1"], options, joint, advance, notes.append
+        )
+    for sentence in [] if quiet else notes:
+        print(f"airtruth: {sentence}", file=sys.stderr)
     if out is not None:
         write_table(out, estimates)
     print(estimates.to_json(orient="records", indent=1) if json_ else as_text(overview(estimates)))

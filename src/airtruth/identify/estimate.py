@@ -10,10 +10,11 @@ import pandas as pd
 from airtruth.identify.checks import check_batch, check_log
 from airtruth.identify.condition import AircraftConstants
 from airtruth.identify.methods import method, regression
+from airtruth.identify.of_record import common, with_constants
 from airtruth.identify.options import Options
 from airtruth.identify.regression import regress_batch, regress_joint
 from airtruth.identify.results import Estimates, estimates_table
-from airtruth.logs.flight_log import Batch, FlightLog, batches
+from airtruth.logs.flight_log import Batch, FlightLog
 
 
 def identify_batch(
@@ -76,7 +77,8 @@ def identify_log(
 ) -> pd.DataFrame:
     """Check a log, then estimate: one row per run and method, or per method if joint.
 
-    Rows keep the order of the log's runs, and for each the order of the methods.
+    Rows keep the order of the log's runs, and for each the order of the methods. Mass, inertia and reference
+    lengths that the log states for a run (``record_constants``) count in place of those of ``constants``.
 
     Parameters
     ----------
@@ -88,21 +90,23 @@ def identify_log(
     Raises
     ------
     ConfigurationError
-        If a method does not exist or an option does not fit the log.
+        If a method does not exist or an option does not fit the log, or runs of a joint estimate state
+        different constants.
     LogError
         Listing what is wrong with the log.
     """
     options = options or Options()
     chosen = [method(name) for name in methods]
     check_log(log, chosen, options)
-    parts = list(batches(log))
-    for batch in parts:
+    parts = list(with_constants(log, constants))
+    for batch, _ in parts:
         check_batch(batch, options)
     if joint:
-        tables = [estimates_table(identify_joint(parts, constants, m.name, options)) for m in chosen]
+        one, together = common(parts), [batch for batch, _ in parts]
+        tables = [estimates_table(identify_joint(together, one, m.name, options)) for m in chosen]
         return pd.concat(tables, ignore_index=True)
     tables = [
-        estimates_table(identify_batch(batch, constants, m.name, options)) for batch in parts for m in chosen
+        estimates_table(identify_batch(batch, own, m.name, options)) for batch, own in parts for m in chosen
     ]
     table = pd.concat(tables, ignore_index=True)
     order = {run_id: i for i, run_id in enumerate(log.run_ids)}

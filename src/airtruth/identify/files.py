@@ -12,15 +12,17 @@ from airtruth.identify.checks import check_batch, check_log
 from airtruth.identify.condition import AircraftConstants
 from airtruth.identify.estimate import identify_joint, identify_log
 from airtruth.identify.methods import method
+from airtruth.identify.of_record import common, note, with_constants
 from airtruth.identify.options import Options
 from airtruth.identify.results import estimates_table
 from airtruth.identify.summary import Cell, Table
-from airtruth.logs.flight_log import batches
 from airtruth.logs.store import log_paths, read_log
 from airtruth.physics.short_period import MODAL, PARAMETERS
 
 Progress = Callable[[int, int, int], None]
 """Called with files done, files in all, runs not converged."""
+Say = Callable[[str], None]
+"""Called with a sentence that a reader of the estimates should know."""
 
 
 def identify_files(
@@ -30,6 +32,7 @@ def identify_files(
     options: Options | None = None,
     joint: bool = False,
     progress: Progress = lambda done, total, failed: None,
+    say: Say = lambda sentence: None,
 ) -> pd.DataFrame:
     """Check and identify every run of several logs or campaign folders.
 
@@ -39,6 +42,7 @@ def identify_files(
     constants, methods, options, joint : as in `airtruth.identify.identify_log`; a joint estimate holds
         all runs in memory.
     progress : called after each file.
+    say : told, once for each constant, where records state another value than the aircraft.
 
     Returns
     -------
@@ -53,6 +57,7 @@ def identify_files(
     options = options or Options()
     paths = [path for place in places for path in log_paths(place)]
     tables, parts, owner, failed = [], [], dict[str, Path](), 0
+    other: dict[str, list[tuple[str, float, float]]] = {}
     for number, path in enumerate(paths, start=1):
         log = read_log(path)
         for run_id in log.run_ids:
@@ -62,11 +67,14 @@ def identify_files(
                 )
             owner[run_id] = path
         try:
+            for run_id, name, own, declared in note(log.metadata, log.run_ids, constants):
+                other.setdefault(name, []).append((run_id, own, declared))
             if joint:
                 check_log(log, [method(name) for name in methods], options)
-                parts += list(batches(log))
-                for batch in parts:
+                added = list(with_constants(log, constants))
+                for batch, _ in added:
                     check_batch(batch, options)
+                parts += added
             else:
                 tables.append(identify_log(log, constants, methods, options))
                 failed += int((~tables[-1]["converged"]).sum())
@@ -74,7 +82,14 @@ def identify_files(
             raise LogError(f"{path}: {error}") from None
         progress(number, len(paths), failed)
     if joint:
-        tables = [estimates_table(identify_joint(parts, constants, name, options)) for name in methods]
+        one, together = common(parts), [batch for batch, _ in parts]
+        tables = [estimates_table(identify_joint(together, one, name, options)) for name in methods]
+    for name, found in other.items():
+        run_id, own, declared = found[0]
+        more = f" and {len(found) - 1} more" if len(found) > 1 else ""
+        say(
+            f"{name} of run {run_id!r}{more} as the log states it: {own:.6g}, not the aircraft's {declared:.6g}"
+        )
     return pd.concat(tables, ignore_index=True)
 
 

@@ -14,7 +14,6 @@ from airtruth.physics.short_period import PARAMETERS
 from airtruth.report import style
 from airtruth.report.loop import BARS, LoopTable, bias_pct
 from airtruth.report.published import SYMBOLS
-from airtruth.report.trace_effect import contribution
 from airtruth.report.trace_figures import Sight, sight
 from airtruth.report.trace_table import shown
 from airtruth.report.trace_text import key
@@ -74,46 +73,56 @@ def _bias_panel(ax: Axes, table: LoopTable, methods: list[str], name: str) -> No
 
 
 def traces_page(found: Mapping[str, Trace]) -> Figure:
-    """One page over several traces: residual before, the effect, residual after, of one record and channel each.
+    """One page over several traces: innovations before, what the effects take out of them, innovations after.
 
-    The channel is that in which the effect shows most; all in standard deviations of what gusts and sensors explain.
+    Of one record each, and the channel from which most is taken; whitened, so that gusts do not hide an effect.
+    Where no effect was accepted, before and after are the aircraft as declared and refitted.
 
     Parameters
     ----------
     found : name of the log -> its trace.
     """
     with style.applied():
-        figure = style.new_figure(10.0, 0.8 + 1.15 * len(found))
-        axes = figure.subplots(len(found), 3, squeeze=False, sharex="row", sharey="row")
+        figure = style.new_figure(10.0, 0.9 + 1.15 * len(found))
+        axes = figure.subplots(len(found), 3, squeeze=False, sharex="row")
         for row, (name, trace) in zip(axes, found.items(), strict=True):
             _trace_row(row, name, trace, sight(trace))
         for ax, title in zip(
-            axes[0], ("residual before", "the effect on the output", "residual after"), strict=True
+            axes[0], ("innovations before", "taken out of them", "innovations after"), strict=True
         ):
             ax.set_title(title)
         for ax in axes[-1]:
             ax.set_xlabel("time [s]")
         figure.suptitle(
-            "Free runs, in standard deviations of what gusts and sensors explain (shaded: two)", fontsize=10.0
+            "Whitened innovations of one held-out record each (shaded: two standard deviations)",
+            fontsize=10.0,
         )
     return figure
 
 
 def _trace_row(row: NDArray[np.object_], name: str, trace: Trace, seen: Sight) -> None:
-    moved = contribution(trace, seen.record, seen.after)
-    strength = np.zeros(3) if moved is None else (moved**2).mean(axis=0) / seen.floor**2
-    i = int(np.argmax(strength))
-    before, after = (own.residual[:, i] / seen.floor[i] for own in (seen.before, seen.after))
-    middle = None if moved is None else moved[:, i] / seen.floor[i]
+    before, after = seen.before.whitened, seen.after.whitened
+    i = int(np.argmax(((before - after) ** 2).mean(axis=0)))
     for ax, values, colour in zip(
-        row, (before, middle, after), (style.VERMILLION, style.GREEN, style.BLUE), strict=True
+        row,
+        (before[:, i], before[:, i] - after[:, i], after[:, i]),
+        (style.VERMILLION, style.GREEN, style.BLUE),
+        strict=True,
     ):
-        ax.axhspan(-2.0, 2.0, color=style.SKY, alpha=0.25, lw=0.0, zorder=0)
-        if values is not None:
-            ax.plot(seen.time_s, values, color=colour, lw=0.9)
+        ax.plot(seen.time_s, values, color=colour, lw=0.8)
         ax.margins(x=0.01)
-    names = ", ".join(key(e) for e in trace.answer["effects"]) or "no effect"
-    told = f"{trace.answer['verdict']}: {names}" if trace.answer["effects"] else trace.answer["verdict"]
+    low, high = zip(*(ax.get_ylim() for ax in (row[0], row[2])), strict=True)
+    for ax in (row[0], row[2]):
+        ax.axhspan(-2.0, 2.0, color=style.SKY, alpha=0.25, lw=0.0, zorder=0)
+        ax.set_ylim(min(low), max(high))
+    bottom, top = row[1].get_ylim()
+    row[1].set_ylim(bottom, top + 0.35 * (top - bottom))
+    effects = ", ".join(key(e) for e in trace.answer["effects"])
+    told = (
+        f"{trace.answer['verdict']}: {effects}"
+        if effects
+        else f"{trace.answer['verdict']} (as declared, refitted)"
+    )
     row[1].text(0.02, 0.96, told, transform=row[1].transAxes, fontsize=7.5, va="top")
     row[0].set_ylabel(f"{name}: {shown(CHANNELS[i])[0].split(' ')[0]} [σ]")
 

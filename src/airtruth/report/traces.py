@@ -22,12 +22,15 @@ Answer = Mapping[str, Any]
 
 
 def over_floor(answer: Answer, stage: str) -> float | None:
-    """Root mean square of a stage's free run over the floor, mean of the channels; held-out records if there are any."""
+    """Innovations of a stage over what gusts and sensors explain, largest of the channels; None without the stage.
+
+    Of held-out records if there are any.
+    """
     which = "held_out" if answer["records"]["held_out"] else "fit"
     if stage not in answer["error"]:
         return None
-    own, floor = (answer["error"][name][which]["free_run"] for name in (stage, "floor"))
-    return float(sum(own[c] / floor[c] for c in own) / len(own))
+    own, floor = (answer["error"][name][which]["innovation"] for name in (stage, "floor"))
+    return max(float(own[c] / floor[c]) for c in own)
 
 
 def lay_out(answers: Mapping[str, Answer]) -> Grid:
@@ -39,17 +42,17 @@ def lay_out(answers: Mapping[str, Answer]) -> Grid:
     """
     return Grid(
         title="Traces",
-        header=("log", "verdict", "effect", "value (95 % interval)", *STAGES, "p remaining"),
+        header=("log", "verdict", "effect", "value (95 %)", *STAGES, "p left"),
         groups=(
             Group(
-                "Effects, and the free run's error over the floor",
+                "Effects, and the errors over the floor",
                 tuple(r for name, a in answers.items() for r in _rows(name, a)),
             ),
         ),
         notes=(
-            "declared, before, after: root mean square of the free run's error over what gusts and sensors explain, mean "
-            "of the channels, held-out records; before has derivatives and biases refitted, after the effects as well. "
-            "p remaining: of the anomaly that is left.",
+            "declared, before, after: root mean square of the innovations in held-out records over what gusts and "
+            "sensors explain, largest of the channels; before has derivatives and biases refitted, after the effects too. "
+            "p left: of the anomaly that remains.",
         ),
     )
 

@@ -134,7 +134,11 @@ def parameters(effect: Effect, sizes: Array, covariance: Array) -> dict[str, dic
         value = p.value(size)
         ends = sorted((p.value(size - _Z95 * std), p.value(size + _Z95 * std)))
         slope = abs(p.value(size + 0.01 * std) - value) / 0.01 if math.isfinite(value) else math.inf
-        result[p.name] = {"value": value, "std": slope, "ci95": [max(e, -1e300) if math.isfinite(e) else None for e in ends]}
+        result[p.name] = {
+            "value": value,
+            "std": slope,
+            "ci95": [max(e, -1e300) if math.isfinite(e) else None for e in ends],
+        }
     return result
 
 
@@ -195,7 +199,11 @@ def _candidates(case: Case, stages: Sequence[Stage]) -> list[dict[str, Any]]:
             }
         )
     seen = {s.effect.key for s in first.table.scores}
-    silent = [(e, "these records do not excite it, or refitting the rest absorbs it") for e in case.effects if e.key not in seen]
+    silent = [
+        (e, "these records do not excite it, or refitting the rest absorbs it")
+        for e in case.effects
+        if e.key not in seen
+    ]
     for effect, why in (*case.untestable, *silent):
         rows.append(
             {
@@ -239,7 +247,11 @@ def _signals(case: Case) -> dict[str, float]:
 def _pooled(found: Sequence[Assessment]) -> dict[str, dict[str, float]]:
     return {
         kind: dict(
-            zip(CHANNELS, np.sqrt(np.mean([getattr(a, kind) ** 2 for a in found], axis=0)).tolist(), strict=True)
+            zip(
+                CHANNELS,
+                np.sqrt(np.mean([getattr(a, kind) ** 2 for a in found], axis=0)).tolist(),
+                strict=True,
+            )
         )
         for kind in ("free_run", "innovation")
     }
@@ -302,4 +314,6 @@ def _next_flight(found: Sequence[tuple[Candidate, tuple[Candidate, ...]]], verdi
         if len({e.name for e in names.values()}) > 1:
             advice = " ".join(dict.fromkeys(e.splits for e in names.values() if e.splits))
             lines.append(f"To split {', '.join(names)}: {advice}")
-    return " ".join(lines) or "Fly the updated aircraft's largest remaining residual again, in the other sign."
+    return (
+        " ".join(lines) or "Fly the updated aircraft's largest remaining residual again, in the other sign."
+    )

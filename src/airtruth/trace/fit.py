@@ -332,7 +332,11 @@ def autoregression(tangents: Sequence[Tangent]) -> Whitener:
         for t in tangents:
             n = t.r.shape[0]
             right.append(t.r[_ORDERS:])
-            left.append(np.concatenate([t.r[_ORDERS - j : n - j] for j in range(1, order + 1)], axis=1) if order else np.zeros((n - _ORDERS, 0)))
+            left.append(
+                np.concatenate([t.r[_ORDERS - j : n - j] for j in range(1, order + 1)], axis=1)
+                if order
+                else np.zeros((n - _ORDERS, 0))
+            )
         x, y = np.concatenate(left), np.concatenate(right)
         b = np.linalg.solve(x.T @ x, x.T @ y) if order else np.zeros((0, 3))
         residual = y - x @ b
@@ -420,9 +424,7 @@ def _step(problem: Problem, hypothesis: Hypothesis, point: Point, pieces, dampin
     shared = -np.linalg.solve(normal, gradient / scale) / scale
     local = np.stack([-(solved[:, 0] + solved[:, 1:] @ shared) for _, solved in back])
     local[:, _SIGMA] = np.clip(local[:, _SIGMA], -1.0, 1.0)
-    gain = float(-gradient @ shared) + sum(
-        float(solved[:, 0] @ h_ll @ solved[:, 0]) for h_ll, solved in back
-    )
+    gain = float(-gradient @ shared) + sum(float(solved[:, 0] @ h_ll @ solved[:, 0]) for h_ll, solved in back)
     return Point(shared[:S], local, shared[S:]), 0.5 * gain
 
 
@@ -435,18 +437,37 @@ def _moved(hypothesis: Hypothesis, point: Point, step: Point) -> Point:
         if p.one_sided:
             ends[0] = max(ends[0], 0.0) if p.reciprocal else max(ends[0], p.size(p.low))
         room = 0.25 * (ends[1] - ends[0])
-        sizes[i] = min(max(sizes[i], max(ends[0], point.sizes[i] - room)), min(ends[1], point.sizes[i] + room))
+        sizes[i] = min(
+            max(sizes[i], max(ends[0], point.sizes[i] - room)), min(ends[1], point.sizes[i] + room)
+        )
     shared = point.shared + np.concatenate([step.shared[:6], np.clip(step.shared[6:], -1.0, 1.0)])
     return Point(shared, point.local + step.local, sizes)
 
 
 def _covariance(problem: Problem, hypothesis: Hypothesis, pieces, levels: bool) -> Array:  # type: ignore[no-untyped-def]
     k = len(hypothesis.parameters)
-    empty = Point(np.zeros(S), np.stack([local_prior(r, problem.settings)[0] for r in problem.records]), np.zeros(k))
+    empty = Point(
+        np.zeros(S), np.stack([local_prior(r, problem.settings)[0] for r in problem.records]), np.zeros(k)
+    )
     _, information, _ = reduced(problem, empty, k, pieces, levels)
     scale = np.sqrt(np.maximum(np.diag(information), 1e-30))
     normal = information / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
     return np.asarray(np.linalg.inv(normal) / np.outer(scale, scale))
 
 
-__all__ = ["External", "Fit", "Hypothesis", "NO_WHITENER", "Point", "Problem", "Tangent", "Whitener", "autoregression", "begin", "fit", "parts", "reduced", "tangent"]
+__all__ = [
+    "NO_WHITENER",
+    "External",
+    "Fit",
+    "Hypothesis",
+    "Point",
+    "Problem",
+    "Tangent",
+    "Whitener",
+    "autoregression",
+    "begin",
+    "fit",
+    "parts",
+    "reduced",
+    "tangent",
+]

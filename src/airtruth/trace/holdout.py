@@ -12,7 +12,7 @@ from scipy.linalg import solve_continuous_lyapunov
 from airtruth.trace.fit import NO_WHITENER, Fit, Hypothesis, Point, Problem, parts, reduced, tangent
 from airtruth.trace.kernel import CORE, linear
 from airtruth.trace.lower import Lowered, lower
-from airtruth.trace.model import LOCAL_STEP, L, S, local_prior, respond, shared_prior, start
+from airtruth.trace.model import LOCAL_STEP, L, S, local_prior, plane_of, respond, shared_prior, start
 from airtruth.trace.records import Record
 
 Array = NDArray[np.float64]
@@ -44,15 +44,23 @@ class Assessment:
     local: Array
 
 
-def assess(problem: Problem, index: int, hypothesis: Hypothesis, shared: Array, sizes: Array, local: Array | None = None) -> Assessment:
+def assess(
+    problem: Problem,
+    index: int,
+    hypothesis: Hypothesis,
+    shared: Array,
+    sizes: Array,
+    local: Array | None = None,
+) -> Assessment:
     """Innovations and free run of one record for shared parameters and sizes that are given."""
     record, settings = problem.records[index], problem.settings
-    own = start(record, settings) if local is None else local.copy()
+    own: Array = start(record, settings) if local is None else local.copy()
     one = Problem((record,), settings)
     middle, precision = local_prior(record, settings)
     k = len(sizes)
-    best, kept, damping = np.inf, own, 1e-6
-    step = np.zeros(L)
+    best, damping = np.inf, 1e-6
+    kept: Array = own
+    step: Array = np.zeros(L)
     for _ in range(_ROUNDS):
         found = tangent(one, 0, hypothesis, Point(shared, own[None, :], sizes), local_only=True)
         cost = np.inf
@@ -69,7 +77,7 @@ def assess(problem: Problem, index: int, hypothesis: Hypothesis, shared: Array, 
             break
         h = information[S + k :, S + k :] + precision
         g = gradient[S + k :] + precision @ off
-        step = -np.linalg.solve(h + damping * np.diag(np.diag(h)), g)
+        step = np.asarray(-np.linalg.solve(h + damping * np.diag(np.diag(h)), g))
         step[9] = np.clip(step[9], -1.0, 1.0)
         own = own + step
     found = tangent(one, 0, hypothesis, Point(shared, kept[None, :], sizes), local_only=True)
@@ -133,22 +141,24 @@ def floor(record: Record, problem: Problem, low: Lowered, shared: Array, local: 
     states = sum(1 if kind == 0 else 2 for kind in low.state_index[:, 0])
     motion = CORE + states
     n = motion
-    c0 = plant.aircraft.constants
-    vector = np.array(
-        [c0.wing_area_m2, c0.chord_m, c0.mass_kg, c0.inertia_yy_kg_m2, 9.80665, plant.trim_alpha_rad,
-         plant.trim_elevator_rad, settings.length_w_m, float(np.exp(local[9])),
-         0.5 + shared[9], 4.0 * c0.span_m / (np.pi * float(s.airspeed_m_s.mean()))]
-    )  # fmt: skip
     a, c = np.empty((n, n)), np.empty((3, n))
     v, density = float(s.airspeed_m_s.mean()), float(s.density_kg_m3.mean())
     x = np.zeros(n)
     x[0] = float(s.y[:, 0].mean()) - plant.alpha_shift_rad
     linear(
-        x, float(s.elevator_rad.mean()), v, 0.5 * density * v * v, float(s.theta_rad.mean()) - plant.alpha_shift_rad, motion, np.zeros(3),
-        vector, np.concatenate([low.declared, [plant.thrust_n], plant.constant * (1.0 + shared[10])]), shared[:6], plant.alpha_rad, plant.elevator_rad,
-        plant.qhat, plant.values, low.aero_index, low.aero_value, low.state_index, low.state_value, low.arms,
-        low.scales, a, c,
-    )  # fmt: skip
+        x,
+        float(s.elevator_rad.mean()),
+        v,
+        0.5 * density * v * v,
+        float(s.theta_rad.mean()) - plant.alpha_shift_rad,
+        motion,
+        np.zeros(3),
+        plane_of(plant, settings, low, shared, local, v),
+        low.arms,
+        low.scales,
+        a,
+        c,
+    )
     process = np.zeros((n, n))
     process[2, 2] = 2.0 * v / settings.length_w_m
     noise = (settings.noise * np.exp(shared[6:9])) ** 2
@@ -186,9 +196,14 @@ def leave_one_out(problem: Problem, found: Fit) -> tuple[Array, list[Assessment]
         gradient, information = one_by_one[i]
         rest = total - information
         scale = np.sqrt(np.maximum(np.diag(rest), 1e-30))
-        step = np.linalg.solve(rest / np.outer(scale, scale) + 1e-9 * np.eye(len(scale)), gradient / scale) / scale
+        step = (
+            np.linalg.solve(rest / np.outer(scale, scale) + 1e-9 * np.eye(len(scale)), gradient / scale)
+            / scale
+        )
         sizes = found.point.sizes + _held(found.hypothesis, found.point.sizes, step[S:])
-        return assess(problem, i, found.hypothesis, found.point.shared + step[:S], sizes, found.point.local[i])
+        return assess(
+            problem, i, found.hypothesis, found.point.shared + step[:S], sizes, found.point.local[i]
+        )
 
     assessed = problem.each(one, range(len(problem.records)))
     return np.array([a.likelihood for a in assessed]), assessed

@@ -1,11 +1,13 @@
 """The declared aircraft in gusts as a filter: nonlinear in the motion, with the steady gain of its linearisation.
 
-State x: alpha over ground [rad], q [rad/s], two Dryden states of unit variance, the upward gust w as the tail
-meets it, states of effects, states of lagging sensors. Airspeed, density and pitch attitude are measured
-and enter as known series, and so does the speed over ground, which the gust along the path lacks. The
-air's alpha is theta - asin((V_ground sin(theta - alpha) - w)/V), its pitch rate q - (w - w_late)/(tau V), tau = 4 b/(pi V). Between samples the motion is integrated by the classical Runge-Kutta method, whose
-weights are Simpson's: the middle value of an input carries its area. Sensor lags are integrated exactly for
-a signal linear over half a step; a delayed output is the motion integrated back by the delay.
+State x: alpha over ground [rad], q [rad/s], two Dryden states of unit variance, the upward gust w as the
+tail meets it, states of effects, states of lagging sensors. Airspeed, density and pitch attitude are
+measured and enter as known series, and so does the speed over ground, which lacks the gust along the path.
+The air's alpha is theta - asin((V_ground sin(theta - alpha) - w)/V), its pitch rate
+q - (w - w_late)/(tau V), tau = 4 b/(pi V). Between samples the motion is integrated by the classical
+Runge-Kutta method, whose weights are Simpson's: the middle value of an input carries its area. Sensor lags
+are integrated exactly for a signal linear over half a step; a delayed output is the motion integrated back
+by the delay.
 
 Forces: tables of X, Z, M over alpha, elevator and q c/(2V) times q_bar, the engines' constants, increments of
 the derivatives, and the terms of `airtruth.effects.change`. Equations of motion: see
@@ -26,6 +28,10 @@ from airtruth.identify.kalman_step import riccati, step
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Plane = tuple[Array, Array, Array, Array, Array, Array, Array, Ints, Array, Ints, Array]
+"""The aircraft and its effects: constants, declared (see the places below), increments (6,) of CLalpha, CLq,
+CLde, Cmalpha, Cmq, Cmde about the trim [-]; axes of alpha, elevator, qhat, and the tables over them; then
+index and value of aero terms and of states (`airtruth.trace.lower`)."""
 
 OUTPUTS: Final = 3
 CORE: Final = 5
@@ -61,17 +67,7 @@ def rates(
     theta: float,
     lift_more: float,
     moment_more: float,
-    constants: Array,
-    declared: Array,
-    increments: Array,
-    alpha_axis: Array,
-    de_axis: Array,
-    q_axis: Array,
-    values: Array,
-    aero_index: Ints,
-    aero_value: Array,
-    state_index: Ints,
-    state_value: Array,
+    plane: Plane,
     out: Array,
 ) -> float:
     """x' of the motion, the gusts and the effects' states into ``out``; returns az at the CG [m/s2].
@@ -80,8 +76,10 @@ def rates(
     ----------
     v, ground : speed through the air and over ground [m/s].
     lift_more, moment_more : increments of CL and Cm [-].
-    increments : (6,) of CLalpha, CLq, CLde, Cmalpha, Cmq, Cmde about the trim [-].
+    plane : see `Plane`.
     """
+    constants, declared, increments, alpha_axis, de_axis, q_axis, values = plane[:7]
+    aero_index, aero_value, state_index, state_value = plane[7:]
     sigma, length = constants[SIGMA_W], constants[LENGTH_W]
     gust = _W1 * x[2] + _W2 * x[3]
     sine = (math.sin(theta - x[0]) * ground - sigma * gust) / v
@@ -117,9 +115,11 @@ def rates(
     mass = constants[MASS] * declared[F_MASS]
     inertia = constants[INERTIA] * declared[F_INERTIA]
     # alpha' before the terms that need it
-    first = q + (
-        (fz - force * lift) * math.cos(alpha) - fx * math.sin(alpha)
-    ) / (mass * ground) + constants[GRAVITY] * math.cos(theta - x[0]) / ground
+    first = (
+        q
+        + ((fz - force * lift) * math.cos(alpha) - fx * math.sin(alpha)) / (mass * ground)
+        + constants[GRAVITY] * math.cos(theta - x[0]) / ground
+    )
     for t in range(aero_index.shape[0]):
         signal = aero_index[t, 1]
         if signal == 0:
@@ -175,7 +175,7 @@ def rates(
             out[at] = x[at + 1]
             out[at + 1] = wn * wn * (s - x[at]) - 2.0 * state_value[k, 1] * wn * x[at + 1]
             at += 2
-    return az
+    return float(az)
 
 
 @njit(cache=True, nogil=True)
@@ -209,17 +209,7 @@ def linear(
     theta: float,
     motion: int,
     lags: Array,
-    constants: Array,
-    declared: Array,
-    increments: Array,
-    alpha_axis: Array,
-    de_axis: Array,
-    q_axis: Array,
-    values: Array,
-    aero_index: Ints,
-    aero_value: Array,
-    state_index: Ints,
-    state_value: Array,
+    plane: Plane,
     arms: Array,
     scales: Array,
     a: Array,
@@ -240,11 +230,11 @@ def linear(
         if j >= 2 and j < CORE:
             h = 0.1
         moved[j] = x[j] + h
-        az_up = rates(moved, de, v, v, qbar, theta, 0.0, 0.0, constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, up)  # fmt: skip
-        outputs(moved, up, az_up, v, v, theta, constants, arms, scales, y_up)
+        az_up = rates(moved, de, v, v, qbar, theta, 0.0, 0.0, plane, up)
+        outputs(moved, up, az_up, v, v, theta, plane[0], arms, scales, y_up)
         moved[j] = x[j] - h
-        az_down = rates(moved, de, v, v, qbar, theta, 0.0, 0.0, constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, down)  # fmt: skip
-        outputs(moved, down, az_down, v, v, theta, constants, arms, scales, y_down)
+        az_down = rates(moved, de, v, v, qbar, theta, 0.0, 0.0, plane, down)
+        outputs(moved, down, az_down, v, v, theta, plane[0], arms, scales, y_down)
         moved[j] = x[j]
         for i in range(motion):
             a[i, j] = (up[i] - down[i]) / (2.0 * h)
@@ -309,8 +299,8 @@ def gain(
                 logdet += math.log(total)
             else:
                 lower[i, j] = total / lower[j, j]
-    white = np.linalg.inv(lower)
-    k_gain = np.dot(pc, np.dot(np.ascontiguousarray(white.T), white))
+    white[:] = np.linalg.inv(lower)
+    k_gain[:] = np.dot(pc, np.dot(np.ascontiguousarray(white.T), white))
     return k_gain, white, s, logdet
 
 
@@ -334,17 +324,7 @@ def innovations(
     motion: int,
     lags: Array,
     delays: Array,
-    constants: Array,
-    declared: Array,
-    increments: Array,
-    alpha_axis: Array,
-    de_axis: Array,
-    q_axis: Array,
-    values: Array,
-    aero_index: Ints,
-    aero_value: Array,
-    state_index: Ints,
-    state_value: Array,
+    plane: Plane,
     arms: Array,
     scales: Array,
     e: Array,
@@ -361,6 +341,7 @@ def innovations(
     motion : states of motion, gusts and effects.
     lags, delays, arms, scales : (3,) of the sensors.
     """
+    constants, declared, state_index = plane[0], plane[1], plane[9]
     n = k_gain.shape[0]
     samples = y.shape[0]
     h = 2.0 * dt_s / sub
@@ -386,7 +367,18 @@ def innovations(
     for k in range(samples):
         f = k * sub
         qbar = 0.5 * density[f] * v[f] * v[f]
-        az = rates(x, de[f], v[f], ground[f], qbar, theta[f], offset[0] + lift_more[f], offset[1] + moment_more[f], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, rate[0])  # fmt: skip
+        az = rates(
+            x,
+            de[f],
+            v[f],
+            ground[f],
+            qbar,
+            theta[f],
+            offset[0] + lift_more[f],
+            offset[1] + moment_more[f],
+            plane,
+            rate[0],
+        )
         outputs(x, rate[0], az, v[f], ground[f], theta[f], constants, arms, scales, out)
         at = motion
         for i in range(OUTPUTS):
@@ -398,7 +390,7 @@ def innovations(
                 at += 1
             elif delays[i] != 0.0:
                 # integrate back by the delay: whole and part steps of the fine grid's pairs
-                steps = max(1, int(math.ceil(abs(delays[i]) / h - 1e-9)))
+                steps = max(1, math.ceil(abs(delays[i]) / h - 1e-9))
                 hb = -delays[i] / steps
                 back[:] = x
                 position = float(f)
@@ -417,9 +409,22 @@ def innovations(
                         th_b = theta[low] + part * (theta[low + 1] - theta[low])
                         for m in range(motion):
                             tried[m] = back[m] + (share * hb * back_rate[stage - 1, m] if stage > 0 else 0.0)
-                        rates(tried, de_b, v_b, g_b, 0.5 * rho_b * v_b * v_b, th_b, offset[0] + lift_more[low], offset[1] + moment_more[low], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, back_rate[stage])  # fmt: skip
+                        rates(
+                            tried,
+                            de_b,
+                            v_b,
+                            g_b,
+                            0.5 * rho_b * v_b * v_b,
+                            th_b,
+                            offset[0] + lift_more[low],
+                            offset[1] + moment_more[low],
+                            plane,
+                            back_rate[stage],
+                        )
                     for m in range(motion):
-                        slope = back_rate[0, m] + 2.0 * back_rate[1, m] + 2.0 * back_rate[2, m] + back_rate[3, m]
+                        slope = (
+                            back_rate[0, m] + 2.0 * back_rate[1, m] + 2.0 * back_rate[2, m] + back_rate[3, m]
+                        )
                         back[m] += hb / 6.0 * slope
                     position += hb / fine
                 where = min(max(position, 0.0), float(de.size - 1))
@@ -430,7 +435,18 @@ def innovations(
                 g_b = ground[low] + part * (ground[low + 1] - ground[low])
                 rho_b = density[low] + part * (density[low + 1] - density[low])
                 th_b = theta[low] + part * (theta[low + 1] - theta[low])
-                az_b = rates(back, de_b, v_b, g_b, 0.5 * rho_b * v_b * v_b, th_b, offset[0] + lift_more[low], offset[1] + moment_more[low], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, back_rate[0])  # fmt: skip
+                az_b = rates(
+                    back,
+                    de_b,
+                    v_b,
+                    g_b,
+                    0.5 * rho_b * v_b * v_b,
+                    th_b,
+                    offset[0] + lift_more[low],
+                    offset[1] + moment_more[low],
+                    plane,
+                    back_rate[0],
+                )
                 outputs(back, back_rate[0], az_b, v_b, g_b, th_b, constants, arms, scales, last)
                 value = last[i]
             e[k, i] = y[k, i] - value - bias[i] - output_more[k, i]
@@ -451,7 +467,18 @@ def innovations(
                 for m in range(motion):
                     tried[m] = x[m] + (share * h * rate[stage - 1, m] if stage > 0 else 0.0)
                 qbar = 0.5 * density[g] * v[g] * v[g]
-                az = rates(tried, de[g], v[g], ground[g], qbar, theta[g], offset[0] + lift_more[g], offset[1] + moment_more[g], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, rate[stage])  # fmt: skip
+                az = rates(
+                    tried,
+                    de[g],
+                    v[g],
+                    ground[g],
+                    qbar,
+                    theta[g],
+                    offset[0] + lift_more[g],
+                    offset[1] + moment_more[g],
+                    plane,
+                    rate[stage],
+                )
                 if stage == 0 and motion < n:
                     outputs(tried, rate[0], az, v[g], ground[g], theta[g], constants, arms, scales, last)
                     first[0], first[1] = rate[0, 0], rate[0, 1]
@@ -461,7 +488,18 @@ def innovations(
             if motion < n:
                 g = f + 2
                 qbar = 0.5 * density[g] * v[g] * v[g]
-                az = rates(x, de[g], v[g], ground[g], qbar, theta[g], offset[0] + lift_more[g], offset[1] + moment_more[g], constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, rate[0])  # fmt: skip
+                az = rates(
+                    x,
+                    de[g],
+                    v[g],
+                    ground[g],
+                    qbar,
+                    theta[g],
+                    offset[0] + lift_more[g],
+                    offset[1] + moment_more[g],
+                    plane,
+                    rate[0],
+                )
                 outputs(x, rate[0], az, v[g], ground[g], theta[g], constants, arms, scales, out)
                 at = motion
                 for i in range(OUTPUTS):
@@ -500,17 +538,7 @@ def evaluate(
     free_run: bool,
     lags: Array,
     delays: Array,
-    constants: Array,
-    declared: Array,
-    increments: Array,
-    alpha_axis: Array,
-    de_axis: Array,
-    q_axis: Array,
-    values: Array,
-    aero_index: Ints,
-    aero_value: Array,
-    state_index: Ints,
-    state_value: Array,
+    plane: Plane,
     arms: Array,
     scales: Array,
     e: Array,
@@ -525,6 +553,7 @@ def evaluate(
     free_run : no gain: the residuals of a simulation; ``white`` and ``s`` are left alone.
     others : as in `innovations`.
     """
+    constants, state_index = plane[0], plane[9]
     motion = CORE
     for k in range(state_index.shape[0]):
         motion += 1 if state_index[k, 0] == 0 else 2
@@ -546,11 +575,47 @@ def evaluate(
             at += 1 if state_index[k, 0] == 0 else 2
         a, c = np.empty((n, n)), np.empty((OUTPUTS, n))
         speed = reference[2]
-        linear(x, reference[1], speed, 0.5 * reference[3] * speed * speed, reference[4], motion, lags, constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, arms, scales, a, c)  # fmt: skip
+        linear(
+            x,
+            reference[1],
+            speed,
+            0.5 * reference[3] * speed * speed,
+            reference[4],
+            motion,
+            lags,
+            plane,
+            arms,
+            scales,
+            a,
+            c,
+        )
         k_gain, w, cov, logdet = gain(a, c, speed, delays, constants, variance, dt_s)
         if not math.isfinite(logdet):
             return np.nan
         white[:] = w
         s[:] = cov
-    sound = innovations(y, de, v, ground, density, theta, lift_more, moment_more, output_more, dt_s, sub, start, bias, offset, k_gain, motion, lags, delays, constants, declared, increments, alpha_axis, de_axis, q_axis, values, aero_index, aero_value, state_index, state_value, arms, scales, e)  # fmt: skip
+    sound = innovations(
+        y,
+        de,
+        v,
+        ground,
+        density,
+        theta,
+        lift_more,
+        moment_more,
+        output_more,
+        dt_s,
+        sub,
+        start,
+        bias,
+        offset,
+        k_gain,
+        motion,
+        lags,
+        delays,
+        plane,
+        arms,
+        scales,
+        e,
+    )
     return logdet if sound else np.nan

@@ -76,7 +76,10 @@ def lower(change: Change) -> Lowered:
     state_index = np.zeros((len(change.states), 2), dtype=np.int64)
     state_value = np.zeros((len(change.states), 2))
     for i, state in enumerate(change.states):
-        state_index[i] = (_index(state.kind, ("lag", "mode"), "state"), _index(state.signal, SIGNALS, "signal"))
+        state_index[i] = (
+            _index(state.kind, ("lag", "mode"), "state"),
+            _index(state.signal, SIGNALS, "signal"),
+        )
         state_value[i] = (state.time_s, state.damping)
     declared = np.array([1.0, 1.0, 1.0, 0.0, 0.0])
     for shifted in change.declared:

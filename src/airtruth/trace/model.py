@@ -2,25 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.effects.change import AeroTerm, Change, SensorTerm
-from airtruth.trace.kernel import evaluate
+from airtruth.effects.change import Change, SensorTerm
+from airtruth.trace.kernel import Plane, evaluate
 from airtruth.trace.lower import CHANNELS, Lowered, lower
+from airtruth.trace.plant import Plant
 from airtruth.trace.records import FINE, Record, nodes
 from airtruth.trace.surface import through
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
-SHARED: Final = ("CLalpha", "CLq", "CLde", "Cmalpha", "Cmq", "Cmde", "log_noise_alpha", "log_noise_q", "log_noise_az", "rotary", "thrust")
-"""Parameters that all records share: increments of the derivatives [-], logarithms of noise over declared, share of the
-rotary gust (1: all of the specification's; counted from 1/2), relative change of the engines' thrust."""
+SHARED: Final = (
+    "CLalpha",
+    "CLq",
+    "CLde",
+    "Cmalpha",
+    "Cmq",
+    "Cmde",
+    "log_noise_alpha",
+    "log_noise_q",
+    "log_noise_az",
+    "rotary",
+    "thrust",
+)
+"""Parameters that all records share: increments of the derivatives [-], logarithms of noise over declared,
+share of the rotary gust (1: all of the specification's; counted from 1/2), relative change of the thrust."""
 LOCAL: Final = ("alpha0", "q0", "w1", "w2", "bias_alpha", "bias_q", "bias_az", "CL0", "Cm0", "log_sigma_w")
 """Parameters of one record: initial state, sensors' biases, trim coefficients, logarithm of the gust [m/s]."""
 _ROTARY_STD: Final = 0.5
@@ -117,23 +130,6 @@ def respond(
     if low.surface:
         de = through(low.surface, de, s.dt_s / (s.sub * FINE))
     de = nodes(de)
-    constants = plant.aircraft.constants
-    vector = np.array(
-        [
-            constants.wing_area_m2,
-            constants.chord_m,
-            constants.mass_kg,
-            constants.inertia_yy_kg_m2,
-            G0,
-            plant.trim_alpha_rad,
-            plant.trim_elevator_rad,
-            settings.length_w_m,
-            float(np.exp(local[9])),
-            0.5 + shared[9],
-            4.0 * constants.span_m / (np.pi * float(s.airspeed_m_s.mean())),
-        ]
-    )
-    declared = np.concatenate([low.declared, [plant.thrust_n], plant.constant * (1.0 + shared[10])])
     e = np.empty_like(y)
     white, covariance = np.eye(3), np.eye(3)
     points = de.size
@@ -142,9 +138,7 @@ def respond(
         lift_more, moment_more, output_more = none, none, still
     else:
         lift_more, moment_more, output_more = external.lift, external.moment, external.output
-    reference = np.array(
-        [y[:, 0].mean(), de.mean(), v.mean(), s.density_kg_m3.mean(), theta.mean()]
-    )
+    reference = np.array([y[:, 0].mean(), de.mean(), v.mean(), s.density_kg_m3.mean(), theta.mean()])
     logdet = evaluate(
         y,
         de,
@@ -165,7 +159,39 @@ def respond(
         free_run,
         low.lags,
         low.delays,
-        vector,
+        plane_of(plant, settings, low, shared, local, float(s.airspeed_m_s.mean())),
+        low.arms,
+        low.scales,
+        e,
+        white,
+        covariance,
+    )
+    return Response(e, white, covariance, logdet)
+
+
+def plane_of(
+    plant: Plant, settings: Settings, low: Lowered, shared: Array, local: Array, airspeed_m_s: float
+) -> Plane:
+    """The aircraft with its changes as the kernel reads it."""
+    c = plant.aircraft.constants
+    constants = np.array(
+        [
+            c.wing_area_m2,
+            c.chord_m,
+            c.mass_kg,
+            c.inertia_yy_kg_m2,
+            G0,
+            plant.trim_alpha_rad,
+            plant.trim_elevator_rad,
+            settings.length_w_m,
+            float(np.exp(local[9])),
+            0.5 + shared[9],
+            4.0 * c.span_m / (np.pi * airspeed_m_s),
+        ]
+    )
+    declared = np.concatenate([low.declared, [plant.thrust_n], plant.constant * (1.0 + shared[10])])
+    return (
+        constants,
         declared,
         shared[:6],
         plant.alpha_rad,
@@ -176,13 +202,7 @@ def respond(
         low.aero_value,
         low.state_index,
         low.state_value,
-        low.arms,
-        low.scales,
-        e,
-        white,
-        covariance,
     )
-    return Response(e, white, covariance, logdet)
 
 
 def _input(low: Lowered, channel: str, x: Array) -> Array:
@@ -260,6 +280,3 @@ def settings_of(aircraft: Aircraft, length_w_m: float, thrust_std: float) -> Set
         thrust_std=thrust_std,
         offset_std=np.array([0.1, 0.03]),
     )
-
-
-__all__ = ["AeroTerm", "External", "Response", "Settings", "declared_change", "local_prior", "replace", "respond", "settings_of", "shared_prior", "start"]

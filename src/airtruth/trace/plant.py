@@ -58,7 +58,9 @@ class Plant:
     trim: Trim | None
 
 
-def trim_of(aircraft: Aircraft, airspeed_m_s: float, density_kg_m3: float, altitude_m: float, gamma_rad: float) -> Trim:
+def trim_of(
+    aircraft: Aircraft, airspeed_m_s: float, density_kg_m3: float, altitude_m: float, gamma_rad: float
+) -> Trim:
     """The declared JSBSim aircraft's equilibrium at a measured airspeed.
 
     Raises
@@ -70,7 +72,9 @@ def trim_of(aircraft: Aircraft, airspeed_m_s: float, density_kg_m3: float, altit
     return trim(aircraft, Condition(eas, altitude_m, gamma_rad))
 
 
-def probed(aircraft: Aircraft, at: Trim, alpha: tuple[float, float], elevator: tuple[float, float], q: float) -> Plant:
+def probed(
+    aircraft: Aircraft, at: Trim, alpha: tuple[float, float], elevator: tuple[float, float], q: float
+) -> Plant:
     """Tables of the JSBSim aircraft over the stated ranges, on whole degrees where its own tables break.
 
     Forces of the air are taken to go with the dynamic pressure at equal qhat, those of the engines to stay.

@@ -31,7 +31,9 @@ _LEAST_SAMPLES: Final = 40
 _LEAST_ELEVATOR_RAD: Final = 0.1 * DEG
 _THRUST_STD: Final = 0.05
 _THRUST_UNKNOWN_STD: Final = 0.25
-_AIR: Final = "the level of the gusts is each record's own, and the measured airspeed carries the horizontal ones"
+_AIR: Final = (
+    "the level of the gusts is each record's own, and the measured airspeed carries the horizontal ones"
+)
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,9 @@ class Case:
     notes: tuple[str, ...]
 
 
-def prepare(logs: Sequence[FlightLog], aircraft: Aircraft, effects: Sequence[Effect], options: TraceOptions) -> Case:
+def prepare(
+    logs: Sequence[FlightLog], aircraft: Aircraft, effects: Sequence[Effect], options: TraceOptions
+) -> Case:
     """Check the records, build the declared plant about each flight condition, and split off what is held out.
 
     Raises
@@ -170,16 +174,17 @@ def _plants(signals: Sequence[Signals], aircraft: Aircraft, model: str) -> list[
                 found[i] = linear(aircraft, derivatives, speed, density, alpha, elevator, moment)
             continue
         at = _trim(aircraft, members, speed, density)
-        alpha = (min(float(s.y[:, 0].min()) for s in members), max(float(s.y[:, 0].max()) for s in members))
-        elevator = (
-            min(float(s.elevator_rad.min()) for s in members),
-            max(float(s.elevator_rad.max()) for s in members),
-        )
+        reach = _reach([s.y[:, 0] for s in members])
+        deflection = _reach([s.elevator_rad for s in members])
         rate = max(float(np.abs(s.y[:, 1]).max()) for s in members)
-        plant = probed(aircraft, at, alpha, elevator, rate)
+        plant = probed(aircraft, at, reach, deflection, rate)
         for i in group:
             found[i] = plant
     return [found[i] for i in range(len(signals))]
+
+
+def _reach(found: Sequence[Array]) -> tuple[float, float]:
+    return min(float(x.min()) for x in found), max(float(x.max()) for x in found)
 
 
 def _trim(aircraft: Aircraft, members: Sequence[Signals], speed: float, density: float) -> Trim:

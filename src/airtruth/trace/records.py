@@ -91,7 +91,9 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0) -> list[Signals]:
         sub = 2 * math.ceil(dt / _STEP_S - 1e-9)
         y = np.stack([channels[name] for name in CHANNELS], axis=1)
         density = (
-            channels["density_kg_m3"] if "density_kg_m3" in channels else density_kg_m3(channels["altitude_m"])
+            channels["density_kg_m3"]
+            if "density_kg_m3" in channels
+            else density_kg_m3(channels["altitude_m"])
         )
         altitude = channels.get("altitude_m")
         if altitude is None:

@@ -215,10 +215,22 @@ def _with(null: Fit, problem: Problem, index: int, tried: Sequence[Direction]) -
     record, base, k = problem.records[index], null.tangents[index], len(null.point.sizes)
     t = np.zeros((len(tried), *base.r.shape))
     w = np.zeros((len(tried), 3, 3))
-    e = respond(record, problem.settings, null.hypothesis.change(null.point.sizes), null.point.shared, null.point.local[index])
+    e = respond(
+        record,
+        problem.settings,
+        null.hypothesis.change(null.point.sizes),
+        null.point.shared,
+        null.point.local[index],
+    )
     before = null.hypothesis.change(null.point.sizes)
     for i, d in enumerate(tried):
-        moved = respond(record, problem.settings, lower(before + d.effect.change(_values(d))), null.point.shared, null.point.local[index])
+        moved = respond(
+            record,
+            problem.settings,
+            lower(before + d.effect.change(_values(d))),
+            null.point.shared,
+            null.point.local[index],
+        )
         if not np.isfinite(moved.logdet):
             continue
         t[i] = (moved.e - e.e) @ base.white.T / d.step
@@ -274,7 +286,9 @@ def _laguerre(de: Array, dt_s: float, pole: float = 6.0) -> list[Array]:
     return [*found, (de / size) ** 2, found[0] ** 2]
 
 
-def _projected(null: Fit, problem: Problem, tangents: Sequence[Tangent], whitener: Whitener, k: int, count: int):  # type: ignore[no-untyped-def]
+def _projected(
+    null: Fit, problem: Problem, tangents: Sequence[Tangent], whitener: Whitener, k: int, count: int
+) -> tuple[Array, Array]:
     """Gradient and information of the further directions, all nuisance eliminated, priors included."""
     pieces = [parts(t, whitener, levels=False) for t in tangents]
     gradient, information, _ = reduced(problem, null.point, k + count, pieces, levels=False)

@@ -181,7 +181,9 @@ def _ends(effect: Effect) -> tuple[float, float]:
     """Plausible sizes of an effect."""
     first = effect.parameters[0]
     low, high = sorted((first.size(first.low), first.size(first.high)))
-    return (max(low, 0.0) if first.one_sided and not first.reciprocal else 0.0 if first.reciprocal else low), high
+    return (
+        max(low, 0.0) if first.one_sided and not first.reciprocal else 0.0 if first.reciprocal else low
+    ), high
 
 
 def _outdone(s: Score, found: Fit, gain: float) -> Candidate:
@@ -237,7 +239,10 @@ def _tied(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     if not accepted:
         return ()
     best = accepted[0]
-    return (best, *(c for c in candidates if c is not best and abs(best.gain - c.gain) <= TIE and c.found.converged))
+    return (
+        best,
+        *(c for c in candidates if c is not best and abs(best.gain - c.gain) <= TIE and c.found.converged),
+    )
 
 
 __all__ = ["Candidate", "Stage", "search"]

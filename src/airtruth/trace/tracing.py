@@ -107,8 +107,12 @@ def run(
     found = traced(read, plane, options, advance)
     if out is not None:
         advance("write the updated aircraft")
-        found.answer["updated_aircraft"] = write_update(found.case, found.stages, plane, out, options.refitted)
-        found.answer["replay"] = flown_again(found.case, found.outcome, plane, found.answer["updated_aircraft"])
+        found.answer["updated_aircraft"] = write_update(
+            found.case, found.stages, plane, out, options.refitted
+        )
+        found.answer["replay"] = flown_again(
+            found.case, found.outcome, plane, found.answer["updated_aircraft"]
+        )
         atomic.make_folder(out)
         atomic.write_text(out / ANSWER, json.dumps(found.answer, indent=1, allow_nan=False) + "\n")
     return found

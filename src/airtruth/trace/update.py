@@ -27,7 +27,9 @@ def accepted_change(stages: Sequence[Stage]) -> Change:
     return total
 
 
-def write_update(case: Case, stages: Sequence[Stage], aircraft: Aircraft, out: Path, refitted: bool) -> str | None:
+def write_update(
+    case: Case, stages: Sequence[Stage], aircraft: Aircraft, out: Path, refitted: bool
+) -> str | None:
     """Write the updated aircraft to OUT/aircraft/NAME; None where no effect was accepted.
 
     An earlier update in that place is replaced. An aircraft without a JSBSim model takes effects of its
