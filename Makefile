@@ -26,7 +26,7 @@ campaign: $(READY) ## fly data/campaigns, identify, print the paper's tables, cl
 campaign-quick: $(READY) ## the same with a tenth of the runs
 	$(BIN)/python scripts/campaign.py --out $(OUT)/quick --jobs $(JOBS) --quick
 
-loop: $(READY) ## the paper's experiment through the loop: 2000 runs, every method before and after (five minutes)
+loop: $(READY) ## the paper's experiment through the loop: 2000 runs, every method before and after (six minutes)
 	$(BIN)/python scripts/paper_loop.py --out $(OUT)/loop-2000 --jobs $(JOBS) --affine 300
 
 study: $(READY) ## every cause behind docs/paper.md and docs/closed_loop.md, off and on (about ten minutes)

@@ -147,7 +147,7 @@ def estimates(
 ) -> pd.DataFrame:
     """Estimates of every run by every method, with effects in the model if ``taken`` is given."""
     work = partial(estimates_of, taken=taken, methods=methods)
-    if jobs == 1:
+    if min(jobs, len(paths)) == 1:
         parts = list(map(work, paths))
     else:
         with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:

@@ -32,6 +32,14 @@ def test_quick_campaign_ends_in_tables_and_figures_and_resumes(tmp_path):
         "estimates-light.png",
         "estimates-moderate-fit.png",
     } <= figures
+    assert "The loop: effects traced, then in the model" in first.stdout
+    assert {p.name for p in (tmp_path / "out" / "loop").iterdir()} >= {
+        "loop.md",
+        "loop.csv",
+        "loop.tex",
+        "loop.png",
+    }
+    assert {p.name for p in (tmp_path / "out" / "trace").iterdir()} >= {"d", "traces.md", "traces.png"}
     again = subprocess.run(command, capture_output=True, text=True, check=False)
     assert "(0 flown now, 0 failed)" in again.stdout
     assert again.stdout.split("Table 1.")[1:] == first.stdout.split("Table 1.")[1:]

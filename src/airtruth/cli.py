@@ -23,6 +23,9 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
+aircraft_app = typer.Typer(help="Write aircraft.", no_args_is_help=True, rich_markup_mode=None)
+app.add_typer(aircraft_app, name="aircraft")
+
 INTERRUPTED = 130
 FAILED_RUNS = 1
 
@@ -334,6 +337,34 @@ def check(
             print("\n\n".join(as_text(table) for table in kinematics_report.tables(answer)))
     if json_:
         print(json.dumps(answers[0] if len(answers) == 1 else answers, indent=1))
+
+
+@aircraft_app.command(
+    "new", epilog="Example: airtruth aircraft new attas --estimates estimates.parquet --log a.parquet --out attas_jsb"
+)
+def aircraft_new(
+    aircraft: Annotated[str, typer.Argument(metavar="A", help="Folder with aircraft.toml, or a shipped name.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write; its name is the aircraft's.")],
+    estimates: Annotated[
+        Path | None, typer.Option(help="Estimates of `airtruth identify`, in place of [derivatives].")
+    ] = None,
+    method: Annotated[str | None, typer.Option(metavar="NAME", help="Which method of the estimates.")] = None,
+    derivative: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="In place of a stated one; may be repeated.")
+    ] = None,
+    log: Annotated[
+        Path | None, typer.Option(help="Flight log whose first second is the trim, in place of what follows.")
+    ] = None,
+    airspeed_m_s: Annotated[float | None, typer.Option(help="True airspeed of the trim [m/s].")] = None,
+    altitude_m: Annotated[float | None, typer.Option(help="Pressure altitude of the trim [m].")] = None,
+    alpha_deg: Annotated[float, typer.Option(help="Angle of attack of the trim [deg].")] = 3.0,
+    elevator_deg: Annotated[float, typer.Option(help="Elevator of the trim [deg].")] = 0.0,
+) -> None:
+    """Write a JSBSim aircraft that flies six derivatives about a trim, for one that has no model."""
+    from airtruth.fly.new_aircraft import make
+
+    trim = (airspeed_m_s, altitude_m, alpha_deg, elevator_deg)
+    print(make(aircraft, out, estimates, method, derivative or [], log, trim))
 
 
 @contextmanager

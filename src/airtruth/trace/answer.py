@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from airtruth.effects.effect import Effect
 from airtruth.physics.short_period import PARAMETERS
@@ -155,12 +156,13 @@ def _effect(stages: Sequence[Stage], number: int) -> dict[str, Any]:
         for c in stage.candidates
         if c is not best and c.score.effect.name != effect.name and c.gain <= best.gain
     ]
-    separation = math.sqrt(max(0.0, best.gain - rest[0].gain)) if rest else math.sqrt(max(0.0, best.gain))
+    runner = max([c.gain for c in rest], default=0.0)
+    separation = math.sqrt(max(0.0, best.gain - max(0.0, runner)))
     row = {
         "name": effect.name,
         "variant": effect.variant,
         "parameters": parameters(effect, final.point.sizes[span], block),
-        "p_value": float(stage.adjusted[[s.effect.key for s in stage.table.scores].index(effect.key)]),
+        "p_value": _p_value(stage, best),
         "separation_sigma": separation,
         "indistinguishable_from": sorted({c.score.effect.name for c in others} - {effect.name}),
         "gain_2_log_likelihood": best.gain,
@@ -168,6 +170,13 @@ def _effect(stages: Sequence[Stage], number: int) -> dict[str, Any]:
     if effect.name == "sensor_delay":
         row["channel"] = effect.variant
     return row
+
+
+def _p_value(stage: Stage, best: Candidate) -> float:
+    """Holm's p-value of the score, or, where levels tell more, Bonferroni's of the likelihood ratio."""
+    index = [s.effect.key for s in stage.table.scores].index(best.score.effect.key)
+    ratio = len(stage.adjusted) * float(chi2.sf(max(best.gain, 0.0), 1))
+    return min(float(stage.adjusted[index]), ratio)
 
 
 def _candidates(case: Case, stages: Sequence[Stage]) -> list[dict[str, Any]]:

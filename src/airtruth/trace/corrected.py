@@ -1,8 +1,9 @@
 """Estimates with traced effects in the model, by any method of identify.
 
 An effect adds known increments dCL(t), dCm(t) to the coefficients: functions of the measured angle of attack,
-elevator and pitch rate. The equations of motion are linear in the rest, so that the motion is the sum of two:
-that of the linear aircraft under its elevator, and the response d of the same aircraft to the increments,
+elevator and pitch rate, or of lags and modes that these drive. The equations of motion are linear in the rest,
+so that the motion is the sum of two: that of the linear aircraft under its elevator, and the response d of the
+same aircraft to the increments,
 
     d_alpha' = d_q - lift (CLalpha d_alpha + CLq hat d_q + dCL),   d_q' = moment (Cmalpha d_alpha + Cmq hat d_q + dCm),
     d_az = -normal (CLalpha d_alpha + CLq hat d_q + dCL),
@@ -17,7 +18,7 @@ to first order; those of the trace serve, and the estimates themselves may serve
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -25,8 +26,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from scipy.linalg import expm
+from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
-from airtruth.effects.change import AeroTerm, Change
+from airtruth.effects.change import AeroTerm, Change, StateTerm
 from airtruth.errors import ConfigurationError
 from airtruth.identify import AircraftConstants, Options, identify_log
 from airtruth.logs.flight_log import Batch, FlightLog, batches
@@ -49,7 +51,7 @@ class Correction:
 
     Attributes
     ----------
-    aero : increments of the coefficients.
+    aero : increments of the coefficients; states : lags and modes that they may take as their signals.
     derivatives : (6,) of the aircraft that answers them, in the order of `short_period.PARAMETERS` [-].
     from_trim : whether alpha counts from the record's own trim, its mean over the first 0.1 s, as in a trace
         with the linear model.
@@ -58,6 +60,7 @@ class Correction:
     aero: tuple[AeroTerm, ...]
     derivatives: Array
     from_trim: bool
+    states: tuple[StateTerm, ...] = ()
 
 
 def correction(found: Trace) -> Correction:
@@ -75,6 +78,7 @@ def correction(found: Trace) -> Correction:
         aero=change.aero,
         derivatives=plant.derivatives + found.stages[-1].gls.point.shared[:6],
         from_trim=found.case.model == "linear",
+        states=change.states,
     )
 
 
@@ -86,8 +90,9 @@ def check(change: Change) -> None:
     ConfigurationError
         Naming what it is.
     """
-    unknown = sorted({t.signal for t in change.aero} - set(MEASURED))
-    others = [name for name in ("surface", "states", "declared", "sensors", "air") if getattr(change, name)]
+    used = {s.signal for s in change.states} | {t.signal for t in change.aero}
+    unknown = sorted(used - {s.name for s in change.states} - set(MEASURED))
+    others = [name for name in ("surface", "declared", "sensors", "air") if getattr(change, name)]
     if unknown or others:
         what = ", ".join([*(f"terms of {name}" for name in others), *(f"signal {name}" for name in unknown)])
         raise ConfigurationError(
@@ -96,15 +101,14 @@ def check(change: Change) -> None:
         )
 
 
-def increments(aero: Sequence[AeroTerm], alpha: Array, elevator: Array, qhat: Array) -> Array:
-    """(2, ...) dCL and dCm [-] of terms at signals of one shape.
+def increments(aero: Sequence[AeroTerm], signals: Mapping[str, Array]) -> Array:
+    """(2, ...) dCL and dCm [-] of terms.
 
     Parameters
     ----------
-    alpha, elevator : angles [rad], alpha as the terms count it; qhat : q c/(2V) [-].
+    signals : name -> values of one shape: alpha as the terms count it [rad], elevator [rad], qhat = q c/(2V), states.
     """
-    signals = dict(zip(MEASURED, (alpha, elevator, qhat), strict=True))
-    total = np.zeros((2, *alpha.shape))
+    total = np.zeros((2, *next(iter(signals.values())).shape))
     for term in aero:
         s = signals[term.signal] - term.at
         shaped = {
@@ -115,6 +119,16 @@ def increments(aero: Sequence[AeroTerm], alpha: Array, elevator: Array, qhat: Ar
         }[term.shape]
         total[0 if term.coefficient == "CL" else 1] += term.amplitude * shaped
     return total
+
+
+def state(term: StateTerm, signal: Array, dt_s: float) -> Array:
+    """A lag or a mode of a signal (runs, samples), from equilibrium, exact for a signal linear between samples."""
+    time = term.time_s
+    poles = [time, 1.0] if term.kind == "lag" else [time**2, 2.0 * term.damping * time, 1.0]
+    b, a, _ = cont2discrete(([1.0], poles), dt_s, method="foh")
+    b = b.ravel()
+    start = lfilter_zi(b, a)[None, :] * signal[:, :1]
+    return np.asarray(lfilter(b, a, signal, axis=1, zi=start)[0])
 
 
 def response(derivatives: Array, scale: short_period.Scale, lift: Array, moment: Array, dt_s: float) -> Array:
@@ -168,7 +182,13 @@ def corrected_batch(batch: Batch, constants: AircraftConstants, taken: Correctio
         np.asarray(density).mean(axis=1),
     )
     trim = trim_alpha(alpha, batch.dt_s)[:, None] if taken.from_trim else 0.0
-    more = increments(taken.aero, alpha - trim, channels["elevator_rad"], q * scale.half_chord_time[:, None])
+    signals = {
+        "alpha": alpha - trim,
+        "elevator": channels["elevator_rad"],
+        "qhat": q * scale.half_chord_time[:, None],
+    }
+    signals |= {s.name: state(s, signals[s.signal], batch.dt_s) for s in taken.states}
+    more = increments(taken.aero, signals)
     head = _head(batch.dt_s)
     more -= more[..., :head].mean(axis=2, keepdims=True)
     moved = response(taken.derivatives, scale, more[0], more[1], batch.dt_s)

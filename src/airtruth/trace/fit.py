@@ -38,7 +38,7 @@ from airtruth.trace.records import Record
 
 Array = NDArray[np.float64]
 
-ITERATIONS: Final = 30
+ITERATIONS: Final = 45
 _ENOUGH: Final = 0.002
 """A fit has converged once a step would gain less than this in log-likelihood: 0.06 standard errors."""
 _STALE: Final = 1.0
@@ -305,6 +305,7 @@ def fit(
                 break
             current, fresh, damping = anew, True, 0.1 * damping
         if damping > 1e7:
+            converged = fresh  # not even the smallest step helps
             break
     if not fresh:
         current = _evaluate(problem, hypothesis, point, whitener, free_levels) or current

@@ -153,6 +153,7 @@ def floor(record: Record, problem: Problem, low: Lowered, shared: Array, local: 
         float(s.theta_rad.mean()) - plant.alpha_shift_rad,
         motion,
         np.zeros(3),
+        np.zeros(3),
         plane_of(plant, settings, low, shared, local, v),
         low.arms,
         low.scales,

@@ -41,7 +41,7 @@ _W2: Final = math.sqrt(1.5) * (1.0 / math.sqrt(3.0) - 1.0)
 # places in the vector of constants
 AREA, CHORD, MASS, INERTIA, GRAVITY, ALPHA0, DE0, LENGTH_W, SIGMA_W, ROTARY, ROTARY_S = range(11)
 # factors and shifts of declared quantities
-F_MASS, F_INERTIA, F_ELEVATOR, CG, THRUST_ARM, THRUST, CONSTANT = range(7)
+F_MASS, F_INERTIA, F_ELEVATOR, CG, THRUST_ARM, THRUST, THRUST_SLOPE, CONSTANT = range(8)
 
 
 @njit(cache=True, nogil=True)
@@ -147,7 +147,10 @@ def rates(
         else:
             moment += aero_value[t, 0] * s
     fz -= force * lift
-    fm += force * chord * (moment - declared[CG] * fz / force) + declared[THRUST] * declared[THRUST_ARM]
+    fm += (
+        force * chord * (moment - declared[CG] * fz / force)
+        + (declared[THRUST] + declared[THRUST_SLOPE] * qbar) * declared[THRUST_ARM]
+    )
     az = fz / mass
     turn = (fz * math.cos(alpha) - fx * math.sin(alpha)) / (mass * ground)
     out[0] = q + turn + constants[GRAVITY] * math.cos(theta - x[0]) / ground
@@ -209,13 +212,17 @@ def linear(
     theta: float,
     motion: int,
     lags: Array,
+    delays: Array,
     plane: Plane,
     arms: Array,
     scales: Array,
     a: Array,
     c: Array,
 ) -> None:
-    """A and C of the motion, effects' states and lagging sensors about a state, by central differences."""
+    """A and C of the motion, effects' states and late sensors about a state, by central differences.
+
+    A delay d is the response (1 - d s/2 + d^2 s^2/12)/(1 + d s/2 + d^2 s^2/12) in two states.
+    """
     n = x.size
     a[:] = 0.0
     c[:] = 0.0
@@ -249,23 +256,22 @@ def linear(
             a[at, at] = -1.0 / lags[i]
             c[i, at] = 1.0
             at += 1
+        if delays[i] > 0.0:
+            for j in range(n):
+                a[at + 1, j] = 12.0 / delays[i] * c[i, j]
+            a[at, at + 1] = 1.0 / delays[i]
+            a[at + 1, at] = -12.0 / delays[i]
+            a[at + 1, at + 1] = -6.0 / delays[i]
+            c[i, at + 1] -= 1.0
+            at += 2
 
 
 @njit(cache=True, nogil=True)
 def gain(
-    a: Array, c: Array, v: float, delays: Array, constants: Array, variance: Array, dt_s: float
+    a: Array, c: Array, v: float, constants: Array, variance: Array, dt_s: float
 ) -> tuple[Array, Array, Array, float]:
     """Steady gain K of the update, whitener W with W S W' = I, S itself, and log|S| (nan where there is none)."""
     n = a.shape[0]
-    c = c.copy()
-    for i in range(OUTPUTS):
-        if delays[i] != 0.0:  # y(t - d) = C exp(-A d) x: a short series
-            row = c[i].copy()
-            term = row.copy()
-            for k in range(1, 6):
-                term = np.dot(term, a) * (-delays[i] / k)
-                row = row + term
-            c[i] = row
     system = np.zeros((n, n + 1))
     system[:, :n] = a
     process = np.zeros(n)
@@ -350,7 +356,18 @@ def innovations(
     x[4] = _W1 * start[2] + _W2 * start[3]
     rate, tried = np.zeros((4, n)), np.zeros(n)
     out, last, first = np.zeros(OUTPUTS), np.zeros(OUTPUTS), np.zeros(2)
-    back, back_rate = np.zeros(n), np.zeros((4, n))
+    ends = np.zeros(3)
+    phi, early, late = np.zeros((OUTPUTS, 2, 2)), np.zeros((OUTPUTS, 2)), np.zeros((OUTPUTS, 2))
+    for i in range(OUTPUTS):
+        if delays[i] > 0.0:
+            d = delays[i]
+            system = np.array([[0.0, 1.0 / d, 0.0], [-12.0 / d, -6.0 / d, 12.0 / d]])
+            transition, noise = np.empty((2, 2)), np.empty((2, 2))
+            input0, input1 = np.empty((2, 1)), np.empty((2, 1))
+            step(system, np.zeros(2), 2, 0.5 * h, transition, input0, input1, noise)
+            phi[i] = transition
+            early[i] = input0[:, 0]
+            late[i] = input1[:, 0]
     # effects' states begin in equilibrium with the first state
     at = CORE
     for k in range(state_index.shape[0]):
@@ -385,70 +402,14 @@ def innovations(
             value = out[i]
             if lags[i] > 0.0:
                 if k == 0:
-                    x[at] = out[i]
+                    x[at] = value
                 value = x[at]
                 at += 1
-            elif delays[i] != 0.0:
-                # integrate back by the delay: whole and part steps of the fine grid's pairs
-                steps = max(1, math.ceil(abs(delays[i]) / h - 1e-9))
-                hb = -delays[i] / steps
-                back[:] = x
-                position = float(f)
-                fine = dt_s / sub
-                for _ in range(steps):
-                    for stage in range(4):
-                        share = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
-                        where = position + share * hb / fine
-                        where = min(max(where, 0.0), float(de.size - 1))
-                        low = min(int(where), de.size - 2)
-                        part = where - low
-                        de_b = de[low] + part * (de[low + 1] - de[low])
-                        v_b = v[low] + part * (v[low + 1] - v[low])
-                        g_b = ground[low] + part * (ground[low + 1] - ground[low])
-                        rho_b = density[low] + part * (density[low + 1] - density[low])
-                        th_b = theta[low] + part * (theta[low + 1] - theta[low])
-                        for m in range(motion):
-                            tried[m] = back[m] + (share * hb * back_rate[stage - 1, m] if stage > 0 else 0.0)
-                        rates(
-                            tried,
-                            de_b,
-                            v_b,
-                            g_b,
-                            0.5 * rho_b * v_b * v_b,
-                            th_b,
-                            offset[0] + lift_more[low],
-                            offset[1] + moment_more[low],
-                            plane,
-                            back_rate[stage],
-                        )
-                    for m in range(motion):
-                        slope = (
-                            back_rate[0, m] + 2.0 * back_rate[1, m] + 2.0 * back_rate[2, m] + back_rate[3, m]
-                        )
-                        back[m] += hb / 6.0 * slope
-                    position += hb / fine
-                where = min(max(position, 0.0), float(de.size - 1))
-                low = min(int(where), de.size - 2)
-                part = where - low
-                de_b = de[low] + part * (de[low + 1] - de[low])
-                v_b = v[low] + part * (v[low + 1] - v[low])
-                g_b = ground[low] + part * (ground[low + 1] - ground[low])
-                rho_b = density[low] + part * (density[low + 1] - density[low])
-                th_b = theta[low] + part * (theta[low + 1] - theta[low])
-                az_b = rates(
-                    back,
-                    de_b,
-                    v_b,
-                    g_b,
-                    0.5 * rho_b * v_b * v_b,
-                    th_b,
-                    offset[0] + lift_more[low],
-                    offset[1] + moment_more[low],
-                    plane,
-                    back_rate[0],
-                )
-                outputs(back, back_rate[0], az_b, v_b, g_b, th_b, constants, arms, scales, last)
-                value = last[i]
+            if delays[i] > 0.0:
+                if k == 0:
+                    x[at] = value
+                value -= x[at + 1]
+                at += 2
             e[k, i] = y[k, i] - value - bias[i] - output_more[k, i]
         if k + 1 == samples:
             break
@@ -503,17 +464,32 @@ def innovations(
                 outputs(x, rate[0], az, v[g], ground[g], theta[g], constants, arms, scales, out)
                 at = motion
                 for i in range(OUTPUTS):
+                    # two half steps; in between the motion's own curvature (cubic through values and slopes)
+                    middle = 0.5 * (last[i] + out[i])
+                    if i < 2:
+                        middle += scales[i] * h / 8.0 * (first[i] - rate[0, i])
+                    ends[0], ends[1], ends[2] = last[i], middle, out[i]
                     if lags[i] > 0.0:
-                        # two half steps; in between the motion's own curvature (cubic through values and slopes)
-                        middle = 0.5 * (last[i] + out[i])
-                        if i < 2:
-                            middle += scales[i] * h / 8.0 * (first[i] - rate[0, i])
                         r = 0.5 * h / lags[i]
                         decay = math.exp(-r)
                         mean = (1.0 - decay) / r
-                        x[at] = decay * x[at] + (mean - decay) * last[i] + (1.0 - mean) * middle
-                        x[at] = decay * x[at] + (mean - decay) * middle + (1.0 - mean) * out[i]
+                        before = ends[0]
+                        ends[0] = x[at]
+                        for half in range(1, 3):
+                            x[at] = decay * x[at] + (mean - decay) * before + (1.0 - mean) * ends[half]
+                            before, ends[half] = ends[half], x[at]
                         at += 1
+                    if delays[i] > 0.0:
+                        for half in range(2):
+                            u0, u1, p0, p1 = ends[half], ends[half + 1], x[at], x[at + 1]
+                            for row in range(2):
+                                x[at + row] = (
+                                    phi[i, row, 0] * p0
+                                    + phi[i, row, 1] * p1
+                                    + early[i, row] * u0
+                                    + late[i, row] * u1
+                                )
+                        at += 2
     return True
 
 
@@ -561,6 +537,8 @@ def evaluate(
     for i in range(OUTPUTS):
         if lags[i] > 0.0:
             n += 1
+        if delays[i] > 0.0:
+            n += 2
     k_gain = np.zeros((n, OUTPUTS))
     logdet = 0.0
     if not free_run:
@@ -583,13 +561,14 @@ def evaluate(
             reference[4],
             motion,
             lags,
+            delays,
             plane,
             arms,
             scales,
             a,
             c,
         )
-        k_gain, w, cov, logdet = gain(a, c, speed, delays, constants, variance, dt_s)
+        k_gain, w, cov, logdet = gain(a, c, speed, constants, variance, dt_s)
         if not math.isfinite(logdet):
             return np.nan
         white[:] = w

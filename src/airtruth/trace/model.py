@@ -189,7 +189,7 @@ def plane_of(
             4.0 * c.span_m / (np.pi * airspeed_m_s),
         ]
     )
-    declared = np.concatenate([low.declared, [plant.thrust_n], plant.constant * (1.0 + shared[10])])
+    declared = np.concatenate([low.declared, plant.thrust, plant.constant * (1.0 + shared[10])])
     return (
         constants,
         declared,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import AircraftError
-from airtruth.fly.engine import Condition
+from airtruth.fly.engine import Condition, Executive
 from airtruth.fly.linearise import linearise
 from airtruth.fly.probe import Grid, probe
 from airtruth.fly.trim import Trim, trim
 from airtruth.physics import short_period
 from airtruth.physics.short_period import PARAMETERS
-from airtruth.units import DEG, G0
+from airtruth.units import DEG, G0, LBF
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ class Plant:
     constant : (3,) X, Z [N] and M [N m] that the dynamic pressure leaves alone: the engines'.
     trim_alpha_rad, trim_elevator_rad : about which increments of derivatives count.
     alpha_shift_rad : taken from the measured alpha and theta (the linear model counts alpha from its trim).
-    thrust_n : net thrust at the trim, for its arm [N].
+    thrust : (2,) thrust for its arm: at no dynamic pressure [N], and its slope over that [m2].
     derivatives, derivative_cov : (6,) declared values and (6, 6) covariance, mass, inertia and CG
         included.
     trim : of the JSBSim aircraft, None for a linear one.
@@ -52,7 +52,7 @@ class Plant:
     trim_alpha_rad: float
     trim_elevator_rad: float
     alpha_shift_rad: float
-    thrust_n: float
+    thrust: Array
     derivatives: Array
     derivative_cov: Array
     trim: Trim | None
@@ -92,7 +92,8 @@ def probed(
     rates = np.linspace(-1.0, 1.0, 7) * max(q * 1.2, 0.05)
     commands = whole(elevator[0] + offset, elevator[1] + offset, DEG)
     tables = probe(aircraft, at, Grid(whole(alpha[0], alpha[1], DEG), commands, rates, np.ones(1))).tables
-    constant = engines(aircraft, at)
+    power = engines(aircraft, at)
+    constant = power.constant
     pressure = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2
     declared = linearise(aircraft, at)
     constants = aircraft.constants
@@ -106,21 +107,45 @@ def probed(
         trim_alpha_rad=at.alpha_rad,
         trim_elevator_rad=at.elevator_rad,
         alpha_shift_rad=0.0,
-        thrust_n=float(max(constant[0], 0.05 * constants.mass_kg * G0)),
+        thrust=power.thrust,
         derivatives=declared.central,
         derivative_cov=declared_covariance(aircraft, declared.central),
         trim=at,
     )
 
 
-def engines(aircraft: Aircraft, at: Trim) -> Array:
-    """X, Z [N] and M [N m] at a trim that do not go with the dynamic pressure (3,), by three airspeeds in JSBSim."""
-    still = np.array([at.controls.elevator_command_rad])
-    speeds = probe(aircraft, at, Grid(np.array([at.alpha_rad]), still, np.zeros(1), _SPEEDS)).tables
-    pressures = 0.5 * at.density_kg_m3 * speeds.airspeed_m_s**2
-    basis = np.column_stack([pressures, np.ones_like(pressures)])
-    fitted = np.linalg.lstsq(basis, speeds.values.reshape(len(pressures), 3), rcond=None)[0]
-    return np.asarray(fitted[1])
+@dataclass(frozen=True)
+class Engines:
+    """What the engines do at a trim, lines over the dynamic pressure.
+
+    Attributes
+    ----------
+    constant : (3,) X, Z [N] and M [N m] of the aircraft that do not go with the dynamic pressure.
+    thrust : (2,) thrust along body x at none [N], and its slope over the dynamic pressure [m2].
+    """
+
+    constant: Array
+    thrust: Array
+
+
+def engines(aircraft: Aircraft, at: Trim) -> Engines:
+    """The engines of the JSBSim aircraft, from three airspeeds about a trim."""
+    executive = Executive(aircraft, 1.0 / 200.0)
+    inertia = aircraft.constants.inertia_yy_kg_m2
+    rows = []
+    for ratio in _SPEEDS:
+        condition = replace(at.condition, eas_m_s=at.condition.eas_m_s * float(ratio))
+        executive = executive.renewed()
+        total = executive.nodes(["forces/fbx-total-lbs", "forces/fbz-total-lbs"])
+        air = executive.node("forces/fbx-aero-lbs")
+        executive.initialise(condition, at.alpha_rad, at.controls)
+        moment = executive.respond().q_dot_rad_s2 * inertia
+        x, z = (node.get_double_value() * LBF for node in total)
+        rows.append([x, z, moment, x - air.get_double_value() * LBF])
+    pressures = 0.5 * at.density_kg_m3 * (at.airspeed_m_s * _SPEEDS) ** 2
+    basis = np.column_stack([np.ones_like(pressures), pressures])
+    fitted = np.linalg.lstsq(basis, np.array(rows), rcond=None)[0]
+    return Engines(np.ascontiguousarray(fitted[0, :3]), np.ascontiguousarray(fitted[:, 3]))
 
 
 def linear(
@@ -130,7 +155,7 @@ def linear(
     density_kg_m3: float,
     alpha: float,
     elevator: float,
-    engine_moment: float = 0.0,
+    power: Engines | None = None,
 ) -> Plant:
     """The linear short-period model about a measured trim, as tables of two points per axis.
 
@@ -138,8 +163,10 @@ def linear(
     ----------
     derivatives : (6,) declared.
     alpha, elevator : the record's own trim [rad].
-    engine_moment : pitching moment of the engines, which that of the air balances at trim [N m].
+    power : engines, whose pitching moment that of the air balances at trim; None for none, and a thrust of a
+        tenth of the weight for its arm.
     """
+    engine_moment = 0.0 if power is None else float(power.constant[2])
     c = aircraft.constants
     s, chord = c.wing_area_m2, c.chord_m
     pressure = 0.5 * density_kg_m3 * airspeed_m_s**2
@@ -161,7 +188,7 @@ def linear(
         trim_alpha_rad=0.0,
         trim_elevator_rad=elevator,
         alpha_shift_rad=alpha,
-        thrust_n=0.1 * c.mass_kg * G0,
+        thrust=np.array([0.1 * c.mass_kg * G0, 0.0]) if power is None else power.thrust,
         derivatives=np.asarray(derivatives, dtype=np.float64),
         derivative_cov=declared_covariance(aircraft, np.asarray(derivatives)),
         trim=None,

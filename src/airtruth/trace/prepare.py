@@ -165,13 +165,13 @@ def _plants(signals: Sequence[Signals], aircraft: Aircraft, model: str) -> list[
         if model == "linear":
             at = _trim(aircraft, members, speed, density) if aircraft.file.jsbsim is not None else None
             derivatives = declared_derivatives(aircraft, at)
-            moment = 0.0 if at is None else float(engines(aircraft, at)[2])
+            power = None if at is None else engines(aircraft, at)
             for i in group:
                 s = signals[i]
                 head = max(3, int(0.1 / s.dt_s))
                 alpha = float(s.y[:head, 0].mean())
                 elevator = float(s.elevator_rad[: head * s.sub * FINE].mean())
-                found[i] = linear(aircraft, derivatives, speed, density, alpha, elevator, moment)
+                found[i] = linear(aircraft, derivatives, speed, density, alpha, elevator, power)
             continue
         at = _trim(aircraft, members, speed, density)
         reach = _reach([s.y[:, 0] for s in members])

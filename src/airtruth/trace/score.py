@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from airtruth.effects.effect import Effect
-from airtruth.trace.fit import Fit, Problem, Tangent, Whitener, parts, reduced
+from airtruth.trace.fit import NO_WHITENER, Fit, Problem, Tangent, Whitener, parts, reduced
 from airtruth.trace.lower import lower
 from airtruth.trace.model import External, S, respond
 from airtruth.trace.records import nodes
@@ -72,11 +72,14 @@ class Table:
     ----------
     scores : one per effect that could be tested.
     information : (directions, directions) of unit sizes, nuisance eliminated: cosines and separations.
+    white : |z| of each score were the innovations white, with what the effect does to their covariance: an
+        autoregression takes up part of a large effect, and a lag in gusts is seen in the scatter.
     omnibus : statistic, degrees of freedom and p-value of the test that names no effect.
     """
 
     scores: tuple[Score, ...]
     information: Array
+    white: tuple[float, ...]
     omnibus: tuple[float, int, float]
 
 
@@ -114,8 +117,9 @@ def table(null: Fit, problem: Problem, effects: Sequence[Effect], whitener: Whit
     extended = problem.each(one, range(len(problem.records)))
     k = len(null.point.sizes)
     gradient, information = _projected(null, problem, [e[0] for e in extended], whitener, k, len(tried))
+    plain = _projected(null, problem, [e[0] for e in extended], NO_WHITENER, k, len(tried), levels=True)
     rng = np.random.default_rng([seed, len(tried), 7])
-    scores = []
+    scores, white = [], []
     at = 0
     for effect in effects:
         count = len(directions(effect, null, problem))
@@ -140,8 +144,10 @@ def table(null: Fit, problem: Problem, effects: Sequence[Effect], whitener: Whit
                 int(span[best]),
             )
         )
+        raw = np.diag(plain[1])[span]
+        white.append(float(np.max(np.abs(plain[0][span]) / np.sqrt(np.where(raw > 0.0, raw, np.inf)))))
     g, h = _projected(null, problem, [e[1] for e in extended], whitener, k, generic)
-    return Table(tuple(scores), information, _omnibus(g, h))
+    return Table(tuple(scores), information, tuple(white), _omnibus(g, h))
 
 
 def _audible(direction: Direction, null: Fit, problem: Problem) -> Direction:
@@ -287,11 +293,17 @@ def _laguerre(de: Array, dt_s: float, pole: float = 6.0) -> list[Array]:
 
 
 def _projected(
-    null: Fit, problem: Problem, tangents: Sequence[Tangent], whitener: Whitener, k: int, count: int
+    null: Fit,
+    problem: Problem,
+    tangents: Sequence[Tangent],
+    whitener: Whitener,
+    k: int,
+    count: int,
+    levels: bool = False,
 ) -> tuple[Array, Array]:
     """Gradient and information of the further directions, all nuisance eliminated, priors included."""
-    pieces = [parts(t, whitener, levels=False) for t in tangents]
-    gradient, information, _ = reduced(problem, null.point, k + count, pieces, levels=False)
+    pieces = [parts(t, whitener, levels) for t in tangents]
+    gradient, information, _ = reduced(problem, null.point, k + count, pieces, levels)
     m = S + k
     nuisance = information[:m, :m]
     scale = np.sqrt(np.maximum(np.diag(nuisance), 1e-30))

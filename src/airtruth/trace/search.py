@@ -11,45 +11,24 @@ from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
 from airtruth.trace import score
-from airtruth.trace.fit import Fit, Hypothesis, Problem, Whitener, autoregression, begin, fit
-from airtruth.trace.holdout import Assessment, floor, leave_one_out
-from airtruth.trace.lower import lower
-from airtruth.trace.model import S
+from airtruth.trace.fit import Fit, Hypothesis, Point, Problem, Whitener, autoregression, begin, fit
+from airtruth.trace.holdout import leave_one_out
+from airtruth.trace.judge import IMMATERIAL, Candidate, ends, judge, outdone
+from airtruth.trace.model import respond
 from airtruth.trace.score import Score, Table
 
 Array = NDArray[np.float64]
 
 LEVEL: Final = 0.05
-LEADING: Final = 6
+LEADING: Final = 7
 MOST: Final = 3
-_SIGNIFICANT: Final = 3.84
+_BETTER: Final = 2.0
+_NEAR: Final = 30.0
+_RESTARTS: Final = 2
+_VISIBLE: Final = 2.0
+_SHARES: Final = (1.0, 0.3, 0.1, 0.02)
 TIE: Final = 4.0
 """Effects within this of the best in 2 log L cannot be told apart."""
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """An effect that was refitted.
-
-    Attributes
-    ----------
-    score : what put it among the leading ones.
-    found : its fit, all free.
-    gain : 2 log L gained over the null, less 2 per parameter beyond the first.
-    likelihood_gain, free_run_gain : (records,) gains on records left out: log-likelihood; squared residual
-        over what gusts and sensors explain.
-    size, std : of the first parameter in its size coordinate.
-    reasons : what it fails, in words; empty if it is accepted.
-    """
-
-    score: Score
-    found: Fit
-    gain: float
-    likelihood_gain: Array
-    free_run_gain: Array
-    size: float
-    std: float
-    reasons: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -101,6 +80,7 @@ def search(
     """
     stages: list[Stage] = []
     start = begin(problem, hypothesis)
+    restarts = _RESTARTS
     while True:
         advance(f"round {len(stages) + 1}: refit without further effects")
         null = fit(problem, hypothesis, start)
@@ -111,15 +91,20 @@ def search(
         advance(f"round {len(stages) + 1}: score {len(effects)} effects")
         table = score.table(gls, problem, effects, whitener, seed)
         adjusted = score.holm([s.p_value for s in table.scores])
-        candidates, tied = (), ()  # type: tuple[Candidate, ...], tuple[Candidate, ...]
+        candidates: tuple[Candidate, ...] = ()
         if len(stages) < MOST:
-            candidates = _refitted(problem, null, table, adjusted, advance)
-            tied = _tied(candidates)
+            fits = _refitted(problem, null, table, adjusted, advance)
+            better = _better_null(problem, null, fits) if restarts else None
+            if better is not None:
+                start, restarts = better.point, restarts - 1
+                continue
+            candidates = _judged(problem, null, fits)
+        tied = _tied(candidates)
         stages.append(Stage(null, gls, whitener, table, adjusted, candidates, tied))
         if not tied:
             break
         best = tied[0]
-        hypothesis, start = best.found.hypothesis, best.found.point
+        hypothesis, start, restarts = best.found.hypothesis, best.found.point, _RESTARTS
         names = {e.key for e in hypothesis.effects}
         effects = [e for e in effects if e.key not in names]
     return tuple(stages)
@@ -132,44 +117,77 @@ def _gls(problem: Problem, null: Fit, whitener: Whitener) -> Fit:
 
 def _refitted(
     problem: Problem, null: Fit, table: Table, adjusted: Array, advance: Callable[[str], None]
-) -> tuple[Candidate, ...]:
-    order = [i for i in np.argsort(adjusted, kind="stable") if adjusted[i] <= LEVEL]
-    order = sorted(order, key=lambda i: -abs(table.scores[i].z))[:LEADING]
-    if not order:
-        return ()
-    fits: list[tuple[float, Score, Fit]] = []
+) -> list[tuple[Score, Fit]]:
+    """Full refits of the leading effects, best first."""
+    if not (adjusted <= LEVEL).any():
+        return []
+    # once something is missing, levels may tell more than means: a lag in gusts is seen in the scatter
+    seen = np.array([max(abs(s.z), w) for s, w in zip(table.scores, table.white, strict=True)])
+    order = [int(i) for i in np.argsort(-seen, kind="stable")[:LEADING] if seen[i] > _VISIBLE]
+    fits: list[tuple[Score, Fit]] = []
     for i in order:
         s = table.scores[i]
         advance(f"refit {s.effect.key}")
-        best = min((f.cost for _, _, f in fits), default=np.inf)
-        found = _refit(problem, null, s, best)
+        found = _refit(problem, null, s, min((f.cost for _, f in fits), default=np.inf))
         if found is not None:
-            gain = 2.0 * (null.cost - found.cost) - 2.0 * (len(s.effect.parameters) - 1)
-            fits.append((gain, s, found))
-    fits.sort(key=lambda f: -f[0])
+            fits.append((s, found))
+    return sorted(fits, key=lambda f: f[1].cost + len(f[0].effect.parameters))
+
+
+def _better_null(problem: Problem, null: Fit, fits: Sequence[tuple[Score, Fit]]) -> Fit | None:
+    """The null fitted again from where the best candidate ended, if that is a better optimum of it."""
+    if not fits:
+        return None
+    best = fits[0][1]
+    begin_there = replace(best.point, sizes=best.point.sizes[: len(null.point.sizes)])
+    again = fit(problem, null.hypothesis, begin_there, iterations=20)
+    return again if again is not None and again.cost < null.cost - _BETTER else None
+
+
+def _judged(problem: Problem, null: Fit, fits: Sequence[tuple[Score, Fit]]) -> tuple[Candidate, ...]:
+    """Gains under one whitener, the best candidate's, and the rules for those that lead."""
+    if not fits:
+        return ()
+    whitener = autoregression(fits[0][1].tangents)
+    costs = {s.effect.key: f.cost for s, f in fits}
+    base = null.cost
+    if whitener.coefficients.shape[0]:
+        near = [(s, f) for s, f in fits if f.cost - fits[0][1].cost < _NEAR]
+        base = _whitened(problem, null, whitener)
+        costs = {s.effect.key: _whitened(problem, f, whitener) for s, f in near}
+    ranked = []
+    for s, f in fits:
+        cost = costs.get(s.effect.key)
+        gain = 2.0 * (null.cost - f.cost if cost is None else base - cost) - 2.0 * (
+            len(s.effect.parameters) - 1
+        )
+        ranked.append((cost is not None, gain, s, f))
+    ranked.sort(key=lambda r: (not r[0], -r[1]))
     reference = leave_one_out(problem, null)
     judged: list[Candidate] = []
-    accepted = np.inf
-    for gain, s, found in fits:
-        if gain < accepted - TIE and np.isfinite(accepted):
-            judged.append(_outdone(s, found, gain))
+    accepted = -np.inf
+    for _, gain, s, f in ranked:
+        if gain < accepted - TIE:
+            judged.append(outdone(s, f, gain))
             continue
-        candidate = _candidate(problem, null, s, found, gain, reference)
+        candidate = judge(problem, null, s, f, gain, reference)
         judged.append(candidate)
-        if not candidate.reasons and not np.isfinite(accepted):
-            accepted = gain
+        if not np.isfinite(accepted) and (not candidate.reasons or candidate.reasons == (IMMATERIAL,)):
+            accepted = gain  # what explains less than an immaterial effect is not the cause either
     return tuple(judged)
 
 
+def _whitened(problem: Problem, found: Fit, whitener: Whitener) -> float:
+    again = fit(problem, found.hypothesis, found.point, whitener, iterations=6, free_levels=False)
+    return np.inf if again is None else again.cost
+
+
 def _refit(problem: Problem, null: Fit, s: Score, rival: float) -> Fit | None:
-    """The null and one effect, all free, from the size that the score suggests and from a third of it."""
+    """The null and one effect, all free, from shares of the size that the score suggests."""
     hypothesis = null.hypothesis.plus(s.effect)
-    low, high = _ends(s.effect)
     best: Fit | None = None
-    for share in (1.0, 0.3):
-        size = min(max(share * s.size, low), high)
-        sizes = np.concatenate([null.point.sizes, s.direction.sizes(size)])
-        tried = fit(problem, hypothesis, replace(null.point, sizes=sizes), rival=rival)
+    for share in _shares(problem, null, hypothesis, s)[:2]:
+        tried = fit(problem, hypothesis, _from(null, s, share), rival=rival)
         if tried is not None and (best is None or tried.cost < best.cost):
             best = tried
         if best is not None and best.converged and null.cost - best.cost > 0.2 * s.z**2:
@@ -177,61 +195,25 @@ def _refit(problem: Problem, null: Fit, s: Score, rival: float) -> Fit | None:
     return best
 
 
-def _ends(effect: Effect) -> tuple[float, float]:
-    """Plausible sizes of an effect."""
-    first = effect.parameters[0]
-    low, high = sorted((first.size(first.low), first.size(first.high)))
-    return (
-        max(low, 0.0) if first.one_sided and not first.reciprocal else 0.0 if first.reciprocal else low
-    ), high
+def _from(null: Fit, s: Score, share: float) -> Point:
+    low, high = ends(s.effect)
+    size = min(max(share * s.size, low), high)
+    return replace(null.point, sizes=np.concatenate([null.point.sizes, s.direction.sizes(size)]))
 
 
-def _outdone(s: Score, found: Fit, gain: float) -> Candidate:
-    at = len(found.point.sizes) - len(s.effect.parameters)
-    nothing = np.full(len(found.likelihood), np.nan)
-    size, std = float(found.point.sizes[at]), float(np.sqrt(found.covariance[S + at, S + at]))
-    return Candidate(s, found, gain, nothing, nothing, size, std, ("another effect explains more",))
-
-
-def _candidate(
-    problem: Problem, null: Fit, s: Score, best: Fit, gain: float, reference: tuple[Array, list[Assessment]]
-) -> Candidate:
-    first = s.effect.parameters[0]
-    at = len(null.point.sizes)
-    size, std = float(best.point.sizes[at]), float(np.sqrt(best.covariance[S + at, S + at]))
-    likelihood, assessed = leave_one_out(problem, best)
-    likelihood_gain = reference[0] - likelihood
-    low = lower(null.hypothesis.change(null.point.sizes))
-    free = []
-    for i, (before, after) in enumerate(zip(reference[1], assessed, strict=True)):
-        weight = floor(problem.records[i], problem, low, null.point.shared, null.point.local[i])
-        squares = [float(((a.residual / weight) ** 2).mean()) for a in (before, after)]
-        free.append(squares[0] - squares[1])
-    reasons = []
-    if not best.converged:
-        reasons.append("its refit did not converge")
-    if gain < _SIGNIFICANT:
-        reasons.append("refitted, it explains nothing significant")
-    if _worse(likelihood_gain):
-        reasons.append("it worsens the likelihood of records left out")
-    if _worse(np.array(free)):
-        reasons.append("it worsens the free run of records left out")
-    if abs(size) < first.material:
-        reasons.append(f"its size is immaterial (below {first.material:g})")
-    ends = _ends(s.effect)
-    span = ends[1] - ends[0]
-    if ends[1] - size < 1e-6 * span or (size - ends[0] < 1e-6 * span and ends[0] != 0.0):
-        reasons.append("its size ends at the limit of what is plausible")
-    return Candidate(s, best, gain, likelihood_gain, np.array(free), size, std, tuple(reasons))
-
-
-def _worse(gains: Array) -> bool:
-    """Whether records left out lose: their sum is negative by more than its own standard error."""
-    total = float(gains.sum())
-    if not np.isfinite(total):
-        return True
-    error = float(gains.std(ddof=1) * np.sqrt(gains.size)) if gains.size > 2 else 0.0
-    return total < -error
+def _shares(problem: Problem, null: Fit, hypothesis: Hypothesis, s: Score) -> list[float]:
+    """Shares of the size that the score suggests, the most likely first, the rest as the null has it."""
+    costs = []
+    for share in _SHARES:
+        point = _from(null, s, share)
+        change = hypothesis.change(point.sizes)
+        total = 0.0
+        for record, local in zip(problem.records, point.local, strict=True):
+            found = respond(record, problem.settings, change, point.shared, local)
+            white = found.e @ found.white.T
+            total += 0.5 * len(white) * found.logdet + 0.5 * float((white**2).sum())
+        costs.append(total if np.isfinite(total) else np.inf)
+    return [_SHARES[i] for i in np.argsort(costs, kind="stable")]
 
 
 def _tied(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:

@@ -1,0 +1,265 @@
+"""What trace.json says of flights with nothing, one effect and two; contract 3; what it must not depend on."""
+
+import json
+import math
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trace_flights as flights
+from trace_flights import log_of
+
+from airtruth import aircraft as planes
+from airtruth.effects.library import EFFECTS
+from airtruth.errors import ConfigurationError
+from airtruth.physics.short_period import PARAMETERS
+from airtruth.trace import TraceOptions, run, trace
+
+CASES = {
+    "null": (),
+    "delay": (("elevator_delay", {"delay_s": 0.03}),),
+    "two": (("elevator_delay", {"delay_s": 0.03}), ("accelerometer_arm", {"x_m": 0.4})),
+}
+CHANNELS = {"alpha_rad", "q_rad_s", "az_m_s2"}
+FEW = ("elevator_delay", "gyro_scale", "accelerometer_arm")
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("answers")
+    return {name: flights.fly(folder / name, effects) for name, effects in CASES.items()}
+
+
+@pytest.fixture(scope="module")
+def traced(flown):
+    return {
+        name: run([place], "gtm", TraceOptions(), place.parent / "traced").answer
+        for name, place in flown.items()
+    }
+
+
+def stored(place):
+    return json.loads((place.parent / "traced" / "trace.json").read_text())
+
+
+def numbers(x):
+    if isinstance(x, dict):
+        return [n for v in x.values() for n in numbers(v)]
+    if isinstance(x, list):
+        return [n for v in x for n in numbers(v)]
+    return [x] if isinstance(x, int | float) and not isinstance(x, bool) else []
+
+
+# -- contract 3
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_contract_3(name, flown, traced):
+    a = stored(flown[name])
+    assert a == json.loads(json.dumps(traced[name]))
+    assert a["verdict"] in ("none", "traced", "one_of", "unexplained")
+    assert isinstance(a["provisional"], bool)
+    assert all(math.isfinite(n) for n in numbers(a))
+    for key in ("anomaly", "remaining"):
+        assert set(a[key]) == {"statistic", "p_value"}
+        assert 0.0 <= a[key]["p_value"] <= 1.0
+        assert a[key]["statistic"] >= 0.0
+    known = {e.name for e in EFFECTS.values()}
+    for e in a["effects"]:
+        assert {"name", "parameters", "p_value", "separation_sigma", "indistinguishable_from"} <= set(e)
+        assert e["name"] in known
+        assert set(e["indistinguishable_from"]) <= known - {e["name"]}
+        assert 0.0 <= e["p_value"] <= 0.05
+        assert e["separation_sigma"] >= 0.0
+        for p in e["parameters"].values():
+            assert set(p) == {"value", "std", "ci95"}
+            low, high = p["ci95"]
+            assert low < p["value"] < high
+            assert high - low == pytest.approx(2.0 * 1.96 * p["std"], rel=0.02)
+    for c in a["candidates"]:
+        assert {"name", "score", "p_value", "testable", "why_not"} <= set(c)
+        assert isinstance(c["testable"], bool)
+        assert c["testable"] or c["why_not"]
+    assert {c["name"] for c in a["candidates"]} == known
+    assert len(a["candidates"]) == len(EFFECTS)
+    assert set(a["error"]["channels"]) == CHANNELS
+    expected = {"declared", "before", "floor"} | ({"after"} if a["effects"] else set())
+    assert expected <= set(a["error"]) - {"channels"} <= expected | {"control"}
+    for stage in set(a["error"]) - {"channels"}:
+        assert set(a["error"][stage]) == {"fit", "held_out"}
+        for part in a["error"][stage].values():
+            assert set(part) == {"free_run", "innovation"}
+            assert all(set(found) == CHANNELS for found in part.values())
+    for which in ("declared", "before", "after"):
+        assert set(a["derivatives"][which]) == set(PARAMETERS)
+    assert set(a["detectability"]) >= {c["name"] for c in a["candidates"] if c["testable"]}
+    assert a["next_flight"].endswith(".")
+
+
+# -- what was flown is what is said
+
+
+def test_nothing_is_traced_where_nothing_is_missing(traced):
+    a = traced["null"]
+    assert (a["verdict"], a["provisional"], a["effects"], a["updated_aircraft"]) == ("none", False, [], None)
+    assert a["anomaly"]["p_value"] > 0.05
+    assert a["anomaly"] == a["remaining"]
+    assert a["derivatives"]["before"] == a["derivatives"]["after"]
+
+
+def test_a_delay_is_traced(flown, traced):
+    a = traced["delay"]
+    (e,) = a["effects"]
+    assert e["name"] == "elevator_delay"
+    assert a["verdict"] == ("one_of" if e["indistinguishable_from"] else "traced")
+    found = e["parameters"]["delay_s"]
+    assert abs(found["value"] - 0.03) < 3.0 * found["std"]
+    assert a["anomaly"]["p_value"] < 1e-6
+    assert a["remaining"]["p_value"] > 0.05
+    for channel in ("alpha_rad", "q_rad_s"):
+        before, after = (a["error"][s]["held_out"]["innovation"][channel] for s in ("before", "after"))
+        assert after <= before * 1.01
+    before, after = (a["error"][s]["held_out"]["free_run"]["q_rad_s"] for s in ("before", "after"))
+    assert after < before
+    assert after < 1.5 * a["error"]["floor"]["held_out"]["free_run"]["q_rad_s"]
+
+
+def test_two_effects_are_both_traced(traced):
+    a = traced["two"]
+    found = {e["name"]: e for e in a["effects"]}
+    assert set(found) == {"elevator_delay", "accelerometer_arm"}
+    for name, parameter, truth in (("elevator_delay", "delay_s", 0.03), ("accelerometer_arm", "x_m", 0.4)):
+        p = found[name]["parameters"][parameter]
+        assert abs(p["value"] - truth) < 3.0 * p["std"]
+
+
+@pytest.mark.parametrize("name", ["delay", "two"])
+def test_the_updated_aircraft_loads_and_says_what_was_added(name, traced):
+    folder = traced[name]["updated_aircraft"]
+    plane = planes.load(folder)
+    assert plane.name == "gtm"
+    assert plane.constants == planes.load("gtm").constants
+    if name == "two":
+        sensor = plane.file.sensors["az_m_s2"].x.value
+        stated = next(e for e in traced[name]["effects"] if e["name"] == "accelerometer_arm")
+        assert sensor == pytest.approx(stated["parameters"]["x_m"]["value"], rel=1e-6)
+
+
+# -- what is held out
+
+
+def test_default_holds_out_every_third(traced):
+    assert traced["null"]["records"] == {
+        "fitted": ["blind-000000", "blind-000001"],
+        "held_out": ["blind-000002"],
+    }
+
+
+def test_held_out_runs_serve_the_report_alone(flown):
+    """Another record held out: other errors there, and nothing of it in what is fitted."""
+    log = log_of(flown["delay"])
+    q = np.array(log.channels["q_rad_s"])
+    spoiled = q.copy()
+    spoiled[log.rows(1)] += 0.3 * np.sin(9.0 * log.t_s[log.rows(1)])
+    options = TraceOptions(hold_out=("blind-000001",), effects=FEW)
+    clean = trace(log, "gtm", options)
+    other = trace(replace(log, channels={**log.channels, "q_rad_s": spoiled}), "gtm", options)
+    assert clean["records"]["held_out"] == ["blind-000001"]
+    assert clean["records"]["fitted"] == ["blind-000000", "blind-000002"]
+    for key in ("verdict", "anomaly", "remaining", "effects", "candidates", "derivatives"):
+        assert clean[key] == other[key], key
+    before, after = (a["error"]["before"]["held_out"]["free_run"]["q_rad_s"] for a in (clean, other))
+    assert after > 2.0 * before
+
+
+def test_two_records_are_both_fitted_and_the_answer_is_provisional(flown):
+    a = trace(log_of(flown["delay"], [0, 1]), "gtm", TraceOptions(effects=FEW))
+    assert a["records"] == {"fitted": ["blind-000000", "blind-000001"], "held_out": []}
+    assert a["provisional"] is True
+    assert any("provisional" in note for note in a["notes"])
+    assert set(a["error"]["before"]) == {"fit"}
+
+
+def test_a_single_record_is_judged_on_its_halves(flown):
+    a = trace(log_of(flown["delay"], [0]), "gtm", TraceOptions(effects=FEW))
+    assert a["records"]["fitted"] == ["blind-000000, first half", "blind-000000, second half"]
+    assert a["provisional"] is True
+    assert a["verdict"] in ("none", "traced", "one_of", "unexplained")
+    assert any("halves" in note for note in a["notes"])
+
+
+# -- models
+
+
+def test_linear_model(flown):
+    a = trace(log_of(flown["delay"]), "gtm", TraceOptions(model="linear", effects=FEW))
+    assert a["model"] == "linear"
+    assert "elevator_delay" in {e["name"] for e in a["effects"]}
+
+
+def test_an_aircraft_without_a_model_is_linear_and_says_so(flown, tmp_path):
+    text = (planes.load("gtm").folder / "aircraft.toml").read_text()
+    kept, skip = [], False
+    for line in text.splitlines():
+        if line.startswith("["):
+            skip = line.startswith("[jsbsim")
+        if not skip:
+            kept.append(line)
+    (tmp_path / "paper").mkdir()
+    (tmp_path / "paper" / "aircraft.toml").write_text("\n".join(kept).replace('"gtm"', '"paper"', 1) + "\n")
+    found = run([flown["delay"]], tmp_path / "paper", TraceOptions(effects=FEW), tmp_path / "out")
+    assert found.answer["model"] == "linear"
+    assert any("no JSBSim model" in note for note in found.answer["notes"])
+    assert (tmp_path / "out" / "trace.json").exists()
+
+
+def test_candidates_can_be_chosen(flown):
+    a = trace(log_of(flown["null"]), "gtm", TraceOptions(effects=FEW))
+    assert {c["name"] for c in a["candidates"]} == set(FEW)
+    with pytest.raises(ConfigurationError, match=r"effect 'elevator_delai': did you mean 'elevator_delay'"):
+        trace(log_of(flown["null"]), "gtm", TraceOptions(effects=("elevator_delai",)))
+
+
+# -- what it must not depend on
+
+
+def test_threads_and_a_second_run_change_no_byte(flown, tmp_path, monkeypatch):
+    texts = []
+    for threads in (1, 2, 1):
+        folder = tmp_path / str(len(texts))
+        folder.mkdir()
+        monkeypatch.chdir(folder)
+        run([flown["two"]], "gtm", TraceOptions(threads=threads), Path("traced"))
+        texts.append((folder / "traced" / "trace.json").read_bytes())
+    assert texts[0] == texts[1] == texts[2]
+
+
+def test_nothing_that_tells_the_truth_is_read(flown, tmp_path, monkeypatch):
+    """plan.parquet and truth.parquet replaced by rubbish, or gone: the same bytes."""
+    texts = []
+    for name in ("as flown", "poisoned", "gone"):
+        copy = tmp_path / name
+        shutil.copytree(flown["delay"], copy / "flown")
+        for file in ("plan.parquet", "truth.parquet", "campaign.json", "manifest.jsonl"):
+            path = copy / "flown" / file
+            if name == "poisoned" and path.exists():
+                path.write_bytes(b"poison")
+            if name == "gone":
+                path.unlink(missing_ok=True)
+        monkeypatch.chdir(copy)
+        run(["flown"], "gtm", TraceOptions(effects=FEW), Path("traced"))
+        texts.append((copy / "traced" / "trace.json").read_bytes())
+    assert texts[0] == texts[1] == texts[2]
+
+
+def test_order_of_logs_does_not_matter(flown):
+    """Forward and backward: the same effects to a thousandth of their error."""
+    options = TraceOptions(hold_out=("blind-000001",), effects=FEW)
+    one, other = (trace(log_of(flown["delay"], order), "gtm", options) for order in ([0, 1, 2], [2, 1, 0]))
+    assert one["verdict"] == other["verdict"]
+    a, b = (x["effects"][0]["parameters"]["delay_s"] for x in (one, other))
+    assert a["value"] == pytest.approx(b["value"], abs=1e-3 * a["std"])
+    after, again = (x["error"]["after"]["held_out"]["free_run"] for x in (one, other))
+    assert after == pytest.approx(again, rel=1e-4)

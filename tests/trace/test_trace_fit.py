@@ -1,0 +1,247 @@
+"""The fit: its gradient, what it recovers, the autoregression, and that the answer depends on records alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trace_records as tr
+
+from airtruth.effects.change import Change
+from airtruth.effects.library import EFFECTS
+from airtruth.trace.fit import (
+    NO_WHITENER,
+    Hypothesis,
+    Point,
+    Tangent,
+    Whitener,
+    autoregression,
+    begin,
+    fit,
+    parts,
+    tangent,
+)
+from airtruth.trace.model import LOCAL, LOCAL_STEP, SHARED, SHARED_STEP, L, S
+from airtruth.units import DEG
+
+DELAY, ARM, KINK = (EFFECTS[k] for k in ("elevator_delay", "vane_arm", "elevator_asymmetry"))
+TWO = Hypothesis(Change(), (DELAY, ARM))
+MORE = np.array([0.15, -4.0, 0.03, -0.06, 3.0, 0.07])
+"""Increments of the derivatives, about one declared standard deviation each."""
+
+
+# -- gradient
+
+
+@pytest.fixture(scope="module")
+def off_optimum():
+    """A record, and a point some standard errors from everything that explains it."""
+    problem = tr.problem([tr.fly(np.random.default_rng(1), samples=150)])
+    point = tr.point(problem.records, [0.012, 0.2])
+    shared, local = point.shared.copy(), point.local.copy()
+    shared[:6] = 0.5 * MORE
+    shared[6:9] = [0.05, -0.08, 0.03]
+    shared[9:] = [0.3, 0.1]
+    local[0] += [0.001, 0.01, 0.3, -0.2, 0.002, 0.003, 0.02, 0.003, -0.0004, 0.2]
+    return problem, Point(shared, local, point.sizes)
+
+
+def likelihood(problem, point):
+    found = tangent(problem, 0, TWO, point)
+    return parts(found, NO_WHITENER, levels=True)[0]
+
+
+def moved(point, i, h):
+    shared, sizes, local = point.shared.copy(), point.sizes.copy(), point.local.copy()
+    if i < S:
+        shared[i] += h
+    elif i < S + sizes.size:
+        sizes[i - S] += h
+    else:
+        local[0, i - S - sizes.size] += h
+    return Point(shared, local, sizes)
+
+
+@pytest.mark.parametrize("name", [*SHARED, "delay", "arm", *LOCAL])
+def test_gradient_is_that_of_the_likelihood(off_optimum, name):
+    """Central differences of the negative log-likelihood itself; the fit's are one-sided, steps as in the model."""
+    problem, point = off_optimum
+    names = [*SHARED, "delay", "arm", *LOCAL]
+    steps = [*SHARED_STEP, 1e-3, 0.01, *LOCAL_STEP]
+    i = names.index(name)
+    _, gradient, information = parts(tangent(problem, 0, TWO, point), NO_WHITENER, levels=True)
+    h = 0.5 * steps[i]
+    expected = (likelihood(problem, moved(point, i, h)) - likelihood(problem, moved(point, i, -h))) / (
+        2.0 * h
+    )
+    # in standard errors: a hundredth of one is below what ends a search
+    unit = np.sqrt(information[i, i]) + 1e-12
+    assert gradient[i] / unit == pytest.approx(expected / unit, rel=0.01, abs=0.02)
+
+
+def test_information_is_the_expected_curvature():
+    """Mean gradient outer product over 40 simulated records is the information: diagonal of six derivatives.
+
+    A variance of 40 draws is within 3 sqrt(2/40) of its mean.
+    """
+    rng = np.random.default_rng(2)
+    scores = []
+    for _ in range(40):
+        problem = tr.problem([tr.fly(rng, samples=120, sigma_w=0.3)])
+        point = tr.point(problem.records)
+        local = np.zeros((1, L))
+        local[0, 9] = np.log(0.3)
+        made = tangent(problem, 0, tr.NOTHING, replace(point, local=local))
+        # the first second starts from a gust that the filter does not know
+        late = Tangent(made.r[25:], made.logdet, made.t[:, 25:], made.w, made.white)
+        _, gradient, information = parts(late, NO_WHITENER, levels=True)
+        scores.append(gradient[:6] / np.sqrt(np.diag(information)[:6]))
+    variance = np.mean(np.square(scores), axis=0)
+    assert np.abs(variance - 1.0).max() < 3.0 * np.sqrt(2.0 / 40.0)
+
+
+# -- what a fit recovers
+
+
+def recovered(noise, sigma_w, seed, hypothesis=tr.NOTHING, sizes=(), levels=True):
+    rng = np.random.default_rng(seed)
+    records = [
+        tr.fly(
+            rng,
+            tr.TRUTH + MORE,
+            sigma_w,
+            noise=noise,
+            amplitude=a * DEG,
+            bias=(0.003, -0.002, 0.05),
+            name=str(a),
+        )
+        for a in (2.0, -2.0, 3.0)
+    ]
+    problem = tr.problem(records)
+    start = begin(problem, hypothesis)
+    if not levels:
+        start.local[:, 9] = np.log(0.05)
+    found = fit(problem, hypothesis, replace(start, sizes=np.array(sizes, dtype=float)), free_levels=levels)
+    assert found is not None
+    assert found.converged
+    return found
+
+
+def test_noise_free_records_give_the_derivatives_back():
+    """What is left is the prior's pull and the second-order terms of a 3 deg doublet.
+
+    Levels are held at the declared noise and little gust: free ones would follow the residuals to nothing.
+    """
+    found = recovered(np.zeros(3), 0.0, 3, levels=False)
+    error = np.sqrt(np.diag(found.covariance)[:6])
+    assert (np.abs(found.point.shared[:6] - MORE) < error).all()
+    assert (error[3:] < 0.2 * np.abs(MORE[3:])).all()
+    np.testing.assert_allclose(found.point.shared[[3, 5]], MORE[[3, 5]], rtol=0.05)
+
+
+@pytest.mark.parametrize("seed", [4, 5, 6])
+def test_noisy_records_give_the_derivatives_within_their_errors(seed):
+    found = recovered(tr.SETTINGS.noise, 0.3, seed)
+    error = np.sqrt(np.diag(found.covariance)[:6])
+    assert (np.abs(found.point.shared[:6] - MORE) < 3.0 * error).all()
+    # three records of 0.3 m/s: the mean log level is within 0.5 (one correlation time is a whole record)
+    assert found.point.local[:, 9].mean() == pytest.approx(np.log(0.3), abs=0.5)
+    np.testing.assert_allclose(found.point.shared[6:9], 0.0, atol=0.15)
+
+
+def test_an_effect_that_is_not_there_has_no_size():
+    found = recovered(tr.SETTINGS.noise, 0.3, 7, Hypothesis(Change(), (KINK,)), [0.0])
+    assert abs(found.point.sizes[0]) < 3.0 * np.sqrt(found.covariance[S, S])
+
+
+def test_a_rival_out_of_reach_ends_a_search_early():
+    problem = tr.problem([tr.fly(np.random.default_rng(1), tr.TRUTH + MORE)])
+    start = begin(problem, tr.NOTHING)
+    full = fit(problem, tr.NOTHING, start)
+    assert fit(problem, tr.NOTHING, start, rival=full.cost - 1e6).cost >= full.cost - 1e-6
+
+
+def test_a_start_that_cannot_be_evaluated_gives_none():
+    problem = tr.problem([tr.fly(np.random.default_rng(1), samples=60)])
+    start = tr.point(problem.records)
+    start.shared[3] = np.nan
+    assert fit(problem, tr.NOTHING, start) is None
+
+
+# -- autoregression
+
+
+def innovations(rng, a, samples, records):
+    found = []
+    for _ in range(records):
+        r = np.zeros((samples + 50, 3))
+        for k in range(1, len(r)):
+            r[k] = a @ r[k - 1] + rng.standard_normal(3)
+        found.append(Tangent(r[50:], 0.0, np.zeros((0, samples, 3)), np.zeros((0, 3, 3)), np.eye(3)))
+    return found
+
+
+def test_autoregression_finds_a_known_one():
+    """Var(1), 4 x 2000 samples: coefficients within 4/sqrt(8000) of the known ones; what is left is white."""
+    a = np.array([[0.5, 0.1, 0.0], [-0.2, 0.3, 0.1], [0.0, 0.2, -0.4]])
+    rng = np.random.default_rng(8)
+    tangents = innovations(rng, a, 2000, 4)
+    found = autoregression(tangents)
+    assert found.coefficients.shape == (1, 3, 3)
+    np.testing.assert_allclose(found.coefficients[0], a, atol=4.0 / np.sqrt(8000.0) / np.sqrt(1.0 - 0.5))
+    whitened = np.concatenate([found.apply(t.r)[1:] for t in tangents])
+    np.testing.assert_allclose(whitened.T @ whitened / len(whitened), np.eye(3), atol=0.01)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_autoregression_leaves_white_noise_alone(seed):
+    found = autoregression(innovations(np.random.default_rng(seed), np.zeros((3, 3)), 250, 3))
+    assert found.coefficients.shape == (0, 3, 3)
+    x = np.random.default_rng(seed).standard_normal((4, 7, 3))
+    np.testing.assert_array_equal(found.apply(x), x)
+
+
+def test_whitener_filters_along_the_samples():
+    """Two lags by hand."""
+    rng = np.random.default_rng(9)
+    a, root, x = rng.standard_normal((2, 3, 3)), rng.standard_normal((3, 3)), rng.standard_normal((5, 6, 3))
+    out = Whitener(a, root).apply(x)
+    for n in range(5):
+        for k in range(6):
+            left = x[n, k].copy()
+            for j in (1, 2):
+                if k >= j:
+                    left -= a[j - 1] @ x[n, k - j]
+            np.testing.assert_allclose(out[n, k], root @ left, rtol=1e-10, atol=1e-12)
+
+
+# -- the answer depends on the records alone
+
+
+@pytest.fixture(scope="module")
+def three():
+    rng = np.random.default_rng(10)
+    records = [tr.fly(rng, tr.TRUTH + MORE, amplitude=a * DEG, samples=150, name=str(a)) for a in (2, -2, 1)]
+    return records, fit(tr.problem(records), TWO, replace(tr.point(records), sizes=np.array([0.003, 0.05])))
+
+
+def test_threads_change_no_bit(three):
+    records, one = three
+    again = fit(
+        tr.problem(records, threads=2), TWO, replace(tr.point(records), sizes=np.array([0.003, 0.05]))
+    )
+    assert again.cost == one.cost
+    for name in ("shared", "local", "sizes"):
+        np.testing.assert_array_equal(getattr(again.point, name), getattr(one.point, name))
+    np.testing.assert_array_equal(again.covariance, one.covariance)
+
+
+def test_order_of_records_does_not_matter(three):
+    records, one = three
+    order = [2, 0, 1]
+    turned = [records[i] for i in order]
+    again = fit(tr.problem(turned), TWO, replace(tr.point(turned), sizes=np.array([0.003, 0.05])))
+    error = np.sqrt(np.diag(one.covariance))
+    assert again.cost == pytest.approx(one.cost, rel=1e-8)
+    np.testing.assert_allclose(again.point.shared / error[:S], one.point.shared / error[:S], atol=1e-6)
+    np.testing.assert_allclose(again.point.sizes / error[S:], one.point.sizes / error[S:], atol=1e-6)
+    np.testing.assert_allclose(again.point.local, one.point.local[order], atol=1e-7)

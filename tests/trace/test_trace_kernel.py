@@ -1,0 +1,481 @@
+"""The filter's motion, sensors, gain and linearisation against independent calculations."""
+
+import math
+
+import numpy as np
+import pytest
+import trace_records as tr
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm, solve_discrete_are
+
+from airtruth.effects.change import AeroTerm, Change, DeclaredTerm, SensorTerm, StateTerm
+from airtruth.effects.library import EFFECTS
+from airtruth.trace import kernel
+from airtruth.trace.lower import lower
+from airtruth.trace.model import respond
+from airtruth.trace.plant import Plant
+from airtruth.units import DEG, G0
+
+SMALL = 1e-6 * DEG
+"""Elevator so small that the filter's sines and cosines are straight to 1e-9."""
+SUB = 8
+T = np.arange(151) * tr.DT
+U = tr.doublet(T, SMALL)
+ARMS, ONES = np.zeros(3), np.ones(3)
+
+
+def free(change=None, sub=SUB, amplitude=SMALL):
+    """Outputs of a free run from the trim, deviations from its first sample."""
+    made = tr.record(np.zeros((len(T), 3)), lambda t: tr.doublet(t, amplitude), sub=sub)
+    shared, local = tr.still()
+    y = -respond(made, tr.SETTINGS, change or Change(), shared, local, free_run=True).e
+    return y - y[0]
+
+
+def close(found, expected, tolerance):
+    """Largest difference of a channel over its largest value."""
+    error = np.abs(found - expected).max(axis=0) / np.abs(expected).max(axis=0)
+    assert (error < tolerance).all(), error
+
+
+def test_free_run_is_the_exact_discretisation():
+    a, b, c, d = tr.motion()
+    expected, _ = tr.run(a, b, c, d, U, tr.DT)
+    close(free(), expected, 1e-6)
+
+
+def test_free_run_converges_with_the_fourth_order_of_runge_kutta():
+    expected, _ = tr.run(*tr.motion(), U, tr.DT)
+    errors = [np.abs(free(sub=sub) - expected)[:, 0].max() for sub in (2, 4, 8)]
+    assert errors[0] < 1e-4 * np.abs(expected[:, 0]).max()
+    assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.3)
+    assert errors[1] / errors[2] == pytest.approx(16.0, rel=0.3)
+
+
+# -- nonlinear motion
+
+
+def curved():
+    """A plant whose tables are one cell, so that forces are smooth products of the three signals."""
+    rng = np.random.default_rng(3)
+    base = tr.plant().values
+    values = base * (1.0 + 0.2 * rng.standard_normal(base.shape))
+    values[..., 0] = -0.05 + 0.02 * rng.standard_normal((2, 2, 2))
+    values[..., 1] = base[..., 1] + 0.3 * rng.standard_normal((2, 2, 2))
+    values[..., 2] = base[..., 2] + 0.02 * rng.standard_normal((2, 2, 2))
+    axis = np.array([-1.0, 1.0])
+    return Plant(
+        tr.GTM,
+        axis,
+        axis,
+        axis,
+        values,
+        np.array([30.0, -4.0, 1.5]),
+        0.02,
+        -0.01,
+        0.0,
+        25.0,
+        tr.TRUTH,
+        tr.plant().derivative_cov,
+        None,
+    )
+
+
+def forces(plant, alpha, surface, qhat):
+    """Trilinear products over axes of -1 and 1."""
+    share = [0.5 * (1.0 + s) for s in (alpha, surface, qhat)]
+    f = np.zeros(3)
+    for i in (0, 1):
+        for j in (0, 1):
+            for n in (0, 1):
+                weights = [s if k else 1.0 - s for s, k in zip(share, (i, j, n), strict=True)]
+                f += math.prod(weights) * plant.values[i, j, n]
+    return f
+
+
+def test_nonlinear_free_run_against_dop853():
+    """Varying airspeed, density, attitude and speed over ground, declared changes, increments, offsets, biases."""
+    plant = curved()
+    mass, inertia, factor, cg, arm = 1.1, 0.9, 1.2, 0.03, 0.1
+    change = Change(
+        declared=(
+            DeclaredTerm("mass", mass),
+            DeclaredTerm("inertia", inertia),
+            DeclaredTerm("elevator", factor),
+            DeclaredTerm("cg", cg),
+            DeclaredTerm("thrust_arm", arm),
+        )
+    )
+
+    def elevator(t):
+        return 0.03 * np.sin(6.0 * t)
+
+    def theta(t):
+        return 0.05 + 0.04 * np.sin(2.0 * t)
+
+    def speed(t):
+        return 42.0 + 1.5 * np.sin(1.3 * t)
+
+    def ground(t):
+        return 41.0 + 0.5 * t
+
+    def density(t):
+        return 1.0 - 0.01 * t
+
+    shared, local = tr.still()
+    shared[:6] = [0.1, 2.0, -0.05, 0.03, -3.0, 0.1]
+    shared[10] = 0.04
+    local[:2] = [0.06, -0.1]
+    local[4:9] = [0.001, -0.002, 0.05, 0.01, -0.004]
+    c = tr.C
+
+    def rates(t, x):
+        alpha_ground, q = x
+        v, vg = speed(t), ground(t)
+        qbar = 0.5 * density(t) * v * v
+        alpha = theta(t) - math.asin(vg * math.sin(theta(t) - alpha_ground) / v)
+        surface = plant.trim_elevator_rad + factor * (elevator(t) - plant.trim_elevator_rad)
+        qhat = q * c.chord_m / (2.0 * v)
+        fx, fz, fm = qbar * forces(plant, alpha, surface, qhat) + plant.constant * 1.04
+        states = np.array([alpha - plant.trim_alpha_rad, qhat, surface - plant.trim_elevator_rad])
+        lift = local[7] + shared[:3] @ states
+        moment = local[8] + shared[3:6] @ states
+        fz -= qbar * c.wing_area_m2 * lift
+        fm += (
+            qbar * c.wing_area_m2 * c.chord_m * moment
+            - cg * c.chord_m * fz  # a CG aft of the forces' old point: nose-up for an upward force
+            + plant.thrust_n * arm
+        )
+        m = c.mass_kg * mass
+        turn = (fz * math.cos(alpha) - fx * math.sin(alpha)) / (m * vg)
+        slope = [q + turn + G0 * math.cos(theta(t) - alpha_ground) / vg, fm / (c.inertia_yy_kg_m2 * inertia)]
+        return slope, (alpha, q, fz / m)
+
+    end = 2.0
+    t = np.arange(round(end / tr.DT) + 1) * tr.DT
+    solved = solve_ivp(
+        lambda t, x: rates(t, x)[0], (0.0, end), local[:2], "DOP853", t, rtol=1e-12, atol=1e-14
+    )
+    expected = np.array([rates(s, x)[1] for s, x in zip(t, solved.y.T, strict=True)]) + local[4:7]
+    made = tr.record(
+        np.zeros((len(t), 3)), elevator, theta, 16, v=speed, density=density, ground=ground, plant_=plant
+    )
+    found = -respond(made, tr.SETTINGS, change, shared, local, free_run=True).e
+    close(found, expected, 1e-7)
+
+
+# -- terms of effects, by the rates at one state
+
+
+def rates_at(change, x=(0.04, 0.3), de=0.05, shared=None):
+    low = lower(change)
+    states = sum(1 if k == 0 else 2 for k in low.state_index[:, 0])
+    state = np.zeros(kernel.CORE + states)
+    state[:2] = x
+    out = np.zeros(state.size)
+    qbar = 0.5 * tr.DENSITY * tr.V**2
+    az = kernel.rates(state, de, tr.V, tr.V, qbar, 0.04, 0.0, 0.0, tr.plane(change, shared), out)
+    return out, az
+
+
+FORCE = 0.5 * tr.DENSITY * tr.V**2 * tr.C.wing_area_m2
+HALF = 0.5 * tr.C.chord_m / tr.V
+VALUES = {"alpha": 0.04, "elevator": 0.05, "qhat": 0.3 * HALF}
+
+
+@pytest.mark.parametrize("signal", sorted(VALUES))
+@pytest.mark.parametrize("shape", ["linear", "quadratic", "above", "below"])
+@pytest.mark.parametrize("side", [-0.5, 0.5])
+def test_shapes_of_aerodynamic_terms(signal, shape, side):
+    at = VALUES[signal] * (1.0 + side)
+    s = VALUES[signal] - at
+    f = {"linear": s, "quadratic": s * s, "above": max(0.0, s), "below": min(0.0, s)}[shape]
+    (plain, az), amplitude = rates_at(Change()), 0.7
+    moment, az_moment = rates_at(Change(aero=(AeroTerm("Cm", signal, shape, amplitude, at),)))
+    assert moment[1] - plain[1] == pytest.approx(
+        FORCE * tr.C.chord_m * amplitude * f / tr.C.inertia_yy_kg_m2, rel=1e-9, abs=1e-12
+    )
+    assert az_moment == az
+    lift, az_lift = rates_at(Change(aero=(AeroTerm("CL", signal, shape, amplitude, at),)))
+    assert az_lift - az == pytest.approx(-FORCE * amplitude * f / tr.C.mass_kg, rel=1e-9, abs=1e-12)
+    assert lift[0] - plain[0] == pytest.approx(
+        -FORCE * amplitude * f * math.cos(0.04) / (tr.C.mass_kg * tr.V), rel=1e-9, abs=1e-13
+    )
+    assert lift[1] == plain[1]
+
+
+def test_lift_in_alpha_dot_is_in_proportion_to_the_alpha_dot_that_it_changes():
+    amplitude = 12.0
+    _, az = rates_at(Change())
+    out, az_more = rates_at(Change(aero=(AeroTerm("CL", "alpha_dot_hat", "linear", amplitude),)))
+    lift = -(az_more - az) * tr.C.mass_kg / FORCE
+    assert lift == pytest.approx(amplitude * out[0] * HALF, rel=1e-9)
+
+
+def test_moment_in_alpha_dot_takes_the_motion_over_ground():
+    plain, _ = rates_at(Change())
+    out, _ = rates_at(Change(aero=(AeroTerm("Cm", "alpha_dot_hat", "linear", -9.0),)))
+    assert out[0] == plain[0]
+    assert (out[1] - plain[1]) * tr.C.inertia_yy_kg_m2 / (FORCE * tr.C.chord_m) == pytest.approx(
+        -9.0 * plain[0] * HALF, rel=1e-9
+    )
+
+
+def test_declared_terms_at_one_state():
+    plain, az = rates_at(Change())
+    heavy, az_heavy = rates_at(Change(declared=(DeclaredTerm("mass", 1.25),)))
+    assert az_heavy == pytest.approx(az / 1.25, rel=1e-12)
+    assert heavy[1] == plain[1]
+    inert, _ = rates_at(Change(declared=(DeclaredTerm("inertia", 0.8),)))
+    assert inert[1] == pytest.approx(plain[1] / 0.8, rel=1e-12)
+    twice, _ = rates_at(Change(declared=(DeclaredTerm("mass", 1.25), DeclaredTerm("mass", 0.8))))
+    np.testing.assert_allclose(twice, plain, rtol=1e-12)
+
+
+# -- effects with states, exactly
+
+
+def augmented(name, kind, signal, time_s, damping, coefficient, amplitude):
+    """Linear system with an effect's state: coefficient += amplitude (x - signal)."""
+    a, b, c, d = tr.motion()
+    extra = 1 if kind == "lag" else 2
+    n = 5 + extra
+    big, bb, cc = np.zeros((n, n)), np.zeros(n), np.zeros((3, n))
+    big[:5, :5], bb[:5], cc[:, :5] = a, b, c
+    drive, direct = np.zeros(n), 0.0
+    if signal == "alpha":
+        drive[0] = 1.0
+    elif signal == "elevator":
+        direct = 1.0
+    elif signal == "qhat":
+        drive[1] = HALF
+    if kind == "lag":
+        big[5] = drive / time_s
+        big[5, 5], bb[5] = -1.0 / time_s, direct / time_s
+    else:
+        wn = 1.0 / time_s
+        big[5, 6], big[6] = 1.0, wn * wn * drive
+        big[6, 5], big[6, 6], bb[6] = -wn * wn, -2.0 * damping * wn, wn * wn * direct
+    late, ahead = -drive, -direct
+    late[5] = 1.0
+    if coefficient == "Cm":
+        gain = FORCE * tr.C.chord_m / tr.C.inertia_yy_kg_m2 * amplitude
+        big[1] += gain * late
+        bb[1] += gain * ahead
+    else:
+        gain = -FORCE / tr.C.mass_kg * amplitude
+        big[0] += gain / tr.V * late
+        bb[0] += gain / tr.V * ahead
+        cc[2] += gain * late
+        d = d + np.array([0.0, 0.0, gain * ahead])
+    return big, bb, cc, d
+
+
+@pytest.mark.parametrize("coefficient", ["CL", "Cm"])
+@pytest.mark.parametrize("signal", ["alpha", "elevator", "qhat"])
+@pytest.mark.parametrize(("kind", "time_s", "damping"), [("lag", 0.15, 0.0), ("mode", 0.05, 0.1)])
+def test_states_of_effects(coefficient, signal, kind, time_s, damping):
+    amplitude = 3.0 if signal == "qhat" else 0.4
+    change = Change(
+        states=(StateTerm("own", kind, signal, time_s, damping),),
+        aero=(
+            AeroTerm(coefficient, "own", "linear", amplitude),
+            AeroTerm(coefficient, signal, "linear", -amplitude),
+        ),
+    )
+    expected, _ = tr.run(*augmented("own", kind, signal, time_s, damping, coefficient, amplitude), U, tr.DT)
+    close(free(change), expected, 3e-6)
+    plain, _ = tr.run(*tr.motion(), U, tr.DT)
+    assert np.abs(expected - plain)[:, 1].max() > 3e-4 * np.abs(plain[:, 1]).max()
+
+
+def test_two_states_do_not_take_each_other_s_place():
+    """A mode has two places; a lag that follows it is found behind both."""
+    mode, lag = EFFECTS["elastic_mode"], EFFECTS["lift_lag"]
+    first = mode.change({"dCmalpha": 0.4, "frequency_hz": 3.0, "damping": 0.1})
+    second = lag.change({"dCLalpha": 1.0, "tau_s": 0.2})
+    np.testing.assert_allclose(free(first + second), free(second + first), rtol=0.0, atol=1e-14)
+    assert np.abs(free(first + second) - free(first)).max() > 1e-9
+
+
+# -- sensors of a known motion
+
+FINE_STEPS = 20
+
+
+def known():
+    """The exact motion every DT/FINE_STEPS from half a second before the record."""
+    t = np.arange(-25 * FINE_STEPS, 150 * FINE_STEPS + 1) * tr.DT / FINE_STEPS
+    y, x = tr.run(*tr.motion(), tr.doublet(t, SMALL), tr.DT / FINE_STEPS)
+    return t, y, x
+
+
+def sampled(t, y):
+    return y[25 * FINE_STEPS :: FINE_STEPS]
+
+
+def test_scales_and_arms():
+    """alpha - q x/V, az - x q_dot with q_dot of the equation of motion; then the scale."""
+    change = Change(
+        sensors=(
+            SensorTerm("alpha_rad", "arm", 0.8),
+            SensorTerm("az_m_s2", "arm", -0.3),
+            SensorTerm("alpha_rad", "scale", 1.1),
+            SensorTerm("q_rad_s", "scale", 0.9),
+            SensorTerm("az_m_s2", "scale", 1.05),
+        )
+    )
+    a, b, c, d = tr.motion()
+    y, x = tr.run(a, b, c, d, U, tr.DT)
+    q_dot = x @ a[1] + b[1] * U
+    expected = np.column_stack(
+        [1.1 * (y[:, 0] - 0.8 / tr.V * y[:, 1]), 0.9 * y[:, 1], 1.05 * (y[:, 2] + 0.3 * q_dot)]
+    )
+    close(free(change), expected, 1e-6)
+
+
+def test_bias_adds_after_all():
+    made = tr.record(np.zeros((5, 3)), 0.0)
+    change = Change(sensors=(SensorTerm("alpha_rad", "bias", 0.01), SensorTerm("alpha_rad", "scale", 2.0)))
+    shared, local = tr.still()
+    y = -respond(made, tr.SETTINGS, change, shared, local, free_run=True).e
+    np.testing.assert_allclose(y[:, 0], 0.01, atol=1e-12)
+
+
+@pytest.mark.parametrize("delay", [0.004, 0.013, 0.02, 0.051])
+def test_delayed_sensors(delay):
+    """The motion so much earlier, from its own fine grid."""
+    change = Change(sensors=tuple(SensorTerm(c, "delay", delay) for c in ("alpha_rad", "q_rad_s", "az_m_s2")))
+    t, y, _ = known()
+    shift = round(delay / tr.DT * FINE_STEPS)
+    assert shift * tr.DT / FINE_STEPS == pytest.approx(delay)
+    close(free(change), sampled(t, np.roll(y, shift, axis=0)), 3e-5)
+
+
+@pytest.mark.parametrize("lag", [0.005, 0.03, 0.2])
+def test_lagging_sensors(lag):
+    """tau y' = x - y as further states of the exact discretisation.
+
+    The filter takes the signal as linear over half a step h: w^2 h^2/48 of it at 7 rad/s and 5 ms is 3e-5.
+    """
+    change = Change(sensors=tuple(SensorTerm(c, "lag", lag) for c in ("alpha_rad", "q_rad_s", "az_m_s2")))
+    a, b, c, d = tr.motion()
+    big, bb, cc = np.zeros((8, 8)), np.concatenate([b, d / lag]), np.zeros((3, 8))
+    big[:5, :5], big[5:, :5], big[5:, 5:], cc[:, 5:] = a, c / lag, -np.eye(3) / lag, np.eye(3)
+    expected, _ = tr.run(big, bb, cc, np.zeros(3), U, tr.DT)
+    close(free(change), expected, 1.2e-4)
+
+
+# -- gain and linearisation
+
+
+def linearised(change=None, lags=None, sigma_w=0.3, local=None):
+    low = lower(change or Change())
+    motion = kernel.CORE + sum(1 if k == 0 else 2 for k in low.state_index[:, 0])
+    lags = np.zeros(3) if lags is None else lags
+    n = motion + int((lags > 0.0).sum())
+    a, c = np.empty((n, n)), np.empty((3, n))
+    shared, local = tr.still()
+    local[9] = np.log(sigma_w)
+    plane = tr.plane(change, shared, local)
+    kernel.linear(
+        np.zeros(n),
+        0.0,
+        tr.V,
+        0.5 * tr.DENSITY * tr.V**2,
+        0.0,
+        motion,
+        lags,
+        plane,
+        low.arms,
+        low.scales,
+        a,
+        c,
+    )
+    return a, c, plane
+
+
+def test_linearisation_is_the_linear_model_s():
+    """Central differences over 0.01 rad: cosines cost h^2/6 of the slope."""
+    a, c, _ = linearised()
+    expected_a, _, expected_c, _ = tr.motion(sigma_w=0.3)
+    scale = np.abs(expected_a).max(axis=1, keepdims=True)
+    np.testing.assert_allclose(a / scale, expected_a / scale, atol=1e-4)
+    np.testing.assert_allclose(c, expected_c, rtol=1e-4, atol=1e-6)
+
+
+def test_linearisation_of_lagging_sensors():
+    lags = np.array([0.05, 0.0, 0.02])
+    a, c, _ = linearised(lags=lags)
+    plain_a, plain_c, _ = linearised()
+    np.testing.assert_array_equal(a[:5, :5], plain_a)
+    np.testing.assert_allclose(a[5], [*plain_c[0] / 0.05, -20.0, 0.0])
+    np.testing.assert_allclose(a[6], [*plain_c[2] / 0.02, 0.0, -50.0])
+    np.testing.assert_array_equal(c, [[0, 0, 0, 0, 0, 1, 0], [*plain_c[1], 0, 0], [0, 0, 0, 0, 0, 0, 1]])
+
+
+@pytest.mark.parametrize("sigma_w", [0.05, 0.3, 2.0])
+@pytest.mark.parametrize("delays", [np.zeros(3), np.array([0.01, 0.03, 0.0])])
+def test_steady_gain_solves_the_riccati_equation(sigma_w, delays):
+    """K, S and the whitener against scipy's DARE with Van Loan's noise covariance and expm of the delay.
+
+    The filter's series for exp(-A d) ends with the fifth power: 1e-4 at 30 ms.
+    """
+    a, c, plane = linearised(sigma_w=sigma_w)
+    variance = tr.SETTINGS.noise**2
+    k_gain, white, s, logdet = kernel.gain(a, c, tr.V, delays, plane[0], variance, tr.DT)
+    late = np.stack([row @ expm(-a * d) for row, d in zip(c, delays, strict=True)])
+    q = tr.noise_step(a, tr.DT, np.array([0.0, 0.0, 2.0 * tr.V / tr.LENGTH_W, 0.0, 0.0]))
+    p = solve_discrete_are(expm(a * tr.DT).T, late.T, q + 1e-18 * np.eye(5), np.diag(variance))
+    expected = late @ p @ late.T + np.diag(variance)
+    tolerance = 3e-4 if delays.any() else 1e-6
+    spread = np.sqrt(np.diag(expected))
+    unit = np.outer(spread, spread)
+    np.testing.assert_allclose(s / unit, expected / unit, atol=tolerance)
+    scale = np.sqrt(np.diag(p))[:, None] / spread
+    expected_gain = p @ np.linalg.solve(expected, late).T
+    np.testing.assert_allclose(k_gain / scale, expected_gain / scale, atol=10.0 * tolerance)
+    np.testing.assert_allclose(white @ s @ white.T, np.eye(3), atol=1e-12)
+    assert logdet == pytest.approx(np.linalg.slogdet(s)[1], rel=1e-12)
+
+
+def test_innovations_are_those_of_the_steady_kalman_filter():
+    """A noisy record through x+ = phi x + ..., x <- x + K e with the DARE's gain."""
+    rng = np.random.default_rng(5)
+    made = tr.fly(rng, sigma_w=0.3, amplitude=0.5 * DEG)
+    shared, local = tr.still()
+    local[9] = np.log(0.3)
+    found = respond(made, tr.SETTINGS, Change(), shared, local)
+    a, b, c, d = tr.motion(sigma_w=0.3)
+    k_gain, _, _, _ = kernel.gain(
+        a, c, tr.V, np.zeros(3), tr.plane(None, shared, local)[0], tr.SETTINGS.noise**2, tr.DT
+    )
+    phi, early, late = tr.discrete(a, b, tr.DT)
+    t = np.arange(made.samples) * tr.DT
+    u = tr.doublet(t, 0.5 * DEG)
+    x, expected = np.zeros(5), []
+    for k in range(len(t)):
+        e = made.signals.y[k] + [0.0, 0.0, G0] - c @ x - d * u[k]
+        expected.append(e)
+        x = x + k_gain @ e
+        if k + 1 < len(t):
+            x = phi @ x + early * u[k] + late * u[k + 1]
+    # curvature of the sines at half a degree, in units of the innovations' own spread
+    error = np.abs(found.e - expected).max(axis=0) / np.sqrt(np.diag(found.covariance))
+    assert (error < 0.05).all(), error
+
+
+def test_innovations_of_a_true_model_are_white_and_of_the_stated_covariance():
+    """20 records of 200 samples: the mean square of 12 000 whitened values is 1 within 4 sqrt(2/12000)."""
+    rng = np.random.default_rng(6)
+    shared, local = tr.still()
+    local[9] = np.log(0.3)
+    whitened = []
+    for _ in range(20):
+        found = respond(tr.fly(rng, sigma_w=0.3, amplitude=DEG), tr.SETTINGS, Change(), shared, local)
+        whitened.append(found.e[20:] @ found.white.T)  # the filter starts at the trim, the air does not
+    r = np.array(whitened)
+    draws = r.size
+    assert np.mean(r**2) == pytest.approx(1.0, abs=4.0 * math.sqrt(2.0 / draws))
+    lagged = np.einsum("nki,nkj->ij", r[:, 1:], r[:, :-1]) / (draws / 3.0)
+    assert np.abs(lagged).max() < 4.0 / math.sqrt(draws / 3.0)

@@ -1,0 +1,183 @@
+"""Records of the linear short period, simulated apart from the code under test, for the tests of the tracer."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import expm
+
+from airtruth import aircraft
+from airtruth.effects.change import Change
+from airtruth.physics import short_period
+from airtruth.trace.fit import Hypothesis, Point, Problem
+from airtruth.trace.lower import lower
+from airtruth.trace.model import L, S, plane_of, settings_of
+from airtruth.trace.model import start as begin
+from airtruth.trace.plant import linear
+from airtruth.trace.records import FINE, Record, Signals
+from airtruth.units import DEG
+
+GTM = aircraft.load("gtm")
+C = GTM.constants
+V, DENSITY = 42.852, 0.993
+TRUTH = np.array([4.79, 31.8, 0.48, -1.785, -41.2, -1.787])
+DT = 0.02
+LENGTH_W = 160.0
+SETTINGS = settings_of(GTM, LENGTH_W, 0.05)
+SCALE = short_period.scale(C.wing_area_m2, C.chord_m, C.mass_kg, C.inertia_yy_kg_m2, V, DENSITY)
+ROOT_1, ROOT_2 = np.sqrt(1.5), np.sqrt(1.5) * (1.0 / np.sqrt(3.0) - 1.0)
+"""w/sigma = ROOT_1 x1 + ROOT_2 x2 of MIL-F-8785C's vertical Dryden filter, states of unit drive."""
+
+
+def plant(derivatives=TRUTH, alpha=0.0, elevator=0.0):
+    return linear(GTM, derivatives, V, DENSITY, alpha, elevator)
+
+
+def doublet(t, amplitude=2.0 * DEG, start=0.5, step=0.4):
+    """Corners on whole samples; linear in between."""
+    corners = start + np.array([0.0, 0.1, step, step + 0.2, 2.0 * step + 0.1, 2.0 * step + 0.2])
+    return amplitude * np.interp(t, corners, [0.0, 1.0, 1.0, -1.0, -1.0, 0.0])
+
+
+def record(y, elevator, theta=None, sub=2, dt=DT, v=V, density=DENSITY, ground=None, name="a", plant_=None):
+    """A record as `records.read` makes it: y (samples, 3); elevator, theta, v, ... callables of time or constants."""
+    samples = len(y)
+    grid = np.arange((samples - 1) * sub + 1) * dt / sub
+    fine = np.arange((samples - 1) * sub * FINE + 1) * dt / (sub * FINE)
+
+    def on(x, t):
+        return x(t) if callable(x) else np.full(t.size, float(x))
+
+    speed = on(v, grid)
+    signals = Signals(
+        run_id=name,
+        dt_s=dt,
+        sub=sub,
+        y=np.ascontiguousarray(y),
+        elevator_rad=on(elevator, fine),
+        airspeed_m_s=speed,
+        ground_m_s=speed if ground is None else on(ground, grid),
+        density_kg_m3=on(density, grid),
+        theta_rad=on(0.0 if theta is None else theta, grid),
+        altitude_m=2133.6,
+        throttle=None,
+    )
+    return Record(signals, plant_ or plant())
+
+
+def motion(theta=TRUTH, sigma_w=0.0, rotary=0.5):
+    """A (5, 5), B (5,), C (3, 5), D (3,) of [alpha, q, w1, w2, w late] about the trim, by hand.
+
+    The air's alpha is alpha + w/V, its pitch rate q - rotary (w - late)/(tau V), tau = 4 b/(pi V).
+    """
+    a2, b2 = short_period.system(theta, SCALE)
+    row = short_period.normal_force_row(theta, SCALE)
+    tau = 4.0 * C.span_m / (np.pi * V)
+    # the kernel's late gust is in units of sigma
+    w = np.array([ROOT_1, ROOT_2])
+    slow = rotary * sigma_w / (tau * V)
+    a = np.zeros((5, 5))
+    a[:2, :2] = a2
+    by_alpha, by_q = a2[:, 0], a2[:, 1] - np.array([1.0, 0.0])
+    a[:2, 2:4] = np.outer(by_alpha * sigma_w / V - by_q * slow, w)
+    a[:2, 4] = by_q * slow
+    rate = V / LENGTH_W
+    a[2, 2], a[3, 2], a[3, 3] = -rate, rate, -rate
+    a[4, 2:4], a[4, 4] = w / tau, -1.0 / tau
+    c = np.zeros((3, 5))
+    c[0, 0], c[1, 1] = 1.0, 1.0
+    c[0, 2:4] = sigma_w / V * w
+    c[2, :2] = row[:2]
+    c[2, 2:4] = (row[0] * sigma_w / V - row[1] * slow) * w
+    c[2, 4] = row[1] * slow
+    return a, np.array([*b2, 0.0, 0.0, 0.0]), c, np.array([0.0, 0.0, row[2]])
+
+
+def discrete(a, b, dt):
+    """phi, early, late of x+ = phi x + early u + late u+, exact for u linear in between (augmented expm)."""
+    n = len(a)
+    big = np.zeros((n + 2, n + 2))
+    big[:n, :n], big[:n, n], big[n, n + 1] = a * dt, b * dt, 1.0
+    e = expm(big)
+    return e[:n, :n], e[:n, n] - e[:n, n + 1], e[:n, n + 1]
+
+
+def noise_step(a, dt, intensity):
+    """Covariance of a step's process noise (C. F. Van Loan, IEEE Trans. Automatic Control 23, 1978)."""
+    n = len(a)
+    e = expm(np.block([[-a, np.diag(intensity)], [np.zeros((n, n)), a.T]]) * dt)
+    return e[n:, n:].T @ e[:n, n:]
+
+
+def run(a, b, c, d, u, dt, start=None, kicks=None):
+    """Outputs (samples, outputs) and states of the exact discretisation."""
+    phi, early, late = discrete(a, b, dt)
+    x = np.zeros(len(a)) if start is None else np.array(start, dtype=float)
+    states = [x]
+    for k in range(len(u) - 1):
+        x = phi @ x + early * u[k] + late * u[k + 1]
+        if kicks is not None:
+            x = x + kicks[k]
+        states.append(x)
+    states = np.array(states)
+    return states @ c.T + np.outer(u, d), states
+
+
+def fly(
+    rng,
+    theta=TRUTH,
+    sigma_w=0.3,
+    samples=200,
+    noise=SETTINGS.noise,
+    amplitude=2.0 * DEG,
+    bias=(0.0, 0.0, 0.0),
+    name="a",
+    rotary=0.5,
+    dt=DT,
+):
+    """A noisy record of the linear aircraft in stationary Dryden gusts; az counts gravity."""
+    a, b, c, d = motion(theta, sigma_w, rotary)
+    t = np.arange(samples) * dt
+    intensity = np.array([0.0, 0.0, 2.0 * V / LENGTH_W, 0.0, 0.0])
+    step = noise_step(a, dt, intensity)
+    values, vectors = np.linalg.eigh(step)
+    kicks = rng.standard_normal((samples, 5)) @ (vectors * np.sqrt(np.maximum(values, 0.0))).T
+    start = np.zeros(5)
+    start[2:4] = np.linalg.cholesky(np.array([[1.0, 0.5], [0.5, 0.5]])) @ rng.standard_normal(2)
+    start[4] = start[2:4] @ [ROOT_1, ROOT_2]
+    y, states = run(a, b, c, d, doublet(t, amplitude), dt, start, kicks)
+    attitude = np.concatenate([[0.0], np.cumsum(0.5 * dt * (states[1:, 1] + states[:-1, 1]))])
+    y = y + np.array(bias) + [0.0, 0.0, -9.80665] + np.asarray(noise) * rng.standard_normal(y.shape)
+    return record(
+        y, lambda at: doublet(at, amplitude), lambda at: np.interp(at, t, attitude), name=name, dt=dt
+    )
+
+
+def problem(records, threads=1, settings=SETTINGS):
+    return Problem(tuple(records), settings, threads)
+
+
+NOTHING = Hypothesis(Change())
+
+
+def still():
+    """Shared and local parameters at zero, gusts next to none."""
+    local = np.zeros(L)
+    local[9] = -30.0
+    return np.zeros(S), local
+
+
+def plane(change=None, shared=None, local=None, plant_=None, settings=SETTINGS):
+    none = still()
+    return plane_of(
+        plant_ or plant(),
+        settings,
+        lower(change or Change()),
+        none[0] if shared is None else shared,
+        none[1] if local is None else local,
+        V,
+    )
+
+
+def point(records, sizes=(), settings=SETTINGS):
+    """Where a search begins."""
+    return Point(np.zeros(S), np.stack([begin(r, settings) for r in records]), np.array(sizes, dtype=float))
