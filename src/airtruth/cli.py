@@ -180,9 +180,7 @@ def identify(
     plane = planes.load(aircraft)
     notes: list[str] = []
     with _progress("identify", "files", quiet) as advance:
-        estimates = identify_files(
-            logs, plane, method or ["iv-f1"], options, joint, advance, notes.append
-        )
+        estimates = identify_files(logs, plane, method or ["iv-f1"], options, joint, advance, notes.append)
     for sentence in [] if quiet else notes:
         print(f"airtruth: {sentence}", file=sys.stderr)
     if out is not None:
@@ -190,24 +188,27 @@ def identify(
     print(estimates.to_json(orient="records", indent=1) if json_ else as_text(overview(estimates)))
 
 
-@app.command(
-    epilog="Example: airtruth trace data/undeclared/a.parquet --aircraft gtm --out out/trace"
-)
+@app.command(epilog="Example: airtruth trace data/undeclared/a.parquet --aircraft gtm --out out/trace")
 def trace(
     logs: Annotated[
         list[Path], typer.Argument(metavar="LOG...", help="Flight logs of one aircraft, or folders of them.")
     ],
-    aircraft: Annotated[str, typer.Option(metavar="A", help="The declared aircraft: a folder, or a shipped name.")],
+    aircraft: Annotated[
+        str, typer.Option(metavar="A", help="The declared aircraft: a folder, or a shipped name.")
+    ],
     out: Annotated[Path, typer.Option(help="Folder of trace.json, figures and the updated aircraft.")],
     model: Annotated[
         str, typer.Option(help="aircraft: forces probed in JSBSim; linear: the linear short-period model.")
     ] = "aircraft",
     hold_out: Annotated[
         list[str] | None,
-        typer.Option(metavar="RUN_ID", help="Run kept for the report alone; may be repeated. Default: every third."),
+        typer.Option(
+            metavar="RUN_ID", help="Run kept for the report alone; may be repeated. Default: every third."
+        ),
     ] = None,
-    jobs: Annotated[int, typer.Option(min=1, help="Threads; the answer does not depend on it.")] = os.cpu_count()
-    or 1,
+    jobs: Annotated[
+        int, typer.Option(min=1, help="Threads; the answer does not depend on it.")
+    ] = os.cpu_count() or 1,
     seed: Annotated[int, typer.Option(min=0, help="Of the draws behind p-values.")] = 0,
     effect: Annotated[
         list[str] | None,
@@ -249,7 +250,8 @@ def tables(
 @app.command(epilog="Example: airtruth report out/trace --out out/trace/report.html")
 def report(
     folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="Folder of a trace or of an identified campaign, or estimates.")
+        Path,
+        typer.Argument(metavar="DIR", help="Folder of a trace or of an identified campaign, or estimates."),
     ],
     out: Annotated[Path, typer.Option(help="The page; its tables stand beside it as .csv and .tex.")],
 ) -> None:
@@ -340,17 +342,21 @@ def check(
 
 
 @aircraft_app.command(
-    "new", epilog="Example: airtruth aircraft new attas --estimates estimates.parquet --log a.parquet --out attas_jsb"
+    "new",
+    epilog="Example: airtruth aircraft new attas --estimates estimates.parquet --log a.parquet --out attas_jsb",
 )
 def aircraft_new(
-    aircraft: Annotated[str, typer.Argument(metavar="A", help="Folder with aircraft.toml, or a shipped name.")],
+    aircraft: Annotated[
+        str, typer.Argument(metavar="A", help="Folder with aircraft.toml, or a shipped name.")
+    ],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write; its name is the aircraft's.")],
     estimates: Annotated[
         Path | None, typer.Option(help="Estimates of `airtruth identify`, in place of [derivatives].")
     ] = None,
     method: Annotated[str | None, typer.Option(metavar="NAME", help="Which method of the estimates.")] = None,
     derivative: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=VALUE", help="In place of a stated one; may be repeated.")
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE", help="In place of a stated one; may be repeated."),
     ] = None,
     log: Annotated[
         Path | None, typer.Option(help="Flight log whose first second is the trim, in place of what follows.")

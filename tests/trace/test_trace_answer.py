@@ -168,8 +168,10 @@ def test_held_out_runs_serve_the_report_alone(flown):
     other = trace(replace(log, channels={**log.channels, "q_rad_s": spoiled}), "gtm", options)
     assert clean["records"]["held_out"] == ["blind-000001"]
     assert clean["records"]["fitted"] == ["blind-000000", "blind-000002"]
-    for key in ("verdict", "anomaly", "remaining", "effects", "candidates", "derivatives"):
-        assert clean[key] == other[key], key
+    assert clean["verdict"] == other["verdict"]
+    for key in ("anomaly", "remaining", "effects", "candidates", "derivatives"):
+        # the range over which the declared aircraft is probed is that of all records
+        assert numbers(clean[key]) == pytest.approx(numbers(other[key]), rel=1e-5, abs=1e-9), key
     before, after = (a["error"]["before"]["held_out"]["free_run"]["q_rad_s"] for a in (clean, other))
     assert after > 2.0 * before
 

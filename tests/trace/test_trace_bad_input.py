@@ -1,0 +1,235 @@
+"""What `airtruth trace` says of input that it cannot trace: one sentence, the right exit code, no traceback."""
+
+import json
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trace_flights as flights
+
+from airtruth import cli
+from airtruth.effects.library import EFFECTS
+from airtruth.errors import ConfigurationError, LogError
+from airtruth.logs.store import write_log
+from airtruth.trace import TraceOptions, trace, tracing
+from airtruth.trace.prepare import prepare
+
+FEW = ("elevator_delay", "gyro_scale")
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    """Three records without an effect."""
+    return flights.log_of(flights.fly(tmp_path_factory.mktemp("plain") / "null"))
+
+
+@pytest.fixture
+def command(monkeypatch, capsys, tmp_path):
+    """The command as a user runs it: exit code, stdout, stderr."""
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["airtruth", "trace", *map(str, arguments)])
+        code = 0
+        try:
+            cli.main()
+        except SystemExit as end:
+            code = end.code
+        out, err = capsys.readouterr()
+        return code or 0, out, err
+
+    return run
+
+
+def stored(folder, log, name="log"):
+    path = folder / f"{name}.parquet"
+    write_log(path, log, dtype="float64")
+    return path
+
+
+def with_channel(log, name, values):
+    return replace(log, channels={**log.channels, name: values})
+
+
+def one(log, run=0, samples=None):
+    """One run, or its first samples."""
+    rows = log.rows(run)
+    rows = slice(rows.start, rows.stop if samples is None else rows.start + samples)
+    return replace(
+        log,
+        run_ids=(log.run_ids[run],),
+        offsets=np.array([0, rows.stop - rows.start]),
+        t_s=log.t_s[rows],
+        channels={k: v[rows] for k, v in log.channels.items()},
+    )
+
+
+def refused(command, path, tmp_path, *more):
+    """Exit code 2, one message on stderr (what a log's validation finds stands in a list), nothing written."""
+    code, out, err = command(path, "--aircraft", "gtm", "--out", tmp_path / "out", "--quiet", *more)
+    assert code == 2, (code, out, err)
+    assert "Traceback" not in err
+    assert not (tmp_path / "out" / "trace.json").exists()
+    lines = err.strip().splitlines()
+    assert lines[0].startswith("airtruth: ")
+    assert all(line.startswith("  - ") for line in lines[1:])
+    return " ".join(lines)
+
+
+def test_one_record_works_and_is_provisional(command, log, tmp_path):
+    path = stored(tmp_path, one(log))
+    code, out, err = command(
+        path,
+        "--aircraft",
+        "gtm",
+        "--out",
+        tmp_path / "out",
+        "--quiet",
+        "--json",
+        "--effect",
+        FEW[0],
+        "--jobs",
+        "1",
+    )
+    assert (code, err) == (0, "")
+    answer = json.loads(out)
+    assert answer["provisional"] is True
+    assert answer == json.loads((tmp_path / "out" / "trace.json").read_text())
+
+
+def test_no_elevator_movement(command, log, tmp_path):
+    still = with_channel(log, "elevator_rad", np.full_like(log.t_s, 0.002))
+    message = refused(command, stored(tmp_path, still), tmp_path)
+    assert "elevator" in message
+    assert "deg" in message or "constant" in message
+
+
+def test_records_of_two_aircraft(command, log, tmp_path):
+    first = stored(tmp_path, log, "a")
+    renamed = replace(
+        log, run_ids=tuple(f"other-{r}" for r in log.run_ids), metadata={**log.metadata, "aircraft": "T38"}
+    )
+    message = refused(command, first, tmp_path, stored(tmp_path, renamed, "b"))
+    assert "several aircraft (T38, gtm)" in message
+
+
+def test_the_same_run_twice(command, log, tmp_path):
+    message = refused(command, stored(tmp_path, log, "a"), tmp_path, stored(tmp_path, log, "b"))
+    assert "'blind-000000' occurs in several logs" in message
+
+
+def test_an_aircraft_of_quite_another_kind(command, log, tmp_path):
+    """A Cessna declared for records of a 26 kg model: refused, or an answer that says that much is missing."""
+    try:
+        answer = trace(log, "c172x", TraceOptions(effects=FEW))
+    except LogError as error:
+        assert "c172x" in str(error)
+        assert "another aircraft" in str(error) or "right aircraft" in str(error)
+    else:
+        assert answer["verdict"] != "none"
+        assert answer["anomaly"]["p_value"] < 1e-6
+
+
+def test_an_effect_whose_channel_the_log_lacks_is_untestable(log, monkeypatch):
+    asking = replace(EFFECTS["elevator_delay"], name="needs_flaps", channels=("flap_rad",))
+    monkeypatch.setattr(tracing, "EFFECTS", {**EFFECTS, "needs_flaps": asking})
+    answer = trace(log, "gtm", TraceOptions(effects=("needs_flaps", *FEW)))
+    row = next(c for c in answer["candidates"] if c["name"] == "needs_flaps")
+    assert row["testable"] is False
+    assert row["why_not"] == "the log lacks flap_rad"
+    assert "needs_flaps" not in answer["detectability"]
+
+
+def test_effects_of_the_air_are_untestable_and_say_why(log):
+    answer = trace(log, "gtm", TraceOptions(effects=("gust_level", *FEW)))
+    row = next(c for c in answer["candidates"] if c["name"] == "gust_level")
+    assert row["testable"] is False
+    assert "each record's own" in row["why_not"]
+
+
+def test_unknown_hold_out(command, log, tmp_path):
+    message = refused(command, stored(tmp_path, log), tmp_path, "--hold-out", "blind-000009")
+    assert "--hold-out 'blind-000009': no such run" in message
+    assert "allowed: blind-000000, blind-000001, blind-000002" in message
+
+
+def test_everything_held_out(command, log, tmp_path):
+    more = [word for run in log.run_ids for word in ("--hold-out", run)]
+    assert "leave at least one to fit" in refused(command, stored(tmp_path, log), tmp_path, *more)
+
+
+def test_nan(command, log, tmp_path):
+    q = log.channels["q_rad_s"].copy()
+    q[17] = np.nan
+    message = refused(command, stored(tmp_path, with_channel(log, "q_rad_s", q)), tmp_path)
+    assert "q_rad_s" in message
+    assert "blind-000000" in message
+
+
+@pytest.mark.parametrize("channel", ["alpha_rad", "q_rad_s", "az_m_s2", "elevator_rad", "airspeed_m_s"])
+def test_missing_channel(command, log, tmp_path, channel):
+    less = replace(log, channels={k: v for k, v in log.channels.items() if k != channel})
+    assert channel in refused(command, stored(tmp_path, less), tmp_path)
+
+
+def test_neither_density_nor_altitude(command, log, tmp_path):
+    less = replace(
+        log, channels={k: v for k, v in log.channels.items() if k not in ("density_kg_m3", "altitude_m")}
+    )
+    message = refused(command, stored(tmp_path, less), tmp_path)
+    assert "density_kg_m3" in message
+    assert "altitude_m" in message
+
+
+@pytest.mark.parametrize("gone", ["throttle", "theta_rad", "ax_m_s2", "elevator_command_rad", "altitude_m"])
+def test_channels_that_are_not_needed(log, gone):
+    """The problem can be set up without each of those that contract 1 calls optional."""
+    from airtruth import aircraft
+
+    less = replace(log, channels={k: v for k, v in log.channels.items() if k != gone})
+    effects = [EFFECTS[k] for k in FEW]
+    case = prepare([less], aircraft.load("gtm"), effects, TraceOptions(model="linear"))
+    assert len(case.fitted.records) == 2
+
+
+def test_too_short(command, log, tmp_path):
+    message = refused(command, stored(tmp_path, one(log, samples=30)), tmp_path)
+    assert "30 samples" in message
+    assert "blind-000000" in message
+
+
+def test_a_folder_that_cannot_be_written(command, log, tmp_path):
+    path = stored(tmp_path, log)
+    (tmp_path / "out").write_text("a file")
+    code, _, err = command(
+        path, "--aircraft", "gtm", "--out", tmp_path / "out" / "deep", "--quiet", "--effect", FEW[0]
+    )
+    assert code == 2
+    assert "Traceback" not in err
+    assert str(tmp_path / "out") in err
+
+
+def test_no_log_there(command, tmp_path):
+    assert "no such file or folder" in refused(command, tmp_path / "nothing", tmp_path)
+    (tmp_path / "empty").mkdir()
+    assert "holds no flight log" in refused(command, tmp_path / "empty", tmp_path)
+
+
+def test_a_file_that_is_no_log(command, tmp_path):
+    path = tmp_path / "text.parquet"
+    path.write_text("not a log")
+    assert "text.parquet" in refused(command, path, tmp_path)
+
+
+def test_unknown_aircraft(command, log, tmp_path):
+    code, _, err = command(stored(tmp_path, log), "--aircraft", "gtn", "--out", tmp_path / "out", "--quiet")
+    assert code == 2
+    assert "gtn" in err
+    assert "gtm" in err
+
+
+def test_options_that_mean_nothing(log):
+    with pytest.raises(ConfigurationError, match=r"--model 'liner': did you mean 'linear'\?"):
+        TraceOptions(model="liner")
+    with pytest.raises(ConfigurationError, match="--jobs 0: must be at least 1"):
+        TraceOptions(threads=0)
