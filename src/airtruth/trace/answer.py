@@ -14,7 +14,7 @@ from scipy.stats import chi2
 from airtruth.effects.effect import Effect
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.trace.fit import Fit, Hypothesis, Problem
-from airtruth.trace.holdout import Assessment, assess, floor
+from airtruth.trace.holdout import Assessment, assess, explained
 from airtruth.trace.lower import CHANNELS, lower
 from airtruth.trace.model import S
 from airtruth.trace.prepare import Case
@@ -272,8 +272,8 @@ def _floor(problem: Problem, outcome: Outcome, which: str) -> dict[str, dict[str
     low = lower(model.hypothesis.change(model.sizes))
     found = (outcome.fitted if which == "fit" else outcome.held)[name]
     free = [
-        floor(record, problem, low, model.shared, a.local) ** 2
-        for record, a in zip(problem.records, found, strict=True)
+        explained(record, problem, low, model.shared, a.local, number) ** 2
+        for number, (record, a) in enumerate(zip(problem.records, found, strict=True))
     ]
     return {
         kind: dict(zip(CHANNELS, np.sqrt(np.mean(squares, axis=0)).tolist(), strict=True))

@@ -290,7 +290,9 @@ def fit(
         tried = _evaluate(problem, hypothesis, trial, whitener, free_levels, tangents)
         better = -np.inf if tried is None else cost - tried[0]
         if tried is not None and better > -1e-9:
-            point, current, damping = trial, tried, max(damping * 0.1, 1e-9)
+            point, current = trial, tried
+            ratio = better / max(gain, 1e-12)  # what was gained over what was promised
+            damping = max(damping * (0.1 if ratio > 0.75 else 1.0 if ratio > 0.25 else 5.0), 1e-9)
             behind = tried[0] - rival
             if (better < 0.01 and fresh) or (behind > 20.0 and 4.0 * better < behind):
                 converged = True
@@ -303,7 +305,7 @@ def fit(
             anew = _evaluate(problem, hypothesis, point, whitener, free_levels)
             if anew is None:
                 break
-            current, fresh, damping = anew, True, 0.1 * damping
+            current, fresh = anew, True
         if damping > 1e7:
             converged = fresh  # not even the smallest step helps
             break

@@ -9,15 +9,27 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_lyapunov
 
+from airtruth.identify.kalman_step import step
 from airtruth.trace.fit import NO_WHITENER, Fit, Hypothesis, Point, Problem, parts, reduced, tangent
 from airtruth.trace.kernel import CORE, linear
 from airtruth.trace.lower import Lowered, lower
-from airtruth.trace.model import LOCAL_STEP, L, S, local_prior, plane_of, respond, shared_prior, start
+from airtruth.trace.model import (
+    LOCAL_STEP,
+    L,
+    S,
+    Settings,
+    local_prior,
+    plane_of,
+    respond,
+    shared_prior,
+    start,
+)
 from airtruth.trace.records import Record
 
 Array = NDArray[np.float64]
 
 _ROUNDS: Final = 10
+_DRAWS: Final = 32
 _MOTION: Final = (0, 1, 4, 5, 6, 7, 8)
 """Own parameters that a free run leaves free: initial alpha and q, biases, trim coefficients."""
 
@@ -60,7 +72,7 @@ def assess(
     k = len(sizes)
     best, damping = np.inf, 1e-6
     kept: Array = own
-    step: Array = np.zeros(L)
+    move: Array = np.zeros(L)
     for _ in range(_ROUNDS):
         found = tangent(one, 0, hypothesis, Point(shared, own[None, :], sizes), local_only=True)
         cost = np.inf
@@ -69,17 +81,17 @@ def assess(
             off = own - middle
             cost += 0.5 * float(off @ precision @ off)
         if found is None or not cost < best:
-            step = 0.25 * step
-            own = kept + step
+            move = 0.25 * move
+            own = kept + move
             continue
         better, best, kept = best - cost, cost, own
         if better < 0.01:
             break
         h = information[S + k :, S + k :] + precision
         g = gradient[S + k :] + precision @ off
-        step = np.asarray(-np.linalg.solve(h + damping * np.diag(np.diag(h)), g))
-        step[9] = np.clip(step[9], -1.0, 1.0)
-        own = own + step
+        move = np.asarray(-np.linalg.solve(h + damping * np.diag(np.diag(h)), g))
+        move[9] = np.clip(move[9], -1.0, 1.0)
+        own = own + move
     found = tangent(one, 0, hypothesis, Point(shared, kept[None, :], sizes), local_only=True)
     low = lower(hypothesis.change(sizes))
     response = respond(record, settings, low, shared, kept)
@@ -112,19 +124,13 @@ def free_run(record: Record, problem: Problem, low: Lowered, shared: Array, loca
     prior = np.diag(precision)[list(_MOTION)]
     residual = respond(record, settings, low, shared, own, free_run=True).e
     for _ in range(3):
-        columns = []
-        for i in _MOTION:
-            moved = own.copy()
-            moved[i] += LOCAL_STEP[i]
-            e = respond(record, settings, low, shared, moved, free_run=True).e
-            columns.append(((e - residual) * weight / LOCAL_STEP[i]).ravel())
-        t = np.array(columns)
+        residual, t = _tangents(record, settings, low, shared, own, weight)
         off = (own - middle)[list(_MOTION)]
-        step = -np.linalg.solve(t @ t.T + np.diag(prior), t @ (residual * weight).ravel() + prior * off)
-        if not np.isfinite(step).all():
+        move = -np.linalg.solve(t @ t.T + np.diag(prior), t @ (residual * weight).ravel() + prior * off)
+        if not np.isfinite(move).all():
             break
         trial = own.copy()
-        trial[list(_MOTION)] += step
+        trial[list(_MOTION)] += move
         after = respond(record, settings, low, shared, trial, free_run=True).e
         better = float(((residual * weight) ** 2).sum() - ((after * weight) ** 2).sum())
         if not np.isfinite(better) or better < 0.0:
@@ -136,11 +142,64 @@ def free_run(record: Record, problem: Problem, low: Lowered, shared: Array, loca
 
 
 def floor(record: Record, problem: Problem, low: Lowered, shared: Array, local: Array) -> Array:
-    """What gusts and sensors explain of a free run: (3,) standard deviations."""
+    """What gusts and sensors explain of a free run before anything is fitted to it: (3,) standard deviations."""
+    a, c, process, noise = _noise_model(record, problem, low, shared, local)
+    if np.linalg.eigvals(a).real.max() >= 0.0:
+        return np.asarray(10.0 * np.sqrt(noise))
+    spread = solve_continuous_lyapunov(a, -np.diag(process))
+    return np.asarray(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", c, spread, c), 0.0) + noise))
+
+
+def explained(
+    record: Record, problem: Problem, low: Lowered, shared: Array, local: Array, seed: int
+) -> Array:
+    """What gusts and sensors leave of a free run once initial state, biases and trim are fitted to it: (3,) rms.
+
+    The mean over `_DRAWS` records of the linear model in its gusts, treated as `free_run` treats the measured one.
+    """
+    a, c, process, noise = _noise_model(record, problem, low, shared, local)
+    n, samples = a.shape[0], record.samples
+    phi, spread = np.empty((n, n)), np.empty((n, n))
+    early, late = np.empty((n, 1)), np.empty((n, 1))
+    step(np.hstack([a, np.zeros((n, 1))]), process, n, record.signals.dt_s, phi, early, late, spread)
+    values, vectors = np.linalg.eigh(spread)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    rng = np.random.default_rng([seed, samples])
+    x = np.zeros((n, _DRAWS))
+    x[2:4] = np.linalg.cholesky(np.array([[1.0, 0.5], [0.5, 0.5]])) @ rng.standard_normal((2, _DRAWS))
+    y = np.empty((samples, 3, _DRAWS))
+    for k in range(samples):
+        y[k] = c @ x
+        x = phi @ x + root @ rng.standard_normal((n, _DRAWS))
+    y += np.sqrt(noise)[:, None] * rng.standard_normal(y.shape)
+    weight = 1.0 / floor(record, problem, low, shared, local)
+    t = _tangents(record, problem.settings, low, shared, local, weight)[1]
+    prior = np.diag(np.diag(local_prior(record, problem.settings)[1])[list(_MOTION)])
+    flat = (y * weight[:, None]).reshape(-1, _DRAWS)
+    left = flat - t.T @ np.linalg.solve(t @ t.T + prior, t @ flat)
+    return np.asarray(np.sqrt((left.reshape(samples, 3, _DRAWS) ** 2).mean(axis=(0, 2))) / weight)
+
+
+def _tangents(
+    record: Record, settings: Settings, low: Lowered, shared: Array, own: Array, weight: Array
+) -> tuple[Array, Array]:
+    """Residual of a free run (samples, 3) and its weighted derivatives (7, samples * 3)."""
+    residual = respond(record, settings, low, shared, own, free_run=True).e
+    columns = []
+    for i in _MOTION:
+        moved = own.copy()
+        moved[i] += LOCAL_STEP[i]
+        e = respond(record, settings, low, shared, moved, free_run=True).e
+        columns.append(((e - residual) * weight / LOCAL_STEP[i]).ravel())
+    return residual, np.array(columns)
+
+
+def _noise_model(
+    record: Record, problem: Problem, low: Lowered, shared: Array, local: Array
+) -> tuple[Array, Array, Array, Array]:
+    """A (n, n), C (3, n), intensities (n,) [1/s] and variances (3,) of the linearised motion in its gusts."""
     settings, plant, s = problem.settings, record.plant, record.signals
-    states = sum(1 if kind == 0 else 2 for kind in low.state_index[:, 0])
-    motion = CORE + states
-    n = motion
+    n = CORE + sum(1 if kind == 0 else 2 for kind in low.state_index[:, 0])
     a, c = np.empty((n, n)), np.empty((3, n))
     v, density = float(s.airspeed_m_s.mean()), float(s.density_kg_m3.mean())
     x = np.zeros(n)
@@ -151,7 +210,7 @@ def floor(record: Record, problem: Problem, low: Lowered, shared: Array, local: 
         v,
         0.5 * density * v * v,
         float(s.theta_rad.mean()) - plant.alpha_shift_rad,
-        motion,
+        n,
         np.zeros(3),
         np.zeros(3),
         plane_of(plant, settings, low, shared, local, v),
@@ -160,15 +219,9 @@ def floor(record: Record, problem: Problem, low: Lowered, shared: Array, local: 
         a,
         c,
     )
-    process = np.zeros((n, n))
-    process[2, 2] = 2.0 * v / settings.length_w_m
-    noise = (settings.noise * np.exp(shared[6:9])) ** 2
-    if np.linalg.eigvals(a).real.max() < 0.0:
-        spread = solve_continuous_lyapunov(a, -process)
-        open_loop = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", c, spread, c), 0.0) + noise)
-    else:
-        open_loop = 10.0 * np.sqrt(noise)
-    return np.asarray(open_loop)
+    process = np.zeros(n)
+    process[2] = 2.0 * v / settings.length_w_m
+    return a, c, process, (settings.noise * np.exp(shared[6:9])) ** 2
 
 
 def leave_one_out(problem: Problem, found: Fit) -> tuple[Array, list[Assessment]]:
@@ -197,28 +250,28 @@ def leave_one_out(problem: Problem, found: Fit) -> tuple[Array, list[Assessment]
         gradient, information = one_by_one[i]
         rest = total - information
         scale = np.sqrt(np.maximum(np.diag(rest), 1e-30))
-        step = (
+        move = (
             np.linalg.solve(rest / np.outer(scale, scale) + 1e-9 * np.eye(len(scale)), gradient / scale)
             / scale
         )
-        sizes = found.point.sizes + _held(found.hypothesis, found.point.sizes, step[S:])
+        sizes = found.point.sizes + _held(found.hypothesis, found.point.sizes, move[S:])
         return assess(
-            problem, i, found.hypothesis, found.point.shared + step[:S], sizes, found.point.local[i]
+            problem, i, found.hypothesis, found.point.shared + move[:S], sizes, found.point.local[i]
         )
 
     assessed = problem.each(one, range(len(problem.records)))
     return np.array([a.likelihood for a in assessed]), assessed
 
 
-def _held(hypothesis: Hypothesis, sizes: Array, step: Array) -> Array:
+def _held(hypothesis: Hypothesis, sizes: Array, step_: Array) -> Array:
     """The step, ended where a parameter would leave its range."""
-    moved = step.copy()
+    moved = step_.copy()
     for i, (effect, j) in enumerate(hypothesis.parameters):
         p = hypothesis.effects[effect].parameters[j]
         ends = sorted((p.size(p.low), p.size(p.high)))
         if p.one_sided:
             ends[0] = min(ends[0], 0.0) if not p.reciprocal else 0.0
-        moved[i] = min(max(sizes[i] + step[i], ends[0]), ends[1]) - sizes[i]
+        moved[i] = min(max(sizes[i] + step_[i], ends[0]), ends[1]) - sizes[i]
     return moved
 
 

@@ -17,6 +17,7 @@ from airtruth.trace.score import Score
 
 Array = NDArray[np.float64]
 
+UNCONVERGED: Final = "its refit did not converge"
 IMMATERIAL: Final = "its size is immaterial"
 _SIGNIFICANT: Final = 10.0
 _ERRORS: Final = 2.0
@@ -78,7 +79,7 @@ def judge(
         spread += long_run_variance(gains, round(_MEMORY_S / record.signals.dt_s))
     reasons = []
     if not best.converged:
-        reasons.append("its refit did not converge")
+        reasons.append(UNCONVERGED)
     if gain < _SIGNIFICANT:
         reasons.append("refitted, it explains nothing significant")
     if not first.one_sided and abs(size) < _ERRORS * std:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,7 +128,7 @@ def respond(
         theta = theta - plant.alpha_shift_rad
     de, v = _input(low, "elevator_rad", s.elevator_rad), _input(low, "airspeed_m_s", s.airspeed_m_s)
     if low.surface:
-        de = through(low.surface, de, s.dt_s / (s.sub * FINE))
+        de = through(low.surface, de, s.dt_s / (s.sub * FINE), s.elevator_std_rad)
     de = nodes(de)
     e = np.empty_like(y)
     white, covariance = np.eye(3), np.eye(3)
@@ -139,11 +139,11 @@ def respond(
     else:
         lift_more, moment_more, output_more = external.lift, external.moment, external.output
     reference = np.array([y[:, 0].mean(), de.mean(), v.mean(), s.density_kg_m3.mean(), theta.mean()])
-    logdet = evaluate(
+    logdet = _evaluated(
         y,
         de,
         v,
-        s.ground_m_s,
+        _input(low, "airspeed_m_s", s.ground_m_s),
         s.density_kg_m3,
         theta,
         lift_more,
@@ -167,6 +167,13 @@ def respond(
         covariance,
     )
     return Response(e, white, covariance, logdet)
+
+
+def _evaluated(*arguments: Any) -> float:
+    try:
+        return float(evaluate(*arguments))
+    except np.linalg.LinAlgError:  # a covariance that is none
+        return float("nan")
 
 
 def plane_of(

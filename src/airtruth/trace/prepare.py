@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -214,8 +213,11 @@ def _settings(aircraft: Aircraft, signals: Sequence[Signals]) -> Settings:
 
 
 def _halves(record: Record) -> tuple[Record, Record]:
+    """The record cut where half of the elevator's travel is done, so that both parts are excited."""
     s = record.signals
-    middle = math.ceil(s.y.shape[0] / 2)
+    travel = np.cumsum(np.abs(np.diff(s.elevator_rad[:: s.sub * FINE])))
+    half = int(np.searchsorted(travel, 0.5 * travel[-1]))
+    middle = min(max(half, _LEAST_SAMPLES // 2), s.y.shape[0] - _LEAST_SAMPLES // 2)
     halves = []
     for name, first, last in (("first half", 0, middle), ("second half", middle, s.y.shape[0])):
         points = slice(first * s.sub, (last - 1) * s.sub + 1)

@@ -38,6 +38,7 @@ class Signals:
     elevator_rad : (fine points,) `FINE` cells to a cell of the filter's grid.
     airspeed_m_s, ground_m_s, density_kg_m3, theta_rad : (points,) on the filter's grid; ground: speed without the gust.
     altitude_m : mean pressure altitude [m].
+    elevator_std_rad : declared noise of the measured surface [rad].
     throttle : its mean where it is logged, None elsewhere [0..1].
     """
 
@@ -52,6 +53,7 @@ class Signals:
     theta_rad: Array
     altitude_m: float
     throttle: float | None
+    elevator_std_rad: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -114,6 +116,7 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0) -> list[Signals]:
                 density_kg_m3=_fine(_smooth(density, dt), sub),
                 theta_rad=_fine(theta, sub),
                 altitude_m=float(np.mean(altitude)),
+                elevator_std_rad=elevator_std_rad,
                 throttle=float(channels["throttle"].mean()) if "throttle" in channels else None,
             )
         )

@@ -13,18 +13,21 @@ from airtruth.effects.effect import Effect
 from airtruth.trace import score
 from airtruth.trace.fit import Fit, Hypothesis, Point, Problem, Whitener, autoregression, begin, fit
 from airtruth.trace.holdout import leave_one_out
-from airtruth.trace.judge import IMMATERIAL, Candidate, ends, judge, outdone
+from airtruth.trace.judge import IMMATERIAL, UNCONVERGED, Candidate, ends, judge, outdone
 from airtruth.trace.model import respond
 from airtruth.trace.score import Score, Table
 
 Array = NDArray[np.float64]
 
 LEVEL: Final = 0.05
+LATER_LEVEL: Final = 0.001
+"""Of a further effect: a model that is nobody's leaves something small to explain whatever is added."""
 LEADING: Final = 7
 MOST: Final = 3
 _BETTER: Final = 2.0
 _NEAR: Final = 30.0
 _RESTARTS: Final = 2
+_FAR: Final = 5.0
 _VISIBLE: Final = 2.0
 _SHARES: Final = (1.0, 0.3, 0.1, 0.02)
 TIE: Final = 4.0
@@ -93,7 +96,8 @@ def search(
         adjusted = score.holm([s.p_value for s in table.scores])
         candidates: tuple[Candidate, ...] = ()
         if len(stages) < MOST:
-            fits = _refitted(problem, null, table, adjusted, advance)
+            level = LATER_LEVEL if stages else LEVEL
+            fits = _refitted(problem, null, table, adjusted <= level, advance)
             better = _better_null(problem, null, fits) if restarts else None
             if better is not None:
                 start, restarts = better.point, restarts - 1
@@ -111,15 +115,23 @@ def search(
 
 
 def _gls(problem: Problem, null: Fit, whitener: Whitener) -> Fit:
+    """The null under an autoregression; at the null's own point where that would lead far away.
+
+    An autoregression of a misfit takes up the very motion that the derivatives are seen in.
+    """
     found = fit(problem, null.hypothesis, null.point, whitener, iterations=6, free_levels=False)
-    return found or null
+    if found is not None:
+        std = np.sqrt(np.diag(null.covariance)[:6])
+        if (np.abs(found.point.shared[:6] - null.point.shared[:6]) < _FAR * std).all():
+            return found
+    return fit(problem, null.hypothesis, null.point, whitener, iterations=0, free_levels=False) or null
 
 
 def _refitted(
-    problem: Problem, null: Fit, table: Table, adjusted: Array, advance: Callable[[str], None]
+    problem: Problem, null: Fit, table: Table, significant: NDArray[np.bool_], advance: Callable[[str], None]
 ) -> list[tuple[Score, Fit]]:
-    """Full refits of the leading effects, best first."""
-    if not (adjusted <= LEVEL).any():
+    """Full refits of the leading effects, best first; none where no score is significant."""
+    if not significant.any():
         return []
     # once something is missing, levels may tell more than means: a lag in gusts is seen in the scatter
     seen = np.array([max(abs(s.z), w) for s, w in zip(table.scores, table.white, strict=True)])
@@ -172,7 +184,7 @@ def _judged(problem: Problem, null: Fit, fits: Sequence[tuple[Score, Fit]]) -> t
             continue
         candidate = judge(problem, null, s, f, gain, reference)
         judged.append(candidate)
-        if not np.isfinite(accepted) and (not candidate.reasons or candidate.reasons == (IMMATERIAL,)):
+        if not np.isfinite(accepted) and set(candidate.reasons) <= {IMMATERIAL, UNCONVERGED}:
             accepted = gain  # what explains less than an immaterial effect is not the cause either
     return tuple(judged)
 

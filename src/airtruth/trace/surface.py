@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 from numba import njit
@@ -14,7 +15,11 @@ from airtruth.effects.change import SurfaceTerm
 Array = NDArray[np.float64]
 
 
-def through(terms: Sequence[SurfaceTerm], de: Array, dt_s: float) -> Array:
+_EXTREME: Final = 1.4
+"""Standard deviations by which noise pushes a play beyond the turning points of its input (measured)."""
+
+
+def through(terms: Sequence[SurfaceTerm], de: Array, dt_s: float, noise_rad: float = 0.0) -> Array:
     """The surface after delays, lags, rate limits and backlash, in the order given; each starts in equilibrium.
 
     A delay is linear between the points of the grid; a lag is exact for a signal linear between them.
@@ -23,6 +28,7 @@ def through(terms: Sequence[SurfaceTerm], de: Array, dt_s: float) -> Array:
     ----------
     terms : what lies in between.
     de : (points,) surface [rad], every ``dt_s`` [s].
+    noise_rad : standard deviation of its noise, whose extremes would pass a backlash for motion.
     """
     for term in terms:
         if term.kind == "delay":
@@ -32,7 +38,9 @@ def through(terms: Sequence[SurfaceTerm], de: Array, dt_s: float) -> Array:
         elif term.kind == "rate_limit" and math.isfinite(term.value):
             de = _limited(de, term.value * dt_s)
         elif term.kind == "backlash" and term.value > 0.0:
-            de = _slack(de, 0.5 * term.value)
+            half = 0.5 * term.value
+            allowance = _EXTREME * noise_rad * half / (half + noise_rad) if noise_rad > 0.0 else 0.0
+            de = _slack(de, half + allowance)
     return de
 
 

@@ -22,6 +22,7 @@ from airtruth.trace.options import TraceOptions
 from airtruth.trace.prepare import Case, prepare
 from airtruth.trace.replay import flown_again
 from airtruth.trace.search import Stage, search
+from airtruth.trace.tolerances import tolerances
 from airtruth.trace.update import write_update
 
 ANSWER: Final = "trace.json"
@@ -69,7 +70,8 @@ def traced(
         )
     advance("judge every stage on fitted and held-out records")
     outcome = assessed(case, stages)
-    return Trace(case, stages, outcome, answer(case, stages, outcome))
+    found = answer(case, stages, outcome) | {"tolerances": tolerances(case, outcome)}
+    return Trace(case, stages, outcome, found)
 
 
 def run(
