@@ -11,8 +11,8 @@ from pydantic import Field, ValidationError, field_validator
 from airtruth import quantity as qt
 from airtruth.aircraft_probe import Constants, probe
 from airtruth.errors import AircraftError, choices
-from airtruth.quantity import Quantity, Strict
 from airtruth.physics.short_period import PARAMETERS
+from airtruth.quantity import Quantity, Strict
 from airtruth.signals import SIGNALS
 
 FILE: Final = "aircraft.toml"

@@ -118,16 +118,30 @@ def test_the_same_run_twice(command, log, tmp_path):
     assert "'blind-000000' occurs in several logs" in message
 
 
+def refusal_or_answer(log, plane, options):
+    try:
+        return trace(log, plane, options)
+    except LogError as error:
+        return str(error)
+
+
 def test_an_aircraft_of_quite_another_kind(command, log, tmp_path):
     """A Cessna declared for records of a 26 kg model: refused, or an answer that says that much is missing."""
-    try:
-        answer = trace(log, "c172x", TraceOptions(effects=FEW))
-    except LogError as error:
-        assert "c172x" in str(error)
-        assert "another aircraft" in str(error) or "right aircraft" in str(error)
+    found = refusal_or_answer(log, "c172x", TraceOptions(effects=FEW))
+    if isinstance(found, str):
+        assert "c172x" in found
+        assert "gtm" in found or "another aircraft" in found or "right aircraft" in found
     else:
-        assert answer["verdict"] != "none"
-        assert answer["anomaly"]["p_value"] < 1e-6
+        assert found["verdict"] != "none"
+        assert found["anomaly"]["p_value"] < 1e-6
+
+
+def test_an_aircraft_that_cannot_fly_there(command, log, tmp_path):
+    """A T-38 at 75 kt: no trim."""
+    code, _, err = command(stored(tmp_path, log), "--aircraft", "T38", "--out", tmp_path / "out", "--quiet")
+    assert code == 2
+    assert "T38" in err
+    assert "Traceback" not in err
 
 
 def test_an_effect_whose_channel_the_log_lacks_is_untestable(log, monkeypatch):

@@ -381,7 +381,7 @@ def test_delayed_sensors(delay):
 def test_a_delay_comes_after_a_lag():
     """Both in one sensor: the lagged signal, late."""
     lag, delay = SensorTerm("q_rad_s", "lag", 0.05), SensorTerm("q_rad_s", "delay", 0.03)
-    a, b, c, d = tr.motion()
+    a, b, _, _ = tr.motion()
     big, bb, cc = np.zeros((6, 6)), np.append(b, 0.0), np.zeros((1, 6))
     big[:5, :5], big[5, 1], big[5, 5], cc[0, 5] = a, 20.0, -20.0, 1.0
     expected, _ = tr.run(*behind((big, bb, cc, np.zeros(1)), 0.03), U, tr.DT)

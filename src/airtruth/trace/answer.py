@@ -24,6 +24,8 @@ from airtruth.trace.search import LEVEL, Candidate, Stage
 Array = NDArray[np.float64]
 
 _Z95: Final = 1.959964
+ANOMALY: Final = 0.01
+"""Level at which something counts as missing although no effect is named."""
 _DETECTED: Final = 4.0
 """Square root of the noncentrality that counts as traceable."""
 STAGES: Final = ("declared", "before", "after", "control", "floor")
@@ -102,10 +104,10 @@ def answer(case: Case, stages: Sequence[Stage], outcome: Outcome) -> dict[str, A
     anomaly, remaining = first.anomaly, last.anomaly
     names = [{c.score.effect.name for c in (best, *others)} for best, others in found]
     if not found:
-        verdict = "unexplained" if anomaly[1] <= LEVEL else "none"
+        verdict = "unexplained" if anomaly[1] <= ANOMALY else "none"
     else:
         verdict = "one_of" if any(len(n) > 1 for n in names) else "traced"
-    provisional = case.held is None or (bool(found) and remaining[1] <= LEVEL)
+    provisional = case.held is None or (bool(found) and remaining[1] <= ANOMALY)
     return {
         "verdict": verdict,
         "provisional": bool(provisional),
