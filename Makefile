@@ -51,6 +51,7 @@ bench: $(READY) ## ratios against bare baselines and peers
 	$(BIN)/python benchmarks/bench_identify.py
 	$(BIN)/python benchmarks/bench_filter_error.py
 	$(BIN)/python benchmarks/bench_peers.py
+	$(BIN)/python benchmarks/bench_trace.py
 
 clean: ## remove the environment, caches and output
 	rm -rf $(VENV) $(OUT) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -227,33 +227,31 @@ def test_candidates_can_be_chosen(flown):
 # -- what it must not depend on
 
 
-def test_threads_and_a_second_run_change_no_byte(flown, tmp_path, monkeypatch):
+def test_threads_change_no_byte(flown, tmp_path, monkeypatch):
     texts = []
-    for threads in (1, 2, 1):
+    for threads in (1, 2):
         folder = tmp_path / str(len(texts))
         folder.mkdir()
         monkeypatch.chdir(folder)
-        run([flown["two"]], "gtm", TraceOptions(threads=threads), Path("traced"))
+        run([flown["two"]], "gtm", TraceOptions(threads=threads, effects=FEW), Path("traced"))
         texts.append((folder / "traced" / "trace.json").read_bytes())
-    assert texts[0] == texts[1] == texts[2]
+    assert texts[0] == texts[1]
 
 
 def test_nothing_that_tells_the_truth_is_read(flown, tmp_path, monkeypatch):
-    """plan.parquet and truth.parquet replaced by rubbish, or gone: the same bytes."""
+    """plan.parquet, truth.parquet and what else stands beside the logs replaced by rubbish: the same bytes."""
     texts = []
-    for name in ("as flown", "poisoned", "gone"):
+    for name in ("as flown", "poisoned"):
         copy = tmp_path / name
         shutil.copytree(flown["delay"], copy / "flown")
-        for file in ("plan.parquet", "truth.parquet", "campaign.json", "manifest.jsonl"):
-            path = copy / "flown" / file
-            if name == "poisoned" and path.exists():
-                path.write_bytes(b"poison")
-            if name == "gone":
-                path.unlink(missing_ok=True)
+        beside = [p for p in (copy / "flown").iterdir() if p.is_file()]
+        assert {"plan.parquet", "truth.parquet"} <= {p.name for p in beside}
+        for path in beside if name == "poisoned" else []:
+            path.write_bytes(b"poison")
         monkeypatch.chdir(copy)
         run(["flown"], "gtm", TraceOptions(effects=FEW), Path("traced"))
         texts.append((copy / "traced" / "trace.json").read_bytes())
-    assert texts[0] == texts[1] == texts[2]
+    assert texts[0] == texts[1]
 
 
 def test_order_of_logs_does_not_matter(flown):

@@ -124,9 +124,9 @@ def _size(s: Score, found: Fit) -> tuple[float, float]:
 
 
 def _lost(gains: Array) -> bool:
-    """Whether records left out lose: their sum is negative by more than its own standard error."""
+    """Whether records left out lose: their sum is negative by more than two of its own standard errors."""
     total = float(gains.sum())
     if not np.isfinite(total):
         return True
     error = float(gains.std(ddof=1) * np.sqrt(gains.size)) if gains.size > 2 else 0.0
-    return total < -error
+    return total < -_ERRORS * error

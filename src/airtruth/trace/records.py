@@ -38,7 +38,7 @@ class Signals:
     elevator_rad : (fine points,) `FINE` cells to a cell of the filter's grid.
     airspeed_m_s, ground_m_s, density_kg_m3, theta_rad : (points,) on the filter's grid; ground: speed without the gust.
     altitude_m : mean pressure altitude [m].
-    elevator_std_rad : declared noise of the measured surface [rad].
+    elevator_std_rad : noise that is left in the elevator after smoothing, all samples alike [rad].
     throttle : its mean where it is logged, None elsewhere [0..1].
     """
 
@@ -116,7 +116,8 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0) -> list[Signals]:
                 density_kg_m3=_fine(_smooth(density, dt), sub),
                 theta_rad=_fine(theta, sub),
                 altitude_m=float(np.mean(altitude)),
-                elevator_std_rad=elevator_std_rad,
+                elevator_std_rad=elevator_std_rad
+                * np.sqrt(_moving(channels["elevator_rad"], dt, elevator_std_rad)),
                 throttle=float(channels["throttle"].mean()) if "throttle" in channels else None,
             )
         )
@@ -146,6 +147,12 @@ def _quiet(elevator: Array, dt_s: float, std: float) -> Array:
         return raw
     middle = median_filter(raw, size=2 * round(0.1 / dt_s) + 1, mode="nearest")
     return np.where(np.abs(raw - middle) <= 3.0 * std, middle, raw)
+
+
+def _moving(elevator: Array, dt_s: float, std: float) -> float:
+    """Share of the samples that smoothing leaves as they are."""
+    raw = np.asarray(elevator, dtype=np.float64)
+    return float((_quiet(raw, dt_s, std) == raw).mean())
 
 
 def _elevator(elevator: Array, sub: int) -> Array:

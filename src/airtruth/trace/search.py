@@ -30,7 +30,7 @@ _RESTARTS: Final = 2
 _FAR: Final = 5.0
 _VISIBLE: Final = 2.0
 _SHARES: Final = (1.0, 0.3, 0.1, 0.02)
-TIE: Final = 4.0
+TIE: Final = 6.0
 """Effects within this of the best in 2 log L cannot be told apart."""
 
 
