@@ -32,6 +32,7 @@ loop: $(READY) ## the paper's experiment through the loop: 2000 runs, every meth
 study: $(READY) ## every cause behind docs/paper.md and docs/closed_loop.md, off and on (about ten minutes)
 	$(BIN)/python scripts/paper_study.py --out $(OUT)/study --jobs $(JOBS)
 	$(BIN)/python scripts/closed_loop_study.py
+	$(BIN)/python -m pytest -q -m study tests/trace/test_conformance_trace.py
 	$(BIN)/python scripts/foreign_aircraft.py
 
 blind: $(READY) ## 200 flight tests that the tracer has not seen, scored against their truth

@@ -114,38 +114,41 @@ def rates(
     moment = moment_more + increments[3] * d_alpha + increments[4] * qhat + increments[5] * d_de
     mass = constants[MASS] * declared[F_MASS]
     inertia = constants[INERTIA] * declared[F_INERTIA]
-    # alpha' before the terms that need it
-    first = (
-        q
-        + ((fz - force * lift) * math.cos(alpha) - fx * math.sin(alpha)) / (mass * ground)
-        + constants[GRAVITY] * math.cos(theta - x[0]) / ground
-    )
-    for t in range(aero_index.shape[0]):
-        signal = aero_index[t, 1]
-        if signal == 0:
-            s = alpha
-        elif signal == 1:
-            s = surface
-        elif signal == 2:
-            s = qhat
-        elif signal == 3:
-            s = first * half
-            if aero_index[t, 0] == 0:  # the term is part of the alpha' that it is in proportion to
-                s /= 1.0 + aero_value[t, 0] * half * force * math.cos(alpha) / (mass * v)
-        else:
-            s = x[CORE + signal - 4]
-        s -= aero_value[t, 1]
-        shape = aero_index[t, 2]
-        if shape == 1:
-            s = s * s
-        elif shape == 2:
-            s = max(0.0, s)
-        elif shape == 3:
-            s = min(0.0, s)
-        if aero_index[t, 0] == 0:
-            lift += aero_value[t, 0] * s
-        else:
-            moment += aero_value[t, 0] * s
+    # terms in alpha' last: they take alpha' with everything else in it
+    for late_terms in range(2):
+        first = (
+            q
+            + ((fz - force * lift) * math.cos(alpha) - fx * math.sin(alpha)) / (mass * ground)
+            + constants[GRAVITY] * math.cos(theta - x[0]) / ground
+        )
+        for t in range(aero_index.shape[0]):
+            signal = aero_index[t, 1]
+            if (signal == 3) != (late_terms == 1):
+                continue
+            if signal == 0:
+                s = alpha
+            elif signal == 1:
+                s = surface
+            elif signal == 2:
+                s = qhat
+            elif signal == 3:
+                s = first * half
+                if aero_index[t, 0] == 0:  # the term is part of the alpha' that it is in proportion to
+                    s /= 1.0 + aero_value[t, 0] * half * force * math.cos(alpha) / (mass * v)
+            else:
+                s = x[CORE + signal - 4]
+            s -= aero_value[t, 1]
+            shape = aero_index[t, 2]
+            if shape == 1:
+                s = s * s
+            elif shape == 2:
+                s = max(0.0, s)
+            elif shape == 3:
+                s = min(0.0, s)
+            if aero_index[t, 0] == 0:
+                lift += aero_value[t, 0] * s
+            else:
+                moment += aero_value[t, 0] * s
     fz -= force * lift
     fm += (
         force * chord * (moment - declared[CG] * fz / force)

@@ -77,9 +77,9 @@ def prepare(
     notes = []
     if model != options.model:
         notes.append("the aircraft has no JSBSim model: the loop's model is the linear short-period model")
-    plants = _plants(signals, aircraft, model)
+    plants = _plants(signals, aircraft, model, chosen)
     records = [Record(s, plant) for s, plant in zip(signals, plants, strict=True)]
-    settings = _settings(aircraft, signals)
+    settings = _settings(aircraft, [s for s in signals if s.run_id not in chosen])
     fitted = tuple(r for r in records if r.signals.run_id not in chosen)
     held = tuple(r for r in records if r.signals.run_id in chosen)
     if len(fitted) == 1:
@@ -144,10 +144,13 @@ def _hold_out(runs: Sequence[str], options: TraceOptions) -> tuple[str, ...]:
     return tuple(options.hold_out)
 
 
-def _plants(signals: Sequence[Signals], aircraft: Aircraft, model: str) -> list[Plant]:
-    """One plant per flight condition (airspeed within 3 %, altitude within 200 m), shared by its records."""
+def _plants(signals: Sequence[Signals], aircraft: Aircraft, model: str, held: Sequence[str]) -> list[Plant]:
+    """One plant per flight condition (airspeed within 3 %, altitude within 200 m), shared by its records.
+
+    Held-out records have no say in it: they only widen the range of the tables, which are at whole degrees.
+    """
     groups: list[list[int]] = []
-    for i, s in enumerate(signals):
+    for i, s in sorted(enumerate(signals), key=lambda item: item[1].run_id in held):
         for group in groups:
             first = signals[group[0]]
             near = abs(s.airspeed_m_s.mean() / first.airspeed_m_s.mean() - 1.0) < _SAME_SPEED
@@ -158,7 +161,8 @@ def _plants(signals: Sequence[Signals], aircraft: Aircraft, model: str) -> list[
             groups.append([i])
     found: dict[int, Plant] = {}
     for group in groups:
-        members = [signals[i] for i in group]
+        everyone = [signals[i] for i in group]
+        members = [s for s in everyone if s.run_id not in held] or everyone
         speed = float(np.mean([s.airspeed_m_s.mean() for s in members]))
         density = float(np.mean([s.density_kg_m3.mean() for s in members]))
         if model == "linear":
@@ -173,8 +177,8 @@ def _plants(signals: Sequence[Signals], aircraft: Aircraft, model: str) -> list[
                 found[i] = linear(aircraft, derivatives, speed, density, alpha, elevator, power)
             continue
         at = _trim(aircraft, members, speed, density)
-        reach = _reach([s.y[:, 0] for s in members])
-        deflection = _reach([s.elevator_rad for s in members])
+        reach = _reach([s.y[:, 0] for s in everyone])
+        deflection = _reach([s.elevator_rad for s in everyone])
         rate = max(float(np.abs(s.y[:, 1]).max()) for s in members)
         plant = probed(aircraft, at, reach, deflection, rate)
         for i in group:

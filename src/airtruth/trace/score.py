@@ -89,13 +89,14 @@ def directions(effect: Effect, null: Fit, problem: Problem) -> list[Direction]:
     if not places:
         return [Direction(effect, (), first.step)]
     place = places[0]
-    rest = tuple(p.size(p.neutral) for p in places[1:])
+    rest = tuple(p.size(float(np.sqrt(p.low * p.high))) for p in places[1:])
     alpha = np.concatenate([r.signals.y[:, 0] - r.plant.alpha_shift_rad for r in problem.records])
     low, high = np.quantile(alpha, [0.02, 0.98]) if place.unit == "rad" else (place.low, place.high)
     low, high = max(low, place.low), min(high, place.high)
     if not low < high:
         low, high = place.low, place.high
-    return [Direction(effect, (float(x), *rest), first.step) for x in np.linspace(low, high, PLACES)]
+    grid = np.linspace(low, high, PLACES) if place.unit == "rad" else np.geomspace(low, high, PLACES)
+    return [Direction(effect, (float(x), *rest), first.step) for x in grid]
 
 
 def table(null: Fit, problem: Problem, effects: Sequence[Effect], whitener: Whitener, seed: int) -> Table:
