@@ -22,11 +22,12 @@ Array = NDArray[np.float64]
 LEVEL: Final = 0.05
 LATER_LEVEL: Final = 0.001
 """Of a further effect: a model that is nobody's leaves something small to explain whatever is added."""
-LEADING: Final = 7
+LEADING: Final = 8
 MOST: Final = 3
 _BETTER: Final = 2.0
 _NEAR: Final = 30.0
 _RESTARTS: Final = 2
+_PATIENCE: Final = 3
 _FAR: Final = 5.0
 _VISIBLE: Final = 2.0
 _SHARES: Final = (1.0, 0.3, 0.1, 0.02)
@@ -133,9 +134,12 @@ def _refitted(
     """Full refits of the leading effects, best first; none where no score is significant."""
     if not significant.any():
         return []
-    # once something is missing, levels may tell more than means: a lag in gusts is seen in the scatter
-    seen = np.array([max(abs(s.z), w) for s, w in zip(table.scores, table.white, strict=True)])
-    order = [int(i) for i in np.argsort(-seen, kind="stable")[:LEADING] if seen[i] > _VISIBLE]
+    # An autoregression of a large misfit inflates what is left, so most are chosen as if there was none; and
+    # once something is missing, levels may tell more than means: a lag in gusts is seen in the scatter.
+    white = np.array(table.white)
+    order = [int(i) for i in np.argsort(-white, kind="stable")[: LEADING - 2] if white[i] > _VISIBLE]
+    by_score = np.argsort([-abs(s.z) for s in table.scores], kind="stable")
+    order += [int(i) for i in by_score if int(i) not in order and significant[i]][: LEADING - len(order)]
     fits: list[tuple[Score, Fit]] = []
     for i in order:
         s = table.scores[i]
@@ -143,6 +147,12 @@ def _refitted(
         found = _refit(problem, null, s, min((f.cost for _, f in fits), default=np.inf))
         if found is not None:
             fits.append((s, found))
+    for _ in range(_PATIENCE):  # the leader at least has to arrive
+        fits.sort(key=lambda f: f[1].cost + len(f[0].effect.parameters))
+        if not fits or fits[0][1].converged:
+            break
+        s, found = fits[0]
+        fits[0] = (s, fit(problem, found.hypothesis, found.point) or found)
     return sorted(fits, key=lambda f: f[1].cost + len(f[0].effect.parameters))
 
 
@@ -157,28 +167,24 @@ def _better_null(problem: Problem, null: Fit, fits: Sequence[tuple[Score, Fit]])
 
 
 def _judged(problem: Problem, null: Fit, fits: Sequence[tuple[Score, Fit]]) -> tuple[Candidate, ...]:
-    """Gains under one whitener, the best candidate's, and the rules for those that lead."""
+    """Gains, those near the best compared under one autoregression, and the rules for those that lead."""
     if not fits:
         return ()
+    gains = {s.effect.key: 2.0 * (null.cost - f.cost) - 2.0 * (len(s.effect.parameters) - 1) for s, f in fits}
+    near = [(s, f) for s, f in fits if f.cost - fits[0][1].cost < _NEAR]
     whitener = autoregression(fits[0][1].tangents)
-    costs = {s.effect.key: f.cost for s, f in fits}
-    base = null.cost
-    if whitener.coefficients.shape[0]:
-        near = [(s, f) for s, f in fits if f.cost - fits[0][1].cost < _NEAR]
-        base = _whitened(problem, null, whitener)
-        costs = {s.effect.key: _whitened(problem, f, whitener) for s, f in near}
-    ranked = []
-    for s, f in fits:
-        cost = costs.get(s.effect.key)
-        gain = 2.0 * (null.cost - f.cost if cost is None else base - cost) - 2.0 * (
-            len(s.effect.parameters) - 1
-        )
-        ranked.append((cost is not None, gain, s, f))
-    ranked.sort(key=lambda r: (not r[0], -r[1]))
+    if whitener.coefficients.shape[0] and len(near) > 1:
+        costs = {
+            s.effect.key: _whitened(problem, f, whitener, fits[0][1]) + len(s.effect.parameters)
+            for s, f in near
+        }
+        top, least = max(gains[key] for key in costs), min(costs.values())
+        gains |= {key: top - 2.0 * (cost - least) for key, cost in costs.items()}
+    ranked = sorted(((gains[s.effect.key], s, f) for s, f in fits), key=lambda r: -r[0])
     reference = leave_one_out(problem, null)
     judged: list[Candidate] = []
     accepted = -np.inf
-    for _, gain, s, f in ranked:
+    for gain, s, f in ranked:
         if gain < accepted - TIE:
             judged.append(outdone(s, f, gain))
             continue
@@ -189,8 +195,13 @@ def _judged(problem: Problem, null: Fit, fits: Sequence[tuple[Score, Fit]]) -> t
     return tuple(judged)
 
 
-def _whitened(problem: Problem, found: Fit, whitener: Whitener) -> float:
-    again = fit(problem, found.hypothesis, found.point, whitener, iterations=6, free_levels=False)
+def _whitened(problem: Problem, found: Fit, whitener: Whitener, levels: Fit) -> float:
+    """Cost under an autoregression at another fit's noise and gust levels, so that only the motion counts."""
+    shared, local = found.point.shared.copy(), found.point.local.copy()
+    shared[6:9] = levels.point.shared[6:9]
+    local[:, 9] = levels.point.local[:, 9]
+    start = replace(found.point, shared=shared, local=local)
+    again = fit(problem, found.hypothesis, start, whitener, iterations=6, free_levels=False)
     return np.inf if again is None else again.cost
 
 
