@@ -46,6 +46,18 @@ class Parameter:
     prior_std: float | None = None
     step: float = 1e-4
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Sizes at the ends of the plausible range, the smaller first."""
+        low, high = sorted((self.size(self.low), self.size(self.high)))
+        return low, high
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Plausible sizes, and none: a reciprocal may vanish, and one-sided sizes begin at zero."""
+        low, high = self.ends
+        return (0.0 if self.reciprocal else max(low, 0.0) if self.one_sided else low), high
+
     def size(self, value: float) -> float:
         """Coordinate that is zero at neutral and in which the effect grows smoothly."""
         if not self.reciprocal:

@@ -21,7 +21,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airtruth.identify.kalman_step import DOUBLINGS, TINY, assemble, lyapunov, multiply, riccati, step
+from airtruth.identify.kalman_step import (
+    DOUBLINGS,
+    TINY,
+    assemble,
+    lyapunov,
+    multiply,
+    riccati,
+    step,
+    whitener,
+)
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -86,22 +95,10 @@ def score(
         s[i, i] += variance[i]
     if not np.isfinite(s).all():
         return np.inf
-    # Cholesky factor by hand: a covariance that is not one makes J infinite instead of raising
-    lower = np.zeros((m, m))
-    logdet = 0.0
-    for i in range(m):
-        for j in range(i + 1):
-            total = s[i, j]
-            for k in range(j):
-                total -= lower[i, k] * lower[j, k]
-            if i == j:
-                if not total > 0.0:
-                    return np.inf
-                lower[i, i] = np.sqrt(total)
-                logdet += np.log(total)
-            else:
-                lower[i, j] = total / lower[j, j]
-    white = np.linalg.inv(lower)  # whitens: white s white' = I
+    white = np.empty((m, m))
+    logdet = whitener(s, white)
+    if not np.isfinite(logdet):
+        return np.inf
     gain = np.dot(pc, np.dot(white.T, white))
     gain_p = np.dot(phi, gain)
 

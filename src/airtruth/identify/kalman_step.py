@@ -172,6 +172,31 @@ def riccati(phi: Array, c: Array, noise: Array, variance: Array) -> Array:
     return p
 
 
+@njit(cache=True, nogil=True)
+def whitener(s: Array, white: Array) -> float:
+    """W with W S W' = I into ``white`` (m, m), lower triangular; log|S|, nan where S is no covariance.
+
+    Cholesky's factor by hand: what is no covariance is answered instead of raised.
+    """
+    m = s.shape[0]
+    lower = np.zeros((m, m))
+    logdet = 0.0
+    for i in range(m):
+        for j in range(i + 1):
+            total = s[i, j]
+            for k in range(j):
+                total -= lower[i, k] * lower[j, k]
+            if i == j:
+                if not total > 0.0:
+                    return np.nan
+                lower[i, i] = np.sqrt(total)
+                logdet += np.log(total)
+            else:
+                lower[i, j] = total / lower[j, j]
+    white[:] = np.linalg.inv(lower)
+    return float(logdet)
+
+
 @njit(cache=True)
 def lyapunov(powers: Array, count: int, x: Array, work: Array, other: Array) -> None:
     """x <- solution of X = F X F' + x, from the powers F^(2^k)."""

@@ -85,9 +85,9 @@ class Motion:
     az_m_s2: Array
 
 
-@njit(cache=True)
-def _cell(axis: Array, x: float) -> tuple[int, float]:
-    """Lower point of the cell that holds x, and the share of the cell below x, held to 0..1."""
+@njit(cache=True, nogil=True)
+def lower_point(axis: Array, x: float) -> int:
+    """Lower point of the cell of an increasing axis that holds x; the end cells reach beyond the ends."""
     low, high = 0, axis.size - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -95,6 +95,13 @@ def _cell(axis: Array, x: float) -> tuple[int, float]:
             low = middle
         else:
             high = middle
+    return low
+
+
+@njit(cache=True)
+def _cell(axis: Array, x: float) -> tuple[int, float]:
+    """Lower point of the cell that holds x, and the share of the cell below x, held to 0..1."""
+    low = lower_point(axis, x)
     share = (x - axis[low]) / (axis[low + 1] - axis[low])
     return low, min(max(share, 0.0), 1.0)
 

@@ -435,14 +435,9 @@ def _moved(hypothesis: Hypothesis, point: Point, step: Point) -> Point:
     """The step taken, sizes held to their plausible ranges."""
     sizes = point.sizes + step.sizes
     for i, (effect, j) in enumerate(hypothesis.parameters):
-        p = hypothesis.effects[effect].parameters[j]
-        ends = sorted((p.size(p.low), p.size(p.high)))
-        if p.one_sided:
-            ends[0] = max(ends[0], 0.0) if p.reciprocal else max(ends[0], p.size(p.low))
-        room = 0.25 * (ends[1] - ends[0])
-        sizes[i] = min(
-            max(sizes[i], max(ends[0], point.sizes[i] - room)), min(ends[1], point.sizes[i] + room)
-        )
+        low, high = hypothesis.effects[effect].parameters[j].ends
+        room = 0.25 * (high - low)
+        sizes[i] = min(max(sizes[i], max(low, point.sizes[i] - room)), min(high, point.sizes[i] + room))
     shared = point.shared + np.concatenate([step.shared[:6], np.clip(step.shared[6:], -1.0, 1.0)])
     return Point(shared, point.local + step.local, sizes)
 

@@ -267,12 +267,9 @@ def _held(hypothesis: Hypothesis, sizes: Array, step_: Array) -> Array:
     """The step, ended where a parameter would leave its range."""
     moved = step_.copy()
     for i, (effect, j) in enumerate(hypothesis.parameters):
-        p = hypothesis.effects[effect].parameters[j]
-        ends = sorted((p.size(p.low), p.size(p.high)))
-        if p.one_sided:
-            ends[0] = min(ends[0], 0.0) if not p.reciprocal else 0.0
-        moved[i] = min(max(sizes[i] + step_[i], ends[0]), ends[1]) - sizes[i]
+        low, high = hypothesis.effects[effect].parameters[j].reach
+        moved[i] = min(max(sizes[i] + step_[i], low), high) - sizes[i]
     return moved
 
 
-__all__ = ["Assessment", "assess", "floor", "free_run", "leave_one_out"]
+__all__ = ["Assessment", "assess", "explained", "floor", "free_run", "leave_one_out"]

@@ -8,7 +8,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.effects.effect import Effect
 from airtruth.trace.fit import Fit, Problem
 from airtruth.trace.holdout import Assessment, floor, leave_one_out
 from airtruth.trace.lower import lower
@@ -90,20 +89,11 @@ def judge(
         reasons.append("it worsens the free run of records left out")
     if abs(size) < first.material:
         reasons.append(IMMATERIAL)
-    low_end, high_end = ends(s.effect)
+    low_end, high_end = first.reach
     span = high_end - low_end
     if high_end - size < 1e-6 * span or (size - low_end < 1e-6 * span and low_end != 0.0):
         reasons.append("its size ends at the limit of what is plausible")
     return Candidate(s, best, gain, likelihood_gain, free, size, std, tuple(reasons))
-
-
-def ends(effect: Effect) -> tuple[float, float]:
-    """Plausible sizes of an effect."""
-    first = effect.parameters[0]
-    low, high = sorted((first.size(first.low), first.size(first.high)))
-    if first.reciprocal:
-        return 0.0, high
-    return (max(low, 0.0) if first.one_sided else low), high
 
 
 def long_run_variance(x: Array, lags: int) -> float:

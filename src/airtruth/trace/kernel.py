@@ -6,13 +6,12 @@ measured and enter as known series, and so does the speed over ground, which lac
 The air's alpha is theta - asin((V_ground sin(theta - alpha) - w)/V), its pitch rate
 q - (w - w_late)/(tau V), tau = 4 b/(pi V). Between samples the motion is integrated by the classical
 Runge-Kutta method, whose weights are Simpson's: the middle value of an input carries its area. Sensor lags
-are integrated exactly for a signal linear over half a step; a delayed output is the motion integrated back
-by the delay.
+are integrated exactly for a signal linear over half a step, and so is a delay, which is two states.
 
 Forces: tables of X, Z, M over alpha, elevator and q c/(2V) times q_bar, the engines' constants, increments of
 the derivatives, and the terms of `airtruth.effects.change`. Equations of motion: see
-`airtruth.physics.longitudinal`; Dryden form and rotary gust: MIL-F-8785C, 3.7.1.2; gain: R. E. Maine and K. W. Iliff, NASA
-RP-1138 (1985).
+`airtruth.physics.longitudinal`; Dryden form and rotary gust: MIL-F-8785C, 3.7.1.2; gain: R. E. Maine and
+K. W. Iliff, NASA RP-1138 (1985).
 """
 
 from __future__ import annotations
@@ -24,7 +23,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airtruth.identify.kalman_step import riccati, step
+from airtruth.identify.kalman_step import riccati, step, whitener
+from airtruth.physics.longitudinal import lower_point
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -47,13 +47,7 @@ F_MASS, F_INERTIA, F_ELEVATOR, CG, THRUST_ARM, THRUST, THRUST_SLOPE, CONSTANT = 
 @njit(cache=True, nogil=True)
 def cell(axis: Array, x: float) -> tuple[int, float]:
     """Lower point of the cell that holds x and the share of the cell below x; the end cells go on outside."""
-    low, high = 0, axis.size - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if axis[middle] <= x:
-            low = middle
-        else:
-            high = middle
+    low = lower_point(axis, x)
     return low, (x - axis[low]) / (axis[low + 1] - axis[low])
 
 
@@ -185,6 +179,29 @@ def rates(
 
 
 @njit(cache=True, nogil=True)
+def rates_at(x: Array, point: int, air: Array, plane: Plane, out: Array) -> float:
+    """`rates` at a point of the filter's grid.
+
+    Parameters
+    ----------
+    air : (7, points) elevator, speed through the air and over ground, dynamic pressure, pitch attitude, and
+        increments of CL and Cm.
+    """
+    return rates(
+        x,
+        air[0, point],
+        air[1, point],
+        air[2, point],
+        air[3, point],
+        air[4, point],
+        air[5, point],
+        air[6, point],
+        plane,
+        out,
+    )
+
+
+@njit(cache=True, nogil=True)
 def outputs(
     x: Array,
     rate: Array,
@@ -294,21 +311,9 @@ def gain(
         s[i, i] += variance[i]
     if not np.isfinite(s).all():
         return k_gain, white, s, np.nan
-    lower = np.zeros((OUTPUTS, OUTPUTS))
-    logdet = 0.0
-    for i in range(OUTPUTS):
-        for j in range(i + 1):
-            total = s[i, j]
-            for k in range(j):
-                total -= lower[i, k] * lower[j, k]
-            if i == j:
-                if not total > 0.0:
-                    return k_gain, white, s, np.nan
-                lower[i, i] = math.sqrt(total)
-                logdet += math.log(total)
-            else:
-                lower[i, j] = total / lower[j, j]
-    white[:] = np.linalg.inv(lower)
+    logdet = whitener(s, white)
+    if not math.isfinite(logdet):
+        return k_gain, white, s, np.nan
     k_gain[:] = np.dot(pc, np.dot(np.ascontiguousarray(white.T), white))
     return k_gain, white, s, logdet
 
@@ -343,7 +348,7 @@ def innovations(
     Parameters
     ----------
     y : (samples, 3) alpha [rad], q [rad/s], az [m/s2].
-    de, v, density, theta, lift_more, moment_more : on the fine grid, ``sub`` (even) cells per sample.
+    de, v, ground, density, theta, lift_more, moment_more : on the filter's grid, ``sub`` (even) cells per sample.
     output_more : (samples, 3) added to the outputs.
     start : (4,) initial alpha, q and gusts; bias : (3,) of the outputs; offset : (2,) CL, Cm.
     k_gain : (states, 3) of the update; zeros for a free run.
@@ -354,6 +359,9 @@ def innovations(
     n = k_gain.shape[0]
     samples = y.shape[0]
     h = 2.0 * dt_s / sub
+    air = np.empty((7, de.size))
+    air[0], air[1], air[2], air[3], air[4] = de, v, ground, 0.5 * density * v * v, theta
+    air[5], air[6] = offset[0] + lift_more, offset[1] + moment_more
     x = np.zeros(n)
     x[:4] = start
     x[4] = _W1 * start[2] + _W2 * start[3]
@@ -386,19 +394,7 @@ def innovations(
         at += 1 if state_index[k, 0] == 0 else 2
     for k in range(samples):
         f = k * sub
-        qbar = 0.5 * density[f] * v[f] * v[f]
-        az = rates(
-            x,
-            de[f],
-            v[f],
-            ground[f],
-            qbar,
-            theta[f],
-            offset[0] + lift_more[f],
-            offset[1] + moment_more[f],
-            plane,
-            rate[0],
-        )
+        az = rates_at(x, f, air, plane, rate[0])
         outputs(x, rate[0], az, v[f], ground[f], theta[f], constants, arms, scales, out)
         at = motion
         for i in range(OUTPUTS):
@@ -430,19 +426,7 @@ def innovations(
                 g = f + (0 if stage == 0 else (2 if stage == 3 else 1))
                 for m in range(motion):
                     tried[m] = x[m] + (share * h * rate[stage - 1, m] if stage > 0 else 0.0)
-                qbar = 0.5 * density[g] * v[g] * v[g]
-                az = rates(
-                    tried,
-                    de[g],
-                    v[g],
-                    ground[g],
-                    qbar,
-                    theta[g],
-                    offset[0] + lift_more[g],
-                    offset[1] + moment_more[g],
-                    plane,
-                    rate[stage],
-                )
+                az = rates_at(tried, g, air, plane, rate[stage])
                 if stage == 0 and motion < n:
                     outputs(tried, rate[0], az, v[g], ground[g], theta[g], constants, arms, scales, last)
                     first[0], first[1] = rate[0, 0], rate[0, 1]
@@ -451,19 +435,7 @@ def innovations(
                 x[m] += h / 6.0 * slope
             if motion < n:
                 g = f + 2
-                qbar = 0.5 * density[g] * v[g] * v[g]
-                az = rates(
-                    x,
-                    de[g],
-                    v[g],
-                    ground[g],
-                    qbar,
-                    theta[g],
-                    offset[0] + lift_more[g],
-                    offset[1] + moment_more[g],
-                    plane,
-                    rate[0],
-                )
+                az = rates_at(x, g, air, plane, rate[0])
                 outputs(x, rate[0], az, v[g], ground[g], theta[g], constants, arms, scales, out)
                 at = motion
                 for i in range(OUTPUTS):

@@ -104,20 +104,21 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0) -> list[Signals]:
         if theta is None:
             q = channels["q_rad_s"]
             theta = channels["alpha_rad"][0] + np.concatenate([[0.0], np.cumsum(0.5 * dt * (q[1:] + q[:-1]))])
+        quiet = _quiet(channels["elevator_rad"], dt, elevator_std_rad)
         found.append(
             Signals(
                 run_id=run_id,
                 dt_s=dt,
                 sub=sub,
                 y=np.ascontiguousarray(y, dtype=np.float64),
-                elevator_rad=_elevator(_quiet(channels["elevator_rad"], dt, elevator_std_rad), sub * FINE),
+                elevator_rad=_elevator(quiet, sub * FINE),
                 airspeed_m_s=_fine(_smooth(channels["airspeed_m_s"], dt), sub),
                 ground_m_s=_fine(_ground(channels, theta, dt), sub),
                 density_kg_m3=_fine(_smooth(density, dt), sub),
                 theta_rad=_fine(theta, sub),
                 altitude_m=float(np.mean(altitude)),
                 elevator_std_rad=elevator_std_rad
-                * np.sqrt(_moving(channels["elevator_rad"], dt, elevator_std_rad)),
+                * float(np.sqrt((quiet == channels["elevator_rad"]).mean())),
                 throttle=float(channels["throttle"].mean()) if "throttle" in channels else None,
             )
         )
@@ -147,12 +148,6 @@ def _quiet(elevator: Array, dt_s: float, std: float) -> Array:
         return raw
     middle = median_filter(raw, size=2 * round(0.1 / dt_s) + 1, mode="nearest")
     return np.where(np.abs(raw - middle) <= 3.0 * std, middle, raw)
-
-
-def _moving(elevator: Array, dt_s: float, std: float) -> float:
-    """Share of the samples that smoothing leaves as they are."""
-    raw = np.asarray(elevator, dtype=np.float64)
-    return float((_quiet(raw, dt_s, std) == raw).mean())
 
 
 def _elevator(elevator: Array, sub: int) -> Array:

@@ -13,7 +13,7 @@ from airtruth.effects.effect import Effect
 from airtruth.trace import score
 from airtruth.trace.fit import Fit, Hypothesis, Point, Problem, Whitener, autoregression, begin, fit
 from airtruth.trace.holdout import leave_one_out
-from airtruth.trace.judge import IMMATERIAL, UNCONVERGED, Candidate, ends, judge, outdone
+from airtruth.trace.judge import IMMATERIAL, UNCONVERGED, Candidate, judge, outdone
 from airtruth.trace.model import respond
 from airtruth.trace.score import Score, Table
 
@@ -219,7 +219,7 @@ def _refit(problem: Problem, null: Fit, s: Score, rival: float) -> Fit | None:
 
 
 def _from(null: Fit, s: Score, share: float) -> Point:
-    low, high = ends(s.effect)
+    low, high = s.effect.parameters[0].reach
     size = min(max(share * s.size, low), high)
     return replace(null.point, sizes=np.concatenate([null.point.sizes, s.direction.sizes(size)]))
 
