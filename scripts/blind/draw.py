@@ -23,11 +23,23 @@ from blind.truths import EFFECTS, LIBRARY, OFF_LIBRARY, Added, Parts, combined, 
 
 Array = NDArray[np.float64]
 
-MODES: Final = ("mixed", "null", "single", "pair", "off-library", "clutter")
+MODES: Final = ("mixed", "null", "single", "pair", "off-library", "clutter", "curve")
 AIRS: Final = tuple(SIGMA_M_S)
 _MIXED: Final = {"null": 0.25, "single": 0.45, "pair": 0.12, "off-library": 0.12, "clutter": 0.06}
 _SIZES: Final = (0.35, 8.0)  # over size16: noncentrality about 2 to 1000
 _CLUTTER: Final = (0.15, 0.5)
+_CURVE_SIZES: Final = (0.2, 1.5)  # noncentrality about 0.6 to 36
+CURVE: Final = (
+    "elevator_delay",
+    "elevator_asymmetry",
+    "cm_alpha_nonlinear:quadratic",
+    "downwash_lag",
+    "vane_arm",
+    "vane_lag",
+    "gyro_lag",
+    "accelerometer_arm",
+)
+"""Whose detection is compared with its bound as a curve over size."""
 _CLUTTERS: Final = 4
 _LEAD_S: Final = {"calm": 0.2, "light": 2.0, "moderate": 2.0}
 FORBIDDEN: Final = ("airtruth.effects", "airtruth.identify", "airtruth.trace")
@@ -76,7 +88,10 @@ def draw(seed: int, number: int, mode: str = "mixed") -> Trial:
     """The trial of a number."""
     rng = stream(seed, number, 0)
     composition = str(rng.choice(list(_MIXED), p=list(_MIXED.values()))) if mode == "mixed" else mode
+    sizes = _SIZES
     air = str(rng.choice(AIRS))
+    if mode == "curve":
+        composition = "single"
     own = composition if composition != "clutter" else ("single" if rng.random() < 0.6 else "null")
     pool, count = {
         "null": (LIBRARY, 0),
@@ -84,6 +99,8 @@ def draw(seed: int, number: int, mode: str = "mixed") -> Trial:
         "pair": (LIBRARY, 2),
         "off-library": (OFF_LIBRARY, 1),
     }[own]
+    if mode == "curve":
+        pool, sizes = CURVE, _CURVE_SIZES
     keys = [str(key) for key in rng.choice(pool, count, replace=False)]
     clutter_keys: list[str] = []
     if composition == "clutter":
@@ -93,7 +110,7 @@ def draw(seed: int, number: int, mode: str = "mixed") -> Trial:
         seed=seed,
         number=number,
         composition=composition,
-        effects=tuple(_added(key, air, _SIZES, rng) for key in keys),
+        effects=tuple(_added(key, air, sizes, rng) for key in keys),
         clutter=tuple(_added(key, air, _CLUTTER, rng) for key in clutter_keys),
         body=_body(rng),
         air=air,

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from blind import gusts, sensors, surface
 from blind.aircraft_xml import Shape, nuisances
-from blind.draw import Trial, fly_record, stream, truth_of
+from blind.draw import AIRS, Trial, fly_record, stream, truth_of
 from blind.figures import (
     CHANNELS,
     DEG,
@@ -40,7 +40,8 @@ from blind.figures import (
     STEP_S,
 )
 from blind.flight import Model, Truth
-from blind.truths import EFFECTS, Added, Parts, shrunk
+from blind.sizes import SIZE16
+from blind.truths import EFFECTS, LIBRARY, Added, Parts, shrunk
 
 Array = NDArray[np.float64]
 
@@ -53,6 +54,8 @@ _SETTLE_S: Final = 4.0
 _SHARE: Final = 0.125
 _TRIMS: Final = (Shape("CL", "one", 0.01), Shape("Cm", "one", 0.003))
 _STATE_SHIFT: Final = 5  # samples: 0.1 s
+BEYOND: Final = "beyond the library"
+"""Key among the noncentralities of an effect that the library lacks."""
 
 
 @dataclass(frozen=True)
@@ -215,16 +218,34 @@ def lambdas(trial: Trial) -> dict[str, float]:
         others = tuple(e for e in everything if e is not effect)
         d = whiten(difference(trial, effect, others)).ravel()
         result[effect.key] = noncentrality(d, along.free, along.prior)
+        if not EFFECTS[effect.key].library:
+            result[BEYOND] = beyond(trial, d, whiten, along)
     return result
 
 
-def difference(trial: Trial, effect: Added, others: Sequence[Added] = ()) -> Array:
+def beyond(trial: Trial, d: Array, whiten: Whitener, along: Directions) -> float:
+    """What of a whitened difference is left after the best single effect of the library, at any size.
+
+    Effects of the library are taken to first order at their nominal size; those with a place at three places.
+    """
+    left = []
+    for key in LIBRARY:
+        kind = EFFECTS[key]
+        size = min(SIZE16[key][AIRS.index(trial.air)], kind.largest)
+        for place in (0.0, 0.5, 0.99) if key.endswith(":break") else (0.5,):
+            effect = Added(key, kind.values(size, place))
+            column = whiten(difference(trial, effect, (), _COARSE_S)).ravel()[:, None]
+            left.append(noncentrality(d, np.hstack([along.free, column]), along.prior))
+    return min(left)
+
+
+def difference(trial: Trial, effect: Added, others: Sequence[Added] = (), step_s: float = STEP_S) -> Array:
     """What an effect adds to alpha, q and az beside others, calm air, (records, samples, 3)."""
     if effect.key == "airspeed_scale":
         return _airspeed(trial, effect.values["factor"])
     share = _SHARE if EFFECTS[effect.key].smooth else 1.0
-    full = responses(trial, (*others, shrunk(effect, share)), STEP_S)
-    return (full - responses(trial, others, STEP_S)) / share
+    full = responses(trial, (*others, shrunk(effect, share)), step_s)
+    return (full - responses(trial, others, step_s)) / share
 
 
 def _airspeed(trial: Trial, factor: float) -> Array:

@@ -102,10 +102,16 @@ def discrete(a, b, dt):
 
 
 def noise_step(a, dt, intensity):
-    """Covariance of a step's process noise (C. F. Van Loan, IEEE Trans. Automatic Control 23, 1978)."""
+    """Covariance of a step's process noise (C. F. Van Loan, IEEE Trans. Automatic Control 23, 1978).
+
+    Of a 256th of the step, doubled: exp(-a dt) has no digits left where a sensor is quick.
+    """
     n = len(a)
-    e = expm(np.block([[-a, np.diag(intensity)], [np.zeros((n, n)), a.T]]) * dt)
-    return e[n:, n:].T @ e[:n, n:]
+    e = expm(np.block([[-a, np.diag(intensity)], [np.zeros((n, n)), a.T]]) * dt / 256)
+    phi, q = e[n:, n:].T, e[n:, n:].T @ e[:n, n:]
+    for _ in range(8):
+        phi, q = phi @ phi, q + phi @ q @ phi.T
+    return 0.5 * (q + q.T)
 
 
 def run(a, b, c, d, u, dt, start=None, kicks=None):

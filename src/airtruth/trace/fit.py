@@ -41,6 +41,9 @@ Array = NDArray[np.float64]
 ITERATIONS: Final = 45
 _ENOUGH: Final = 0.002
 """A fit has converged once a step would gain less than this in log-likelihood: 0.06 standard errors."""
+_NEARLY: Final = 0.02
+"""The same where the search cannot go on: 0.2 standard errors."""
+_CHORDS: Final = 3
 _STALE: Final = 1.0
 """Gain in log-likelihood below which derivatives are made anew."""
 _ORDERS: Final = 6
@@ -284,19 +287,33 @@ def fit(
         cost, pieces, tangents = current
         step, gain = _step(problem, hypothesis, point, pieces, damping, free_levels)
         if gain < _ENOUGH and fresh:
-            converged = True
+            converged = _decrement(problem, hypothesis, point, pieces, free_levels) < _NEARLY
             break
         trial = _moved(hypothesis, point, step)
         tried = _evaluate(problem, hypothesis, trial, whitener, free_levels, tangents)
+        for _ in range(_CHORDS):
+            # valleys are curved: from a poor trial one more step with the same derivatives leads back into it
+            if tried is None or cost - tried[0] > 0.5 * gain:
+                break
+            onwards, _ = _step(problem, hypothesis, trial, tried[1], damping, free_levels)
+            further = _moved(hypothesis, trial, onwards)
+            again = _evaluate(problem, hypothesis, further, whitener, free_levels, tangents)
+            if again is None or again[0] >= tried[0]:
+                break
+            trial, tried = further, again
         better = -np.inf if tried is None else cost - tried[0]
         if tried is not None and better > -1e-9:
             point, current = trial, tried
             ratio = better / max(gain, 1e-12)  # what was gained over what was promised
             damping = max(damping * (0.1 if ratio > 0.75 else 1.0 if ratio > 0.25 else 5.0), 1e-9)
             behind = tried[0] - rival
-            if (better < 0.01 and fresh) or (behind > 20.0 and 4.0 * better < behind):
+            if behind > 20.0 and 4.0 * better < behind:
                 converged = True
                 break
+            if better < 0.01 and fresh:
+                converged = _decrement(problem, hypothesis, point, tried[1], free_levels) < _NEARLY
+                if converged:
+                    break
             fresh = False
         else:
             damping = max(damping * 10.0, 1e-3)
@@ -406,6 +423,9 @@ def reduced(problem: Problem, point: Point, k: int, pieces, levels: bool, dampin
             h_ll[_SIGMA], h_ll[:, _SIGMA], h_ll[_SIGMA, _SIGMA] = 0.0, 0.0, 1.0
             g_l[_SIGMA] = 0.0
             h_sl[:, _SIGMA] = 0.0
+        else:
+            # of a level that the record puts at none, the observed information: J'' = 4 s^2 J_ss + 2 J' in log s
+            h_ll[_SIGMA, _SIGMA] += 2.0 * max(g[m + _SIGMA], 0.0)
         h_ll[np.diag_indices(L)] *= 1.0 + damping
         solved = np.linalg.solve(h_ll, np.column_stack([g_l, h_sl.T]))
         gradient += g[:m] - h_sl @ solved[:, 0]
@@ -429,6 +449,11 @@ def _step(problem: Problem, hypothesis: Hypothesis, point: Point, pieces, dampin
     local[:, _SIGMA] = np.clip(local[:, _SIGMA], -1.0, 1.0)
     gain = float(-gradient @ shared) + sum(float(solved[:, 0] @ h_ll @ solved[:, 0]) for h_ll, solved in back)
     return Point(shared[:S], local, shared[S:]), 0.5 * gain
+
+
+def _decrement(problem: Problem, hypothesis: Hypothesis, point: Point, pieces, levels: bool) -> float:  # type: ignore[no-untyped-def]
+    """What a step without damping promises."""
+    return _step(problem, hypothesis, point, pieces, 0.0, levels)[1]
 
 
 def _moved(hypothesis: Hypothesis, point: Point, step: Point) -> Point:

@@ -6,7 +6,7 @@ measured and enter as known series, and so does the speed over ground, which lac
 The air's alpha is theta - asin((V_ground sin(theta - alpha) - w)/V), its pitch rate
 q - (w - w_late)/(tau V), tau = 4 b/(pi V). Between samples the motion is integrated by the classical
 Runge-Kutta method, whose weights are Simpson's: the middle value of an input carries its area. Sensor lags
-are integrated exactly for a signal linear over half a step, and so is a delay, which is two states.
+are integrated exactly for a signal linear over half a step, and so is a delay.
 
 Forces: tables of X, Z, M over alpha, elevator and q c/(2V) times q_bar, the engines' constants, increments of
 the derivatives, and the terms of `airtruth.effects.change`. Equations of motion: see
@@ -35,11 +35,13 @@ index and value of aero terms and of states (`airtruth.trace.lower`)."""
 
 OUTPUTS: Final = 3
 CORE: Final = 5
+DELAY: Final = 8
+"""States of a delay."""
 _W1: Final = math.sqrt(1.5)
 _W2: Final = math.sqrt(1.5) * (1.0 / math.sqrt(3.0) - 1.0)
 
 # places in the vector of constants
-AREA, CHORD, MASS, INERTIA, GRAVITY, ALPHA0, DE0, LENGTH_W, SIGMA_W, ROTARY, ROTARY_S = range(11)
+AREA, CHORD, MASS, INERTIA, GRAVITY, ALPHA0, DE0, LENGTH_W, SIGMA_W, ROTARY, ROTARY_S, NEUTRAL = range(12)
 # factors and shifts of declared quantities
 F_MASS, F_INERTIA, F_ELEVATOR, CG, THRUST_ARM, THRUST, THRUST_SLOPE, CONSTANT = range(8)
 
@@ -81,7 +83,7 @@ def rates(
     q = x[1]
     late = (gust - x[4]) / constants[ROTARY_S]
     q_air = q - constants[ROTARY] * sigma * late / v
-    surface = constants[DE0] + declared[F_ELEVATOR] * (de - constants[DE0])
+    surface = constants[NEUTRAL] + declared[F_ELEVATOR] * (de - constants[NEUTRAL])
     force = qbar * constants[AREA]
     chord = constants[CHORD]
     half = 0.5 * chord / v
@@ -224,6 +226,27 @@ def outputs(
 
 
 @njit(cache=True, nogil=True)
+def delayed(delay_s: float) -> Array:
+    """A and B (order, order + 1) of a delay; its output is the input less twice the sum of every second state.
+
+    exp(-s) = (1 - z)/(1 + z) with z = tanh(s/2) cut off after ``DELAY`` steps of its continued fraction, a ladder
+    of integrators: the diagonal Pade approximant, to one degree up to a phase of 11 rad.
+
+    Source: G. A. Baker and P. Graves-Morris, Pade Approximants, 2nd ed. (1996), section 4.6 (the fraction).
+    """
+    system = np.zeros((DELAY, DELAY + 1))
+    for row in range(DELAY):
+        rate = 2.0 * (2.0 * row + 1.0) / delay_s
+        if row % 2 == 0:
+            system[row, row + 1 : DELAY : 2] = rate
+        else:
+            system[row, DELAY] = rate
+            system[row, 1:DELAY:2] = -rate
+            system[row, 0:row:2] = -rate
+    return system
+
+
+@njit(cache=True, nogil=True)
 def linear(
     x: Array,
     de: float,
@@ -241,7 +264,7 @@ def linear(
 ) -> None:
     """A and C of the motion, effects' states and late sensors about a state, by central differences.
 
-    A delay d is the response (1 - d s/2 + d^2 s^2/12)/(1 + d s/2 + d^2 s^2/12) in two states.
+    A delay is the Pade approximant of order `DELAY`, see `delayed`.
     """
     n = x.size
     a[:] = 0.0
@@ -277,13 +300,14 @@ def linear(
             c[i, at] = 1.0
             at += 1
         if delays[i] > 0.0:
-            for j in range(n):
-                a[at + 1, j] = 12.0 / delays[i] * c[i, j]
-            a[at, at + 1] = 1.0 / delays[i]
-            a[at + 1, at] = -12.0 / delays[i]
-            a[at + 1, at + 1] = -6.0 / delays[i]
-            c[i, at + 1] -= 1.0
-            at += 2
+            system = delayed(delays[i])
+            for row in range(DELAY):
+                for j in range(n):
+                    a[at + row, j] = system[row, DELAY] * c[i, j]
+            a[at : at + DELAY, at : at + DELAY] = system[:, :DELAY]
+            for row in range(1, DELAY, 2):
+                c[i, at + row] -= 2.0
+            at += DELAY
 
 
 @njit(cache=True, nogil=True)
@@ -368,14 +392,14 @@ def innovations(
     rate, tried = np.zeros((4, n)), np.zeros(n)
     out, last, first = np.zeros(OUTPUTS), np.zeros(OUTPUTS), np.zeros(2)
     ends = np.zeros(3)
-    phi, early, late = np.zeros((OUTPUTS, 2, 2)), np.zeros((OUTPUTS, 2)), np.zeros((OUTPUTS, 2))
+    phi = np.zeros((OUTPUTS, DELAY, DELAY))
+    early, late = np.zeros((OUTPUTS, DELAY)), np.zeros((OUTPUTS, DELAY))
+    held = np.zeros(DELAY)
     for i in range(OUTPUTS):
         if delays[i] > 0.0:
-            d = delays[i]
-            system = np.array([[0.0, 1.0 / d, 0.0], [-12.0 / d, -6.0 / d, 12.0 / d]])
-            transition, noise = np.empty((2, 2)), np.empty((2, 2))
-            input0, input1 = np.empty((2, 1)), np.empty((2, 1))
-            step(system, np.zeros(2), 2, 0.5 * h, transition, input0, input1, noise)
+            transition, noise = np.empty((DELAY, DELAY)), np.empty((DELAY, DELAY))
+            input0, input1 = np.empty((DELAY, 1)), np.empty((DELAY, 1))
+            step(delayed(delays[i]), np.zeros(DELAY), DELAY, 0.5 * h, transition, input0, input1, noise)
             phi[i] = transition
             early[i] = input0[:, 0]
             late[i] = input1[:, 0]
@@ -384,7 +408,7 @@ def innovations(
     for k in range(state_index.shape[0]):
         signal = state_index[k, 1]
         alpha = x[0]
-        surface = constants[DE0] + declared[F_ELEVATOR] * (de[0] - constants[DE0])
+        surface = constants[NEUTRAL] + declared[F_ELEVATOR] * (de[0] - constants[NEUTRAL])
         s = alpha
         if signal == 1:
             s = surface
@@ -407,8 +431,9 @@ def innovations(
             if delays[i] > 0.0:
                 if k == 0:
                     x[at] = value
-                value -= x[at + 1]
-                at += 2
+                for row in range(1, DELAY, 2):
+                    value -= 2.0 * x[at + row]
+                at += DELAY
             e[k, i] = y[k, i] - value - bias[i] - output_more[k, i]
         if k + 1 == samples:
             break
@@ -456,15 +481,14 @@ def innovations(
                         at += 1
                     if delays[i] > 0.0:
                         for half in range(2):
-                            u0, u1, p0, p1 = ends[half], ends[half + 1], x[at], x[at + 1]
-                            for row in range(2):
-                                x[at + row] = (
-                                    phi[i, row, 0] * p0
-                                    + phi[i, row, 1] * p1
-                                    + early[i, row] * u0
-                                    + late[i, row] * u1
-                                )
-                        at += 2
+                            for row in range(DELAY):
+                                held[row] = x[at + row]
+                            for row in range(DELAY):
+                                total = early[i, row] * ends[half] + late[i, row] * ends[half + 1]
+                                for m in range(DELAY):
+                                    total += phi[i, row, m] * held[m]
+                                x[at + row] = total
+                        at += DELAY
     return True
 
 
@@ -513,7 +537,7 @@ def evaluate(
         if lags[i] > 0.0:
             n += 1
         if delays[i] > 0.0:
-            n += 2
+            n += DELAY
     k_gain = np.zeros((n, OUTPUTS))
     logdet = 0.0
     if not free_run:

@@ -194,6 +194,7 @@ def plane_of(
             float(np.exp(local[9])),
             0.5 + shared[9],
             4.0 * c.span_m / (np.pi * airspeed_m_s),
+            plant.neutral_elevator_rad,
         ]
     )
     declared = np.concatenate([low.declared, plant.thrust, plant.constant * (1.0 + shared[10])])

@@ -36,6 +36,7 @@ class Plant:
     values : (alpha, elevator, qhat, 3) X, Z [m2] and M [m3] of the air over the dynamic pressure.
     constant : (3,) X, Z [N] and M [N m] that the dynamic pressure leaves alone: the engines'.
     trim_alpha_rad, trim_elevator_rad : about which increments of derivatives count.
+    neutral_elevator_rad : about which a deflection is scaled: none, or of the linear model its trim.
     alpha_shift_rad : taken from the measured alpha and theta (the linear model counts alpha from its trim).
     thrust : (2,) thrust for its arm: at no dynamic pressure [N], and its slope over that [m2].
     derivatives, derivative_cov : (6,) declared values and (6, 6) covariance, mass, inertia and CG
@@ -51,6 +52,7 @@ class Plant:
     constant: Array
     trim_alpha_rad: float
     trim_elevator_rad: float
+    neutral_elevator_rad: float
     alpha_shift_rad: float
     thrust: Array
     derivatives: Array
@@ -106,6 +108,7 @@ def probed(
         constant=constant,
         trim_alpha_rad=at.alpha_rad,
         trim_elevator_rad=at.elevator_rad,
+        neutral_elevator_rad=0.0,
         alpha_shift_rad=0.0,
         thrust=power.thrust,
         derivatives=declared.central,
@@ -187,6 +190,7 @@ def linear(
         constant=np.array([0.0, 0.0, engine_moment]),
         trim_alpha_rad=0.0,
         trim_elevator_rad=elevator,
+        neutral_elevator_rad=elevator,
         alpha_shift_rad=alpha,
         thrust=np.array([0.1 * c.mass_kg * G0, 0.0]) if power is None else power.thrust,
         derivatives=np.asarray(derivatives, dtype=np.float64),
