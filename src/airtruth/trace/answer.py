@@ -18,6 +18,7 @@ from airtruth.trace.holdout import Assessment, assess, explained
 from airtruth.trace.lower import CHANNELS, lower
 from airtruth.trace.model import S
 from airtruth.trace.prepare import Case
+from airtruth.trace.profile import Profile, place_of
 from airtruth.trace.score import Table
 from airtruth.trace.search import LEVEL, Candidate, Stage
 
@@ -160,10 +161,13 @@ def _effect(stages: Sequence[Stage], number: int) -> dict[str, Any]:
     ]
     runner = max([c.gain for c in rest], default=0.0)
     separation = math.sqrt(max(0.0, best.gain - max(0.0, runner)))
+    stated = parameters(effect, final.point.sizes[span], block)
+    if stage.profile is not None:
+        _widen(effect, stated, stage.profile)
     row = {
         "name": effect.name,
         "variant": effect.variant,
-        "parameters": parameters(effect, final.point.sizes[span], block),
+        "parameters": stated,
         "p_value": _p_value(stage, best),
         "separation_sigma": separation,
         "indistinguishable_from": sorted({c.score.effect.name for c in others} - {effect.name}),
@@ -172,6 +176,16 @@ def _effect(stages: Sequence[Stage], number: int) -> dict[str, Any]:
     if effect.name == "sensor_delay":
         row["channel"] = effect.variant
     return row
+
+
+def _widen(effect: Effect, stated: dict[str, dict[str, Any]], profile: Profile) -> None:
+    """Intervals of size and place made to hold those of the profile, in place."""
+    at = place_of(effect) or 0
+    for j, ends in ((0, profile.size_interval()), (at, profile.place_interval())):
+        p = effect.parameters[j]
+        row = stated[p.name]
+        known = [e for e in row["ci95"] if e is not None]
+        row["ci95"] = [min(*known, *map(p.value, ends)), max(*known, *map(p.value, ends))]
 
 
 def _p_value(stage: Stage, best: Candidate) -> float:

@@ -44,6 +44,7 @@ _ENOUGH: Final = 0.002
 _NEARLY: Final = 0.02
 """The same where the search cannot go on: 0.2 standard errors."""
 _CHORDS: Final = 3
+_LEAST_DAMPING: Final = 1e-9
 _STALE: Final = 1.0
 """Gain in log-likelihood below which derivatives are made anew."""
 _ORDERS: Final = 6
@@ -84,6 +85,12 @@ class Hypothesis:
         for effect, values in zip(self.effects, self.values(sizes), strict=True):
             total = total + effect.change(values)
         return total
+
+    @cached_property
+    def held(self) -> tuple[int, ...]:
+        """Places in the vector of sizes whose range is a single value."""
+        ends = [self.effects[i].parameters[j].ends for i, j in self.parameters]
+        return tuple(k for k, (low, high) in enumerate(ends) if low == high)
 
     def plus(self, effect: Effect) -> Hypothesis:
         """The hypothesis with one effect more."""
@@ -305,7 +312,7 @@ def fit(
         if tried is not None and better > -1e-9:
             point, current = trial, tried
             ratio = better / max(gain, 1e-12)  # what was gained over what was promised
-            damping = max(damping * (0.1 if ratio > 0.75 else 1.0 if ratio > 0.25 else 5.0), 1e-9)
+            damping = max(damping * (0.1 if ratio > 0.75 else 1.0 if ratio > 0.25 else 5.0), _LEAST_DAMPING)
             behind = tried[0] - rival
             if behind > 20.0 and 4.0 * better < behind:
                 converged = True
@@ -402,8 +409,20 @@ def _prior_cost(problem: Problem, point: Point) -> float:
     return total
 
 
-def reduced(problem: Problem, point: Point, k: int, pieces, levels: bool, damping: float = 0.0):  # type: ignore[no-untyped-def]
+def reduced(  # type: ignore[no-untyped-def]
+    problem: Problem,
+    point: Point,
+    k: int,
+    pieces,
+    levels: bool,
+    damping: float = 0.0,
+    held: Sequence[int] = (),
+):
     """Gradient and information of shared parameters and sizes with the local ones eliminated.
+
+    Parameters
+    ----------
+    held : places in the vector of sizes that do not move.
 
     Returns
     -------
@@ -431,17 +450,16 @@ def reduced(problem: Problem, point: Point, k: int, pieces, levels: bool, dampin
         gradient += g[:m] - h_sl @ solved[:, 0]
         information += h[:m, :m] - h_sl @ solved[:, 1:]
         back.append((h_ll, solved))
-    if not levels:
-        for i in _LEVELS:
-            information[i], information[:, i] = 0.0, 0.0
-            information[i, i] = 1.0
-            gradient[i] = 0.0
+    for i in (*(() if levels else _LEVELS), *(S + i for i in held)):
+        information[i], information[:, i] = 0.0, 0.0
+        information[i, i] = 1.0
+        gradient[i] = 0.0
     return gradient, information, back
 
 
 def _step(problem: Problem, hypothesis: Hypothesis, point: Point, pieces, damping: float, levels: bool):  # type: ignore[no-untyped-def]
     k = len(point.sizes)
-    gradient, information, back = reduced(problem, point, k, pieces, levels, damping)
+    gradient, information, back = reduced(problem, point, k, pieces, levels, damping, hypothesis.held)
     scale = np.sqrt(np.maximum(np.diag(information), 1e-30))
     normal = information / np.outer(scale, scale) + damping * np.eye(len(scale))
     shared = -np.linalg.solve(normal, gradient / scale) / scale
@@ -452,8 +470,8 @@ def _step(problem: Problem, hypothesis: Hypothesis, point: Point, pieces, dampin
 
 
 def _decrement(problem: Problem, hypothesis: Hypothesis, point: Point, pieces, levels: bool) -> float:  # type: ignore[no-untyped-def]
-    """What a step without damping promises."""
-    return _step(problem, hypothesis, point, pieces, 0.0, levels)[1]
+    """What a step (nearly) without damping promises."""
+    return float(_step(problem, hypothesis, point, pieces, _LEAST_DAMPING, levels)[1])
 
 
 def _moved(hypothesis: Hypothesis, point: Point, step: Point) -> Point:
@@ -472,7 +490,7 @@ def _covariance(problem: Problem, hypothesis: Hypothesis, pieces, levels: bool) 
     empty = Point(
         np.zeros(S), np.stack([local_prior(r, problem.settings)[0] for r in problem.records]), np.zeros(k)
     )
-    _, information, _ = reduced(problem, empty, k, pieces, levels)
+    _, information, _ = reduced(problem, empty, k, pieces, levels, held=hypothesis.held)
     scale = np.sqrt(np.maximum(np.diag(information), 1e-30))
     normal = information / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
     return np.asarray(np.linalg.inv(normal) / np.outer(scale, scale))

@@ -15,6 +15,7 @@ from airtruth.trace.fit import Fit, Hypothesis, Point, Problem, Whitener, autore
 from airtruth.trace.holdout import leave_one_out
 from airtruth.trace.judge import IMMATERIAL, UNCONVERGED, Candidate, judge, outdone
 from airtruth.trace.model import respond
+from airtruth.trace.profile import Profile, best_place, place_of
 from airtruth.trace.score import Score, Table
 
 Array = NDArray[np.float64]
@@ -45,6 +46,7 @@ class Stage:
     adjusted : Holm's p-values of the table's scores.
     candidates : refitted ones, best first.
     tied : those that cannot be told from the best accepted one, itself first; empty if none was.
+    profile : of the best accepted one along its place; None without one.
     """
 
     null: Fit
@@ -54,6 +56,7 @@ class Stage:
     adjusted: Array
     candidates: tuple[Candidate, ...]
     tied: tuple[Candidate, ...]
+    profile: Profile | None = None
 
     @property
     def anomaly(self) -> tuple[float, float]:
@@ -105,7 +108,14 @@ def search(
                 continue
             candidates = _judged(problem, null, fits)
         tied = _tied(candidates)
-        stages.append(Stage(null, gls, whitener, table, adjusted, candidates, tied))
+        profile = None
+        if tied and place_of(tied[0].score.effect) is not None:
+            advance(f"place of {tied[0].score.effect.key}")
+            found, profile = best_place(problem, tied[0].found)
+            leader = replace(tied[0], found=found)
+            candidates = tuple(leader if c is tied[0] else c for c in candidates)
+            tied = (leader, *tied[1:])
+        stages.append(Stage(null, gls, whitener, table, adjusted, candidates, tied, profile))
         if not tied:
             break
         best = tied[0]
