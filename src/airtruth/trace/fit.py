@@ -41,8 +41,8 @@ Array = NDArray[np.float64]
 ITERATIONS: Final = 45
 _ENOUGH: Final = 0.002
 """A fit has converged once a step would gain less than this in log-likelihood: 0.06 standard errors."""
-_NEARLY: Final = 0.02
-"""The same where the search cannot go on: 0.2 standard errors."""
+_NEARLY: Final = 0.05
+"""The same where a step does not keep its promise: 0.3 standard errors."""
 _CHORDS: Final = 3
 _LEAST_DAMPING: Final = 1e-9
 _STALE: Final = 1.0
@@ -322,6 +322,9 @@ def fit(
                 if converged:
                     break
             fresh = False
+        elif fresh and _decrement(problem, hypothesis, point, pieces, free_levels) < _NEARLY:
+            converged = True
+            break
         else:
             damping = max(damping * 10.0, 1e-3)
         if not fresh and better < _STALE:
