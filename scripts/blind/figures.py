@@ -66,3 +66,5 @@ QUANTUM: Final = {"alpha_rad": 0.05 * DEG, "q_rad_s": 0.3 * DEG, "az_m_s2": 0.01
 """Steps of the quantised sensors."""
 HELD_OUT: Final = (2, 5)
 """Records that a tracer holds out by default: every third."""
+STRONG: Final = 30.0
+"""Noncentrality above which an effect has to be found."""

@@ -38,6 +38,7 @@ from blind.figures import (
     SIGMA_M_S,
     SPAN_M,
     STEP_S,
+    STRONG,
 )
 from blind.flight import Model, Truth
 from blind.sizes import SIZE16
@@ -218,7 +219,7 @@ def lambdas(trial: Trial) -> dict[str, float]:
         others = tuple(e for e in everything if e is not effect)
         d = whiten(difference(trial, effect, others)).ravel()
         result[effect.key] = noncentrality(d, along.free, along.prior)
-        if not EFFECTS[effect.key].library:
+        if not EFFECTS[effect.key].library and result[effect.key] > STRONG:
             result[BEYOND] = beyond(trial, d, whiten, along)
     return result
 

@@ -9,6 +9,8 @@ from typing import Any, Final
 import numpy as np
 from scipy.stats import beta, chi2, ncx2
 
+from blind.figures import STRONG
+
 Case = Mapping[str, Any]
 
 CLASSES: Final = (
@@ -20,7 +22,6 @@ CLASSES: Final = (
     (60.0, 150.0),
     (150.0, np.inf),
 )
-STRONG: Final = 30.0
 LEVEL: Final = 0.01
 """Level of the score test whose power is compared with the bound."""
 WORSE: Final = 1.02

@@ -46,14 +46,14 @@ AREA, CHORD, MASS, INERTIA, GRAVITY, ALPHA0, DE0, LENGTH_W, SIGMA_W, ROTARY, ROT
 F_MASS, F_INERTIA, F_ELEVATOR, CG, THRUST_ARM, THRUST, THRUST_SLOPE, CONSTANT = range(8)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def cell(axis: Array, x: float) -> tuple[int, float]:
     """Lower point of the cell that holds x and the share of the cell below x; the end cells go on outside."""
     low = lower_point(axis, x)
     return low, (x - axis[low]) / (axis[low + 1] - axis[low])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def rates(
     x: Array,
     de: float,
@@ -78,8 +78,11 @@ def rates(
     aero_index, aero_value, state_index, state_value = plane[7:]
     sigma, length = constants[SIGMA_W], constants[LENGTH_W]
     gust = _W1 * x[2] + _W2 * x[3]
-    sine = (math.sin(theta - x[0]) * ground - sigma * gust) / v
+    climb = theta - x[0]
+    sine = (math.sin(climb) * ground - sigma * gust) / v
     alpha = theta - math.asin(min(max(sine, -1.0), 1.0))
+    cosine, sine = math.cos(alpha), math.sin(alpha)
+    weight = constants[GRAVITY] * math.cos(climb) / ground
     q = x[1]
     late = (gust - x[4]) / constants[ROTARY_S]
     q_air = q - constants[ROTARY] * sigma * late / v
@@ -95,13 +98,11 @@ def rates(
     for a in range(2):
         wa = si if a else 1.0 - si
         for b in range(2):
-            wb = wa * (sj if b else 1.0 - sj)
-            for c in range(2):
-                w = wb * (sn if c else 1.0 - sn)
-                f = values[i + a, j + b, n + c]
-                fx += w * f[0]
-                fz += w * f[1]
-                fm += w * f[2]
+            w1 = wa * (sj if b else 1.0 - sj)
+            w0, w1 = w1 * (1.0 - sn), w1 * sn
+            fx += w0 * values[i + a, j + b, n, 0] + w1 * values[i + a, j + b, n + 1, 0]
+            fz += w0 * values[i + a, j + b, n, 1] + w1 * values[i + a, j + b, n + 1, 1]
+            fm += w0 * values[i + a, j + b, n, 2] + w1 * values[i + a, j + b, n + 1, 2]
     fx = fx * qbar + declared[CONSTANT]
     fz = fz * qbar + declared[CONSTANT + 1]
     fm = fm * qbar + declared[CONSTANT + 2]
@@ -112,11 +113,9 @@ def rates(
     inertia = constants[INERTIA] * declared[F_INERTIA]
     # terms in alpha' last: they take alpha' with everything else in it
     for late_terms in range(2):
-        first = (
-            q
-            + ((fz - force * lift) * math.cos(alpha) - fx * math.sin(alpha)) / (mass * ground)
-            + constants[GRAVITY] * math.cos(theta - x[0]) / ground
-        )
+        if aero_index.shape[0] == 0:
+            break
+        first = q + ((fz - force * lift) * cosine - fx * sine) / (mass * ground) + weight
         for t in range(aero_index.shape[0]):
             signal = aero_index[t, 1]
             if (signal == 3) != (late_terms == 1):
@@ -130,7 +129,7 @@ def rates(
             elif signal == 3:
                 s = first * half
                 if aero_index[t, 0] == 0:  # the term is part of the alpha' that it is in proportion to
-                    s /= 1.0 + aero_value[t, 0] * half * force * math.cos(alpha) / (mass * v)
+                    s /= 1.0 + aero_value[t, 0] * half * force * cosine / (mass * v)
             else:
                 s = x[CORE + signal - 4]
             s -= aero_value[t, 1]
@@ -151,8 +150,7 @@ def rates(
         + (declared[THRUST] + declared[THRUST_SLOPE] * qbar) * declared[THRUST_ARM]
     )
     az = fz / mass
-    turn = (fz * math.cos(alpha) - fx * math.sin(alpha)) / (mass * ground)
-    out[0] = q + turn + constants[GRAVITY] * math.cos(theta - x[0]) / ground
+    out[0] = q + (fz * cosine - fx * sine) / (mass * ground) + weight
     out[1] = fm / inertia
     a = v / length
     out[2] = -a * x[2]
@@ -180,7 +178,7 @@ def rates(
     return float(az)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def rates_at(x: Array, point: int, air: Array, plane: Plane, out: Array) -> float:
     """`rates` at a point of the filter's grid.
 
@@ -203,7 +201,7 @@ def rates_at(x: Array, point: int, air: Array, plane: Plane, out: Array) -> floa
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def outputs(
     x: Array,
     rate: Array,
@@ -225,7 +223,7 @@ def outputs(
     y[2] = scales[2] * (az - arms[2] * rate[1])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def delayed(delay_s: float) -> Array:
     """A and B (order, order + 1) of a delay; its output is the input less twice the sum of every second state.
 
@@ -246,7 +244,7 @@ def delayed(delay_s: float) -> Array:
     return system
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def linear(
     x: Array,
     de: float,
@@ -310,7 +308,7 @@ def linear(
             at += DELAY
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def gain(
     a: Array, c: Array, v: float, constants: Array, variance: Array, dt_s: float
 ) -> tuple[Array, Array, Array, float]:
@@ -342,7 +340,7 @@ def gain(
     return k_gain, white, s, logdet
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def innovations(
     y: Array,
     de: Array,
@@ -492,7 +490,7 @@ def innovations(
     return True
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def evaluate(
     y: Array,
     de: Array,
