@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from blind import draw, information
+from blind import draw, information, refit
 from blind.draw import Trial
 from blind.figures import CHANNELS, DEG, ROOT
 from blind.truths import Added
@@ -75,7 +75,7 @@ def records(log: FlightLog) -> list[Array]:
 def entry(name: str, log: FlightLog) -> str:
     """TOML of one log's truth."""
     t = trial(name)
-    strength = information.lambdas(t)
+    strength = refit.lambdas(t)
     oracle = information.oracle(t, records(log))["free_run"]
     lines = [
         f"[{name}]",

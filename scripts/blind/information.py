@@ -1,6 +1,6 @@
 """How much the records of a trial tell of an effect, and what error the truth itself leaves on them.
 
-The noncentrality of a trial's effect is |(1 - P) W d|^2.
+The noncentrality of a trial's effect is |(1 - P) W d|^2, here to first order; `blind.refit` refits in earnest.
 
 - d: difference of alpha, q and az between twins flown in calm air with and without the effect; for an effect
   that grows smoothly, of an eighth of it times eight, as a refit is not linear where this projection is.
@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +38,6 @@ from blind.figures import (
     SIGMA_M_S,
     SPAN_M,
     STEP_S,
-    STRONG,
 )
 from blind.flight import Model, Truth
 from blind.sizes import SIZE16
@@ -48,12 +47,12 @@ Array = NDArray[np.float64]
 
 ORDER: Final = 10
 """Of the autoregression; 0.2 s."""
-_COARSE_S: Final = 0.004
+COARSE_S: Final = 0.004
 _GUST_FLIGHTS: Final = 6
 _GUST_FLIGHT_S: Final = 30.0
 _SETTLE_S: Final = 4.0
 _SHARE: Final = 0.125
-_TRIMS: Final = (Shape("CL", "one", 0.01), Shape("Cm", "one", 0.003))
+TRIMS: Final = (Shape("CL", "one", 0.01), Shape("Cm", "one", 0.003))
 _STATE_SHIFT: Final = 5  # samples: 0.1 s
 BEYOND: Final = "beyond the library"
 """Key among the noncentralities of an effect that the library lacks."""
@@ -116,21 +115,21 @@ def stacked(clean: Mapping[str, Array]) -> Array:
 
 def noise_model(trial: Trial, air: str) -> Whitener:
     """Whitener of gust response and sensor noise, by flights of the trial's aircraft without effect or input."""
-    truth, parts = truth_of(trial, (), _COARSE_S)
+    truth, parts = truth_of(trial, (), COARSE_S)
     rest = surface.Manoeuvre("doublet", 0.0, 1.0, 0.5)
     series = []
     still = stacked(fly_record(truth, parts, rest, _GUST_FLIGHT_S, 0.2)) if air == "calm" else None
     for index in range(_GUST_FLIGHTS):
         rng = stream(trial.seed, trial.number, 300 + index)
         if still is None:
-            count = round((_SETTLE_S + _GUST_FLIGHT_S) / _COARSE_S) + 1
+            count = round((_SETTLE_S + _GUST_FLIGHT_S) / COARSE_S) + 1
             gust = gusts.synthesise(
                 trial.spectrum,
                 SIGMA_M_S[air],
                 LENGTH_M,
                 truth.airspeed_m_s,
                 SPAN_M,
-                _COARSE_S,
+                COARSE_S,
                 count,
                 rng,
             )
@@ -188,40 +187,28 @@ def initial_states(truth: Truth, samples: int) -> Array:
     return np.array([y[:samples], y[_STATE_SHIFT : _STATE_SHIFT + samples]])
 
 
-def directions(trial: Trial, whiten: Whitener) -> Directions:
-    """Biases, initial states, the trim, derivatives, mass, inertia and CG of a trial."""
-    base = responses(trial, (), _COARSE_S, Model(trial.body))
-    records, samples, m = base.shape
-    states = whiten(initial_states(Truth(Model(trial.body), _COARSE_S), samples))
+def own_directions(trial: Trial, whiten: Whitener, records: int, samples: int) -> Array:
+    """Initial states and biases of every record, whitened, (n, 5 records)."""
+    m = len(CHANNELS)
+    states = whiten(initial_states(Truth(Model(trial.body), COARSE_S), samples))
     constants = whiten(np.eye(m)[:, None, :].repeat(samples, axis=1))
     own = np.concatenate([states, constants]).reshape(len(states) + m, -1).T
-    free = np.kron(np.eye(records), own)
+    return np.kron(np.eye(records), own)
+
+
+def directions(trial: Trial, whiten: Whitener) -> Directions:
+    """Biases, initial states, the trim, derivatives, mass, inertia and CG of a trial."""
+    base = responses(trial, (), COARSE_S, Model(trial.body))
+    free = own_directions(trial, whiten, *base.shape[:2])
     columns = []
     for step, part in nuisances(trial.body).values():
-        moved = responses(trial, (), _COARSE_S, Model(step))
+        moved = responses(trial, (), COARSE_S, Model(step))
         columns.append(whiten(moved - base).ravel() / part)
     trims = []
-    for shape in _TRIMS:
-        moved = responses(trial, (), _COARSE_S, Model(trial.body, (shape,)))
+    for shape in TRIMS:
+        moved = responses(trial, (), COARSE_S, Model(trial.body, (shape,)))
         trims.append(whiten(moved - base).ravel())
     return Directions(np.column_stack([free, *trims]), np.column_stack(columns))
-
-
-def lambdas(trial: Trial) -> dict[str, float]:
-    """Noncentrality of each effect of the trial, the others being there."""
-    if not trial.effects:
-        return {}
-    whiten = noise_model(trial, trial.air)
-    along = directions(trial, whiten)
-    everything = (*trial.effects, *trial.clutter)
-    result = {}
-    for effect in trial.effects:
-        others = tuple(e for e in everything if e is not effect)
-        d = whiten(difference(trial, effect, others)).ravel()
-        result[effect.key] = noncentrality(d, along.free, along.prior)
-        if not EFFECTS[effect.key].library and result[effect.key] > STRONG:
-            result[BEYOND] = beyond(trial, d, whiten, along)
-    return result
 
 
 def beyond(trial: Trial, d: Array, whiten: Whitener, along: Directions) -> float:
@@ -235,7 +222,7 @@ def beyond(trial: Trial, d: Array, whiten: Whitener, along: Directions) -> float
         size = min(SIZE16[key][AIRS.index(trial.air)], kind.largest)
         for place in (0.0, 0.5, 0.99) if key.endswith(":break") else (0.5,):
             effect = Added(key, kind.values(size, place))
-            column = whiten(difference(trial, effect, (), _COARSE_S)).ravel()[:, None]
+            column = whiten(difference(trial, effect, (), COARSE_S)).ravel()[:, None]
             left.append(noncentrality(d, np.hstack([along.free, column]), along.prior))
     return min(left)
 
@@ -260,8 +247,8 @@ def _airspeed(trial: Trial, factor: float) -> Array:
         power = 1.0 if name.endswith("q") else 2.0
         errors[name] = errors.get(name, 0.0) - _SHARE * power * (factor - 1.0)
     seen = replace(trial.body, derivatives=errors)
-    moved = responses(trial, (), _COARSE_S, Model(seen))
-    return (moved - responses(trial, (), _COARSE_S, Model(trial.body))) / _SHARE
+    moved = responses(trial, (), COARSE_S, Model(seen))
+    return (moved - responses(trial, (), COARSE_S, Model(trial.body))) / _SHARE
 
 
 def oracle(trial: Trial, records: Sequence[Array]) -> dict[str, dict[str, float]]:
@@ -293,8 +280,3 @@ def oracle(trial: Trial, records: Sequence[Array]) -> dict[str, dict[str, float]
         kind: dict(zip(CHANNELS, np.sqrt(np.mean(np.square(values), axis=(0, 1))).tolist(), strict=True))
         for kind, values in (("free_run", errors), ("signal", signals))
     }
-
-
-def measured(trial: Trial, records: Sequence[Array]) -> dict[str, Any]:
-    """What the scoring needs of the truth."""
-    return {"lambda": lambdas(trial), "oracle": oracle(trial, records)}

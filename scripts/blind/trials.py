@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from airtruth.logs.store import read_log, write_text
-from blind import draw, information, tracing
+from blind import draw, information, refit, tracing
 from blind.figures import CHANNELS
 
 
@@ -50,7 +50,11 @@ def fly(plan: Plan, number: int) -> dict[str, Any]:
         np.column_stack([log.channels[name][log.rows(k)] for name in CHANNELS])
         for k in range(len(log.run_ids))
     ]
-    return {"trial": draw.plain(trial), **information.measured(trial, records)}
+    return {
+        "trial": draw.plain(trial),
+        "lambda": refit.lambdas(trial),
+        "oracle": information.oracle(trial, records),
+    }
 
 
 def trace(plan: Plan, number: int) -> dict[str, Any]:

@@ -10,10 +10,11 @@ import pytest
 from airtruth.logs.store import read_log
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
-from blind import draw, information, scoring, trials
+from blind import draw, information, refit, scoring, trials
 from blind.aircraft_xml import Body
 from blind.figures import BODY, CHANNELS, NOISE
-from blind.truths import Added
+from blind.flight import Truth
+from blind.truths import Added, Parts, combined, model
 
 
 def test_noncentrality_of_a_sine_in_white_noise():
@@ -72,14 +73,52 @@ def test_what_is_declared_with_an_uncertainty_is_bounded_by_it(calm):
     ):
         effect = Added(key, values)
         size = values.get("factor", 1.0) - 1.0 if "factor" in values else values["dx_mac"]
-        value = information.lambdas(replace(calm, effects=(effect,)))[key]
+        value = refit.lambdas(replace(calm, effects=(effect,)))[key]
         assert 0.2 < value < 1.05 * (size / std) ** 2
+
+
+def test_a_refit_of_a_delay_is_the_projection_to_first_order(calm):
+    """What moves no trim is linear: both ways to the same noncentrality."""
+    trial = replace(calm, effects=(Added("elevator_delay", {"delay_s": 0.003}),))
+    whiten = information.noise_model(trial, "calm")
+    along = information.directions(trial, whiten)
+    d = whiten(information.difference(trial, trial.effects[0])).ravel()
+    linear = information.noncentrality(d, along.free, along.prior)
+    assert linear > 30.0
+    assert refit.refitted(trial, trial.effects[0], (), whiten) == pytest.approx(linear, rel=0.05)
+
+
+def test_a_refit_takes_up_what_the_derivatives_and_the_trim_can_imitate(calm):
+    """A heavier aircraft is one with smaller lift derivatives, but for their priors and the mass's own.
+
+    Lift over mass: CLalpha, CLq, CLde each less by the same share s; prior deviations 0.05, 0.3, 0.1 and 0.01, so
+    that lambda would be s^2/(0.01^2 + 1/(0.05^-2 + 0.3^-2 + 0.1^-2)) were the imitation exact; drag, thrust and the
+    curvature of the tables tell a little more.
+    """
+    share = np.log(1.09)
+    effect = Added("mass_error", {"factor": 1.09})
+    imitated = share**2 / (0.01**2 + 1.0 / (0.05**-2 + 0.3**-2 + 0.1**-2))
+    whiten = information.noise_model(calm, "calm")
+    found = refit.refitted(calm, effect, (), whiten)
+    assert imitated < found < 2.0 * imitated
+    d = whiten(information.difference(calm, effect)).ravel()
+    along = information.directions(calm, whiten)
+    assert information.noncentrality(d, along.free, along.prior) > 5.0 * found
+
+
+def test_constants_trim_the_aircraft_where_the_effect_does(calm):
+    effect = combined((Added("cg_shift", {"dx_mac": -0.06}),))
+    x = refit.trimmed_alike(calm, Parts(), effect)
+    aim = Truth(model(calm.body, effect), information.COARSE_S)
+    found = Truth(model(calm.body, refit.constants(x)), information.COARSE_S)
+    assert found.alpha_rad == pytest.approx(aim.alpha_rad, abs=1e-5)
+    assert found.elevator_rad == pytest.approx(aim.elevator_rad, abs=1e-5)
 
 
 def test_noncentrality_grows_as_the_square_and_falls_with_gusts(calm):
     def of(x_m, air):
         effect = Added("vane_arm", {"x_m": x_m})
-        return information.lambdas(replace(calm, effects=(effect,), air=air))["vane_arm"]
+        return refit.lambdas(replace(calm, effects=(effect,), air=air))["vane_arm"]
 
     calm_air = of(0.2, "calm")
     assert of(0.4, "calm") / calm_air == pytest.approx(4.0, rel=0.02)

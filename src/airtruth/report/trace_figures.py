@@ -21,7 +21,7 @@ from airtruth.report.trace_effect import contribution, draw_effect
 from airtruth.report.trace_table import error_csv, shown, stages
 from airtruth.report.trace_text import key, verdict
 from airtruth.trace import Trace
-from airtruth.trace.holdout import Assessment, floor
+from airtruth.trace.holdout import Assessment, explained
 from airtruth.trace.lower import CHANNELS, lower
 from airtruth.trace.records import Record
 
@@ -47,7 +47,7 @@ class Sight:
     time_s : (samples,).
     stages : the two stages that are compared.
     before, after : their assessments of the record.
-    floor : (3,) standard deviation of what gusts and sensors explain of a free run.
+    floor : (3,) root mean square of what gusts and sensors explain of a free run.
     """
 
     record: Record
@@ -67,8 +67,8 @@ def sight(found: Trace) -> Sight:
     model = outcome.models[pair[1]]
     low = lower(model.hypothesis.change(model.sizes))
     floors = [
-        floor(record, problem, low, model.shared, own.local)
-        for record, own in zip(problem.records, assessed[pair[1]], strict=True)
+        explained(record, problem, low, model.shared, own.local, outcome.air, number)
+        for number, (record, own) in enumerate(zip(problem.records, assessed[pair[1]], strict=True))
     ]
     gains = [
         float(((first.free_run**2 - second.free_run**2) / level**2).sum())

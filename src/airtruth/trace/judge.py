@@ -48,34 +48,57 @@ class Candidate:
     reasons: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Reference:
+    """The fit that an effect is judged against, on records left out.
+
+    Attributes
+    ----------
+    likelihood, assessed : what `leave_one_out` says of it.
+    weight : (3,) of each record, what gusts and sensors explain of its free run.
+    """
+
+    likelihood: Array
+    assessed: tuple[Assessment, ...]
+    weight: tuple[Array, ...]
+
+
+def reference_of(problem: Problem, null: Fit) -> Reference:
+    """The null as the reference of every candidate of its round."""
+    likelihood, found = leave_one_out(problem, null)
+    low = lower(null.hypothesis.change(null.point.sizes))
+    weight = tuple(
+        floor(record, problem, low, null.point.shared, local)
+        for record, local in zip(problem.records, null.point.local, strict=True)
+    )
+    return Reference(likelihood, tuple(found), weight)
+
+
 def outdone(s: Score, found: Fit, gain: float) -> Candidate:
     """A candidate that need not be judged: an accepted one explains more."""
     nothing = np.full(len(found.likelihood), np.nan)
     return Candidate(s, found, gain, nothing, nothing, *_size(s, found), ("another effect explains more",))
 
 
-def judge(
-    problem: Problem, null: Fit, s: Score, best: Fit, gain: float, reference: tuple[Array, list[Assessment]]
-) -> Candidate:
+def judge(problem: Problem, s: Score, best: Fit, gain: float, reference: Reference) -> Candidate:
     """Judge a refitted effect.
 
     Parameters
     ----------
-    null, reference : the fit without it, and what `leave_one_out` says of that.
     s, best, gain : its score, its fit, and what it gained.
+    reference : the fit without it.
     """
     first = s.effect.parameters[0]
     size, std = _size(s, best)
     likelihood, assessed = leave_one_out(problem, best)
-    likelihood_gain = reference[0] - likelihood
-    low = lower(null.hypothesis.change(null.point.sizes))
+    likelihood_gain = reference.likelihood - likelihood
     free, spread = np.zeros(len(assessed)), 0.0
-    for i, (before, after) in enumerate(zip(reference[1], assessed, strict=True)):
-        record = problem.records[i]
-        weight = floor(record, problem, low, null.point.shared, null.point.local[i])
+    for i, (before, after, weight) in enumerate(
+        zip(reference.assessed, assessed, reference.weight, strict=True)
+    ):
         gains = (((before.residual / weight) ** 2) - ((after.residual / weight) ** 2)).sum(axis=1)
         free[i] = gains.sum()
-        spread += long_run_variance(gains, round(_MEMORY_S / record.signals.dt_s))
+        spread += long_run_variance(gains, round(_MEMORY_S / problem.records[i].signals.dt_s))
     reasons = []
     if not best.converged:
         reasons.append(UNCONVERGED)

@@ -224,6 +224,18 @@ def outputs(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def states(motion: int, lags: Array, delays: Array) -> int:
+    """States of the motion and of late sensors."""
+    n = motion
+    for i in range(OUTPUTS):
+        if lags[i] > 0.0:
+            n += 1
+        if delays[i] > 0.0:
+            n += DELAY
+    return n
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def delayed(delay_s: float) -> Array:
     """A and B (order, order + 1) of a delay; its output is the input less twice the sum of every second state.
 
@@ -530,12 +542,7 @@ def evaluate(
     motion = CORE
     for k in range(state_index.shape[0]):
         motion += 1 if state_index[k, 0] == 0 else 2
-    n = motion
-    for i in range(OUTPUTS):
-        if lags[i] > 0.0:
-            n += 1
-        if delays[i] > 0.0:
-            n += DELAY
+    n = states(motion, lags, delays)
     k_gain = np.zeros((n, OUTPUTS))
     logdet = 0.0
     if not free_run:

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from airtruth.effects.effect import Effect
 from airtruth.trace import score
 from airtruth.trace.fit import Fit, Hypothesis, Point, Problem, Whitener, autoregression, begin, fit
-from airtruth.trace.holdout import leave_one_out
-from airtruth.trace.judge import IMMATERIAL, UNCONVERGED, Candidate, judge, outdone
+from airtruth.trace.judge import IMMATERIAL, UNCONVERGED, Candidate, judge, outdone, reference_of
 from airtruth.trace.model import respond
 from airtruth.trace.profile import Profile, best_place, place_of
 from airtruth.trace.score import Score, Table
@@ -191,14 +190,14 @@ def _judged(problem: Problem, null: Fit, fits: Sequence[tuple[Score, Fit]]) -> t
         top, least = max(gains[key] for key in costs), min(costs.values())
         gains |= {key: top - 2.0 * (cost - least) for key, cost in costs.items()}
     ranked = sorted(((gains[s.effect.key], s, f) for s, f in fits), key=lambda r: -r[0])
-    reference = leave_one_out(problem, null)
+    reference = reference_of(problem, null)
     judged: list[Candidate] = []
     accepted = -np.inf
     for gain, s, f in ranked:
         if gain < accepted - TIE:
             judged.append(outdone(s, f, gain))
             continue
-        candidate = judge(problem, null, s, f, gain, reference)
+        candidate = judge(problem, s, f, gain, reference)
         judged.append(candidate)
         if not np.isfinite(accepted) and set(candidate.reasons) <= {IMMATERIAL, UNCONVERGED}:
             accepted = gain  # what explains less than an immaterial effect is not the cause either
