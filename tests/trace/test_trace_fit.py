@@ -40,7 +40,7 @@ def off_optimum():
     shared, local = point.shared.copy(), point.local.copy()
     shared[:6] = 0.5 * MORE
     shared[6:9] = [0.05, -0.08, 0.03]
-    shared[9:] = [0.3, 0.1]
+    shared[9:] = [0.3, 0.1, -0.2, 0.03]
     local[0] += [0.001, 0.01, 0.3, -0.2, 0.002, 0.003, 0.02, 0.003, -0.0004, 0.2]
     return problem, Point(shared, local, point.sizes)
 

@@ -117,7 +117,7 @@ def test_floor_is_the_standard_deviation_of_the_gust_response(sigma_w):
     local[9] = np.log(sigma_w)
     found = floor(made, problem, lower(Change()), shared, local)
     a, _, c, _ = tr.motion(sigma_w=sigma_w)
-    drive = np.diag([0.0, 0.0, 2.0 * tr.V / tr.LENGTH_W, 0.0, 0.0])
+    drive = np.diag([0.0, 0.0, 2.0 * tr.V / tr.LENGTH_W, *np.zeros(5)])
     spread = solve_continuous_lyapunov(a, -drive)
     expected = np.sqrt(np.diag(c @ spread @ c.T) + tr.SETTINGS.noise**2)
     # the filter's linearisation is about the record's mean alpha, not the trim

@@ -12,7 +12,7 @@ from airtruth.effects.change import AeroTerm, Change, DeclaredTerm, SensorTerm, 
 from airtruth.effects.library import EFFECTS
 from airtruth.trace import kernel
 from airtruth.trace.lower import lower
-from airtruth.trace.model import respond
+from airtruth.trace.model import SHARED, respond, shared_prior
 from airtruth.trace.plant import Plant
 from airtruth.units import DEG, G0
 
@@ -240,9 +240,9 @@ def augmented(name, kind, signal, time_s, damping, coefficient, amplitude):
     """Linear system with an effect's state: coefficient += amplitude (x - signal)."""
     a, b, c, d = tr.motion()
     extra = 1 if kind == "lag" else 2
-    n = 5 + extra
+    n = 8 + extra
     big, bb, cc = np.zeros((n, n)), np.zeros(n), np.zeros((3, n))
-    big[:5, :5], bb[:5], cc[:, :5] = a, b, c
+    big[:8, :8], bb[:8], cc[:, :8] = a, b, c
     drive, direct = np.zeros(n), 0.0
     if signal == "alpha":
         drive[0] = 1.0
@@ -251,14 +251,14 @@ def augmented(name, kind, signal, time_s, damping, coefficient, amplitude):
     elif signal == "qhat":
         drive[1] = HALF
     if kind == "lag":
-        big[5] = drive / time_s
-        big[5, 5], bb[5] = -1.0 / time_s, direct / time_s
+        big[8] = drive / time_s
+        big[8, 8], bb[8] = -1.0 / time_s, direct / time_s
     else:
         wn = 1.0 / time_s
-        big[5, 6], big[6] = 1.0, wn * wn * drive
-        big[6, 5], big[6, 6], bb[6] = -wn * wn, -2.0 * damping * wn, wn * wn * direct
+        big[8, 9], big[9] = 1.0, wn * wn * drive
+        big[9, 8], big[9, 9], bb[9] = -wn * wn, -2.0 * damping * wn, wn * wn * direct
     late, ahead = -drive, -direct
-    late[5] = 1.0
+    late[8] = 1.0
     if coefficient == "Cm":
         gain = FORCE * tr.C.chord_m / tr.C.inertia_yy_kg_m2 * amplitude
         big[1] += gain * late
@@ -363,8 +363,8 @@ def test_a_delay_comes_after_a_lag():
     """Both in one sensor: the lagged signal, late."""
     lag, delay = SensorTerm("q_rad_s", "lag", 0.05), SensorTerm("q_rad_s", "delay", 0.03)
     a, b, _, _ = tr.motion()
-    big, bb, cc = np.zeros((6, 6)), np.append(b, 0.0), np.zeros((1, 6))
-    big[:5, :5], big[5, 1], big[5, 5], cc[0, 5] = a, 20.0, -20.0, 1.0
+    big, bb, cc = np.zeros((9, 9)), np.append(b, 0.0), np.zeros((1, 9))
+    big[:8, :8], big[8, 1], big[8, 8], cc[0, 8] = a, 20.0, -20.0, 1.0
     t = known()[0]
     lagged, _ = tr.run(big, bb, cc, np.zeros(1), tr.doublet(t, SMALL), tr.DT / FINE_STEPS)
     expected = sampled(t, np.roll(lagged, round(0.03 / tr.DT * FINE_STEPS), axis=0))
@@ -380,8 +380,8 @@ def test_lagging_sensors(lag):
     """
     change = Change(sensors=tuple(SensorTerm(c, "lag", lag) for c in ("alpha_rad", "q_rad_s", "az_m_s2")))
     a, b, c, d = tr.motion()
-    big, bb, cc = np.zeros((8, 8)), np.concatenate([b, d / lag]), np.zeros((3, 8))
-    big[:5, :5], big[5:, :5], big[5:, 5:], cc[:, 5:] = a, c / lag, -np.eye(3) / lag, np.eye(3)
+    big, bb, cc = np.zeros((11, 11)), np.concatenate([b, d / lag]), np.zeros((3, 11))
+    big[:8, :8], big[8:, :8], big[8:, 8:], cc[:, 8:] = a, c / lag, -np.eye(3) / lag, np.eye(3)
     expected, _ = tr.run(big, bb, cc, np.zeros(3), U, tr.DT)
     close(free(change), expected, 1.2e-4)
 
@@ -430,10 +430,10 @@ def test_linearisation_of_lagging_sensors():
     lags = np.array([0.05, 0.0, 0.02])
     a, c, _ = linearised(lags=lags)
     plain_a, plain_c, _ = linearised()
-    np.testing.assert_array_equal(a[:5, :5], plain_a)
-    np.testing.assert_allclose(a[5], [*plain_c[0] / 0.05, -20.0, 0.0])
-    np.testing.assert_allclose(a[6], [*plain_c[2] / 0.02, 0.0, -50.0])
-    np.testing.assert_array_equal(c, [[0, 0, 0, 0, 0, 1, 0], [*plain_c[1], 0, 0], [0, 0, 0, 0, 0, 0, 1]])
+    np.testing.assert_array_equal(a[:8, :8], plain_a)
+    np.testing.assert_allclose(a[8], [*plain_c[0] / 0.05, -20.0, 0.0])
+    np.testing.assert_allclose(a[9], [*plain_c[2] / 0.02, 0.0, -50.0])
+    np.testing.assert_array_equal(c, [[*np.zeros(8), 1, 0], [*plain_c[1], 0, 0], [*np.zeros(8), 0, 1]])
 
 
 @pytest.mark.parametrize("sigma_w", [0.05, 0.3, 2.0])
@@ -467,7 +467,7 @@ def test_linearisation_of_late_sensors():
     for w in (0.5, 5.0, 20.0):
         s = 1j * w
         late = c[0] @ np.linalg.inv(s * np.eye(n) - a)[:, 1]
-        plain = plain_c[0] @ np.linalg.inv(s * np.eye(5) - plain_a)[:, 1]
+        plain = plain_c[0] @ np.linalg.inv(s * np.eye(kernel.CORE) - plain_a)[:, 1]
         assert late / plain == pytest.approx(np.exp(-0.03 * s), abs=1e-9)
 
 
@@ -505,7 +505,7 @@ def test_innovations_are_those_of_the_steady_kalman_filter():
     phi, early, late = tr.discrete(a, b, tr.DT)
     t = np.arange(made.samples) * tr.DT
     u = tr.doublet(t, 0.5 * DEG)
-    x, expected = np.zeros(5), []
+    x, expected = np.zeros(8), []
     for k in range(len(t)):
         e = made.signals.y[k] + [0.0, 0.0, G0] - c @ x - d * u[k]
         expected.append(e)
@@ -531,3 +531,77 @@ def test_innovations_of_a_true_model_are_white_and_of_the_stated_covariance():
     assert np.mean(r**2) == pytest.approx(1.0, abs=4.0 * math.sqrt(2.0 / draws))
     lagged = np.einsum("nki,nkj->ij", r[:, 1:], r[:, :-1]) / (draws / 3.0)
     assert np.abs(lagged).max() < 4.0 / math.sqrt(draws / 3.0)
+
+
+# -- gusts
+
+
+@pytest.mark.parametrize(("rolloff", "tolerance"), [(0.0, 1e-9), (1.0, 0.06)])
+def test_spectrum_of_the_gust(rolloff, tolerance):
+    """MIL-F-8785C, 3.7.1: Dryden's exactly; von Karman's from 0.5 to 600 rad/s but for the level."""
+    shared, local = tr.still()
+    shared[SHARED.index("rolloff")] = rolloff - 0.5
+    length, v = 840.419, tr.V
+    constants = tr.plane(None, shared, local)[0]
+    rate = v / length
+    a = np.zeros((8, 8))
+    a[2, 2], a[3, 2], a[3, 3] = -rate, rate, -rate
+    state, out = np.zeros(8), np.zeros(8)
+    row = np.zeros(8)
+    for i in (2, 3, 5, 6, 7):
+        state[:] = 0.0
+        state[i] = 1.0
+        row[i] = kernel.gust(state, constants)
+        kernel.rates(state, 0.0, v, v, 1.0, 0.0, 0.0, 0.0, tr.plane(None, shared, local), out)
+        a[5:, i] = out[5:]
+    omega = np.geomspace(0.5, 600.0, 200)
+    drive = np.zeros(8)
+    drive[2] = np.sqrt(2.0 * rate)
+    density = np.array([abs(row @ np.linalg.solve(1j * w * np.eye(8) - a, drive)) ** 2 for w in omega])
+    x2 = (omega / rate) ** 2
+    expected = (1.0 + 3.0 * x2) / (1.0 + x2) ** 2
+    if rolloff == 1.0:
+        y2 = 1.339**2 * x2
+        expected = (1.0 + 8.0 / 3.0 * y2) / (1.0 + y2) ** (11.0 / 6.0)
+    off = np.log(density / expected)
+    assert np.abs(off - off.mean()).max() < tolerance
+    if rolloff == 0.0:  # two-sided over omega: sigma^2 L/V times Dryden's form
+        np.testing.assert_allclose(density * rate, expected, rtol=1e-9)
+
+
+def test_shared_inertia_leaves_the_linear_model_alone():
+    """Its derivatives are those of the pitch acceleration, so that only the tables' curvature sees it."""
+    shared, local = tr.still()
+    shared[:6] = 0.02 * tr.TRUTH
+    made = tr.record(np.zeros((len(T), 3)), lambda t: tr.doublet(t, DEG))
+    plain = respond(made, tr.SETTINGS, Change(), shared, local, free_run=True).e
+    shared[SHARED.index("inertia")] = 0.05
+    heavy = respond(made, tr.SETTINGS, Change(), shared, local, free_run=True).e
+    close(heavy - heavy[0], plain - plain[0], 1e-9)
+
+
+def test_shared_inertia_is_the_declared_one_s_factor_with_other_derivatives():
+    """On a curved plant: factor 1 + i and, of the moment's derivatives, i of the declared added to the increments."""
+    plant = curved()
+    made = tr.record(np.zeros((len(T), 3)), lambda t: tr.doublet(t, DEG), plant_=plant)
+    shared, local = tr.still()
+    shared[SHARED.index("inertia")] = 0.05
+    found = respond(made, tr.SETTINGS, Change(), shared, local, free_run=True).e
+    by_hand, _ = tr.still()
+    by_hand[3:6] = 0.05 * plant.derivatives[3:]
+    change = Change(declared=(DeclaredTerm("inertia", 1.05),))
+    np.testing.assert_allclose(
+        found, respond(made, tr.SETTINGS, change, by_hand, local, free_run=True).e, rtol=1e-12
+    )
+
+
+def test_shared_prior_is_what_is_declared():
+    """Covariance of the derivatives as declared; of the inertia too, and between them that of 1/Iyy."""
+    plant = tr.plant()
+    made = tr.record(np.zeros((len(T), 3)), 0.0, plant_=plant)
+    covariance = np.linalg.inv(shared_prior(made, tr.SETTINGS))
+    at = SHARED.index("inertia")
+    std = tr.GTM.file.mass.inertia_yy.std / tr.GTM.file.mass.inertia_yy.value
+    np.testing.assert_allclose(covariance[:6, :6], plant.derivative_cov, rtol=1e-9)
+    assert covariance[at, at] == pytest.approx(std**2, rel=1e-9)
+    np.testing.assert_allclose(covariance[at, 3:6], -(std**2) * plant.derivatives[3:], rtol=1e-9)

@@ -22,10 +22,12 @@ V, DENSITY = 42.852, 0.993
 TRUTH = np.array([4.79, 31.8, 0.48, -1.785, -41.2, -1.787])
 DT = 0.02
 LENGTH_W = 160.0
-SETTINGS = settings_of(GTM, LENGTH_W, 0.05)
+SETTINGS = settings_of(GTM, LENGTH_W, 0.05, TRUTH)
 SCALE = short_period.scale(C.wing_area_m2, C.chord_m, C.mass_kg, C.inertia_yy_kg_m2, V, DENSITY)
 ROOT_1, ROOT_2 = np.sqrt(1.5), np.sqrt(1.5) * (1.0 / np.sqrt(3.0) - 1.0)
 """w/sigma = ROOT_1 x1 + ROOT_2 x2 of MIL-F-8785C's vertical Dryden filter, states of unit drive."""
+CORNERS, LEADS = np.array([2.1, 21.0, 217.0]), np.array([0.58, 0.84, 1.39])
+"""rad/s and gains of what a rolloff adds: gain s/(s + corner) of x1 each."""
 
 
 def plant(derivatives=TRUTH, alpha=0.0, elevator=0.0):
@@ -64,8 +66,8 @@ def record(y, elevator, theta=None, sub=2, dt=DT, v=V, density=DENSITY, ground=N
     return Record(signals, plant_ or plant())
 
 
-def motion(theta=TRUTH, sigma_w=0.0, rotary=0.5):
-    """A (5, 5), B (5,), C (3, 5), D (3,) of [alpha, q, w1, w2, w late] about the trim, by hand.
+def motion(theta=TRUTH, sigma_w=0.0, rotary=0.5, rolloff=0.5):
+    """A (8, 8), B (8,), C (3, 8), D (3,) of [alpha, q, w1, w2, w late, three copies of w1] about the trim, by hand.
 
     The air's alpha is alpha + w/V, its pitch rate q - rotary (w - late)/(tau V), tau = 4 b/(pi V).
     """
@@ -73,23 +75,31 @@ def motion(theta=TRUTH, sigma_w=0.0, rotary=0.5):
     row = short_period.normal_force_row(theta, SCALE)
     tau = 4.0 * C.span_m / (np.pi * V)
     # the kernel's late gust is in units of sigma
-    w = np.array([ROOT_1, ROOT_2])
+    w = gust_row(rolloff)
     slow = rotary * sigma_w / (tau * V)
-    a = np.zeros((5, 5))
-    a[:2, :2] = a2
+    a = np.zeros((8, 8))
     by_alpha, by_q = a2[:, 0], a2[:, 1] - np.array([1.0, 0.0])
-    a[:2, 2:4] = np.outer(by_alpha * sigma_w / V - by_q * slow, w)
+    a[:2] = np.outer(by_alpha * sigma_w / V - by_q * slow, w)
+    a[:2, :2] = a2
     a[:2, 4] = by_q * slow
     rate = V / LENGTH_W
     a[2, 2], a[3, 2], a[3, 3] = -rate, rate, -rate
-    a[4, 2:4], a[4, 4] = w / tau, -1.0 / tau
-    c = np.zeros((3, 5))
+    a[4] = w / tau
+    a[4, 4] = -1.0 / tau
+    a[5:, 2], a[5:, 5:] = CORNERS, -np.diag(CORNERS)
+    c = np.zeros((3, 8))
+    c[0] = sigma_w / V * w
+    c[2] = (row[0] * sigma_w / V - row[1] * slow) * w
     c[0, 0], c[1, 1] = 1.0, 1.0
-    c[0, 2:4] = sigma_w / V * w
     c[2, :2] = row[:2]
-    c[2, 2:4] = (row[0] * sigma_w / V - row[1] * slow) * w
     c[2, 4] = row[1] * slow
-    return a, np.array([*b2, 0.0, 0.0, 0.0]), c, np.array([0.0, 0.0, row[2]])
+    return a, np.array([*b2, *np.zeros(6)]), c, np.array([0.0, 0.0, row[2]])
+
+
+def gust_row(rolloff):
+    """(8,) w/sigma of the states of `motion`."""
+    lead = rolloff * LEADS
+    return np.array([0.0, 0.0, ROOT_1 + lead.sum(), ROOT_2, 0.0, *-lead])
 
 
 def discrete(a, b, dt):
@@ -140,16 +150,17 @@ def fly(
     rotary=0.5,
     dt=DT,
 ):
-    """A noisy record of the linear aircraft in stationary Dryden gusts; az counts gravity."""
+    """A noisy record of the linear aircraft in stationary gusts, between Dryden's and von Karman's; az counts gravity."""
     a, b, c, d = motion(theta, sigma_w, rotary)
     t = np.arange(samples) * dt
-    intensity = np.array([0.0, 0.0, 2.0 * V / LENGTH_W, 0.0, 0.0])
+    intensity = np.array([0.0, 0.0, 2.0 * V / LENGTH_W, *np.zeros(5)])
     step = noise_step(a, dt, intensity)
     values, vectors = np.linalg.eigh(step)
-    kicks = rng.standard_normal((samples, 5)) @ (vectors * np.sqrt(np.maximum(values, 0.0))).T
-    start = np.zeros(5)
+    kicks = rng.standard_normal((samples, 8)) @ (vectors * np.sqrt(np.maximum(values, 0.0))).T
+    start = np.zeros(8)
     start[2:4] = np.linalg.cholesky(np.array([[1.0, 0.5], [0.5, 0.5]])) @ rng.standard_normal(2)
-    start[4] = start[2:4] @ [ROOT_1, ROOT_2]
+    start[5:] = start[2]
+    start[4] = start @ gust_row(0.5)
     y, states = run(a, b, c, d, doublet(t, amplitude), dt, start, kicks)
     attitude = np.concatenate([[0.0], np.cumsum(0.5 * dt * (states[1:, 1] + states[:-1, 1]))])
     y = y + np.array(bias) + [0.0, 0.0, -9.80665] + np.asarray(noise) * rng.standard_normal(y.shape)

@@ -13,11 +13,10 @@ from scipy.stats import chi2
 
 from airtruth.effects.effect import Effect
 from airtruth.physics.short_period import PARAMETERS
-from airtruth.trace.air import Air
 from airtruth.trace.fit import Fit, Hypothesis, Problem
-from airtruth.trace.holdout import Assessment, air_of, assess, explained
+from airtruth.trace.holdout import Assessment, assess, explained
 from airtruth.trace.lower import CHANNELS, lower
-from airtruth.trace.model import S
+from airtruth.trace.model import SHARED, S
 from airtruth.trace.prepare import Case
 from airtruth.trace.profile import Profile, place_of
 from airtruth.trace.score import Table
@@ -51,13 +50,11 @@ class Outcome:
     ----------
     models : stage -> model.
     fitted, held : stage -> assessment of each record.
-    air : spectrum of the gusts, by the fitted records under the last stage; it serves the held-out ones too.
     """
 
     models: dict[str, Model]
     fitted: dict[str, list[Assessment]]
     held: dict[str, list[Assessment]]
-    air: Air
 
 
 def accepted(stages: Sequence[Stage]) -> list[tuple[Candidate, tuple[Candidate, ...]]]:
@@ -70,7 +67,8 @@ def assessed(case: Case, stages: Sequence[Stage]) -> Outcome:
     null, last = stages[0].null, stages[-1].null
     nothing = np.zeros(0)
     # noise levels are those of the stage before: the declared ones would judge the declared model alone
-    declared = np.concatenate([np.zeros(6), null.point.shared[6:]])
+    declared = null.point.shared.copy()
+    declared[[*range(6), SHARED.index("inertia")]] = 0.0
     models = {
         "declared": Model(case.hypothesis, declared, nothing, null.point.local),
         "before": _model(null),
@@ -84,14 +82,7 @@ def assessed(case: Case, stages: Sequence[Stage]) -> Outcome:
             models["control"] = _model(others[0].found)
     fitted = {name: _all(case.fitted, m, fitted=True) for name, m in models.items()}
     held = {name: _all(case.held, m, fitted=False) for name, m in models.items()} if case.held else {}
-    name = _last(models)
-    m = models[name]
-    air = air_of(case.fitted, m.hypothesis, m.shared, m.sizes, fitted[name])
-    return Outcome(models, fitted, held, air)
-
-
-def _last(models: dict[str, Model]) -> str:
-    return "after" if "after" in models else "before"
+    return Outcome(models, fitted, held)
 
 
 def _model(found: Fit) -> Model:
@@ -293,12 +284,12 @@ def _pooled(found: Sequence[Assessment]) -> dict[str, dict[str, float]]:
 
 
 def _floor(problem: Problem, outcome: Outcome, which: str) -> dict[str, dict[str, float]]:
-    name = _last(outcome.models)
+    name = "after" if "after" in outcome.models else "before"
     model = outcome.models[name]
     low = lower(model.hypothesis.change(model.sizes))
     found = (outcome.fitted if which == "fit" else outcome.held)[name]
     free = [
-        explained(record, problem, low, model.shared, a.local, outcome.air, number) ** 2
+        explained(record, problem, low, model.shared, a.local, number) ** 2
         for number, (record, a) in enumerate(zip(problem.records, found, strict=True))
     ]
     return {

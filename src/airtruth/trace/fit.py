@@ -99,7 +99,7 @@ class Hypothesis:
 
 @dataclass(frozen=True)
 class Point:
-    """Values of all free parameters: shared (11,), local (records, 10), sizes (k,)."""
+    """Values of all free parameters: shared (13,), local (records, 10), sizes (k,)."""
 
     shared: Array
     local: Array
@@ -162,7 +162,7 @@ class Fit:
     cost : negative log-posterior, constants left out; likelihood : (records,) negative log-likelihood of each record.
     tangents : of each record at ``point``.
     whitener : of the innovations.
-    covariance : (11 + k, 11 + k) of shared parameters and sizes, local ones free.
+    covariance : (13 + k, 13 + k) of shared parameters and sizes, local ones free.
     converged : whether the search ended by its tolerance.
     """
 
@@ -429,7 +429,7 @@ def reduced(  # type: ignore[no-untyped-def]
 
     Returns
     -------
-    gradient (11 + k,), information, and of each record what back-substitution needs; priors included.
+    gradient (13 + k,), information, and of each record what back-substitution needs; priors included.
     """
     m = S + k
     gradient, information = np.zeros(m), np.zeros((m, m))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_lyapunov
 
-from airtruth.trace.air import Air, chosen, gusts, motion, response
+from airtruth.identify.kalman_step import step
 from airtruth.trace.fit import NO_WHITENER, Fit, Hypothesis, Point, Problem, parts, reduced, tangent
+from airtruth.trace.kernel import CORE, linear, states
 from airtruth.trace.lower import Lowered, lower
 from airtruth.trace.model import (
     LOCAL_STEP,
@@ -19,6 +19,7 @@ from airtruth.trace.model import (
     S,
     Settings,
     local_prior,
+    plane_of,
     respond,
     shared_prior,
     start,
@@ -141,33 +142,37 @@ def free_run(record: Record, problem: Problem, low: Lowered, shared: Array, loca
 
 
 def floor(record: Record, problem: Problem, low: Lowered, shared: Array, local: Array) -> Array:
-    """What gusts and sensors explain of a free run before anything is fitted to it: (3,) standard deviations.
-
-    In the filter's gusts, whatever the air's spectrum: it weights channels against one another.
-    """
-    m = motion(record, problem.settings, low, shared, local)
-    if np.linalg.eigvals(m.a).real.max() >= 0.0:
-        return np.asarray(10.0 * np.sqrt(m.variance))
-    spread = solve_continuous_lyapunov(m.a, -np.diag(m.process))
-    return np.asarray(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", m.c, spread, m.c), 0.0) + m.variance))
+    """What gusts and sensors explain of a free run before anything is fitted to it: (3,) standard deviations."""
+    a, c, process, noise = _linearised(record, problem.settings, low, shared, local)
+    if np.linalg.eigvals(a).real.max() >= 0.0:
+        return np.asarray(10.0 * np.sqrt(noise))
+    spread = solve_continuous_lyapunov(a, -np.diag(process))
+    return np.asarray(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", c, spread, c), 0.0) + noise))
 
 
 def explained(
-    record: Record, problem: Problem, low: Lowered, shared: Array, local: Array, air: Air, seed: int
+    record: Record, problem: Problem, low: Lowered, shared: Array, local: Array, seed: int
 ) -> Array:
     """What gusts and sensors leave of a free run once initial state, biases and trim are fitted to it: (3,) rms.
 
-    The mean over `_DRAWS` records of the linear model in gusts, treated as `free_run` treats the measured one.
-
-    Parameters
-    ----------
-    air : spectrum of the gusts.
+    The mean over `_DRAWS` records of the linear model in its gusts, treated as `free_run` treats the measured one.
     """
-    m = motion(record, problem.settings, low, shared, local)
-    samples, dt = record.samples, record.signals.dt_s
+    a, c, process, noise = _linearised(record, problem.settings, low, shared, local)
+    n, samples = a.shape[0], record.samples
+    phi, spread = np.empty((n, n)), np.empty((n, n))
+    early, late = np.empty((n, 1)), np.empty((n, 1))
+    step(np.hstack([a, np.zeros((n, 1))]), process, n, record.signals.dt_s, phi, early, late, spread)
+    values, vectors = np.linalg.eigh(spread)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
     rng = np.random.default_rng([seed, samples])
-    w = gusts(air, m, dt, samples, _DRAWS, rng)
-    y = response(m, w, dt) + np.sqrt(m.variance)[:, None] * rng.standard_normal((samples, 3, _DRAWS))
+    x = np.zeros((n, _DRAWS))
+    x[2:4] = np.linalg.cholesky(np.array([[1.0, 0.5], [0.5, 0.5]])) @ rng.standard_normal((2, _DRAWS))
+    x[5:CORE] = x[2]
+    y = np.empty((samples, 3, _DRAWS))
+    for k in range(samples):
+        y[k] = c @ x
+        x = phi @ x + root @ rng.standard_normal((n, _DRAWS))
+    y += np.sqrt(noise)[:, None] * rng.standard_normal(y.shape)
     weight = 1.0 / floor(record, problem, low, shared, local)
     t = _tangents(record, problem.settings, low, shared, local, weight)[1]
     prior = np.diag(np.diag(local_prior(record, problem.settings)[1])[list(_MOTION)])
@@ -176,15 +181,37 @@ def explained(
     return np.asarray(np.sqrt((left.reshape(samples, 3, _DRAWS) ** 2).mean(axis=(0, 2))) / weight)
 
 
-def air_of(
-    problem: Problem, hypothesis: Hypothesis, shared: Array, sizes: Array, found: Sequence[Assessment]
-) -> Air:
-    """The spectrum of the air in which records were flown, by their innovations under a model."""
-    low = lower(hypothesis.change(sizes))
-    motions = [
-        motion(r, problem.settings, low, shared, a.local) for r, a in zip(problem.records, found, strict=True)
-    ]
-    return chosen(motions, [a.whitened for a in found], [r.signals.dt_s for r in problem.records])
+def _linearised(
+    record: Record, settings: Settings, low: Lowered, shared: Array, local: Array
+) -> tuple[Array, Array, Array, Array]:
+    """A (n, n), C (3, n), intensities (n,) [1/s] and variances (3,) of the motion in its gusts, sensors' lags and
+    delays included.
+    """
+    plant, s = record.plant, record.signals
+    inner = CORE + sum(1 if kind == 0 else 2 for kind in low.state_index[:, 0])
+    n = states(inner, low.lags, low.delays)
+    a, c = np.empty((n, n)), np.empty((3, n))
+    v, density = float(s.airspeed_m_s.mean()), float(s.density_kg_m3.mean())
+    x = np.zeros(n)
+    x[0] = float(s.y[:, 0].mean()) - plant.alpha_shift_rad
+    linear(
+        x,
+        float(s.elevator_rad.mean()),
+        v,
+        0.5 * density * v * v,
+        float(s.theta_rad.mean()) - plant.alpha_shift_rad,
+        inner,
+        low.lags,
+        low.delays,
+        plane_of(plant, settings, low, shared, local, v),
+        low.arms,
+        low.scales,
+        a,
+        c,
+    )
+    process = np.zeros(n)
+    process[2] = 2.0 * v / settings.length_w_m
+    return a, c, process, (settings.noise * np.exp(shared[6:9])) ** 2
 
 
 def _tangents(
@@ -249,4 +276,4 @@ def _held(hypothesis: Hypothesis, sizes: Array, step_: Array) -> Array:
     return moved
 
 
-__all__ = ["Assessment", "air_of", "assess", "explained", "floor", "free_run", "leave_one_out"]
+__all__ = ["Assessment", "assess", "explained", "floor", "free_run", "leave_one_out"]

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.effects.change import Change, SensorTerm
-from airtruth.trace.kernel import Plane, evaluate
+from airtruth.trace.kernel import F_INERTIA, Plane, evaluate
 from airtruth.trace.lower import CHANNELS, Lowered, lower
-from airtruth.trace.plant import Plant
+from airtruth.trace.plant import Plant, inertia_std
 from airtruth.trace.records import FINE, Record, nodes
 from airtruth.trace.surface import through
 from airtruth.units import G0
@@ -31,14 +31,19 @@ SHARED: Final = (
     "log_noise_az",
     "rotary",
     "thrust",
+    "rolloff",
+    "inertia",
 )
 """Parameters that all records share: increments of the derivatives [-], logarithms of noise over declared,
-share of the rotary gust (1: all of the specification's; counted from 1/2), relative change of the thrust."""
+share of the rotary gust (1: all of the specification's; counted from 1/2), relative change of the thrust,
+rolloff of the gusts (0: Dryden's, 1: von Karman's; counted from 1/2), relative change of the pitch inertia at
+equal derivatives of the pitch acceleration: what it does to the curvature of the tables."""
 LOCAL: Final = ("alpha0", "q0", "w1", "w2", "bias_alpha", "bias_q", "bias_az", "CL0", "Cm0", "log_sigma_w")
 """Parameters of one record: initial state, sensors' biases, trim coefficients, logarithm of the gust [m/s]."""
 _ROTARY_STD: Final = 0.5
+_ROLLOFF_STD: Final = 0.5
 S, L = len(SHARED), len(LOCAL)
-SHARED_STEP: Final = np.array([1e-3, 1e-1, 1e-3, 1e-4, 1e-2, 1e-4, 1e-4, 1e-4, 1e-4, 1e-3, 1e-3])
+SHARED_STEP: Final = np.array([1e-3, 1e-1, 1e-3, 1e-4, 1e-2, 1e-4, 1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3, 1e-3])
 LOCAL_STEP: Final = np.array([1e-5, 1e-4, 1e-3, 1e-3, 1e-5, 1e-4, 1e-3, 1e-5, 1e-6, 1e-4])
 
 
@@ -56,6 +61,7 @@ class Settings:
     length_w_m : scale length of the vertical gust [m].
     thrust_std : relative standard deviation of the engines' thrust.
     offset_std : (2,) of CL and Cm at trim, about those of the declared aircraft.
+    derivatives : (6,) declared, the same for every record, about which the shared inertia turns.
     """
 
     noise: Array
@@ -66,6 +72,7 @@ class Settings:
     length_w_m: float
     thrust_std: float
     offset_std: Array
+    derivatives: Array
 
 
 @dataclass(frozen=True)
@@ -118,7 +125,7 @@ def respond(
 
     Parameters
     ----------
-    shared : (11,) see `SHARED`; local : (10,) see `LOCAL`.
+    shared : (13,) see `SHARED`; local : (10,) see `LOCAL`.
     """
     low = change if isinstance(change, Lowered) else lower(change)
     s, plant = record.signals, record.plant
@@ -195,13 +202,17 @@ def plane_of(
             0.5 + shared[9],
             4.0 * c.span_m / (np.pi * airspeed_m_s),
             plant.neutral_elevator_rad,
+            0.5 + shared[11],
         ]
     )
     declared = np.concatenate([low.declared, plant.thrust, plant.constant * (1.0 + shared[10])])
+    declared[F_INERTIA] *= 1.0 + shared[12]
+    increments = shared[:6].copy()
+    increments[3:] += shared[12] * (settings.derivatives[3:] + shared[3:6])
     return (
         constants,
         declared,
-        shared[:6],
+        increments,
         plant.alpha_rad,
         plant.elevator_rad,
         plant.qhat,
@@ -256,16 +267,23 @@ def local_prior(record: Record, settings: Settings) -> tuple[Array, Array]:
 
 
 def shared_prior(record: Record, settings: Settings) -> Array:
-    """(11, 11) precision of the shared parameters about zero."""
+    """(13, 13) precision of the shared parameters about zero."""
     precision = np.zeros((S, S))
-    precision[:6, :6] = np.linalg.inv(record.plant.derivative_cov)
+    # an inertia larger by i makes the derivatives of the moment look smaller by i
+    std = inertia_std(record.plant)
+    turn = np.concatenate([np.zeros(3), -settings.derivatives[3:]])
+    own = np.linalg.inv(record.plant.derivative_cov - std**2 * np.outer(turn, turn))
+    precision[:6, :6] = own
+    precision[12, :6] = precision[:6, 12] = -own @ turn
+    precision[12, 12] = turn @ own @ turn + std**-2
     precision[6:9, 6:9] = np.eye(3) * settings.noise_prior**-2
     precision[9, 9] = _ROTARY_STD**-2
     precision[10, 10] = settings.thrust_std**-2
+    precision[11, 11] = _ROLLOFF_STD**-2
     return precision
 
 
-def settings_of(aircraft: Aircraft, length_w_m: float, thrust_std: float) -> Settings:
+def settings_of(aircraft: Aircraft, length_w_m: float, thrust_std: float, derivatives: Array) -> Settings:
     """What aircraft.toml declares of the sensors, and where it is silent a judgement with a wide prior."""
     noise = np.array([0.1 * np.pi / 180.0, 0.3 * np.pi / 180.0, 0.1])
     bias = np.array([0.5 * np.pi / 180.0, 0.5 * np.pi / 180.0, 0.3])
@@ -287,4 +305,5 @@ def settings_of(aircraft: Aircraft, length_w_m: float, thrust_std: float) -> Set
         length_w_m=length_w_m,
         thrust_std=thrust_std,
         offset_std=np.array([0.1, 0.03]),
+        derivatives=derivatives,
     )

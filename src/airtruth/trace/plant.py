@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 RELATIVE_STD: Final = (0.05, 0.30, 0.10, 0.05, 0.15, 0.05)
 """Uncertainty of a declared derivative that states none, over its value [-] (judgement)."""
 _LEAST_STD: Final = (0.05, 1.0, 0.02, 0.01, 0.5, 0.01)
+_CERTAIN: Final = 1e-6
 _SPEEDS: Final = np.array([0.97, 1.0, 1.03])
 
 
@@ -245,6 +246,12 @@ def declared_covariance(aircraft: Aircraft, derivatives: Array) -> Array:
     return covariance
 
 
+def inertia_std(plant: Plant) -> float:
+    """Relative standard deviation of the declared pitch inertia; next to none where none is stated."""
+    mass = plant.aircraft.file.mass
+    return _CERTAIN if mass is None else max(mass.inertia_yy.std / mass.inertia_yy.value, _CERTAIN)
+
+
 def scale_of(plant: Plant, airspeed_m_s: float, density_kg_m3: float) -> short_period.Scale:
     """Factors of the linear model at a condition."""
     c = plant.aircraft.constants
@@ -253,4 +260,13 @@ def scale_of(plant: Plant, airspeed_m_s: float, density_kg_m3: float) -> short_p
     )
 
 
-__all__ = ["Plant", "declared_covariance", "declared_derivatives", "linear", "probed", "scale_of", "trim_of"]
+__all__ = [
+    "Plant",
+    "declared_covariance",
+    "declared_derivatives",
+    "inertia_std",
+    "linear",
+    "probed",
+    "scale_of",
+    "trim_of",
+]

@@ -79,8 +79,8 @@ def prepare(
         notes.append("the aircraft has no JSBSim model: the loop's model is the linear short-period model")
     plants = _plants(signals, aircraft, model, chosen)
     records = [Record(s, plant) for s, plant in zip(signals, plants, strict=True)]
-    settings = _settings(aircraft, [s for s in signals if s.run_id not in chosen])
     fitted = tuple(r for r in records if r.signals.run_id not in chosen)
+    settings = _settings(aircraft, [r.signals for r in fitted], fitted[0].plant.derivatives)
     held = tuple(r for r in records if r.signals.run_id in chosen)
     if len(fitted) == 1:
         notes.append("one record is fitted: its halves stand in for records left out")
@@ -209,11 +209,13 @@ def _trim(aircraft: Aircraft, members: Sequence[Signals], speed: float, density:
     )
 
 
-def _settings(aircraft: Aircraft, signals: Sequence[Signals]) -> Settings:
+def _settings(aircraft: Aircraft, signals: Sequence[Signals], derivatives: Array) -> Settings:
     altitude = float(np.mean([s.altitude_m for s in signals]))
     scales = gust_scales("mil-f-8785c", "light", min(max(altitude, 30.0), 20000.0))
     known = all(s.throttle is not None for s in signals)
-    return settings_of(aircraft, scales.length_w_m, _THRUST_STD if known else _THRUST_UNKNOWN_STD)
+    return settings_of(
+        aircraft, scales.length_w_m, _THRUST_STD if known else _THRUST_UNKNOWN_STD, derivatives
+    )
 
 
 def _halves(record: Record) -> tuple[Record, Record]:
