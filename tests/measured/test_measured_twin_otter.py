@@ -11,12 +11,15 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
+from airtruth import aircraft
 from airtruth.identify import METHODS, identify_batch, quantities
 from airtruth.identify.kinematics import check_kinematics
 from airtruth.logs.flight_log import batches
 from airtruth.logs.importers import MappingFile, import_log, read_mapping, record_constants
 from airtruth.logs.importers.mapping import Channel
 from airtruth.logs.importers.sources import open_source
+from airtruth.trace import TraceOptions
+from airtruth.trace.tracing import traced
 from airtruth.units import DEG
 
 MAPPING = Path(__file__).resolve().parents[2] / "data" / "mappings" / "sidpac.toml"
@@ -147,3 +150,25 @@ def test_alpha_of_the_second_record_lags(measured):
     assert "none" not in causes
     assert causes["vane_arm"].value == pytest.approx(1.7, abs=0.2)
     assert 0.02 < causes["alpha_delay"].value < 0.03
+
+
+def test_the_second_record_lacks_an_arm_or_a_lag(measured):
+    """One record, so that all is provisional; kinematics alone has an arm of 1.7 m."""
+    plane = aircraft.load(Path(__file__).resolve().parent / "twin_otter")
+    log = import_log(measured(SECOND), with_measured_density()).log
+    answer = traced([log], plane, TraceOptions()).answer
+    print(
+        answer["verdict"],
+        [(e["name"], e["indistinguishable_from"], e["parameters"]) for e in answer["effects"]],
+    )
+    assert answer["verdict"] in ("traced", "one_of")
+    assert answer["provisional"]
+    first = answer["effects"][0]
+    known = {"vane_arm", "vane_lag", "accelerometer_arm"}
+    assert {first["name"], *first["indistinguishable_from"]} <= known
+    if first["name"] == "vane_arm":
+        assert first["parameters"]["x_m"]["value"] == pytest.approx(1.7, abs=0.2)
+    before, after = (answer["error"][stage]["fit"]["free_run"] for stage in ("before", "after"))
+    print(before, after)
+    for channel, share in (("alpha_rad", 0.6), ("q_rad_s", 0.9), ("az_m_s2", 0.6)):
+        assert after[channel] < share * before[channel]

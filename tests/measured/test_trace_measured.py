@@ -19,9 +19,6 @@ from airtruth.trace.tracing import traced
 HERE = Path(__file__).resolve().parent
 RECORDS = ("fAttasElv1", "fAttasElv2")
 ARM_M = 13.08
-NOT_YET = (
-    "the arm is found both ways, but fitted on the second record alone a further effect is accepted with it"
-)
 
 
 @pytest.fixture
@@ -48,12 +45,12 @@ def declared(x_m=0.0):
 
 
 @pytest.mark.parametrize("held", RECORDS)
-@pytest.mark.xfail(reason=NOT_YET, strict=False)
 def test_the_arm_is_traced_and_nothing_else(logs, held):
     answer = traced(logs, declared(), TraceOptions(hold_out=(held,))).answer
     print(answer["verdict"], answer["provisional"], answer["effects"])
     assert answer["verdict"] in ("traced", "one_of")
     assert answer["model"] == "linear"
+    assert answer["provisional"]  # the linear model leaves more than the arm
     # nothing that one record shows alone: Cm alpha^2 has t = -3 in the first and the other sign in the second
     assert len(answer["effects"]) == 1
     effect = answer["effects"][0]
@@ -65,8 +62,14 @@ def test_the_arm_is_traced_and_nothing_else(logs, held):
     assert after["free_run"]["alpha_rad"] < 0.5 * before["free_run"]["alpha_rad"]
     assert after["free_run"]["az_m_s2"] < 0.5 * before["free_run"]["az_m_s2"]
     assert after["innovation"]["alpha_rad"] < before["innovation"]["alpha_rad"]
-    found = answer["derivatives"]["after"]
-    assert found["CLde"] > 0.0
+    derivatives = answer["derivatives"]
+    print({stage: values["CLde"] for stage, values in derivatives.items()})
+    found, std = derivatives["after"], derivatives["after_std"]
+    # lift grows with the elevator's trailing edge down: CLde = -CZde is above 0, by far more than its error
+    assert found["CLde"] > 5.0 * std["CLde"]
+    assert abs(found["CLde"] - derivatives["declared"]["CLde"]) < abs(
+        derivatives["before"]["CLde"] - derivatives["declared"]["CLde"]
+    )
     assert found["CLq"] < 0.5 * answer["derivatives"]["before"]["CLq"]  # the arm no longer hides there
 
 
@@ -74,8 +77,21 @@ def test_the_arm_is_traced_and_nothing_else(logs, held):
 def test_declared_it_is_not_traced_again(logs, held):
     answer = traced(logs, declared(ARM_M), TraceOptions(hold_out=(held,))).answer
     print(answer["verdict"], answer["effects"])
-    for effect in answer["effects"]:
-        assert effect["name"] != "vane_arm" or abs(effect["parameters"]["x_m"]["value"]) < 0.15 * ARM_M
+    row = next(c for c in answer["candidates"] if c["name"] == "vane_arm")
+    assert row["testable"]
+    assert row["why_not"]
+    assert all("vane_arm" not in members(effect) for effect in answer["effects"])
+    # what is left is the same as with the arm traced: the arm is what was missing
+    lacking = traced(logs, declared(), TraceOptions(hold_out=(held,))).answer["error"]
+    here = answer["error"]["before"]["held_out"]["free_run"]["alpha_rad"]
+    assert here == pytest.approx(lacking["after"]["held_out"]["free_run"]["alpha_rad"], rel=0.15)
+
+
+def test_the_second_record_s_interval_holds_the_arm(logs):
+    """The first one's does not: 13.9 to 15.3 m; its bias is the model's, which no standard error covers."""
+    answer = traced(logs, declared(), TraceOptions(hold_out=RECORDS[:1])).answer
+    low, high = answer["effects"][0]["parameters"]["x_m"]["ci95"]
+    assert low < ARM_M < high
 
 
 def test_without_its_declaration_the_answer_says_that_the_model_is_linear(logs):

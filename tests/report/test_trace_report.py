@@ -20,6 +20,7 @@ from airtruth.report.html import trace_report
 from airtruth.report.trace_figures import PAGES, scores, sight
 from airtruth.report.trace_table import error_csv, error_grid, figures
 from airtruth.report.trace_text import detectable, effect_line, verdict
+from airtruth.report.trace_tolerances import tolerance_grid
 from airtruth.trace import TraceOptions, run
 
 CAMPAIGN = """
@@ -142,6 +143,28 @@ def test_replay_is_told_where_there_is_one(answer):
     assert row[grid.header.index("declared")] == "1.15"
     assert row[grid.header.index("after")] == "0.573"
     assert "held_out,replay,q_rad_s,updated,0.01" in error_csv(answer)
+
+
+def test_free_runs_stand_beside_their_tolerances(answer):
+    """14 CFR Part 60, Table A2A, 2.c.10: 1.5 deg pitch or 2 deg/s pitch rate, and 0.10 g."""
+    grid = tolerance_grid(answer)
+    assert [g.heading.rpartition(", ")[2] for g in grid.groups] == ["held-out records", "fitted records"]
+    rows = {r[0]: dict(zip(grid.header, r, strict=True)) for r in grid.groups[0].rows}
+    assert [rows[n]["tolerance"] for n in ("pitch [deg]", "q [deg/s]", "az [g]")] == ["1.5", "2.0", "0.10"]
+    stated = answer["tolerances"]["after"]["held_out"]
+    for name, key, unit in (
+        ("pitch [deg]", "pitch_rad", np.pi / 180.0),
+        ("q [deg/s]", "q_rad_s", np.pi / 180.0),
+        ("az [g]", "az_m_s2", 9.80665),
+    ):
+        assert float(rows[name]["after"]) == pytest.approx(stated[key] / unit, rel=5e-3)
+    assert rows["records within"]["tolerance"] == "1"
+    assert rows["records within"]["after"] == str(stated["records_within"])
+    for told in (as_trace_text(answer), trace_report(answer).page, trace_report(answer).latex):
+        assert "14 CFR Part 60, Appendix A, Table A2A, test 2.c.10" in " ".join(told.split())
+    del answer["tolerances"]
+    assert tolerance_grid(answer) is None
+    assert "14 CFR" not in as_trace_text(answer) + trace_report(answer).page
 
 
 def test_detectable_names_units(answer):

@@ -50,6 +50,31 @@ def test_leave_one_out_is_the_refit_without_the_record(fitted):
         assert assessed[i].likelihood == likelihood[i]
 
 
+def test_of_two_records_the_other_is_refitted(fitted):
+    problem, found = fitted
+    two = replace(problem, records=problem.records[:2])
+    both = fit(two, ONE, replace(found.point, local=found.point.local[:2]))
+    likelihood, _ = leave_one_out(two, both)
+    for i, other in ((0, 1), (1, 0)):
+        alone = replace(two, records=(two.records[other],))
+        again = fit(alone, ONE, replace(both.point, local=both.point.local[[other]]))
+        expected = assess(two, i, ONE, again.point.shared, again.point.sizes, both.point.local[i])
+        assert likelihood[i] == expected.likelihood
+
+
+def test_a_record_far_from_the_start_is_fitted_to_its_end(fitted):
+    """Biases and trim far from the start's: the same optimum as from the fit's own parameters."""
+    problem, found = fitted
+    record = problem.records[0]
+    off = replace(record.signals, y=record.signals.y + np.array([0.01, 0.008, 0.5]))
+    moved = replace(problem, records=(replace(record, signals=off),))
+    point = found.point
+    own = point.local[0] + np.array([0.0, 0.0, 0.0, 0.0, 0.01, 0.008, 0.5, 0.0, 0.0, 0.0])
+    near = assess(moved, 0, ONE, point.shared, point.sizes, own)
+    far = assess(moved, 0, ONE, point.shared, point.sizes)
+    assert far.likelihood == pytest.approx(near.likelihood, abs=0.05)
+
+
 def test_records_left_out_fit_worse_than_records_fitted(fitted):
     """A record left out loses about half its share of the parameters: positive in sum."""
     problem, found = fitted

@@ -25,6 +25,7 @@ from airtruth.report.trace_text import (
     verdict,
     why_not,
 )
+from airtruth.report.trace_tolerances import tolerance_grid
 
 ANSWER: Final = "trace.json"
 PICTURES: Final = {
@@ -113,13 +114,17 @@ def trace_report(answer: Mapping[str, Any], folder: Path | None = None) -> Repor
     answer : what trace.json holds.
     folder : where its pictures are; those that are there are put into the page.
     """
-    grid = error_grid(answer)
+    grid, tolerances = error_grid(answer), tolerance_grid(answer)
     body = [f'<p class="verdict">{html.escape(verdict(answer))}</p>']
     for effect in answer["effects"]:
         told = " ".join(line.strip() + "." for line in effect_details(effect))
         body.append(f"<p><strong>{html.escape(effect_line(effect))}</strong><br>{html.escape(told)}</p>")
     body += _pictures(folder, ["trace.png"])
     body += ["<h2>Error before and after</h2>", grid_html(grid)]
+    latex = render.latex(grid, "trace-error")
+    if tolerances is not None:
+        body += [f"<h2>{html.escape(tolerances.title)}</h2>", grid_html(tolerances)]
+        latex += "\n" + render.latex(tolerances, "trace-tolerances")
     body += ["<h2>Derivatives</h2>", _pre(derivative_lines(answer))]
     body += ["<h2>Candidates</h2>", *_pictures(folder, ["scores.png"]), _candidates(answer)]
     body += ["<h2>What is left</h2>", *_pictures(folder, ["innovations.png"])]
@@ -133,7 +138,7 @@ def trace_report(answer: Mapping[str, Any], folder: Path | None = None) -> Repor
         *(f"{note}." for note in answer.get("notes", ())),
     ]
     body += [f'<p class="note">{html.escape(line)}</p>' for line in said]
-    return Report(_page("Trace", body), error_csv(answer), render.latex(grid, "trace-error"))
+    return Report(_page("Trace", body), error_csv(answer), latex)
 
 
 def campaign_report(campaign: Campaign) -> Report:

@@ -9,6 +9,7 @@ from typing import Any, Final
 from airtruth.effects.library import EFFECTS
 from airtruth.report.render import WIDTH, text
 from airtruth.report.trace_table import error_grid, figures
+from airtruth.report.trace_tolerances import tolerance_grid
 
 MOST_CANDIDATES: Final = 8
 _PRINTED: Final = {
@@ -31,10 +32,12 @@ def as_trace_text(answer: Answer) -> str:
     ----------
     answer : what trace.json holds (docs/trace.md).
     """
+    tolerances = tolerance_grid(answer)
     blocks = [
         [verdict(answer), *textwrap.wrap(_freedom(answer), WIDTH)],
         *([effect_line(e), *effect_details(e)] for e in answer["effects"]),
         text(error_grid(answer)).rstrip("\n").splitlines(),
+        *([text(tolerances).rstrip("\n").splitlines()] if tolerances else []),
         derivative_lines(answer),
         ["Candidates, most significant first:", *_candidate_lines(answer)],
         _wrapped("Smallest traceable sizes", "; ".join(detectable(answer)) + "."),

@@ -19,6 +19,7 @@ from airtruth.trace.lower import CHANNELS, lower
 from airtruth.trace.model import SHARED, S
 from airtruth.trace.prepare import Case
 from airtruth.trace.profile import Profile, place_of
+from airtruth.trace.sandwich import inflation
 from airtruth.trace.score import Table
 from airtruth.trace.search import LEVEL, Candidate, Stage
 
@@ -115,7 +116,7 @@ def answer(case: Case, stages: Sequence[Stage], outcome: Outcome) -> dict[str, A
         "provisional": bool(provisional),
         "anomaly": {"statistic": anomaly[0], "p_value": anomaly[1]},
         "remaining": {"statistic": remaining[0], "p_value": remaining[1]},
-        "effects": [_effect(stages, number) for number in range(len(found))],
+        "effects": [_effect(case.fitted, stages, number) for number in range(len(found))],
         "candidates": _candidates(case, stages),
         "error": errors(case, outcome),
         "derivatives": _derivatives(case, stages),
@@ -147,14 +148,26 @@ def parameters(effect: Effect, sizes: Array, covariance: Array) -> dict[str, dic
     return result
 
 
-def _effect(stages: Sequence[Stage], number: int) -> dict[str, Any]:
+def reported(stage: Stage) -> Fit:
+    """The fit whose sizes are stated: under the autoregression, or without where that was not followed."""
+    stayed = np.array_equal(stage.gls.point.shared, stage.null.point.shared)
+    return stage.null if stayed else stage.gls
+
+
+def _widened(problem: Problem, found: Fit) -> Array:
+    """Covariance with what the innovations owe to one another in it."""
+    ratio = inflation(problem, found)
+    return np.asarray(found.covariance * np.outer(ratio, ratio))
+
+
+def _effect(problem: Problem, stages: Sequence[Stage], number: int) -> dict[str, Any]:
     with_effects = [s for s in stages if s.tied]
-    stage, final = with_effects[number], stages[-1].gls
+    stage, final = with_effects[number], reported(stages[-1])
     best, others = stage.tied[0], stage.tied[1:]
     effect = best.score.effect
     at = sum(len(e.parameters) for e in final.hypothesis.effects[:number])
     span = slice(at, at + len(effect.parameters))
-    block = final.covariance[S:, S:][span, span]
+    block = _widened(problem, final)[S:, S:][span, span]
     rest = [
         c
         for c in stage.candidates
@@ -303,7 +316,7 @@ def _derivatives(case: Case, stages: Sequence[Stage]) -> dict[str, dict[str, flo
     rows = {"declared": declared, "before": declared + stages[0].null.point.shared[:6]}
     rows["after"] = declared + stages[-1].null.point.shared[:6]
     named = {k: dict(zip(PARAMETERS, v.tolist(), strict=True)) for k, v in rows.items()}
-    std = np.sqrt(np.diag(stages[-1].gls.covariance)[:6])
+    std = np.sqrt(np.diag(_widened(case.fitted, reported(stages[-1])))[:6])
     named["after_std"] = dict(zip(PARAMETERS, std.tolist(), strict=True))
     return named
 

@@ -23,6 +23,7 @@ from airtruth.effects.change import Change
 from airtruth.effects.effect import Effect
 from airtruth.trace.lower import lower
 from airtruth.trace.model import (
+    BOUNDS,
     LOCAL_STEP,
     SHARED_STEP,
     External,
@@ -88,9 +89,9 @@ class Hypothesis:
 
     @cached_property
     def held(self) -> tuple[int, ...]:
-        """Places in the vector of sizes whose range is a single value."""
+        """Places among shared parameters and sizes of those whose range is a single value."""
         ends = [self.effects[i].parameters[j].ends for i, j in self.parameters]
-        return tuple(k for k, (low, high) in enumerate(ends) if low == high)
+        return tuple(S + k for k, (low, high) in enumerate(ends) if low == high)
 
     def plus(self, effect: Effect) -> Hypothesis:
         """The hypothesis with one effect more."""
@@ -425,7 +426,7 @@ def reduced(  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    held : places in the vector of sizes that do not move.
+    held : places among shared parameters and sizes that do not move.
 
     Returns
     -------
@@ -453,7 +454,7 @@ def reduced(  # type: ignore[no-untyped-def]
         gradient += g[:m] - h_sl @ solved[:, 0]
         information += h[:m, :m] - h_sl @ solved[:, 1:]
         back.append((h_ll, solved))
-    for i in (*(() if levels else _LEVELS), *(S + i for i in held)):
+    for i in (*(() if levels else _LEVELS), *held):
         information[i], information[:, i] = 0.0, 0.0
         information[i, i] = 1.0
         gradient[i] = 0.0
@@ -462,14 +463,25 @@ def reduced(  # type: ignore[no-untyped-def]
 
 def _step(problem: Problem, hypothesis: Hypothesis, point: Point, pieces, damping: float, levels: bool):  # type: ignore[no-untyped-def]
     k = len(point.sizes)
-    gradient, information, back = reduced(problem, point, k, pieces, levels, damping, hypothesis.held)
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-30))
-    normal = information / np.outer(scale, scale) + damping * np.eye(len(scale))
-    shared = -np.linalg.solve(normal, gradient / scale) / scale
+    held = hypothesis.held
+    while True:
+        gradient, information, back = reduced(problem, point, k, pieces, levels, damping, held)
+        scale = np.sqrt(np.maximum(np.diag(information), 1e-30))
+        normal = information / np.outer(scale, scale) + damping * np.eye(len(scale))
+        shared = -np.linalg.solve(normal, gradient / scale) / scale
+        stopped = tuple(i for i in at_bounds(point) if i not in held and shared[i] * point.shared[i] > 0.0)
+        if not stopped:
+            break
+        held += stopped
     local = np.stack([-(solved[:, 0] + solved[:, 1:] @ shared) for _, solved in back])
     local[:, _SIGMA] = np.clip(local[:, _SIGMA], -1.0, 1.0)
     gain = float(-gradient @ shared) + sum(float(solved[:, 0] @ h_ll @ solved[:, 0]) for h_ll, solved in back)
     return Point(shared[:S], local, shared[S:]), 0.5 * gain
+
+
+def at_bounds(point: Point) -> tuple[int, ...]:
+    """Places of shared parameters that stand at an end of their range."""
+    return tuple(i for i, ends in BOUNDS.items() if point.shared[i] in ends)
 
 
 def _decrement(problem: Problem, hypothesis: Hypothesis, point: Point, pieces, levels: bool) -> float:  # type: ignore[no-untyped-def]
@@ -485,6 +497,8 @@ def _moved(hypothesis: Hypothesis, point: Point, step: Point) -> Point:
         room = 0.25 * (high - low)
         sizes[i] = min(max(sizes[i], max(low, point.sizes[i] - room)), min(high, point.sizes[i] + room))
     shared = point.shared + np.concatenate([step.shared[:6], np.clip(step.shared[6:], -1.0, 1.0)])
+    for i, (low, high) in BOUNDS.items():
+        shared[i] = min(max(shared[i], low), high)
     return Point(shared, point.local + step.local, sizes)
 
 
@@ -508,6 +522,7 @@ __all__ = [
     "Problem",
     "Tangent",
     "Whitener",
+    "at_bounds",
     "autoregression",
     "begin",
     "fit",

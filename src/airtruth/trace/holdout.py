@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -10,12 +10,22 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_lyapunov
 
 from airtruth.identify.kalman_step import step
-from airtruth.trace.fit import NO_WHITENER, Fit, Hypothesis, Point, Problem, parts, reduced, tangent
+from airtruth.trace.fit import (
+    NO_WHITENER,
+    Fit,
+    Hypothesis,
+    Point,
+    Problem,
+    at_bounds,
+    fit,
+    parts,
+    reduced,
+    tangent,
+)
 from airtruth.trace.kernel import CORE, linear, states
 from airtruth.trace.lower import Lowered, lower
 from airtruth.trace.model import (
     LOCAL_STEP,
-    L,
     S,
     Settings,
     local_prior,
@@ -28,7 +38,9 @@ from airtruth.trace.records import Record
 
 Array = NDArray[np.float64]
 
-_ROUNDS: Final = 10
+_ROUNDS: Final = 30
+_DAMPING: Final = 1e-6
+_SIGMA: Final = 9
 _DRAWS: Final = 128
 _MOTION: Final = (0, 1, 4, 5, 6, 7, 8)
 """Own parameters that a free run leaves free: initial alpha and q, biases, trim coefficients."""
@@ -66,32 +78,8 @@ def assess(
 ) -> Assessment:
     """Innovations and free run of one record for shared parameters and sizes that are given."""
     record, settings = problem.records[index], problem.settings
-    own: Array = start(record, settings) if local is None else local.copy()
     one = Problem((record,), settings)
-    middle, precision = local_prior(record, settings)
-    k = len(sizes)
-    best, damping = np.inf, 1e-6
-    kept: Array = own
-    move: Array = np.zeros(L)
-    for _ in range(_ROUNDS):
-        found = tangent(one, 0, hypothesis, Point(shared, own[None, :], sizes), local_only=True)
-        cost = np.inf
-        if found is not None:
-            cost, gradient, information = parts(found, NO_WHITENER, levels=True)
-            off = own - middle
-            cost += 0.5 * float(off @ precision @ off)
-        if found is None or not cost < best:
-            move = 0.25 * move
-            own = kept + move
-            continue
-        better, best, kept = best - cost, cost, own
-        if better < 0.01:
-            break
-        h = information[S + k :, S + k :] + precision
-        g = gradient[S + k :] + precision @ off
-        move = np.asarray(-np.linalg.solve(h + damping * np.diag(np.diag(h)), g))
-        move[9] = np.clip(move[9], -1.0, 1.0)
-        own = own + move
+    kept = _own(one, hypothesis, shared, sizes, start(record, settings) if local is None else local)
     found = tangent(one, 0, hypothesis, Point(shared, kept[None, :], sizes), local_only=True)
     low = lower(hypothesis.change(sizes))
     response = respond(record, settings, low, shared, kept)
@@ -109,6 +97,40 @@ def assess(
         expected=np.sqrt(np.diag(response.covariance)),
         local=kept,
     )
+
+
+def _own(one: Problem, hypothesis: Hypothesis, shared: Array, sizes: Array, begin: Array) -> Array:
+    """Own parameters (10,) of a single record at their best for all else given: Levenberg-Marquardt."""
+    middle, precision = local_prior(one.records[0], one.settings)
+    k = len(sizes)
+
+    def at(local: Array) -> tuple[float, Array, Array] | None:
+        point = Point(shared, local[None, :], sizes)
+        found = tangent(one, 0, hypothesis, point, local_only=True)
+        if found is None:
+            return None
+        cost, gradient, information = parts(found, NO_WHITENER, levels=True)
+        off = local - middle
+        total = cost + 0.5 * float(off @ precision @ off)
+        return total, gradient[S + k :] + precision @ off, information[S + k :, S + k :] + precision
+
+    own, damping = begin, _DAMPING
+    current = at(own)
+    if current is None:
+        return own
+    for _ in range(_ROUNDS):
+        cost, gradient, information = current
+        move = -np.linalg.solve(information + damping * np.diag(np.diag(information)), gradient)
+        move[_SIGMA] = np.clip(move[_SIGMA], -1.0, 1.0)
+        tried = at(own + move)
+        if tried is None or not tried[0] < cost:
+            damping *= 10.0
+            continue
+        own, current = own + move, tried
+        damping = max(0.1 * damping, _DAMPING)
+        if cost - tried[0] < 0.01:
+            break
+    return own
 
 
 def free_run(record: Record, problem: Problem, low: Lowered, shared: Array, local: Array) -> Array:
@@ -239,12 +261,13 @@ def leave_one_out(problem: Problem, found: Fit) -> tuple[Array, list[Assessment]
     """
     k = len(found.point.sizes)
     pieces = [parts(t, NO_WHITENER, levels=True) for t in found.tangents]
-    _, total, _ = reduced(problem, found.point, k, pieces, levels=True)
+    held = at_bounds(found.point)
+    _, total, _ = reduced(problem, found.point, k, pieces, levels=True, held=held)
     one_by_one = []
     for i, piece in enumerate(pieces):
         alone = Problem((problem.records[i],), problem.settings)
         at = Point(np.zeros(S), found.point.local[i : i + 1], found.point.sizes)
-        gradient, information, _ = reduced(alone, at, k, [piece], levels=True)
+        gradient, information, _ = reduced(alone, at, k, [piece], levels=True, held=held)
         information = information.copy()
         information[:S, :S] -= shared_prior(alone.records[0], problem.settings)
         one_by_one.append((gradient, information))
@@ -267,6 +290,20 @@ def leave_one_out(problem: Problem, found: Fit) -> tuple[Array, list[Assessment]
     return np.array([a.likelihood for a in assessed]), assessed
 
 
+def one_by_the_other(problem: Problem, found: Fit) -> tuple[Array, list[Assessment]]:
+    """`leave_one_out` of two records, each judged by a refit to the other: of half of what was known, one step of
+    scoring can be too long, and a refit can be led astray by what the model lacks besides.
+    """
+    assessed = []
+    for i, other in ((0, 1), (1, 0)):
+        alone = Problem((problem.records[other],), problem.settings)
+        there = replace(found.point, local=found.point.local[other : other + 1])
+        refitted = fit(alone, found.hypothesis, there) or found
+        point = refitted.point
+        assessed.append(assess(problem, i, found.hypothesis, point.shared, point.sizes, found.point.local[i]))
+    return np.array([a.likelihood for a in assessed]), assessed
+
+
 def _held(hypothesis: Hypothesis, sizes: Array, step_: Array) -> Array:
     """The step, ended where a parameter would leave its range."""
     moved = step_.copy()
@@ -276,4 +313,4 @@ def _held(hypothesis: Hypothesis, sizes: Array, step_: Array) -> Array:
     return moved
 
 
-__all__ = ["Assessment", "assess", "explained", "floor", "free_run", "leave_one_out"]
+__all__ = ["Assessment", "assess", "explained", "floor", "free_run", "leave_one_out", "one_by_the_other"]

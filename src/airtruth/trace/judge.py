@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from airtruth.trace.fit import Fit, Problem
-from airtruth.trace.holdout import Assessment, floor, leave_one_out
+from airtruth.trace.holdout import Assessment, floor, leave_one_out, one_by_the_other
 from airtruth.trace.lower import lower
 from airtruth.trace.model import S
+from airtruth.trace.sandwich import inflation
 from airtruth.trace.score import Score
 
 Array = NDArray[np.float64]
 
 UNCONVERGED: Final = "its refit did not converge"
 IMMATERIAL: Final = "its size is immaterial"
-_SIGNIFICANT: Final = 10.0
+IMPROBABLE: Final = 0.001
+"""Probability below which refitted derivatives contradict those declared."""
 _ERRORS: Final = 2.0
+_SEVERAL: Final = 3
+"""Records from which their scatter can be told; of fewer, none may lose: what one alone shows has not repeated."""
 _MEMORY_S: Final = 1.0
+_DERIVATIVES: Final = 6
 
 
 @dataclass(frozen=True)
@@ -48,30 +55,36 @@ class Candidate:
     reasons: tuple[str, ...]
 
 
+LeftOut = tuple[Array, list[Assessment]]
+"""Negative log-likelihoods (records,) and assessments of records left out."""
+
+
 @dataclass(frozen=True)
 class Reference:
     """The fit that an effect is judged against, on records left out.
 
     Attributes
     ----------
-    likelihood, assessed : what `leave_one_out` says of it.
+    left_out : one for every way of leaving records out: `leave_one_out`, of two records `one_by_the_other` too.
     weight : (3,) of each record, what gusts and sensors explain of its free run.
     """
 
-    likelihood: Array
-    assessed: tuple[Assessment, ...]
+    left_out: tuple[LeftOut, ...]
     weight: tuple[Array, ...]
 
 
 def reference_of(problem: Problem, null: Fit) -> Reference:
     """The null as the reference of every candidate of its round."""
-    likelihood, found = leave_one_out(problem, null)
     low = lower(null.hypothesis.change(null.point.sizes))
     weight = tuple(
         floor(record, problem, low, null.point.shared, local)
         for record, local in zip(problem.records, null.point.local, strict=True)
     )
-    return Reference(likelihood, tuple(found), weight)
+    return Reference(tuple(way(problem, null) for way in _ways(problem)), weight)
+
+
+def _ways(problem: Problem) -> tuple[Callable[[Problem, Fit], LeftOut], ...]:
+    return (leave_one_out, one_by_the_other) if len(problem.records) == 2 else (leave_one_out,)
 
 
 def outdone(s: Score, found: Fit, gain: float) -> Candidate:
@@ -80,31 +93,37 @@ def outdone(s: Score, found: Fit, gain: float) -> Candidate:
     return Candidate(s, found, gain, nothing, nothing, *_size(s, found), ("another effect explains more",))
 
 
-def judge(problem: Problem, s: Score, best: Fit, gain: float, reference: Reference) -> Candidate:
+def judge(
+    problem: Problem, s: Score, best: Fit, gain: float, reference: Reference, least: float
+) -> Candidate:
     """Judge a refitted effect.
 
     Parameters
     ----------
     s, best, gain : its score, its fit, and what it gained.
     reference : the fit without it.
+    least : gain in 2 log L that counts as significant, were the innovations white: what they owe to one another
+        is taken off it (J. T. Kent, Biometrika 69 (1982): the ratio of robust to plain variance).
     """
     first = s.effect.parameters[0]
     size, std = _size(s, best)
-    likelihood, assessed = leave_one_out(problem, best)
-    likelihood_gain = reference.likelihood - likelihood
+    excess = float(inflation(problem, best)[S + _place(s, best)])
+    for way, before in zip(_ways(problem), reference.left_out, strict=True):
+        likelihood, assessed = way(problem, best)
+        likelihood_gain, unaided = before[0] - likelihood, before[1]
+        if not _lost(likelihood_gain):
+            break
     free, spread = np.zeros(len(assessed)), 0.0
-    for i, (before, after, weight) in enumerate(
-        zip(reference.assessed, assessed, reference.weight, strict=True)
-    ):
-        gains = (((before.residual / weight) ** 2) - ((after.residual / weight) ** 2)).sum(axis=1)
+    for i, (old, new, weight) in enumerate(zip(unaided, assessed, reference.weight, strict=True)):
+        gains = (((old.residual / weight) ** 2) - ((new.residual / weight) ** 2)).sum(axis=1)
         free[i] = gains.sum()
         spread += long_run_variance(gains, round(_MEMORY_S / problem.records[i].signals.dt_s))
     reasons = []
     if not best.converged:
         reasons.append(UNCONVERGED)
-    if gain < _SIGNIFICANT:
+    if gain < least * excess**2:
         reasons.append("refitted, it explains nothing significant")
-    if not first.one_sided and abs(size) < _ERRORS * std:
+    if not first.one_sided and abs(size) < _ERRORS * std * excess:
         reasons.append("refitted, its size is no more than its uncertainty")
     if _lost(likelihood_gain):
         reasons.append("it worsens the likelihood of records left out")
@@ -117,6 +136,17 @@ def judge(problem: Problem, s: Score, best: Fit, gain: float, reference: Referen
     if high_end - size < 1e-6 * span or (size - low_end < 1e-6 * span and low_end != 0.0):
         reasons.append("its size ends at the limit of what is plausible")
     return Candidate(s, best, gain, likelihood_gain, free, size, std, tuple(reasons))
+
+
+def declared_probability(problem: Problem, found: Fit) -> float:
+    """Probability of refitted derivatives as far from the declared ones, by the declared uncertainty alone.
+
+    Source: G. E. P. Box, J. R. Statist. Soc. A 143 (1980): the prior checked by what the data make of it. The
+    mode is nearer to the prior than the likelihood's maximum, so the check is conservative.
+    """
+    off = found.point.shared[:_DERIVATIVES]
+    declared = problem.records[0].plant.derivative_cov
+    return float(chi2.sf(float(off @ np.linalg.solve(declared, off)), _DERIVATIVES))
 
 
 def long_run_variance(x: Array, lags: int) -> float:
@@ -132,8 +162,13 @@ def long_run_variance(x: Array, lags: int) -> float:
 
 
 def _size(s: Score, found: Fit) -> tuple[float, float]:
-    at = len(found.point.sizes) - len(s.effect.parameters)
+    at = _place(s, found)
     return float(found.point.sizes[at]), float(np.sqrt(found.covariance[S + at, S + at]))
+
+
+def _place(s: Score, found: Fit) -> int:
+    """Index of the effect's first parameter among the sizes."""
+    return len(found.point.sizes) - len(s.effect.parameters)
 
 
 def _lost(gains: Array) -> bool:
@@ -141,5 +176,7 @@ def _lost(gains: Array) -> bool:
     total = float(gains.sum())
     if not np.isfinite(total):
         return True
-    error = float(gains.std(ddof=1) * np.sqrt(gains.size)) if gains.size > 2 else 0.0
+    if gains.size < _SEVERAL:
+        return bool(gains.min() < 0.0)
+    error = float(gains.std(ddof=1) * np.sqrt(gains.size))
     return total < -_ERRORS * error

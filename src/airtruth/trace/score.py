@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from airtruth.effects.effect import Effect
-from airtruth.trace.fit import NO_WHITENER, Fit, Problem, Tangent, Whitener, parts, reduced
+from airtruth.trace.fit import NO_WHITENER, Fit, Problem, Tangent, Whitener, at_bounds, parts, reduced
 from airtruth.trace.lower import lower
 from airtruth.trace.model import External, S, respond
 from airtruth.trace.records import nodes
@@ -74,12 +74,14 @@ class Table:
     information : (directions, directions) of unit sizes, nuisance eliminated: cosines and separations.
     white : |z| of each score were the innovations white, with what the effect does to their covariance: an
         autoregression takes up part of a large effect, and a lag in gusts is seen in the scatter.
+    white_sizes : what one step of scoring then estimates of each effect's size, at the score's place.
     omnibus : statistic, degrees of freedom and p-value of the test that names no effect.
     """
 
     scores: tuple[Score, ...]
     information: Array
     white: tuple[float, ...]
+    white_sizes: tuple[float, ...]
     omnibus: tuple[float, int, float]
 
 
@@ -120,7 +122,7 @@ def table(null: Fit, problem: Problem, effects: Sequence[Effect], whitener: Whit
     gradient, information = _projected(null, problem, [e[0] for e in extended], whitener, k, len(tried))
     plain = _projected(null, problem, [e[0] for e in extended], NO_WHITENER, k, len(tried), levels=True)
     rng = np.random.default_rng([seed, len(tried), 7])
-    scores, white = [], []
+    scores, white, white_sizes = [], [], []
     at = 0
     for effect in effects:
         count = len(directions(effect, null, problem))
@@ -147,8 +149,10 @@ def table(null: Fit, problem: Problem, effects: Sequence[Effect], whitener: Whit
         )
         raw = np.diag(plain[1])[span]
         white.append(float(np.max(np.abs(plain[0][span]) / np.sqrt(np.where(raw > 0.0, raw, np.inf)))))
+        here = int(span[best])
+        white_sizes.append(float(-plain[0][here] / raw[best]) if raw[best] > 0.0 else scores[-1].size)
     g, h = _projected(null, problem, [e[1] for e in extended], whitener, k, generic)
-    return Table(tuple(scores), information, tuple(white), _omnibus(g, h))
+    return Table(tuple(scores), information, tuple(white), tuple(white_sizes), _omnibus(g, h))
 
 
 def _audible(direction: Direction, null: Fit, problem: Problem) -> Direction:
@@ -304,7 +308,9 @@ def _projected(
 ) -> tuple[Array, Array]:
     """Gradient and information of the further directions, all nuisance eliminated, priors included."""
     pieces = [parts(t, whitener, levels) for t in tangents]
-    gradient, information, _ = reduced(problem, null.point, k + count, pieces, levels)
+    gradient, information, _ = reduced(
+        problem, null.point, k + count, pieces, levels, held=at_bounds(null.point)
+    )
     m = S + k
     nuisance = information[:m, :m]
     scale = np.sqrt(np.maximum(np.diag(nuisance), 1e-30))

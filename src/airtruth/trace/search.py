@@ -12,7 +12,16 @@ from numpy.typing import NDArray
 from airtruth.effects.effect import Effect
 from airtruth.trace import score
 from airtruth.trace.fit import Fit, Hypothesis, Point, Problem, Whitener, autoregression, begin, fit
-from airtruth.trace.judge import IMMATERIAL, UNCONVERGED, Candidate, judge, outdone, reference_of
+from airtruth.trace.judge import (
+    IMMATERIAL,
+    IMPROBABLE,
+    UNCONVERGED,
+    Candidate,
+    declared_probability,
+    judge,
+    outdone,
+    reference_of,
+)
 from airtruth.trace.model import respond
 from airtruth.trace.profile import Profile, best_place, place_of
 from airtruth.trace.score import Score, Table
@@ -31,6 +40,9 @@ _PATIENCE: Final = 3
 _FAR: Final = 5.0
 _VISIBLE: Final = 2.0
 _SHARES: Final = (1.0, 0.3, 0.1, 0.02)
+SIGNIFICANT: Final = 10.0
+SIGNIFICANT_LATER: Final = 17.5
+"""Gains in 2 log L of a refit: chi-square(1) at both levels over the library's 33 effects (Bonferroni)."""
 TIE: Final = 6.0
 """Effects within this of the best in 2 log L cannot be told apart."""
 
@@ -105,7 +117,8 @@ def search(
             if better is not None:
                 start, restarts = better.point, restarts - 1
                 continue
-            candidates = _judged(problem, null, fits)
+            least = SIGNIFICANT_LATER if stages else SIGNIFICANT
+            candidates = _judged(problem, null, fits, least)
         tied = _tied(candidates)
         profile = None
         if tied and place_of(tied[0].score.effect) is not None:
@@ -153,7 +166,7 @@ def _refitted(
     for i in order:
         s = table.scores[i]
         advance(f"refit {s.effect.key}")
-        found = _refit(problem, null, s, min((f.cost for _, f in fits), default=np.inf))
+        found = _refit(problem, null, s, table.white_sizes[i], min((f.cost for _, f in fits), default=np.inf))
         if found is not None:
             fits.append((s, found))
     for _ in range(_PATIENCE):  # the leader at least has to arrive
@@ -175,7 +188,9 @@ def _better_null(problem: Problem, null: Fit, fits: Sequence[tuple[Score, Fit]])
     return again if again is not None and again.cost < null.cost - _BETTER else None
 
 
-def _judged(problem: Problem, null: Fit, fits: Sequence[tuple[Score, Fit]]) -> tuple[Candidate, ...]:
+def _judged(
+    problem: Problem, null: Fit, fits: Sequence[tuple[Score, Fit]], least: float
+) -> tuple[Candidate, ...]:
     """Gains, those near the best compared under one autoregression, and the rules for those that lead."""
     if not fits:
         return ()
@@ -197,7 +212,7 @@ def _judged(problem: Problem, null: Fit, fits: Sequence[tuple[Score, Fit]]) -> t
         if gain < accepted - TIE:
             judged.append(outdone(s, f, gain))
             continue
-        candidate = judge(problem, s, f, gain, reference)
+        candidate = judge(problem, s, f, gain, reference, least)
         judged.append(candidate)
         if not np.isfinite(accepted) and set(candidate.reasons) <= {IMMATERIAL, UNCONVERGED}:
             accepted = gain  # what explains less than an immaterial effect is not the cause either
@@ -214,30 +229,41 @@ def _whitened(problem: Problem, found: Fit, whitener: Whitener, levels: Fit) -> 
     return np.inf if again is None else again.cost
 
 
-def _refit(problem: Problem, null: Fit, s: Score, rival: float) -> Fit | None:
-    """The null and one effect, all free, from shares of the size that the score suggests."""
+def _refit(problem: Problem, null: Fit, s: Score, white_size: float, rival: float) -> Fit | None:
+    """The null and one effect, all free, from shares of the size that the score suggests.
+
+    Where the null's derivatives are improbable they have absorbed what they can of a large effect, and the
+    search from there can end in another optimum: one more begins at those declared, and at the size that
+    the score has without an autoregression, which can take up such an effect as a whole.
+    """
     hypothesis = null.hypothesis.plus(s.effect)
     best: Fit | None = None
     for share in _shares(problem, null, hypothesis, s)[:2]:
-        tried = fit(problem, hypothesis, _from(null, s, share), rival=rival)
+        tried = fit(problem, hypothesis, _at(null, s, share * s.size), rival=rival)
         if tried is not None and (best is None or tried.cost < best.cost):
             best = tried
         if best is not None and best.converged and null.cost - best.cost > 0.2 * s.z**2:
             break
+    if declared_probability(problem, null) < IMPROBABLE:
+        start = _at(null, s, white_size)
+        shared = np.concatenate([np.zeros(6), start.shared[6:]])
+        tried = fit(problem, hypothesis, replace(start, shared=shared), rival=rival)
+        if tried is not None and (best is None or tried.cost < best.cost):
+            best = tried
     return best
 
 
-def _from(null: Fit, s: Score, share: float) -> Point:
+def _at(null: Fit, s: Score, size: float) -> Point:
     low, high = s.effect.parameters[0].reach
-    size = min(max(share * s.size, low), high)
-    return replace(null.point, sizes=np.concatenate([null.point.sizes, s.direction.sizes(size)]))
+    sizes = s.direction.sizes(min(max(size, low), high))
+    return replace(null.point, sizes=np.concatenate([null.point.sizes, sizes]))
 
 
 def _shares(problem: Problem, null: Fit, hypothesis: Hypothesis, s: Score) -> list[float]:
     """Shares of the size that the score suggests, the most likely first, the rest as the null has it."""
     costs = []
     for share in _SHARES:
-        point = _from(null, s, share)
+        point = _at(null, s, share * s.size)
         change = hypothesis.change(point.sizes)
         total = 0.0
         for record, local in zip(problem.records, point.local, strict=True):

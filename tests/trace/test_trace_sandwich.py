@@ -1,0 +1,77 @@
+"""Robust standard deviations: the elimination against the whole matrix, the long-run variance by hand, and coverage."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import block_diag
+from trace_records import NOTHING, SETTINGS, fly, problem
+
+from airtruth.effects.library import EFFECTS
+from airtruth.trace.fit import S, begin, fit, parts
+from airtruth.trace.model import L, local_prior, shared_prior
+from airtruth.trace.sandwich import MEMORY_S, inflation, long_run
+
+HYPOTHESIS = NOTHING.plus(EFFECTS["vane_arm"])
+
+
+def disturbed(rng, sign, amount):
+    """A record whose alpha and pitch rate carry slow noise that the model does not know."""
+    record = fly(rng, samples=300, amplitude=sign * 0.035, name=f"r{sign}")
+    slow = np.zeros((300, 2))
+    for k in range(1, 300):
+        slow[k] = 0.95 * slow[k - 1] + np.sqrt(1.0 - 0.95**2) * rng.standard_normal(2)
+    y = record.signals.y.copy()
+    y[:, :2] += amount * SETTINGS.noise[:2] * slow
+    return replace(record, signals=replace(record.signals, y=y))
+
+
+def fitted(seed, amount):
+    rng = np.random.default_rng(seed)
+    p = problem([disturbed(rng, sign, amount) for sign in (1, -1)])
+    return p, fit(p, HYPOTHESIS, begin(p, HYPOTHESIS))
+
+
+def whole(p, found):
+    """The same ratio from the matrix of all parameters, nothing eliminated."""
+    m, n = S + 1, len(p.records)
+    slopes, information = [], np.zeros((m + n * L, m + n * L))
+    information[:S, :S] = shared_prior(p.records[0], p.settings)
+    middle = information.copy()
+    for i, (record, t) in enumerate(zip(p.records, found.tangents, strict=True)):
+        _, _, h = parts(t, found.whitener, levels=True)
+        at = np.r_[:m, m + i * L : m + (i + 1) * L]
+        prior = local_prior(record, p.settings)[1]
+        information[np.ix_(at, at)] += h + block_diag(np.zeros((m, m)), prior)
+        rows = np.array([[float(np.sum(a * r)) for a in t.t[:, k]] for k, r in enumerate(t.r)])
+        rows += 0.5 * np.array([[np.trace(w) - r @ w @ r for w in t.w] for r in t.r])
+        full = np.zeros((len(rows), m + n * L))
+        full[:, at] = rows - rows.mean(axis=0)
+        slopes.append(full)
+    for record, x in zip(p.records, slopes, strict=True):
+        lags = round(MEMORY_S / record.signals.dt_s)
+        for a in range(-lags, lags + 1):
+            low, high = max(0, -a), len(x) - max(0, a)
+            middle += (1.0 - abs(a) / (lags + 1)) * x[low + a : high + a].T @ x[low:high]
+    inverse = np.linalg.inv(information)
+    # the prior of the records' own parameters is not in the middle matrix, as in the code
+    return np.sqrt(np.diag(inverse @ middle @ inverse) / np.diag(inverse))[:m]
+
+
+def test_elimination_is_the_whole_matrix():
+    p, found = fitted(3, 2.0)
+    np.testing.assert_allclose(inflation(p, found), np.maximum(whole(p, found), 1.0), rtol=1e-4)
+
+
+def test_long_run_variance_by_hand():
+    x = np.array([[1.0], [2.0], [-1.0], [3.0]])
+    # sum of squares 15; lag one products 2 - 2 - 3 = -3 with weight 1/2 on both sides
+    assert long_run(x, 0)[0, 0] == 15.0
+    assert long_run(x, 1)[0, 0] == pytest.approx(15.0 - 3.0)
+
+
+def test_slow_noise_widens_and_white_noise_hardly_does():
+    white = [inflation(*fitted(seed, 0.0))[S] for seed in range(4)]
+    slow = [inflation(*fitted(seed, 4.0))[S] for seed in range(4)]
+    assert np.mean(white) < 1.1
+    assert np.mean(slow) > 1.15
