@@ -10,7 +10,7 @@ from scipy.linalg import solve_continuous_lyapunov
 from airtruth.effects.change import Change
 from airtruth.effects.library import EFFECTS
 from airtruth.trace.fit import Hypothesis, begin, fit
-from airtruth.trace.holdout import assess, floor, leave_one_out
+from airtruth.trace.holdout import assess, floor, leave_one_out, one_by_the_other
 from airtruth.trace.lower import lower
 from airtruth.trace.model import S, respond
 from airtruth.trace.records import Record
@@ -54,7 +54,7 @@ def test_of_two_records_the_other_is_refitted(fitted):
     problem, found = fitted
     two = replace(problem, records=problem.records[:2])
     both = fit(two, ONE, replace(found.point, local=found.point.local[:2]))
-    likelihood, _ = leave_one_out(two, both)
+    likelihood, _ = one_by_the_other(two, both)
     for i, other in ((0, 1), (1, 0)):
         alone = replace(two, records=(two.records[other],))
         again = fit(alone, ONE, replace(both.point, local=both.point.local[[other]]))

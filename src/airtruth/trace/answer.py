@@ -35,12 +35,16 @@ STAGES: Final = ("declared", "before", "after", "control", "floor")
 
 @dataclass(frozen=True)
 class Model:
-    """A stage: a hypothesis with its shared parameters and sizes, and where the fitted records' own ones ended."""
+    """A stage: a hypothesis with its shared parameters and sizes, and where the fitted records' own ones ended.
+
+    ``fitted``: they ended there under these shared parameters and sizes; else they are where to begin.
+    """
 
     hypothesis: Hypothesis
     shared: Array
     sizes: Array
     local: Array
+    fitted: bool
 
 
 @dataclass(frozen=True)
@@ -71,7 +75,7 @@ def assessed(case: Case, stages: Sequence[Stage]) -> Outcome:
     declared = null.point.shared.copy()
     declared[[*range(6), SHARED.index("inertia")]] = 0.0
     models = {
-        "declared": Model(case.hypothesis, declared, nothing, null.point.local),
+        "declared": Model(case.hypothesis, declared, nothing, null.point.local, False),
         "before": _model(null),
     }
     found = accepted(stages)
@@ -88,14 +92,15 @@ def assessed(case: Case, stages: Sequence[Stage]) -> Outcome:
 
 def _model(found: Fit) -> Model:
     point = found.point
-    return Model(found.hypothesis, point.shared, point.sizes, point.local)
+    return Model(found.hypothesis, point.shared, point.sizes, point.local, found.converged)
 
 
 def _all(problem: Problem, model: Model, fitted: bool) -> list[Assessment]:
     def one(index: object) -> Assessment:
         i = int(index)  # type: ignore[call-overload]
         own = model.local[i] if fitted else None
-        return assess(problem, i, model.hypothesis, model.shared, model.sizes, own)
+        settled = fitted and model.fitted
+        return assess(problem, i, model.hypothesis, model.shared, model.sizes, own, settled)
 
     return problem.each(one, range(len(problem.records)))
 

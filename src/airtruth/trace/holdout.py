@@ -75,11 +75,19 @@ def assess(
     shared: Array,
     sizes: Array,
     local: Array | None = None,
+    settled: bool = False,
 ) -> Assessment:
-    """Innovations and free run of one record for shared parameters and sizes that are given."""
+    """Innovations and free run of one record for shared parameters and sizes that are given.
+
+    Parameters
+    ----------
+    local : own parameters to begin at; settled : they are at their best already.
+    """
     record, settings = problem.records[index], problem.settings
     one = Problem((record,), settings)
-    kept = _own(one, hypothesis, shared, sizes, start(record, settings) if local is None else local)
+    kept = start(record, settings) if local is None else local.copy()
+    if not settled:
+        kept = _own(one, hypothesis, shared, sizes, kept)
     found = tangent(one, 0, hypothesis, Point(shared, kept[None, :], sizes), local_only=True)
     low = lower(hypothesis.change(sizes))
     response = respond(record, settings, low, shared, kept)
