@@ -44,6 +44,8 @@ _ENOUGH: Final = 0.002
 """A fit has converged once a step would gain less than this in log-likelihood: 0.06 standard errors."""
 _NEARLY: Final = 0.05
 """The same where a step does not keep its promise: 0.3 standard errors."""
+_STUCK: Final = 0.5
+"""The same where no step gains anything: tables with breaks give the gain, and with it the cost, small ones too."""
 _CHORDS: Final = 3
 _LEAST_DAMPING: Final = 1e-9
 _STALE: Final = 1.0
@@ -295,7 +297,7 @@ def fit(
         cost, pieces, tangents = current
         step, gain = _step(problem, hypothesis, point, pieces, damping, free_levels)
         if gain < _ENOUGH and fresh:
-            converged = _decrement(problem, hypothesis, point, pieces, free_levels) < _NEARLY
+            converged = _decrement(problem, hypothesis, point, pieces, free_levels) < _STUCK
             break
         trial = _moved(hypothesis, point, step)
         tried = _evaluate(problem, hypothesis, trial, whitener, free_levels, tangents)

@@ -24,6 +24,8 @@ IMMATERIAL: Final = "its size is immaterial"
 IMPROBABLE: Final = 0.001
 """Probability below which refitted derivatives contradict those declared."""
 _ERRORS: Final = 2.0
+_FREE_ERRORS: Final = 3.0
+"""Standard errors by which a free run may seem worse: in rough air it is mostly gusts."""
 _SEVERAL: Final = 3
 """Records from which their scatter can be told; of fewer, none may lose: what one alone shows has not repeated."""
 _MEMORY_S: Final = 1.0
@@ -127,7 +129,7 @@ def judge(
         reasons.append("refitted, its size is no more than its uncertainty")
     if _lost(likelihood_gain):
         reasons.append("it worsens the likelihood of records left out")
-    if not free.sum() > -_ERRORS * np.sqrt(spread):
+    if not free.sum() > -_FREE_ERRORS * np.sqrt(spread):
         reasons.append("it worsens the free run of records left out")
     if abs(size) < first.material:
         reasons.append(IMMATERIAL)
