@@ -41,8 +41,8 @@ _FAR: Final = 5.0
 _VISIBLE: Final = 2.0
 _SHARES: Final = (1.0, 0.3, 0.1, 0.02)
 SIGNIFICANT: Final = 10.0
-SIGNIFICANT_LATER: Final = 17.5
-"""Gains in 2 log L of a refit: chi-square(1) at both levels over the library's 33 effects (Bonferroni)."""
+SIGNIFICANT_LATER: Final = 25.0
+"""Gains in 2 log L of a refit: chi-square(1) at 5 % over the library's 33 effects (Bonferroni), and at 2e-5."""
 TIE: Final = 6.0
 """Effects within this of the best in 2 log L cannot be told apart."""
 
