@@ -302,14 +302,18 @@ def linear(
     c[:] = 0.0
     up, down = np.empty(n), np.empty(n)
     y_up, y_down = np.empty(OUTPUTS), np.empty(OUTPUTS)
-    moved = x.copy()
+    moved, unit = x.copy(), np.zeros(n)
     for j in range(motion):
         # wide enough to average a table's break, so that the gain does not jump with the reference
         h = 0.01
         if j == 1:
             h = 0.05
         if j >= 2 and j < CORE:
-            h = 0.1
+            # a gust that moves alpha as far as above, so that no level or rolloff shifts the breaks that are met
+            unit[j] = 1.0
+            moves = abs(plane[0][SIGMA_W] * gust(unit, plane[0])) / v
+            unit[j] = 0.0
+            h = 0.01 / moves if moves > 1e-9 else 0.1
         moved[j] = x[j] + h
         az_up = rates(moved, de, v, v, qbar, theta, 0.0, 0.0, plane, up)
         outputs(moved, up, az_up, v, v, theta, plane[0], arms, scales, y_up)
