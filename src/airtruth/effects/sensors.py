@@ -82,7 +82,7 @@ def _lag(name: str, channel: str, splits: str) -> Effect:
                 f"time constant of {channel}",
                 low=0.0,
                 high=0.5,
-                material=0.005,
+                material=0.002,
                 one_sided=True,
                 prior_std=0.05,
                 step=1e-3,
@@ -90,7 +90,7 @@ def _lag(name: str, channel: str, splits: str) -> Effect:
         ),
         describe=_term(channel, "lag", "tau_s"),
         explanation=f"The reading of {channel} follows the truth with a first-order lag.",
-        source=f"tau y' = x - y; {_SOURCE}. Material: a quarter of a sample at 50 Hz.",
+        source=f"tau y' = x - y; {_SOURCE}. Material: a tenth of a sample at 50 Hz.",
         splits=splits,
     )
 
@@ -107,7 +107,7 @@ def _delay(channel: str) -> Effect:
                 f"of {channel} behind the other channels",
                 low=0.0,
                 high=0.3,
-                material=0.005,
+                material=0.002,
                 one_sided=True,
                 prior_std=0.05,
                 step=1e-3,
@@ -115,7 +115,7 @@ def _delay(channel: str) -> Effect:
         ),
         describe=_term(channel, "delay", "delay_s"),
         explanation=f"The reading of {channel} is late: a time stamp, a bus, a filter.",
-        source="y(t) = x(t - delay). Material: a quarter of a sample at 50 Hz.",
+        source="y(t) = x(t - delay). Material: a tenth of a sample at 50 Hz.",
         splits="Kinematics: alpha, theta, q and az must agree (`airtruth check`).",
     )
 

@@ -42,7 +42,7 @@ EFFECTS: Final = (
                 "time from the measured surface to the forces it causes",
                 low=0.0,
                 high=0.2,
-                material=0.005,
+                material=0.002,
                 one_sided=True,
                 prior_std=0.05,
                 step=1e-3,
@@ -51,7 +51,7 @@ EFFECTS: Final = (
         describe=_delay,
         explanation="The air sees the surface later than it is measured: a time stamp, a bus, or a position "
         "transducer ahead of the linkage.",
-        source="y(t) = x(t - delay). Material: 5 ms, a quarter of a sample at 50 Hz and 5 deg of phase at 3 Hz.",
+        source="y(t) = x(t - delay). Material: 2 ms, a tenth of a sample at 50 Hz and 2 deg of phase at 3 Hz.",
         splits="A measured surface and a multisine up to 5 Hz tell it from a lag; a delay of every sensor looks the "
         "same if the surface is not measured.",
     ),
@@ -77,7 +77,7 @@ EFFECTS: Final = (
         describe=_lag,
         explanation="The surface follows what is measured of it with a first-order lag: a soft linkage, or a "
         "position measured at the servo and not at the surface.",
-        source="tau y' = x - y, tau = 1/(2 pi bandwidth). Material: tau of 5 ms, a bandwidth of 32 Hz.",
+        source="tau y' = x - y, tau = 1/(2 pi bandwidth). Material: tau of 2 ms, a bandwidth of 80 Hz.",
         splits="High-frequency content in the elevator (multisine, doublets of short steps) tells it from a delay.",
     ),
     Effect(

@@ -167,6 +167,7 @@ class Fit:
     whitener : of the innovations.
     covariance : (13 + k, 13 + k) of shared parameters and sizes, local ones free.
     converged : whether the search ended by its tolerance.
+    shortfall : log-likelihood that an undamped step promises where it did not, else none.
     """
 
     hypothesis: Hypothesis
@@ -177,6 +178,7 @@ class Fit:
     whitener: Whitener
     covariance: Array
     converged: bool
+    shortfall: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -344,7 +346,8 @@ def fit(
     cost, pieces, tangents = current
     covariance = _covariance(problem, hypothesis, pieces, free_levels)
     likelihood = np.array([p[0] for p in pieces])
-    return Fit(hypothesis, point, cost, likelihood, tangents, whitener, covariance, converged)
+    shortfall = 0.0 if converged else _decrement(problem, hypothesis, point, pieces, free_levels)
+    return Fit(hypothesis, point, cost, likelihood, tangents, whitener, covariance, converged, shortfall)
 
 
 def begin(problem: Problem, hypothesis: Hypothesis) -> Point:

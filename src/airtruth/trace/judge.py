@@ -26,6 +26,7 @@ IMPROBABLE: Final = 0.001
 _ERRORS: Final = 2.0
 _FREE_ERRORS: Final = 3.0
 """Standard errors by which a free run may seem worse: in rough air it is mostly gusts."""
+_NEXT_TO_NOTHING: Final = 0.02
 _SEVERAL: Final = 3
 """Records from which their scatter can be told; of fewer, none may lose: what one alone shows has not repeated."""
 _MEMORY_S: Final = 1.0
@@ -121,7 +122,7 @@ def judge(
         free[i] = gains.sum()
         spread += long_run_variance(gains, round(_MEMORY_S / problem.records[i].signals.dt_s))
     reasons = []
-    if not best.converged:
+    if not arrived(best, gain):
         reasons.append(UNCONVERGED)
     if gain < least * excess**2:
         reasons.append("refitted, it explains nothing significant")
@@ -138,6 +139,11 @@ def judge(
     if high_end - size < 1e-6 * span or (size - low_end < 1e-6 * span and low_end != 0.0):
         reasons.append("its size ends at the limit of what is plausible")
     return Candidate(s, best, gain, likelihood_gain, free, size, std, tuple(reasons))
+
+
+def arrived(found: Fit, gain: float) -> bool:
+    """Whether a fit has converged, or lacks next to nothing of what it gained: limits and play give no smooth cost."""
+    return found.converged or 2.0 * found.shortfall < _NEXT_TO_NOTHING * gain
 
 
 def declared_probability(problem: Problem, found: Fit) -> float:

@@ -17,6 +17,7 @@ from airtruth.trace.judge import (
     IMPROBABLE,
     UNCONVERGED,
     Candidate,
+    arrived,
     declared_probability,
     judge,
     outdone,
@@ -281,7 +282,11 @@ def _tied(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     best = accepted[0]
     return (
         best,
-        *(c for c in candidates if c is not best and abs(best.gain - c.gain) <= TIE and c.found.converged),
+        *(
+            c
+            for c in candidates
+            if c is not best and abs(best.gain - c.gain) <= TIE and arrived(c.found, c.gain)
+        ),
     )
 
 
