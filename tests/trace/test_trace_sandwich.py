@@ -8,9 +8,9 @@ from scipy.linalg import block_diag
 from trace_records import NOTHING, SETTINGS, fly, problem
 
 from airtruth.effects.library import EFFECTS
-from airtruth.trace.fit import S, begin, fit, parts
+from airtruth.trace.fit import S, begin, fit, parts, reduced
 from airtruth.trace.model import L, local_prior, shared_prior
-from airtruth.trace.sandwich import MEMORY_S, inflation, long_run
+from airtruth.trace.sandwich import MEMORY_S, inflation, long_run, scatter
 
 HYPOTHESIS = NOTHING.plus(EFFECTS["vane_arm"])
 
@@ -75,3 +75,39 @@ def test_slow_noise_widens_and_white_noise_hardly_does():
     slow = [inflation(*fitted(seed, 4.0))[S] for seed in range(4)]
     assert np.mean(white) < 1.1
     assert np.mean(slow) > 1.15
+
+
+def test_records_that_disagree_widen():
+    """Alike records, one of them with alpha scaled by 1.1 besides: its pull on the size is not the others'."""
+    rng = np.random.default_rng(4)
+    alike = [
+        fly(rng, samples=300, amplitude=a, name=f"r{i}") for i, a in enumerate((0.035, -0.035, 0.03, -0.03))
+    ]
+    y = alike[0].signals.y * [1.1, 1.0, 1.0]
+    other = replace(alike[0], signals=replace(alike[0].signals, y=y))
+    ratios = []
+    for records in (alike, [other, *alike[1:]]):
+        p = problem(records)
+        found = fit(p, HYPOTHESIS, begin(p, HYPOTHESIS))
+        ratios.append(scatter(p, found)[S])
+    assert ratios[0] < 2.0
+    assert ratios[1] > 1.2 * ratios[0]
+
+
+def test_scatter_by_hand():
+    """One size of four records: J^-1 K J^-1 over J^-1 with K from the records' gradients at the optimum."""
+    rng = np.random.default_rng(5)
+    p = problem([fly(rng, samples=200, amplitude=a, name=f"r{a}") for a in (0.035, -0.035, 0.03)])
+    found = fit(p, HYPOTHESIS, begin(p, HYPOTHESIS))
+    m = S + 1
+    gradients = np.array([-parts(t, found.whitener, levels=True)[1][:m] for t in found.tangents])
+    middle = 3.0 * np.cov(gradients.T)
+    middle[:S, :S] += shared_prior(p.records[0], p.settings)
+    pieces = [parts(t, found.whitener, levels=True) for t in found.tangents]
+    inverse = np.linalg.inv(reduced(p, found.point, 1, pieces, True)[1])
+    expected = np.sqrt(np.diag(inverse @ middle @ inverse) / np.diag(inverse))
+    np.testing.assert_allclose(scatter(p, found), np.maximum(expected, 1.0), rtol=1e-3)
+
+
+def test_two_records_cannot_tell_their_scatter():
+    assert (scatter(*fitted(1, 0.0)) == 1.0).all()

@@ -19,7 +19,7 @@ from airtruth.trace.lower import CHANNELS, lower
 from airtruth.trace.model import SHARED, S
 from airtruth.trace.prepare import Case
 from airtruth.trace.profile import Profile, place_of
-from airtruth.trace.sandwich import inflation
+from airtruth.trace.sandwich import inflation, scatter
 from airtruth.trace.score import Table
 from airtruth.trace.search import LEVEL, Candidate, Stage
 
@@ -160,8 +160,8 @@ def reported(stage: Stage) -> Fit:
 
 
 def _widened(problem: Problem, found: Fit) -> Array:
-    """Covariance with what the innovations owe to one another in it."""
-    ratio = inflation(problem, found)
+    """Covariance with what the innovations owe to one another in it, and what the records disagree by."""
+    ratio = np.maximum(inflation(problem, found), scatter(problem, found))
     return np.asarray(found.covariance * np.outer(ratio, ratio))
 
 

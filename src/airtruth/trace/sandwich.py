@@ -21,12 +21,13 @@ from airtruth.trace.model import L, S, local_prior, shared_prior
 
 Array = NDArray[np.float64]
 
+_SEVERAL: Final = 3
 MEMORY_S: Final = 1.0
 """Lag up to which slopes are taken to depend on one another [s]."""
 
 
 def inflation(problem: Problem, found: Fit) -> Array:
-    """Robust over plain standard deviation of shared parameters and sizes, not below one.
+    """Robust over plain standard deviation of shared parameters and sizes, by the slopes within records.
 
     Parameters
     ----------
@@ -34,17 +35,47 @@ def inflation(problem: Problem, found: Fit) -> Array:
 
     Returns
     -------
-    (11 + k,) ratios [-]. A long-run variance from few seconds scatters and is short on average, so it is never
-    taken to narrow anything.
+    (13 + k,) ratios [-], not below one. A long-run variance from few seconds scatters and is short on average, so
+    it is never taken to narrow anything.
     """
-    levels = found.whitener.coefficients.shape[0] == 0
-    k = len(found.point.sizes)
-    m = S + k
-    pieces = [parts(t, found.whitener, levels) for t in found.tangents]
-    _, information, _ = reduced(problem, found.point, k, pieces, levels)
+    m = S + len(found.point.sizes)
     total = np.zeros((m, m))
     total[:S, :S] = shared_prior(problem.records[0], problem.settings)
-    for record, tangent, (_, _, h) in zip(problem.records, found.tangents, pieces, strict=True):
+    for record, (slopes, own, across) in zip(problem.records, _slopes(problem, found), strict=True):
+        free = slopes[:, m : m + own.shape[0]]
+        z = slopes[:, :m] - free @ np.linalg.solve(own, across.T)
+        total += long_run(z - z.mean(axis=0), round(MEMORY_S / record.signals.dt_s))
+    return _ratio(problem, found, total)
+
+
+def scatter(problem: Problem, found: Fit) -> Array:
+    """The same by the slopes of whole records: what they disagree by is more than each knows of itself.
+
+    K is n/(n - 1) times the sum of squares of the records' slopes about their mean; ones of fewer than three.
+
+    Source: C. B. Hansen, J. Econometrics 141 (2007), eq. (3), for few clusters.
+    """
+    m = S + len(found.point.sizes)
+    n = len(problem.records)
+    if n < _SEVERAL:
+        return np.ones(m)
+    # own parameters are at their best, so that a record's slope is that of its profile
+    x = np.array([slopes[:, :m].sum(axis=0) for slopes, _, _ in _slopes(problem, found)])
+    off = x - x.mean(axis=0)
+    total = n / (n - 1.0) * off.T @ off
+    total[:S, :S] += shared_prior(problem.records[0], problem.settings)
+    return _ratio(problem, found, total)
+
+
+def _slopes(problem: Problem, found: Fit) -> list[tuple[Array, Array, Array]]:
+    """Of each record: slopes of every sample (samples, parameters), the information of its own parameters with their
+    prior, and what that shares with the others'.
+    """
+    levels = found.whitener.coefficients.shape[0] == 0
+    m = S + len(found.point.sizes)
+    result = []
+    for record, tangent in zip(problem.records, found.tangents, strict=True):
+        _, _, h = parts(tangent, found.whitener, levels)
         r, t = found.whitener.apply(tangent.r), found.whitener.apply(tangent.t)
         slopes = np.einsum("pki,ki->kp", t, r)
         if levels:
@@ -54,12 +85,17 @@ def inflation(problem: Problem, found: Fit) -> Array:
         across = h[:m, m:]
         if not levels:
             own, across = own[: L - 1, : L - 1], across[:, : L - 1]
-        free = slopes[:, m : m + own.shape[0]]
-        z = slopes[:, :m] - free @ np.linalg.solve(own, across.T)
-        total += long_run(z - z.mean(axis=0), round(MEMORY_S / record.signals.dt_s))
+        result.append((slopes, own, across))
+    return result
+
+
+def _ratio(problem: Problem, found: Fit, middle: Array) -> Array:
+    levels = found.whitener.coefficients.shape[0] == 0
+    pieces = [parts(t, found.whitener, levels) for t in found.tangents]
+    _, information, _ = reduced(problem, found.point, len(found.point.sizes), pieces, levels)
     scale = np.sqrt(np.maximum(np.diag(information), 1e-30))
-    inverse = np.linalg.inv(information / np.outer(scale, scale) + 1e-12 * np.eye(m))
-    robust = inverse @ (total / np.outer(scale, scale)) @ inverse
+    inverse = np.linalg.inv(information / np.outer(scale, scale) + 1e-12 * np.eye(len(scale)))
+    robust = inverse @ (middle / np.outer(scale, scale)) @ inverse
     return np.asarray(np.sqrt(np.maximum(np.diag(robust) / np.diag(inverse), 1.0)))
 
 
@@ -72,4 +108,4 @@ def long_run(x: Array, lags: int) -> Array:
     return total
 
 
-__all__ = ["MEMORY_S", "inflation", "long_run"]
+__all__ = ["MEMORY_S", "inflation", "long_run", "scatter"]
