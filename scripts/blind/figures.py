@@ -68,3 +68,5 @@ HELD_OUT: Final = (2, 5)
 """Records that a tracer holds out by default: every third."""
 STRONG: Final = 30.0
 """Noncentrality above which an effect has to be found."""
+BEYOND: Final = "beyond the library"
+"""Key among the noncentralities of an effect that the library lacks: what its best member leaves."""

@@ -54,8 +54,6 @@ _SETTLE_S: Final = 4.0
 _SHARE: Final = 0.125
 TRIMS: Final = (Shape("CL", "one", 0.01), Shape("Cm", "one", 0.003))
 _STATE_SHIFT: Final = 5  # samples: 0.1 s
-BEYOND: Final = "beyond the library"
-"""Key among the noncentralities of an effect that the library lacks."""
 
 
 @dataclass(frozen=True)

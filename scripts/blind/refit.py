@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 
 from blind.aircraft_xml import Body, Shape
 from blind.draw import Trial, fly_record
-from blind.figures import BODY, DERIVATIVES, STRONG
+from blind.figures import BEYOND, BODY, DERIVATIVES, STRONG
 from blind.flight import Truth
 from blind.information import (
-    BEYOND,
     COARSE_S,
     TRIMS,
     Whitener,

@@ -9,7 +9,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from blind.scoring import CLASSES, LEVEL, STRONG, Case, Share, bound, detection
+from blind.figures import STRONG
+from blind.scoring import CLASSES, HOLM, LEVEL, Case, Share, bound, detection
 
 _PANELS: Final = 12
 
@@ -76,9 +77,25 @@ def markdown(scores: Mapping[str, Any]) -> str:
     )
     parts.append(
         _table(
-            ("effect", "bound", "score significant", "named", f"named above lambda {STRONG:g}"),
+            (
+                "effect",
+                f"bound at {LEVEL:g}",
+                "score significant",
+                f"bound at {HOLM:.2g}",
+                "score significant",
+                "named",
+                f"named above lambda {STRONG:g}",
+            ),
             [
-                (r["effect"], _number(r["bound"]), r["score"], r["named"], r["strong"])
+                (
+                    r["effect"],
+                    _number(r["bound"]),
+                    r["score"],
+                    _number(r["bound_holm"]),
+                    r["score_holm"],
+                    r["named"],
+                    r["strong"],
+                )
                 for r in scores["by_effect"]
             ],
         )

@@ -15,6 +15,7 @@ from airtruth.logs.validate import validate
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
 import make_undeclared
 from blind import draw, results, scoring, trials
+from blind.figures import BEYOND
 from blind.scoring import Share
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -100,7 +101,8 @@ def case(composition, effects, answered, *, air="calm", verdict=None, provisiona
                 "body": {"mass": 1.01, "inertia": 0.96, "cg": 0.004},
                 "effects": [{"key": k, "values": v} for k, v, _ in effects],
             },
-            "lambda": {k: strength for k, _, strength in effects},
+            "lambda": {k: strength for k, _, strength in effects}
+            | ({BEYOND: 0.9 * effects[0][2]} if composition == "off-library" else {}),
             "oracle": {"free_run": clean, "signal": dict.fromkeys(channels, 2.0)},
         },
         "answer": {
