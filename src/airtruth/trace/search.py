@@ -203,8 +203,8 @@ def _judged(
             s.effect.key: _whitened(problem, f, whitener, fits[0][1]) + len(s.effect.parameters)
             for s, f in near
         }
-        top, least = max(gains[key] for key in costs), min(costs.values())
-        gains |= {key: top - 2.0 * (cost - least) for key, cost in costs.items()}
+        top, lowest = max(gains[key] for key in costs), min(costs.values())
+        gains |= {key: top - 2.0 * (cost - lowest) for key, cost in costs.items()}
     ranked = sorted(((gains[s.effect.key], s, f) for s, f in fits), key=lambda r: -r[0])
     reference = reference_of(problem, null)
     judged: list[Candidate] = []
