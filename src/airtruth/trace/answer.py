@@ -111,6 +111,7 @@ def answer(case: Case, stages: Sequence[Stage], outcome: Outcome) -> dict[str, A
     found = accepted(stages)
     anomaly, remaining = first.anomaly, last.anomaly
     names = [{c.score.effect.name for c in (best, *others)} for best, others in found]
+    covariance = _widened(case.fitted, reported(last))
     if not found:
         verdict = "unexplained" if anomaly[1] <= ANOMALY else "none"
     else:
@@ -121,10 +122,10 @@ def answer(case: Case, stages: Sequence[Stage], outcome: Outcome) -> dict[str, A
         "provisional": bool(provisional),
         "anomaly": {"statistic": anomaly[0], "p_value": anomaly[1]},
         "remaining": {"statistic": remaining[0], "p_value": remaining[1]},
-        "effects": [_effect(case.fitted, stages, number) for number in range(len(found))],
+        "effects": [_effect(stages, number, covariance) for number in range(len(found))],
         "candidates": _candidates(case, stages),
         "error": errors(case, outcome),
-        "derivatives": _derivatives(case, stages),
+        "derivatives": _derivatives(case, stages, covariance),
         "updated_aircraft": None,
         "detectability": detectability(first.table),
         "next_flight": _next_flight(found, verdict),
@@ -165,14 +166,14 @@ def _widened(problem: Problem, found: Fit) -> Array:
     return np.asarray(found.covariance * np.outer(ratio, ratio))
 
 
-def _effect(problem: Problem, stages: Sequence[Stage], number: int) -> dict[str, Any]:
+def _effect(stages: Sequence[Stage], number: int, covariance: Array) -> dict[str, Any]:
     with_effects = [s for s in stages if s.tied]
     stage, final = with_effects[number], reported(stages[-1])
     best, others = stage.tied[0], stage.tied[1:]
     effect = best.score.effect
     at = sum(len(e.parameters) for e in final.hypothesis.effects[:number])
     span = slice(at, at + len(effect.parameters))
-    block = _widened(problem, final)[S:, S:][span, span]
+    block = covariance[S:, S:][span, span]
     rest = [
         c
         for c in stage.candidates
@@ -316,12 +317,12 @@ def _floor(problem: Problem, outcome: Outcome, which: str) -> dict[str, dict[str
     }
 
 
-def _derivatives(case: Case, stages: Sequence[Stage]) -> dict[str, dict[str, float]]:
+def _derivatives(case: Case, stages: Sequence[Stage], covariance: Array) -> dict[str, dict[str, float]]:
     declared = case.fitted.records[0].plant.derivatives
     rows = {"declared": declared, "before": declared + stages[0].null.point.shared[:6]}
     rows["after"] = declared + stages[-1].null.point.shared[:6]
     named = {k: dict(zip(PARAMETERS, v.tolist(), strict=True)) for k, v in rows.items()}
-    std = np.sqrt(np.diag(_widened(case.fitted, reported(stages[-1])))[:6])
+    std = np.sqrt(np.diag(covariance)[:6])
     named["after_std"] = dict(zip(PARAMETERS, std.tolist(), strict=True))
     return named
 

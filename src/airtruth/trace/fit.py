@@ -24,6 +24,7 @@ from airtruth.effects.effect import Effect
 from airtruth.trace.lower import lower
 from airtruth.trace.model import (
     BOUNDS,
+    GUST_LEVEL,
     LOCAL_STEP,
     SHARED_STEP,
     External,
@@ -52,7 +53,6 @@ _STALE: Final = 1.0
 """Gain in log-likelihood below which derivatives are made anew."""
 _ORDERS: Final = 6
 _LEVELS: Final = (6, 7, 8)
-_SIGMA: Final = 9
 _ROUGH_M_S: Final = 1.0
 
 
@@ -353,7 +353,7 @@ def fit(
 def begin(problem: Problem, hypothesis: Hypothesis) -> Point:
     """Where a search begins without anything known: motions fitted with the levels held in rough air."""
     local = np.stack([start(record, problem.settings) for record in problem.records])
-    local[:, _SIGMA] = np.log(_ROUGH_M_S)
+    local[:, GUST_LEVEL] = np.log(_ROUGH_M_S)
     point = Point(np.zeros(S), local, np.zeros(len(hypothesis.parameters)))
     found = fit(problem, hypothesis, point, iterations=4, free_levels=False)
     return point if found is None else found.point
@@ -448,12 +448,12 @@ def reduced(  # type: ignore[no-untyped-def]
         g_l = g[m:] + precision @ (local - middle)
         h_sl = h[:m, m:].copy()
         if not levels:
-            h_ll[_SIGMA], h_ll[:, _SIGMA], h_ll[_SIGMA, _SIGMA] = 0.0, 0.0, 1.0
-            g_l[_SIGMA] = 0.0
-            h_sl[:, _SIGMA] = 0.0
+            h_ll[GUST_LEVEL], h_ll[:, GUST_LEVEL], h_ll[GUST_LEVEL, GUST_LEVEL] = 0.0, 0.0, 1.0
+            g_l[GUST_LEVEL] = 0.0
+            h_sl[:, GUST_LEVEL] = 0.0
         else:
             # of a level that the record puts at none, the observed information: J'' = 4 s^2 J_ss + 2 J' in log s
-            h_ll[_SIGMA, _SIGMA] += 2.0 * max(g[m + _SIGMA], 0.0)
+            h_ll[GUST_LEVEL, GUST_LEVEL] += 2.0 * max(g[m + GUST_LEVEL], 0.0)
         h_ll[np.diag_indices(L)] *= 1.0 + damping
         solved = np.linalg.solve(h_ll, np.column_stack([g_l, h_sl.T]))
         gradient += g[:m] - h_sl @ solved[:, 0]
@@ -479,7 +479,7 @@ def _step(problem: Problem, hypothesis: Hypothesis, point: Point, pieces, dampin
             break
         held += stopped
     local = np.stack([-(solved[:, 0] + solved[:, 1:] @ shared) for _, solved in back])
-    local[:, _SIGMA] = np.clip(local[:, _SIGMA], -1.0, 1.0)
+    local[:, GUST_LEVEL] = np.clip(local[:, GUST_LEVEL], -1.0, 1.0)
     gain = float(-gradient @ shared) + sum(float(solved[:, 0] @ h_ll @ solved[:, 0]) for h_ll, solved in back)
     return Point(shared[:S], local, shared[S:]), 0.5 * gain
 

@@ -25,6 +25,7 @@ from airtruth.trace.fit import (
 from airtruth.trace.kernel import CORE, linear, states
 from airtruth.trace.lower import Lowered, lower
 from airtruth.trace.model import (
+    GUST_LEVEL,
     LOCAL_STEP,
     S,
     Settings,
@@ -40,7 +41,6 @@ Array = NDArray[np.float64]
 
 _ROUNDS: Final = 30
 _DAMPING: Final = 1e-6
-_SIGMA: Final = 9
 _DRAWS: Final = 128
 _MOTION: Final = (0, 1, 4, 5, 6, 7, 8)
 """Own parameters that a free run leaves free: initial alpha and q, biases, trim coefficients."""
@@ -129,7 +129,7 @@ def _own(one: Problem, hypothesis: Hypothesis, shared: Array, sizes: Array, begi
     for _ in range(_ROUNDS):
         cost, gradient, information = current
         move = -np.linalg.solve(information + damping * np.diag(np.diag(information)), gradient)
-        move[_SIGMA] = np.clip(move[_SIGMA], -1.0, 1.0)
+        move[GUST_LEVEL] = np.clip(move[GUST_LEVEL], -1.0, 1.0)
         tried = at(own + move)
         if tried is None or not tried[0] < cost:
             damping *= 10.0

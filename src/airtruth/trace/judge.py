@@ -14,7 +14,7 @@ from airtruth.trace.fit import Fit, Problem
 from airtruth.trace.holdout import Assessment, floor, leave_one_out, one_by_the_other
 from airtruth.trace.lower import lower
 from airtruth.trace.model import S
-from airtruth.trace.sandwich import inflation
+from airtruth.trace.sandwich import MEMORY_S, inflation, long_run
 from airtruth.trace.score import Score
 
 Array = NDArray[np.float64]
@@ -29,7 +29,6 @@ _FREE_ERRORS: Final = 3.0
 _NEXT_TO_NOTHING: Final = 0.02
 _SEVERAL: Final = 3
 """Records from which their scatter can be told; of fewer, none may lose: what one alone shows has not repeated."""
-_MEMORY_S: Final = 1.0
 _DERIVATIVES: Final = 6
 
 
@@ -120,7 +119,8 @@ def judge(
     for i, (old, new, weight) in enumerate(zip(unaided, assessed, reference.weight, strict=True)):
         gains = (((old.residual / weight) ** 2) - ((new.residual / weight) ** 2)).sum(axis=1)
         free[i] = gains.sum()
-        spread += long_run_variance(gains, round(_MEMORY_S / problem.records[i].signals.dt_s))
+        lags = round(MEMORY_S / problem.records[i].signals.dt_s)
+        spread += max(float(long_run((gains - gains.mean())[:, None], lags)[0, 0]), 0.0)
     reasons = []
     if not arrived(best, gain):
         reasons.append(UNCONVERGED)
@@ -155,18 +155,6 @@ def declared_probability(problem: Problem, found: Fit) -> float:
     off = found.point.shared[:_DERIVATIVES]
     declared = problem.records[0].plant.derivative_cov
     return float(chi2.sf(float(off @ np.linalg.solve(declared, off)), _DERIVATIVES))
-
-
-def long_run_variance(x: Array, lags: int) -> float:
-    """Variance of the sum of a serially dependent series (samples,), Bartlett weights.
-
-    Source: W. K. Newey and K. D. West, Econometrica 55 (1987).
-    """
-    off = x - x.mean()
-    total = float(off @ off)
-    for k in range(1, min(lags, len(x) - 1) + 1):
-        total += 2.0 * (1.0 - k / (lags + 1.0)) * float(off[k:] @ off[:-k])
-    return max(total, 0.0)
 
 
 def _size(s: Score, found: Fit) -> tuple[float, float]:

@@ -40,6 +40,8 @@ rolloff of the gusts (0: Dryden's, 1: von Karman's; counted from 1/2), relative 
 equal derivatives of the pitch acceleration: what it does to the curvature of the tables."""
 LOCAL: Final = ("alpha0", "q0", "w1", "w2", "bias_alpha", "bias_q", "bias_az", "CL0", "Cm0", "log_sigma_w")
 """Parameters of one record: initial state, sensors' biases, trim coefficients, logarithm of the gust [m/s]."""
+GUST_LEVEL: Final = LOCAL.index("log_sigma_w")
+"""Place of the gust level among a record's own parameters."""
 BOUNDS: Final = {SHARED.index("rotary"): (-0.75, 0.75), SHARED.index("rolloff"): (-0.75, 0.75)}
 """Shares of none to all, and a quarter beyond for what is no gust of either form."""
 _ROTARY_STD: Final = 0.5

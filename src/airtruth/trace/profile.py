@@ -25,7 +25,6 @@ _LEAST: Final = 0.01
 _MOST: Final = 0.12
 """Standard error taken for the grid, between these shares of the plausible range."""
 _CHI2_95: Final = 3.841
-_Z95: Final = 1.96
 
 
 @dataclass(frozen=True)

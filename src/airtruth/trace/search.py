@@ -23,7 +23,7 @@ from airtruth.trace.judge import (
     outdone,
     reference_of,
 )
-from airtruth.trace.model import respond
+from airtruth.trace.model import GUST_LEVEL, respond
 from airtruth.trace.profile import Profile, best_place, place_of
 from airtruth.trace.score import Score, Table
 
@@ -224,7 +224,7 @@ def _whitened(problem: Problem, found: Fit, whitener: Whitener, levels: Fit) -> 
     """Cost under an autoregression at another fit's noise and gust levels, so that only the motion counts."""
     shared, local = found.point.shared.copy(), found.point.local.copy()
     shared[6:9] = levels.point.shared[6:9]
-    local[:, 9] = levels.point.local[:, 9]
+    local[:, GUST_LEVEL] = levels.point.local[:, GUST_LEVEL]
     start = replace(found.point, shared=shared, local=local)
     again = fit(problem, found.hypothesis, start, whitener, iterations=6, free_levels=False)
     return np.inf if again is None else again.cost
