@@ -104,7 +104,7 @@ def test_scatter_by_hand():
     middle = 3.0 * np.cov(gradients.T)
     middle[:S, :S] += shared_prior(p.records[0], p.settings)
     pieces = [parts(t, found.whitener, levels=True) for t in found.tangents]
-    inverse = np.linalg.inv(reduced(p, found.point, 1, pieces, True)[1])
+    inverse = np.linalg.inv(reduced(p, found.hypothesis, found.point, 1, pieces, True)[1])
     expected = np.sqrt(np.diag(inverse @ middle @ inverse) / np.diag(inverse))
     np.testing.assert_allclose(scatter(p, found), np.maximum(expected, 1.0), rtol=1e-3)
 

@@ -79,7 +79,6 @@ def test_scores_do_not_depend_on_company_or_threads(null):
     together = table(found, problem, effects(*keys), NO_WHITENER, 0)
     threaded = table(found, replace(problem, threads=2), effects(*keys), NO_WHITENER, 0)
     assert [s.z for s in threaded.scores] == [s.z for s in together.scores]
-    assert threaded.omnibus == together.omnibus
     for key, score in zip(keys, together.scores, strict=True):
         alone = table(found, problem, effects(key), NO_WHITENER, 0)
         assert alone.scores[0].z == pytest.approx(score.z, rel=1e-9)

@@ -138,7 +138,7 @@ EFFECTS: Final = (
         name="cl_alpha_nonlinear",
         variant="quadratic",
         where="dynamics",
-        parameters=(_slope("CLalpha2", "curvature of CL in alpha [1/rad2]", 25.0, 1.25, 1.0),),
+        parameters=(_slope("CLalpha2", "curvature of CL in alpha [1/rad2]", 40.0, 1.25, 1.0),),
         describe=_cl_quadratic,
         explanation="The lift slope changes gradually with angle of attack.",
         source="CL += CLalpha2 alpha^2, force along -z of the body through the CG. Material: CLalpha changes by 0.25 "

@@ -51,7 +51,7 @@ def as_trace_text(answer: Answer) -> str:
 
 def verdict(answer: Answer) -> str:
     """The verdict in one sentence."""
-    anomaly, remaining = answer["anomaly"], answer["remaining"]
+    anomaly, remaining, shown = answer["anomaly"], answer["remaining"], answer["shown_by"]
     effects = answer["effects"]
     names = " and ".join(", ".join(key(e) for e in effects).rsplit(", ", 1))
     if answer["verdict"] == "none":
@@ -61,8 +61,8 @@ def verdict(answer: Answer) -> str:
         )
     elif answer["verdict"] == "unexplained":
         said = (
-            f"Unexplained: something is missing (p = {figures(anomaly['p_value'], 2)}), and no effect of the library "
-            "passes every test."
+            f"Unexplained: something is missing (p = {figures(anomaly['p_value'], 2)}; it shows in {shown['anomaly']}), "
+            "and no effect of the library passes every test."
         )
     elif answer["verdict"] == "one_of":
         alike = sorted({name for e in effects for name in e["indistinguishable_from"]})
@@ -72,7 +72,7 @@ def verdict(answer: Answer) -> str:
     if answer["provisional"]:
         held = answer["records"]["held_out"]
         why = (
-            f"a significant anomaly remains (p = {figures(remaining['p_value'], 2)})"
+            f"a significant anomaly remains (p = {figures(remaining['p_value'], 2)}; it shows in {shown['remaining']})"
             if held
             else "no record was held out"
         )

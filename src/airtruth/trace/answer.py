@@ -22,6 +22,7 @@ from airtruth.trace.profile import Profile, place_of
 from airtruth.trace.sandwich import inflation, scatter
 from airtruth.trace.score import Table
 from airtruth.trace.search import LEVEL, Candidate, Stage
+from airtruth.trace.unnamed import Anomaly, advice
 
 Array = NDArray[np.float64]
 
@@ -113,22 +114,23 @@ def answer(case: Case, stages: Sequence[Stage], outcome: Outcome) -> dict[str, A
     names = [{c.score.effect.name for c in (best, *others)} for best, others in found]
     covariance = _widened(case.fitted, reported(last))
     if not found:
-        verdict = "unexplained" if anomaly[1] <= ANOMALY else "none"
+        verdict = "unexplained" if anomaly.p_value <= ANOMALY else "none"
     else:
         verdict = "one_of" if any(len(n) > 1 for n in names) else "traced"
-    provisional = case.held is None or (bool(found) and remaining[1] <= ANOMALY)
+    provisional = case.held is None or (bool(found) and remaining.p_value <= ANOMALY)
     return {
         "verdict": verdict,
         "provisional": bool(provisional),
-        "anomaly": {"statistic": anomaly[0], "p_value": anomaly[1]},
-        "remaining": {"statistic": remaining[0], "p_value": remaining[1]},
+        "anomaly": {"statistic": anomaly.statistic, "p_value": anomaly.p_value},
+        "remaining": {"statistic": remaining.statistic, "p_value": remaining.p_value},
+        "shown_by": {"anomaly": anomaly.where, "remaining": remaining.where},
         "effects": [_effect(stages, number, covariance) for number in range(len(found))],
         "candidates": _candidates(case, stages),
         "error": errors(case, outcome),
         "derivatives": _derivatives(case, stages, covariance),
         "updated_aircraft": None,
         "detectability": detectability(first.table),
-        "next_flight": _next_flight(found, verdict),
+        "next_flight": _next_flight(found, verdict, remaining),
         "model": case.model,
         "records": {
             "fitted": [r.signals.run_id for r in case.fitted.records],
@@ -345,20 +347,21 @@ def detectability(table: Table) -> dict[str, float]:
     return result
 
 
-def _next_flight(found: Sequence[tuple[Candidate, tuple[Candidate, ...]]], verdict: str) -> str:
+def _next_flight(
+    found: Sequence[tuple[Candidate, tuple[Candidate, ...]]], verdict: str, remaining: Anomaly
+) -> str:
     if verdict == "none":
         return "Nothing is missing at the sizes listed under detectability; larger or longer manoeuvres lower them."
-    if verdict == "unexplained":
-        return (
-            "Something is missing that no effect of the library explains: repeat the manoeuvre in both signs and two "
-            "amplitudes, and add sensors (ax, theta, surface) to see where it enters."
-        )
     lines = []
+    if verdict == "unexplained":
+        lines.append("Something is missing that no effect of the library explains.")
     for best, others in found:
         names = {c.score.effect.key: c.score.effect for c in (best, *others)}
         if len({e.name for e in names.values()}) > 1:
-            advice = " ".join(dict.fromkeys(e.splits for e in names.values() if e.splits))
-            lines.append(f"To split {', '.join(names)}: {advice}")
+            split = " ".join(dict.fromkeys(e.splits for e in names.values() if e.splits))
+            lines.append(f"To split {', '.join(names)}: {split}")
+    if remaining.p_value <= ANOMALY:
+        lines.append(f"What is left shows in {remaining.where}: {advice(remaining.where)}")
     return (
         " ".join(lines) or "Fly the updated aircraft's largest remaining residual again, in the other sign."
     )

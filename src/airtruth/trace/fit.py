@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from airtruth.effects.change import Change
 from airtruth.effects.effect import Effect
-from airtruth.trace.lower import lower
 from airtruth.trace.model import (
     BOUNDS,
     GUST_LEVEL,
@@ -31,6 +30,8 @@ from airtruth.trace.model import (
     L,
     S,
     Settings,
+    answered,
+    inputs,
     local_prior,
     respond,
     shared_prior,
@@ -95,9 +96,30 @@ class Hypothesis:
         ends = [self.effects[i].parameters[j].ends for i, j in self.parameters]
         return tuple(S + k for k, (low, high) in enumerate(ends) if low == high)
 
+    @cached_property
+    def loose(self) -> tuple[int, ...]:
+        """Derivatives of which the declared value says nothing beside the effects, see `loosened`."""
+        return tuple(sorted({i for e in self.effects for i in loosened(e)}))
+
     def plus(self, effect: Effect) -> Hypothesis:
         """The hypothesis with one effect more."""
         return replace(self, effects=(*self.effects, effect))
+
+
+def loosened(effect: Effect) -> tuple[int, ...]:
+    """Derivatives whose declared value says nothing beside the effect.
+
+    A curvature about an angle of attack of zero is a slope at the trim besides, and a slope cannot be both what is
+    declared and that much more: which of the two the aircraft has is for the records to say.
+    """
+    change = effect.change({p.name: p.high for p in effect.parameters})
+    bent = {t.coefficient for t in change.aero if t.signal == "alpha" and t.shape == "quadratic"}
+    return tuple(i for i, coefficient in ((0, "CL"), (3, "Cm")) if coefficient in bent)
+
+
+def freedoms(effect: Effect) -> int:
+    """Parameters that come with an effect: its own, and derivatives that it sets free."""
+    return len(effect.parameters) + len(loosened(effect))
 
 
 @dataclass(frozen=True)
@@ -189,6 +211,15 @@ class Problem:
     settings: Settings
     threads: int = 1
 
+    @cached_property
+    def own_priors(self) -> tuple[tuple[Array, Array], ...]:
+        """Middle (10,) and precision (10, 10) of each record's own parameters."""
+        return tuple(local_prior(record, self.settings) for record in self.records)
+
+    def shared_precision(self, hypothesis: Hypothesis) -> Array:
+        """(13, 13) of the shared parameters about zero."""
+        return shared_prior(self.records[0], self.settings, hypothesis.loose)
+
     def each(self, function, arguments: Sequence[object]) -> list:  # type: ignore[no-untyped-def, type-arg]
         """The function of each argument, in order."""
         if self.threads <= 1 or len(arguments) <= 1:
@@ -213,8 +244,8 @@ def tangent(
     old : derivatives at a point nearby, whitened anew and kept for all but the sizes.
     """
     record, settings = problem.records[index], problem.settings
-    low = lower(hypothesis.change(point.sizes))
-    base = respond(record, settings, low, point.shared, point.local[index])
+    given = inputs(record, hypothesis.change(point.sizes))
+    base = answered(given, settings, point.shared, point.local[index])
     if not np.isfinite(base.logdet):
         return None
     k = len(point.sizes)
@@ -233,7 +264,7 @@ def tangent(
         for i in range(S if old is None else 0):
             shared = point.shared.copy()
             shared[i] += SHARED_STEP[i]
-            put(i, respond(record, settings, low, shared, point.local[index]), SHARED_STEP[i])
+            put(i, answered(given, settings, shared, point.local[index]), SHARED_STEP[i])
         for i in range(k):
             effect, j = hypothesis.parameters[i]
             p = hypothesis.effects[effect].parameters[j]
@@ -245,7 +276,7 @@ def tangent(
     for i in range(L if old is None else 0):
         local = point.local[index].copy()
         local[i] += LOCAL_STEP[i]
-        put(S + k + i, respond(record, settings, low, point.shared, local), LOCAL_STEP[i])
+        put(S + k + i, answered(given, settings, point.shared, local), LOCAL_STEP[i])
     if not (np.isfinite(t).all() and np.isfinite(w).all()):
         return None
     return Tangent(base.e @ base.white.T, base.logdet, t, w, base.white)
@@ -403,16 +434,15 @@ def _evaluate(  # type: ignore[no-untyped-def]
     if any(d is None for d in done):
         return None
     pieces = [d[1] for d in done]
-    cost = sum(p[0] for p in pieces) + _prior_cost(problem, point)
+    cost = sum(p[0] for p in pieces) + _prior_cost(problem, hypothesis, point)
     if not np.isfinite(cost):
         return None
     return cost, pieces, tuple(d[0] for d in done)
 
 
-def _prior_cost(problem: Problem, point: Point) -> float:
-    total = 0.5 * float(point.shared @ shared_prior(problem.records[0], problem.settings) @ point.shared)
-    for record, local in zip(problem.records, point.local, strict=True):
-        middle, precision = local_prior(record, problem.settings)
+def _prior_cost(problem: Problem, hypothesis: Hypothesis, point: Point) -> float:
+    total = 0.5 * float(point.shared @ problem.shared_precision(hypothesis) @ point.shared)
+    for (middle, precision), local in zip(problem.own_priors, point.local, strict=True):
         off = local - middle
         total += 0.5 * float(off @ precision @ off)
     return total
@@ -420,6 +450,7 @@ def _prior_cost(problem: Problem, point: Point) -> float:
 
 def reduced(  # type: ignore[no-untyped-def]
     problem: Problem,
+    hypothesis: Hypothesis,
     point: Point,
     k: int,
     pieces,
@@ -439,11 +470,10 @@ def reduced(  # type: ignore[no-untyped-def]
     """
     m = S + k
     gradient, information = np.zeros(m), np.zeros((m, m))
-    information[:S, :S] = shared_prior(problem.records[0], problem.settings)
+    information[:S, :S] = problem.shared_precision(hypothesis)
     gradient[:S] = information[:S, :S] @ point.shared
     back = []
-    for record, local, (_, g, h) in zip(problem.records, point.local, pieces, strict=True):
-        middle, precision = local_prior(record, problem.settings)
+    for (middle, precision), local, (_, g, h) in zip(problem.own_priors, point.local, pieces, strict=True):
         h_ll = h[m:, m:] + precision
         g_l = g[m:] + precision @ (local - middle)
         h_sl = h[:m, m:].copy()
@@ -470,7 +500,7 @@ def _step(problem: Problem, hypothesis: Hypothesis, point: Point, pieces, dampin
     k = len(point.sizes)
     held = hypothesis.held
     while True:
-        gradient, information, back = reduced(problem, point, k, pieces, levels, damping, held)
+        gradient, information, back = reduced(problem, hypothesis, point, k, pieces, levels, damping, held)
         scale = np.sqrt(np.maximum(np.diag(information), 1e-30))
         normal = information / np.outer(scale, scale) + damping * np.eye(len(scale))
         shared = -np.linalg.solve(normal, gradient / scale) / scale
@@ -509,10 +539,8 @@ def _moved(hypothesis: Hypothesis, point: Point, step: Point) -> Point:
 
 def _covariance(problem: Problem, hypothesis: Hypothesis, pieces, levels: bool) -> Array:  # type: ignore[no-untyped-def]
     k = len(hypothesis.parameters)
-    empty = Point(
-        np.zeros(S), np.stack([local_prior(r, problem.settings)[0] for r in problem.records]), np.zeros(k)
-    )
-    _, information, _ = reduced(problem, empty, k, pieces, levels, held=hypothesis.held)
+    empty = Point(np.zeros(S), np.stack([middle for middle, _ in problem.own_priors]), np.zeros(k))
+    _, information, _ = reduced(problem, hypothesis, empty, k, pieces, levels, held=hypothesis.held)
     scale = np.sqrt(np.maximum(np.diag(information), 1e-30))
     normal = information / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
     return np.asarray(np.linalg.inv(normal) / np.outer(scale, scale))
@@ -531,6 +559,8 @@ __all__ = [
     "autoregression",
     "begin",
     "fit",
+    "freedoms",
+    "loosened",
     "parts",
     "reduced",
     "tangent",

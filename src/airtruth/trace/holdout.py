@@ -29,10 +29,11 @@ from airtruth.trace.model import (
     LOCAL_STEP,
     S,
     Settings,
+    answered,
+    inputs,
     local_prior,
     plane_of,
     respond,
-    shared_prior,
     start,
 )
 from airtruth.trace.records import Record
@@ -109,7 +110,7 @@ def assess(
 
 def _own(one: Problem, hypothesis: Hypothesis, shared: Array, sizes: Array, begin: Array) -> Array:
     """Own parameters (10,) of a single record at their best for all else given: Levenberg-Marquardt."""
-    middle, precision = local_prior(one.records[0], one.settings)
+    middle, precision = one.own_priors[0]
     k = len(sizes)
 
     def at(local: Array) -> tuple[float, Array, Array] | None:
@@ -248,12 +249,13 @@ def _tangents(
     record: Record, settings: Settings, low: Lowered, shared: Array, own: Array, weight: Array
 ) -> tuple[Array, Array]:
     """Residual of a free run (samples, 3) and its weighted derivatives (7, samples * 3)."""
-    residual = respond(record, settings, low, shared, own, free_run=True).e
+    given = inputs(record, low)
+    residual = answered(given, settings, shared, own, free_run=True).e
     columns = []
     for i in _MOTION:
         moved = own.copy()
         moved[i] += LOCAL_STEP[i]
-        e = respond(record, settings, low, shared, moved, free_run=True).e
+        e = answered(given, settings, shared, moved, free_run=True).e
         columns.append(((e - residual) * weight / LOCAL_STEP[i]).ravel())
     return residual, np.array(columns)
 
@@ -270,14 +272,14 @@ def leave_one_out(problem: Problem, found: Fit) -> tuple[Array, list[Assessment]
     k = len(found.point.sizes)
     pieces = [parts(t, NO_WHITENER, levels=True) for t in found.tangents]
     held = at_bounds(found.point)
-    _, total, _ = reduced(problem, found.point, k, pieces, levels=True, held=held)
+    _, total, _ = reduced(problem, found.hypothesis, found.point, k, pieces, levels=True, held=held)
     one_by_one = []
     for i, piece in enumerate(pieces):
         alone = Problem((problem.records[i],), problem.settings)
         at = Point(np.zeros(S), found.point.local[i : i + 1], found.point.sizes)
-        gradient, information, _ = reduced(alone, at, k, [piece], levels=True, held=held)
+        gradient, information, _ = reduced(alone, found.hypothesis, at, k, [piece], levels=True, held=held)
         information = information.copy()
-        information[:S, :S] -= shared_prior(alone.records[0], problem.settings)
+        information[:S, :S] -= alone.shared_precision(found.hypothesis)
         one_by_one.append((gradient, information))
 
     def one(index: object) -> Assessment:

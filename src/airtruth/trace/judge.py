@@ -153,8 +153,9 @@ def declared_probability(problem: Problem, found: Fit) -> float:
     mode is nearer to the prior than the likelihood's maximum, so the check is conservative.
     """
     off = found.point.shared[:_DERIVATIVES]
-    declared = problem.records[0].plant.derivative_cov
-    return float(chi2.sf(float(off @ np.linalg.solve(declared, off)), _DERIVATIVES))
+    tight = [i for i in range(_DERIVATIVES) if i not in found.hypothesis.loose]
+    declared = problem.records[0].plant.derivative_cov[np.ix_(tight, tight)]
+    return float(chi2.sf(float(off[tight] @ np.linalg.solve(declared, off[tight])), len(tight)))
 
 
 def _size(s: Score, found: Fit) -> tuple[float, float]:

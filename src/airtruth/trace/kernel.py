@@ -36,6 +36,8 @@ Plane = tuple[Array, Array, Array, Array, Array, Array, Array, Ints, Array, Ints
 CLde, Cmalpha, Cmq, Cmde about the trim [-]; axes of alpha, elevator, qhat, and the tables over them; then
 index and value of aero terms and of states (`airtruth.trace.lower`)."""
 
+_REORDER: Final = {"contract", "reassoc", "arcp", "nsz"}
+"""Liberties of the compiler; not those that presume finite numbers, since what diverges has to be seen."""
 OUTPUTS: Final = 3
 LEADS: Final = 3
 CORE: Final = 5 + LEADS
@@ -57,14 +59,14 @@ AREA, CHORD, MASS, INERTIA, GRAVITY, ALPHA0, DE0, LENGTH_W, SIGMA_W, ROTARY, ROT
 F_MASS, F_INERTIA, F_ELEVATOR, CG, THRUST_ARM, THRUST, THRUST_SLOPE, CONSTANT = range(8)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_REORDER, inline="always")
 def cell(axis: Array, x: float) -> tuple[int, float]:
     """Lower point of the cell that holds x and the share of the cell below x; the end cells go on outside."""
     low = lower_point(axis, x)
     return low, (x - axis[low]) / (axis[low + 1] - axis[low])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_REORDER)
 def gust(x: Array, constants: Array) -> float:
     """The upward gust over the level of Dryden's part [-]."""
     lead = 0.0
@@ -73,7 +75,7 @@ def gust(x: Array, constants: Array) -> float:
     return float(_W1 * x[2] + _W2 * x[3] + constants[ROLLOFF] * lead)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_REORDER)
 def rates(
     x: Array,
     de: float,
@@ -200,7 +202,7 @@ def rates(
     return float(az)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_REORDER, inline="always")
 def rates_at(x: Array, point: int, air: Array, plane: Plane, out: Array) -> float:
     """`rates` at a point of the filter's grid.
 
@@ -223,7 +225,7 @@ def rates_at(x: Array, point: int, air: Array, plane: Plane, out: Array) -> floa
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_REORDER)
 def outputs(
     x: Array,
     rate: Array,
@@ -244,7 +246,7 @@ def outputs(
     y[2] = scales[2] * (az - arms[2] * rate[1])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_REORDER)
 def states(motion: int, lags: Array, delays: Array) -> int:
     """States of the motion and of late sensors."""
     n = motion
@@ -256,7 +258,7 @@ def states(motion: int, lags: Array, delays: Array) -> int:
     return n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_REORDER)
 def delayed(delay_s: float) -> Array:
     """A and B (order, order + 1) of a delay; its output is the input less twice the sum of every second state.
 
@@ -277,7 +279,7 @@ def delayed(delay_s: float) -> Array:
     return system
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_REORDER)
 def linear(
     x: Array,
     de: float,
@@ -345,7 +347,7 @@ def linear(
             at += DELAY
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_REORDER)
 def gain(
     a: Array, c: Array, v: float, constants: Array, variance: Array, dt_s: float
 ) -> tuple[Array, Array, Array, float]:
@@ -377,7 +379,7 @@ def gain(
     return k_gain, white, s, logdet
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_REORDER)
 def innovations(
     y: Array,
     de: Array,
@@ -541,7 +543,7 @@ def innovations(
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_REORDER)
 def evaluate(
     y: Array,
     de: Array,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -44,6 +45,7 @@ GUST_LEVEL: Final = LOCAL.index("log_sigma_w")
 """Place of the gust level among a record's own parameters."""
 BOUNDS: Final = {SHARED.index("rotary"): (-0.75, 0.75), SHARED.index("rolloff"): (-0.75, 0.75)}
 """Shares of none to all, and a quarter beyond for what is no gust of either form."""
+_LOOSE_STD: Final = 10.0
 _ROTARY_STD: Final = 0.5
 _ROLLOFF_STD: Final = 0.5
 S, L = len(SHARED), len(LOCAL)
@@ -116,6 +118,43 @@ def declared_change(aircraft: Aircraft) -> Change:
     return Change(sensors=tuple(terms))
 
 
+@dataclass(frozen=True)
+class Inputs:
+    """A record as one change has it, whatever the parameters are.
+
+    Attributes
+    ----------
+    record, low : the record and the change.
+    y : (samples, 3) outputs; de, v, ground, theta : (points,) inputs on the filter's grid, sensors' errors undone.
+    reference : (5,) where the gain is made, see `airtruth.trace.kernel.evaluate`.
+    """
+
+    record: Record
+    low: Lowered
+    y: Array
+    de: Array
+    v: Array
+    ground: Array
+    theta: Array
+    reference: Array
+
+
+def inputs(record: Record, change: Change | Lowered) -> Inputs:
+    """What the filter is given of a record."""
+    low = change if isinstance(change, Lowered) else lower(change)
+    s, plant = record.signals, record.plant
+    y, theta = s.y, s.theta_rad
+    if plant.alpha_shift_rad != 0.0:
+        y = y - np.array([plant.alpha_shift_rad, 0.0, 0.0])
+        theta = theta - plant.alpha_shift_rad
+    de, v = _input(low, "elevator_rad", s.elevator_rad), _input(low, "airspeed_m_s", s.airspeed_m_s)
+    if low.surface:
+        de = through(low.surface, de, s.dt_s / (s.sub * FINE), s.elevator_std_rad)
+    de = nodes(de)
+    reference = np.array([y[:, 0].mean(), de.mean(), v.mean(), s.density_kg_m3.mean(), theta.mean()])
+    return Inputs(record, low, y, de, v, _input(low, "airspeed_m_s", s.ground_m_s), theta, reference)
+
+
 def respond(
     record: Record,
     settings: Settings,
@@ -131,36 +170,37 @@ def respond(
     ----------
     shared : (13,) see `SHARED`; local : (10,) see `LOCAL`.
     """
-    low = change if isinstance(change, Lowered) else lower(change)
-    s, plant = record.signals, record.plant
-    y, theta = s.y, s.theta_rad
-    if plant.alpha_shift_rad != 0.0:
-        y = y - np.array([plant.alpha_shift_rad, 0.0, 0.0])
-        theta = theta - plant.alpha_shift_rad
-    de, v = _input(low, "elevator_rad", s.elevator_rad), _input(low, "airspeed_m_s", s.airspeed_m_s)
-    if low.surface:
-        de = through(low.surface, de, s.dt_s / (s.sub * FINE), s.elevator_std_rad)
-    de = nodes(de)
-    e = np.empty_like(y)
+    return answered(inputs(record, change), settings, shared, local, external, free_run)
+
+
+def answered(
+    given: Inputs,
+    settings: Settings,
+    shared: Array,
+    local: Array,
+    external: External | None = None,
+    free_run: bool = False,
+) -> Response:
+    """`respond` where the same inputs serve many parameters."""
+    low, s = given.low, given.record.signals
+    e = np.empty_like(given.y)
     white, covariance = np.eye(3), np.eye(3)
-    points = de.size
     if external is None:
-        none, still = _zeros(points), np.zeros_like(y)
-        lift_more, moment_more, output_more = none, none, still
+        none = np.zeros(given.de.size)
+        lift_more, moment_more, output_more = none, none, np.zeros_like(given.y)
     else:
         lift_more, moment_more, output_more = external.lift, external.moment, external.output
-    reference = np.array([y[:, 0].mean(), de.mean(), v.mean(), s.density_kg_m3.mean(), theta.mean()])
     logdet = _evaluated(
-        y,
-        de,
-        v,
-        _input(low, "airspeed_m_s", s.ground_m_s),
+        given.y,
+        given.de,
+        given.v,
+        given.ground,
         s.density_kg_m3,
-        theta,
+        given.theta,
         lift_more,
         moment_more,
         output_more,
-        reference,
+        given.reference,
         s.dt_s,
         s.sub,
         local[:4],
@@ -170,7 +210,7 @@ def respond(
         free_run,
         low.lags,
         low.delays,
-        plane_of(plant, settings, low, shared, local, float(s.airspeed_m_s.mean())),
+        plane_of(given.record.plant, settings, low, shared, local, float(given.reference[2])),
         low.arms,
         low.scales,
         e,
@@ -234,15 +274,6 @@ def _input(low: Lowered, channel: str, x: Array) -> Array:
     return x if scale == 1.0 and bias == 0.0 else (x - bias) / scale
 
 
-_CACHE: dict[int, Array] = {}
-
-
-def _zeros(points: int) -> Array:
-    if points not in _CACHE:
-        _CACHE[points] = np.zeros(points)
-    return _CACHE[points]
-
-
 def start(record: Record, settings: Settings) -> Array:
     """(10,) where the search for a record's own parameters begins."""
     local = np.zeros(L)
@@ -270,13 +301,20 @@ def local_prior(record: Record, settings: Settings) -> tuple[Array, Array]:
     return middle, precision
 
 
-def shared_prior(record: Record, settings: Settings) -> Array:
-    """(13, 13) precision of the shared parameters about zero."""
+def shared_prior(record: Record, settings: Settings, loose: Sequence[int] = ()) -> Array:
+    """(13, 13) precision of the shared parameters about zero.
+
+    Parameters
+    ----------
+    loose : derivatives of whose value nothing is declared.
+    """
     precision = np.zeros((S, S))
     # an inertia larger by i makes the derivatives of the moment look smaller by i
     std = inertia_std(record.plant)
     turn = np.concatenate([np.zeros(3), -settings.derivatives[3:]])
-    own = np.linalg.inv(record.plant.derivative_cov - std**2 * np.outer(turn, turn))
+    covariance = record.plant.derivative_cov - std**2 * np.outer(turn, turn)
+    covariance[list(loose), list(loose)] += _LOOSE_STD**2
+    own = np.linalg.inv(covariance)
     precision[:6, :6] = own
     precision[12, :6] = precision[:6, 12] = -own @ turn
     precision[12, 12] = turn @ own @ turn + std**-2

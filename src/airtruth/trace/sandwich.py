@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.trace.fit import Fit, Problem, parts, reduced
-from airtruth.trace.model import L, S, local_prior, shared_prior
+from airtruth.trace.model import L, S
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ def inflation(problem: Problem, found: Fit) -> Array:
     """
     m = S + len(found.point.sizes)
     total = np.zeros((m, m))
-    total[:S, :S] = shared_prior(problem.records[0], problem.settings)
+    total[:S, :S] = problem.shared_precision(found.hypothesis)
     for record, (slopes, own, across) in zip(problem.records, _slopes(problem, found), strict=True):
         free = slopes[:, m : m + own.shape[0]]
         z = slopes[:, :m] - free @ np.linalg.solve(own, across.T)
@@ -63,7 +63,7 @@ def scatter(problem: Problem, found: Fit) -> Array:
     x = np.array([slopes[:, :m].sum(axis=0) for slopes, _, _ in _slopes(problem, found)])
     off = x - x.mean(axis=0)
     total = n / (n - 1.0) * off.T @ off
-    total[:S, :S] += shared_prior(problem.records[0], problem.settings)
+    total[:S, :S] += problem.shared_precision(found.hypothesis)
     return _ratio(problem, found, total)
 
 
@@ -74,14 +74,14 @@ def _slopes(problem: Problem, found: Fit) -> list[tuple[Array, Array, Array]]:
     levels = found.whitener.coefficients.shape[0] == 0
     m = S + len(found.point.sizes)
     result = []
-    for record, tangent in zip(problem.records, found.tangents, strict=True):
+    for (_, precision), tangent in zip(problem.own_priors, found.tangents, strict=True):
         _, _, h = parts(tangent, found.whitener, levels)
         r, t = found.whitener.apply(tangent.r), found.whitener.apply(tangent.t)
         slopes = np.einsum("pki,ki->kp", t, r)
         if levels:
             spread = np.trace(tangent.w, axis1=1, axis2=2)
             slopes += 0.5 * (spread - np.einsum("pij,ki,kj->kp", tangent.w, r, r))
-        own = h[m:, m:] + local_prior(record, problem.settings)[1]
+        own = h[m:, m:] + precision
         across = h[:m, m:]
         if not levels:
             own, across = own[: L - 1, : L - 1], across[:, : L - 1]
@@ -92,7 +92,9 @@ def _slopes(problem: Problem, found: Fit) -> list[tuple[Array, Array, Array]]:
 def _ratio(problem: Problem, found: Fit, middle: Array) -> Array:
     levels = found.whitener.coefficients.shape[0] == 0
     pieces = [parts(t, found.whitener, levels) for t in found.tangents]
-    _, information, _ = reduced(problem, found.point, len(found.point.sizes), pieces, levels)
+    _, information, _ = reduced(
+        problem, found.hypothesis, found.point, len(found.point.sizes), pieces, levels
+    )
     scale = np.sqrt(np.maximum(np.diag(information), 1e-30))
     inverse = np.linalg.inv(information / np.outer(scale, scale) + 1e-12 * np.eye(len(scale)))
     robust = inverse @ (middle / np.outer(scale, scale)) @ inverse

@@ -13,19 +13,17 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, norm
+from scipy.stats import norm
 
 from airtruth.effects.effect import Effect
 from airtruth.trace.fit import NO_WHITENER, Fit, Problem, Tangent, Whitener, at_bounds, parts, reduced
 from airtruth.trace.lower import lower
-from airtruth.trace.model import External, S, respond
-from airtruth.trace.records import nodes
+from airtruth.trace.model import S, respond
 
 Array = NDArray[np.float64]
 
 PLACES: Final = 9
 _DRAWS: Final = 20_000
-_BASIS: Final = 5
 
 
 @dataclass(frozen=True)
@@ -75,14 +73,12 @@ class Table:
     white : |z| of each score were the innovations white, with what the effect does to their covariance: an
         autoregression takes up part of a large effect, and a lag in gusts is seen in the scatter.
     white_sizes : what one step of scoring then estimates of each effect's size, at the score's place.
-    omnibus : statistic, degrees of freedom and p-value of the test that names no effect.
     """
 
     scores: tuple[Score, ...]
     information: Array
     white: tuple[float, ...]
     white_sizes: tuple[float, ...]
-    omnibus: tuple[float, int, float]
 
 
 def directions(effect: Effect, null: Fit, problem: Problem) -> list[Direction]:
@@ -102,7 +98,7 @@ def directions(effect: Effect, null: Fit, problem: Problem) -> list[Direction]:
 
 
 def table(null: Fit, problem: Problem, effects: Sequence[Effect], whitener: Whitener, seed: int) -> Table:
-    """Scores of the effects and the omnibus at the optimum of a null hypothesis.
+    """Scores of the effects at the optimum of a null hypothesis.
 
     Parameters
     ----------
@@ -111,16 +107,14 @@ def table(null: Fit, problem: Problem, effects: Sequence[Effect], whitener: Whit
     seed : of the draws that give p-values of effects with a place.
     """
     tried = [_audible(d, null, problem) for effect in effects for d in directions(effect, null, problem)]
-    generic = 4 * (_BASIS + 2)
 
-    def one(index: object) -> tuple[Tangent, Tangent]:
-        i = int(index)  # type: ignore[call-overload]
-        return _with(null, problem, i, tried), _with_generic(null, problem, i)
+    def one(index: object) -> Tangent:
+        return _with(null, problem, int(index), tried)  # type: ignore[call-overload]
 
     extended = problem.each(one, range(len(problem.records)))
     k = len(null.point.sizes)
-    gradient, information = _projected(null, problem, [e[0] for e in extended], whitener, k, len(tried))
-    plain = _projected(null, problem, [e[0] for e in extended], NO_WHITENER, k, len(tried), levels=True)
+    gradient, information = projected(null, problem, extended, whitener, k, len(tried))
+    plain = projected(null, problem, extended, NO_WHITENER, k, len(tried), levels=True)
     rng = np.random.default_rng([seed, len(tried), 7])
     scores, white, white_sizes = [], [], []
     at = 0
@@ -151,8 +145,7 @@ def table(null: Fit, problem: Problem, effects: Sequence[Effect], whitener: Whit
         white.append(float(np.max(np.abs(plain[0][span]) / np.sqrt(np.where(raw > 0.0, raw, np.inf)))))
         here = int(span[best])
         white_sizes.append(float(-plain[0][here] / raw[best]) if raw[best] > 0.0 else scores[-1].size)
-    g, h = _projected(null, problem, [e[1] for e in extended], whitener, k, generic)
-    return Table(tuple(scores), information, tuple(white), tuple(white_sizes), _omnibus(g, h))
+    return Table(tuple(scores), information, tuple(white), tuple(white_sizes))
 
 
 def _audible(direction: Direction, null: Fit, problem: Problem) -> Direction:
@@ -212,15 +205,6 @@ def _p_value(z: Array, best: int, one_sided: bool, information: Array, rng: np.r
     return float((np.count_nonzero(largest >= top) + 1) / (_DRAWS + 1))
 
 
-def _omnibus(gradient: Array, information: Array) -> tuple[float, int, float]:
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    kept = values > 1e-3 * values.max()
-    amounts = (vectors.T @ (gradient / scale))[kept] / np.sqrt(values[kept])
-    statistic, degrees = float(amounts @ amounts), int(kept.sum())
-    return statistic, degrees, float(chi2.sf(statistic, degrees))
-
-
 def _with(null: Fit, problem: Problem, index: int, tried: Sequence[Direction]) -> Tangent:
     """The null's tangent of one record with the directions as further shared parameters."""
     record, base, k = problem.records[index], null.tangents[index], len(null.point.sizes)
@@ -246,10 +230,10 @@ def _with(null: Fit, problem: Problem, index: int, tried: Sequence[Direction]) -
             continue
         t[i] = (moved.e - e.e) @ base.white.T / d.step
         w[i] = base.white @ ((moved.covariance - e.covariance) / d.step) @ base.white.T
-    return _insert(base, k, t, w)
+    return inserted(base, k, t, w)
 
 
-def _insert(base: Tangent, k: int, t: Array, w: Array) -> Tangent:
+def inserted(base: Tangent, k: int, t: Array, w: Array) -> Tangent:
     at = S + k
     return Tangent(
         base.r,
@@ -260,44 +244,7 @@ def _insert(base: Tangent, k: int, t: Array, w: Array) -> Tangent:
     )
 
 
-def _with_generic(null: Fit, problem: Problem, index: int) -> Tangent:
-    """Directions that name no effect: unknown responses of lift, moment, alpha and q to the elevator.
-
-    Laguerre functions of the elevator's deflection (their pole at 6 rad/s), its square and the square of
-    its first filter, so that both memory and curvature are seen.
-    """
-    record, base, k = problem.records[index], null.tangents[index], len(null.point.sizes)
-    s = record.signals
-    elevator = nodes(s.elevator_rad)
-    basis = _laguerre(elevator - elevator[0], s.dt_s / s.sub)
-    low = lower(null.hypothesis.change(null.point.sizes))
-    e = respond(record, problem.settings, low, null.point.shared, null.point.local[index])
-    nothing, still = np.zeros(elevator.size), np.zeros_like(s.y)
-    t = []
-    for entry, unit in ((0, 1e-3), (1, 1e-4), (2, 1e-4), (3, 1e-4)):
-        for b in basis:
-            sampled = still.copy()
-            if entry >= 2:
-                sampled[:, entry - 2] = unit * b[:: s.sub]
-            more = External(unit * b if entry == 0 else nothing, unit * b if entry == 1 else nothing, sampled)
-            moved = respond(record, problem.settings, low, null.point.shared, null.point.local[index], more)
-            t.append((moved.e - e.e) @ base.white.T / unit)
-    return _insert(base, k, np.array(t), np.zeros((len(t), 3, 3)))
-
-
-def _laguerre(de: Array, dt_s: float, pole: float = 6.0) -> list[Array]:
-    from scipy.signal import lfilter
-
-    a = np.exp(-pole * dt_s)
-    size = max(float(np.abs(de).max()), 1e-9)
-    x = lfilter([1.0 - a], [1.0, -a], de / size)
-    found = [x]
-    for _ in range(_BASIS - 1):
-        found.append(lfilter([-a, 1.0], [1.0, -a], found[-1]))
-    return [*found, (de / size) ** 2, found[0] ** 2]
-
-
-def _projected(
+def projected(
     null: Fit,
     problem: Problem,
     tangents: Sequence[Tangent],
@@ -309,7 +256,7 @@ def _projected(
     """Gradient and information of the further directions, all nuisance eliminated, priors included."""
     pieces = [parts(t, whitener, levels) for t in tangents]
     gradient, information, _ = reduced(
-        problem, null.point, k + count, pieces, levels, held=at_bounds(null.point)
+        problem, null.hypothesis, null.point, k + count, pieces, levels, held=at_bounds(null.point)
     )
     m = S + k
     nuisance = information[:m, :m]
@@ -326,4 +273,4 @@ def _projected(
     return g, h
 
 
-__all__ = ["Direction", "Score", "Table", "directions", "holm", "table"]
+__all__ = ["Direction", "Score", "Table", "directions", "holm", "inserted", "projected", "table"]

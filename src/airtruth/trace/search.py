@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
 from airtruth.trace import score
-from airtruth.trace.fit import Fit, Hypothesis, Point, Problem, Whitener, autoregression, begin, fit
+from airtruth.trace.fit import Fit, Hypothesis, Point, Problem, Whitener, autoregression, begin, fit, freedoms
 from airtruth.trace.judge import (
     IMMATERIAL,
     IMPROBABLE,
@@ -26,6 +26,7 @@ from airtruth.trace.judge import (
 from airtruth.trace.model import GUST_LEVEL, respond
 from airtruth.trace.profile import Profile, best_place, place_of
 from airtruth.trace.score import Score, Table
+from airtruth.trace.unnamed import Anomaly, anomalies
 
 Array = NDArray[np.float64]
 
@@ -55,6 +56,7 @@ class Stage:
     Attributes
     ----------
     null : fit of the effects accepted so far, levels free; gls : the same under ``whitener``.
+    unnamed : tests that name no effect.
     adjusted : Holm's p-values of the table's scores.
     candidates : refitted ones, best first.
     tied : those that cannot be told from the best accepted one, itself first; empty if none was.
@@ -65,20 +67,25 @@ class Stage:
     gls: Fit
     whitener: Whitener
     table: Table
+    unnamed: tuple[Anomaly, ...]
     adjusted: Array
     candidates: tuple[Candidate, ...]
     tied: tuple[Candidate, ...]
     profile: Profile | None = None
 
     @property
-    def anomaly(self) -> tuple[float, float]:
-        """Statistic and p-value of the best evidence that something is missing: the library's or the omnibus's."""
-        statistic, _, omnibus = self.table.omnibus
-        smallest = float(self.adjusted.min(initial=1.0))
-        if smallest <= omnibus and self.table.scores:
+    def anomaly(self) -> Anomaly:
+        """The best evidence that something is missing, a score of the library or a test without a name.
+
+        Its p-value allows for all of them (Bonferroni).
+        """
+        seen = list(self.unnamed)
+        if self.table.scores:
             best = int(np.argmin(self.adjusted))
-            return self.table.scores[best].z ** 2, min(1.0, 2.0 * smallest)
-        return statistic, min(1.0, 2.0 * omnibus)
+            s = self.table.scores[best]
+            seen.append(Anomaly(s.effect.key, s.z**2, 1, float(self.adjusted[best])))
+        least = min(seen, key=lambda a: a.p_value)
+        return replace(least, p_value=min(1.0, len(seen) * least.p_value))
 
 
 def search(
@@ -128,7 +135,8 @@ def search(
             leader = replace(tied[0], found=found)
             candidates = tuple(leader if c is tied[0] else c for c in candidates)
             tied = (leader, *tied[1:])
-        stages.append(Stage(null, gls, whitener, table, adjusted, candidates, tied, profile))
+        unnamed = anomalies(gls, problem, whitener)
+        stages.append(Stage(null, gls, whitener, table, unnamed, adjusted, candidates, tied, profile))
         if not tied:
             break
         best = tied[0]
@@ -171,12 +179,12 @@ def _refitted(
         if found is not None:
             fits.append((s, found))
     for _ in range(_PATIENCE):  # the leader at least has to arrive
-        fits.sort(key=lambda f: f[1].cost + len(f[0].effect.parameters))
+        fits.sort(key=lambda f: f[1].cost + freedoms(f[0].effect))
         if not fits or fits[0][1].converged:
             break
         s, found = fits[0]
         fits[0] = (s, fit(problem, found.hypothesis, found.point) or found)
-    return sorted(fits, key=lambda f: f[1].cost + len(f[0].effect.parameters))
+    return sorted(fits, key=lambda f: f[1].cost + freedoms(f[0].effect))
 
 
 def _better_null(problem: Problem, null: Fit, fits: Sequence[tuple[Score, Fit]]) -> Fit | None:
@@ -195,13 +203,12 @@ def _judged(
     """Gains, those near the best compared under one autoregression, and the rules for those that lead."""
     if not fits:
         return ()
-    gains = {s.effect.key: 2.0 * (null.cost - f.cost) - 2.0 * (len(s.effect.parameters) - 1) for s, f in fits}
+    gains = {s.effect.key: 2.0 * (null.cost - f.cost) - 2.0 * (freedoms(s.effect) - 1) for s, f in fits}
     near = [(s, f) for s, f in fits if f.cost - fits[0][1].cost < _NEAR]
     whitener = autoregression(fits[0][1].tangents)
     if whitener.coefficients.shape[0] and len(near) > 1:
         costs = {
-            s.effect.key: _whitened(problem, f, whitener, fits[0][1]) + len(s.effect.parameters)
-            for s, f in near
+            s.effect.key: _whitened(problem, f, whitener, fits[0][1]) + freedoms(s.effect) for s, f in near
         }
         top, lowest = max(gains[key] for key in costs), min(costs.values())
         gains |= {key: top - 2.0 * (cost - lowest) for key, cost in costs.items()}

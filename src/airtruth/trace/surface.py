@@ -40,7 +40,7 @@ def through(terms: Sequence[SurfaceTerm], de: Array, dt_s: float, noise_rad: flo
         elif term.kind == "backlash" and term.value > 0.0:
             half = 0.5 * term.value
             allowance = _EXTREME * noise_rad * half / (half + noise_rad) if noise_rad > 0.0 else 0.0
-            de = _slack(de, half + allowance)
+            de = play(de, half + allowance)
     return de
 
 
@@ -76,7 +76,8 @@ def _limited(x: Array, most: float) -> Array:
 
 
 @njit(cache=True, nogil=True)
-def _slack(x: Array, half: float) -> Array:
+def play(x: Array, half: float) -> Array:
+    """What follows (points,) ``x`` at a distance of at most ``half``, and stands still until it has to."""
     out = np.empty_like(x)
     out[0] = x[0]
     for k in range(1, x.size):
