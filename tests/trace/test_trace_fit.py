@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trace_records as tr
 
-from airtruth.effects.change import Change
+from airtruth.effects.change import AeroTerm, Change
 from airtruth.effects.library import EFFECTS
 from airtruth.trace.fit import (
     NO_WHITENER,
@@ -17,10 +17,13 @@ from airtruth.trace.fit import (
     autoregression,
     begin,
     fit,
+    freedoms,
+    loosened,
     parts,
     tangent,
 )
-from airtruth.trace.model import LOCAL, LOCAL_STEP, SHARED, SHARED_STEP, L, S
+from airtruth.trace.model import LOCAL, LOCAL_STEP, SHARED, SHARED_STEP, L, S, respond, shared_prior
+from airtruth.trace.records import Record
 from airtruth.units import DEG
 
 DELAY, ARM, KINK = (EFFECTS[k] for k in ("elevator_delay", "vane_arm", "elevator_asymmetry"))
@@ -245,3 +248,53 @@ def test_order_of_records_does_not_matter(three):
     np.testing.assert_allclose(again.point.shared / error[:S], one.point.shared / error[:S], atol=1e-6)
     np.testing.assert_allclose(again.point.sizes / error[S:], one.point.sizes / error[S:], atol=1e-6)
     np.testing.assert_allclose(again.point.local, one.point.local[order], atol=1e-7)
+
+
+# -- derivatives that an effect sets free
+
+
+def test_a_curvature_sets_its_slope_free_and_counts_for_two():
+    free = {key: (loosened(EFFECTS[key]), freedoms(EFFECTS[key])) for key in EFFECTS}
+    assert {key: f for key, (f, _) in free.items() if f} == {
+        "cl_alpha_nonlinear:quadratic": (0,),
+        "cm_alpha_nonlinear:quadratic": (3,),
+    }
+    assert free["cl_alpha_nonlinear:quadratic"][1] == 2
+    assert free["vane_lag"][1] == 1
+    assert free["cl_alpha_nonlinear:break"][1] == 2
+
+
+def test_precision_without_a_declared_slope():
+    """A variance of 100 more for CLalpha, all else as declared: the marginal covariance says so."""
+    made = tr.fly(np.random.default_rng(80))
+    tight, free = (np.linalg.inv(shared_prior(made, tr.SETTINGS, loose)) for loose in ((), (0,)))
+    more = np.zeros_like(tight)
+    more[0, 0] = 100.0
+    np.testing.assert_allclose(free, tight + more, rtol=1e-6, atol=1e-9)
+
+
+def test_a_curvature_about_the_trim_is_found_beside_a_declared_slope():
+    """CL += 10 (alpha - 0.1)^2 is 10 alpha^2 - 2 alpha + 0.1: a slope of -2 that nobody declared, eight standard deviations."""
+    rng = np.random.default_rng(81)
+    bent = Change(aero=(AeroTerm("CL", "alpha", "quadratic", 10.0, 0.1),))
+    shared, local = tr.still()
+    local[0] = 0.1
+    records = []
+    for amplitude in (3.0, -3.0, 2.0):
+        made = tr.fly(rng, amplitude=amplitude * DEG, sigma_w=0.1, name=str(amplitude))
+        s = made.signals
+        there = Record(
+            replace(s, y=s.y + np.array([0.1, 0.0, 0.0]), theta_rad=s.theta_rad + 0.1), tr.plant(alpha=0.1)
+        )
+        before, after = (
+            respond(there, tr.SETTINGS, c, shared, local, free_run=True).e for c in (Change(), bent)
+        )
+        records.append(replace(there, signals=replace(there.signals, y=there.signals.y + before - after)))
+    problem = tr.problem(records)
+    null = fit(problem, tr.NOTHING, begin(problem, tr.NOTHING))
+    start = replace(null.point, sizes=np.array([5.0]))
+    found = fit(problem, tr.NOTHING.plus(EFFECTS["cl_alpha_nonlinear:quadratic"]), start)
+    std = np.sqrt(np.diag(found.covariance))
+    assert abs(found.point.sizes[0] - 10.0) < 3.0 * std[S]
+    assert std[S] < 1.5
+    assert abs(found.point.shared[0] + 2.0) < 3.0 * std[0]

@@ -1,0 +1,159 @@
+"""Tests without a name: statistics against scipy and by hand, spread under the null, and what each of them sees."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trace_records as tr
+from scipy.stats import chi2
+
+from airtruth.effects.change import AeroTerm, Change
+from airtruth.trace.fit import NO_WHITENER, begin, fit
+from airtruth.trace.model import External, respond
+from airtruth.trace.records import Record
+from airtruth.trace.surface import play
+from airtruth.trace.unnamed import FAMILIES, advice, anomalies, chi_square, lines
+from airtruth.units import DEG
+
+ELEVATOR, STATIC, HISTORY, VANE = FAMILIES
+DRAWS = 20
+
+
+def test_chi_square_is_the_quadratic_form():
+    rng = np.random.default_rng(1)
+    root = rng.standard_normal((4, 4))
+    information, gradient = root @ root.T + np.eye(4), rng.standard_normal(4)
+    statistic, degrees, p = chi_square(gradient, information)
+    assert statistic == pytest.approx(gradient @ np.linalg.solve(information, gradient), rel=1e-12)
+    assert degrees == 4
+    assert p == pytest.approx(chi2.sf(statistic, 4), rel=1e-12)
+
+
+def test_a_direction_that_stands_twice_counts_once():
+    """g = [1, 1], I = ones: one direction of information 1 with a score of 1."""
+    statistic, degrees, p = chi_square(np.ones(2), np.ones((2, 2)))
+    assert (statistic, degrees) == (pytest.approx(1.0), 1)
+    assert p == pytest.approx(chi2.sf(1.0, 1))
+
+
+def test_directions_of_any_unit_count_alike():
+    rng = np.random.default_rng(2)
+    root = rng.standard_normal((3, 3))
+    information, gradient = root @ root.T, rng.standard_normal(3)
+    unit = np.array([1e-4, 1.0, 1e3])
+    plain = chi_square(gradient, information)
+    assert chi_square(gradient * unit, information * np.outer(unit, unit)) == pytest.approx(plain, rel=1e-8)
+
+
+def test_lines_of_white_innovations():
+    """The smallest p of 45 bands and three channels, times their number, is above 5 % in about 95 % (Bonferroni).
+
+    500 draws: four binomial standard errors.
+    """
+    rng = np.random.default_rng(3)
+    found = [
+        lines([rng.standard_normal((250, 3)), rng.standard_normal((300, 3))], [0.02, 0.02]).p_value
+        for _ in range(500)
+    ]
+    share = np.mean(np.array(found) <= 0.05)
+    assert share == pytest.approx(0.05, abs=4.0 * np.sqrt(0.05 * 0.95 / 500))
+
+
+def test_a_ringing_channel_is_found_where_it_rings():
+    """A sine of amplitude A over n samples of unit noise adds n A^2/2 to the ordinate 2 I of its own frequency."""
+    rng = np.random.default_rng(4)
+    r = rng.standard_normal((500, 3))
+    r[:, 1] += 0.5 * np.sin(2.0 * np.pi * 6.8 * 0.02 * np.arange(500))
+    found = lines([r], [0.02])
+    assert found.where == "q_rad_s at 6.5 to 7.0 Hz"
+    assert found.p_value < 1e-6
+    # 500 samples of 20 ms: a line every 0.1 Hz, five to a band
+    assert found.degrees == 10
+    f, square = np.fft.rfftfreq(500, 0.02), np.mean(r[:, 1] ** 2)
+    band = (f > 6.5 + 1e-9) & (f < 7.0 + 1e-9)
+    by_hand = (2.0 * np.abs(np.fft.rfft(r[:, 1])) ** 2 / 500 / square)[band].sum()
+    assert found.statistic == pytest.approx(by_hand, rel=1e-9)
+
+
+def test_records_of_several_rates_share_their_bands():
+    rng = np.random.default_rng(5)
+    found = lines([rng.standard_normal((100, 3)), rng.standard_normal((40, 3))], [0.02, 0.05])
+    assert float(found.where.split(" to ")[1].split()[0]) <= 10.0
+    assert lines([rng.standard_normal((20, 3))], [0.5]).p_value == 1.0
+
+
+def seen(records):
+    problem = tr.problem(records)
+    null = fit(problem, tr.NOTHING, begin(problem, tr.NOTHING))
+    return {a.where if a.where in FAMILIES else "lines": a for a in anomalies(null, problem, NO_WHITENER)}
+
+
+def pair(rng, samples=200, sigma_w=0.3):
+    return [
+        tr.fly(rng, amplitude=a * DEG, name=str(a), samples=samples, sigma_w=sigma_w)
+        for a in (2.0, -2.0, 1.0)
+    ]
+
+
+def changed(made, more):
+    return Record(replace(made.signals, y=made.signals.y + more), made.plant)
+
+
+def difference(made, change=None, external=None):
+    """What a change, or a moment, does to the outputs of a free run of the linear aircraft."""
+    shared, local = tr.still()
+    before = respond(made, tr.SETTINGS, Change(), shared, local, free_run=True).e
+    after = respond(made, tr.SETTINGS, change or Change(), shared, local, external, free_run=True).e
+    return before - after
+
+
+def test_p_values_are_uniform_where_nothing_is_missing():
+    """Mean 1/2 within four of 1/sqrt(12 draws), each family; noise and gusts are drawn."""
+    rng = np.random.default_rng(6)
+    found = [seen(pair(rng, 150)[:2]) for _ in range(DRAWS)]
+    assert set(found[0]) == {*FAMILIES, "lines"}
+    for name in FAMILIES:
+        p = [f[name].p_value for f in found]
+        assert np.mean(p) == pytest.approx(0.5, abs=4.0 / np.sqrt(12.0 * DRAWS)), name
+    assert min(f["lines"].p_value for f in found) > 0.05 / DRAWS / 4.0
+
+
+def test_a_slope_that_changes_is_seen_over_the_angle_of_attack():
+    change = Change(aero=(AeroTerm("Cm", "alpha", "above", -1.2, 1.0 * DEG),))
+    found = seen([changed(r, difference(r, change)) for r in pair(np.random.default_rng(7))])
+    assert found[STATIC].p_value < 1e-6
+    assert found[VANE].p_value > 1e-3
+
+
+def test_hysteresis_is_seen_in_the_history():
+    records = []
+    for made in pair(np.random.default_rng(8)):
+        smooth = np.convolve(made.signals.y[:, 0], np.ones(7) / 7.0, mode="same")
+        lag = np.interp(
+            np.arange((len(smooth) - 1) * 2 + 1) / 2.0,
+            np.arange(len(smooth)),
+            smooth - play(smooth, 0.5 * DEG),
+        )
+        moment = External(np.zeros(lag.size), -0.8 * lag, np.zeros_like(made.signals.y))
+        records.append(changed(made, difference(made, external=moment)))
+    found = seen(records)
+    assert found[HISTORY].p_value < 1e-6
+    assert found[HISTORY].p_value < found[STATIC].p_value
+
+
+def test_a_vane_that_sticks_is_seen_as_friction():
+    """Still air, so that the vane is moved by the manoeuvre alone."""
+    records = []
+    for made in pair(np.random.default_rng(9), sigma_w=1e-3):
+        smooth = np.convolve(made.signals.y[:, 0], np.ones(5) / 5.0, mode="same")
+        more = np.zeros_like(made.signals.y)
+        more[:, 0] = play(smooth, 0.15 * DEG) - smooth
+        records.append(changed(made, more))
+    found = seen(records)
+    assert found[VANE].p_value < 1e-6
+
+
+def test_advice_for_each_place():
+    said = [advice(where) for where in (*FAMILIES, "az_m_s2 at 2.0 to 2.5 Hz", "vane_lag")]
+    assert len(set(said)) == len(said)
+    assert all(s.endswith(".") for s in said)
