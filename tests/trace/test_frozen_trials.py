@@ -29,8 +29,9 @@ FIRST = {
 }
 """Trial -> the effect, or the dominant one, which has to be in the first reported set."""
 BOTH = {12: {"downwash_lag", "inertia_error"}}
-OFF_LIBRARY = (0, 1, 14, 23)
-"""Effects that the library lacks: unexplained, or provisional."""
+OFF_LIBRARY = (0, 1, 23)
+"""Effects that the library lacks: unexplained, or provisional. The best effect of the library leaves 57, 659 and 72 of
+their noncentrality; of a fourth, a weak mode of the structure in 14, it leaves 9.9."""
 NOT_WORSE = 1.02
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("frozen")]
