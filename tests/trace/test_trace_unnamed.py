@@ -36,6 +36,11 @@ def test_a_direction_that_stands_twice_counts_once():
     assert p == pytest.approx(chi2.sf(1.0, 1))
 
 
+def test_directions_that_records_do_not_excite_say_nothing():
+    assert chi_square(np.zeros(3), np.zeros((3, 3))) == (0.0, 0, 1.0)
+    assert lines([np.zeros((100, 3))], [0.02]).p_value == 1.0
+
+
 def test_directions_of_any_unit_count_alike():
     rng = np.random.default_rng(2)
     root = rng.standard_normal((3, 3))

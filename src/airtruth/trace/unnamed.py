@@ -21,7 +21,7 @@ from scipy.stats import chi2
 
 from airtruth.trace.fit import Fit, Problem, Whitener
 from airtruth.trace.lower import CHANNELS
-from airtruth.trace.model import External, answered, inputs
+from airtruth.trace.model import External, Response, answered, inputs
 from airtruth.trace.records import Record, nodes
 from airtruth.trace.score import inserted, projected
 from airtruth.trace.surface import play
@@ -119,10 +119,12 @@ def anomalies(null: Fit, problem: Problem, whitener: Whitener) -> tuple[Anomaly,
 
 
 def chi_square(gradient: Array, information: Array) -> tuple[float, int, float]:
-    """Statistic g' I^-1 g over the directions that can be told apart, their number, and the p-value."""
+    """Statistic g' I^-1 g over the directions that can be told apart, their number, and the p-value; 1 of none."""
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    kept = values > 1e-3 * values.max()
+    kept = values > 1e-3 * max(values.max(), 1e-3)
+    if not kept.any():
+        return 0.0, 0, 1.0
     amounts = (vectors.T @ (gradient / scale))[kept] / np.sqrt(values[kept])
     statistic, degrees = float(amounts @ amounts), int(kept.sum())
     return statistic, degrees, float(chi2.sf(statistic, degrees))
@@ -140,7 +142,7 @@ def lines(residuals: Sequence[Array], dt_s: Sequence[float]) -> Anomaly:
     edges = np.arange(_LOWEST_HZ, top + 1e-9, _BAND_HZ)
     bands = max(len(edges) - 1, 0)
     power, degrees = np.zeros((bands, 3)), np.zeros(bands)
-    square = np.mean(np.concatenate(residuals) ** 2, axis=0)
+    square = np.maximum(np.mean(np.concatenate(residuals) ** 2, axis=0), 1e-300)
     for r, dt in zip(residuals, dt_s, strict=True):
         f = np.fft.rfftfreq(len(r), dt)
         ordinates = 2.0 * np.abs(np.fft.rfft(r, axis=0)) ** 2 / (len(r) * square)
@@ -286,10 +288,10 @@ def _tangents(null: Fit, problem: Problem, index: int, series: Series) -> Array:
     given = inputs(record, null.hypothesis.change(null.point.sizes))
     nothing, still = np.zeros(given.de.size), np.zeros_like(given.y)
 
-    def moved(more: External | None) -> Array:
-        return answered(given, problem.settings, null.point.shared, null.point.local[index], more).e
+    def response(more: External | None = None) -> Response:
+        return answered(given, problem.settings, null.point.shared, null.point.local[index], more)
 
-    e, t = moved(None), []
+    e, t = response().e, []
     for entry, x in series:
         unit = _UNIT[entry]
         output = still
@@ -299,7 +301,9 @@ def _tangents(null: Fit, problem: Problem, index: int, series: Series) -> Array:
         more = External(
             unit * x if entry == LIFT else nothing, unit * x if entry == MOMENT else nothing, output
         )
-        t.append((moved(more) - e) @ base.white.T / unit)
+        moved = response(more)
+        sound = np.isfinite(moved.logdet)  # else the motion was lost, and nothing can be said
+        t.append((moved.e - e) @ base.white.T / unit if sound else np.zeros_like(e))
     return np.array(t)
 
 
