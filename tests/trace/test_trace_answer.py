@@ -66,6 +66,9 @@ def test_contract_3(name, flown, traced):
         assert set(a[key]) == {"statistic", "p_value"}
         assert 0.0 <= a[key]["p_value"] <= 1.0
         assert a[key]["statistic"] >= 0.0
+    assert set(a["shown_by"]) == {"anomaly", "remaining"}
+    shows = a["shown_by"]["remaining"]
+    assert (f"What is left shows in {shows}:" in a["next_flight"]) == (a["remaining"]["p_value"] <= 0.01)
     known = {e.name for e in EFFECTS.values()}
     for e in a["effects"]:
         assert {"name", "parameters", "p_value", "separation_sigma", "indistinguishable_from"} <= set(e)

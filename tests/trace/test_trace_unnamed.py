@@ -1,18 +1,21 @@
 """Tests without a name: statistics against scipy and by hand, spread under the null, and what each of them sees."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import trace_records as tr
+from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from airtruth.effects.change import AeroTerm, Change
 from airtruth.trace.fit import NO_WHITENER, begin, fit
 from airtruth.trace.model import External, respond
 from airtruth.trace.records import Record
+from airtruth.trace.search import Stage
 from airtruth.trace.surface import play
-from airtruth.trace.unnamed import FAMILIES, advice, anomalies, chi_square, lines
+from airtruth.trace.unnamed import FAMILIES, Anomaly, advice, anomalies, chi_square, lines
 from airtruth.units import DEG
 
 ELEVATOR, STATIC, HISTORY, VANE = FAMILIES
@@ -50,34 +53,62 @@ def test_directions_of_any_unit_count_alike():
     assert chi_square(gradient * unit, information * np.outer(unit, unit)) == pytest.approx(plain, rel=1e-8)
 
 
-def test_lines_of_white_innovations():
-    """The smallest p of 45 bands and three channels, times their number, is above 5 % in about 95 % (Bonferroni).
+def test_one_row_without_information_changes_nothing():
+    """Whatever its gradient is: nothing was measured in that direction."""
+    rng = np.random.default_rng(12)
+    root = rng.standard_normal((4, 4))
+    information, gradient = np.zeros((5, 5)), np.append(rng.standard_normal(4), 0.7)
+    information[:4, :4] = root @ root.T + np.eye(4)
+    assert chi_square(gradient, information) == pytest.approx(chi_square(gradient[:4], information[:4, :4]))
 
-    500 draws: four binomial standard errors.
+
+@pytest.mark.parametrize("pole", [0.0, 0.6])
+def test_lines_of_innovations_without_a_line(pole):
+    """The smallest p of 48 bands and three channels, times their number, is below 5 % in about 5 % (Bonferroni).
+
+    500 draws of white and of first-order innovations: four binomial standard errors.
     """
     rng = np.random.default_rng(3)
-    found = [
-        lines([rng.standard_normal((250, 3)), rng.standard_normal((300, 3))], [0.02, 0.02]).p_value
-        for _ in range(500)
-    ]
+    found = []
+    for _ in range(500):
+        records = [lfilter([1.0], [1.0, -pole], rng.standard_normal((n, 3)), axis=0) for n in (250, 300)]
+        found.append(lines(records, [0.02, 0.02]).p_value)
     share = np.mean(np.array(found) <= 0.05)
     assert share == pytest.approx(0.05, abs=4.0 * np.sqrt(0.05 * 0.95 / 500))
 
 
 def test_a_ringing_channel_is_found_where_it_rings():
-    """A sine of amplitude A over n samples of unit noise adds n A^2/2 to the ordinate 2 I of its own frequency."""
+    """2 I/s^2 of x_k - a x_(k-1), a the first autocorrelation, summed over the band by the definition of I."""
     rng = np.random.default_rng(4)
     r = rng.standard_normal((500, 3))
-    r[:, 1] += 0.5 * np.sin(2.0 * np.pi * 6.8 * 0.02 * np.arange(500))
+    r[:, 1] += 0.8 * np.sin(2.0 * np.pi * 6.8 * 0.02 * np.arange(500))
     found = lines([r], [0.02])
     assert found.where == "q_rad_s at 6.5 to 7.0 Hz"
-    assert found.p_value < 1e-6
+    assert found.p_value < 1e-12
     # 500 samples of 20 ms: a line every 0.1 Hz, five to a band
     assert found.degrees == 10
-    f, square = np.fft.rfftfreq(500, 0.02), np.mean(r[:, 1] ** 2)
-    band = (f > 6.5 + 1e-9) & (f < 7.0 + 1e-9)
-    by_hand = (2.0 * np.abs(np.fft.rfft(r[:, 1])) ** 2 / 500 / square)[band].sum()
-    assert found.statistic == pytest.approx(by_hand, rel=1e-9)
+    x = r[:, 1]
+    a = (x[1:] @ x[:-1]) / (x[:-1] @ x[:-1])
+    x = np.concatenate([[x[0] * np.sqrt(1.0 - a**2)], x[1:] - a * x[:-1]])
+    turns = np.outer([6.6, 6.7, 6.8, 6.9, 7.0], 0.02 * np.arange(500))
+    power = np.abs(np.exp(-2j * np.pi * turns) @ x) ** 2 / 500
+    assert found.statistic == pytest.approx(2.0 * power.sum() / np.mean(x**2), rel=1e-9)
+
+
+@pytest.mark.parametrize("size", [1.0, 4.0])
+def test_a_strong_mode_is_not_taken_for_colour(size):
+    """A mode of 7 Hz, 2 % damped, as strong as the noise and four times: an autoregression of order 4 takes it up."""
+    rng = np.random.default_rng(13)
+    pole = np.exp((-0.02 + 1j) * 2.0 * np.pi * 7.0 * 0.02)
+    records = []
+    for _ in range(4):
+        r = rng.standard_normal((300, 3))
+        ringing = lfilter([1.0], [1.0, -2.0 * pole.real, abs(pole) ** 2], rng.standard_normal(300))
+        r[:, 1] += size * ringing / ringing.std()
+        records.append(r)
+    found = lines(records, [0.02] * 4)
+    assert found.where == "q_rad_s at 6.5 to 7.0 Hz"
+    assert found.p_value < 1e-9
 
 
 def test_records_of_several_rates_share_their_bands():
@@ -162,3 +193,27 @@ def test_advice_for_each_place():
     said = [advice(where) for where in (*FAMILIES, "az_m_s2 at 2.0 to 2.5 Hz", "vane_lag")]
     assert len(set(said)) == len(said)
     assert all(s.endswith(".") for s in said)
+
+
+# -- the tests together
+
+
+def stage(unnamed, adjusted=(), z=()):
+    scores = tuple(SimpleNamespace(effect=SimpleNamespace(key=f"effect {i}"), z=v) for i, v in enumerate(z))
+    table = SimpleNamespace(scores=scores)
+    return Stage(None, None, None, table, tuple(unnamed), np.array(adjusted), (), ())
+
+
+def test_the_smallest_p_value_counts_times_the_number_of_tests():
+    unnamed = [Anomaly("one", 9.0, 2, 0.011), Anomaly("two", 1.0, 3, 0.8)]
+    found = stage(unnamed, [0.3, 0.004], [1.1, -3.9]).anomaly
+    assert (found.where, found.statistic, found.p_value) == ("effect 1", pytest.approx(3.9**2), 0.012)
+    found = stage(unnamed, [0.3, 0.04], [1.1, -3.9]).anomaly
+    assert (found.where, found.statistic, found.p_value) == ("one", 9.0, pytest.approx(0.033))
+    assert stage(unnamed).anomaly.p_value == pytest.approx(0.022)
+
+
+def test_among_p_values_that_are_all_zero_the_strongest_counts():
+    unnamed = [Anomaly("one", 2000.0, 12, 0.0), Anomaly("two", 5000.0, 28, 0.0)]
+    assert stage(unnamed, [0.0, 0.0], [40.0, -60.0]).anomaly.where == "two"
+    assert stage(unnamed, [0.0, 0.0], [40.0, -90.0]).anomaly.where == "effect 1"

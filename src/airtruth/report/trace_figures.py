@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,7 @@ from scipy.stats import norm
 
 from airtruth.logs.atomic import make_folder, write_text
 from airtruth.report import style
+from airtruth.report.render import WIDTH
 from airtruth.report.trace_effect import contribution, draw_effect
 from airtruth.report.trace_table import error_csv, shown, stages
 from airtruth.report.trace_text import key, verdict
@@ -105,7 +107,7 @@ def page(found: Trace, seen: Sight) -> Figure:
         _contribution(axes[1, 1], found, seen)
         _stages(axes[2, 1], answer)
         figure.suptitle(
-            f"{verdict(answer)}\nRecord {seen.record.signals.run_id}, "
+            f"{textwrap.fill(verdict(answer), WIDTH)}\nRecord {seen.record.signals.run_id}, "
             f"{'held out' if found.case.held else 'fitted'}; shaded: two standard deviations of what gusts and sensors explain",
             fontsize=10.0,
         )

@@ -34,7 +34,7 @@ def as_trace_text(answer: Answer) -> str:
     """
     tolerances = tolerance_grid(answer)
     blocks = [
-        [verdict(answer), *textwrap.wrap(_freedom(answer), WIDTH)],
+        [*textwrap.wrap(verdict(answer), WIDTH), *textwrap.wrap(_freedom(answer), WIDTH)],
         *([effect_line(e), *effect_details(e)] for e in answer["effects"]),
         text(error_grid(answer)).rstrip("\n").splitlines(),
         *([text(tolerances).rstrip("\n").splitlines()] if tolerances else []),
@@ -51,18 +51,19 @@ def as_trace_text(answer: Answer) -> str:
 
 def verdict(answer: Answer) -> str:
     """The verdict in one sentence."""
-    anomaly, remaining, shown = answer["anomaly"], answer["remaining"], answer["shown_by"]
+    anomaly, remaining = (
+        _evidence(answer[which], answer.get("shown_by", {}).get(which)) for which in ("anomaly", "remaining")
+    )
     effects = answer["effects"]
     names = " and ".join(", ".join(key(e) for e in effects).rsplit(", ", 1))
     if answer["verdict"] == "none":
         said = (
-            f"None: the declared aircraft explains these records (p = {figures(anomaly['p_value'], 2)}); "
+            f"None: the declared aircraft explains these records (p = {figures(answer['anomaly']['p_value'], 2)}); "
             "no effect is missing that they could show."
         )
     elif answer["verdict"] == "unexplained":
         said = (
-            f"Unexplained: something is missing (p = {figures(anomaly['p_value'], 2)}; it shows in {shown['anomaly']}), "
-            "and no effect of the library passes every test."
+            f"Unexplained: something is missing ({anomaly}), and no effect of the library passes every test."
         )
     elif answer["verdict"] == "one_of":
         alike = sorted({name for e in effects for name in e["indistinguishable_from"]})
@@ -71,13 +72,13 @@ def verdict(answer: Answer) -> str:
         said = f"Traced: the declared aircraft lacks {names}."
     if answer["provisional"]:
         held = answer["records"]["held_out"]
-        why = (
-            f"a significant anomaly remains (p = {figures(remaining['p_value'], 2)}; it shows in {shown['remaining']})"
-            if held
-            else "no record was held out"
-        )
+        why = f"a significant anomaly remains ({remaining})" if held else "no record was held out"
         said += f" Provisional: {why}."
     return said
+
+
+def _evidence(found: Mapping[str, float], where: str | None) -> str:
+    return f"p = {figures(found['p_value'], 2)}" + (f"; it shows in {where}" if where else "")
 
 
 def key(entry: Mapping[str, Any]) -> str:

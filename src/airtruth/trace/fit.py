@@ -65,10 +65,12 @@ class Hypothesis:
     ----------
     declared : what aircraft.toml says of the sensors.
     effects : the effects; none is the null hypothesis.
+    freed : derivatives of whose value nothing is declared, besides those that the effects set free (`loosened`).
     """
 
     declared: Change
     effects: tuple[Effect, ...] = ()
+    freed: tuple[int, ...] = ()
 
     @cached_property
     def parameters(self) -> tuple[tuple[int, int], ...]:
@@ -96,30 +98,24 @@ class Hypothesis:
         ends = [self.effects[i].parameters[j].ends for i, j in self.parameters]
         return tuple(S + k for k, (low, high) in enumerate(ends) if low == high)
 
-    @cached_property
-    def loose(self) -> tuple[int, ...]:
-        """Derivatives of which the declared value says nothing beside the effects, see `loosened`."""
-        return tuple(sorted({i for e in self.effects for i in loosened(e)}))
-
     def plus(self, effect: Effect) -> Hypothesis:
         """The hypothesis with one effect more."""
         return replace(self, effects=(*self.effects, effect))
 
 
-def loosened(effect: Effect) -> tuple[int, ...]:
+def loosened(effect: Effect, trim_alpha_rad: float) -> tuple[int, ...]:
     """Derivatives whose declared value says nothing beside the effect.
 
-    A curvature about an angle of attack of zero is a slope at the trim besides, and a slope cannot be both what is
-    declared and that much more: which of the two the aircraft has is for the records to say.
+    A curvature about another angle of attack than the trim's is a slope at the trim besides, and that cannot be both
+    what is declared and so much more: which of the two the aircraft has is for the records to say.
     """
     change = effect.change({p.name: p.high for p in effect.parameters})
-    bent = {t.coefficient for t in change.aero if t.signal == "alpha" and t.shape == "quadratic"}
+    bent = {
+        t.coefficient
+        for t in change.aero
+        if t.signal == "alpha" and t.shape == "quadratic" and t.at != trim_alpha_rad
+    }
     return tuple(i for i, coefficient in ((0, "CL"), (3, "Cm")) if coefficient in bent)
-
-
-def freedoms(effect: Effect) -> int:
-    """Parameters that come with an effect: its own, and derivatives that it sets free."""
-    return len(effect.parameters) + len(loosened(effect))
 
 
 @dataclass(frozen=True)
@@ -184,7 +180,8 @@ class Fit:
     Attributes
     ----------
     hypothesis, point : what was fitted and where it ended.
-    cost : negative log-posterior, constants left out; likelihood : (records,) negative log-likelihood of each record.
+    cost : negative log-posterior, constants left out, so that it compares hypotheses whose derivatives are as free.
+    likelihood : (records,) negative log-likelihood of each record.
     tangents : of each record at ``point``.
     whitener : of the innovations.
     covariance : (13 + k, 13 + k) of shared parameters and sizes, local ones free.
@@ -216,9 +213,15 @@ class Problem:
         """Middle (10,) and precision (10, 10) of each record's own parameters."""
         return tuple(local_prior(record, self.settings) for record in self.records)
 
+    def loose(self, hypothesis: Hypothesis) -> tuple[int, ...]:
+        """Derivatives of whose value nothing is declared beside the hypothesis."""
+        trim = self.records[0].plant.trim_alpha_rad
+        free = (i for e in hypothesis.effects for i in loosened(e, trim))
+        return tuple(sorted({*hypothesis.freed, *free}))
+
     def shared_precision(self, hypothesis: Hypothesis) -> Array:
         """(13, 13) of the shared parameters about zero."""
-        return shared_prior(self.records[0], self.settings, hypothesis.loose)
+        return shared_prior(self.records[0], self.settings, self.loose(hypothesis))
 
     def each(self, function, arguments: Sequence[object]) -> list:  # type: ignore[no-untyped-def, type-arg]
         """The function of each argument, in order."""
@@ -559,7 +562,6 @@ __all__ = [
     "autoregression",
     "begin",
     "fit",
-    "freedoms",
     "loosened",
     "parts",
     "reduced",

@@ -218,23 +218,21 @@ def _linearised(
     """A (n, n), C (3, n), intensities (n,) [1/s] and variances (3,) of the motion in its gusts, sensors' lags and
     delays included.
     """
-    plant, s = record.plant, record.signals
     inner = CORE + sum(1 if kind == 0 else 2 for kind in low.state_index[:, 0])
     n = states(inner, low.lags, low.delays)
     a, c = np.empty((n, n)), np.empty((3, n))
-    v, density = float(s.airspeed_m_s.mean()), float(s.density_kg_m3.mean())
     x = np.zeros(n)
-    x[0] = float(s.y[:, 0].mean()) - plant.alpha_shift_rad
+    x[0], elevator, v, density, theta = inputs(record, low).reference.tolist()
     linear(
         x,
-        float(s.elevator_rad.mean()),
+        elevator,
         v,
         0.5 * density * v * v,
-        float(s.theta_rad.mean()) - plant.alpha_shift_rad,
+        theta,
         inner,
         low.lags,
         low.delays,
-        plane_of(plant, settings, low, shared, local, v),
+        plane_of(record.plant, settings, low, shared, local, v),
         low.arms,
         low.scales,
         a,

@@ -40,7 +40,7 @@ class Candidate:
     ----------
     score : what put it among the leading ones.
     found : its fit, all free.
-    gain : 2 log L gained over the null, less 2 per parameter beyond the first.
+    gain : 2 log L gained over the null with derivatives as free, less 2 per parameter beyond the first.
     likelihood_gain, free_run_gain : (records,) gains on records left out: log-likelihood; squared residual
         over what gusts and sensors explain. NaN where it was not judged.
     size, std : of the first parameter in its size coordinate.
@@ -153,7 +153,7 @@ def declared_probability(problem: Problem, found: Fit) -> float:
     mode is nearer to the prior than the likelihood's maximum, so the check is conservative.
     """
     off = found.point.shared[:_DERIVATIVES]
-    tight = [i for i in range(_DERIVATIVES) if i not in found.hypothesis.loose]
+    tight = [i for i in range(_DERIVATIVES) if i not in problem.loose(found.hypothesis)]
     declared = problem.records[0].plant.derivative_cov[np.ix_(tight, tight)]
     return float(chi2.sf(float(off[tight] @ np.linalg.solve(declared, off[tight])), len(tight)))
 

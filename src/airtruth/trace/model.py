@@ -46,6 +46,7 @@ GUST_LEVEL: Final = LOCAL.index("log_sigma_w")
 BOUNDS: Final = {SHARED.index("rotary"): (-0.75, 0.75), SHARED.index("rolloff"): (-0.75, 0.75)}
 """Shares of none to all, and a quarter beyond for what is no gust of either form."""
 _LOOSE_STD: Final = 10.0
+"""[1/rad] of a derivative in alpha of which nothing is declared: twice a lift slope."""
 _ROTARY_STD: Final = 0.5
 _ROLLOFF_STD: Final = 0.5
 S, L = len(SHARED), len(LOCAL)

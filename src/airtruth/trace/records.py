@@ -112,10 +112,10 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0) -> list[Signals]:
                 sub=sub,
                 y=np.ascontiguousarray(y, dtype=np.float64),
                 elevator_rad=_elevator(quiet, sub * FINE),
-                airspeed_m_s=_fine(_smooth(channels["airspeed_m_s"], dt), sub),
-                ground_m_s=_fine(_ground(channels, theta, dt), sub),
-                density_kg_m3=_fine(_smooth(density, dt), sub),
-                theta_rad=_fine(theta, sub),
+                airspeed_m_s=fine(_smooth(channels["airspeed_m_s"], dt), sub),
+                ground_m_s=fine(_ground(channels, theta, dt), sub),
+                density_kg_m3=fine(_smooth(density, dt), sub),
+                theta_rad=fine(theta, sub),
                 altitude_m=float(np.mean(altitude)),
                 elevator_std_rad=elevator_std_rad
                 * float(np.sqrt((quiet == channels["elevator_rad"]).mean())),
@@ -161,7 +161,8 @@ def _elevator(elevator: Array, sub: int) -> Array:
     return np.append(cells.ravel(), elevator[-1])
 
 
-def _fine(x: Array, sub: int) -> Array:
+def fine(x: Array, sub: int) -> Array:
+    """Samples on the filter's grid, linear in between."""
     return np.interp(np.arange((len(x) - 1) * sub + 1) / sub, np.arange(len(x)), x)
 
 

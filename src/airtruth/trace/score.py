@@ -269,7 +269,7 @@ def projected(
     # what is left after a projection of nearly everything is rounding, not information
     floor = 1e-8 * np.diag(information)[m:]
     small = np.diag(h) < floor
-    h[small], h[:, small] = 0.0, 0.0
+    g[small], h[small], h[:, small] = 0.0, 0.0, 0.0
     return g, h
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
 from airtruth.trace import score
-from airtruth.trace.fit import Fit, Hypothesis, Point, Problem, Whitener, autoregression, begin, fit, freedoms
+from airtruth.trace.fit import Fit, Hypothesis, Point, Problem, Whitener, autoregression, begin, fit
 from airtruth.trace.judge import (
     IMMATERIAL,
     IMPROBABLE,
@@ -50,6 +50,31 @@ TIE: Final = 6.0
 
 
 @dataclass(frozen=True)
+class Refit:
+    """An effect's refit beside the round's null.
+
+    Attributes
+    ----------
+    score, fit : what put it among the leading ones, and its fit, all free.
+    handicap : log-likelihood that the null gains by the mere freedom of derivatives that the effect sets free.
+    """
+
+    score: Score
+    fit: Fit
+    handicap: float
+
+    @property
+    def cost(self) -> float:
+        """Comparable between effects: one per parameter, none for freedom."""
+        return self.fit.cost + self.handicap + self.parameters
+
+    @property
+    def parameters(self) -> int:
+        """Of the effect."""
+        return len(self.score.effect.parameters)
+
+
+@dataclass(frozen=True)
 class Stage:
     """One round: the null of the round, the scores at it, and what was made of them.
 
@@ -81,10 +106,13 @@ class Stage:
         """
         seen = list(self.unnamed)
         if self.table.scores:
-            best = int(np.argmin(self.adjusted))
+            best = min(
+                range(len(self.adjusted)), key=lambda i: (self.adjusted[i], -abs(self.table.scores[i].z))
+            )
             s = self.table.scores[best]
             seen.append(Anomaly(s.effect.key, s.z**2, 1, float(self.adjusted[best])))
-        least = min(seen, key=lambda a: a.p_value)
+        # of p-values that are all zero the one whose chi-square is farthest out, by R. A. Fisher's sqrt(2 x)
+        least = min(seen, key=lambda a: (a.p_value, np.sqrt(2.0 * a.degrees) - np.sqrt(2.0 * a.statistic)))
         return replace(least, p_value=min(1.0, len(seen) * least.p_value))
 
 
@@ -161,7 +189,7 @@ def _gls(problem: Problem, null: Fit, whitener: Whitener) -> Fit:
 
 def _refitted(
     problem: Problem, null: Fit, table: Table, significant: NDArray[np.bool_], advance: Callable[[str], None]
-) -> list[tuple[Score, Fit]]:
+) -> list[Refit]:
     """Full refits of the leading effects, best first; none where no score is significant."""
     if not significant.any():
         return []
@@ -171,56 +199,65 @@ def _refitted(
     order = [int(i) for i in np.argsort(-white, kind="stable")[: LEADING - 2] if white[i] > _VISIBLE]
     by_score = np.argsort([-abs(s.z) for s in table.scores], kind="stable")
     order += [int(i) for i in by_score if int(i) not in order and significant[i]][: LEADING - len(order)]
-    fits: list[tuple[Score, Fit]] = []
+    fits: list[Refit] = []
     for i in order:
         s = table.scores[i]
         advance(f"refit {s.effect.key}")
-        found = _refit(problem, null, s, table.white_sizes[i], min((f.cost for _, f in fits), default=np.inf))
+        rival = min((r.fit.cost for r in fits), default=np.inf)
+        found = _refit(problem, null, s, table.white_sizes[i], rival)
         if found is not None:
-            fits.append((s, found))
+            fits.append(Refit(s, found, _handicap(problem, null, s.effect)))
     for _ in range(_PATIENCE):  # the leader at least has to arrive
-        fits.sort(key=lambda f: f[1].cost + freedoms(f[0].effect))
-        if not fits or fits[0][1].converged:
+        fits.sort(key=lambda r: r.cost)
+        if not fits or fits[0].fit.converged:
             break
-        s, found = fits[0]
-        fits[0] = (s, fit(problem, found.hypothesis, found.point) or found)
-    return sorted(fits, key=lambda f: f[1].cost + freedoms(f[0].effect))
+        first = fits[0].fit
+        fits[0] = replace(fits[0], fit=fit(problem, first.hypothesis, first.point) or first)
+    return sorted(fits, key=lambda r: r.cost)
 
 
-def _better_null(problem: Problem, null: Fit, fits: Sequence[tuple[Score, Fit]]) -> Fit | None:
+def _handicap(problem: Problem, null: Fit, effect: Effect) -> float:
+    free = problem.loose(null.hypothesis.plus(effect))
+    if free == problem.loose(null.hypothesis):
+        return 0.0
+    freed = fit(problem, replace(null.hypothesis, freed=free), null.point)
+    return 0.0 if freed is None else max(null.cost - freed.cost, 0.0)
+
+
+def _better_null(problem: Problem, null: Fit, fits: Sequence[Refit]) -> Fit | None:
     """The null fitted again from where the best candidate ended, if that is a better optimum of it."""
     if not fits:
         return None
-    best = fits[0][1]
+    best = fits[0].fit
     begin_there = replace(best.point, sizes=best.point.sizes[: len(null.point.sizes)])
     again = fit(problem, null.hypothesis, begin_there, iterations=20)
     return again if again is not None and again.cost < null.cost - _BETTER else None
 
 
-def _judged(
-    problem: Problem, null: Fit, fits: Sequence[tuple[Score, Fit]], least: float
-) -> tuple[Candidate, ...]:
+def _judged(problem: Problem, null: Fit, fits: Sequence[Refit], least: float) -> tuple[Candidate, ...]:
     """Gains, those near the best compared under one autoregression, and the rules for those that lead."""
     if not fits:
         return ()
-    gains = {s.effect.key: 2.0 * (null.cost - f.cost) - 2.0 * (freedoms(s.effect) - 1) for s, f in fits}
-    near = [(s, f) for s, f in fits if f.cost - fits[0][1].cost < _NEAR]
-    whitener = autoregression(fits[0][1].tangents)
+    best = fits[0].fit
+    gains = {r.score.effect.key: 2.0 * (null.cost + 1.0 - r.cost) for r in fits}
+    near = [r for r in fits if r.fit.cost - best.cost < _NEAR]
+    whitener = autoregression(best.tangents)
     if whitener.coefficients.shape[0] and len(near) > 1:
         costs = {
-            s.effect.key: _whitened(problem, f, whitener, fits[0][1]) + freedoms(s.effect) for s, f in near
+            r.score.effect.key: _whitened(problem, r.fit, whitener, best) + r.handicap + r.parameters
+            for r in near
         }
         top, lowest = max(gains[key] for key in costs), min(costs.values())
         gains |= {key: top - 2.0 * (cost - lowest) for key, cost in costs.items()}
-    ranked = sorted(((gains[s.effect.key], s, f) for s, f in fits), key=lambda r: -r[0])
+    ranked = sorted(((gains[r.score.effect.key], r) for r in fits), key=lambda g: -g[0])
     reference = reference_of(problem, null)
     judged: list[Candidate] = []
     accepted = -np.inf
-    for gain, s, f in ranked:
+    for gain, r in ranked:
         if gain < accepted - TIE:
-            judged.append(outdone(s, f, gain))
+            judged.append(outdone(r.score, r.fit, gain))
             continue
-        candidate = judge(problem, s, f, gain, reference, least)
+        candidate = judge(problem, r.score, r.fit, gain, reference, least)
         judged.append(candidate)
         if not np.isfinite(accepted) and set(candidate.reasons) <= {IMMATERIAL, UNCONVERGED}:
             accepted = gain  # what explains less than an immaterial effect is not the cause either

@@ -22,7 +22,7 @@ from scipy.stats import chi2
 from airtruth.trace.fit import Fit, Problem, Whitener
 from airtruth.trace.lower import CHANNELS
 from airtruth.trace.model import External, Response, answered, inputs
-from airtruth.trace.records import Record, nodes
+from airtruth.trace.records import Record, fine, nodes
 from airtruth.trace.score import inserted, projected
 from airtruth.trace.surface import play
 
@@ -31,16 +31,21 @@ Array = NDArray[np.float64]
 LIFT, MOMENT, ALPHA, Q = range(4)
 """Where a series enters."""
 _UNIT: Final = (1e-3, 1e-4, 1e-4, 1e-4)
+"""Amounts [-, -, rad, rad/s] of the differences that give derivatives: small against noise, large against rounding."""
 _BASIS: Final = 5
 _POLE_RAD_S: Final = 6.0
+"""About the short period of a transport's model; five functions then reach from 0.2 to 2 Hz."""
 _HINGES: Final = 6
 _MEMORY_S: Final = 0.05
 """Of the low-pass that takes the scatter out of the rate of the predicted angle of attack."""
 _TURN: Final = 0.5
 """Share of the rate's standard deviation over which its sign turns."""
 _PLAYS: Final = (0.1, 0.25)
-_FRICTIONS: Final = (0.02, 0.06, 0.15)
 """Half widths over the range of the angle of attack."""
+_FRICTIONS: Final = (0.02, 0.06, 0.15)
+"""The same of a vane."""
+_APART: Final = 1e-3
+"""Least eigenvalue, over the largest, of directions that count as different; the answers to an elevator overlap."""
 _BAND_HZ: Final = 0.5
 _LOWEST_HZ: Final = 1.0
 """Below, the level of the gusts, the biases and a sensor's coloured noise have freedoms of their own."""
@@ -69,13 +74,14 @@ class View:
 
     Attributes
     ----------
-    elevator_rad : (points,) on the filter's grid.
+    elevator_rad : (points,) on the filter's grid, from the record's first value; largest_rad : over all records.
     alpha_rad, rate_rad_s : (samples,) predicted angle of attack, and its rate behind a low-pass.
     low_rad, high_rad, rate_std_rad_s : range and spread over all records.
     dt_s, sub : sample period [s]; cells of the filter's grid per sample.
     """
 
     elevator_rad: Array
+    largest_rad: float
     alpha_rad: Array
     rate_rad_s: Array
     low_rad: float
@@ -114,30 +120,35 @@ def anomalies(null: Fit, problem: Problem, whitener: Whitener) -> tuple[Anomaly,
         span = slice(at, at + len(series))
         at += len(series)
         found.append(Anomaly(name, *chi_square(gradient[span], information[span, span])))
-    residuals = [whitener.apply(t.r) for t in null.tangents]
-    return (*found, lines(residuals, [r.signals.dt_s for r in problem.records]))
+    return (*found, lines([t.r for t in null.tangents], [r.signals.dt_s for r in problem.records]))
 
 
 def chi_square(gradient: Array, information: Array) -> tuple[float, int, float]:
     """Statistic g' I^-1 g over the directions that can be told apart, their number, and the p-value; 1 of none."""
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    kept = values > 1e-3 * max(values.max(), 1e-3)
-    if not kept.any():
+    known = np.diag(information) > 0.0
+    if not known.any():
         return 0.0, 0, 1.0
+    gradient, information = gradient[known], information[np.ix_(known, known)]
+    scale = np.sqrt(np.diag(information))
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    kept = values > _APART * values.max()
     amounts = (vectors.T @ (gradient / scale))[kept] / np.sqrt(values[kept])
     statistic, degrees = float(amounts @ amounts), int(kept.sum())
     return statistic, degrees, float(chi2.sf(statistic, degrees))
 
 
 def lines(residuals: Sequence[Array], dt_s: Sequence[float]) -> Anomaly:
-    """Whether innovations have more power in a band than white ones: a lightly damped mode rings in one.
+    """Whether innovations have more power in a band than they should: a lightly damped mode rings in one.
+
+    Each channel is whitened by an autoregression of first order, which takes up the colour of a sensor's noise and
+    cannot take up a mode: one of more orders and channels would.
 
     Parameters
     ----------
-    residuals : of each record (samples, 3), white under the null.
+    residuals : of each record (samples, 3).
     dt_s : of each record [s].
     """
+    residuals = _whitened(residuals)
     top = 0.5 / max(dt_s)
     edges = np.arange(_LOWEST_HZ, top + 1e-9, _BAND_HZ)
     bands = max(len(edges) - 1, 0)
@@ -165,8 +176,22 @@ def lines(residuals: Sequence[Array], dt_s: Sequence[float]) -> Anomaly:
     )
 
 
+def _whitened(residuals: Sequence[Array]) -> list[Array]:
+    """Residuals behind a first-order autoregression of each channel, the same for all records."""
+    product = sum((r[1:] * r[:-1]).sum(axis=0) for r in residuals)
+    square = sum((r[:-1] ** 2).sum(axis=0) for r in residuals)
+    pole = product / np.maximum(square, 1e-300)
+    return [
+        np.concatenate([r[:1] * np.sqrt(np.maximum(1.0 - pole**2, 0.0)), r[1:] - pole * r[:-1]])
+        for r in residuals
+    ]
+
+
 def _views(null: Fit, problem: Problem) -> list[View]:
     change = null.hypothesis.change(null.point.sizes)
+    elevators = [nodes(r.signals.elevator_rad) for r in problem.records]
+    elevators = [e - e[0] for e in elevators]
+    largest = max(float(np.abs(e).max()) for e in elevators)
     predicted, rates = [], []
     for record, tangent in zip(problem.records, null.tangents, strict=True):
         y = inputs(record, change).y
@@ -176,7 +201,8 @@ def _views(null: Fit, problem: Problem) -> list[View]:
     spread = max(float(np.std(np.concatenate(rates))), 1e-9)
     return [
         View(
-            elevator_rad=nodes(record.signals.elevator_rad),
+            elevator_rad=elevator,
+            largest_rad=max(largest, 1e-9),
             alpha_rad=alpha,
             rate_rad_s=rate,
             low_rad=float(low),
@@ -185,7 +211,7 @@ def _views(null: Fit, problem: Problem) -> list[View]:
             dt_s=record.signals.dt_s,
             sub=record.signals.sub,
         )
-        for record, alpha, rate in zip(problem.records, predicted, rates, strict=True)
+        for record, elevator, alpha, rate in zip(problem.records, elevators, predicted, rates, strict=True)
     ]
 
 
@@ -195,21 +221,16 @@ def _rate(x: Array, dt_s: float) -> Array:
     return np.asarray(np.diff(smooth, prepend=0.0) / dt_s)
 
 
-def _fine(x: Array, sub: int) -> Array:
-    return np.interp(np.arange((len(x) - 1) * sub + 1) / sub, np.arange(len(x)), x)
-
-
 def _elevator(view: View) -> Series:
     """Unknown responses of lift, moment, alpha and q to the elevator: Laguerre functions, so that memory is seen, the
     square and the square of its first filter, so that curvature is.
     """
-    de = view.elevator_rad - view.elevator_rad[0]
+    de = view.elevator_rad / view.largest_rad
     pole = np.exp(-_POLE_RAD_S * view.dt_s / view.sub)
-    size = max(float(np.abs(de).max()), 1e-9)
-    basis = [lfilter([1.0 - pole], [1.0, -pole], de / size)]
+    basis = [lfilter([1.0 - pole], [1.0, -pole], de)]
     for _ in range(_BASIS - 1):
         basis.append(lfilter([-pole, 1.0], [1.0, -pole], basis[-1]))
-    basis += [(de / size) ** 2, basis[0] ** 2]
+    basis += [de**2, basis[0] ** 2]
     return [
         (entry, b if entry < ALPHA else b[:: view.sub]) for entry in (LIFT, MOMENT, ALPHA, Q) for b in basis
     ]
@@ -219,7 +240,7 @@ def _static(view: View) -> Series:
     """Lift and moment as any function of the angle of attack: a slope that changes at each of several hinges."""
     hinges = np.linspace(view.low_rad, view.high_rad, _HINGES + 2)[1:-1]
     return [
-        (entry, _fine(np.maximum(0.0, view.alpha_rad - at), view.sub))
+        (entry, fine(np.maximum(0.0, view.alpha_rad - at), view.sub))
         for entry in (LIFT, MOMENT)
         for at in hinges
     ]
@@ -233,7 +254,7 @@ def _history(view: View) -> Series:
     sign = np.tanh(rate / _TURN)
     shapes = [sign, sign * middle, rate * middle, np.abs(rate)]
     shapes += [play(view.alpha_rad, half * span) / span for half in _PLAYS]
-    return [(entry, _fine(s - s[0], view.sub)) for entry in (LIFT, MOMENT) for s in shapes]
+    return [(entry, fine(s - s[0], view.sub)) for entry in (LIFT, MOMENT) for s in shapes]
 
 
 def _vane(view: View) -> Series:
