@@ -113,8 +113,8 @@ def table(null: Fit, problem: Problem, effects: Sequence[Effect], whitener: Whit
 
     extended = problem.each(one, range(len(problem.records)))
     k = len(null.point.sizes)
-    gradient, information = projected(null, problem, extended, whitener, k, len(tried))
-    plain = projected(null, problem, extended, NO_WHITENER, k, len(tried), levels=True)
+    gradient, information = _with_freedoms(null, problem, extended, whitener, k, tried)
+    plain = _with_freedoms(null, problem, extended, NO_WHITENER, k, tried, levels=True)
     rng = np.random.default_rng([seed, len(tried), 7])
     scores, white, white_sizes = [], [], []
     at = 0
@@ -242,6 +242,29 @@ def inserted(base: Tangent, k: int, t: Array, w: Array) -> Tangent:
         np.concatenate([base.w[:at], w, base.w[at:]]),
         base.white,
     )
+
+
+def _with_freedoms(
+    null: Fit,
+    problem: Problem,
+    tangents: Sequence[Tangent],
+    whitener: Whitener,
+    k: int,
+    tried: Sequence[Direction],
+    levels: bool = False,
+) -> tuple[Array, Array]:
+    """`projected`, each direction beside derivatives as free as its effect sets them."""
+    count = len(tried)
+    gradient, information = projected(null, problem, tangents, whitener, k, count, levels)
+    kept = problem.loose(null.hypothesis)
+    freedoms = [problem.loose(null.hypothesis.plus(d.effect)) for d in tried]
+    for free in sorted({f for f in freedoms if f != kept}):
+        rows = [i for i, f in enumerate(freedoms) if f == free]
+        freed = replace(null, hypothesis=replace(null.hypothesis, freed=free))
+        g, h = projected(freed, problem, tangents, whitener, k, count, levels)
+        gradient[rows] = g[rows]
+        information[rows], information[:, rows] = h[rows], h[:, rows]
+    return gradient, information
 
 
 def projected(
