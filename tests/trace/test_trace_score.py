@@ -7,7 +7,7 @@ import pytest
 import trace_records as tr
 from scipy.stats import norm
 
-from airtruth.effects.change import Change
+from airtruth.effects.change import AeroTerm, Change
 from airtruth.effects.library import EFFECTS
 from airtruth.trace.fit import NO_WHITENER, autoregression, begin, fit
 from airtruth.trace.model import respond
@@ -229,3 +229,27 @@ def test_nothing_is_scored_that_the_records_do_not_excite():
     problem, null = changed(51, Change())
     silent = replace(EFFECTS["gyro_lag"], describe=lambda values: Change())
     assert table(null, problem, [silent], NO_WHITENER, 0).scores == ()
+
+
+def test_the_score_of_a_curvature_is_that_of_a_refit_beside_a_free_slope():
+    """At a trim of 0.1 rad, 5 (alpha - 0.1)^2 of lift: z^2 is 2 log L over a null that is as free, the likelihood's own
+    curvature a tenth. Beside the declared slope, four of its standard deviations off, it would be half.
+    """
+    rng = np.random.default_rng(92)
+    bent = Change(aero=(AeroTerm("CL", "alpha", "quadratic", 5.0, 0.1),))
+    plant = tr.plant()
+    plant = replace(plant, alpha_rad=plant.alpha_rad + 0.1, trim_alpha_rad=0.1)
+    shared, local = tr.still()
+    local[0] = 0.1
+    made = tr.fly(rng, amplitude=1.5 * DEG)
+    made = Record(replace(made.signals, theta_rad=np.full_like(made.signals.theta_rad, 0.1)), plant)
+    y = made.signals.y - respond(made, tr.SETTINGS, bent, shared, local, free_run=True).e
+    y += tr.SETTINGS.noise * rng.standard_normal(y.shape)
+    problem = tr.problem([replace(made, signals=replace(made.signals, y=y))])
+    curvature = EFFECTS["cl_alpha_nonlinear:quadratic"]
+    null = fit(problem, tr.NOTHING, begin(problem, tr.NOTHING))
+    (score,) = table(null, problem, [curvature], NO_WHITENER, 0).scores
+    freed = fit(problem, replace(tr.NOTHING, freed=(0,)), null.point)
+    found = fit(problem, tr.NOTHING.plus(curvature), replace(null.point, sizes=np.array([score.size])))
+    assert score.z > 4.0
+    assert score.z**2 == pytest.approx(2.0 * (freed.cost - found.cost), rel=0.1)
