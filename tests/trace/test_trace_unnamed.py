@@ -95,9 +95,9 @@ def test_a_ringing_channel_is_found_where_it_rings():
     assert found.statistic == pytest.approx(2.0 * power.sum() / np.mean(x**2), rel=1e-9)
 
 
-@pytest.mark.parametrize("size", [1.0, 4.0])
+@pytest.mark.parametrize("size", [1.0, 4.0, 100.0])
 def test_a_strong_mode_is_not_taken_for_colour(size):
-    """A mode of 7 Hz, 2 % damped, as strong as the noise and four times: an autoregression of order 4 takes it up."""
+    """A mode of 7 Hz, 2 % damped, as strong as the noise, four and a hundred times: an autoregression of order 4 takes it up."""
     rng = np.random.default_rng(13)
     pole = np.exp((-0.02 + 1j) * 2.0 * np.pi * 7.0 * 0.02)
     records = []

@@ -234,6 +234,7 @@ def _with(null: Fit, problem: Problem, index: int, tried: Sequence[Direction]) -
 
 
 def inserted(base: Tangent, k: int, t: Array, w: Array) -> Tangent:
+    """A tangent with further directions after the ``k`` sizes: t (directions, samples, 3), w (directions, 3, 3)."""
     at = S + k
     return Tangent(
         base.r,

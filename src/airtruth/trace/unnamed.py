@@ -166,7 +166,9 @@ def lines(residuals: Sequence[Array], dt_s: Sequence[float]) -> Anomaly:
         return Anomaly(CHANNELS[0], 0.0, 1, 1.0)
     p = np.ones_like(power)
     p[seen] = chi2.sf(power[seen], degrees[seen][:, None])
-    b, channel = divmod(int(np.argmin(p)), p.shape[1])
+    excess = np.sqrt(2.0 * power) - np.sqrt(2.0 * degrees)[:, None]
+    # of bands whose p-values are all zero the one with the most power
+    b, channel = divmod(int(np.lexsort((-excess.ravel(), p.ravel()))[0]), p.shape[1])
     where = f"{CHANNELS[channel]} at {edges[b]:.1f} to {edges[b + 1]:.1f} Hz"
     return Anomaly(
         where,
