@@ -1,6 +1,6 @@
 """Tests that name no effect: whether anything is missing, whatever it is.
 
-Four families of directions, each a chi-square with every nuisance eliminated, and one of the spectrum. A direction
+Five families of directions, each a chi-square with every nuisance eliminated, and one of the spectrum. A direction
 is a series added to CL, Cm or an output. Series of the motion are made of predicted outputs: a prediction does not
 contain the noise of its own sample, so that under the null the scores are those of a martingale.
 
@@ -240,12 +240,18 @@ def _elevator(view: View) -> Series:
 
 def _static(view: View) -> Series:
     """Lift and moment as any function of the angle of attack: a slope that changes at each of several hinges."""
-    hinges = np.linspace(view.low_rad, view.high_rad, _HINGES + 2)[1:-1]
-    return [
-        (entry, fine(np.maximum(0.0, view.alpha_rad - at), view.sub))
-        for entry in (LIFT, MOMENT)
-        for at in hinges
-    ]
+    shapes = [fine(s, view.sub) for s in _bends(view.alpha_rad, view.low_rad, view.high_rad)]
+    return [(entry, s) for entry in (LIFT, MOMENT) for s in shapes]
+
+
+def _surface(view: View) -> Series:
+    """Lift and moment as any function of the deflection, likewise."""
+    shapes = _bends(view.elevator_rad / view.largest_rad, -1.0, 1.0)
+    return [(entry, s) for entry in (LIFT, MOMENT) for s in shapes]
+
+
+def _bends(x: Array, low: float, high: float) -> list[Array]:
+    return [np.maximum(0.0, x - at) for at in np.linspace(low, high, _HINGES + 2)[1:-1]]
 
 
 def _history(view: View) -> Series:
@@ -282,6 +288,9 @@ FAMILIES: Final = {
     ),
     "lift or moment over the angle of attack": Family(
         _static, "sweep the angle of attack slowly through the same range, at two airspeeds."
+    ),
+    "lift or moment over the deflection": Family(
+        _surface, "repeat the manoeuvre in both signs and at several amplitudes of the elevator."
     ),
     "lift or moment by the history of the angle of attack": Family(
         _history, "sweep the same range of angles of attack up and down, at two rates."
