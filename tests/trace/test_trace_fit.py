@@ -21,7 +21,18 @@ from airtruth.trace.fit import (
     parts,
     tangent,
 )
-from airtruth.trace.model import LOCAL, LOCAL_STEP, SHARED, SHARED_STEP, L, S, respond, shared_prior
+from airtruth.trace.model import (
+    COLOUR,
+    LOCAL,
+    LOCAL_STEP,
+    SHARED,
+    SHARED_STEP,
+    L,
+    S,
+    local_prior,
+    respond,
+    shared_prior,
+)
 from airtruth.trace.records import Record
 from airtruth.units import DEG
 
@@ -37,12 +48,13 @@ MORE = np.array([0.15, -4.0, 0.03, -0.06, 3.0, 0.07])
 @pytest.fixture(scope="module")
 def off_optimum():
     """A record, and a point some standard errors from everything that explains it."""
-    problem = tr.problem([tr.fly(np.random.default_rng(1), samples=150)])
+    settings = replace(tr.SETTINGS, coloured=True)
+    problem = tr.problem([tr.fly(np.random.default_rng(1), samples=150)], settings=settings)
     point = tr.point(problem.records, [0.012, 0.2])
     shared, local = point.shared.copy(), point.local.copy()
     shared[:6] = 0.5 * MORE
     shared[6:9] = [0.05, -0.08, 0.03]
-    shared[9:] = [0.3, 0.1, -0.2, 0.03]
+    shared[9:] = [0.3, 0.1, -0.2, 0.03, 0.2, 0.4, 0.1, -0.3]
     local[0] += [0.001, 0.01, 0.3, -0.2, 0.002, 0.003, 0.02, 0.003, -0.0004, 0.2]
     return problem, Point(shared, local, point.sizes)
 
@@ -270,15 +282,17 @@ def test_precision_without_a_declared_slope():
     np.testing.assert_allclose(free, tight + more, rtol=1e-6, atol=1e-9)
 
 
-def test_a_curvature_about_another_angle_is_found_beside_a_declared_slope():
-    """CL += 10 (alpha - 0.1)^2 is 10 alpha^2 - 2 alpha + 0.1: a slope of -2 that nobody declared, eight standard
-    deviations of its prior."""
+@pytest.mark.parametrize(("about", "slope"), [(0.1, 0.0), (0.0, 2.0)])
+def test_a_curvature_is_found_whatever_angle_it_is_about(about, slope):
+    """At a trim of 0.1 rad 10 alpha^2 is 10 (alpha - 0.1)^2 and a slope of 2 that nobody declared, eight standard
+    deviations of its prior; its constant of 0.1 is trimmed out.
+    """
     rng = np.random.default_rng(81)
-    bent = Change(aero=(AeroTerm("CL", "alpha", "quadratic", 10.0, 0.1),))
+    bent = Change(aero=(AeroTerm("CL", "alpha", "quadratic", 10.0, about),))
     plant = tr.plant()
     plant = replace(plant, alpha_rad=plant.alpha_rad + 0.1, trim_alpha_rad=0.1)
     shared, local = tr.still()
-    local[0] = 0.1
+    local[0], local[7] = 0.1, -10.0 * (0.1 - about) ** 2
     records = []
     for amplitude in (3.0, -3.0, 2.0):
         made = tr.fly(rng, amplitude=amplitude * DEG, name=str(amplitude))
@@ -287,11 +301,67 @@ def test_a_curvature_about_another_angle_is_found_beside_a_declared_slope():
         y += tr.SETTINGS.noise * rng.standard_normal(y.shape)
         records.append(replace(made, signals=replace(made.signals, y=y)))
     problem = tr.problem(records)
-    hypothesis = tr.NOTHING.plus(EFFECTS["cl_alpha_nonlinear:quadratic"])
-    assert problem.loose(hypothesis) == (0,)
-    null = fit(problem, tr.NOTHING, begin(problem, tr.NOTHING))
+    declared = replace(tr.NOTHING, trim_alpha_rad=0.1)
+    hypothesis = declared.plus(EFFECTS["cl_alpha_nonlinear:quadratic"])
+    assert hypothesis.loose == (0,)
+    null = fit(problem, declared, begin(problem, declared))
     found = fit(problem, hypothesis, replace(null.point, sizes=np.array([5.0])))
     std = np.sqrt(np.diag(found.covariance))
     assert abs(found.point.sizes[0] - 10.0) < 3.0 * std[S]
     assert std[S] < 1.5
-    assert abs(found.point.shared[0] + 2.0) < 3.0 * std[0]
+    assert abs(found.point.shared[0] - slope) < 3.0 * std[0]
+
+
+def test_a_curvature_counts_from_the_trim():
+    """alpha^2 and (alpha - 0.1)^2 differ by a line, which the derivatives carry; a break stays where it is."""
+    about_zero = EFFECTS["cm_alpha_nonlinear:quadratic"]
+    kink = EFFECTS["cm_alpha_nonlinear:break"]
+    hypothesis = Hypothesis(Change(), (about_zero, kink), trim_alpha_rad=0.1)
+    terms = hypothesis.change(np.array([3.0, 0.5, 0.02])).aero
+    assert [(t.shape, t.at) for t in terms] == [("quadratic", 0.1), ("above", 0.02)]
+
+
+def test_a_loose_coefficient_has_a_wide_offset():
+    """Of the coefficient that a curvature bends alone: 0.5 for what is declared as 0.1 and 0.03."""
+    made = tr.fly(np.random.default_rng(82))
+    std = {
+        loose: np.sqrt(np.diag(np.linalg.inv(local_prior(made, tr.SETTINGS, loose)[1])))[7:9]
+        for loose in ((), (0,), (3,))
+    }
+    np.testing.assert_allclose(std[()], [0.1, 0.03])
+    np.testing.assert_allclose(std[(0,)], [0.5, 0.03])
+    np.testing.assert_allclose(std[(3,)], [0.1, 0.5])
+
+
+# -- slow noise
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5])
+def test_slow_noise_is_told_from_white(share):
+    """Half of every sensor's variance over 80 ms, or none; three standard errors. Of none no time can be told."""
+    rng = np.random.default_rng(83)
+    records = [
+        tr.fly(rng, sigma_w=0.1, amplitude=a * DEG, name=str(a), slow_share=share) for a in (2.0, -2.0, 3.0)
+    ]
+    problem = tr.problem(records, settings=replace(tr.SETTINGS, coloured=True))
+    start = begin(problem, tr.NOTHING)
+    shared = start.shared.copy()
+    shared[list(COLOUR[:3])] = 0.2
+    found = fit(problem, tr.NOTHING, replace(start, shared=shared))
+    std = np.sqrt(np.diag(found.covariance))
+    at = list(COLOUR[:3])
+    if share == 0.0:
+        assert (found.point.shared[at] < 0.1).all()
+        return
+    assert found.converged
+    assert (np.abs(found.point.shared[at] - share) < 3.0 * std[at]).all()
+    assert abs(found.point.shared[COLOUR[3]] - np.log(0.08 / 0.1)) < 3.0 * std[COLOUR[3]]
+    assert (std[at] < 0.2).all()
+
+
+def test_white_records_know_no_slow_noise():
+    """Its shares are no parameters then: they stay at none, and no derivative is made for them."""
+    problem = tr.problem([tr.fly(np.random.default_rng(84))])
+    found = fit(problem, tr.NOTHING, begin(problem, tr.NOTHING))
+    np.testing.assert_array_equal(found.point.shared[list(COLOUR)], 0.0)
+    np.testing.assert_array_equal(found.tangents[0].t[list(COLOUR)], 0.0)

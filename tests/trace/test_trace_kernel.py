@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import trace_records as tr
 from scipy.integrate import solve_ivp
-from scipy.linalg import expm, solve_discrete_are
+from scipy.linalg import block_diag, expm, solve_discrete_are
 
 from airtruth.effects.change import AeroTerm, Change, DeclaredTerm, SensorTerm, StateTerm
 from airtruth.effects.library import EFFECTS
 from airtruth.trace import kernel
 from airtruth.trace.lower import lower
-from airtruth.trace.model import SHARED, respond, shared_prior
+from airtruth.trace.model import COLOUR, SHARED, respond, shared_prior
 from airtruth.trace.plant import Plant
 from airtruth.units import DEG, G0
 
@@ -389,12 +389,18 @@ def test_lagging_sensors(lag):
 # -- gain and linearisation
 
 
-def linearised(change=None, lags=None, sigma_w=0.3, delays=None):
+WHITE = np.array([0.0, 0.0, 0.0, 0.1])
+SLOW = np.array([0.7 * tr.SETTINGS.noise[0], 0.0, 0.5 * tr.SETTINGS.noise[2], 0.08])
+"""Standard deviations of the sensors' slow noise, and its correlation time [s]."""
+
+
+def linearised(change=None, lags=None, sigma_w=0.3, delays=None, colour=WHITE):
     low = lower(change or Change())
     motion = kernel.CORE + sum(1 if k == 0 else 2 for k in low.state_index[:, 0])
     lags = np.zeros(3) if lags is None else lags
     delays = np.zeros(3) if delays is None else delays
     n = motion + int((lags > 0.0).sum()) + kernel.DELAY * int((delays > 0.0).sum())
+    n += 3 if colour[:3].any() else 0
     a, c = np.empty((n, n)), np.empty((3, n))
     shared, local = tr.still()
     local[9] = np.log(sigma_w)
@@ -408,6 +414,7 @@ def linearised(change=None, lags=None, sigma_w=0.3, delays=None):
         motion,
         lags,
         delays,
+        colour,
         plane,
         low.arms,
         low.scales,
@@ -437,14 +444,19 @@ def test_linearisation_of_lagging_sensors():
 
 
 @pytest.mark.parametrize("sigma_w", [0.05, 0.3, 2.0])
+@pytest.mark.parametrize("colour", [WHITE, SLOW])
 @pytest.mark.parametrize("delays", [np.zeros(3), np.array([0.01, 0.03, 0.0])])
-def test_steady_gain_solves_the_riccati_equation(sigma_w, delays):
-    """K, S and the whitener against scipy's DARE with Van Loan's noise covariance; delays are states of their own."""
-    a, c, plane = linearised(sigma_w=sigma_w, delays=delays)
+def test_steady_gain_solves_the_riccati_equation(sigma_w, delays, colour):
+    """K, S and the whitener against scipy's DARE with Van Loan's noise covariance; delays and slow noise are states of
+    their own.
+    """
+    a, c, plane = linearised(sigma_w=sigma_w, delays=delays, colour=colour)
     variance = tr.SETTINGS.noise**2
-    k_gain, white, s, logdet = kernel.gain(a, c, tr.V, plane[0], variance, tr.DT)
+    k_gain, white, s, logdet = kernel.gain(a, c, tr.V, plane[0], variance, colour, tr.DT)
     drive = np.zeros(len(a))
     drive[2] = 2.0 * tr.V / tr.LENGTH_W
+    if colour is SLOW:
+        drive[-3:] = 2.0 / 0.08
     q = tr.noise_step(a, tr.DT, drive)
     p = solve_discrete_are(expm(a * tr.DT).T, c.T, q + 1e-18 * np.eye(len(a)), np.diag(variance))
     expected = c @ p @ c.T + np.diag(variance)
@@ -456,6 +468,15 @@ def test_steady_gain_solves_the_riccati_equation(sigma_w, delays):
     np.testing.assert_allclose(k_gain / scale, expected_gain / scale, atol=1e-5)
     np.testing.assert_allclose(white @ s @ white.T, np.eye(3), atol=1e-12)
     assert logdet == pytest.approx(np.linalg.slogdet(s)[1], rel=1e-12)
+
+
+def test_linearisation_of_slow_noise():
+    """Three states of their own behind the motion's and the sensors'."""
+    lags = np.array([0.05, 0.0, 0.0])
+    a, c, _ = linearised(lags=lags, colour=SLOW)
+    plain_a, plain_c, _ = linearised(lags=lags)
+    np.testing.assert_array_equal(a, block_diag(plain_a, -12.5 * np.eye(3)))
+    np.testing.assert_array_equal(c, np.hstack([plain_c, np.diag(SLOW[:3])]))
 
 
 def test_linearisation_of_late_sensors():
@@ -493,19 +514,27 @@ def test_a_delay_is_pade_s_approximant():
     np.testing.assert_allclose(np.sort_complex(poles), np.sort_complex(roots), rtol=1e-8)
 
 
-def test_innovations_are_those_of_the_steady_kalman_filter():
-    """A noisy record through x+ = phi x + ..., x <- x + K e with the DARE's gain."""
+@pytest.mark.parametrize("shares", [(0.0, 0.0, 0.0), (0.5, 0.0, 0.3)])
+def test_innovations_are_those_of_the_steady_kalman_filter(shares):
+    """A noisy record through x+ = phi x + ..., x <- x + K e with the DARE's gain, slow noise among the states."""
     rng = np.random.default_rng(5)
     made = tr.fly(rng, sigma_w=0.3, amplitude=0.5 * DEG)
     shared, local = tr.still()
     local[9] = np.log(0.3)
+    shared[list(COLOUR)] = [*shares, np.log(0.08 / 0.1)]
     found = respond(made, tr.SETTINGS, Change(), shared, local)
     a, b, c, d = tr.motion(sigma_w=0.3)
-    k_gain, _, _, _ = kernel.gain(a, c, tr.V, tr.plane(None, shared, local)[0], tr.SETTINGS.noise**2, tr.DT)
+    variance = tr.SETTINGS.noise**2
+    colour = np.array([*np.sqrt(variance * shares), 0.08])
+    if any(shares):
+        a, b = block_diag(a, -np.eye(3) / 0.08), np.append(b, np.zeros(3))
+        c = np.hstack([c, np.diag(colour[:3])])
+    constants = tr.plane(None, shared, local)[0]
+    k_gain, _, _, _ = kernel.gain(a, c, tr.V, constants, variance * (1.0 - np.array(shares)), colour, tr.DT)
     phi, early, late = tr.discrete(a, b, tr.DT)
     t = np.arange(made.samples) * tr.DT
     u = tr.doublet(t, 0.5 * DEG)
-    x, expected = np.zeros(8), []
+    x, expected = np.zeros(len(a)), []
     for k in range(len(t)):
         e = made.signals.y[k] + [0.0, 0.0, G0] - c @ x - d * u[k]
         expected.append(e)
@@ -517,14 +546,17 @@ def test_innovations_are_those_of_the_steady_kalman_filter():
     assert (error < 0.05).all(), error
 
 
-def test_innovations_of_a_true_model_are_white_and_of_the_stated_covariance():
+@pytest.mark.parametrize("share", [0.0, 0.5])
+def test_innovations_of_a_true_model_are_white_and_of_the_stated_covariance(share):
     """20 records of 200 samples: the mean square of 12 000 whitened values is 1 within 4 sqrt(2/12000)."""
     rng = np.random.default_rng(6)
     shared, local = tr.still()
     local[9] = np.log(0.3)
+    shared[list(COLOUR)] = [share, share, share, np.log(0.08 / 0.1)]
     whitened = []
     for _ in range(20):
-        found = respond(tr.fly(rng, sigma_w=0.3, amplitude=DEG), tr.SETTINGS, Change(), shared, local)
+        made = tr.fly(rng, sigma_w=0.3, amplitude=DEG, slow_share=share)
+        found = respond(made, tr.SETTINGS, Change(), shared, local)
         whitened.append(found.e[20:] @ found.white.T)  # the filter starts at the trim, the air does not
     r = np.array(whitened)
     draws = r.size

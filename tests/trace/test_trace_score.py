@@ -232,24 +232,25 @@ def test_nothing_is_scored_that_the_records_do_not_excite():
 
 
 def test_the_score_of_a_curvature_is_that_of_a_refit_beside_a_free_slope():
-    """At a trim of 0.1 rad, 5 (alpha - 0.1)^2 of lift: z^2 is 2 log L over a null that is as free, the likelihood's own
-    curvature a tenth. Beside the declared slope, four of its standard deviations off, it would be half.
+    """At a trim of 0.1 rad, 7 alpha^2 of lift, its constant trimmed out: z^2 is 2 log L over a null that is as free,
+    the likelihood's own curvature a tenth. Its slope of 1.4 is six standard deviations of the declared one.
     """
     rng = np.random.default_rng(92)
-    bent = Change(aero=(AeroTerm("CL", "alpha", "quadratic", 5.0, 0.1),))
+    bent = Change(aero=(AeroTerm("CL", "alpha", "quadratic", 7.0, 0.0),))
     plant = tr.plant()
     plant = replace(plant, alpha_rad=plant.alpha_rad + 0.1, trim_alpha_rad=0.1)
     shared, local = tr.still()
-    local[0] = 0.1
+    local[0], local[7] = 0.1, -0.07
     made = tr.fly(rng, amplitude=1.5 * DEG)
     made = Record(replace(made.signals, theta_rad=np.full_like(made.signals.theta_rad, 0.1)), plant)
     y = made.signals.y - respond(made, tr.SETTINGS, bent, shared, local, free_run=True).e
     y += tr.SETTINGS.noise * rng.standard_normal(y.shape)
     problem = tr.problem([replace(made, signals=replace(made.signals, y=y))])
     curvature = EFFECTS["cl_alpha_nonlinear:quadratic"]
-    null = fit(problem, tr.NOTHING, begin(problem, tr.NOTHING))
+    declared = replace(tr.NOTHING, trim_alpha_rad=0.1)
+    null = fit(problem, declared, begin(problem, declared))
     (score,) = table(null, problem, [curvature], NO_WHITENER, 0).scores
-    freed = fit(problem, replace(tr.NOTHING, freed=(0,)), null.point)
-    found = fit(problem, tr.NOTHING.plus(curvature), replace(null.point, sizes=np.array([score.size])))
+    freed = fit(problem, replace(declared, freed=(0,)), null.point)
+    found = fit(problem, declared.plus(curvature), replace(null.point, sizes=np.array([score.size])))
     assert score.z > 4.0
     assert score.z**2 == pytest.approx(2.0 * (freed.cost - found.cost), rel=0.1)

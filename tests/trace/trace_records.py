@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import expm
+from scipy.signal import lfilter
 
 from airtruth import aircraft
 from airtruth.effects.change import Change
@@ -149,8 +150,12 @@ def fly(
     name="a",
     rotary=0.5,
     dt=DT,
+    slow_share=0.0,
 ):
-    """A noisy record of the linear aircraft in stationary gusts, between Dryden's and von Karman's; az counts gravity."""
+    """A noisy record of the linear aircraft in stationary gusts, between Dryden's and von Karman's; az counts gravity.
+
+    ``slow_share`` of the sensors' variance is correlated over 80 ms.
+    """
     a, b, c, d = motion(theta, sigma_w, rotary)
     t = np.arange(samples) * dt
     intensity = np.array([0.0, 0.0, 2.0 * V / LENGTH_W, *np.zeros(5)])
@@ -163,10 +168,27 @@ def fly(
     start[4] = start @ gust_row(0.5)
     y, states = run(a, b, c, d, doublet(t, amplitude), dt, start, kicks)
     attitude = np.concatenate([[0.0], np.cumsum(0.5 * dt * (states[1:, 1] + states[:-1, 1]))])
-    y = y + np.array(bias) + [0.0, 0.0, -9.80665] + np.asarray(noise) * rng.standard_normal(y.shape)
+    y = (
+        y
+        + np.array(bias)
+        + [0.0, 0.0, -9.80665]
+        + np.asarray(noise) * sensor_noise(rng, y.shape, slow_share, dt)
+    )
     return record(
         y, lambda at: doublet(at, amplitude), lambda at: np.interp(at, t, attitude), name=name, dt=dt
     )
+
+
+def sensor_noise(rng, shape, slow_share, dt):
+    """Of unit variance, white and a first-order autoregression."""
+    white = rng.standard_normal(shape)
+    if slow_share == 0.0:
+        return white
+    pole = np.exp(-dt / 0.08)
+    drive = rng.standard_normal(shape)
+    drive[1:] *= np.sqrt(1.0 - pole**2)
+    slow = lfilter([1.0], [1.0, -pole], drive, axis=0)
+    return np.sqrt(1.0 - slow_share) * white + np.sqrt(slow_share) * slow
 
 
 def problem(records, threads=1, settings=SETTINGS):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -13,7 +14,6 @@ from airtruth.report import style
 from airtruth.report.trace_table import figures, shown
 from airtruth.trace import Trace
 from airtruth.trace.answer import Model
-from airtruth.trace.fit import Hypothesis
 from airtruth.trace.holdout import Assessment
 from airtruth.trace.lower import CHANNELS, lower
 from airtruth.trace.model import respond
@@ -33,7 +33,7 @@ def change_of(found: Trace) -> Change:
     model = found.outcome.models.get("after")
     if model is None:
         return Change()
-    return Hypothesis(Change(), model.hypothesis.effects).change(model.sizes)
+    return replace(model.hypothesis, declared=Change()).change(model.sizes)
 
 
 def contribution(found: Trace, record: Record, own: Assessment) -> Array | None:

@@ -320,31 +320,14 @@ def _floor(problem: Problem, outcome: Outcome, which: str) -> dict[str, dict[str
 
 
 def _derivatives(case: Case, stages: Sequence[Stage], covariance: Array) -> dict[str, dict[str, float]]:
-    """Declared and refitted derivatives; after: with the slope that a curvature has at the trim."""
+    """Declared and refitted derivatives at the trim."""
     declared = case.fitted.records[0].plant.derivatives
     after = stages[-1].null
-    bends = _slopes_at_trim(case, after.hypothesis)
     rows = {"declared": declared, "before": declared + stages[0].null.point.shared[:6]}
-    rows["after"] = declared + after.point.shared[:6] + bends @ after.point.sizes
+    rows["after"] = declared + after.point.shared[:6]
     named = {k: dict(zip(PARAMETERS, v.tolist(), strict=True)) for k, v in rows.items()}
-    joint = np.hstack([np.eye(6, S), bends])
-    std = np.sqrt(np.diag(joint @ covariance @ joint.T))
-    named["after_std"] = dict(zip(PARAMETERS, std.tolist(), strict=True))
+    named["after_std"] = dict(zip(PARAMETERS, np.sqrt(np.diag(covariance)[:6]).tolist(), strict=True))
     return named
-
-
-def _slopes_at_trim(case: Case, hypothesis: Hypothesis) -> Array:
-    """(6, sizes) what a curvature of unit size adds to CLalpha and Cmalpha at the trim."""
-    trim = case.fitted.records[0].plant.trim_alpha_rad
-    result = np.zeros((6, len(hypothesis.parameters)))
-    for at, (i, j) in enumerate(hypothesis.parameters):
-        effect = hypothesis.effects[i]
-        p = effect.parameters[j]
-        for term in effect.change({p.name: p.value(1.0)}).aero if len(effect.parameters) == 1 else ():
-            if term.signal == "alpha" and term.shape == "quadratic":
-                row = 0 if term.coefficient == "CL" else 3
-                result[row, at] += 2.0 * term.amplitude * (trim - term.at)
-    return result
 
 
 def detectability(table: Table) -> dict[str, float]:

@@ -19,17 +19,19 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.effects.change import Change
+from airtruth.effects.change import AeroTerm, Change
 from airtruth.effects.effect import Effect
 from airtruth.trace.model import (
     BOUNDS,
     GUST_LEVEL,
     LOCAL_STEP,
+    NOISE,
     SHARED_STEP,
     External,
     L,
     S,
     Settings,
+    active,
     answered,
     inputs,
     local_prior,
@@ -53,7 +55,6 @@ _LEAST_DAMPING: Final = 1e-9
 _STALE: Final = 1.0
 """Gain in log-likelihood below which derivatives are made anew."""
 _ORDERS: Final = 6
-_LEVELS: Final = (6, 7, 8)
 _ROUGH_M_S: Final = 1.0
 
 
@@ -66,11 +67,20 @@ class Hypothesis:
     declared : what aircraft.toml says of the sensors.
     effects : the effects; none is the null hypothesis.
     freed : derivatives of whose value nothing is declared, besides those that the effects set free (`loosened`).
+    trim_alpha_rad : about which a curvature in alpha is counted: about any other angle it is a slope and a constant
+        besides, and those are for the records to say.
     """
 
     declared: Change
     effects: tuple[Effect, ...] = ()
     freed: tuple[int, ...] = ()
+    trim_alpha_rad: float = 0.0
+
+    @cached_property
+    def loose(self) -> tuple[int, ...]:
+        """Derivatives of whose value nothing is declared; nor of the coefficient that they are of."""
+        free = (i for e in self.effects for i in loosened(e, self.trim_alpha_rad))
+        return tuple(sorted({*self.freed, *free}))
 
     @cached_property
     def parameters(self) -> tuple[tuple[int, int], ...]:
@@ -90,7 +100,10 @@ class Hypothesis:
         total = self.declared
         for effect, values in zip(self.effects, self.values(sizes), strict=True):
             total = total + effect.change(values)
-        return total
+        return replace(total, aero=tuple(self._about_trim(t) for t in total.aero))
+
+    def _about_trim(self, term: AeroTerm) -> AeroTerm:
+        return replace(term, at=self.trim_alpha_rad) if _is_curvature(term) else term
 
     @cached_property
     def held(self) -> tuple[int, ...]:
@@ -106,21 +119,21 @@ class Hypothesis:
 def loosened(effect: Effect, trim_alpha_rad: float) -> tuple[int, ...]:
     """Derivatives whose declared value says nothing beside the effect.
 
-    A curvature about another angle of attack than the trim's is a slope at the trim besides, and that cannot be both
-    what is declared and so much more: which of the two the aircraft has is for the records to say.
+    A curvature about another angle of attack than the trim's is a slope and a constant at the trim besides, and those
+    cannot be both what is declared and so much more: which of the two the aircraft has is for the records to say.
     """
     change = effect.change({p.name: p.high for p in effect.parameters})
-    bent = {
-        t.coefficient
-        for t in change.aero
-        if t.signal == "alpha" and t.shape == "quadratic" and t.at != trim_alpha_rad
-    }
+    bent = {t.coefficient for t in change.aero if _is_curvature(t) and t.at != trim_alpha_rad}
     return tuple(i for i, coefficient in ((0, "CL"), (3, "Cm")) if coefficient in bent)
+
+
+def _is_curvature(term: AeroTerm) -> bool:
+    return term.signal == "alpha" and term.shape == "quadratic"
 
 
 @dataclass(frozen=True)
 class Point:
-    """Values of all free parameters: shared (13,), local (records, 10), sizes (k,)."""
+    """Values of all free parameters: shared (17,), local (records, 10), sizes (k,)."""
 
     shared: Array
     local: Array
@@ -184,7 +197,7 @@ class Fit:
     likelihood : (records,) negative log-likelihood of each record.
     tangents : of each record at ``point``.
     whitener : of the innovations.
-    covariance : (13 + k, 13 + k) of shared parameters and sizes, local ones free.
+    covariance : (17 + k, 17 + k) of shared parameters and sizes, local ones free.
     converged : whether the search ended by its tolerance.
     shortfall : log-likelihood that an undamped step promises where it did not, else none.
     """
@@ -208,20 +221,20 @@ class Problem:
     settings: Settings
     threads: int = 1
 
-    @cached_property
-    def own_priors(self) -> tuple[tuple[Array, Array], ...]:
+    def own_priors(self, hypothesis: Hypothesis) -> tuple[tuple[Array, Array], ...]:
         """Middle (10,) and precision (10, 10) of each record's own parameters."""
-        return tuple(local_prior(record, self.settings) for record in self.records)
+        loose = hypothesis.loose
+        if loose not in self._own_priors:
+            self._own_priors[loose] = tuple(local_prior(r, self.settings, loose) for r in self.records)
+        return self._own_priors[loose]
 
-    def loose(self, hypothesis: Hypothesis) -> tuple[int, ...]:
-        """Derivatives of whose value nothing is declared beside the hypothesis."""
-        trim = self.records[0].plant.trim_alpha_rad
-        free = (i for e in hypothesis.effects for i in loosened(e, trim))
-        return tuple(sorted({*hypothesis.freed, *free}))
+    @cached_property
+    def _own_priors(self) -> dict[tuple[int, ...], tuple[tuple[Array, Array], ...]]:
+        return {}
 
     def shared_precision(self, hypothesis: Hypothesis) -> Array:
-        """(13, 13) of the shared parameters about zero."""
-        return shared_prior(self.records[0], self.settings, self.loose(hypothesis))
+        """(17, 17) of the shared parameters about zero."""
+        return shared_prior(self.records[0], self.settings, hypothesis.loose)
 
     def each(self, function, arguments: Sequence[object]) -> list:  # type: ignore[no-untyped-def, type-arg]
         """The function of each argument, in order."""
@@ -264,7 +277,7 @@ def tangent(
         t[:] = old.t @ turn
         w[:] = turn.T @ old.w @ turn
     if not local_only:
-        for i in range(S if old is None else 0):
+        for i in active(settings) if old is None else ():
             shared = point.shared.copy()
             shared[i] += SHARED_STEP[i]
             put(i, answered(given, settings, shared, point.local[index]), SHARED_STEP[i])
@@ -445,7 +458,7 @@ def _evaluate(  # type: ignore[no-untyped-def]
 
 def _prior_cost(problem: Problem, hypothesis: Hypothesis, point: Point) -> float:
     total = 0.5 * float(point.shared @ problem.shared_precision(hypothesis) @ point.shared)
-    for (middle, precision), local in zip(problem.own_priors, point.local, strict=True):
+    for (middle, precision), local in zip(problem.own_priors(hypothesis), point.local, strict=True):
         off = local - middle
         total += 0.5 * float(off @ precision @ off)
     return total
@@ -469,14 +482,15 @@ def reduced(  # type: ignore[no-untyped-def]
 
     Returns
     -------
-    gradient (13 + k,), information, and of each record what back-substitution needs; priors included.
+    gradient (17 + k,), information, and of each record what back-substitution needs; priors included.
     """
     m = S + k
     gradient, information = np.zeros(m), np.zeros((m, m))
     information[:S, :S] = problem.shared_precision(hypothesis)
     gradient[:S] = information[:S, :S] @ point.shared
     back = []
-    for (middle, precision), local, (_, g, h) in zip(problem.own_priors, point.local, pieces, strict=True):
+    priors = problem.own_priors(hypothesis)
+    for (middle, precision), local, (_, g, h) in zip(priors, point.local, pieces, strict=True):
         h_ll = h[m:, m:] + precision
         g_l = g[m:] + precision @ (local - middle)
         h_sl = h[:m, m:].copy()
@@ -492,7 +506,7 @@ def reduced(  # type: ignore[no-untyped-def]
         gradient += g[:m] - h_sl @ solved[:, 0]
         information += h[:m, :m] - h_sl @ solved[:, 1:]
         back.append((h_ll, solved))
-    for i in (*(() if levels else _LEVELS), *held):
+    for i in (*(() if levels else NOISE), *held):
         information[i], information[:, i] = 0.0, 0.0
         information[i, i] = 1.0
         gradient[i] = 0.0
@@ -507,7 +521,7 @@ def _step(problem: Problem, hypothesis: Hypothesis, point: Point, pieces, dampin
         scale = np.sqrt(np.maximum(np.diag(information), 1e-30))
         normal = information / np.outer(scale, scale) + damping * np.eye(len(scale))
         shared = -np.linalg.solve(normal, gradient / scale) / scale
-        stopped = tuple(i for i in at_bounds(point) if i not in held and shared[i] * point.shared[i] > 0.0)
+        stopped = tuple(i for i in at_bounds(point) if i not in held and _outward(point, i, shared[i]))
         if not stopped:
             break
         held += stopped
@@ -520,6 +534,11 @@ def _step(problem: Problem, hypothesis: Hypothesis, point: Point, pieces, dampin
 def at_bounds(point: Point) -> tuple[int, ...]:
     """Places of shared parameters that stand at an end of their range."""
     return tuple(i for i, ends in BOUNDS.items() if point.shared[i] in ends)
+
+
+def _outward(point: Point, place: int, step: float) -> bool:
+    low, high = BOUNDS[place]
+    return (point.shared[place] == low and step < 0.0) or (point.shared[place] == high and step > 0.0)
 
 
 def _decrement(problem: Problem, hypothesis: Hypothesis, point: Point, pieces, levels: bool) -> float:  # type: ignore[no-untyped-def]
@@ -542,7 +561,9 @@ def _moved(hypothesis: Hypothesis, point: Point, step: Point) -> Point:
 
 def _covariance(problem: Problem, hypothesis: Hypothesis, pieces, levels: bool) -> Array:  # type: ignore[no-untyped-def]
     k = len(hypothesis.parameters)
-    empty = Point(np.zeros(S), np.stack([middle for middle, _ in problem.own_priors]), np.zeros(k))
+    empty = Point(
+        np.zeros(S), np.stack([middle for middle, _ in problem.own_priors(hypothesis)]), np.zeros(k)
+    )
     _, information, _ = reduced(problem, hypothesis, empty, k, pieces, levels, held=hypothesis.held)
     scale = np.sqrt(np.maximum(np.diag(information), 1e-30))
     normal = information / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))

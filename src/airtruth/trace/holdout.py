@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -22,11 +23,12 @@ from airtruth.trace.fit import (
     reduced,
     tangent,
 )
-from airtruth.trace.kernel import CORE, linear, states
+from airtruth.trace.kernel import CORE, OUTPUTS, is_coloured, linear, states
 from airtruth.trace.lower import Lowered, lower
 from airtruth.trace.model import (
     GUST_LEVEL,
     LOCAL_STEP,
+    MOTION,
     S,
     Settings,
     answered,
@@ -34,6 +36,7 @@ from airtruth.trace.model import (
     local_prior,
     plane_of,
     respond,
+    sensor_noise,
     start,
 )
 from airtruth.trace.records import Record
@@ -43,8 +46,6 @@ Array = NDArray[np.float64]
 _ROUNDS: Final = 30
 _DAMPING: Final = 1e-6
 _DRAWS: Final = 128
-_MOTION: Final = (0, 1, 4, 5, 6, 7, 8)
-"""Own parameters that a free run leaves free: initial alpha and q, biases, trim coefficients."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def assess(
         likelihood, whitened = np.inf, np.full_like(record.signals.y, np.nan)
     else:
         likelihood, whitened = parts(found, NO_WHITENER, levels=False)[0], found.r
-    residual = free_run(record, problem, low, shared, kept)
+    residual = free_run(record, problem, low, shared, kept, hypothesis.loose)
     return Assessment(
         likelihood=float(likelihood),
         innovation=np.sqrt((response.e**2).mean(axis=0)),
@@ -110,7 +111,7 @@ def assess(
 
 def _own(one: Problem, hypothesis: Hypothesis, shared: Array, sizes: Array, begin: Array) -> Array:
     """Own parameters (10,) of a single record at their best for all else given: Levenberg-Marquardt."""
-    middle, precision = one.own_priors[0]
+    middle, precision = one.own_priors(hypothesis)[0]
     k = len(sizes)
 
     def at(local: Array) -> tuple[float, Array, Array] | None:
@@ -142,26 +143,32 @@ def _own(one: Problem, hypothesis: Hypothesis, shared: Array, sizes: Array, begi
     return own
 
 
-def free_run(record: Record, problem: Problem, low: Lowered, shared: Array, local: Array) -> Array:
+def free_run(
+    record: Record, problem: Problem, low: Lowered, shared: Array, local: Array, loose: Sequence[int] = ()
+) -> Array:
     """(samples, 3) residuals of a simulation, initial state, biases and trim coefficients at their best.
 
     Least squares with the channels weighted by what gusts and sensors explain of them (`floor`).
+
+    Parameters
+    ----------
+    loose : derivatives of whose coefficient nothing is declared.
     """
     settings = problem.settings
     weight = 1.0 / floor(record, problem, low, shared, local)
     own = local.copy()
     own[2:4] = 0.0
-    middle, precision = local_prior(record, settings)
-    prior = np.diag(precision)[list(_MOTION)]
+    middle, precision = local_prior(record, settings, loose)
+    prior = np.diag(precision)[list(MOTION)]
     residual = respond(record, settings, low, shared, own, free_run=True).e
     for _ in range(3):
         residual, t = _tangents(record, settings, low, shared, own, weight)
-        off = (own - middle)[list(_MOTION)]
+        off = (own - middle)[list(MOTION)]
         move = -np.linalg.solve(t @ t.T + np.diag(prior), t @ (residual * weight).ravel() + prior * off)
         if not np.isfinite(move).all():
             break
         trial = own.copy()
-        trial[list(_MOTION)] += move
+        trial[list(MOTION)] += move
         after = respond(record, settings, low, shared, trial, free_run=True).e
         better = float(((residual * weight) ** 2).sum() - ((after * weight) ** 2).sum())
         if not np.isfinite(better) or better < 0.0:
@@ -199,6 +206,8 @@ def explained(
     x = np.zeros((n, _DRAWS))
     x[2:4] = np.linalg.cholesky(np.array([[1.0, 0.5], [0.5, 0.5]])) @ rng.standard_normal((2, _DRAWS))
     x[5:CORE] = x[2]
+    if is_coloured(sensor_noise(problem.settings, shared)[1]):
+        x[-OUTPUTS:] = rng.standard_normal((OUTPUTS, _DRAWS))
     y = np.empty((samples, 3, _DRAWS))
     for k in range(samples):
         y[k] = c @ x
@@ -206,7 +215,7 @@ def explained(
     y += np.sqrt(noise)[:, None] * rng.standard_normal(y.shape)
     weight = 1.0 / floor(record, problem, low, shared, local)
     t = _tangents(record, problem.settings, low, shared, local, weight)[1]
-    prior = np.diag(np.diag(local_prior(record, problem.settings)[1])[list(_MOTION)])
+    prior = np.diag(np.diag(local_prior(record, problem.settings)[1])[list(MOTION)])
     flat = (y * weight[:, None]).reshape(-1, _DRAWS)
     left = flat - t.T @ np.linalg.solve(t @ t.T + prior, t @ flat)
     return np.asarray(np.sqrt((left.reshape(samples, 3, _DRAWS) ** 2).mean(axis=(0, 2))) / weight)
@@ -215,11 +224,12 @@ def explained(
 def _linearised(
     record: Record, settings: Settings, low: Lowered, shared: Array, local: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """A (n, n), C (3, n), intensities (n,) [1/s] and variances (3,) of the motion in its gusts, sensors' lags and
-    delays included.
+    """A (n, n), C (3, n), intensities (n,) [1/s] and white noise's variances (3,) of the motion in its gusts,
+    sensors' lags, delays and slow noise included.
     """
     inner = CORE + sum(1 if kind == 0 else 2 for kind in low.state_index[:, 0])
-    n = states(inner, low.lags, low.delays)
+    variance, colour = sensor_noise(settings, shared)
+    n = states(inner, low.lags, low.delays, colour)
     a, c = np.empty((n, n)), np.empty((3, n))
     x = np.zeros(n)
     x[0], elevator, v, density, theta = inputs(record, low).reference.tolist()
@@ -232,6 +242,7 @@ def _linearised(
         inner,
         low.lags,
         low.delays,
+        colour,
         plane_of(record.plant, settings, low, shared, local, v),
         low.arms,
         low.scales,
@@ -240,7 +251,9 @@ def _linearised(
     )
     process = np.zeros(n)
     process[2] = 2.0 * v / settings.length_w_m
-    return a, c, process, (settings.noise * np.exp(shared[6:9])) ** 2
+    if is_coloured(colour):
+        process[-OUTPUTS:] = 2.0 / colour[OUTPUTS]
+    return a, c, process, variance
 
 
 def _tangents(
@@ -250,7 +263,7 @@ def _tangents(
     given = inputs(record, low)
     residual = answered(given, settings, shared, own, free_run=True).e
     columns = []
-    for i in _MOTION:
+    for i in MOTION:
         moved = own.copy()
         moved[i] += LOCAL_STEP[i]
         e = answered(given, settings, shared, moved, free_run=True).e

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from airtruth.trace.fit import Fit, Problem
 from airtruth.trace.holdout import Assessment, floor, leave_one_out, one_by_the_other
 from airtruth.trace.lower import lower
-from airtruth.trace.model import S
+from airtruth.trace.model import OFFSETS, S
 from airtruth.trace.sandwich import MEMORY_S, inflation, long_run
 from airtruth.trace.score import Score
 
@@ -153,9 +153,20 @@ def declared_probability(problem: Problem, found: Fit) -> float:
     mode is nearer to the prior than the likelihood's maximum, so the check is conservative.
     """
     off = found.point.shared[:_DERIVATIVES]
-    tight = [i for i in range(_DERIVATIVES) if i not in problem.loose(found.hypothesis)]
+    tight = [i for i in range(_DERIVATIVES) if i not in found.hypothesis.loose]
     declared = problem.records[0].plant.derivative_cov[np.ix_(tight, tight)]
     return float(chi2.sf(float(off[tight] @ np.linalg.solve(declared, off[tight])), len(tight)))
+
+
+def own_probability(problem: Problem, found: Fit) -> float:
+    """Probability of biases and trim coefficients as far from the declared ones, as `declared_probability`."""
+    total = 0.0
+    for (middle, precision), local in zip(
+        problem.own_priors(found.hypothesis), found.point.local, strict=True
+    ):
+        off = (local - middle)[list(OFFSETS)]
+        total += float(off**2 @ np.diag(precision)[list(OFFSETS)])
+    return float(chi2.sf(total, len(OFFSETS) * len(found.point.local)))
 
 
 def _size(s: Score, found: Fit) -> tuple[float, float]:

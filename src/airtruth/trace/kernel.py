@@ -1,7 +1,8 @@
 """The declared aircraft in gusts as a filter: nonlinear in the motion, with the steady gain of its linearisation.
 
 State x: alpha over ground [rad], q [rad/s], two Dryden states of unit variance, the upward gust w as the
-tail meets it, three low-passed copies of the first Dryden state, states of effects, states of lagging sensors.
+tail meets it, three low-passed copies of the first Dryden state, states of effects, states of lagging sensors,
+and where a sensor's noise is coloured a state of unit variance for each sensor's slow noise.
 The gust is w = sigma (1.22 x_2 - 0.52 x_3 + rolloff sum_i g_i (x_2 - x_i)): without rolloff Dryden's; with a
 rolloff of 1 its spectrum falls as von Karman's, with the power -5/3 instead of -2, in the band that a flight
 test sees. Airspeed, density and pitch attitude are measured and enter as known series, and so does the speed
@@ -246,10 +247,18 @@ def outputs(
     y[2] = scales[2] * (az - arms[2] * rate[1])
 
 
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_REORDER, inline="always")
+def is_coloured(colour: Array) -> bool:
+    """Whether any sensor has slow noise."""
+    return bool(colour[0] > 0.0 or colour[1] > 0.0 or colour[2] > 0.0)
+
+
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=_REORDER)
-def states(motion: int, lags: Array, delays: Array) -> int:
-    """States of the motion and of late sensors."""
+def states(motion: int, lags: Array, delays: Array, colour: Array) -> int:
+    """States of the motion, of late sensors and of coloured noise (``colour`` as in `innovations`)."""
     n = motion
+    if is_coloured(colour):
+        n += OUTPUTS
     for i in range(OUTPUTS):
         if lags[i] > 0.0:
             n += 1
@@ -289,13 +298,14 @@ def linear(
     motion: int,
     lags: Array,
     delays: Array,
+    colour: Array,
     plane: Plane,
     arms: Array,
     scales: Array,
     a: Array,
     c: Array,
 ) -> None:
-    """A and C of the motion, effects' states and late sensors about a state, by central differences.
+    """A and C of the motion, effects' states, late sensors and slow noise about a state, by central differences.
 
     A delay is the Pade approximant of order `DELAY`, see `delayed`.
     """
@@ -345,18 +355,29 @@ def linear(
             for row in range(1, DELAY, 2):
                 c[i, at + row] -= 2.0
             at += DELAY
+    if is_coloured(colour):
+        for i in range(OUTPUTS):
+            a[at + i, at + i] = -1.0 / colour[OUTPUTS]
+            c[i, at + i] = colour[i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=_REORDER)
 def gain(
-    a: Array, c: Array, v: float, constants: Array, variance: Array, dt_s: float
+    a: Array, c: Array, v: float, constants: Array, variance: Array, colour: Array, dt_s: float
 ) -> tuple[Array, Array, Array, float]:
-    """Steady gain K of the update, whitener W with W S W' = I, S itself, and log|S| (nan where there is none)."""
+    """Steady gain K of the update, whitener W with W S W' = I, S itself, and log|S| (nan where there is none).
+
+    Parameters
+    ----------
+    a, c : as `linear` makes them; variance : (3,) of the white noise; colour : as in `innovations`.
+    """
     n = a.shape[0]
     system = np.zeros((n, n + 1))
     system[:, :n] = a
     process = np.zeros(n)
     process[2] = 2.0 * v / constants[LENGTH_W]
+    if is_coloured(colour):
+        process[n - OUTPUTS :] = 2.0 / colour[OUTPUTS]
     phi, noise = np.empty((n, n)), np.empty((n, n))
     early, late = np.empty((n, 1)), np.empty((n, 1))
     step(system, process, n, dt_s, phi, early, late, noise)
@@ -399,6 +420,7 @@ def innovations(
     motion: int,
     lags: Array,
     delays: Array,
+    colour: Array,
     plane: Plane,
     arms: Array,
     scales: Array,
@@ -415,9 +437,14 @@ def innovations(
     k_gain : (states, 3) of the update; zeros for a free run.
     motion : states of motion, gusts and effects.
     lags, delays, arms, scales : (3,) of the sensors.
+    colour : (4,) standard deviations of the sensors' slow noise, a Gauss-Markov process, and its correlation
+        time [s].
     """
     constants, declared, state_index = plane[0], plane[1], plane[9]
+    noisy = is_coloured(colour)
+    forget = math.exp(-dt_s / colour[OUTPUTS]) if noisy else 0.0
     n = k_gain.shape[0]
+    late_sensors = n > motion + (OUTPUTS if noisy else 0)
     samples = y.shape[0]
     h = 2.0 * dt_s / sub
     air = np.empty((7, de.size))
@@ -479,6 +506,8 @@ def innovations(
                 for row in range(1, DELAY, 2):
                     value -= 2.0 * x[at + row]
                 at += DELAY
+            if noisy:
+                value += colour[i] * x[n - OUTPUTS + i]
             e[k, i] = y[k, i] - value - bias[i] - output_more[k, i]
         if k + 1 == samples:
             break
@@ -489,6 +518,9 @@ def innovations(
             x[i] += total
             if not abs(x[i]) < 1e6:
                 return False
+        if noisy:
+            for i in range(n - OUTPUTS, n):
+                x[i] *= forget
         for pair in range(sub // 2):
             f = k * sub + 2 * pair
             for stage in range(4):
@@ -502,14 +534,14 @@ def innovations(
                         rest = (level[j, i] - fade[j, i]) * x[2] + (1.0 - level[j, i]) * tried[2]
                         tried[5 + i] = fade[j, i] * x[5 + i] + rest
                 az = rates_at(tried, g, air, plane, rate[stage])
-                if stage == 0 and motion < n:
+                if stage == 0 and late_sensors:
                     outputs(tried, rate[0], az, v[g], ground[g], theta[g], constants, arms, scales, last)
                     first[0], first[1] = rate[0, 0], rate[0, 1]
             for m in range(motion):
                 slope = rate[0, m] + 2.0 * rate[1, m] + 2.0 * rate[2, m] + rate[3, m]
                 x[m] += h / 6.0 * slope
             x[5:CORE] = tried[5:CORE]
-            if motion < n:
+            if late_sensors:
                 g = f + 2
                 az = rates_at(x, g, air, plane, rate[0])
                 outputs(x, rate[0], az, v[g], ground[g], theta[g], constants, arms, scales, out)
@@ -564,6 +596,7 @@ def evaluate(
     free_run: bool,
     lags: Array,
     delays: Array,
+    colour: Array,
     plane: Plane,
     arms: Array,
     scales: Array,
@@ -577,13 +610,14 @@ def evaluate(
     ----------
     reference : alpha [rad], elevator [rad], airspeed [m/s], density [kg/m3], theta [rad] at which the gain is made.
     free_run : no gain: the residuals of a simulation; ``white`` and ``s`` are left alone.
+    variance : (3,) of the sensors' white noise.
     others : as in `innovations`.
     """
     constants, state_index = plane[0], plane[9]
     motion = CORE
     for k in range(state_index.shape[0]):
         motion += 1 if state_index[k, 0] == 0 else 2
-    n = states(motion, lags, delays)
+    n = states(motion, lags, delays, colour)
     k_gain = np.zeros((n, OUTPUTS))
     logdet = 0.0
     if not free_run:
@@ -607,13 +641,14 @@ def evaluate(
             motion,
             lags,
             delays,
+            colour,
             plane,
             arms,
             scales,
             a,
             c,
         )
-        k_gain, w, cov, logdet = gain(a, c, speed, constants, variance, dt_s)
+        k_gain, w, cov, logdet = gain(a, c, speed, constants, variance, colour, dt_s)
         if not math.isfinite(logdet):
             return np.nan
         white[:] = w
@@ -637,6 +672,7 @@ def evaluate(
         motion,
         lags,
         delays,
+        colour,
         plane,
         arms,
         scales,

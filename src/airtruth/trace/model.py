@@ -34,23 +34,48 @@ SHARED: Final = (
     "thrust",
     "rolloff",
     "inertia",
+    "colour_alpha",
+    "colour_q",
+    "colour_az",
+    "log_colour_time",
 )
 """Parameters that all records share: increments of the derivatives [-], logarithms of noise over declared,
 share of the rotary gust (1: all of the specification's; counted from 1/2), relative change of the thrust,
 rolloff of the gusts (0: Dryden's, 1: von Karman's; counted from 1/2), relative change of the pitch inertia at
-equal derivatives of the pitch acceleration: what it does to the curvature of the tables."""
+equal derivatives of the pitch acceleration: what it does to the curvature of the tables; share of the sensors'
+noise variance that is slow, and the logarithm of its correlation time over 0.1 s."""
 LOCAL: Final = ("alpha0", "q0", "w1", "w2", "bias_alpha", "bias_q", "bias_az", "CL0", "Cm0", "log_sigma_w")
 """Parameters of one record: initial state, sensors' biases, trim coefficients, logarithm of the gust [m/s]."""
+OFFSETS: Final = (4, 5, 6, 7, 8)
+"""Places of biases and trim coefficients among a record's own parameters."""
+MOTION: Final = (0, 1, *OFFSETS)
+"""Places of all but the gusts: initial alpha and q, biases, trim coefficients."""
 GUST_LEVEL: Final = LOCAL.index("log_sigma_w")
 """Place of the gust level among a record's own parameters."""
-BOUNDS: Final = {SHARED.index("rotary"): (-0.75, 0.75), SHARED.index("rolloff"): (-0.75, 0.75)}
-"""Shares of none to all, and a quarter beyond for what is no gust of either form."""
+COLOUR: Final = tuple(range(SHARED.index("colour_alpha"), len(SHARED)))
+"""Places of the sensors' slow noise among the shared parameters."""
+NOISE: Final = (*range(6, 9), *COLOUR)
+"""Places of all that is noise of the sensors."""
+COLOUR_TIME_S: Final = 0.1
+BOUNDS: Final = {
+    SHARED.index("rotary"): (-0.75, 0.75),
+    SHARED.index("rolloff"): (-0.75, 0.75),
+    **dict.fromkeys(COLOUR[:3], (0.0, 0.95)),
+    COLOUR[3]: (-1.6, 1.6),
+}
+"""Shares of gusts of none to all, and a quarter beyond for what is no gust of either form; slow noise that leaves
+some white noise, correlated over 20 ms to half a second."""
 _LOOSE_STD: Final = 10.0
 """[1/rad] of a derivative in alpha of which nothing is declared: twice a lift slope."""
+_LOOSE_OFFSET_STD: Final = 0.5
+"""Of the coefficient at the trim: a curvature of 40 about zero has 0.4 at 0.1 rad."""
 _ROTARY_STD: Final = 0.5
 _ROLLOFF_STD: Final = 0.5
+_COLOUR_STD: Final = (0.5, 0.5, 0.5, 0.7)
 S, L = len(SHARED), len(LOCAL)
-SHARED_STEP: Final = np.array([1e-3, 1e-1, 1e-3, 1e-4, 1e-2, 1e-4, 1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3, 1e-3])
+SHARED_STEP: Final = np.array(
+    [1e-3, 1e-1, 1e-3, 1e-4, 1e-2, 1e-4, 1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3, 1e-3] + [1e-3] * 4
+)
 LOCAL_STEP: Final = np.array([1e-5, 1e-4, 1e-3, 1e-3, 1e-5, 1e-4, 1e-3, 1e-5, 1e-6, 1e-4])
 
 
@@ -69,6 +94,7 @@ class Settings:
     thrust_std : relative standard deviation of the engines' thrust.
     offset_std : (2,) of CL and Cm at trim, about those of the declared aircraft.
     derivatives : (6,) declared, the same for every record, about which the shared inertia turns.
+    coloured : whether part of the sensors' noise may be slow.
     """
 
     noise: Array
@@ -80,6 +106,7 @@ class Settings:
     thrust_std: float
     offset_std: Array
     derivatives: Array
+    coloured: bool = False
 
 
 @dataclass(frozen=True)
@@ -169,7 +196,7 @@ def respond(
 
     Parameters
     ----------
-    shared : (13,) see `SHARED`; local : (10,) see `LOCAL`.
+    shared : (17,) see `SHARED`; local : (10,) see `LOCAL`.
     """
     return answered(inputs(record, change), settings, shared, local, external, free_run)
 
@@ -186,6 +213,7 @@ def answered(
     low, s = given.low, given.record.signals
     e = np.empty_like(given.y)
     white, covariance = np.eye(3), np.eye(3)
+    variance, colour = sensor_noise(settings, shared)
     if external is None:
         none = np.zeros(given.de.size)
         lift_more, moment_more, output_more = none, none, np.zeros_like(given.y)
@@ -207,10 +235,11 @@ def answered(
         local[:4],
         local[4:7] + low.bias,
         local[7:9],
-        (settings.noise * np.exp(shared[6:9])) ** 2,
+        variance,
         free_run,
         low.lags,
         low.delays,
+        colour,
         plane_of(given.record.plant, settings, low, shared, local, float(given.reference[2])),
         low.arms,
         low.scales,
@@ -219,6 +248,14 @@ def answered(
         covariance,
     )
     return Response(e, white, covariance, logdet)
+
+
+def sensor_noise(settings: Settings, shared: Array) -> tuple[Array, Array]:
+    """Variances (3,) of the sensors' white noise, and of the slow one (4,) standard deviations and time [s]."""
+    variance = (settings.noise * np.exp(shared[6:9])) ** 2
+    share = np.clip(shared[list(COLOUR[:3])], 0.0, 0.95)
+    time_s = COLOUR_TIME_S * np.exp(shared[COLOUR[3]])
+    return variance * (1.0 - share), np.append(np.sqrt(variance * share), time_s)
 
 
 def _evaluated(*arguments: Any) -> float:
@@ -275,6 +312,11 @@ def _input(low: Lowered, channel: str, x: Array) -> Array:
     return x if scale == 1.0 and bias == 0.0 else (x - bias) / scale
 
 
+def active(settings: Settings) -> tuple[int, ...]:
+    """Places of the shared parameters that are free."""
+    return tuple(i for i in range(S) if settings.coloured or i not in COLOUR)
+
+
 def start(record: Record, settings: Settings) -> Array:
     """(10,) where the search for a record's own parameters begins."""
     local = np.zeros(L)
@@ -285,14 +327,19 @@ def start(record: Record, settings: Settings) -> Array:
     return local
 
 
-def local_prior(record: Record, settings: Settings) -> tuple[Array, Array]:
-    """Middle (10,) and precision (10, 10) of a record's own parameters."""
+def local_prior(record: Record, settings: Settings, loose: Sequence[int] = ()) -> tuple[Array, Array]:
+    """Middle (10,) and precision (10, 10) of a record's own parameters.
+
+    Parameters
+    ----------
+    loose : derivatives of whose coefficient nothing is declared.
+    """
     middle = start(record, settings)
     std = np.concatenate(
         [
             [0.05, 0.2, 1.0, 1.0],
             settings.bias_std,
-            settings.offset_std,
+            np.where([0 in loose, 3 in loose], _LOOSE_OFFSET_STD, settings.offset_std),
             [settings.sigma_w_prior],
         ]
     )
@@ -303,7 +350,7 @@ def local_prior(record: Record, settings: Settings) -> tuple[Array, Array]:
 
 
 def shared_prior(record: Record, settings: Settings, loose: Sequence[int] = ()) -> Array:
-    """(13, 13) precision of the shared parameters about zero.
+    """(17, 17) precision of the shared parameters about zero.
 
     Parameters
     ----------
@@ -323,6 +370,7 @@ def shared_prior(record: Record, settings: Settings, loose: Sequence[int] = ()) 
     precision[9, 9] = _ROTARY_STD**-2
     precision[10, 10] = settings.thrust_std**-2
     precision[11, 11] = _ROLLOFF_STD**-2
+    precision[COLOUR, COLOUR] = np.array(_COLOUR_STD) ** -2.0
     return precision
 
 

@@ -74,7 +74,7 @@ def _slopes(problem: Problem, found: Fit) -> list[tuple[Array, Array, Array]]:
     levels = found.whitener.coefficients.shape[0] == 0
     m = S + len(found.point.sizes)
     result = []
-    for (_, precision), tangent in zip(problem.own_priors, found.tangents, strict=True):
+    for (_, precision), tangent in zip(problem.own_priors(found.hypothesis), found.tangents, strict=True):
         _, _, h = parts(tangent, found.whitener, levels)
         r, t = found.whitener.apply(tangent.r), found.whitener.apply(tangent.t)
         slopes = np.einsum("pki,ki->kp", t, r)

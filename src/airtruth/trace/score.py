@@ -257,8 +257,8 @@ def _with_freedoms(
     """`projected`, each direction beside derivatives as free as its effect sets them."""
     count = len(tried)
     gradient, information = projected(null, problem, tangents, whitener, k, count, levels)
-    kept = problem.loose(null.hypothesis)
-    freedoms = [problem.loose(null.hypothesis.plus(d.effect)) for d in tried]
+    kept = null.hypothesis.loose
+    freedoms = [null.hypothesis.plus(d.effect).loose for d in tried]
     for free in sorted({f for f in freedoms if f != kept}):
         rows = [i for i, f in enumerate(freedoms) if f == free]
         freed = replace(null, hypothesis=replace(null.hypothesis, freed=free))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
 from airtruth.trace import score
-from airtruth.trace.fit import Fit, Hypothesis, Point, Problem, Whitener, autoregression, begin, fit
+from airtruth.trace.fit import Fit, Hypothesis, Point, Problem, Whitener, autoregression, fit
 from airtruth.trace.judge import (
     IMMATERIAL,
     IMPROBABLE,
@@ -21,9 +21,10 @@ from airtruth.trace.judge import (
     declared_probability,
     judge,
     outdone,
+    own_probability,
     reference_of,
 )
-from airtruth.trace.model import GUST_LEVEL, respond
+from airtruth.trace.model import GUST_LEVEL, MOTION, NOISE, respond
 from airtruth.trace.profile import Profile, best_place, place_of
 from airtruth.trace.score import Score, Table
 from airtruth.trace.unnamed import Anomaly, anomalies
@@ -119,6 +120,7 @@ class Stage:
 def search(
     problem: Problem,
     hypothesis: Hypothesis,
+    start: Point,
     effects: Sequence[Effect],
     seed: int,
     advance: Callable[[str], None] = lambda what: None,
@@ -127,13 +129,12 @@ def search(
 
     Parameters
     ----------
-    hypothesis : the declared aircraft.
+    hypothesis, start : the declared aircraft, and where the search for its parameters begins.
     effects : candidates.
     seed : of the draws behind p-values.
     advance : told what is being done.
     """
     stages: list[Stage] = []
-    start = begin(problem, hypothesis)
     restarts = _RESTARTS
     while True:
         advance(f"round {len(stages) + 1}: refit without further effects")
@@ -217,8 +218,8 @@ def _refitted(
 
 
 def _handicap(problem: Problem, null: Fit, effect: Effect) -> float:
-    free = problem.loose(null.hypothesis.plus(effect))
-    if free == problem.loose(null.hypothesis):
+    free = null.hypothesis.plus(effect).loose
+    if free == null.hypothesis.loose:
         return 0.0
     freed = fit(problem, replace(null.hypothesis, freed=free), null.point)
     return 0.0 if freed is None else max(null.cost - freed.cost, 0.0)
@@ -267,7 +268,7 @@ def _judged(problem: Problem, null: Fit, fits: Sequence[Refit], least: float) ->
 def _whitened(problem: Problem, found: Fit, whitener: Whitener, levels: Fit) -> float:
     """Cost under an autoregression at another fit's noise and gust levels, so that only the motion counts."""
     shared, local = found.point.shared.copy(), found.point.local.copy()
-    shared[6:9] = levels.point.shared[6:9]
+    shared[list(NOISE)] = levels.point.shared[list(NOISE)]
     local[:, GUST_LEVEL] = levels.point.local[:, GUST_LEVEL]
     start = replace(found.point, shared=shared, local=local)
     again = fit(problem, found.hypothesis, start, whitener, iterations=6, free_levels=False)
@@ -277,8 +278,8 @@ def _whitened(problem: Problem, found: Fit, whitener: Whitener, levels: Fit) -> 
 def _refit(problem: Problem, null: Fit, s: Score, white_size: float, rival: float) -> Fit | None:
     """The null and one effect, all free, from shares of the size that the score suggests.
 
-    Where the null's derivatives are improbable they have absorbed what they can of a large effect, and the
-    search from there can end in another optimum: one more begins at those declared, and at the size that
+    Where the null's derivatives or biases are improbable they have absorbed what they can of a large effect, and
+    the search from there can end in another optimum: one more begins at those declared, and at the size that
     the score has without an autoregression, which can take up such an effect as a whole.
     """
     hypothesis = null.hypothesis.plus(s.effect)
@@ -289,10 +290,13 @@ def _refit(problem: Problem, null: Fit, s: Score, white_size: float, rival: floa
             best = tried
         if best is not None and best.converged and null.cost - best.cost > 0.2 * s.z**2:
             break
-    if declared_probability(problem, null) < IMPROBABLE:
+    if min(declared_probability(problem, null), own_probability(problem, null)) < IMPROBABLE:
         start = _at(null, s, white_size)
         shared = np.concatenate([np.zeros(6), start.shared[6:]])
-        tried = fit(problem, hypothesis, replace(start, shared=shared), rival=rival)
+        local = start.local.copy()
+        middle = np.array([own[0] for own in problem.own_priors(hypothesis)])
+        local[:, MOTION] = middle[:, MOTION]
+        tried = fit(problem, hypothesis, replace(start, shared=shared, local=local), rival=rival)
         if tried is not None and (best is None or tried.cost < best.cost):
             best = tried
     return best

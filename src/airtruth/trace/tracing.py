@@ -18,6 +18,7 @@ from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.store import log_paths, read_log
 from airtruth.logs.validate import validate
 from airtruth.trace.answer import Outcome, answer, assessed
+from airtruth.trace.colour import begun
 from airtruth.trace.options import TraceOptions
 from airtruth.trace.prepare import Case, prepare
 from airtruth.trace.replay import flown_again
@@ -62,7 +63,9 @@ def traced(
     effects = _effects(options)
     advance("probe the declared aircraft")
     case = prepare(logs, aircraft, effects, options)
-    stages = search(case.fitted, case.hypothesis, case.effects, options.seed, advance)
+    advance("refit the declared aircraft")
+    case, start = begun(case)
+    stages = search(case.fitted, case.hypothesis, start, case.effects, options.seed, advance)
     if not stages:
         raise LogError(
             f"the declared aircraft {aircraft.name} does not fly like these records: its motion leaves all bounds; "

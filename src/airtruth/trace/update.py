@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,12 +20,7 @@ from airtruth.trace.search import Stage
 def accepted_change(stages: Sequence[Stage]) -> Change:
     """What the accepted effects change at their estimated sizes."""
     final = stages[-1].gls
-    total = Change()
-    for effect, values in zip(
-        final.hypothesis.effects, final.hypothesis.values(final.point.sizes), strict=True
-    ):
-        total = total + effect.change(values)
-    return total
+    return replace(final.hypothesis, declared=Change()).change(final.point.sizes)
 
 
 def write_update(
@@ -37,7 +33,7 @@ def write_update(
 
     Parameters
     ----------
-    refitted : write the increments of the derivatives too.
+    refitted : write the increments of the derivatives too; those that an effect sets free are always written.
 
     Raises
     ------
@@ -55,7 +51,9 @@ def write_update(
     plant = case.fitted.records[0].plant
     increments = dict(zip(PARAMETERS, stages[-1].gls.point.shared[:6].tolist(), strict=True))
     corrections = None
-    if refitted and plant.trim is not None and np.isfinite(list(increments.values())).all():
+    if not refitted:
+        increments = {PARAMETERS[i]: increments[PARAMETERS[i]] for i in stages[-1].gls.hypothesis.loose}
+    if increments and plant.trim is not None and np.isfinite(list(increments.values())).all():
         corrections = Corrections(increments, plant.trim_alpha_rad, plant.trim_elevator_rad)
     names = ", ".join(e.key for e in stages[-1].gls.hypothesis.effects)
     note = f"Traced from measured records: {names}."

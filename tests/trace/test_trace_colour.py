@@ -1,0 +1,77 @@
+"""Slow noise of the sensors enters where the records show it, and not elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trace_records as tr
+
+from airtruth.trace.colour import SHARES, begun, scores, share_slopes
+from airtruth.trace.fit import begin, fit
+from airtruth.trace.prepare import Case
+from airtruth.units import DEG
+
+
+def flown(seed, share, amplitudes=(2.0, -2.0)):
+    rng = np.random.default_rng(seed)
+    return [
+        tr.fly(rng, sigma_w=0.1, amplitude=a * DEG, samples=150, name=str(a), slow_share=share)
+        for a in amplitudes
+    ]
+
+
+def case(seed, share):
+    records = flown(seed, share, (2.0, -2.0, 3.0))
+    return Case(tr.problem(records[:2]), tr.problem(records[2:]), tr.NOTHING, (), (), "linear", ())
+
+
+def test_scores_of_white_noise_are_no_larger_than_normal():
+    """Initial states and biases take up what is slow in a short record, so that the mean of 60 is below none and the
+    standard deviation below one, each within four standard errors.
+    """
+    z = []
+    for seed in range(20):
+        problem = tr.problem(flown(seed, 0.0))
+        slow = replace(problem, settings=replace(problem.settings, coloured=True))
+        z.append(scores(slow, fit(problem, tr.NOTHING, begin(problem, tr.NOTHING))))
+    z = np.array(z)
+    assert -2.0 < z.mean() < 4.0 / np.sqrt(z.size)
+    assert 0.5 < z.std() < 1.0 + 4.0 / np.sqrt(2.0 * z.size)
+
+
+def test_slope_of_a_share_is_that_of_the_refitted_likelihood():
+    """Differences over a share of 0.01 and its half, refitted, extrapolated to none; a search ends within 0.002."""
+    problem = tr.problem(flown(4, 0.3, (2.0, -2.0, 3.0)))
+    slow = replace(problem, settings=replace(problem.settings, coloured=True))
+    null = fit(problem, tr.NOTHING, begin(problem, tr.NOTHING))
+    slope, information = share_slopes(slow, null)
+
+    def rise(place, share):
+        shared = null.point.shared.copy()
+        shared[place] = share
+        again = fit(problem, tr.NOTHING, replace(null.point, shared=shared))
+        return (again.cost - 0.5 * share**2 / 0.5**2 - null.cost) / share
+
+    for i, place in enumerate(SHARES):
+        expected = 2.0 * rise(place, 0.005) - rise(place, 0.01)
+        assert slope[i] == pytest.approx(expected, abs=0.04 * abs(expected) + 1.5)
+        assert abs(slope[i]) > 3.0 * np.sqrt(information[i, i])
+
+
+def test_white_records_stay_as_they_are():
+    white = case(5, 0.0)
+    found, start = begun(white)
+    assert found is white
+    np.testing.assert_array_equal(start.shared[list(SHARES)], 0.0)
+
+
+def test_slow_noise_enters_fitted_and_held_out_records():
+    slow = case(5, 0.5)
+    found, start = begun(slow)
+    assert found.fitted.settings.coloured
+    assert found.held is not None
+    assert found.held.settings.coloured
+    assert (start.shared[list(SHARES)] > 0.0).any()
+    assert found.fitted.records == slow.fitted.records
