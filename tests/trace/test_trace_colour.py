@@ -14,16 +14,24 @@ from airtruth.trace.prepare import Case
 from airtruth.units import DEG
 
 
-def flown(seed, share, amplitudes=(2.0, -2.0)):
+def flown(seed, share, amplitudes=(2.0, -2.0), time_s=0.08):
     rng = np.random.default_rng(seed)
     return [
-        tr.fly(rng, sigma_w=0.1, amplitude=a * DEG, samples=150, name=str(a), slow_share=share)
+        tr.fly(
+            rng,
+            sigma_w=0.1,
+            amplitude=a * DEG,
+            samples=150,
+            name=str(a),
+            slow_share=share,
+            slow_time_s=time_s,
+        )
         for a in amplitudes
     ]
 
 
-def case(seed, share):
-    records = flown(seed, share, (2.0, -2.0, 3.0))
+def case(seed, share, time_s=0.08):
+    records = flown(seed, share, (2.0, -2.0, 3.0), time_s)
     return Case(tr.problem(records[:2]), tr.problem(records[2:]), tr.NOTHING, (), (), "linear", ())
 
 
@@ -75,3 +83,24 @@ def test_slow_noise_enters_fitted_and_held_out_records():
     assert found.held.settings.coloured
     assert (start.shared[list(SHARES)] > 0.0).any()
     assert found.fitted.records == slow.fitted.records
+
+
+def test_noise_that_nobody_declares_is_no_slow_noise():
+    """It would explain whatever the model lacks."""
+    slow = case(5, 0.5)
+    settings = replace(tr.SETTINGS, noise_prior=1.0)
+    slow = replace(slow, fitted=replace(slow.fitted, settings=settings))
+    found, start = begun(slow)
+    assert found is slow
+    np.testing.assert_array_equal(start.shared[list(SHARES)], 0.0)
+
+
+def test_what_is_as_slow_as_a_motion_is_no_noise():
+    """A correlation time of a second ends the search at the limit of 0.27 s, and the records stay with white noise."""
+    slow = case(5, 0.5, time_s=1.0)
+    problem = replace(slow.fitted, settings=replace(slow.fitted.settings, coloured=True))
+    white = fit(slow.fitted, tr.NOTHING, begin(slow.fitted, tr.NOTHING))
+    assert scores(problem, white).max() > 5.0
+    found, start = begun(slow)
+    assert found is slow
+    np.testing.assert_array_equal(start.shared[list(SHARES)], 0.0)

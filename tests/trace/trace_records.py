@@ -151,10 +151,11 @@ def fly(
     rotary=0.5,
     dt=DT,
     slow_share=0.0,
+    slow_time_s=0.08,
 ):
     """A noisy record of the linear aircraft in stationary gusts, between Dryden's and von Karman's; az counts gravity.
 
-    ``slow_share`` of the sensors' variance is correlated over 80 ms.
+    ``slow_share`` of the sensors' variance is correlated over ``slow_time_s``.
     """
     a, b, c, d = motion(theta, sigma_w, rotary)
     t = np.arange(samples) * dt
@@ -172,19 +173,19 @@ def fly(
         y
         + np.array(bias)
         + [0.0, 0.0, -9.80665]
-        + np.asarray(noise) * sensor_noise(rng, y.shape, slow_share, dt)
+        + np.asarray(noise) * sensor_noise(rng, y.shape, slow_share, slow_time_s, dt)
     )
     return record(
         y, lambda at: doublet(at, amplitude), lambda at: np.interp(at, t, attitude), name=name, dt=dt
     )
 
 
-def sensor_noise(rng, shape, slow_share, dt):
+def sensor_noise(rng, shape, slow_share, slow_time_s, dt):
     """Of unit variance, white and a first-order autoregression."""
     white = rng.standard_normal(shape)
     if slow_share == 0.0:
         return white
-    pole = np.exp(-dt / 0.08)
+    pole = np.exp(-dt / slow_time_s)
     drive = rng.standard_normal(shape)
     drive[1:] *= np.sqrt(1.0 - pole**2)
     slow = lfilter([1.0], [1.0, -pole], drive, axis=0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -16,7 +16,7 @@ from airtruth.physics.short_period import PARAMETERS
 from airtruth.trace.fit import Fit, Hypothesis, Problem
 from airtruth.trace.holdout import Assessment, assess, explained
 from airtruth.trace.lower import CHANNELS, lower
-from airtruth.trace.model import SHARED, S
+from airtruth.trace.model import COLOUR, COLOUR_TIME_S, SHARED, S
 from airtruth.trace.prepare import Case
 from airtruth.trace.profile import Profile, place_of
 from airtruth.trace.sandwich import inflation, scatter
@@ -27,6 +27,8 @@ from airtruth.trace.unnamed import Anomaly, advice
 Array = NDArray[np.float64]
 
 _Z95: Final = 1.959964
+_SEEN: Final = 0.02
+"""Share of slow noise that is said."""
 ANOMALY: Final = 0.01
 """Level at which something counts as missing although no effect is named."""
 _DETECTED: Final = 4.0
@@ -136,8 +138,16 @@ def answer(case: Case, stages: Sequence[Stage], outcome: Outcome) -> dict[str, A
             "fitted": [r.signals.run_id for r in case.fitted.records],
             "held_out": [r.signals.run_id for r in case.held.records] if case.held else [],
         },
-        "notes": list(case.notes),
+        "notes": [*case.notes, *_slow_noise(last.null.point.shared)],
     }
+
+
+def _slow_noise(shared: Array) -> Iterator[str]:
+    shares = {channel: shared[i] for channel, i in zip(CHANNELS, COLOUR, strict=False)}
+    seen = [f"{100.0 * share:.0f} % of {channel}'s" for channel, share in shares.items() if share > _SEEN]
+    if seen:
+        time_s = COLOUR_TIME_S * math.exp(shared[COLOUR[-1]])
+        yield f"part of the sensors' noise is slow: {', '.join(seen)} variance is correlated over {time_s:.2g} s"
 
 
 def parameters(effect: Effect, sizes: Array, covariance: Array) -> dict[str, dict[str, Any]]:

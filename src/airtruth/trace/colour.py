@@ -1,7 +1,8 @@
 """Whether the sensors' noise is white, or part of it slow, before anything is traced.
 
 Slow noise (a Gauss-Markov process beside the white one) costs states and parameters, and most records have none: it
-enters once the records show it.
+enters once the records show it. Nothing tells it from what the model lacks where nobody declares how large the noise
+is, nor where it has to be as slow as a motion or all there is: there it does not enter.
 
 Source: C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948), 50 (the score test), one-sided for each sensor's share.
 """
@@ -27,7 +28,7 @@ from airtruth.trace.fit import (
     reduced,
     tangent,
 )
-from airtruth.trace.model import COLOUR
+from airtruth.trace.model import BOUNDS, COLOUR
 from airtruth.trace.prepare import Case
 
 Array = NDArray[np.float64]
@@ -46,6 +47,8 @@ def begun(case: Case) -> tuple[Case, Point]:
     null = fit(problem, hypothesis, start)
     if null is None:
         return case, start
+    if not problem.settings.noise_is_declared:
+        return case, null.point
     settings = replace(problem.settings, coloured=True)
     slow = replace(problem, settings=settings)
     z = scores(slow, null)
@@ -53,8 +56,11 @@ def begun(case: Case) -> tuple[Case, Point]:
         return case, null.point
     shared = null.point.shared.copy()
     shared[list(SHARES)] = np.where(z > 0.0, FIRST_SHARE, 0.0)
+    found = fit(slow, hypothesis, replace(null.point, shared=shared))
+    if found is None or any(found.point.shared[i] == BOUNDS[i][1] for i in COLOUR):
+        return case, null.point
     held = None if case.held is None else replace(case.held, settings=settings)
-    return replace(case, fitted=slow, held=held), replace(null.point, shared=shared)
+    return replace(case, fitted=slow, held=held), found.point
 
 
 def scores(problem: Problem, null: Fit) -> Array:

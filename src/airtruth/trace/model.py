@@ -61,16 +61,17 @@ BOUNDS: Final = {
     SHARED.index("rotary"): (-0.75, 0.75),
     SHARED.index("rolloff"): (-0.75, 0.75),
     **dict.fromkeys(COLOUR[:3], (0.0, 0.95)),
-    COLOUR[3]: (-1.6, 1.6),
+    COLOUR[3]: (-1.6, 1.0),
 }
 """Shares of gusts of none to all, and a quarter beyond for what is no gust of either form; slow noise that leaves
-some white noise, correlated over 20 ms to half a second."""
+some white noise, correlated over 20 to 270 ms: what is slower is motion."""
 _LOOSE_STD: Final = 10.0
 """[1/rad] of a derivative in alpha of which nothing is declared: twice a lift slope."""
 _LOOSE_OFFSET_STD: Final = 0.5
 """Of the coefficient at the trim: a curvature of 40 about zero has 0.4 at 0.1 rad."""
 _ROTARY_STD: Final = 0.5
 _ROLLOFF_STD: Final = 0.5
+_NOISE_STD, _NOISE_UNKNOWN_STD = 0.1, 1.0
 _COLOUR_STD: Final = (0.5, 0.5, 0.5, 0.7)
 S, L = len(SHARED), len(LOCAL)
 SHARED_STEP: Final = np.array(
@@ -107,6 +108,11 @@ class Settings:
     offset_std: Array
     derivatives: Array
     coloured: bool = False
+
+    @property
+    def noise_is_declared(self) -> bool:
+        """Whether the sensors' noise levels are more than a judgement."""
+        return self.noise_prior < _NOISE_UNKNOWN_STD
 
 
 @dataclass(frozen=True)
@@ -378,11 +384,11 @@ def settings_of(aircraft: Aircraft, length_w_m: float, thrust_std: float, deriva
     """What aircraft.toml declares of the sensors, and where it is silent a judgement with a wide prior."""
     noise = np.array([0.1 * np.pi / 180.0, 0.3 * np.pi / 180.0, 0.1])
     bias = np.array([0.5 * np.pi / 180.0, 0.5 * np.pi / 180.0, 0.3])
-    prior = 0.1
+    prior = _NOISE_STD
     for i, channel in enumerate(CHANNELS):
         sensor = aircraft.file.sensors.get(channel)
         if sensor is None or sensor.noise_std.value <= 0.0:
-            prior = 1.0
+            prior = _NOISE_UNKNOWN_STD
             continue
         # quantisation and white noise add
         noise[i] = np.hypot(sensor.noise_std.value, sensor.quantum.value / np.sqrt(12.0))
