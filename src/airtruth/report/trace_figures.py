@@ -69,7 +69,7 @@ def sight(found: Trace) -> Sight:
     model = outcome.models[pair[1]]
     low = lower(model.hypothesis.change(model.sizes))
     floors = [
-        explained(record, problem, low, model.shared, own.local, number)
+        explained(record, problem, low, model.shared, own.local, number, model.hypothesis.loose)
         for number, (record, own) in enumerate(zip(problem.records, assessed[pair[1]], strict=True))
     ]
     gains = [

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 
 from airtruth.effects.effect import Effect
 from airtruth.physics.short_period import PARAMETERS
-from airtruth.trace.fit import Fit, Hypothesis, Problem
+from airtruth.trace.fit import Fit, Hypothesis, Problem, loosened
 from airtruth.trace.holdout import Assessment, assess, explained
 from airtruth.trace.lower import CHANNELS, lower
 from airtruth.trace.model import COLOUR, COLOUR_TIME_S, SHARED, S
@@ -207,6 +207,8 @@ def _effect(stages: Sequence[Stage], number: int, covariance: Array) -> dict[str
     }
     if effect.name == "sensor_delay":
         row["channel"] = effect.variant
+    if loosened(effect, final.hypothesis.trim_alpha_rad):
+        row["about_alpha_rad"] = final.hypothesis.trim_alpha_rad
     return row
 
 
@@ -320,7 +322,7 @@ def _floor(problem: Problem, outcome: Outcome, which: str) -> dict[str, dict[str
     low = lower(model.hypothesis.change(model.sizes))
     found = (outcome.fitted if which == "fit" else outcome.held)[name]
     free = [
-        explained(record, problem, low, model.shared, a.local, number) ** 2
+        explained(record, problem, low, model.shared, a.local, number, model.hypothesis.loose) ** 2
         for number, (record, a) in enumerate(zip(problem.records, found, strict=True))
     ]
     return {

@@ -193,7 +193,8 @@ class Fit:
     Attributes
     ----------
     hypothesis, point : what was fitted and where it ended.
-    cost : negative log-posterior, constants left out, so that it compares hypotheses whose derivatives are as free.
+    cost : negative log-posterior, constants left out, so that it compares hypotheses whose derivatives and trim
+        coefficients are as free.
     likelihood : (records,) negative log-likelihood of each record.
     tangents : of each record at ``point``.
     whitener : of the innovations.
@@ -335,7 +336,7 @@ def fit(
     ----------
     rival : cost of a better hypothesis: the search ends early once it is plainly out of reach.
     whitener : an autoregression that is held; with one, levels should not be free.
-    free_levels : whether noise and gust levels are fitted.
+    free_levels : whether noise and gust levels and the share of slow noise are fitted.
     """
     point, damping = begin, 1e-3
     current = _evaluate(problem, hypothesis, point, whitener, free_levels)

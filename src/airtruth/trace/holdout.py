@@ -189,7 +189,13 @@ def floor(record: Record, problem: Problem, low: Lowered, shared: Array, local: 
 
 
 def explained(
-    record: Record, problem: Problem, low: Lowered, shared: Array, local: Array, seed: int
+    record: Record,
+    problem: Problem,
+    low: Lowered,
+    shared: Array,
+    local: Array,
+    seed: int,
+    loose: Sequence[int] = (),
 ) -> Array:
     """What gusts and sensors leave of a free run once initial state, biases and trim are fitted to it: (3,) rms.
 
@@ -215,7 +221,7 @@ def explained(
     y += np.sqrt(noise)[:, None] * rng.standard_normal(y.shape)
     weight = 1.0 / floor(record, problem, low, shared, local)
     t = _tangents(record, problem.settings, low, shared, local, weight)[1]
-    prior = np.diag(np.diag(local_prior(record, problem.settings)[1])[list(MOTION)])
+    prior = np.diag(np.diag(local_prior(record, problem.settings, loose)[1])[list(MOTION)])
     flat = (y * weight[:, None]).reshape(-1, _DRAWS)
     left = flat - t.T @ np.linalg.solve(t @ t.T + prior, t @ flat)
     return np.asarray(np.sqrt((left.reshape(samples, 3, _DRAWS) ** 2).mean(axis=(0, 2))) / weight)

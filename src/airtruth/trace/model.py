@@ -72,6 +72,8 @@ _LOOSE_OFFSET_STD: Final = 0.5
 _ROTARY_STD: Final = 0.5
 _ROLLOFF_STD: Final = 0.5
 _NOISE_STD, _NOISE_UNKNOWN_STD = 0.1, 1.0
+_MOST_SLOW: Final = 0.99
+"""Share of slow noise beyond the search's bound, where differences have to see its slope."""
 _COLOUR_STD: Final = (0.5, 0.5, 0.5, 0.7)
 S, L = len(SHARED), len(LOCAL)
 SHARED_STEP: Final = np.array(
@@ -259,7 +261,7 @@ def answered(
 def sensor_noise(settings: Settings, shared: Array) -> tuple[Array, Array]:
     """Variances (3,) of the sensors' white noise, and of the slow one (4,) standard deviations and time [s]."""
     variance = (settings.noise * np.exp(shared[6:9])) ** 2
-    share = np.clip(shared[list(COLOUR[:3])], 0.0, 0.95)
+    share = np.clip(shared[list(COLOUR[:3])], 0.0, _MOST_SLOW)
     time_s = COLOUR_TIME_S * np.exp(shared[COLOUR[3]])
     return variance * (1.0 - share), np.append(np.sqrt(variance * share), time_s)
 

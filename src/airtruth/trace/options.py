@@ -22,7 +22,8 @@ class TraceOptions:
     threads : records worked on at a time; the answer does not depend on it.
     seed : of the draws behind p-values.
     effects : keys of the candidates; None for the whole library.
-    refitted : write the refitted derivatives into the updated aircraft too.
+    refitted : write the refitted derivatives into the updated aircraft too; those that a curvature sets free are
+        written in any case.
     """
 
     model: str = "aircraft"

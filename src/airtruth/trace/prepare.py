@@ -99,7 +99,7 @@ def prepare(
     return Case(
         fitted=Problem(fitted, settings, options.threads),
         held=Problem(held, settings, options.threads) if held else None,
-        hypothesis=Hypothesis(declared_change(aircraft), trim_alpha_rad=records[0].plant.trim_alpha_rad),
+        hypothesis=Hypothesis(declared_change(aircraft), trim_alpha_rad=fitted[0].plant.trim_alpha_rad),
         effects=tuple(testable),
         untestable=tuple(untestable),
         model=model,

@@ -35,7 +35,7 @@ def inflation(problem: Problem, found: Fit) -> Array:
 
     Returns
     -------
-    (13 + k,) ratios [-], not below one. A long-run variance from few seconds scatters and is short on average, so
+    (17 + k,) ratios [-], not below one. A long-run variance from few seconds scatters and is short on average, so
     it is never taken to narrow anything.
     """
     m = S + len(found.point.sizes)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
+from airtruth.effects.change import Change
 from airtruth.effects.effect import Effect
 from airtruth.trace.fit import NO_WHITENER, Fit, Problem, Tangent, Whitener, at_bounds, parts, reduced
 from airtruth.trace.lower import lower
@@ -150,15 +151,14 @@ def table(null: Fit, problem: Problem, effects: Sequence[Effect], whitener: Whit
 
 def _audible(direction: Direction, null: Fit, problem: Problem) -> Direction:
     """The direction with a step that can be seen: a limit does nothing until it is low enough."""
-    effect, first = direction.effect, direction.effect.parameters[0]
+    first = direction.effect.parameters[0]
     largest = max(abs(first.size(first.low)), abs(first.size(first.high)))
-    before = null.hypothesis.change(null.point.sizes)
     if not (first.reciprocal and not first.time_constant):
         return direction
     step = direction.step
 
     def moves(size: float) -> float:
-        change = before + effect.change(_values(replace(direction, step=size)))
+        change = _with_effect(null, replace(direction, step=size))
         total = 0.0
         for record, local, tangent in zip(problem.records, null.point.local, null.tangents, strict=True):
             moved = respond(record, problem.settings, change, null.point.shared, local)
@@ -170,8 +170,9 @@ def _audible(direction: Direction, null: Fit, problem: Problem) -> Direction:
     return replace(direction, step=min(step, largest))
 
 
-def _values(d: Direction) -> dict[str, float]:
-    return {p.name: p.value(float(s)) for p, s in zip(d.effect.parameters, d.sizes(d.step), strict=True)}
+def _with_effect(null: Fit, d: Direction) -> Change:
+    sizes = np.concatenate([null.point.sizes, d.sizes(d.step)])
+    return null.hypothesis.plus(d.effect).change(sizes)
 
 
 def holm(p_values: Sequence[float]) -> Array:
@@ -217,12 +218,11 @@ def _with(null: Fit, problem: Problem, index: int, tried: Sequence[Direction]) -
         null.point.shared,
         null.point.local[index],
     )
-    before = null.hypothesis.change(null.point.sizes)
     for i, d in enumerate(tried):
         moved = respond(
             record,
             problem.settings,
-            lower(before + d.effect.change(_values(d))),
+            lower(_with_effect(null, d)),
             null.point.shared,
             null.point.local[index],
         )

@@ -57,7 +57,8 @@ class Refit:
     Attributes
     ----------
     score, fit : what put it among the leading ones, and its fit, all free.
-    handicap : log-likelihood that the null gains by the mere freedom of derivatives that the effect sets free.
+    handicap : log-likelihood that the null gains by the mere freedom of derivatives and trim coefficients that the
+        effect sets free.
     """
 
     score: Score
@@ -207,7 +208,7 @@ def _refitted(
         rival = min((r.fit.cost for r in fits), default=np.inf)
         found = _refit(problem, null, s, table.white_sizes[i], rival)
         if found is not None:
-            fits.append(Refit(s, found, _handicap(problem, null, s.effect)))
+            fits.append(Refit(s, found, _handicap(problem, null, s.effect, found)))
     for _ in range(_PATIENCE):  # the leader at least has to arrive
         fits.sort(key=lambda r: r.cost)
         if not fits or fits[0].fit.converged:
@@ -217,12 +218,14 @@ def _refitted(
     return sorted(fits, key=lambda r: r.cost)
 
 
-def _handicap(problem: Problem, null: Fit, effect: Effect) -> float:
+def _handicap(problem: Problem, null: Fit, effect: Effect, found: Fit) -> float:
     free = null.hypothesis.plus(effect).loose
     if free == null.hypothesis.loose:
         return 0.0
-    freed = fit(problem, replace(null.hypothesis, freed=free), null.point)
-    return 0.0 if freed is None else max(null.cost - freed.cost, 0.0)
+    hypothesis = replace(null.hypothesis, freed=free)
+    without = replace(found.point, sizes=found.point.sizes[: len(null.point.sizes)])
+    ends = [fit(problem, hypothesis, start) for start in (null.point, without)]
+    return max([null.cost - end.cost for end in ends if end is not None], default=0.0)
 
 
 def _better_null(problem: Problem, null: Fit, fits: Sequence[Refit]) -> Fit | None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from airtruth.aircraft import Aircraft
-from airtruth.effects.change import Change
+from airtruth.effects.change import AeroTerm, Change
 from airtruth.effects.writing import Corrections, write_aircraft
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.trace.prepare import Case
@@ -21,6 +21,11 @@ def accepted_change(stages: Sequence[Stage]) -> Change:
     """What the accepted effects change at their estimated sizes."""
     final = stages[-1].gls
     return replace(final.hypothesis, declared=Change()).change(final.point.sizes)
+
+
+def _counted_from_zero(term: AeroTerm, counted_from_rad: float) -> AeroTerm:
+    """A term of the angle of attack that the linear model counts from a record's own trim, as an aircraft has it."""
+    return replace(term, at=term.at + counted_from_rad) if term.signal == "alpha" else term
 
 
 def write_update(
@@ -48,13 +53,16 @@ def write_update(
     folder = out / "aircraft" / aircraft.name
     if folder.exists():
         shutil.rmtree(folder)
-    plant = case.fitted.records[0].plant
+    plants = [record.plant for record in case.fitted.records]
+    counted_from = float(np.mean([p.alpha_shift_rad for p in plants]))
+    change = replace(change, aero=tuple(_counted_from_zero(t, counted_from) for t in change.aero))
     increments = dict(zip(PARAMETERS, stages[-1].gls.point.shared[:6].tolist(), strict=True))
     corrections = None
     if not refitted:
         increments = {PARAMETERS[i]: increments[PARAMETERS[i]] for i in stages[-1].gls.hypothesis.loose}
-    if increments and plant.trim is not None and np.isfinite(list(increments.values())).all():
-        corrections = Corrections(increments, plant.trim_alpha_rad, plant.trim_elevator_rad)
+    if increments and aircraft.file.jsbsim is not None and np.isfinite(list(increments.values())).all():
+        elevator = float(np.mean([p.trim_elevator_rad for p in plants]))
+        corrections = Corrections(increments, plants[0].trim_alpha_rad + counted_from, elevator)
     names = ", ".join(e.key for e in stages[-1].gls.hypothesis.effects)
     note = f"Traced from measured records: {names}."
     if corrections is not None:
