@@ -398,12 +398,18 @@ def fit(
     return Fit(hypothesis, point, cost, likelihood, tangents, whitener, covariance, converged, shortfall)
 
 
-def begin(problem: Problem, hypothesis: Hypothesis) -> Point:
-    """Where a search begins without anything known: motions fitted with the levels held in rough air."""
+def begin(problem: Problem, hypothesis: Hypothesis, sizes: Array | None = None, iterations: int = 4) -> Point:
+    """Where a search begins without anything known: motions fitted with the levels held in rough air.
+
+    Parameters
+    ----------
+    sizes : where those of the effects begin; None for none.
+    """
     local = np.stack([start(record, problem.settings) for record in problem.records])
     local[:, GUST_LEVEL] = np.log(_ROUGH_M_S)
-    point = Point(np.zeros(S), local, np.zeros(len(hypothesis.parameters)))
-    found = fit(problem, hypothesis, point, iterations=4, free_levels=False)
+    first = np.zeros(len(hypothesis.parameters)) if sizes is None else sizes
+    point = Point(np.zeros(S), local, first)
+    found = fit(problem, hypothesis, point, iterations=iterations, free_levels=False)
     return point if found is None else found.point
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
 from airtruth.trace import score
-from airtruth.trace.fit import Fit, Hypothesis, Point, Problem, Whitener, autoregression, fit
+from airtruth.trace.fit import Fit, Hypothesis, Point, Problem, Whitener, autoregression, begin, fit
 from airtruth.trace.judge import (
     IMMATERIAL,
     IMPROBABLE,
@@ -24,7 +24,7 @@ from airtruth.trace.judge import (
     own_probability,
     reference_of,
 )
-from airtruth.trace.model import GUST_LEVEL, MOTION, NOISE, respond
+from airtruth.trace.model import GUST_LEVEL, NOISE, respond
 from airtruth.trace.profile import Profile, best_place, place_of
 from airtruth.trace.score import Score, Table
 from airtruth.trace.unnamed import Anomaly, anomalies
@@ -41,6 +41,8 @@ _NEAR: Final = 30.0
 _RESTARTS: Final = 2
 _PATIENCE: Final = 3
 _FAR: Final = 5.0
+_ANEW: Final = 6
+"""Iterations in rough air where a search begins as if nothing was known."""
 _VISIBLE: Final = 2.0
 _SHARES: Final = (1.0, 0.3, 0.1, 0.02)
 SIGNIFICANT: Final = 10.0
@@ -199,6 +201,11 @@ def _refitted(
     # once something is missing, levels may tell more than means: a lag in gusts is seen in the scatter.
     white = np.array(table.white)
     order = [int(i) for i in np.argsort(-white, kind="stable")[: LEADING - 2] if white[i] > _VISIBLE]
+    if _is_improbable(problem, null):
+        # what a null far from the declared aircraft has absorbed has no score there
+        loose = null.hypothesis.loose
+        absorbed = [i for i, s in enumerate(table.scores) if null.hypothesis.plus(s.effect).loose != loose]
+        order = [*absorbed, *(i for i in order if i not in absorbed)]
     by_score = np.argsort([-abs(s.z) for s in table.scores], kind="stable")
     order += [int(i) for i in by_score if int(i) not in order and significant[i]][: LEADING - len(order)]
     fits: list[Refit] = []
@@ -281,9 +288,9 @@ def _whitened(problem: Problem, found: Fit, whitener: Whitener, levels: Fit) -> 
 def _refit(problem: Problem, null: Fit, s: Score, white_size: float, rival: float) -> Fit | None:
     """The null and one effect, all free, from shares of the size that the score suggests.
 
-    Where the null's derivatives or biases are improbable they have absorbed what they can of a large effect, and
-    the search from there can end in another optimum: one more begins at those declared, and at the size that
-    the score has without an autoregression, which can take up such an effect as a whole.
+    Where the null is improbable it has absorbed what it can of a large effect, and the search from there can end in
+    another optimum: one more begins at what is declared, as if nothing was known, and at the size that the score
+    has without an autoregression, which can take up such an effect as a whole.
     """
     hypothesis = null.hypothesis.plus(s.effect)
     best: Fit | None = None
@@ -293,16 +300,19 @@ def _refit(problem: Problem, null: Fit, s: Score, white_size: float, rival: floa
             best = tried
         if best is not None and best.converged and null.cost - best.cost > 0.2 * s.z**2:
             break
-    if min(declared_probability(problem, null), own_probability(problem, null)) < IMPROBABLE:
-        start = _at(null, s, white_size)
-        shared = np.concatenate([np.zeros(6), start.shared[6:]])
-        local = start.local.copy()
-        middle = np.array([own[0] for own in problem.own_priors(hypothesis)])
-        local[:, MOTION] = middle[:, MOTION]
-        tried = fit(problem, hypothesis, replace(start, shared=shared, local=local), rival=rival)
+    if _is_improbable(problem, null):
+        start = begin(problem, hypothesis, _at(null, s, white_size).sizes, _ANEW)
+        shared = start.shared.copy()
+        shared[list(NOISE)] = null.point.shared[list(NOISE)]
+        tried = fit(problem, hypothesis, replace(start, shared=shared), rival=rival)
         if tried is not None and (best is None or tried.cost < best.cost):
             best = tried
     return best
+
+
+def _is_improbable(problem: Problem, null: Fit) -> bool:
+    """Whether derivatives, biases or trim coefficients of a null contradict those declared."""
+    return min(declared_probability(problem, null), own_probability(problem, null)) < IMPROBABLE
 
 
 def _at(null: Fit, s: Score, size: float) -> Point:
