@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -59,11 +60,13 @@ def test_it_is_found_at_its_size(found):
 
 
 def test_the_update_flies_what_was_fitted(found):
-    """JSBSim's own free run of the held-out record beside the filter's, as for other effects."""
+    """JSBSim's own free run of the held-out record beside the filter's: in calm air what is not written of the fit,
+    thrust and inertia, shows.
+    """
     after = found.answer["error"]["after"]["held_out"]["free_run"]
     for channel, error in found.answer["replay"]["updated"].items():
-        assert error == pytest.approx(after[channel], rel=0.05)
-        assert error < 0.5 * found.answer["replay"]["declared"][channel] or channel == "az_m_s2"
+        assert error < 1.2 * after[channel]
+        assert error < 0.2 * found.answer["replay"]["declared"][channel]
 
 
 @pytest.mark.parametrize("refitted", [True, False])
@@ -73,7 +76,7 @@ def test_the_slope_that_was_set_free_is_always_written(found, refitted, tmp_path
     more = slopes(folder, found) - found.case.fitted.records[0].plant.derivatives
     fitted = found.stages[-1].gls.point.shared[:6]
     assert more[3] == pytest.approx(fitted[3], abs=0.02)
-    assert more[4] == pytest.approx(fitted[4] if refitted else 0.0, abs=0.02)
+    assert more[4] == pytest.approx(fitted[4] if refitted else 0.0, abs=0.1)  # a trim of other alpha
 
 
 def test_a_linear_model_s_curve_is_written_at_its_trim(linear, tmp_path):
@@ -108,5 +111,5 @@ def test_slow_noise_is_said(tmp_path):
     channels = dict(log.channels) | {"q_rad_s": log.channels["q_rad_s"] + level * slow}
     noisy = run(replace(log, channels=channels), GTM, TraceOptions(effects=("elevator_delay",)))
     (note,) = [n for n in noisy.answer["notes"] if "slow" in n]
-    assert "q_rad_s" in note
-    assert "alpha_rad" not in note
+    share = int(re.search(r"(\d+) % of q_rad_s's", note)[1])
+    assert 35 < share < 60  # half of the variance

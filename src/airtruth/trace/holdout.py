@@ -98,10 +98,12 @@ def assess(
     else:
         likelihood, whitened = parts(found, NO_WHITENER, levels=False)[0], found.r
     residual = free_run(record, problem, low, shared, kept, hypothesis.loose)
+    with np.errstate(over="ignore", invalid="ignore"):  # of a model that leaves all bounds on this record
+        innovation, free = (np.sqrt((x**2).mean(axis=0)) for x in (response.e, residual))
     return Assessment(
         likelihood=float(likelihood),
-        innovation=np.sqrt((response.e**2).mean(axis=0)),
-        free_run=np.sqrt((residual**2).mean(axis=0)),
+        innovation=innovation,
+        free_run=free,
         residual=residual,
         whitened=whitened,
         expected=np.sqrt(np.diag(response.covariance)),
@@ -308,6 +310,7 @@ def leave_one_out(problem: Problem, found: Fit) -> tuple[Array, list[Assessment]
             np.linalg.solve(rest / np.outer(scale, scale) + 1e-9 * np.eye(len(scale)), gradient / scale)
             / scale
         )
+        move[6:S] = np.clip(move[6:S], -1.0, 1.0)  # of levels, as in a search
         sizes = found.point.sizes + _held(found.hypothesis, found.point.sizes, move[S:])
         return assess(
             problem, i, found.hypothesis, found.point.shared + move[:S], sizes, found.point.local[i]

@@ -20,6 +20,7 @@ from airtruth.trace.score import Score
 Array = NDArray[np.float64]
 
 UNCONVERGED: Final = "its refit did not converge"
+SUPERSEDED: Final = "it explains nothing beside another effect"
 IMMATERIAL: Final = "its size is immaterial"
 IMPROBABLE: Final = 0.001
 """Probability below which refitted derivatives contradict those declared."""
@@ -27,6 +28,8 @@ _ERRORS: Final = 2.0
 _FREE_ERRORS: Final = 3.0
 """Standard errors by which a free run may seem worse: in rough air it is mostly gusts."""
 _NEXT_TO_NOTHING: Final = 0.02
+_ASTRAY: Final = 1e6
+"""Residual over what gusts and sensors explain, beyond which a free run has left all bounds."""
 _SEVERAL: Final = 3
 """Records from which their scatter can be told; of fewer, none may lose: what one alone shows has not repeated."""
 _DERIVATIVES: Final = 6
@@ -95,6 +98,12 @@ def outdone(s: Score, found: Fit, gain: float) -> Candidate:
     return Candidate(s, found, gain, nothing, nothing, *_size(s, found), ("another effect explains more",))
 
 
+def superseded(s: Score, found: Fit, gain: float, by: str) -> Candidate:
+    """A candidate that explains nothing once another effect is in the model."""
+    nothing = np.full(len(found.likelihood), np.nan)
+    return Candidate(s, found, gain, nothing, nothing, *_size(s, found), (SUPERSEDED, f"that is {by}"))
+
+
 def judge(
     problem: Problem, s: Score, best: Fit, gain: float, reference: Reference, least: float
 ) -> Candidate:
@@ -117,6 +126,9 @@ def judge(
             break
     free, spread = np.zeros(len(assessed)), 0.0
     for i, (old, new, weight) in enumerate(zip(unaided, assessed, reference.weight, strict=True)):
+        if not (np.abs(old.residual) < _ASTRAY * weight).all():
+            free[i] = 0.0 if (np.abs(new.residual) < _ASTRAY * weight).all() else -np.inf
+            continue
         gains = (((old.residual / weight) ** 2) - ((new.residual / weight) ** 2)).sum(axis=1)
         free[i] = gains.sum()
         lags = round(MEMORY_S / problem.records[i].signals.dt_s)
@@ -180,10 +192,16 @@ def _place(s: Score, found: Fit) -> int:
 
 
 def _lost(gains: Array) -> bool:
-    """Whether records left out lose: their sum is negative by more than two of its own standard errors."""
-    total = float(gains.sum())
-    if not np.isfinite(total):
+    """Whether records left out lose: their sum is negative by more than two of its own standard errors.
+
+    A record that the effect alone can follow has gained, one that it cannot has lost.
+    """
+    if np.isnan(gains).any() or gains.min() == -np.inf:
         return True
+    gains = gains[np.isfinite(gains)]
+    if gains.size == 0:
+        return False
+    total = float(gains.sum())
     if gains.size < _SEVERAL:
         return bool(gains.min() < 0.0)
     error = float(gains.std(ddof=1) * np.sqrt(gains.size))

@@ -15,6 +15,7 @@ from airtruth.trace.fit import Fit, Hypothesis, Point, Problem, Whitener, autore
 from airtruth.trace.judge import (
     IMMATERIAL,
     IMPROBABLE,
+    SUPERSEDED,
     UNCONVERGED,
     Candidate,
     arrived,
@@ -23,6 +24,7 @@ from airtruth.trace.judge import (
     outdone,
     own_probability,
     reference_of,
+    superseded,
 )
 from airtruth.trace.model import GUST_LEVEL, NOISE, respond
 from airtruth.trace.profile import Profile, best_place, place_of
@@ -137,7 +139,32 @@ def search(
     seed : of the draws behind p-values.
     advance : told what is being done.
     """
-    stages: list[Stage] = []
+    return tuple(_rounds(problem, Round(hypothesis, start, tuple(effects)), [], seed, advance))
+
+
+@dataclass(frozen=True)
+class Round:
+    """Where a round begins.
+
+    Attributes
+    ----------
+    hypothesis, start : the effects accepted so far, and where the search for its parameters begins.
+    effects : candidates.
+    instead : keys (old, new) of an effect that explains nothing beside a later one, and of that one; None as a rule.
+    """
+
+    hypothesis: Hypothesis
+    start: Point
+    effects: tuple[Effect, ...]
+    instead: tuple[str, str] | None = None
+
+
+def _rounds(
+    problem: Problem, first: Round, before: Sequence[Stage], seed: int, advance: Callable[[str], None]
+) -> list[Stage]:
+    """Rounds from one on, behind those before it."""
+    stages, rounds = list(before), [first]
+    hypothesis, start, effects, instead = first.hypothesis, first.start, first.effects, first.instead
     restarts = _RESTARTS
     while True:
         advance(f"round {len(stages) + 1}: refit without further effects")
@@ -152,13 +179,13 @@ def search(
         candidates: tuple[Candidate, ...] = ()
         if len(stages) < MOST:
             level = LATER_LEVEL if stages else LEVEL
-            fits = _refitted(problem, null, table, adjusted <= level, advance)
+            fits = _refitted(problem, null, table, adjusted <= level, advance, instead)
             better = _better_null(problem, null, fits) if restarts else None
             if better is not None:
                 start, restarts = better.point, restarts - 1
                 continue
             least = SIGNIFICANT_LATER if stages else SIGNIFICANT
-            candidates = _judged(problem, null, fits, least)
+            candidates = _judged(problem, null, fits, least, instead)
         tied = _tied(candidates)
         profile = None
         if tied and place_of(tied[0].score.effect) is not None:
@@ -172,10 +199,34 @@ def search(
         if not tied:
             break
         best = tied[0]
-        hypothesis, start, restarts = best.found.hypothesis, best.found.point, _RESTARTS
+        empty = None if first.instead else _explains_nothing(problem, best.found)
+        if empty is not None:
+            at = len(before) + empty
+            key = stages[at].tied[0].score.effect.key
+            advance(f"{best.score.effect.key} instead of {key}")
+            anew = replace(rounds[empty], start=stages[at].null.point, instead=(key, best.score.effect.key))
+            other = _rounds(problem, anew, stages[:at], seed, advance)
+            if len(other) > at and other[at].tied:
+                return other
+        hypothesis, start, restarts, instead = best.found.hypothesis, best.found.point, _RESTARTS, None
         names = {e.key for e in hypothesis.effects}
-        effects = [e for e in effects if e.key not in names]
-    return tuple(stages)
+        effects = tuple(e for e in effects if e.key not in names)
+        rounds.append(Round(hypothesis, start, effects))
+    return stages
+
+
+def _explains_nothing(problem: Problem, found: Fit) -> int | None:
+    """Place of an earlier effect without which the fit is hardly worse; None if each is needed."""
+    at = 0
+    for i, effect in enumerate(found.hypothesis.effects[:-1]):
+        count = len(effect.parameters)
+        rest = tuple(e for j, e in enumerate(found.hypothesis.effects) if j != i)
+        sizes = np.delete(found.point.sizes, np.arange(at, at + count))
+        less = fit(problem, replace(found.hypothesis, effects=rest), replace(found.point, sizes=sizes))
+        if less is not None and 2.0 * (less.cost - found.cost - count) < SIGNIFICANT:
+            return i
+        at += count
+    return None
 
 
 def _gls(problem: Problem, null: Fit, whitener: Whitener) -> Fit:
@@ -192,7 +243,12 @@ def _gls(problem: Problem, null: Fit, whitener: Whitener) -> Fit:
 
 
 def _refitted(
-    problem: Problem, null: Fit, table: Table, significant: NDArray[np.bool_], advance: Callable[[str], None]
+    problem: Problem,
+    null: Fit,
+    table: Table,
+    significant: NDArray[np.bool_],
+    advance: Callable[[str], None],
+    instead: tuple[str, str] | None = None,
 ) -> list[Refit]:
     """Full refits of the leading effects, best first; none where no score is significant."""
     if not significant.any():
@@ -208,6 +264,9 @@ def _refitted(
         order = [*absorbed, *(i for i in order if i not in absorbed)]
     by_score = np.argsort([-abs(s.z) for s in table.scores], kind="stable")
     order += [int(i) for i in by_score if int(i) not in order and significant[i]][: LEADING - len(order)]
+    if instead is not None:
+        wanted = [i for i, s in enumerate(table.scores) if s.effect.key in instead]
+        order = [*wanted, *(i for i in order if i not in wanted)]
     fits: list[Refit] = []
     for i in order:
         s = table.scores[i]
@@ -245,7 +304,13 @@ def _better_null(problem: Problem, null: Fit, fits: Sequence[Refit]) -> Fit | No
     return again if again is not None and again.cost < null.cost - _BETTER else None
 
 
-def _judged(problem: Problem, null: Fit, fits: Sequence[Refit], least: float) -> tuple[Candidate, ...]:
+def _judged(
+    problem: Problem,
+    null: Fit,
+    fits: Sequence[Refit],
+    least: float,
+    instead: tuple[str, str] | None = None,
+) -> tuple[Candidate, ...]:
     """Gains, those near the best compared under one autoregression, and the rules for those that lead."""
     if not fits:
         return ()
@@ -265,6 +330,9 @@ def _judged(problem: Problem, null: Fit, fits: Sequence[Refit], least: float) ->
     judged: list[Candidate] = []
     accepted = -np.inf
     for gain, r in ranked:
+        if instead is not None and r.score.effect.key == instead[0]:
+            judged.append(superseded(r.score, r.fit, gain, instead[1]))
+            continue
         if gain < accepted - TIE:
             judged.append(outdone(r.score, r.fit, gain))
             continue
@@ -346,7 +414,10 @@ def _tied(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
         *(
             c
             for c in candidates
-            if c is not best and abs(best.gain - c.gain) <= TIE and arrived(c.found, c.gain)
+            if c is not best
+            and c.reasons[:1] != (SUPERSEDED,)
+            and abs(best.gain - c.gain) <= TIE
+            and arrived(c.found, c.gain)
         ),
     )
 
