@@ -46,7 +46,7 @@ _FAR: Final = 5.0
 _ANEW: Final = 6
 """Iterations in rough air where a search begins as if nothing was known."""
 _VISIBLE: Final = 2.0
-_SHARES: Final = (1.0, 0.3, 0.1, 0.02)
+_SHARES: Final = (2.0, 1.0, 0.6, 0.3, 0.1, 0.02)
 SIGNIFICANT: Final = 10.0
 SIGNIFICANT_LATER: Final = 25.0
 """Gains in 2 log L of a refit: chi-square(1) at 5 % over the library's 33 effects (Bonferroni), and at 2e-5."""
@@ -362,7 +362,7 @@ def _refit(problem: Problem, null: Fit, s: Score, white_size: float, rival: floa
     """
     hypothesis = null.hypothesis.plus(s.effect)
     best: Fit | None = None
-    for share in _shares(problem, null, hypothesis, s)[:2]:
+    for share in _shares(problem, null, hypothesis, s):
         tried = fit(problem, hypothesis, _at(null, s, share * s.size), rival=rival)
         if tried is not None and (best is None or tried.cost < best.cost):
             best = tried
