@@ -80,6 +80,8 @@ def test_killed_at_a_rename(short, tmp_path, moment):
 def flying(folder, jobs=2):
     """The command in a session of its own, which is gone afterwards whatever happens."""
     file = write(folder / "campaign.toml", **LONG)
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # of a shell's background jobs, and inherited
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     process = subprocess.Popen(
         [sys.executable, "-m", "airtruth", "fly", file, "--out", folder / "out", "--jobs", str(jobs)],
         start_new_session=True,
