@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -33,7 +32,7 @@ def change_of(found: Trace) -> Change:
     model = found.outcome.models.get("after")
     if model is None:
         return Change()
-    return replace(model.hypothesis, declared=Change()).change(model.sizes)
+    return model.hypothesis.added(model.sizes)
 
 
 def contribution(found: Trace, record: Record, own: Assessment) -> Array | None:

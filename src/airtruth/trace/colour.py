@@ -30,6 +30,7 @@ from airtruth.trace.fit import (
 )
 from airtruth.trace.model import BOUNDS, COLOUR
 from airtruth.trace.prepare import Case
+from airtruth.trace.score import eliminated
 
 Array = NDArray[np.float64]
 
@@ -88,8 +89,4 @@ def share_slopes(problem: Problem, null: Fit) -> tuple[Array, Array]:
     gradient, information, _ = reduced(
         problem, null.hypothesis, null.point, len(null.point.sizes), pieces, levels=True, held=held
     )
-    others = [i for i in range(len(gradient)) if i not in SHARES]
-    mine = list(SHARES)
-    across = np.linalg.solve(information[np.ix_(others, others)], information[np.ix_(others, mine)])
-    slope = gradient[mine] - across.T @ gradient[others]
-    return slope, information[np.ix_(mine, mine)] - information[np.ix_(mine, others)] @ across
+    return eliminated(gradient, information, SHARES)

@@ -97,7 +97,11 @@ class Hypothesis:
 
     def change(self, sizes: Array) -> Change:
         """All that the hypothesis changes at these sizes."""
-        total = self.declared
+        return self.declared + self.added(sizes)
+
+    def added(self, sizes: Array) -> Change:
+        """What the effects change at these sizes, without what is declared."""
+        total = Change()
         for effect, values in zip(self.effects, self.values(sizes), strict=True):
             total = total + effect.change(values)
         return replace(total, aero=tuple(self._about_trim(t) for t in total.aero))

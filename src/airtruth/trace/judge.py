@@ -20,6 +20,7 @@ from airtruth.trace.score import Score
 Array = NDArray[np.float64]
 
 UNCONVERGED: Final = "its refit did not converge"
+OUTDONE: Final = "another effect explains more"
 SUPERSEDED: Final = "it explains nothing beside another effect"
 IMMATERIAL: Final = "its size is immaterial"
 IMPROBABLE: Final = 0.001
@@ -92,16 +93,10 @@ def _ways(problem: Problem) -> tuple[Callable[[Problem, Fit], LeftOut], ...]:
     return (leave_one_out, one_by_the_other) if len(problem.records) == 2 else (leave_one_out,)
 
 
-def outdone(s: Score, found: Fit, gain: float) -> Candidate:
-    """A candidate that need not be judged: an accepted one explains more."""
+def unjudged(s: Score, found: Fit, gain: float, *reasons: str) -> Candidate:
+    """A candidate that need not be judged, and why."""
     nothing = np.full(len(found.likelihood), np.nan)
-    return Candidate(s, found, gain, nothing, nothing, *_size(s, found), ("another effect explains more",))
-
-
-def superseded(s: Score, found: Fit, gain: float, by: str) -> Candidate:
-    """A candidate that explains nothing once another effect is in the model."""
-    nothing = np.full(len(found.likelihood), np.nan)
-    return Candidate(s, found, gain, nothing, nothing, *_size(s, found), (SUPERSEDED, f"that is {by}"))
+    return Candidate(s, found, gain, nothing, nothing, *_size(s, found), reasons)
 
 
 def judge(

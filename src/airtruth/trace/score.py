@@ -282,19 +282,34 @@ def projected(
     gradient, information, _ = reduced(
         problem, null.hypothesis, null.point, k + count, pieces, levels, held=at_bounds(null.point)
     )
-    m = S + k
-    nuisance = information[:m, :m]
+    return eliminated(gradient, information, range(S + k, len(gradient)))
+
+
+def eliminated(gradient: Array, information: Array, kept: Sequence[int]) -> tuple[Array, Array]:
+    """Gradient and information of the parameters at the places ``kept``, those at all others eliminated."""
+    own = np.asarray(kept, dtype=np.int64)
+    rest = np.setdiff1d(np.arange(len(gradient)), own)
+    nuisance = information[np.ix_(rest, rest)]
     scale = np.sqrt(np.maximum(np.diag(nuisance), 1e-30))
-    normal = nuisance / np.outer(scale, scale) + 1e-12 * np.eye(m)
-    across = information[m:, :m] / scale
-    solved = np.linalg.solve(normal, np.column_stack([gradient[:m] / scale, across.T]))
-    g = gradient[m:] - across @ solved[:, 0]
-    h = information[m:, m:] - across @ solved[:, 1:]
+    normal = nuisance / np.outer(scale, scale) + 1e-12 * np.eye(rest.size)
+    across = information[np.ix_(own, rest)] / scale
+    solved = np.linalg.solve(normal, np.column_stack([gradient[rest] / scale, across.T]))
+    g = gradient[own] - across @ solved[:, 0]
+    h = information[np.ix_(own, own)] - across @ solved[:, 1:]
     # what is left after a projection of nearly everything is rounding, not information
-    floor = 1e-8 * np.diag(information)[m:]
-    small = np.diag(h) < floor
+    small = np.diag(h) < 1e-8 * np.diag(information)[own]
     g[small], h[small], h[:, small] = 0.0, 0.0, 0.0
     return g, h
 
 
-__all__ = ["Direction", "Score", "Table", "directions", "holm", "inserted", "projected", "table"]
+__all__ = [
+    "Direction",
+    "Score",
+    "Table",
+    "directions",
+    "eliminated",
+    "holm",
+    "inserted",
+    "projected",
+    "table",
+]

@@ -15,16 +15,16 @@ from airtruth.trace.fit import Fit, Hypothesis, Point, Problem, Whitener, autore
 from airtruth.trace.judge import (
     IMMATERIAL,
     IMPROBABLE,
+    OUTDONE,
     SUPERSEDED,
     UNCONVERGED,
     Candidate,
     arrived,
     declared_probability,
     judge,
-    outdone,
     own_probability,
     reference_of,
-    superseded,
+    unjudged,
 )
 from airtruth.trace.model import GUST_LEVEL, NOISE, respond
 from airtruth.trace.profile import Profile, best_place, place_of
@@ -289,18 +289,20 @@ def _handicap(problem: Problem, null: Fit, effect: Effect, found: Fit) -> float:
     if free == null.hypothesis.loose:
         return 0.0
     hypothesis = replace(null.hypothesis, freed=free)
-    without = replace(found.point, sizes=found.point.sizes[: len(null.point.sizes)])
-    ends = [fit(problem, hypothesis, start) for start in (null.point, without)]
+    ends = [fit(problem, hypothesis, start) for start in (null.point, _without_effect(null, found))]
     return max([null.cost - end.cost for end in ends if end is not None], default=0.0)
+
+
+def _without_effect(null: Fit, found: Fit) -> Point:
+    """Where a null with one effect more ended, without that effect."""
+    return replace(found.point, sizes=found.point.sizes[: len(null.point.sizes)])
 
 
 def _better_null(problem: Problem, null: Fit, fits: Sequence[Refit]) -> Fit | None:
     """The null fitted again from where the best candidate ended, if that is a better optimum of it."""
     if not fits:
         return None
-    best = fits[0].fit
-    begin_there = replace(best.point, sizes=best.point.sizes[: len(null.point.sizes)])
-    again = fit(problem, null.hypothesis, begin_there, iterations=20)
+    again = fit(problem, null.hypothesis, _without_effect(null, fits[0].fit), iterations=20)
     return again if again is not None and again.cost < null.cost - _BETTER else None
 
 
@@ -331,10 +333,10 @@ def _judged(
     accepted = -np.inf
     for gain, r in ranked:
         if instead is not None and r.score.effect.key == instead[0]:
-            judged.append(superseded(r.score, r.fit, gain, instead[1]))
+            judged.append(unjudged(r.score, r.fit, gain, SUPERSEDED, f"that is {instead[1]}"))
             continue
         if gain < accepted - TIE:
-            judged.append(outdone(r.score, r.fit, gain))
+            judged.append(unjudged(r.score, r.fit, gain, OUTDONE))
             continue
         candidate = judge(problem, r.score, r.fit, gain, reference, least)
         judged.append(candidate)

@@ -20,7 +20,7 @@ from airtruth.trace.search import Stage
 def accepted_change(stages: Sequence[Stage]) -> Change:
     """What the accepted effects change at their estimated sizes."""
     final = stages[-1].gls
-    return replace(final.hypothesis, declared=Change()).change(final.point.sizes)
+    return final.hypothesis.added(final.point.sizes)
 
 
 def _counted_from_zero(term: AeroTerm, counted_from_rad: float) -> AeroTerm:
