@@ -84,7 +84,7 @@ def _surface(ax: Axes, record: Record, change: Change) -> None:
     ax.plot(time[span], s.elevator_rad[span] / DEG, color=style.GREY, label="measured")
     ax.plot(time[span], air[span] / DEG, "--", color=style.VERMILLION, label="as the air sees it")
     ax.set(xlabel="time [s]", ylabel="elevator [deg]", title="the effect: surface")
-    ax.legend(loc="upper right", fontsize=7.5)
+    ax.legend(loc="best", fontsize=7.5)
 
 
 def _curve(ax: Axes, found: Trace, record: Record, terms: tuple[AeroTerm, ...]) -> None:
@@ -152,7 +152,7 @@ def _sensor(ax: Axes, found: Trace, record: Record, own: Assessment, change: Cha
     ax.plot(time_s[span], without[span], ":", color=style.BLUE, label="sensor as declared")
     ax.plot(time_s[span], with_[span], "--", color=style.VERMILLION, label="with the effect")
     ax.set(xlabel="time [s]", ylabel=shown(channel)[0], title="the effect: sensor")
-    ax.legend(loc="upper right", fontsize=7.5)
+    ax.legend(loc="best", fontsize=7.5)
 
 
 def _declared(ax: Axes, found: Trace) -> None:
@@ -176,7 +176,7 @@ def _declared(ax: Axes, found: Trace) -> None:
     ax.set_yticks(range(y), names)
     ax.set_ylim(-0.8, y - 0.2)
     ax.set_title("the effect: value and 95 % interval")
-    ax.legend(loc="upper right", fontsize=7.5)
+    ax.legend(loc="best", fontsize=7.5)
 
 
 def _moment(ax: Axes, found: Trace, record: Record, own: Assessment, time_s: Array) -> None:
@@ -199,7 +199,7 @@ def _moment(ax: Axes, found: Trace, record: Record, own: Assessment, time_s: Arr
     for label, (run, line, colour) in runs.items():
         ax.plot(time_s, run[:, 1] * factor, line, color=colour, label=label)
     ax.set(xlabel="time [s]", ylabel="pitch rate [deg/s]", title="the effect: motion with it and without")
-    ax.legend(loc="upper right", fontsize=7.5)
+    ax.legend(loc="best", fontsize=7.5)
 
 
 __all__ = ["change_of", "contribution", "draw_effect"]
