@@ -26,6 +26,9 @@ def run(*arguments, folder=ROOT):
     return subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
 
 
+pytestmark = pytest.mark.xdist_group("cli-identify")
+
+
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory):
     out = tmp_path_factory.mktemp("flown") / "light"

@@ -14,6 +14,8 @@ import worked_example  # noqa: E402
 
 BLOCKS = {"file", "guess", "refused", "imported", "checked", "identified", "traced"}
 
+pytestmark = pytest.mark.xdist_group("worked-example")
+
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):

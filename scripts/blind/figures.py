@@ -70,3 +70,5 @@ STRONG: Final = 30.0
 """Noncentrality above which an effect has to be found."""
 BEYOND: Final = "beyond the library"
 """Key among the noncentralities of an effect that the library lacks: what its best member leaves."""
+APART: Final = "beyond its rivals"
+"""The same of a single effect of the library: what the best effect of another name leaves."""

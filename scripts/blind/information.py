@@ -16,12 +16,13 @@ it, so in rough air it is a lower bound for effects of the vane.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from blind import gusts, sensors, surface
 from blind.aircraft_xml import Shape, nuisances
@@ -54,6 +55,8 @@ _SETTLE_S: Final = 4.0
 _SHARE: Final = 0.125
 TRIMS: Final = (Shape("CL", "one", 0.01), Shape("Cm", "one", 0.003))
 _STATE_SHIFT: Final = 5  # samples: 0.1 s
+_RIVALS: Final = 3
+_NEXT_TO_NONE: Final = 1e-3
 
 
 @dataclass(frozen=True)
@@ -210,19 +213,56 @@ def directions(trial: Trial, whiten: Whitener) -> Directions:
 
 
 def beyond(trial: Trial, d: Array, whiten: Whitener, along: Directions) -> float:
-    """What of a whitened difference is left after the best single effect of the library, at any size.
+    """What of a whitened difference is left after the best single effect of the library, at any size."""
+    return min(left for _, _, left in nearest(trial, d, whiten, along, LIBRARY))
 
-    Effects of the library are taken to first order at their nominal size; those with a place at three places.
+
+def nearest(
+    trial: Trial, d: Array, whiten: Whitener, along: Directions, keys: Iterable[str]
+) -> list[tuple[str, float, float]]:
+    """What of a whitened difference single effects leave at any size: key, place (0 to 1), rest; the best first.
+
+    Effects are taken to first order at their nominal size; those with a place at three places.
     """
     left = []
-    for key in LIBRARY:
+    for key in keys:
         kind = EFFECTS[key]
         size = min(SIZE16[key][AIRS.index(trial.air)], kind.largest)
         for place in (0.0, 0.5, 0.99) if key.endswith(":break") else (0.5,):
             effect = Added(key, kind.values(size, place))
             column = whiten(difference(trial, effect, (), COARSE_S)).ravel()[:, None]
-            left.append(noncentrality(d, np.hstack([along.free, column]), along.prior))
-    return min(left)
+            left.append((key, place, noncentrality(d, np.hstack([along.free, column]), along.prior)))
+    return sorted(left, key=lambda item: item[2])
+
+
+def apart(trial: Trial, effect: Added, d: Array, whiten: Whitener, along: Directions) -> float:
+    """What of an effect the best effect of another name leaves, flown at the size that leaves least.
+
+    Of the effects that come nearest to first order; everything else refitted to first order. Not of a wrong airspeed,
+    which moves no output.
+
+    Parameters
+    ----------
+    d : whitened difference that the effect makes, to first order.
+    """
+    base = responses(trial, (), COARSE_S)
+    target = whiten(responses(trial, (effect,), COARSE_S) - base).ravel()
+
+    def left(key: str, size: float, place: float) -> float:
+        rival = Added(key, EFFECTS[key].values(size, place))
+        made = whiten(responses(trial, (rival,), COARSE_S) - base).ravel()
+        return noncentrality(target - made, along.free, along.prior)
+
+    best = noncentrality(target, along.free, along.prior)
+    others = [key for key in LIBRARY if Added(key, {}).name != effect.name and key != "airspeed_scale"]
+    for key, place, _ in nearest(trial, d, whiten, along, others)[:_RIVALS]:
+        kind = EFFECTS[key]
+        ends = (-kind.largest if kind.signed else _NEXT_TO_NONE * kind.largest, kind.largest)
+        found = minimize_scalar(
+            lambda size, key=key, place=place: left(key, size, place), bounds=ends, method="bounded"
+        )
+        best = min(best, float(found.fun))
+    return best
 
 
 def difference(trial: Trial, effect: Added, others: Sequence[Added] = (), step_s: float = STEP_S) -> Array:

@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 
 from blind.aircraft_xml import Body, Shape
 from blind.draw import Trial, fly_record
-from blind.figures import BEYOND, BODY, DERIVATIVES, STRONG
+from blind.figures import APART, BEYOND, BODY, DERIVATIVES, STRONG
 from blind.flight import Truth
 from blind.information import (
     COARSE_S,
     TRIMS,
     Whitener,
+    apart,
     beyond,
     difference,
     directions,
@@ -69,6 +70,8 @@ def lambdas(trial: Trial) -> dict[str, float]:
         result[effect.key] = value
         if not EFFECTS[effect.key].library and value > STRONG:
             result[BEYOND] = min(value, beyond(trial, d, whiten, along))
+        elif len(everything) == 1 and value > STRONG and effect.key != "airspeed_scale":
+            result[APART] = min(value, apart(trial, effect, d, whiten, along))
     return result
 
 

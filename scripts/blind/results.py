@@ -29,7 +29,7 @@ def _number(value: float | None, digits: int = 2) -> str:
     return "-" if value is None or np.isnan(value) else f"{value:.{digits}f}"
 
 
-def _median(pair: tuple[float, int]) -> str:
+def _averaged(pair: tuple[float, int]) -> str:
     return f"{_number(pair[0])} (of {pair[1]})"
 
 
@@ -44,15 +44,16 @@ def markdown(scores: Mapping[str, Any]) -> str:
         (f"single effects above lambda {STRONG:g}: something named", strong["detected"]),
         ("name in the reported set", strong["in_set"]),
         ("name first", strong["first"]),
+        ("name first, bound by the nearest rival", _averaged(strong["first_bound"])),
         ("given that something is named: in the set", strong["in_set_of_detected"]),
         ("given that something is named: first", strong["first_of_detected"]),
         ("mean size of the set", _number(strong["mean_set_size"])),
         ("above lambda 150: in the set", scores["very_strong_in_set"]),
         ("parameters inside their 95 % interval", strong["coverage"]),
         ("spurious second effect", strong["second_effect"]),
-        ("held-out error after / truth's own, median", _median(scores["after_over_oracle"])),
-        ("held-out error before / truth's own, median", _median(scores["before_over_oracle"])),
-        ("calm air: held-out error after / before, median", _median(scores["calm_after_over_before"])),
+        ("held-out error after / truth's own, median", _averaged(scores["after_over_oracle"])),
+        ("held-out error before / truth's own, median", _averaged(scores["before_over_oracle"])),
+        ("calm air: held-out error after / before, median", _averaged(scores["calm_after_over_before"])),
         ("off-library: unexplained or provisional", off["flagged"]),
         ("off-library: named without reservation", off["named_without_reservation"]),
         ("off-library: passed as none", off["passed_as_none"]),

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from scipy.stats import beta, chi2, ncx2
+from scipy.stats import beta, chi2, ncx2, norm
 
-from blind.figures import BEYOND, STRONG
+from blind.figures import APART, BEYOND, STRONG
 
 Case = Mapping[str, Any]
 
@@ -95,6 +95,15 @@ def beyond(case: Case) -> float:
     return float(case["truth"]["lambda"].get(BEYOND, 0.0))
 
 
+def first_bound(case: Case) -> float | None:
+    """Probability that the likelier of two names is the right one, were the effect and its nearest rival all there is.
+
+    Two means d apart in units of their noise: Phi(d/2) (R. A. Fisher's discriminant). None if it was not measured.
+    """
+    left = case["truth"]["lambda"].get(APART)
+    return None if left is None else float(norm.cdf(0.5 * np.sqrt(max(float(left), 0.0))))
+
+
 def dominant(case: Case) -> str:
     """Key of the strongest effect, "" without effects."""
     table = case["truth"]["lambda"]
@@ -165,6 +174,12 @@ def median(values: Iterable[float | None]) -> tuple[float, int]:
     """Median of what there is, and how many there are."""
     listed = [v for v in values if v is not None]
     return (float(np.median(listed)) if listed else float("nan")), len(listed)
+
+
+def mean(values: Iterable[float | None]) -> tuple[float, int]:
+    """Mean of what there is, and how many there are."""
+    listed = [v for v in values if v is not None]
+    return (float(np.mean(listed)) if listed else float("nan")), len(listed)
 
 
 def actual(case: Case) -> dict[str, float]:
@@ -286,6 +301,7 @@ def score(cases: Sequence[Case]) -> dict[str, Any]:
             "detected": share(bool(accepted(c)) for c in strong),
             "in_set": share(in_set(c, dominant(c)) for c in strong),
             "first": share(named_first(c, dominant(c)) for c in strong),
+            "first_bound": mean(first_bound(c) for c in strong),
             "in_set_of_detected": share(in_set(c, dominant(c)) for c in detected),
             "first_of_detected": share(named_first(c, dominant(c)) for c in detected),
             "mean_set_size": float(np.mean(sizes)) if sizes else None,

@@ -44,6 +44,8 @@ name = "elevator_delay"
 delay_s = 0.04
 """
 
+pytestmark = pytest.mark.xdist_group("trace-report")
+
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):

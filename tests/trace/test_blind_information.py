@@ -125,6 +125,24 @@ def test_noncentrality_grows_as_the_square_and_falls_with_gusts(calm):
     assert of(0.2, "light") < 0.5 * calm_air
 
 
+def test_a_lag_and_a_delay_are_apart_as_the_fourth_power(calm):
+    """exp(-ts) and 1/(1 + ts) differ by (ts)^2/2 at first, so the records tell them apart by t^4, each of them by t^2."""
+    whiten = information.noise_model(calm, "calm")
+    along = information.directions(calm, whiten)
+
+    def of(tau_s):
+        effect = Added("gyro_lag", {"tau_s": tau_s})
+        d = whiten(information.difference(calm, effect)).ravel()
+        return information.noncentrality(d, along.free, along.prior), information.apart(
+            calm, effect, d, whiten, along
+        )
+
+    (alone, least), (alone_twice, twice) = of(0.005), of(0.01)
+    assert alone_twice / alone == pytest.approx(4.0, rel=0.05)
+    assert twice / least == pytest.approx(16.0, rel=0.1)
+    assert twice < 0.02 * alone_twice
+
+
 def test_the_truths_own_error_is_the_noise(tmp_path):
     """A null in calm air: what its own model leaves is white noise of the declared size."""
     numbers = [k for k in range(40) if (t := draw.draw(2, k, "null")).air == "calm" and t.noise == "white"]

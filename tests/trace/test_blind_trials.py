@@ -15,7 +15,7 @@ from airtruth.logs.validate import validate
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
 import make_undeclared
 from blind import draw, results, scoring, trials
-from blind.figures import BEYOND
+from blind.figures import APART, BEYOND
 from blind.scoring import Share
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -180,6 +180,16 @@ def test_scores_of_a_hand_made_set():
     row = next(r for r in s["detection"] if r["from"] == 60.0)
     assert (row["score"].hits, row["score"].count) == (2, 3)
     assert row["bound"] == pytest.approx(scoring.bound(100.0))
+
+
+def test_what_leaves_nothing_beside_a_rival_is_named_first_by_chance():
+    """Phi(d/2): Phi(0) = 1/2, Phi(1) = 0.8413 (any table of the normal distribution); none where not measured."""
+    cases = [case("single", [LAG], [RIGHT]) for _ in range(3)]
+    cases[0]["truth"]["lambda"][APART] = 0.0
+    cases[1]["truth"]["lambda"][APART] = 4.0
+    value, count = scoring.score(cases)["strong"]["first_bound"]
+    assert value == pytest.approx((0.5 + 0.84134) / 2.0, abs=1e-5)
+    assert count == 2
 
 
 def test_a_declared_quantity_is_covered_with_its_draw():

@@ -53,6 +53,9 @@ def traced(folder, effect, key):
     return run([folder / "flown" / "logs"], "gtm", options, folder / "traced")
 
 
+pytestmark = pytest.mark.xdist_group("replay-plain")
+
+
 @pytest.fixture(scope="module", params=[KINK, DELAY, ARM], ids=["kink", "delay", "arm"])
 def found(request, tmp_path_factory):
     effect = request.param

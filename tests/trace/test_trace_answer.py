@@ -25,6 +25,8 @@ CASES = {
 CHANNELS = {"alpha_rad", "q_rad_s", "az_m_s2"}
 FEW = ("elevator_delay", "gyro_scale", "accelerometer_arm")
 
+pytestmark = pytest.mark.xdist_group("answer")
+
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory):

@@ -20,6 +20,8 @@ KEY = "cm_alpha_nonlinear:quadratic"
 TRUE = -8.0
 GTM = planes.load("gtm")
 
+pytestmark = pytest.mark.xdist_group("curvature")
+
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):

@@ -47,6 +47,11 @@ class Parameter:
     step: float = 1e-4
 
     @property
+    def is_limit(self) -> bool:
+        """Whether nothing happens until the value is low enough: the size zero has no slope to begin with."""
+        return self.reciprocal and not self.time_constant
+
+    @property
     def ends(self) -> tuple[float, float]:
         """Sizes at the ends of the plausible range, the smaller first."""
         low, high = sorted((self.size(self.low), self.size(self.high)))

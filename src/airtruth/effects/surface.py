@@ -114,7 +114,7 @@ EFFECTS: Final = (
                 "full width of the play",
                 low=0.0,
                 high=4.0 * DEG,
-                material=0.1 * DEG,
+                material=0.03 * DEG,
                 one_sided=True,
                 prior_std=1.0 * DEG,
                 step=0.1 * DEG,
@@ -122,8 +122,8 @@ EFFECTS: Final = (
         ),
         describe=_backlash,
         explanation="Play in the linkage: the surface stays where it is until the measured position has crossed the play.",
-        source="y stays within width/2 of x and moves only when pushed, starting in the middle. Material: 5 % of a "
-        "doublet of 2 deg.",
+        source="y stays within width/2 of x and moves only when pushed, starting in the middle. Material: 3 % of a "
+        "doublet of 1 deg.",
         splits="A small multisine: the share that is lost falls with amplitude.",
     ),
 )

@@ -153,7 +153,7 @@ def _audible(direction: Direction, null: Fit, problem: Problem) -> Direction:
     """The direction with a step that can be seen: a limit does nothing until it is low enough."""
     first = direction.effect.parameters[0]
     largest = max(abs(first.size(first.low)), abs(first.size(first.high)))
-    if not (first.reciprocal and not first.time_constant):
+    if not first.is_limit:
         return direction
     step = direction.step
 

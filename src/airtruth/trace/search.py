@@ -46,6 +46,8 @@ _FAR: Final = 5.0
 _ANEW: Final = 6
 """Iterations in rough air where a search begins as if nothing was known."""
 _VISIBLE: Final = 2.0
+_SAME: Final = 0.5
+"""Two searches whose log-likelihoods differ by less have ended in the same place."""
 _SHARES: Final = (2.0, 1.0, 0.6, 0.3, 0.1, 0.02)
 SIGNIFICANT: Final = 10.0
 SIGNIFICANT_LATER: Final = 25.0
@@ -363,12 +365,18 @@ def _refit(problem: Problem, null: Fit, s: Score, white_size: float, rival: floa
     has without an autoregression, which can take up such an effect as a whole.
     """
     hypothesis = null.hypothesis.plus(s.effect)
+    is_limit = s.effect.parameters[0].is_limit
     best: Fit | None = None
     for share in _shares(problem, null, hypothesis, s):
         tried = fit(problem, hypothesis, _at(null, s, share * s.size), rival=rival)
-        if tried is not None and (best is None or tried.cost < best.cost):
+        if tried is None:
+            continue
+        again = best is not None and abs(tried.cost - best.cost) < _SAME
+        if best is None or tried.cost < best.cost:
             best = tried
-        if best is not None and best.converged and null.cost - best.cost > 0.2 * s.z**2:
+        gain = null.cost - best.cost
+        # a limit too high to act is where a search may end from more than one start
+        if (best.converged and gain > 0.2 * s.z**2) or (again and not (is_limit and gain < _BETTER)):
             break
     if _is_improbable(problem, null):
         start = begin(problem, hypothesis, _at(null, s, white_size).sizes, _ANEW)
