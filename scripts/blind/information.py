@@ -39,6 +39,7 @@ from blind.figures import (
     SIGMA_M_S,
     SPAN_M,
     STEP_S,
+    STRONG,
 )
 from blind.flight import Model, Truth
 from blind.sizes import SIZE16
@@ -55,7 +56,7 @@ _SETTLE_S: Final = 4.0
 _SHARE: Final = 0.125
 TRIMS: Final = (Shape("CL", "one", 0.01), Shape("Cm", "one", 0.003))
 _STATE_SHIFT: Final = 5  # samples: 0.1 s
-_RIVALS: Final = 3
+_RIVALS: Final = 2
 _NEXT_TO_NONE: Final = 1e-3
 
 
@@ -89,23 +90,43 @@ def autoregression(series: Sequence[Array], order: int = ORDER) -> Whitener:
     return Whitener(solution.T.reshape(m, order, m).transpose(1, 0, 2).copy(), np.linalg.cholesky(covariance))
 
 
+@dataclass(frozen=True)
+class Projection:
+    """What refitting takes up, to first order.
+
+    Attributes
+    ----------
+    basis : (n + p, r) orthonormal, of whitened directions with a row for each of p priors.
+    """
+
+    basis: Array
+
+    @classmethod
+    def of(cls, free: Array, prior: Array) -> Projection:
+        """Of directions (n, f) without a prior and (n, p) per prior standard deviation."""
+        top = np.hstack([free, prior])
+        rows = np.zeros((prior.shape[1], top.shape[1]))
+        rows[:, free.shape[1] :] = np.eye(prior.shape[1])
+        x = np.vstack([top, rows])
+        scale = np.linalg.norm(x, axis=0)
+        u, s, _ = np.linalg.svd(x / np.where(scale > 0.0, scale, 1.0), full_matrices=False)
+        return cls(u[:, s > 1e-10 * s[0]])
+
+    def left(self, d: Array) -> Array:
+        """(n + p,) what is left of a whitened difference (n,)."""
+        target = np.concatenate([d, np.zeros(len(self.basis) - len(d))])
+        return np.asarray(target - self.basis @ (self.basis.T @ target))
+
+
 def noncentrality(d: Array, free: Array, prior: Array) -> float:
     """Squared length of a whitened difference that nothing refitted can take up.
 
     Parameters
     ----------
     d : (n,) whitened difference.
-    free : (n, f) whitened directions without a prior.
-    prior : (n, p) whitened directions per prior standard deviation.
+    free, prior : as of `Projection.of`.
     """
-    top = np.hstack([free, prior])
-    rows = np.zeros((prior.shape[1], top.shape[1]))
-    rows[:, free.shape[1] :] = np.eye(prior.shape[1])
-    x = np.vstack([top, rows])
-    target = np.concatenate([d, np.zeros(len(rows))])
-    scale = np.linalg.norm(x, axis=0)
-    x = x / np.where(scale > 0.0, scale, 1.0)
-    left = target - x @ np.linalg.lstsq(x, target, rcond=1e-10)[0]
+    left = Projection.of(free, prior).left(d)
     return float(left @ left)
 
 
@@ -166,15 +187,18 @@ def fitted(trial: Trial) -> list[int]:
     return [k for k in range(len(trial.manoeuvres)) if k not in HELD_OUT]
 
 
-def responses(trial: Trial, effects: Sequence[Added], step_s: float, model: Model | None = None) -> Array:
-    """Noise-free alpha, q, az of the fitted records in calm air, (records, samples, 3)."""
-    if model is None:
-        truth, parts = truth_of(trial, effects, step_s)
-    else:
-        truth, parts = Truth(model, step_s), Parts()
+def flown(trial: Trial, truth: Truth, parts: Parts) -> Array:
+    """Noise-free alpha, q, az of the fitted records of a truth in calm air, (records, samples, 3)."""
     return np.array(
         [stacked(fly_record(truth, parts, trial.manoeuvres[k], trial.duration_s, 0.2)) for k in fitted(trial)]
     )
+
+
+def responses(trial: Trial, effects: Sequence[Added], step_s: float, model: Model | None = None) -> Array:
+    """`flown` of the trial's aircraft with these effects, or of another model without any."""
+    if model is None:
+        return flown(trial, *truth_of(trial, effects, step_s))
+    return flown(trial, Truth(model, step_s), Parts())
 
 
 def initial_states(truth: Truth, samples: int) -> Array:
@@ -224,54 +248,75 @@ def nearest(
 
     Effects are taken to first order at their nominal size; those with a place at three places.
     """
-    left = []
+    projection = Projection.of(along.free, along.prior)
+    own, base, left = projection.left(d), responses(trial, (), COARSE_S), []
     for key in keys:
         kind = EFFECTS[key]
         size = min(SIZE16[key][AIRS.index(trial.air)], kind.largest)
         for place in (0.0, 0.5, 0.99) if key.endswith(":break") else (0.5,):
             effect = Added(key, kind.values(size, place))
-            column = whiten(difference(trial, effect, (), COARSE_S)).ravel()[:, None]
-            left.append((key, place, noncentrality(d, np.hstack([along.free, column]), along.prior)))
+            other = projection.left(whiten(difference(trial, effect, (), COARSE_S, base)).ravel())
+            rest = float(own @ own - (own @ other) ** 2 / max(float(other @ other), 1e-12))
+            left.append((key, place, rest))
     return sorted(left, key=lambda item: item[2])
 
 
 def apart(trial: Trial, effect: Added, d: Array, whiten: Whitener, along: Directions) -> float:
     """What of an effect the best effect of another name leaves, flown at the size that leaves least.
 
-    Of the effects that come nearest to first order; everything else refitted to first order. Not of a wrong airspeed,
-    which moves no output.
+    Of the effects that come nearest to first order, if that is near; everything else refitted to first order. Not of
+    a wrong airspeed, which moves no output.
 
     Parameters
     ----------
     d : whitened difference that the effect makes, to first order.
     """
-    base = responses(trial, (), COARSE_S)
-    target = whiten(responses(trial, (effect,), COARSE_S) - base).ravel()
+    projection = Projection.of(along.free, along.prior)
+    target = responses(trial, (effect,), COARSE_S)
 
-    def left(key: str, size: float, place: float) -> float:
-        rival = Added(key, EFFECTS[key].values(size, place))
-        made = whiten(responses(trial, (rival,), COARSE_S) - base).ravel()
-        return noncentrality(target - made, along.free, along.prior)
+    def left(made: Array) -> float:
+        gap = projection.left(whiten(target - made).ravel())
+        return float(gap @ gap)
 
-    best = noncentrality(target, along.free, along.prior)
+    def rival(key: str, size: float, place: float) -> Array:
+        return responses(trial, (Added(key, EFFECTS[key].values(size, place)),), COARSE_S)
+
+    best = left(responses(trial, (), COARSE_S))
     others = [key for key in LIBRARY if Added(key, {}).name != effect.name and key != "airspeed_scale"]
-    for key, place, _ in nearest(trial, d, whiten, along, others)[:_RIVALS]:
+    for key, place, rest in nearest(trial, d, whiten, along, others)[:_RIVALS]:
+        if rest > STRONG:
+            break
         kind = EFFECTS[key]
         ends = (-kind.largest if kind.signed else _NEXT_TO_NONE * kind.largest, kind.largest)
         found = minimize_scalar(
-            lambda size, key=key, place=place: left(key, size, place), bounds=ends, method="bounded"
+            lambda size, key=key, place=place: left(rival(key, size, place)),
+            bounds=ends,
+            method="bounded",
+            options={"xatol": _NEXT_TO_NONE * kind.largest},
         )
         best = min(best, float(found.fun))
     return best
 
 
-def difference(trial: Trial, effect: Added, others: Sequence[Added] = (), step_s: float = STEP_S) -> Array:
-    """What an effect adds to alpha, q and az beside others, calm air, (records, samples, 3)."""
+def difference(
+    trial: Trial,
+    effect: Added,
+    others: Sequence[Added] = (),
+    step_s: float = STEP_S,
+    without: Array | None = None,
+) -> Array:
+    """What an effect adds to alpha, q and az beside others, calm air, (records, samples, 3).
+
+    Parameters
+    ----------
+    without : the responses with the others alone, where they are known.
+    """
     if effect.key == "airspeed_scale":
         return _airspeed(trial, effect.values["factor"])
     share = _SHARE if EFFECTS[effect.key].smooth else 1.0
     full = responses(trial, (*others, shrunk(effect, share)), step_s)
-    return (full - responses(trial, others, step_s)) / share
+    base = responses(trial, others, step_s) if without is None else without
+    return (full - base) / share
 
 
 def _airspeed(trial: Trial, factor: float) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blind.aircraft_xml import Body, Shape
-from blind.draw import Trial, fly_record
+from blind.draw import Trial
 from blind.figures import APART, BEYOND, BODY, DERIVATIVES, STRONG
 from blind.flight import Truth
 from blind.information import (
@@ -28,11 +28,10 @@ from blind.information import (
     beyond,
     difference,
     directions,
-    fitted,
+    flown,
     noise_model,
     noncentrality,
     own_directions,
-    stacked,
 )
 from blind.truths import EFFECTS, Added, Parts, combined, model
 
@@ -102,12 +101,9 @@ def body_at(body: Body, x: Sequence[float]) -> Body:
     )
 
 
-def flown(trial: Trial, body: Body, parts: Parts) -> Array:
-    """Noise-free alpha, q, az of the fitted records in calm air, (records, samples, 3)."""
-    truth = Truth(model(body, parts), COARSE_S)
-    return np.array(
-        [stacked(fly_record(truth, parts, trial.manoeuvres[k], trial.duration_s, 0.2)) for k in fitted(trial)]
-    )
+def at_body(trial: Trial, body: Body, parts: Parts) -> Array:
+    """`flown` of the trial's aircraft with another body."""
+    return flown(trial, Truth(model(body, parts), COARSE_S), parts)
 
 
 def refitted(trial: Trial, effect: Added, others: Sequence[Added], whiten: Whitener) -> float:
@@ -118,13 +114,13 @@ def refitted(trial: Trial, effect: Added, others: Sequence[Added], whiten: White
     """
     beside = combined(others)
     parts = beside + combined((effect,))
-    target = whiten(flown(trial, trial.body, parts))
+    target = whiten(at_body(trial, trial.body, parts))
     free = own_directions(trial, whiten, target.shape[0], target.shape[1] + len(whiten.coefficients))
     basis = np.linalg.qr(free / np.linalg.norm(free, axis=0))[0]
 
     def left(x: Array) -> Array:
         shifted = beside + constants(x[_PRIOR:])
-        gap = (target - whiten(flown(trial, body_at(trial.body, x.tolist()), shifted))).ravel()
+        gap = (target - whiten(at_body(trial, body_at(trial.body, x.tolist()), shifted))).ravel()
         return np.concatenate([gap - basis @ (basis.T @ gap), x[:_PRIOR]])
 
     starts = [np.zeros(_PRIOR + _FREE)]

@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FOLDER = Path(os.environ.get("AIRTRUTH_MEASURED", ROOT.parent / "shared" / "measured"))
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def measured():
     """Path of a measured file by name."""
 
