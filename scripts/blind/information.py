@@ -278,10 +278,15 @@ def apart(trial: Trial, effect: Added, d: Array, whiten: Whitener, along: Direct
         gap = projection.left(whiten(target - made).ravel())
         return float(gap @ gap)
 
-    def rival(key: str, size: float, place: float) -> Array:
-        return responses(trial, (Added(key, EFFECTS[key].values(size, place)),), COARSE_S)
+    base = responses(trial, (), COARSE_S)
 
-    best = left(responses(trial, (), COARSE_S))
+    def rival(key: str, size: float, place: float) -> Array:
+        try:
+            return responses(trial, (Added(key, EFFECTS[key].values(float(size), place)),), COARSE_S)
+        except RuntimeError:  # it cannot be trimmed there
+            return base
+
+    best = left(base)
     others = [key for key in LIBRARY if Added(key, {}).name != effect.name and key != "airspeed_scale"]
     for key, place, rest in nearest(trial, d, whiten, along, others)[:_RIVALS]:
         if rest > STRONG:
