@@ -201,7 +201,7 @@ def _rounds(
         if not tied:
             break
         best = tied[0]
-        empty = None if first.instead else _explains_nothing(problem, best.found)
+        empty = None if first.instead else needless(problem, best.found)
         if empty is not None:
             at = len(before) + empty
             key = stages[at].tied[0].score.effect.key
@@ -217,11 +217,15 @@ def _rounds(
     return stages
 
 
-def _explains_nothing(problem: Problem, found: Fit) -> int | None:
-    """Place of an earlier effect without which the fit is hardly worse; None if each is needed."""
+def needless(problem: Problem, found: Fit) -> int | None:
+    """Place of an earlier effect that is immaterial by now, or without which the fit is hardly worse; None if each is
+    needed.
+    """
     at = 0
     for i, effect in enumerate(found.hypothesis.effects[:-1]):
         count = len(effect.parameters)
+        if abs(found.point.sizes[at]) < effect.parameters[0].material:
+            return i
         rest = tuple(e for j, e in enumerate(found.hypothesis.effects) if j != i)
         sizes = np.delete(found.point.sizes, np.arange(at, at + count))
         less = fit(problem, replace(found.hypothesis, effects=rest), replace(found.point, sizes=sizes))
@@ -432,4 +436,4 @@ def _tied(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     )
 
 
-__all__ = ["Candidate", "Stage", "search"]
+__all__ = ["Candidate", "Stage", "needless", "search"]
