@@ -130,6 +130,44 @@ class JsbsimModel(Strict):
     set: dict[str, float] = Field(default_factory=dict)
 
 
+class SurfaceDynamics(Strict):
+    """Between the measured surface and the air: a delay or lag [s], a rate limit [rad/s], a play [rad]."""
+
+    kind: Literal["delay", "lag", "rate_limit", "backlash"]
+    value: float = Field(gt=0.0)
+
+
+class StateDynamics(Strict):
+    """A lag (time constant [s]) or mode (1/wn [s], damping [-]) that a signal drives."""
+
+    name: str
+    kind: Literal["lag", "mode"]
+    signal: Literal["alpha", "elevator", "qhat", "alpha_dot_hat"]
+    time_s: float = Field(gt=0.0)
+    damping: float = 0.0
+
+
+class AeroDynamics(Strict):
+    """A coefficient's increment amplitude f(signal - at); the signal is alpha_dot c/(2V) or a state."""
+
+    coefficient: Literal["CL", "Cm"]
+    signal: str
+    shape: Literal["linear", "quadratic", "above", "below"]
+    amplitude: float
+    at: float = 0.0
+
+
+class Dynamics(Strict):
+    """What of the JSBSim model forces at rest do not show; `airtruth trace` carries it in its filter.
+
+    An update by `airtruth trace` writes it. Terms as in `airtruth.effects.change`; the surface's in sequence.
+    """
+
+    surface: tuple[SurfaceDynamics, ...] = ()
+    states: tuple[StateDynamics, ...] = ()
+    aero: tuple[AeroDynamics, ...] = ()
+
+
 class AircraftFile(Strict):
     """aircraft.toml.
 
@@ -145,6 +183,7 @@ class AircraftFile(Strict):
     mass: MassProperties | None = None
     jsbsim: JsbsimModel | None = None
     elevator_actuator: Actuator | None = None
+    dynamics: Dynamics | None = None
     derivatives: dict[str, qt.Ratio] = Field(default_factory=dict)
     sensors: dict[str, Sensor] = Field(default_factory=dict)
 

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from typing import Any, Final
 
-from airtruth.aircraft import AircraftFile
+from airtruth.aircraft import AircraftFile, Dynamics
 from airtruth.quantity import Quantity
 from airtruth.signals import SIGNALS
 from airtruth.units import UNITS
@@ -47,6 +47,10 @@ def write(file: AircraftFile, heading: str) -> str:
                 lines += _table(f"sensors.{channel}", _stated(sensor), _SENSOR_UNITS, unit)
         elif isinstance(table, Mapping):
             lines += _table(name, table, {}, "")
+        elif isinstance(table, Dynamics):
+            for key, rows in table:
+                for row in rows:
+                    lines += [f"\n[[{name}.{key}]]", *(f"{k} = {_plain(v)}" for k, v in row)]
         else:
             lines += _table(name, _stated(table), _UNITS, "")
     return "\n".join(lines) + "\n"

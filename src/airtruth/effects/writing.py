@@ -14,10 +14,13 @@ from airtruth.aircraft import Aircraft, AircraftFile, JsbsimModel
 from airtruth.effects import aerodynamics_xml, declared_xml, model_files, surface_xml, toml_text
 from airtruth.effects.change import AeroTerm, Change
 from airtruth.effects.declared_xml import Masses, total
+from airtruth.effects.dynamics import joined
 from airtruth.effects.neutral import effective, fitted
 from airtruth.errors import AircraftError, ConfigurationError, StoreError, choices
 from airtruth.physics.short_period import PARAMETERS
 
+MARK: Final = "changed by airtruth"
+"""In the heads of both files of a changed aircraft."""
 HIGHEST_HZ: Final = 400.0
 """Simulation rate up to which a written delay holds, unless another is asked for [Hz]."""
 
@@ -141,7 +144,7 @@ def _claim(folder: Path) -> None:
 
 
 def _heading(plane: Aircraft, change: Change, note: str) -> str:
-    lines = [f"{plane.name}, changed by airtruth. Every quantity in SI."]
+    lines = [f"{plane.name}, {MARK}. Every quantity in SI."]
     lines += [note] if note else []
     for field in fields(Change):
         lines += [
@@ -223,6 +226,9 @@ def _changed_file(plane: Aircraft, change: Change, model_name: str) -> AircraftF
                 "cg": old.cg.model_copy(update={"value": old.cg.value + total(change.declared, "cg")}),
             }
         )
+    dynamics = joined(file.dynamics, change)
+    if dynamics is not None:
+        updates["dynamics"] = dynamics
     if change.sensors:
         updates["sensors"] = fitted(file.sensors, change.sensors)
     return file.model_copy(update=updates)

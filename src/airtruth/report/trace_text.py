@@ -122,6 +122,9 @@ def effect_details(effect: Mapping[str, Any]) -> Iterator[str]:
         if alike
         else "  no other effect that passes every test explains it as well"
     )
+    if variants := effect.get("other_variants"):
+        names = ", ".join(f"{effect['name']}:{v}" for v in variants)
+        yield f"  as {names} it explains the records as well"
 
 
 def derivative_lines(answer: Answer) -> list[str]:

@@ -205,6 +205,9 @@ def _effect(stages: Sequence[Stage], number: int, covariance: Array) -> dict[str
         "indistinguishable_from": sorted({c.score.effect.name for c in others} - {effect.name}),
         "gain_2_log_likelihood": best.gain,
     }
+    variants = sorted(c.score.effect.variant for c in others if c.score.effect.name == effect.name)
+    if variants:
+        row["other_variants"] = variants
     if effect.name == "sensor_delay":
         row["channel"] = effect.variant
     if loosened(effect, final.hypothesis.trim_alpha_rad):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.effects.change import Change, SensorTerm
+from airtruth.effects.dynamics import declared_dynamics
 from airtruth.trace.kernel import F_INERTIA, Plane, evaluate
 from airtruth.trace.lower import CHANNELS, Lowered, lower
 from airtruth.trace.plant import Plant, inertia_std
@@ -137,7 +138,7 @@ class Response:
 
 
 def declared_change(aircraft: Aircraft) -> Change:
-    """Position, lag, delay and scale of the sensors as aircraft.toml declares them."""
+    """What aircraft.toml declares beyond forces at rest: the sensors' position, lag, delay and scale, the dynamics."""
     terms = []
     for channel in CHANNELS:
         sensor = aircraft.file.sensors.get(channel)
@@ -151,7 +152,7 @@ def declared_change(aircraft: Aircraft) -> Change:
         ):
             if value != neutral:
                 terms.append(SensorTerm(channel, kind, value))  # type: ignore[arg-type]
-    return Change(sensors=tuple(terms))
+    return Change(sensors=tuple(terms)) + declared_dynamics(aircraft.file.dynamics)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.aircraft import Aircraft
+from airtruth.aircraft import Aircraft, Sensor
 from airtruth.effects.effect import Effect
 from airtruth.errors import ConfigurationError, LogError, TrimError, choices
 from airtruth.fly.trim import Trim
@@ -69,10 +69,11 @@ def prepare(
     """
     _one_aircraft(logs, aircraft)
     pots = aircraft.file.sensors.get("elevator_rad")
-    signals = [s for log in logs for s in read(log, pots.noise_std.value if pots else 0.0)]
-    _check(signals)
-    columns = set.intersection(*(set(log.channels) for log in logs))
+    noise = pots.noise_std.value if pots else 0.0
+    signals = [inputs_undone(s, aircraft) for log in logs for s in read(log, noise)]
     chosen = _hold_out([s.run_id for s in signals], options)
+    _check(signals, chosen)
+    columns = set.intersection(*(set(log.channels) for log in logs))
     model = options.model if aircraft.file.jsbsim is not None else "linear"
     notes = []
     if model != options.model:
@@ -119,16 +120,36 @@ def _one_aircraft(logs: Sequence[FlightLog], aircraft: Aircraft) -> None:
         raise LogError(f"run_id {twice[0]!r} occurs in several logs: give every record a name of its own")
 
 
-def _check(signals: Sequence[Signals]) -> None:
+def inputs_undone(s: Signals, aircraft: Aircraft) -> Signals:
+    """A run with elevator and airspeed as they were before what aircraft.toml declares of their sensors."""
+
+    def true(channel: str, x: Array, cells: int) -> Array:
+        sensor = aircraft.file.sensors.get(channel, Sensor())
+        late = (sensor.delay.value + sensor.lag.value) / s.dt_s * cells
+        if late > 0.0:
+            at = np.arange(len(x))
+            x = np.interp(at + late, at, x)
+        return np.asarray((x - sensor.bias.value) / sensor.scale.value)
+
+    return replace(
+        s,
+        elevator_rad=true("elevator_rad", s.elevator_rad, s.sub * FINE),
+        airspeed_m_s=true("airspeed_m_s", s.airspeed_m_s, s.sub),
+        ground_m_s=true("airspeed_m_s", s.ground_m_s, s.sub),
+    )
+
+
+def _check(signals: Sequence[Signals], held: Sequence[str]) -> None:
     for s in signals:
         if s.y.shape[0] < _LEAST_SAMPLES:
             raise LogError(
                 f"run {s.run_id}: {s.y.shape[0]} samples; a record needs at least {_LEAST_SAMPLES} to be traced"
             )
-    moved = max(float(np.ptp(s.elevator_rad)) for s in signals)
+    moved = max(float(np.ptp(s.elevator_rad)) for s in signals if s.run_id not in held)
     if moved < _LEAST_ELEVATOR_RAD:
+        which = "record that is not held out" if held else "record"
         raise LogError(
-            f"no record moves the elevator by more than {moved / DEG:.3g} deg: without an input nothing can be told "
+            f"no {which} moves the elevator by more than {moved / DEG:.3g} deg: without an input nothing can be told "
             "apart; fly doublets or 3-2-1-1 of at least 1 deg"
         )
 
@@ -145,9 +166,9 @@ def _hold_out(runs: Sequence[str], options: TraceOptions) -> tuple[str, ...]:
 
 
 def _plants(signals: Sequence[Signals], aircraft: Aircraft, model: str, held: Sequence[str]) -> list[Plant]:
-    """One plant per flight condition (airspeed within 3 %, altitude within 200 m), shared by its records.
+    """One plant per flight condition (airspeed within 3 %, altitude within 200 m), shared by its fitted records.
 
-    Held-out records have no say in it: they only widen the range of the tables, which are at whole degrees.
+    Held-out records have no say in it; they have tables of their own, about the same trim, over what they visited.
     """
     groups: list[list[int]] = []
     for i, s in sorted(enumerate(signals), key=lambda item: item[1].run_id in held):
@@ -177,13 +198,20 @@ def _plants(signals: Sequence[Signals], aircraft: Aircraft, model: str, held: Se
                 found[i] = linear(aircraft, derivatives, speed, density, alpha, elevator, power)
             continue
         at = _trim(aircraft, members, speed, density)
-        reach = _reach([s.y[:, 0] for s in everyone])
-        deflection = _reach([s.elevator_rad for s in everyone])
-        rate = max(float(np.abs(s.y[:, 1]).max()) for s in members)
-        plant = probed(aircraft, at, reach, deflection, rate)
+        plant = _probed(aircraft, at, members)
+        others = [s for s in everyone if s.run_id in held]
+        wider = _probed(aircraft, at, everyone) if others and members is not everyone else plant
         for i in group:
-            found[i] = plant
+            found[i] = wider if signals[i].run_id in held else plant
     return [found[i] for i in range(len(signals))]
+
+
+def _probed(aircraft: Aircraft, at: Trim, runs: Sequence[Signals]) -> Plant:
+    """Tables over what some runs visited."""
+    rate = max(float(np.abs(s.y[:, 1]).max()) for s in runs)
+    return probed(
+        aircraft, at, _reach([s.y[:, 0] for s in runs]), _reach([s.elevator_rad for s in runs]), rate
+    )
 
 
 def _reach(found: Sequence[Array]) -> tuple[float, float]:

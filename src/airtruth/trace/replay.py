@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -75,7 +76,9 @@ def _errors(case: Case, aircraft: Aircraft, levels: list[Array]) -> dict[str, fl
     for record, level in zip((case.held or case.fitted).records, levels, strict=False):
         declared = record.plant.trim
         assert declared is not None
-        at = declared.condition
+        before = declared.airspeed_m_s
+        ratio = float(_corrected("airspeed_m_s", np.array(before), record.plant.aircraft, aircraft)) / before
+        at = replace(declared.condition, eas_m_s=declared.condition.eas_m_s * ratio)
         if at not in trims:
             trims[at] = trim(aircraft, at)
         flown = replay(aircraft, trims[at], track(record, aircraft, level))
@@ -84,11 +87,25 @@ def _errors(case: Case, aircraft: Aircraft, levels: list[Array]) -> dict[str, fl
     return dict(zip(CHANNELS, np.sqrt(np.mean(squares, axis=0)).tolist(), strict=True))
 
 
+def _corrected(channel: str, x: Array, declared: Aircraft, aircraft: Aircraft) -> Array:
+    """An input that was corrected for one aircraft's sensor, corrected for another's instead."""
+    old, new = (plane.file.sensors.get(channel, Sensor()) for plane in (declared, aircraft))
+    measured = x * old.scale.value + old.bias.value
+    return np.asarray((measured - new.bias.value) / new.scale.value)
+
+
+def _lead_s(channel: str, declared: Aircraft, aircraft: Aircraft) -> float:
+    """By how much more an input has to be advanced for one aircraft's sensor than for another's."""
+    old, new = (plane.file.sensors.get(channel, Sensor()) for plane in (declared, aircraft))
+    return new.delay.value + new.lag.value - old.delay.value - old.lag.value
+
+
 def track(record: Record, aircraft: Aircraft, weight: Array) -> Track:
     """A record on the simulation's grid, its inputs as they were before the aircraft's sensors.
 
     Parameters
     ----------
+    record : its inputs are corrected for the sensors of the aircraft that its plant is of.
     weight : (3,) standard deviations by which the residuals of `CHANNELS` count.
     """
     s = record.signals
@@ -97,10 +114,9 @@ def track(record: Record, aircraft: Aircraft, weight: Array) -> Track:
     grid = np.arange((samples - 1) * steps + 1) / steps
 
     def true(channel: str, fine: Array, cells: int) -> Array:
-        sensor = aircraft.file.sensors.get(channel, Sensor())
-        late = (sensor.delay.value + sensor.lag.value) / s.dt_s
+        late = _lead_s(channel, record.plant.aircraft, aircraft) / s.dt_s
         values = np.interp(grid + late, np.arange(len(fine)) / cells, fine)
-        return np.asarray((values - sensor.bias.value) / sensor.scale.value)
+        return _corrected(channel, values, record.plant.aircraft, aircraft)
 
     outputs: Mapping[str, Array] = {c: s.y[:, i] for i, c in enumerate(CHANNELS)}
     return Track(

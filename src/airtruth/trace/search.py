@@ -52,6 +52,10 @@ _SHARES: Final = (2.0, 1.0, 0.6, 0.3, 0.1, 0.02)
 SIGNIFICANT: Final = 10.0
 SIGNIFICANT_LATER: Final = 25.0
 """Gains in 2 log L of a refit: chi-square(1) at 5 % over the library's 33 effects (Bonferroni), and at 2e-5."""
+_ALTERNATIVES: Final = 2
+_CLEAN: Final = 0.05
+"""Of what tie with the leader, so many are tried in its place where it leaves an anomaly at this level, or needs a
+further effect."""
 TIE: Final = 6.0
 """Effects within this of the best in 2 log L cannot be told apart."""
 
@@ -141,7 +145,8 @@ def search(
     seed : of the draws behind p-values.
     advance : told what is being done.
     """
-    return tuple(_rounds(problem, Round(hypothesis, start, tuple(effects)), [], seed, advance))
+    first = Round(hypothesis, start, tuple(effects))
+    return tuple(_rounds(problem, (first,), (), seed, advance))
 
 
 @dataclass(frozen=True)
@@ -153,68 +158,137 @@ class Round:
     hypothesis, start : the effects accepted so far, and where the search for its parameters begins.
     effects : candidates.
     instead : keys (old, new) of an effect that explains nothing beside a later one, and of that one; None as a rule.
+    settled : it lies behind such a round, or behind a choice among effects that tie: neither is made twice.
     """
 
     hypothesis: Hypothesis
     start: Point
     effects: tuple[Effect, ...]
     instead: tuple[str, str] | None = None
+    settled: bool = False
 
 
 def _rounds(
-    problem: Problem, first: Round, before: Sequence[Stage], seed: int, advance: Callable[[str], None]
-) -> list[Stage]:
-    """Rounds from one on, behind those before it."""
-    stages, rounds = list(before), [first]
-    hypothesis, start, effects, instead = first.hypothesis, first.start, first.effects, first.instead
+    problem: Problem,
+    rounds: tuple[Round, ...],
+    before: tuple[Stage, ...],
+    seed: int,
+    advance: Callable[[str], None],
+) -> tuple[Stage, ...]:
+    """Stages from the last of some rounds on, behind those before it."""
+    current = rounds[-1]
+    stage = _stage(problem, current, len(before), seed, advance)
+    if stage is None:
+        return before
+    stages = (*before, stage)
+    if not stage.tied:
+        return stages
+    best = stage.tied[0]
+    empty = None if current.settled else needless(problem, best.found)
+    if empty is not None:
+        key = stages[empty].tied[0].score.effect.key
+        advance(f"{best.score.effect.key} instead of {key}")
+        anew = replace(
+            rounds[empty],
+            start=stages[empty].null.point,
+            instead=(key, best.score.effect.key),
+            settled=True,
+        )
+        other = _rounds(problem, (*rounds[:empty], anew), stages[:empty], seed, advance)
+        if len(other) > empty and other[empty].tied:
+            return other
+    ends = _onwards(problem, rounds, stages, current.settled, seed, advance)
+    if current.settled or _is_clean(ends, len(stages)):
+        return ends
+    for rival in (*stage.tied[1 : 1 + _ALTERNATIVES], *_variants(stage)):
+        advance(f"{rival.score.effect.key} in the place of {best.score.effect.key}")
+        rest = (c for c in stage.tied if c.score.effect.name != rival.score.effect.name)
+        led = _led(problem, replace(stage, tied=(rival, *rest)), advance)
+        tried = _onwards(problem, rounds, (*before, led), True, seed, advance)
+        if _is_clean(tried, len(stages)):
+            return tried
+    return ends
+
+
+def _variants(stage: Stage) -> tuple[Candidate, ...]:
+    """The leader's other variants that pass every rule but gain less: a break stands in for a curve, and leaves more."""
+    best = stage.tied[0]
+    return tuple(
+        replace(c, reasons=())
+        for c in stage.candidates
+        if c.score.effect.name == best.score.effect.name
+        and c.reasons == (OUTDONE,)
+        and np.isfinite(c.likelihood_gain).all()
+    )
+
+
+def _onwards(
+    problem: Problem,
+    rounds: tuple[Round, ...],
+    stages: tuple[Stage, ...],
+    settled: bool,
+    seed: int,
+    advance: Callable[[str], None],
+) -> tuple[Stage, ...]:
+    """Rounds behind a stage that has accepted an effect."""
+    found = stages[-1].tied[0].found
+    names = {e.key for e in found.hypothesis.effects}
+    effects = tuple(e for e in rounds[-1].effects if e.key not in names)
+    following = Round(found.hypothesis, found.point, effects, settled=settled)
+    return _rounds(problem, (*rounds, following), stages, seed, advance)
+
+
+def _is_clean(stages: Sequence[Stage], count: int) -> bool:
+    """Whether so many stages explain the records: nothing more was accepted, and nothing else seems to be missing."""
+    return not any(s.tied for s in stages[count:]) and stages[-1].anomaly.p_value > _CLEAN
+
+
+def _stage(
+    problem: Problem, current: Round, count: int, seed: int, advance: Callable[[str], None]
+) -> Stage | None:
+    """One round behind ``count`` others; None where not even its null can be fitted."""
+    hypothesis, start, effects, instead = (
+        current.hypothesis,
+        current.start,
+        current.effects,
+        current.instead,
+    )
     restarts = _RESTARTS
     while True:
-        advance(f"round {len(stages) + 1}: refit without further effects")
+        advance(f"round {count + 1}: refit without further effects")
         null = fit(problem, hypothesis, start)
         if null is None:
-            break
+            return None
         whitener = autoregression(null.tangents)
         gls = null if whitener.coefficients.shape[0] == 0 else _gls(problem, null, whitener)
-        advance(f"round {len(stages) + 1}: score {len(effects)} effects")
+        advance(f"round {count + 1}: score {len(effects)} effects")
         table = score.table(gls, problem, effects, whitener, seed)
         adjusted = score.holm([s.p_value for s in table.scores])
         candidates: tuple[Candidate, ...] = ()
-        if len(stages) < MOST:
-            level = LATER_LEVEL if stages else LEVEL
+        if count < MOST:
+            level = LATER_LEVEL if count else LEVEL
             fits = _refitted(problem, null, table, adjusted <= level, advance, instead)
             better = _better_null(problem, null, fits) if restarts else None
             if better is not None:
                 start, restarts = better.point, restarts - 1
                 continue
-            least = SIGNIFICANT_LATER if stages else SIGNIFICANT
+            least = SIGNIFICANT_LATER if count else SIGNIFICANT
             candidates = _judged(problem, null, fits, least, instead)
-        tied = _tied(candidates)
-        profile = None
-        if tied and place_of(tied[0].score.effect) is not None:
-            advance(f"place of {tied[0].score.effect.key}")
-            found, profile = best_place(problem, tied[0].found)
-            leader = replace(tied[0], found=found)
-            candidates = tuple(leader if c is tied[0] else c for c in candidates)
-            tied = (leader, *tied[1:])
         unnamed = anomalies(gls, problem, whitener)
-        stages.append(Stage(null, gls, whitener, table, unnamed, adjusted, candidates, tied, profile))
-        if not tied:
-            break
-        best = tied[0]
-        empty = None if first.instead else needless(problem, best.found)
-        if empty is not None:
-            at = len(before) + empty
-            key = stages[at].tied[0].score.effect.key
-            advance(f"{best.score.effect.key} instead of {key}")
-            anew = replace(rounds[empty], start=stages[at].null.point, instead=(key, best.score.effect.key))
-            other = _rounds(problem, anew, stages[:at], seed, advance)
-            if len(other) > at and other[at].tied:
-                return other
-        hypothesis, start, restarts, instead = best.found.hypothesis, best.found.point, _RESTARTS, None
-        names = {e.key for e in hypothesis.effects}
-        effects = tuple(e for e in effects if e.key not in names)
-        rounds.append(Round(hypothesis, start, effects))
-    return stages
+        tied = _tied(candidates)
+        return _led(problem, Stage(null, gls, whitener, table, unnamed, adjusted, candidates, tied), advance)
+
+
+def _led(problem: Problem, stage: Stage, advance: Callable[[str], None]) -> Stage:
+    """A stage with its leader at its best place, where it has one."""
+    if not stage.tied or place_of(stage.tied[0].score.effect) is None:
+        return replace(stage, profile=None)
+    first = stage.tied[0]
+    advance(f"place of {first.score.effect.key}")
+    found, profile = best_place(problem, first.found)
+    leader = replace(first, found=found)
+    candidates = tuple(leader if c is first else c for c in stage.candidates)
+    return replace(stage, candidates=candidates, tied=(leader, *stage.tied[1:]), profile=profile)
 
 
 def needless(problem: Problem, found: Fit) -> int | None:
@@ -336,18 +410,21 @@ def _judged(
     ranked = sorted(((gains[r.score.effect.key], r) for r in fits), key=lambda g: -g[0])
     reference = reference_of(problem, null)
     judged: list[Candidate] = []
-    accepted = -np.inf
+    accepted, leading = -np.inf, ""
     for gain, r in ranked:
         if instead is not None and r.score.effect.key == instead[0]:
             judged.append(unjudged(r.score, r.fit, gain, SUPERSEDED, f"that is {instead[1]}"))
             continue
-        if gain < accepted - TIE:
+        if gain < accepted - TIE and r.score.effect.name != leading:
             judged.append(unjudged(r.score, r.fit, gain, OUTDONE))
             continue
         candidate = judge(problem, r.score, r.fit, gain, reference, least)
+        if gain < accepted - TIE:
+            candidate = replace(candidate, reasons=(*candidate.reasons, OUTDONE))
         judged.append(candidate)
         if not np.isfinite(accepted) and set(candidate.reasons) <= {IMMATERIAL, UNCONVERGED}:
             accepted = gain  # what explains less than an immaterial effect is not the cause either
+            leading = r.score.effect.name
     return tuple(judged)
 
 

@@ -24,7 +24,7 @@ from airtruth.trace.prepare import Case, prepare
 from airtruth.trace.replay import flown_again
 from airtruth.trace.search import Stage, search
 from airtruth.trace.tolerances import tolerances
-from airtruth.trace.update import write_update
+from airtruth.trace.update import place, write_update
 
 ANSWER: Final = "trace.json"
 
@@ -109,6 +109,8 @@ def run(
         read = [read_log(path) for path in paths]
         for log, path in zip(read, paths, strict=True):
             validate(log, source=str(path))
+    if out is not None:
+        place(plane, out)  # before the search, not after it
     found = traced(read, plane, options, advance)
     if out is not None:
         advance("write the updated aircraft")

@@ -1,0 +1,88 @@
+"""The loop closes: the same records traced against the updated aircraft lack nothing more."""
+
+import shutil
+
+import pytest
+import trace_flights as tf
+
+from airtruth import aircraft as planes
+from airtruth.errors import StoreError
+from airtruth.trace import TraceOptions, trace
+from airtruth.trace.tracing import run
+from airtruth.units import DEG
+
+FEW = ("elevator_delay", "gyro_lag", "vane_scale")
+FLOWN = {
+    "elevator_delay": {"delay_s": 0.06},
+    "actuator_lag": {"bandwidth_hz": 4.0},
+    "rate_limit": {"rate_rad_s": 0.3},
+    "backlash": {"width_rad": 1.0 * DEG},
+    "downwash_lag": {"Cmalphadot": -30.0},
+    "lift_lag": {"dCLalpha": 2.0, "tau_s": 0.2},
+    "elastic_mode": {"dCmalpha": 0.5, "frequency_hz": 3.0, "damping": 0.05},
+    "airspeed_scale": {"factor": 1.15},
+    "cm_alpha_nonlinear:break": {"dCmalpha": -0.6, "at_alpha_rad": 0.09},
+}
+
+
+@pytest.mark.parametrize("key", FLOWN)
+def test_what_was_added_is_not_traced_again(key, tmp_path):
+    flown = tf.fly(tmp_path, [(key, FLOWN[key])], runs=6)
+    options = TraceOptions(effects=tuple({key, *FEW}))
+    first = trace([flown], "gtm", options, tmp_path / "first")
+    name = key.partition(":")[0]
+    assert name in {e["name"] for e in first["effects"]} | set(first["effects"][0]["indistinguishable_from"])
+    again = trace([flown], first["updated_aircraft"], options, tmp_path / "again")
+    assert again["effects"] == []
+    # the declared aircraft of the second trace is the updated one of the first, in the filter as in JSBSim
+    for channel in again["error"]["channels"]:
+        after = first["error"]["after"]["held_out"]["innovation"][channel]
+        assert again["error"]["declared"]["held_out"]["innovation"][channel] == pytest.approx(after, rel=0.1)
+        updated, declared = first["replay"]["updated"][channel], again["replay"]["declared"][channel]
+        assert declared == pytest.approx(updated, rel=0.02)  # the weights of its initial state differ
+
+
+@pytest.fixture(scope="module")
+def late(tmp_path_factory):
+    return tf.fly(tmp_path_factory.mktemp("late"), [("vane_lag", {"tau_s": 0.03})])
+
+
+OPTIONS = TraceOptions(effects=("vane_lag",))
+
+
+def test_an_earlier_update_is_replaced(late, tmp_path):
+    first = trace([late], "gtm", OPTIONS, tmp_path)
+    (tmp_path / "aircraft" / "gtm" / "stale.xml").write_text("of the earlier one")
+    again = trace([late], "gtm", OPTIONS, tmp_path)
+    assert again["updated_aircraft"] == first["updated_aircraft"]
+    assert not (tmp_path / "aircraft" / "gtm" / "stale.xml").exists()
+    assert sorted(p.name for p in (tmp_path / "aircraft").iterdir()) == ["gtm"]
+    # and none is left where nothing is missing any more
+    (tmp_path / "kept").mkdir()
+    moved = shutil.move(first["updated_aircraft"], tmp_path / "kept" / "gtm")
+    shutil.copytree(moved, tmp_path / "aircraft" / "gtm")
+    assert trace([late], moved, OPTIONS, tmp_path)["updated_aircraft"] is None
+    assert not (tmp_path / "aircraft" / "gtm").exists()
+
+
+@pytest.mark.parametrize("where", ["itself", "inside", "around", "notes"])
+def test_nothing_of_the_user_s_is_replaced(late, where, tmp_path):
+    """The declared aircraft, a folder in it or around it, or one that no trace has written."""
+    plane = tmp_path / "aircraft" / "gtm"
+    shutil.copytree(planes.load("gtm").folder, plane)
+    out, declared = tmp_path, plane
+    if where == "inside":
+        out = plane / "out"
+    elif where == "around":
+        declared = shutil.copytree(plane, plane / "mine" / "gtm")
+    elif where == "notes":
+        declared = shutil.copytree(plane, tmp_path / "declared" / "gtm")
+        shutil.rmtree(plane)
+        plane.mkdir()
+        (plane / "notes.txt").write_text("mine")
+    before = sorted(str(p) for p in tmp_path.rglob("*"))
+    told = []
+    with pytest.raises(StoreError, match="choose another --out"):
+        run([late], declared, OPTIONS, out, told.append)
+    assert told == []  # before the search
+    assert sorted(str(p) for p in tmp_path.rglob("*")) == before
