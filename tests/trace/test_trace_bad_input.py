@@ -247,3 +247,12 @@ def test_options_that_mean_nothing(log):
         TraceOptions(model="liner")
     with pytest.raises(ConfigurationError, match="--jobs 0: must be at least 1"):
         TraceOptions(threads=0)
+
+
+def test_an_elevator_that_only_held_out_records_move(command, log, tmp_path):
+    elevator = log.channels["elevator_rad"].copy()
+    for run in (0, 1):
+        elevator[log.rows(run)] = elevator[0]
+    path = stored(tmp_path, with_channel(log, "elevator_rad", elevator))
+    message = refused(command, path, tmp_path, "--hold-out", log.run_ids[2])
+    assert "no record that is not held out moves the elevator" in message
