@@ -134,9 +134,14 @@ def trace(
 
 
 def _effects(options: TraceOptions) -> list[Effect]:
+    """The candidates that were asked for, each once; a name without a variant stands for all of its variants."""
     if options.effects is None:
         return list(EFFECTS.values())
+    found: dict[str, Effect] = {}
     for key in options.effects:
-        if key not in EFFECTS:
-            raise ConfigurationError(f"effect {key!r}: {choices(key, EFFECTS)}")
-    return [EFFECTS[key] for key in options.effects]
+        meant = {k: e for k, e in EFFECTS.items() if key in (k, e.name)}
+        if not meant:
+            names = {*EFFECTS, *(e.name for e in EFFECTS.values())}
+            raise ConfigurationError(f"effect {key!r}: {choices(key, names)}")
+        found |= meant
+    return list(found.values())
