@@ -12,7 +12,7 @@ from airtruth import cli
 from airtruth.effects.library import EFFECTS
 from airtruth.errors import ConfigurationError, LogError
 from airtruth.logs.store import write_log
-from airtruth.trace import TraceOptions, trace, tracing
+from airtruth.trace import TraceOptions, records, trace, tracing
 from airtruth.trace.prepare import prepare
 
 FEW = ("elevator_delay", "gyro_scale")
@@ -49,6 +49,10 @@ def stored(folder, log, name="log"):
 
 def with_channel(log, name, values):
     return replace(log, channels={**log.channels, name: values})
+
+
+def without(log, name):
+    return replace(log, channels={k: v for k, v in log.channels.items() if k != name})
 
 
 def one(log, run=0, samples=None):
@@ -182,8 +186,7 @@ def test_nan(command, log, tmp_path):
 
 @pytest.mark.parametrize("channel", ["alpha_rad", "q_rad_s", "az_m_s2", "elevator_rad", "airspeed_m_s"])
 def test_missing_channel(command, log, tmp_path, channel):
-    less = replace(log, channels={k: v for k, v in log.channels.items() if k != channel})
-    assert channel in refused(command, stored(tmp_path, less), tmp_path)
+    assert channel in refused(command, stored(tmp_path, without(log, channel)), tmp_path)
 
 
 def test_neither_density_nor_altitude(command, log, tmp_path):
@@ -195,12 +198,31 @@ def test_neither_density_nor_altitude(command, log, tmp_path):
     assert "altitude_m" in message
 
 
+@pytest.mark.parametrize("altitude", [True, False])
+def test_density_in_another_unit(command, log, tmp_path, altitude):
+    less = log if altitude else without(log, "altitude_m")
+    slugs = with_channel(less, "density_kg_m3", np.full_like(log.t_s, 0.0019))
+    message = refused(command, stored(tmp_path, slugs), tmp_path)
+    assert "run blind-000000: density_kg_m3 is 0.0019 kg/m3 on average, outside 0.088 to 1.48" in message
+    assert "state the unit slug_ft3 in the import mapping" in message
+    dense = with_channel(less, "density_kg_m3", np.full_like(log.t_s, 1.7))
+    message = refused(command, stored(tmp_path, dense), tmp_path)
+    assert "density_kg_m3 is 1.7 kg/m3" in message
+    assert "state its unit in the import mapping, or leave the channel out and give altitude_m" in message
+
+
+def test_no_altitude_has_that_density(log):
+    slugs = with_channel(without(log, "altitude_m"), "density_kg_m3", np.full_like(log.t_s, 0.0019))
+    with pytest.raises(LogError, match=r"density_kg_m3 is 0\.0019 kg/m3"):
+        records.read(slugs)
+
+
 @pytest.mark.parametrize("gone", ["throttle", "theta_rad", "ax_m_s2", "elevator_command_rad", "altitude_m"])
 def test_channels_that_are_not_needed(log, gone):
     """The problem can be set up without each of those that contract 1 calls optional."""
     from airtruth import aircraft
 
-    less = replace(log, channels={k: v for k, v in log.channels.items() if k != gone})
+    less = without(log, gone)
     effects = [EFFECTS[k] for k in FEW]
     case = prepare([less], aircraft.load("gtm"), effects, TraceOptions(model="linear"))
     assert len(case.fitted.records) == 2

@@ -20,6 +20,7 @@ from airtruth.logs.validate import validate
 from airtruth.trace.answer import Outcome, answer, assessed
 from airtruth.trace.colour import begun
 from airtruth.trace.options import TraceOptions
+from airtruth.trace.plausible import plausible
 from airtruth.trace.prepare import Case, prepare
 from airtruth.trace.replay import flown_again
 from airtruth.trace.search import Stage, search
@@ -61,6 +62,7 @@ def traced(
     """
     options = options or TraceOptions()
     effects = _effects(options)
+    plausible(logs)
     advance("probe the declared aircraft")
     case = prepare(logs, aircraft, effects, options)
     advance("refit the declared aircraft")
