@@ -211,6 +211,23 @@ def test_density_in_another_unit(command, log, tmp_path, altitude):
     assert "state its unit in the import mapping, or leave the channel out and give altitude_m" in message
 
 
+def test_an_accelerometer_whose_z_points_up(command, log, tmp_path):
+    up = with_channel(log, "az_m_s2", -log.channels["az_m_s2"])
+    message = refused(command, stored(tmp_path, up), tmp_path)
+    assert "run blind-000000: az_m_s2 is +9." in message
+    assert "level flight has about -9.8 m/s2" in message
+    assert "sign = -1 under [channels.az_m_s2]" in message
+
+
+def test_an_acceleration_without_gravity(command, log, tmp_path):
+    z = log.channels["az_m_s2"].copy()
+    last = log.rows(2)
+    z[last] -= z[last].mean() - 0.1
+    message = refused(command, stored(tmp_path, with_channel(log, "az_m_s2", z)), tmp_path)
+    assert "run blind-000002: az_m_s2 is +0.1 m/s2" in message
+    assert "gravity included" in message
+
+
 def test_no_altitude_has_that_density(log):
     slugs = with_channel(without(log, "altitude_m"), "density_kg_m3", np.full_like(log.t_s, 0.0019))
     with pytest.raises(LogError, match=r"density_kg_m3 is 0\.0019 kg/m3"):
