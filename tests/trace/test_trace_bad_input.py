@@ -1,8 +1,10 @@
 """What `airtruth trace` says of input that it cannot trace: one sentence, the right exit code, no traceback."""
 
 import json
+import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -99,6 +101,18 @@ def test_one_record_works_and_is_provisional(command, log, tmp_path):
     answer = json.loads(out)
     assert answer["provisional"] is True
     assert answer == json.loads((tmp_path / "out" / "trace.json").read_text())
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_json_on_a_full_stdout_is_one_message(log, tmp_path):
+    command = [sys.executable, "-m", "airtruth", "trace", stored(tmp_path, one(log)), "--aircraft", "gtm"]
+    command += ["--out", tmp_path / "out", "--quiet", "--json", "--effect", FEW[0]]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("airtruth: standard output: not written; the disk is full")
+    assert len(done.stderr.splitlines()) == 1
+    assert (tmp_path / "out" / "trace.json").exists()
 
 
 def test_no_elevator_movement(command, log, tmp_path):
