@@ -1,6 +1,7 @@
 """What `airtruth trace` says of input that it cannot trace: one sentence, the right exit code, no traceback."""
 
 import json
+import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -13,6 +14,7 @@ import trace_flights as flights
 from airtruth import cli
 from airtruth.effects.library import EFFECTS
 from airtruth.errors import ConfigurationError, LogError
+from airtruth.logs import atomic
 from airtruth.logs.store import write_log
 from airtruth.trace import TraceOptions, records, trace, tracing
 from airtruth.trace.prepare import prepare
@@ -265,15 +267,30 @@ def test_too_short(command, log, tmp_path):
     assert "blind-000000" in message
 
 
-def test_a_folder_that_cannot_be_written(command, log, tmp_path):
+@pytest.mark.parametrize(
+    ("place", "why"),
+    [
+        ("out", "a file of that name is in the way"),
+        ("out/deep", "a part of the path is a file, not a folder"),
+        ("closed", "permission denied: choose a folder that you may write to"),
+    ],
+)
+def test_a_folder_that_cannot_be_written_is_found_before_the_search(
+    command, log, tmp_path, monkeypatch, place, why
+):
     path = stored(tmp_path, log)
     (tmp_path / "out").write_text("a file")
-    code, _, err = command(
-        path, "--aircraft", "gtm", "--out", tmp_path / "out" / "deep", "--quiet", "--effect", FEW[0]
+    (tmp_path / "closed").mkdir()
+    # root may write everywhere
+    monkeypatch.setattr(
+        atomic.os, "access", lambda path, mode: not (mode & os.W_OK and Path(path).name == "closed")
     )
+    monkeypatch.setattr(tracing, "traced", lambda *a: pytest.fail("searched before it was refused"))
+    code, _, err = command(path, "--aircraft", "gtm", "--out", tmp_path / place, "--quiet")
     assert code == 2
-    assert "Traceback" not in err
-    assert str(tmp_path / "out") in err
+    assert err.startswith(f"airtruth: {tmp_path / place}: not written")
+    assert why in err
+    assert len(err.splitlines()) == 1
 
 
 def test_no_log_there(command, tmp_path):

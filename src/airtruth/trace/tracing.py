@@ -111,6 +111,8 @@ def run(
         read = [read_log(path) for path in paths]
         for log, path in zip(read, paths, strict=True):
             validate(log, source=str(path))
+    if out is not None:
+        atomic.make_folder(out)  # before the search, which takes minutes
     found = traced(read, plane, options, advance)
     if out is not None:
         advance("write the updated aircraft")
@@ -120,7 +122,6 @@ def run(
         found.answer["replay"] = flown_again(
             found.case, found.outcome, plane, found.answer["updated_aircraft"]
         )
-        atomic.make_folder(out)
         atomic.write_text(out / ANSWER, json.dumps(found.answer, indent=1, allow_nan=False) + "\n")
     return found
 
