@@ -3,10 +3,13 @@
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from airtruth import aircraft
 from airtruth.errors import AircraftError
+from airtruth.fly.linearise import linearise
+from airtruth.fly.trim import trim
 
 ROOT = Path(__file__).resolve().parents[1] / "aircraft"
 FT, LB, SLUG = 0.3048, 0.45359237, 14.593902937206364
@@ -58,6 +61,19 @@ def test_found_by_name_folder_or_file(copy, monkeypatch, tmp_path):
     assert aircraft.find(copy) == copy
     assert aircraft.find(copy / "aircraft.toml") == copy
     assert aircraft.find("gtm", near=tmp_path) == copy
+
+
+def test_a_copy_under_another_name_flies_its_own_model(gtm, copy, paper_condition):
+    """Not that of the folder beside it, which has the model's name."""
+    renamed = Path(shutil.copytree(copy, copy.with_name("v2")))
+    loaded = aircraft.load(renamed)
+    flown, own = (linearise(plane, trim(plane, paper_condition)).plus for plane in (loaded, gtm))
+    np.testing.assert_array_equal(flown, own)
+    shutil.rmtree(copy)
+    assert aircraft.load(renamed).constants == gtm.constants
+    shutil.copytree(renamed, copy)
+    edit(renamed / "gtm.xml", "<property>aero/ci2vel</property>", "<property>aero/ci2vell</property>")
+    assert "ci2vell" in refusal(renamed)
 
 
 def test_unknown_name_lists_the_known():

@@ -105,3 +105,48 @@ def test_stderr_is_silent_where_it_is_no_terminal(command, tmp_path):
     code, out, err = command("fly", CAMPAIGN, "--out", tmp_path / "x", "--runs", 2, "--jobs", 1)
     assert (code, err) == (0, "")
     assert out == f"2 runs in {tmp_path / 'x'} (2 flown now, 0 failed)\n"
+
+
+FULL = Path("/dev/full")
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="no device that is always full")
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("arguments", [("effects", "--json"), ("--version",)])
+def test_full_stdout_is_one_message(monkeypatch, arguments, unbuffered):
+    monkeypatch.setenv("PYTHONUNBUFFERED", unbuffered)
+    command = [sys.executable, "-m", "airtruth", *arguments]
+    with FULL.open("w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == (
+        "airtruth: standard output: not written; the disk is full: free some space and run again\n"
+    )
+
+
+def stopped(*arguments, **named):
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize(
+    ("arguments", "place", "said"),
+    [
+        (["fly", CAMPAIGN, "--out", "x", "--runs", "1"], "airtruth.fly.campaign.fly", "resumes"),
+        (
+            ["identify", ".", "--aircraft", "gtm"],
+            "airtruth.identify.identify_files",
+            "starts again from the beginning",
+        ),
+        (
+            ["trace", ".", "--aircraft", "gtm", "--out", "x"],
+            "airtruth.trace.run",
+            "starts again from the beginning",
+        ),
+    ],
+    ids=["fly", "identify", "trace"],
+)
+def test_an_interrupted_command_says_what_the_same_one_does(command, monkeypatch, arguments, place, said):
+    monkeypatch.setattr(place, stopped)
+    code, out, err = command(*arguments)
+    assert (code, out) == (130, "")
+    assert err.endswith(f"airtruth: interrupted; the same command {said}\n")

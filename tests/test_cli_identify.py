@@ -60,6 +60,17 @@ def test_json_on_stdout_is_the_table(flown):
     assert rows[0]["run_id"] == "light-000000"
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_json_on_a_full_stdout_is_one_message(flown):
+    log = flown / "logs" / "00000.parquet"
+    command = [sys.executable, "-m", "airtruth", "identify", log, "--aircraft", "gtm", "--json"]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False, cwd=ROOT)
+    assert done.returncode == 2
+    assert done.stderr.startswith("airtruth: standard output: not written; the disk is full")
+    assert len(done.stderr.splitlines()) == 1
+
+
 def test_identify_never_reads_what_tells_the_truth(flown, tmp_path):
     """Poison every file beside the logs: the bytes that identify writes do not change."""
     clean, poisoned = tmp_path / "clean", tmp_path / "poisoned"

@@ -78,23 +78,36 @@ def model_root(folder: Path, root: str) -> tuple[Path, Path, Path, Path]:
     return base, base, base / "engine", base / "systems"
 
 
+def model_file(folder: Path, root: str, model: str) -> Path:
+    """XML of a model: in the folder of aircraft.toml, whatever its name, or else in one of the model's name."""
+    own = folder.resolve() / f"{model}.xml"
+    if root == "." and own.is_file():
+        return own
+    return model_root(folder, root)[1] / model / f"{model}.xml"
+
+
+def load_model(fdm: Any, folder: Path, root: str, model: str) -> bool:
+    """Load a model into an executive; False if JSBSim refuses it."""
+    _, _, engine, systems = model_root(folder, root)
+    fdm.set_aircraft_path(str(model_file(folder, root, model).parent))
+    fdm.set_engine_path(str(engine))
+    fdm.set_systems_path(str(systems))
+    return bool(fdm.load_model(model, False))  # False: that folder itself, a copy may have another name
+
+
 def _load(folder: Path, table: dict[str, Any]) -> dict[str, Any]:
     import jsbsim
 
-    root, aircraft, engine, systems = model_root(folder, table["root"])
-    xml = aircraft / table["model"] / f"{table['model']}.xml"
+    root, aircraft, *_ = model_root(folder, table["root"])
+    model = table["model"]
+    xml = model_file(folder, table["root"], model)
     if not xml.is_file():
         known = {p.name for p in aircraft.iterdir() if (p / f"{p.name}.xml").is_file()}
-        return {
-            "error": f"jsbsim.model: no {table['model']}.xml below {aircraft}; {choices(table['model'], known)}"
-        }
+        return {"error": f"jsbsim.model: no {model}.xml below {aircraft}; {choices(model, known)}"}
     try:
         fdm = jsbsim.FGFDMExec(str(root))
         fdm.set_debug_level(0)
-        fdm.set_aircraft_path(str(aircraft))
-        fdm.set_engine_path(str(engine))
-        fdm.set_systems_path(str(systems))
-        if not fdm.load_model(table["model"]):
+        if not load_model(fdm, folder, table["root"], model):
             return {"error": f"JSBSim refused {xml}; it said the reason above"}
         fdm.disable_output()
         manager = fdm.get_property_manager()

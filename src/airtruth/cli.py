@@ -41,11 +41,37 @@ def main() -> None:
         sys.exit(error.exit_code)
     except SystemExit as end:  # typer turns Ctrl-C into this
         if end.code == INTERRUPTED:
-            print("airtruth: interrupted; the same command resumes", file=sys.stderr)
+            resumes = sys.argv[1:2] == ["fly"]
+            step = "resumes" if resumes else "starts again from the beginning"
+            print(f"airtruth: interrupted; the same command {step}", file=sys.stderr)
         raise
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _close_stdout()
         sys.exit(1)
+
+
+def _print(text: str, end: str = "\n") -> None:
+    """Write a result to stdout, now, so that a full disk is found while it can be said.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be written.
+    """
+    try:
+        print(text, end=end, flush=True)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        from airtruth.logs.atomic import write_error
+
+        _close_stdout()
+        raise write_error(Path("standard output"), error) from None
+
+
+def _close_stdout() -> None:
+    """Send what is left in stdout's buffer nowhere: the interpreter flushes it once more at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @app.callback(invoke_without_command=True)
@@ -53,7 +79,7 @@ def _root(version: Annotated[bool, typer.Option("--version", help="Print the ver
     if version:
         from airtruth import __version__
 
-        print(__version__)
+        _print(__version__)
         raise typer.Exit
 
 
@@ -81,11 +107,11 @@ def fly(
 
     plan = planning.make(campaign, seed, runs)
     if dry_run:
-        print(planning.describe(plan))
+        _print(planning.describe(plan))
         return
     with _progress("fly", "runs", quiet) as advance:
         summary = flying.fly(plan, out, jobs, advance)
-    print(f"{summary.runs} runs in {out} ({summary.flown_now} flown now, {len(summary.failures)} failed)")
+    _print(f"{summary.runs} runs in {out} ({summary.flown_now} flown now, {len(summary.failures)} failed)")
     if summary.failures:
         for failure in summary.failures[:5]:
             print(f"airtruth: {failure.run_id} failed: {failure.reason}", file=sys.stderr)
@@ -116,7 +142,7 @@ def plan(
     from airtruth.report import forecast as forecasts
 
     made = forecasts.forecast(planning.make(campaign), records, pressure)
-    print(forecasts.as_json(made) if json_ else as_text(forecasts.as_table(made)))
+    _print(forecasts.as_json(made) if json_ else as_text(forecasts.as_table(made)))
 
 
 @app.command(epilog="Example: airtruth identify out/light --aircraft gtm --method iv-f1 --method ls")
@@ -185,7 +211,7 @@ def identify(
         print(f"airtruth: {sentence}", file=sys.stderr)
     if out is not None:
         write_table(out, estimates)
-    print(estimates.to_json(orient="records", indent=1) if json_ else as_text(overview(estimates)))
+    _print(estimates.to_json(orient="records", indent=1) if json_ else as_text(overview(estimates)))
 
 
 @app.command(epilog="Example: airtruth trace data/undeclared/a.parquet --aircraft gtm --out out/trace")
@@ -233,7 +259,7 @@ def trace(
     with _status("trace", quiet) as advance:
         found = run(logs, aircraft, options, out, advance)
         write_trace_figures(found, out)
-    print(json.dumps(found.answer, indent=1) if json_ else as_trace_text(found.answer))
+    _print(json.dumps(found.answer, indent=1) if json_ else as_trace_text(found.answer))
 
 
 @app.command(epilog="Example: airtruth tables out/light out/moderate --out out/tables")
@@ -244,7 +270,7 @@ def tables(
     """Write the paper's tables from identified campaigns, beside the printed figures."""
     from airtruth.report import write_tables
 
-    print(write_tables(folders, out).text)
+    _print(write_tables(folders, out).text)
 
 
 @app.command(epilog="Example: airtruth report out/trace --out out/trace/report.html")
@@ -258,7 +284,7 @@ def report(
     """Write one self-contained HTML page, and its tables as CSV and LaTeX."""
     from airtruth.report import write_report
 
-    print("\n".join(str(path) for path in write_report(folder, out)))
+    _print("\n".join(str(path) for path in write_report(folder, out)))
 
 
 @app.command(epilog="Example: airtruth effects elevator_delay")
@@ -270,7 +296,7 @@ def effects(
     from airtruth.effects import library, listing
 
     chosen = [e for n in name for e in library.named(n)] if name else list(library.EFFECTS.values())
-    print(listing.as_json(chosen) if json_ else listing.as_text(chosen))
+    _print(listing.as_json(chosen) if json_ else listing.as_text(chosen))
 
 
 @app.command(
@@ -295,7 +321,7 @@ def import_(
     from airtruth.logs import importers
 
     if guess:
-        print(importers.guess_mapping(file), end="")
+        _print(importers.guess_mapping(file), end="")
         return
     if mapping is None or out is None:
         raise ConfigurationError(
@@ -309,7 +335,7 @@ def import_(
     for problem in imported.problems:
         print(f"airtruth: {problem.sentence}", file=sys.stderr)
     log = imported.log
-    print(f"{len(log.run_ids)} runs, {len(log.t_s)} rows in {out}: {', '.join(log.channels)}")
+    _print(f"{len(log.run_ids)} runs, {len(log.t_s)} rows in {out}: {', '.join(log.channels)}")
 
 
 @app.command(epilog="Example: airtruth check flight7.parquet --aircraft totter")
@@ -336,9 +362,9 @@ def check(
         answer = kinematics.check_kinematics(read_log(path, run_ids=run), declared)
         answers.append({"file": str(path), **answer.as_dict()})
         if not json_:
-            print("\n\n".join(as_text(table) for table in kinematics_report.tables(answer)))
+            _print("\n\n".join(as_text(table) for table in kinematics_report.tables(answer)))
     if json_:
-        print(json.dumps(answers[0] if len(answers) == 1 else answers, indent=1))
+        _print(json.dumps(answers[0] if len(answers) == 1 else answers, indent=1))
 
 
 @aircraft_app.command(
@@ -370,7 +396,7 @@ def aircraft_new(
     from airtruth.fly.new_aircraft import make
 
     trim = (airspeed_m_s, altitude_m, alpha_deg, elevator_deg)
-    print(make(aircraft, out, estimates, method, derivative or [], log, trim))
+    _print(make(aircraft, out, estimates, method, derivative or [], log, trim))
 
 
 @contextmanager

@@ -108,7 +108,22 @@ def test_dry_run_names_the_effects_and_the_copy_goes_with_its_plan(tmp_path):
         ({"name": "elevator_delay", "delay_s": 3.0}, "outside its range of 0 to 0.2 s"),
         ({"name": "elevator_delay", "delay_s": 0.1, "delay_ms": 100}, "given twice"),
         ({"name": "elevator_delay", "delay_s": "long"}, "has to be a number"),
-        ({"name": "cm_alpha_nonlinear", "Cmalpha2": 1.0}, "state its variant; allowed: break, quadratic"),
+        ({"name": "cm_alpha_nonlinear"}, "state its variant; allowed: break, quadratic"),
+        (
+            {"name": "cm_alpha_nonlinear", "dCmalpha": 0.5, "Cmalpha2": 1.0},
+            "state its variant; allowed: break, quadratic",
+        ),
+        ({"name": "cm_alpha_nonlinear", "dCmalpha": 0.5}, "at_alpha_rad is missing"),
+        (
+            {"name": "sensor_delay", "delay_s": 0.02},
+            "state its variant; allowed: alpha_rad, az_m_s2, q_rad_s",
+        ),
+        ({"name": "sensor_delay", "channel": "q_rads", "delay_s": 0.02}, "did you mean 'q_rad_s'"),
+        (
+            {"name": "sensor_delay", "variant": "alpha_rad", "channel": "q_rad_s", "delay_s": 0.02},
+            "name two variants; state one",
+        ),
+        ({"name": "vane_lag", "channel": "alpha_rad", "tau_s": 0.02}, "'channel' is not a parameter"),
         ({"name": "cm_alpha_nonlinear", "variant": "brake", "dCmalpha": 1}, "did you mean 'break'"),
         ({"name": "backlash", "variant": "x", "width_deg": 1}, "has no variants"),
         ({"variant": "x"}, "effect.0.name"),

@@ -58,6 +58,24 @@ def test_variants():
     assert library.chosen("sensor_delay", "q_rad_s").key == "sensor_delay:q_rad_s"
 
 
+@pytest.mark.parametrize(
+    ("table", "key"),
+    [
+        ({"name": "cm_alpha_nonlinear", "dCmalpha": 0.5, "at_alpha_rad": 0.1}, "cm_alpha_nonlinear:break"),
+        ({"name": "cm_alpha_nonlinear", "dCmalpha": 0.5, "at_alpha_deg": 6}, "cm_alpha_nonlinear:break"),
+        ({"name": "cm_alpha_nonlinear", "Cmalpha2": 1.0}, "cm_alpha_nonlinear:quadratic"),
+        ({"name": "cl_alpha_nonlinear", "dCLalpha": 0.5, "at_alpha_rad": 0.1}, "cl_alpha_nonlinear:break"),
+        ({"name": "cl_alpha_nonlinear", "CLalpha2": 1.0}, "cl_alpha_nonlinear:quadratic"),
+        ({"name": "sensor_delay", "channel": "q_rad_s", "delay_s": 0.02}, "sensor_delay:q_rad_s"),
+        ({"name": "sensor_delay", "channel": "q_rad_s", "delay_ms": 20}, "sensor_delay:q_rad_s"),
+    ],
+)
+def test_what_is_stated_tells_the_variant(table, key):
+    effect, values = library.stated(table)
+    assert effect.key == key
+    assert set(values) == {p.name for p in effect.parameters}
+
+
 class Brought(EntryPoint):
     """An entry point whose object is at hand."""
 

@@ -1,5 +1,6 @@
 """The written aircraft folder: stands alone, says what was changed, and holds for aircraft of others."""
 
+import shutil
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 
@@ -122,6 +123,16 @@ def test_a_changed_aircraft_can_be_changed_again(gtm, paper_condition, tmp_path)
     # another order of summation
     np.testing.assert_allclose(flown["q_rad_s"], expected["q_rad_s"], rtol=0, atol=1e-11)
     np.testing.assert_allclose(flown["az_m_s2"], expected["az_m_s2"], rtol=0, atol=1e-10)
+
+
+def test_a_changed_aircraft_can_be_renamed_and_changed_again(gtm, paper_condition, tmp_path):
+    late = EFFECTS["elevator_delay"].change({"delay_s": 0.06})
+    changed = flights.changed(gtm, late, tmp_path / "first")
+    renamed = aircraft.load(shutil.copytree(changed.folder, tmp_path / "v2"))
+    again = flights.changed(renamed, Change(), tmp_path / "second")
+    expected, *flown = (flights.fly(plane, paper_condition)[1] for plane in (changed, renamed, again))
+    for other in flown:
+        np.testing.assert_array_equal(other["q_rad_s"], expected["q_rad_s"])
 
 
 def test_aircraft_file_survives_its_own_text(gtm, tmp_path):

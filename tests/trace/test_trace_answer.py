@@ -235,6 +235,16 @@ def test_candidates_can_be_chosen(flown):
         trace(log_of(flown["null"]), "gtm", TraceOptions(effects=("elevator_delai",)))
 
 
+def test_a_name_without_its_variant_means_all_of_them(flown):
+    a = trace(
+        log_of(flown["null"]), "gtm", TraceOptions(effects=("cm_alpha_nonlinear", "cm_alpha_nonlinear:break"))
+    )
+    assert sorted((c["name"], c["variant"]) for c in a["candidates"]) == [
+        ("cm_alpha_nonlinear", "break"),
+        ("cm_alpha_nonlinear", "quadratic"),
+    ]
+
+
 # -- what it must not depend on
 
 

@@ -1,8 +1,11 @@
 """What `airtruth trace` says of input that it cannot trace: one sentence, the right exit code, no traceback."""
 
 import json
+import os
+import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +14,9 @@ import trace_flights as flights
 from airtruth import cli
 from airtruth.effects.library import EFFECTS
 from airtruth.errors import ConfigurationError, LogError
+from airtruth.logs import atomic
 from airtruth.logs.store import write_log
-from airtruth.trace import TraceOptions, trace, tracing
+from airtruth.trace import TraceOptions, records, trace, tracing
 from airtruth.trace.prepare import prepare
 
 FEW = ("elevator_delay", "gyro_scale")
@@ -49,6 +53,10 @@ def stored(folder, log, name="log"):
 
 def with_channel(log, name, values):
     return replace(log, channels={**log.channels, name: values})
+
+
+def without(log, name):
+    return replace(log, channels={k: v for k, v in log.channels.items() if k != name})
 
 
 def one(log, run=0, samples=None):
@@ -95,6 +103,18 @@ def test_one_record_works_and_is_provisional(command, log, tmp_path):
     answer = json.loads(out)
     assert answer["provisional"] is True
     assert answer == json.loads((tmp_path / "out" / "trace.json").read_text())
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_json_on_a_full_stdout_is_one_message(log, tmp_path):
+    command = [sys.executable, "-m", "airtruth", "trace", stored(tmp_path, one(log)), "--aircraft", "gtm"]
+    command += ["--out", tmp_path / "out", "--quiet", "--json", "--effect", FEW[0]]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("airtruth: standard output: not written; the disk is full")
+    assert len(done.stderr.splitlines()) == 1
+    assert (tmp_path / "out" / "trace.json").exists()
 
 
 def test_no_elevator_movement(command, log, tmp_path):
@@ -182,8 +202,7 @@ def test_nan(command, log, tmp_path):
 
 @pytest.mark.parametrize("channel", ["alpha_rad", "q_rad_s", "az_m_s2", "elevator_rad", "airspeed_m_s"])
 def test_missing_channel(command, log, tmp_path, channel):
-    less = replace(log, channels={k: v for k, v in log.channels.items() if k != channel})
-    assert channel in refused(command, stored(tmp_path, less), tmp_path)
+    assert channel in refused(command, stored(tmp_path, without(log, channel)), tmp_path)
 
 
 def test_neither_density_nor_altitude(command, log, tmp_path):
@@ -195,12 +214,48 @@ def test_neither_density_nor_altitude(command, log, tmp_path):
     assert "altitude_m" in message
 
 
+@pytest.mark.parametrize("altitude", [True, False])
+def test_density_in_another_unit(command, log, tmp_path, altitude):
+    less = log if altitude else without(log, "altitude_m")
+    slugs = with_channel(less, "density_kg_m3", np.full_like(log.t_s, 0.0019))
+    message = refused(command, stored(tmp_path, slugs), tmp_path)
+    assert "run blind-000000: density_kg_m3 is 0.0019 kg/m3 on average, outside 0.088 to 1.48" in message
+    assert "state the unit slug_ft3 in the import mapping" in message
+    dense = with_channel(less, "density_kg_m3", np.full_like(log.t_s, 1.7))
+    message = refused(command, stored(tmp_path, dense), tmp_path)
+    assert "density_kg_m3 is 1.7 kg/m3" in message
+    assert "state its unit in the import mapping, or leave the channel out and give altitude_m" in message
+
+
+def test_an_accelerometer_whose_z_points_up(command, log, tmp_path):
+    up = with_channel(log, "az_m_s2", -log.channels["az_m_s2"])
+    message = refused(command, stored(tmp_path, up), tmp_path)
+    assert "run blind-000000: az_m_s2 is +9." in message
+    assert "level flight has about -9.8 m/s2" in message
+    assert "sign = -1 under [channels.az_m_s2]" in message
+
+
+def test_an_acceleration_without_gravity(command, log, tmp_path):
+    z = log.channels["az_m_s2"].copy()
+    last = log.rows(2)
+    z[last] -= z[last].mean() - 0.1
+    message = refused(command, stored(tmp_path, with_channel(log, "az_m_s2", z)), tmp_path)
+    assert "run blind-000002: az_m_s2 is +0.1 m/s2" in message
+    assert "gravity included" in message
+
+
+def test_no_altitude_has_that_density(log):
+    slugs = with_channel(without(log, "altitude_m"), "density_kg_m3", np.full_like(log.t_s, 0.0019))
+    with pytest.raises(LogError, match=r"density_kg_m3 is 0\.0019 kg/m3"):
+        records.read(slugs)
+
+
 @pytest.mark.parametrize("gone", ["throttle", "theta_rad", "ax_m_s2", "elevator_command_rad", "altitude_m"])
 def test_channels_that_are_not_needed(log, gone):
     """The problem can be set up without each of those that contract 1 calls optional."""
     from airtruth import aircraft
 
-    less = replace(log, channels={k: v for k, v in log.channels.items() if k != gone})
+    less = without(log, gone)
     effects = [EFFECTS[k] for k in FEW]
     case = prepare([less], aircraft.load("gtm"), effects, TraceOptions(model="linear"))
     assert len(case.fitted.records) == 2
@@ -212,15 +267,30 @@ def test_too_short(command, log, tmp_path):
     assert "blind-000000" in message
 
 
-def test_a_folder_that_cannot_be_written(command, log, tmp_path):
+@pytest.mark.parametrize(
+    ("place", "why"),
+    [
+        ("out", "a file of that name is in the way"),
+        ("out/deep", "a part of the path is a file, not a folder"),
+        ("closed", "permission denied: choose a folder that you may write to"),
+    ],
+)
+def test_a_folder_that_cannot_be_written_is_found_before_the_search(
+    command, log, tmp_path, monkeypatch, place, why
+):
     path = stored(tmp_path, log)
     (tmp_path / "out").write_text("a file")
-    code, _, err = command(
-        path, "--aircraft", "gtm", "--out", tmp_path / "out" / "deep", "--quiet", "--effect", FEW[0]
+    (tmp_path / "closed").mkdir()
+    # root may write everywhere
+    monkeypatch.setattr(
+        atomic.os, "access", lambda path, mode: not (mode & os.W_OK and Path(path).name == "closed")
     )
+    monkeypatch.setattr(tracing, "traced", lambda *a: pytest.fail("searched before it was refused"))
+    code, _, err = command(path, "--aircraft", "gtm", "--out", tmp_path / place, "--quiet")
     assert code == 2
-    assert "Traceback" not in err
-    assert str(tmp_path / "out") in err
+    assert err.startswith(f"airtruth: {tmp_path / place}: not written")
+    assert why in err
+    assert len(err.splitlines()) == 1
 
 
 def test_no_log_there(command, tmp_path):

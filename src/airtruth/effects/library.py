@@ -11,13 +11,14 @@ them; in its pyproject.toml:
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib.metadata import EntryPoint, entry_points
-from typing import Final
+from typing import Any, Final
 
 from airtruth.effects import aerodynamics, air, declared, sensors, surface
 from airtruth.effects.effect import Effect
 from airtruth.errors import ConfigurationError, choices
+from airtruth.signals import SIGNALS
 
 GROUP: Final = "airtruth.effects"
 
@@ -71,13 +72,20 @@ def named(name: str) -> list[Effect]:
     return found
 
 
-def chosen(name: str, variant: str = "") -> Effect:
-    """One effect by name and variant; the variant may be left out where there is only one.
+def chosen(name: str, variant: str = "", keys: Iterable[str] = ()) -> Effect:
+    """One effect by name and variant.
+
+    The variant may be left out where there is only one, or where one alone has a parameter for each of ``keys``.
+
+    Parameters
+    ----------
+    name, variant : of the effect.
+    keys : parameters that are stated of it, in any of their spellings.
 
     Raises
     ------
     ConfigurationError
-        If there is none, or several and no variant is given.
+        If there is none, or several and neither a variant nor the keys tell which.
     """
     found = named(name)
     if len(found) == 1 and not variant:
@@ -88,8 +96,38 @@ def chosen(name: str, variant: str = "") -> Effect:
     variants = [e.variant for e in found if e.variant]
     if not variants:
         raise ConfigurationError(f"effect {name!r} has no variants; leave variant out")
-    if not variant:
+    if variant:
+        raise ConfigurationError(f"effect {name!r}: variant {variant!r}: {choices(variant, variants)}")
+    given = set(keys)
+    fitting = [e for e in found if given <= {key for p in e.parameters for key in p.spellings()}]
+    if len(fitting) != 1:
         raise ConfigurationError(
             f"effect {name!r}: state its variant; allowed: {', '.join(sorted(variants))}"
         )
-    raise ConfigurationError(f"effect {name!r}: variant {variant!r}: {choices(variant, variants)}")
+    return fitting[0]
+
+
+def stated(table: Mapping[str, Any]) -> tuple[Effect, dict[str, float]]:
+    """The effect that a table of a file states, and the values of its parameters in their own units.
+
+    Parameters
+    ----------
+    table : ``name``, ``variant`` where it is needed (or ``channel``, where the variants are channels of a log),
+        and the parameters as `Effect.read` takes them.
+
+    Raises
+    ------
+    ConfigurationError
+        If the effect, its variant or a parameter cannot be used as written.
+    """
+    name, raw = str(table["name"]), {key: value for key, value in table.items() if key != "name"}
+    variant = str(raw.pop("variant", ""))
+    if "channel" in raw and all(effect.variant in SIGNALS for effect in named(name)):
+        channel = str(raw.pop("channel"))
+        if variant not in ("", channel):
+            raise ConfigurationError(
+                f"effect {name!r}: variant {variant!r} and channel {channel!r} name two variants; state one"
+            )
+        variant = channel
+    effect = chosen(name, variant, raw)
+    return effect, effect.read(raw)

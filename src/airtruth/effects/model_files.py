@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from airtruth.aircraft import Aircraft, JsbsimModel
-from airtruth.aircraft_probe import model_root
+from airtruth.aircraft_probe import model_file, model_root
 from airtruth.errors import AircraftError, StoreError
 
 _SECTIONS: Final = ("flight_control", "aerodynamics", "mass_balance", "propulsion", "external_reactions")
@@ -34,7 +34,7 @@ def read(aircraft: Aircraft, model: JsbsimModel) -> Model:
     AircraftError
         If a file cannot be read or is not XML.
     """
-    path = model_root(aircraft.folder, model.root)[1] / model.model / f"{model.model}.xml"
+    path = model_file(aircraft.folder, model.root, model.model)
     text = _text(path)
     root = _parse(text, path)
     for section in list(root):

@@ -253,10 +253,8 @@ class EffectTable(Strict):
             return raw
         from airtruth.effects import library  # loads what other packages bring: only for who asks
 
-        own = {key: raw[key] for key in ("name", "variant") if key in raw}
         try:
-            effect = library.chosen(raw["name"], str(raw.get("variant", "")))
-            values = effect.read({k: v for k, v in raw.items() if k not in own})
+            effect, values = library.stated(raw)
         except ConfigurationError as error:
             raise ValueError(str(error)) from None
         return {"name": effect.name, "variant": effect.variant, "parameters": values}

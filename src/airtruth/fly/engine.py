@@ -15,7 +15,7 @@ from typing import Any, Final
 import jsbsim
 
 from airtruth.aircraft import Aircraft, JsbsimModel
-from airtruth.aircraft_probe import model_root
+from airtruth.aircraft_probe import load_model, model_root
 from airtruth.errors import AircraftError
 from airtruth.units import FT, KT, SLUG
 
@@ -81,15 +81,11 @@ class Executive:
         self.aircraft = aircraft
         self.model = jsbsim_model(aircraft)
         self.dt_s = dt_s
-        root, folder, engine, systems = model_root(aircraft.folder, self.model.root)
-        self.fdm = jsbsim.FGFDMExec(str(root))
+        self.fdm = jsbsim.FGFDMExec(str(model_root(aircraft.folder, self.model.root)[0]))
         self.fdm.set_debug_level(0)
         self.fdm.load_planet(str(_PLANET), False)
         self.fdm.set_dt(dt_s)
-        self.fdm.set_aircraft_path(str(folder))
-        self.fdm.set_engine_path(str(engine))
-        self.fdm.set_systems_path(str(systems))
-        if not self.fdm.load_model(self.model.model):
+        if not load_model(self.fdm, aircraft.folder, self.model.root, self.model.model):
             raise AircraftError(f"{aircraft.folder}: JSBSim refused the model {self.model.model!r}")
         _no_files(self.fdm)
         self._manager = self.fdm.get_property_manager()

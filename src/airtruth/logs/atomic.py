@@ -20,6 +20,7 @@ _NEXT_STEP = {
     errno.EPERM: "permission denied: choose a folder that you may write to",
     errno.EROFS: "the file system is read-only: choose another folder",
     errno.ENOENT: "the folder does not exist: create it or choose another",
+    errno.EEXIST: "a file of that name is in the way: choose another name",
     errno.ENOTDIR: "a part of the path is a file, not a folder: choose another path",
     errno.EISDIR: "a folder of that name is in the way: choose another name",
 }
@@ -68,15 +69,17 @@ def write_text(path: Path | str, text: str) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder and those above it.
+    """Make a folder and those above it, where they are not there yet.
 
     Raises
     ------
     StoreError
-        If it cannot be made.
+        If it cannot be made, or nothing can be written there.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
+        if not os.access(path, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     except OSError as error:
         raise write_error(path, error) from None
 

@@ -21,7 +21,7 @@ class TraceOptions:
     hold_out : runs kept for the report; None holds out every third, never the only one.
     threads : records worked on at a time; the answer does not depend on it.
     seed : of the draws behind p-values.
-    effects : keys of the candidates; None for the whole library.
+    effects : keys of the candidates, a name alone for all of its variants; None for the whole library.
     refitted : write the refitted derivatives into the updated aircraft too; those that a curvature sets free are
         written in any case.
     """

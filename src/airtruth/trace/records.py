@@ -15,6 +15,7 @@ from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.atmosphere import density_kg_m3
 from airtruth.trace.lower import CHANNELS
 from airtruth.trace.plant import Plant
+from airtruth.trace.plausible import HIGHEST_M, LOWEST_M, check_density
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
@@ -176,10 +177,17 @@ def _smooth(x: Array, dt_s: float) -> Array:
 
 
 def _altitude(density: float) -> float:
-    """Altitude [m] of the standard atmosphere with that density."""
+    """Altitude [m] of the standard atmosphere with that density [kg/m3].
+
+    Raises
+    ------
+    LogError
+        If no altitude in the range has it.
+    """
     from scipy.optimize import brentq
 
-    return float(brentq(lambda h: float(density_kg_m3(np.array(h))) - density, -2000.0, 20000.0))
+    check_density(density)
+    return float(brentq(lambda h: float(density_kg_m3(np.array(h))) - density, LOWEST_M, HIGHEST_M))
 
 
 def nodes(fine: Array) -> Array:

@@ -20,6 +20,7 @@ from airtruth.logs.validate import validate
 from airtruth.trace.answer import Outcome, answer, assessed
 from airtruth.trace.colour import begun
 from airtruth.trace.options import TraceOptions
+from airtruth.trace.plausible import plausible
 from airtruth.trace.prepare import Case, prepare
 from airtruth.trace.replay import flown_again
 from airtruth.trace.search import Stage, search
@@ -61,6 +62,7 @@ def traced(
     """
     options = options or TraceOptions()
     effects = _effects(options)
+    plausible(logs)
     advance("probe the declared aircraft")
     case = prepare(logs, aircraft, effects, options)
     advance("refit the declared aircraft")
@@ -110,7 +112,8 @@ def run(
         for log, path in zip(read, paths, strict=True):
             validate(log, source=str(path))
     if out is not None:
-        place(plane, out)  # before the search, not after it
+        place(plane, out)  # both before the search, which takes minutes
+        atomic.make_folder(out)
     found = traced(read, plane, options, advance)
     if out is not None:
         advance("write the updated aircraft")
@@ -120,7 +123,6 @@ def run(
         found.answer["replay"] = flown_again(
             found.case, found.outcome, plane, found.answer["updated_aircraft"]
         )
-        atomic.make_folder(out)
         atomic.write_text(out / ANSWER, json.dumps(found.answer, indent=1, allow_nan=False) + "\n")
     return found
 
@@ -136,9 +138,14 @@ def trace(
 
 
 def _effects(options: TraceOptions) -> list[Effect]:
+    """The candidates that were asked for, each once; a name without a variant stands for all of its variants."""
     if options.effects is None:
         return list(EFFECTS.values())
+    found: dict[str, Effect] = {}
     for key in options.effects:
-        if key not in EFFECTS:
-            raise ConfigurationError(f"effect {key!r}: {choices(key, EFFECTS)}")
-    return [EFFECTS[key] for key in options.effects]
+        meant = {k: e for k, e in EFFECTS.items() if key in (k, e.name)}
+        if not meant:
+            names = {*EFFECTS, *(e.name for e in EFFECTS.values())}
+            raise ConfigurationError(f"effect {key!r}: {choices(key, names)}")
+        found |= meant
+    return list(found.values())
