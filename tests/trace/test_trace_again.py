@@ -1,13 +1,21 @@
 """The loop closes: the same records traced against the updated aircraft lack nothing more."""
 
 import shutil
+from dataclasses import replace
 
+import numpy as np
 import pytest
 import trace_flights as tf
+import trace_records as tr
 
 from airtruth import aircraft as planes
+from airtruth.aircraft import Sensor
 from airtruth.errors import StoreError
+from airtruth.quantity import Quantity
 from airtruth.trace import TraceOptions, trace
+from airtruth.trace.prepare import inputs_undone
+from airtruth.trace.records import FINE
+from airtruth.trace.replay import disagreement
 from airtruth.trace.tracing import run
 from airtruth.units import DEG
 
@@ -86,3 +94,49 @@ def test_nothing_of_the_user_s_is_replaced(late, where, tmp_path):
         run([late], declared, OPTIONS, out, told.append)
     assert told == []  # before the search
     assert sorted(str(p) for p in tmp_path.rglob("*")) == before
+
+
+def test_declared_errors_of_the_inputs_are_undone():
+    """A ramp, late by 40 ms, scaled and biased, as its sensor is declared: the ramp again, but for its last 40 ms."""
+    gtm = planes.load("gtm")
+    declared = Sensor(
+        scale=Quantity(value=1.2),
+        bias=Quantity(value=0.01),
+        lag=Quantity(value=0.03),
+        delay=Quantity(value=0.01),
+    )
+    sensors = gtm.file.sensors | {"elevator_rad": declared, "airspeed_m_s": declared}
+    plane = gtm.model_copy(update={"file": gtm.file.model_copy(update={"sensors": sensors})})
+    one = tr.record(np.zeros((100, 3)), np.zeros_like).signals
+    cells = one.sub * FINE
+    t = np.arange(99 * cells + 1) / cells * one.dt_s
+    coarse = t[::FINE]
+    seen = replace(
+        one,
+        elevator_rad=1.2 * (0.3 * (t - 0.04)) + 0.01,
+        airspeed_m_s=1.2 * (40.0 + coarse - 0.04) + 0.01,
+        ground_m_s=1.2 * (41.0 + coarse - 0.04) + 0.01,
+    )
+    found = inputs_undone(seen, plane)
+    inside = t < t[-1] - 0.041
+    np.testing.assert_allclose(found.elevator_rad[inside], 0.3 * t[inside], atol=1e-12)
+    inside = coarse < t[-1] - 0.041
+    np.testing.assert_allclose(found.airspeed_m_s[inside], 40.0 + coarse[inside], rtol=1e-12)
+    np.testing.assert_allclose(found.ground_m_s[inside], 41.0 + coarse[inside], rtol=1e-12)
+    none = plane.model_copy(update={"file": gtm.file.model_copy(update={"sensors": {}})})
+    np.testing.assert_array_equal(inputs_undone(seen, none).elevator_rad, seen.elevator_rad)
+
+
+def test_a_model_that_moves_otherwise_than_at_rest_is_said():
+    """c172x has alpha-dot terms and a servo with play that aircraft.toml does not declare (measured: q 1.31)."""
+    told = {"free_run": {"alpha_rad": 0.01, "q_rad_s": 0.02}}
+    answer = {
+        "error": {"declared": {"fit": told, "held_out": told}},
+        "replay": {"declared": {"alpha_rad": 0.0096, "q_rad_s": 0.0262}},
+    }
+    (note,) = disagreement(answer)
+    assert "q_rad_s 1.31" in note
+    assert "[dynamics]" in note
+    assert "alpha_rad" not in note
+    assert disagreement(answer | {"replay": {"declared": told["free_run"]}}) == []
+    assert disagreement(answer | {"replay": {}}) == []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 
 MOST_RECORDS: Final = 6
 """Records that are flown again, the first of those held out."""
+_APART: Final = 0.25
+"""Logarithm of two errors of one free run, the filter's and JSBSim's, that differ; they agree to 0.05 as a rule."""
 
 
 def flown_again(
@@ -58,6 +60,30 @@ def flown_again(
         return {name: _errors(case, plane, levels) for name, plane in flying.items()}
     except (FlightError, TrimError):
         return {}
+
+
+def disagreement(answer: Mapping[str, Any]) -> list[str]:
+    """A sentence where JSBSim flies the declared aircraft otherwise than the filter does: of what it has in motion
+    (servos, lags, terms in the rate of the angle of attack) forces at rest show nothing.
+
+    Parameters
+    ----------
+    answer : with ``error`` and ``replay``.
+    """
+    flown = answer["replay"].get("declared")
+    stage = answer["error"]["declared"]
+    told = stage.get("held_out", stage["fit"])["free_run"]
+    if flown is None:
+        return []
+    ratios = {channel: flown[channel] / max(told[channel], 1e-12) for channel in flown}
+    apart = [f"{channel} {ratio:.2f}" for channel, ratio in ratios.items() if abs(np.log(ratio)) > _APART]
+    if not apart:
+        return []
+    return [
+        f"JSBSim flies the declared aircraft otherwise than the filter (error over the filter's: {', '.join(apart)}): "
+        "its model has dynamics that forces at rest do not show, and they may be what is traced; declare them under "
+        "[dynamics] in aircraft.toml (docs/aircraft.md)"
+    ]
 
 
 def _levels(case: Case, outcome: Outcome) -> list[Array]:
@@ -129,4 +155,4 @@ def track(record: Record, aircraft: Aircraft, weight: Array) -> Track:
     )
 
 
-__all__ = ["MOST_RECORDS", "flown_again", "track"]
+__all__ = ["MOST_RECORDS", "disagreement", "flown_again", "track"]

@@ -22,7 +22,7 @@ from airtruth.trace.colour import begun
 from airtruth.trace.options import TraceOptions
 from airtruth.trace.plausible import plausible
 from airtruth.trace.prepare import Case, prepare
-from airtruth.trace.replay import flown_again
+from airtruth.trace.replay import disagreement, flown_again
 from airtruth.trace.search import Stage, search
 from airtruth.trace.tolerances import tolerances
 from airtruth.trace.update import place, write_update
@@ -123,6 +123,7 @@ def run(
         found.answer["replay"] = flown_again(
             found.case, found.outcome, plane, found.answer["updated_aircraft"]
         )
+        found.answer["notes"] += disagreement(found.answer)
         atomic.write_text(out / ANSWER, json.dumps(found.answer, indent=1, allow_nan=False) + "\n")
     return found
 
