@@ -17,14 +17,11 @@ from airtruth.trace.prepare import inputs_undone
 from airtruth.trace.records import FINE
 from airtruth.trace.replay import disagreement
 from airtruth.trace.tracing import run
-from airtruth.units import DEG
 
 FEW = ("elevator_delay", "gyro_lag", "vane_scale")
 FLOWN = {
     "elevator_delay": {"delay_s": 0.06},
-    "actuator_lag": {"bandwidth_hz": 4.0},
     "rate_limit": {"rate_rad_s": 0.3},
-    "backlash": {"width_rad": 1.0 * DEG},
     "downwash_lag": {"Cmalphadot": -30.0},
     "lift_lag": {"dCLalpha": 2.0, "tau_s": 0.2},
     "elastic_mode": {"dCmalpha": 0.5, "frequency_hz": 3.0, "damping": 0.05},
