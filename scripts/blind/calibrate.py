@@ -14,7 +14,7 @@ import numpy as np
 
 from blind.aircraft_xml import Body
 from blind.draw import AIRS, Trial, draw
-from blind.information import Directions, Whitener, difference, directions, noise_model, noncentrality
+from blind.information import Directions, Whitener, difference, directions, noise_model
 from blind.truths import EFFECTS, Added
 
 _HEAD = '''"""Sizes with a noncentrality of 16 in calm, light and moderate air; printed by `blind.calibrate`.
@@ -35,7 +35,7 @@ def sizes(key: str, trial: Trial, tools: Sequence[tuple[Whitener, Directions]]) 
     for whiten, along in tools:
         for _ in range(5):
             d = whiten(difference(trial, Added(key, kind.values(size, 0.5)))).ravel()
-            value = noncentrality(d, along.free, along.prior)
+            value = along.projection.rest(d)
             ratio = 4.0 / max(value, 1e-6) ** 0.5
             size = min(size * float(np.clip(ratio, 0.1, 4.0)), kind.largest)
             if abs(np.log(ratio)) < 0.1 or size == kind.largest:

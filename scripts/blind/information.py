@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -117,6 +118,11 @@ class Projection:
         target = np.concatenate([d, np.zeros(len(self.basis) - len(d))])
         return np.asarray(target - self.basis @ (self.basis.T @ target))
 
+    def rest(self, d: Array) -> float:
+        """Squared length of what is left of a whitened difference (n,)."""
+        left = self.left(d)
+        return float(left @ left)
+
 
 def noncentrality(d: Array, free: Array, prior: Array) -> float:
     """Squared length of a whitened difference that nothing refitted can take up.
@@ -126,8 +132,7 @@ def noncentrality(d: Array, free: Array, prior: Array) -> float:
     d : (n,) whitened difference.
     free, prior : as of `Projection.of`.
     """
-    left = Projection.of(free, prior).left(d)
-    return float(left @ left)
+    return Projection.of(free, prior).rest(d)
 
 
 def stacked(clean: Mapping[str, Array]) -> Array:
@@ -180,6 +185,11 @@ class Directions:
 
     free: Array
     prior: Array
+
+    @cached_property
+    def projection(self) -> Projection:
+        """What they take up."""
+        return Projection.of(self.free, self.prior)
 
 
 def fitted(trial: Trial) -> list[int]:
@@ -238,24 +248,28 @@ def directions(trial: Trial, whiten: Whitener) -> Directions:
 
 def beyond(trial: Trial, d: Array, whiten: Whitener, along: Directions) -> float:
     """What of a whitened difference is left after the best single effect of the library, at any size."""
-    return min(left for _, _, left in nearest(trial, d, whiten, along, LIBRARY))
+    base = responses(trial, (), COARSE_S)
+    return nearest(trial, d, whiten, along, LIBRARY, base)[0][2]
 
 
 def nearest(
-    trial: Trial, d: Array, whiten: Whitener, along: Directions, keys: Iterable[str]
+    trial: Trial, d: Array, whiten: Whitener, along: Directions, keys: Iterable[str], base: Array
 ) -> list[tuple[str, float, float]]:
     """What of a whitened difference single effects leave at any size: key, place (0 to 1), rest; the best first.
 
     Effects are taken to first order at their nominal size; those with a place at three places.
+
+    Parameters
+    ----------
+    base : responses without any effect.
     """
-    projection = Projection.of(along.free, along.prior)
-    own, base, left = projection.left(d), responses(trial, (), COARSE_S), []
+    own, left = along.projection.left(d), []
     for key in keys:
         kind = EFFECTS[key]
         size = min(SIZE16[key][AIRS.index(trial.air)], kind.largest)
         for place in (0.0, 0.5, 0.99) if key.endswith(":break") else (0.5,):
             effect = Added(key, kind.values(size, place))
-            other = projection.left(whiten(difference(trial, effect, (), COARSE_S, base)).ravel())
+            other = along.projection.left(whiten(difference(trial, effect, (), COARSE_S, base)).ravel())
             rest = float(own @ own - (own @ other) ** 2 / max(float(other @ other), 1e-12))
             left.append((key, place, rest))
     return sorted(left, key=lambda item: item[2])
@@ -271,12 +285,10 @@ def apart(trial: Trial, effect: Added, d: Array, whiten: Whitener, along: Direct
     ----------
     d : whitened difference that the effect makes, to first order.
     """
-    projection = Projection.of(along.free, along.prior)
     target = responses(trial, (effect,), COARSE_S)
 
     def left(made: Array) -> float:
-        gap = projection.left(whiten(target - made).ravel())
-        return float(gap @ gap)
+        return along.projection.rest(whiten(target - made).ravel())
 
     base = responses(trial, (), COARSE_S)
 
@@ -288,7 +300,7 @@ def apart(trial: Trial, effect: Added, d: Array, whiten: Whitener, along: Direct
 
     best = left(base)
     others = [key for key in LIBRARY if Added(key, {}).name != effect.name and key != "airspeed_scale"]
-    for key, place, rest in nearest(trial, d, whiten, along, others)[:_RIVALS]:
+    for key, place, rest in nearest(trial, d, whiten, along, others, base)[:_RIVALS]:
         if rest > STRONG:
             break
         kind = EFFECTS[key]

@@ -30,7 +30,6 @@ from blind.information import (
     directions,
     flown,
     noise_model,
-    noncentrality,
     own_directions,
 )
 from blind.truths import EFFECTS, Added, Parts, combined, model
@@ -63,7 +62,7 @@ def lambdas(trial: Trial) -> dict[str, float]:
     for effect in trial.effects:
         others = tuple(e for e in everything if e is not effect)
         d = whiten(difference(trial, effect, others)).ravel()
-        value = noncentrality(d, along.free, along.prior)
+        value = along.projection.rest(d)
         if refit_needed(trial, effect, others, value):
             value = refitted(trial, effect, others, whiten)
         result[effect.key] = value

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -172,14 +172,17 @@ def ratio(case: Case, stage: str, to: str) -> float | None:
 
 def median(values: Iterable[float | None]) -> tuple[float, int]:
     """Median of what there is, and how many there are."""
-    listed = [v for v in values if v is not None]
-    return (float(np.median(listed)) if listed else float("nan")), len(listed)
+    return _over_known(np.median, values)
 
 
 def mean(values: Iterable[float | None]) -> tuple[float, int]:
     """Mean of what there is, and how many there are."""
+    return _over_known(np.mean, values)
+
+
+def _over_known(average: Callable[[list[float]], Any], values: Iterable[float | None]) -> tuple[float, int]:
     listed = [v for v in values if v is not None]
-    return (float(np.mean(listed)) if listed else float("nan")), len(listed)
+    return (float(average(listed)) if listed else float("nan")), len(listed)
 
 
 def actual(case: Case) -> dict[str, float]:

@@ -19,7 +19,7 @@ from airtruth.trace.fit import Hypothesis, Problem
 from airtruth.trace.model import Settings, declared_change, settings_of
 from airtruth.trace.options import TraceOptions
 from airtruth.trace.plant import Plant, declared_derivatives, engines, linear, probed, trim_of
-from airtruth.trace.records import FINE, Record, Signals, read
+from airtruth.trace.records import FINE, Record, Signals, lead_s, read, undone
 from airtruth.units import DEG
 
 Array = NDArray[np.float64]
@@ -125,11 +125,11 @@ def inputs_undone(s: Signals, aircraft: Aircraft) -> Signals:
 
     def true(channel: str, x: Array, cells: int) -> Array:
         sensor = aircraft.file.sensors.get(channel, Sensor())
-        late = (sensor.delay.value + sensor.lag.value) / s.dt_s * cells
+        late = lead_s(sensor) / s.dt_s * cells
         if late > 0.0:
             at = np.arange(len(x))
             x = np.interp(at + late, at, x)
-        return np.asarray((x - sensor.bias.value) / sensor.scale.value)
+        return undone(x, sensor)
 
     return replace(
         s,
@@ -199,8 +199,7 @@ def _plants(signals: Sequence[Signals], aircraft: Aircraft, model: str, held: Se
             continue
         at = _trim(aircraft, members, speed, density)
         plant = _probed(aircraft, at, members)
-        others = [s for s in everyone if s.run_id in held]
-        wider = _probed(aircraft, at, everyone) if others and members is not everyone else plant
+        wider = plant if len(members) == len(everyone) else _probed(aircraft, at, everyone)
         for i in group:
             found[i] = wider if signals[i].run_id in held else plant
     return [found[i] for i in range(len(signals))]

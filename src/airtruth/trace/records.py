@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.aircraft import Sensor
 from airtruth.identify.intersample import servo_bend
 from airtruth.identify.prefilter import butterworth
 from airtruth.logs.flight_log import FlightLog
@@ -174,6 +175,16 @@ def _smooth(x: Array, dt_s: float) -> Array:
     if 0.45 / dt_s <= _CUTOFF_HZ or len(x) < 40:
         return x
     return np.asarray(sosfiltfilt(butterworth(_CUTOFF_HZ, 2, dt_s).copy(), x))
+
+
+def undone(x: Array, sensor: Sensor) -> Array:
+    """A series as it was before the bias and scale of its sensor."""
+    return np.asarray((x - sensor.bias.value) / sensor.scale.value)
+
+
+def lead_s(sensor: Sensor) -> float:
+    """By how much a series has to be advanced for the delay and lag of its sensor [s]."""
+    return sensor.delay.value + sensor.lag.value
 
 
 def _altitude(density: float) -> float:

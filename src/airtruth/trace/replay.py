@@ -20,7 +20,7 @@ from airtruth.trace.answer import Outcome
 from airtruth.trace.holdout import floor
 from airtruth.trace.lower import CHANNELS, lower
 from airtruth.trace.prepare import Case
-from airtruth.trace.records import FINE, Record
+from airtruth.trace.records import FINE, Record, lead_s, undone
 
 Array = NDArray[np.float64]
 
@@ -116,14 +116,13 @@ def _errors(case: Case, aircraft: Aircraft, levels: list[Array]) -> dict[str, fl
 def _corrected(channel: str, x: Array, declared: Aircraft, aircraft: Aircraft) -> Array:
     """An input that was corrected for one aircraft's sensor, corrected for another's instead."""
     old, new = (plane.file.sensors.get(channel, Sensor()) for plane in (declared, aircraft))
-    measured = x * old.scale.value + old.bias.value
-    return np.asarray((measured - new.bias.value) / new.scale.value)
+    return undone(x * old.scale.value + old.bias.value, new)
 
 
 def _lead_s(channel: str, declared: Aircraft, aircraft: Aircraft) -> float:
     """By how much more an input has to be advanced for one aircraft's sensor than for another's."""
     old, new = (plane.file.sensors.get(channel, Sensor()) for plane in (declared, aircraft))
-    return new.delay.value + new.lag.value - old.delay.value - old.lag.value
+    return lead_s(new) - lead_s(old)
 
 
 def track(record: Record, aircraft: Aircraft, weight: Array) -> Track:

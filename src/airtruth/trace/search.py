@@ -146,7 +146,7 @@ def search(
     advance : told what is being done.
     """
     first = Round(hypothesis, start, tuple(effects))
-    return tuple(_rounds(problem, (first,), (), seed, advance))
+    return _rounds(problem, (first,), (), seed, advance)
 
 
 @dataclass(frozen=True)
@@ -247,33 +247,27 @@ def _stage(
     problem: Problem, current: Round, count: int, seed: int, advance: Callable[[str], None]
 ) -> Stage | None:
     """One round behind ``count`` others; None where not even its null can be fitted."""
-    hypothesis, start, effects, instead = (
-        current.hypothesis,
-        current.start,
-        current.effects,
-        current.instead,
-    )
-    restarts = _RESTARTS
+    start, restarts = current.start, _RESTARTS
     while True:
         advance(f"round {count + 1}: refit without further effects")
-        null = fit(problem, hypothesis, start)
+        null = fit(problem, current.hypothesis, start)
         if null is None:
             return None
         whitener = autoregression(null.tangents)
         gls = null if whitener.coefficients.shape[0] == 0 else _gls(problem, null, whitener)
-        advance(f"round {count + 1}: score {len(effects)} effects")
-        table = score.table(gls, problem, effects, whitener, seed)
+        advance(f"round {count + 1}: score {len(current.effects)} effects")
+        table = score.table(gls, problem, current.effects, whitener, seed)
         adjusted = score.holm([s.p_value for s in table.scores])
         candidates: tuple[Candidate, ...] = ()
         if count < MOST:
             level = LATER_LEVEL if count else LEVEL
-            fits = _refitted(problem, null, table, adjusted <= level, advance, instead)
+            fits = _refitted(problem, null, table, adjusted <= level, advance, current.instead)
             better = _better_null(problem, null, fits) if restarts else None
             if better is not None:
                 start, restarts = better.point, restarts - 1
                 continue
             least = SIGNIFICANT_LATER if count else SIGNIFICANT
-            candidates = _judged(problem, null, fits, least, instead)
+            candidates = _judged(problem, null, fits, least, current.instead)
         unnamed = anomalies(gls, problem, whitener)
         tied = _tied(candidates)
         return _led(problem, Stage(null, gls, whitener, table, unnamed, adjusted, candidates, tied), advance)

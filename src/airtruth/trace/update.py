@@ -14,6 +14,7 @@ from airtruth.aircraft import FILE, Aircraft
 from airtruth.effects.change import AeroTerm, Change
 from airtruth.effects.writing import MARK, Corrections, write_aircraft
 from airtruth.errors import StoreError
+from airtruth.logs import atomic
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.trace.prepare import Case
 from airtruth.trace.search import Stage
@@ -93,14 +94,14 @@ def write_update(
     note = f"Traced from measured records: {names}."
     if corrections is not None:
         note += " Derivatives refitted: " + ", ".join(f"{k} {v:+.4g}" for k, v in increments.items()) + "."
+    atomic.make_folder(folder.parent)
     try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".new-", dir=folder.parent) as beside:
             made = write_aircraft(aircraft, change, Path(beside) / folder.name, note, corrections)
             _remove(folder)
             made.rename(folder)
     except OSError as error:
-        raise StoreError(f"{folder}: cannot be written ({error.strerror}); choose another --out") from None
+        raise atomic.write_error(folder, error) from None
     return str(folder)
 
 
@@ -109,6 +110,4 @@ def _remove(folder: Path) -> None:
         try:
             shutil.rmtree(folder)
         except OSError as error:
-            raise StoreError(
-                f"{folder}: cannot be replaced ({error.strerror}); choose another --out"
-            ) from None
+            raise atomic.write_error(folder, error) from None
