@@ -3,56 +3,122 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+DEVELOP := $(VENV)/.develop
+# Modules are compiled when they are first imported: most of those of the libraries never are.
+INSTALL := -m pip install --quiet --disable-pip-version-check --no-compile
 JOBS ?= $(shell nproc 2>/dev/null || echo 2)
 OUT ?= out
+LOCK := uv pip compile --quiet pyproject.toml --universal --python-version 3.11 --generate-hashes --no-header --no-annotate
+# Processes run side by side: further threads for small matrices only wait for each other.
+export OPENBLAS_NUM_THREADS ?= 1
+BUDGET ?= 1
+# make campaign-quick STORE=s3://BUCKET/FOLDER flies into an object store (docs/stores.md)
+AT := $(if $(STORE),--store $(STORE))
 CAMPAIGNS := light light-fit moderate moderate-fit
 
-.PHONY: help setup campaign campaign-quick loop study blind test lint bench clean
+.PHONY: planned check-study help setup setup-dev lock installed docs docs-links campaign campaign-quick loop study blind test test-slow test-all fuzz robustness mutants lint kernels browser bench clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
 
-setup: $(READY) ## make the virtual environment
+setup: $(READY) ## make the virtual environment of a user
+
+setup-dev: $(DEVELOP) ## the same with the tools of a developer
 
 $(READY): requirements.lock pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	$(BIN)/python $(INSTALL) --require-hashes -r requirements.lock
+	$(BIN)/python $(INSTALL) --no-deps --no-build-isolation -e .
+	touch $@
+
+$(DEVELOP): requirements-dev.lock $(READY)
+	$(BIN)/python $(INSTALL) --require-hashes -r requirements-dev.lock
+	touch $@
+
+lock: ## resolve pyproject.toml into the three lock files, with hashes (needs uv)
+	$(LOCK) --extra dev -o requirements-dev.lock
+	$(LOCK) --extra build -c requirements-dev.lock -o requirements.lock
+	$(LOCK) --extra build --extra docs -c requirements-dev.lock -o requirements-docs.lock
+
+installed: $(DEVELOP) ## the README from an installed wheel in an empty folder, and the time of each command
+	$(BIN)/python -m scripts.readme --wheel
+
+docs: $(VENV)/.docs ## build the site into out/site; its numbers and pictures come from code that runs now (minutes; kept in out/docs-cache)
+	$(BIN)/python -m sphinx -q -W --keep-going -b html -d $(OUT)/docs-trees docs $(OUT)/site
+	@echo "open $(OUT)/site/index.html"
+
+docs-links: $(VENV)/.docs ## test the links of the site to other sites (needs a network)
+	$(BIN)/python -m sphinx -q -b linkcheck -d $(OUT)/docs-trees docs $(OUT)/site-links
+
+$(VENV)/.docs: requirements-docs.lock $(READY)
+	$(BIN)/python $(INSTALL) --require-hashes -r requirements-docs.lock
 	touch $@
 
 campaign: $(READY) ## fly data/campaigns, identify, print the paper's tables, close the loop (into out/)
-	$(BIN)/python scripts/campaign.py --out $(OUT) --jobs $(JOBS)
+	$(BIN)/python -m scripts.campaign --out $(OUT) $(AT) --jobs $(JOBS)
 
 campaign-quick: $(READY) ## the same with a tenth of the runs
-	$(BIN)/python scripts/campaign.py --out $(OUT)/quick --jobs $(JOBS) --quick
+	$(BIN)/python -m scripts.campaign --out $(OUT)/quick $(AT) --jobs $(JOBS) --quick
 
 loop: $(READY) ## the paper's experiment through the loop: 2000 runs, every method before and after (six minutes)
-	$(BIN)/python scripts/paper_loop.py --out $(OUT)/loop-2000 --jobs $(JOBS) --affine 300
+	$(BIN)/python -m studies.paper_loop --out $(OUT)/loop-2000 --jobs $(JOBS) --affine 300
 
-study: $(READY) ## every cause behind docs/paper.md and docs/closed_loop.md, off and on (about ten minutes)
-	$(BIN)/python scripts/paper_study.py --out $(OUT)/study --jobs $(JOBS)
-	$(BIN)/python scripts/closed_loop_study.py
-	$(BIN)/python -m pytest -q -m study tests/trace/test_conformance_trace.py
-	$(BIN)/python scripts/foreign_aircraft.py
+study: $(DEVELOP) ## every cause behind docs/paper.md and docs/closed_loop.md, off and on (about ten minutes)
+	$(BIN)/python -m studies.paper_study --out $(OUT)/study --jobs $(JOBS)
+	$(BIN)/python -m studies.closed_loop_study
+	$(BIN)/python -m pytest -q -n $(JOBS) --dist loadgroup -m study
+	$(BIN)/python -m studies.foreign_aircraft
+
+fleet: $(READY) ## 35 aircraft of the JSBSim package surveyed, flown and traced (hours; continues after an interruption)
+	$(BIN)/python -m studies.foreign_fleet --out $(OUT)/fleet
+
+planned: $(DEVELOP) ## planned flights of eight pairs of effects, flown and traced (about an hour; continues after an interruption)
+	$(BIN)/python -m studies.planned_flights --out $(OUT)/planned
+
+check-study: $(DEVELOP) ## 500 records with none to three sensor errors through `airtruth check` (about ten minutes)
+	$(BIN)/python -m studies.check_study --jobs $(JOBS)
 
 blind: $(READY) ## 200 flight tests that the tracer has not seen, scored against their truth
-	$(BIN)/python scripts/blind_trials.py --trials 200 --seed 1 --jobs $(JOBS) --out $(OUT)/blind
+	$(BIN)/python -m validation.blind --trials 200 --seed 1 --jobs $(JOBS) --out $(OUT)/blind
 
-test: $(READY) lint ## lint, type-check and run every test
+test: lint kernels ## lint, types, unit and property tests, one end-to-end run of each command
 	$(BIN)/python -m pytest -n $(JOBS) --dist loadgroup
 
-lint: $(READY) ## ruff, mypy --strict, the import contract
+test-slow: kernels ## the tests that take long: frozen trials, interrupted campaigns, measured flights, studies
+	$(BIN)/python -m pytest -n $(JOBS) --dist loadgroup -m "slow and not study"
+
+test-all: test test-slow ## every test
+
+fuzz: kernels ## damage 33,000 logs, imported files, TOML files and results and use each (about half an hour; BUDGET scales it)
+	$(BIN)/python -m validation.fuzz --budget $(BUDGET) --seed 1
+
+robustness: $(DEVELOP) ## kill commands 200 times and damage a campaign 150 times; every file has to be restored (about an hour)
+	$(BIN)/python -m validation.robustness --kills 200 --damages 150 --seed 1
+
+mutants: $(DEVELOP) ## mutation testing of physics, regression, covariance, campaign and resume (about an hour)
+	$(BIN)/python $(INSTALL) cosmic-ray==8.7.0
+	$(BIN)/python -m scripts.mutants --jobs $(JOBS)
+
+kernels: $(DEVELOP) ## compile the numba kernels once, so that parallel tests do not each compile them
+	$(BIN)/python -m scripts.compile_kernels
+
+browser: ## install Debian's headless Chromium, in which the slow tests open the pages (needs root)
+	apt-get update -qq
+	DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends chromium-headless-shell fonts-dejavu-core
+
+lint: $(DEVELOP) ## ruff, mypy --strict, the import contract
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: $(READY) ## ratios against bare baselines and peers
-	$(BIN)/python benchmarks/bench_fly.py
-	$(BIN)/python benchmarks/bench_identify.py
-	$(BIN)/python benchmarks/bench_filter_error.py
-	$(BIN)/python benchmarks/bench_peers.py
-	$(BIN)/python benchmarks/bench_trace.py
+bench: $(DEVELOP) ## ratios against bare baselines and peers
+	$(BIN)/python -m benchmarks.bench_fly
+	$(BIN)/python -m benchmarks.bench_identify
+	$(BIN)/python -m benchmarks.bench_import
+	$(BIN)/python -m benchmarks.bench_filter_error
+	$(BIN)/python -m benchmarks.bench_peers
+	$(BIN)/python -m benchmarks.bench_trace
 
 clean: ## remove the environment, caches and output
 	rm -rf $(VENV) $(OUT) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -1,4 +1,4 @@
-"""Efficiency, coverage, failures and time of filter error; plain `python benchmarks/bench_filter_error.py`.
+"""Efficiency, coverage, failures and time of filter error; plain `python -m benchmarks.bench_filter_error`.
 
 Records of 5 s at 50 Hz of the linear GTM in u and w gusts with its sensors, started from iv-f1 (least
 squares where iv-f1 fails). Efficiency is 100 (bound/RMSE)^2, with the exact bound of the same experiment:
@@ -10,21 +10,17 @@ best of three, without the start.
 from __future__ import annotations
 
 import functools
-import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 
-from airtruth.identify import Options, identify_batch, quantities
-from airtruth.identify.filter_bound import experiment_bound
-from airtruth.identify.filter_error import FilterOptions, fit, fit_joint
+from airtruth.identification import Options, identify_batch, quantities
+from airtruth.identification.likelihood.cramer_rao import experiment_bound
+from airtruth.identification.likelihood.fit import FilterOptions, fit, fit_joint
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.short_period import PARAMETERS, modal
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "identify"))
-from linear_flight import AIRSPEED_M_S, GTM, LIGHT, NOISE, THETA, doublet, fly, gtm_scale
+from validation.linear_flight import AIRSPEED_M_S, GTM, LIGHT, NOISE, THETA, doublet, fly, gtm_scale
 
 PRIOR = 0.2
 AIRSPEED_STD_M_S = 0.0309  # 0.06 kt

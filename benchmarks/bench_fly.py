@@ -14,24 +14,30 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 CAMPAIGN = Path(__file__).resolve().parents[1] / "data" / "campaigns" / "light.toml"
-BARS = {"overhead": 1.5, "speed-up": 1.8, "help": 0.5, "memory": 1.1}
+BARS = {"overhead": 1.5, "speed-up": 1.8, "help": 0.5, "import": 0.1, "memory": 1.1}
 RUNS_PER_CHUNK = 100
 CHUNKS = 6
 
 
 def overhead() -> float:
     """CPU per step of campaign chunks (gusts, sensors, Parquet, all) over that of a bare run() loop."""
-    from airtruth.fly import plan
-    from airtruth.fly.chunk import Pilot
-    from airtruth.fly.engine import Executive
-    from airtruth.fly.trim import trim
+    from airtruth.simulation.campaign import plan
+    from airtruth.simulation.campaign.chunk import Pilot
+    from airtruth.simulation.campaign.workers import orders_of
+    from airtruth.simulation.simulator import Executive
+    from airtruth.simulation.trim import trim
 
-    made = plan.make(CAMPAIGN, runs=RUNS_PER_CHUNK * 32)  # from 3200 runs on, a chunk has 100
+    made = plan.make(CAMPAIGN, runs=RUNS_PER_CHUNK * 32)
+    first, *numbers = _whole_chunks(made.table["chunk"].value_counts())
     steps = RUNS_PER_CHUNK * (made.samples - 1)
     pilot = Pilot(made)
-    at = trim(made.aircraft, plan.condition(made.table.iloc[0].to_dict()), made.dt_s)
+    at = trim(made.aircraft, plan.planned_runs(made.table.head(1))[0].condition, made.dt_s)
     bare = Executive(made.aircraft, made.dt_s)
     bare.initialise(at.condition, at.alpha_rad, at.controls)
     bare.fdm.set_trim_status(False)
@@ -41,9 +47,10 @@ def overhead() -> float:
 
         def chunk(number: int) -> float:
             start = time.process_time()
-            outcomes = pilot.fly_chunk(number, Path(folder), truths)
-            assert all(o.status == "ok" for o in outcomes)
-            assert len(outcomes) == RUNS_PER_CHUNK
+            (order,) = orders_of(made, [number])
+            flown = pilot.fly_chunk(order, Path(folder), truths)
+            assert flown.runs == RUNS_PER_CHUNK
+            assert not flown.unflown
             return time.process_time() - start
 
         def loop() -> float:
@@ -54,10 +61,10 @@ def overhead() -> float:
 
         truths = Path(folder) / "truth"
         truths.mkdir()
-        chunk(0)
+        chunk(first)
         loop()
         pairs = []
-        for number in range(1, CHUNKS + 1):
+        for number in numbers[:CHUNKS]:
             pairs.append((chunk(number), loop()) if number % 2 else (loop(), chunk(number))[::-1])
     ratios = sorted(a / b for a, b in pairs)
     medians = [1e6 * statistics.median(p) / steps for p in zip(*pairs, strict=True)]
@@ -118,10 +125,15 @@ def peak_memory(runs: int) -> float:
     return float(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
+def _whole_chunks(runs: pd.Series) -> list[int]:
+    """Numbers of the chunks with `RUNS_PER_CHUNK` runs; the first runs of a campaign are in smaller ones."""
+    return sorted(int(chunk) for chunk, count in runs.items() if count == RUNS_PER_CHUNK)
+
+
 def worker(runs: int) -> None:
     """Fly every chunk and print the peak memory [MB]."""
-    from airtruth.fly import plan
-    from airtruth.fly.chunk import Pilot
+    from airtruth.simulation.campaign import plan
+    from airtruth.simulation.campaign.chunk import Pilot
 
     made = plan.make(CAMPAIGN, runs=runs)
     pilot = Pilot(made)
@@ -141,6 +153,13 @@ def help_s() -> float:
     return statistics.median(seconds)
 
 
+def import_s() -> float:
+    """Least of five times of `import airtruth` in a new interpreter [s]."""
+    script = "import time; t = time.perf_counter(); import airtruth; print(time.perf_counter() - t)"
+    command = [sys.executable, "-c", script]
+    return min(float(subprocess.run(command, check=True, capture_output=True).stdout) for _ in range(5))
+
+
 def report(name: str, value: float, ok: bool, bar: str) -> None:
     """One line of the result."""
     print(f"{name:<44} {value:8.2f}   bar: {bar:<14} {'met' if ok else 'MISSED'}")
@@ -150,6 +169,8 @@ def main(full: bool) -> None:
     """Print every figure beside its bar."""
     seconds = help_s()
     report("--help [s]", seconds, seconds < BARS["help"], f"under {BARS['help']}")
+    seconds = import_s()
+    report("import airtruth [s]", seconds, seconds < BARS["import"], f"under {BARS['import']}")
     ratio = overhead()
     report(
         "CPU a step over a bare run() loop", ratio, ratio <= BARS["overhead"], f"at most {BARS['overhead']}"

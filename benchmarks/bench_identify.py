@@ -1,4 +1,4 @@
-"""Time, memory and coverage of the estimators; plain `python benchmarks/bench_identify.py`.
+"""Time, memory and coverage of the estimators; plain `python -m benchmarks.bench_identify`.
 
 10,000 records of 5 s at 50 Hz of the linear GTM in light gusts with its sensors (1000 different ones, ten
 times each). Times are of one core: CPU time of the process, the best of three. The baseline is a loop over
@@ -8,23 +8,19 @@ linearmodels' IV2SLS on the same instruments and regressors: one IV step, with i
 from __future__ import annotations
 
 import resource
-import sys
 import time
 import tracemalloc
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 from linearmodels.iv import IV2SLS
 
-from airtruth.identify import COVARIANCES, METHODS, Options, identify_batch, quantities
-from airtruth.identify.condition import observe
-from airtruth.identify.methods import method
+from airtruth.identification import COVARIANCES, METHODS, Options, identify_batch, quantities
+from airtruth.identification.condition import observe
+from airtruth.identification.methods import method
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.short_period import MODAL, PARAMETERS, modal
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "identify"))
-from linear_flight import GTM, THETA, fly, gtm_scale
+from validation.linear_flight import GTM, THETA, fly, gtm_scale
 
 DISTINCT, TIMES, STEPS = 1000, 10, 25
 BAR_US = 30.0

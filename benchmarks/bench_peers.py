@@ -5,7 +5,7 @@ no airspeed. AeroID 0.5.0 is given what helps it: the estimates of iv-f1 to star
 sensors, and for its filter error the true gusts, as noise on alpha and q alone ("2 states") or as a
 state of their own written by hand ("gust state"). airtruth is given the log alone. Times are CPU of one core.
 
-    pip install airtruth[bench]; python benchmarks/bench_peers.py [RECORDS]
+    pip install airtruth[bench]; python -m benchmarks.bench_peers [RECORDS]
 """
 
 from __future__ import annotations
@@ -16,20 +16,17 @@ import sys
 import time
 import warnings
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.identify import Options, identify_batch, quantities
-from airtruth.identify.filter_bound import experiment_bound
-from airtruth.identify.filter_options import FilterOptions
+from airtruth.identification import Options, identify_batch, quantities
+from airtruth.identification.likelihood.cramer_rao import experiment_bound
+from airtruth.identification.likelihood.options import FilterOptions
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.units import G0
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "identify"))
-from linear_flight import AIRSPEED_M_S, GTM, LIGHT, NOISE, THETA, fly, gtm_scale
+from validation.linear_flight import AIRSPEED_M_S, GTM, LIGHT, NOISE, THETA, fly, gtm_scale
 
 Array = NDArray[np.float64]
 

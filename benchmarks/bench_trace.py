@@ -12,11 +12,11 @@ import time
 from pathlib import Path
 
 from airtruth import aircraft
-from airtruth.effects.library import EFFECTS
+from airtruth.effects.registry import EFFECTS
 from airtruth.logs.store import read_log
-from airtruth.trace import TraceOptions, traced
-from airtruth.trace.fit import begin, fit
-from airtruth.trace.prepare import prepare
+from airtruth.tracing import TraceOptions, trace
+from airtruth.tracing.inference.optimise import fit, initial_parameters
+from airtruth.tracing.prepare import prepare
 
 DATA = Path(__file__).resolve().parents[1] / "data" / "undeclared"
 
@@ -24,7 +24,7 @@ DATA = Path(__file__).resolve().parents[1] / "data" / "undeclared"
 def main() -> None:
     """Print the table."""
     gtm = aircraft.load("gtm")
-    traced([read_log(DATA / "f.parquet")], gtm, TraceOptions())  # compiles
+    trace([read_log(DATA / "f.parquet")], gtm, TraceOptions())  # compiles
     print(f"{len(EFFECTS)} effects; s wall (CPU), refits without effects that would take as long")
     print(f"{'set':4} {'verdict':12} {'one thread':>18} {'two threads':>18} {'refits':>7} same answer")
     for path in sorted(DATA.glob("*.parquet")):
@@ -32,11 +32,11 @@ def main() -> None:
         answers, times = [], []
         for threads in (1, 2):
             wall, cpu = time.perf_counter(), time.process_time()
-            answers.append(traced([log], gtm, TraceOptions(threads=threads)).answer)
+            answers.append(trace([log], gtm, TraceOptions(threads=threads)).to_dict())
             times.append((time.perf_counter() - wall, time.process_time() - cpu))
         case = prepare([log], gtm, list(EFFECTS.values()), TraceOptions())
         wall = time.perf_counter()
-        fit(case.fitted, case.hypothesis, begin(case.fitted, case.hypothesis))
+        fit(case.fitted, case.hypothesis, initial_parameters(case.fitted, case.hypothesis))
         refit = time.perf_counter() - wall
         same = json.dumps(answers[0]) == json.dumps(answers[1])
         one, two = (f"{w:.2f} ({c:.2f})" for w, c in times)

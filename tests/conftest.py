@@ -1,12 +1,15 @@
 """What every test shares: the GTM and its trim at the paper's condition."""
 
+import os
 from pathlib import Path
 
 import pytest
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # parallel tests share the processors
+
 from airtruth import aircraft
-from airtruth.fly.engine import Condition
-from airtruth.fly.trim import trim
+from airtruth.simulation.simulator import Condition
+from airtruth.simulation.trim import trim
 from airtruth.units import FT, KT
 
 ROOT = Path(__file__).resolve().parents[1]

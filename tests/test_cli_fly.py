@@ -1,5 +1,6 @@
 """The command line of fly: help, exit codes, and how little it imports before it works."""
 
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -75,14 +76,14 @@ def test_module_runs_as_the_command():
         (["fly", CAMPAIGN, "--out", "x", "--runs", str(10**9), "--dry-run"], ["runs"]),
         (
             ["fly", "nowhere.toml", "--out", "x"],
-            ["nowhere.toml: cannot be read", "data/campaigns/light.toml"],
+            ["nowhere.toml: cannot be read", "airtruth new campaign"],
         ),
         (["fly", ".", "--out", "x"], ["cannot be read"]),
     ],
 )
 def test_wrong_use_exits_2_and_says_what(command, tmp_path, monkeypatch, arguments, words):
     if str(10**9) in arguments:  # more runs than a file may ask for: refused before a table of them is drawn
-        from airtruth.fly import plan
+        from airtruth.simulation.campaign import plan
 
         monkeypatch.setattr(plan, "_run_table", lambda *a: pytest.fail("drawn before it was refused"))
     monkeypatch.chdir(tmp_path)
@@ -101,7 +102,9 @@ def test_dry_run_prints_the_plan_and_writes_nothing(command, tmp_path):
     assert not (tmp_path / "x").exists()
 
 
-def test_stderr_is_silent_where_it_is_no_terminal(command, tmp_path):
+def test_short_work_leaves_stderr_silent_where_it_is_no_terminal(command, tmp_path, monkeypatch):
+    """A line of progress appears every ten seconds, which a busy machine may take."""
+    monkeypatch.setattr("airtruth.cli.progress.EVERY_S", math.inf)
     code, out, err = command("fly", CAMPAIGN, "--out", tmp_path / "x", "--runs", 2, "--jobs", 1)
     assert (code, err) == (0, "")
     assert out == f"2 runs in {tmp_path / 'x'} (2 flown now, 0 failed)\n"
@@ -124,29 +127,37 @@ def test_full_stdout_is_one_message(monkeypatch, arguments, unbuffered):
     )
 
 
+LOG = str(Path(__file__).resolve().parents[1] / "data" / "undeclared" / "a.parquet")
+
+
 def stopped(*arguments, **named):
     raise KeyboardInterrupt
 
 
 @pytest.mark.parametrize(
-    ("arguments", "place", "said"),
+    ("arguments", "function", "step"),
     [
-        (["fly", CAMPAIGN, "--out", "x", "--runs", "1"], "airtruth.fly.campaign.fly", "resumes"),
+        (["fly", CAMPAIGN, "--out", "x", "--runs", "1"], "airtruth.simulation.campaign.run.fly", "resumes"),
         (
-            ["identify", ".", "--aircraft", "gtm"],
-            "airtruth.identify.identify_files",
+            ["identify", LOG, "--aircraft", "gtm"],
+            "airtruth.identification.identify",
             "starts again from the beginning",
         ),
         (
-            ["trace", ".", "--aircraft", "gtm", "--out", "x"],
-            "airtruth.trace.run",
+            ["trace", LOG, "--aircraft", "gtm", "--out", "x"],
+            "airtruth.tracing.trace",
+            "starts again from the beginning",
+        ),
+        (
+            ["loop", LOG, "--aircraft", "gtm", "--out", "x"],
+            "airtruth.loop.close_loop",
             "starts again from the beginning",
         ),
     ],
-    ids=["fly", "identify", "trace"],
+    ids=["fly", "identify", "trace", "loop"],
 )
-def test_an_interrupted_command_says_what_the_same_one_does(command, monkeypatch, arguments, place, said):
-    monkeypatch.setattr(place, stopped)
+def test_an_interrupted_command_says_what_the_same_one_does(command, monkeypatch, arguments, function, step):
+    monkeypatch.setattr(function, stopped)
     code, out, err = command(*arguments)
     assert (code, out) == (130, "")
-    assert err.endswith(f"airtruth: interrupted; the same command {said}\n")
+    assert err.endswith(f"airtruth: interrupted; the same command {step}\n")

@@ -120,7 +120,7 @@ def test_problems_of_a_model_carry_their_path_and_the_nearest_name():
     assert len(said) == 3
     assert "inner.chord: unit 'kg' is not a unit of length; use one of m, ft, in, mm" in said
     assert "inner.cord: unknown key; did you mean 'chord'? allowed: chord" in said
-    assert any(s.startswith("count: ") and "(found 'many')" in s for s in said)
+    assert any(s.startswith("count: ") and "(got 'many')" in s for s in said)
 
 
 def test_choices_suggest_only_what_is_near():

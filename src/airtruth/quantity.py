@@ -1,4 +1,4 @@
-"""Quantities with a unit, as files state them, turned into SI at the border.
+"""Quantities with a unit in files, and their conversion to SI.
 
 Two notations are read. In aircraft.toml a quantity is a table, ``{ value = 57.75, unit = "lb",
 std = 0.3, source = "..." }``. In a campaign the unit ends the key, ``eas_kt = 75``.
@@ -6,29 +6,83 @@ std = 0.3, source = "..." }``. In a campaign the unit ends the key, ``eas_kt = 7
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Annotated, Any, Final, Self, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from airtruth.errors import choices
 from airtruth.units import UNITS
 
+LARGEST: Final = 1e15
+"""Largest magnitude of a number in a file [SI] (judgement: no quantity of flight comes near it, and its powers do not
+overflow)."""
+
 
 class Strict(BaseModel):
-    """Base of every file model: frozen, and a key it does not know is an error."""
+    """Base of every file model: frozen; an unknown key is an error, and so is a number beyond `LARGEST`."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
+    @field_validator("*", mode="before")
+    @classmethod
+    def _of_its_type(cls, value: Any, info: ValidationInfo) -> Any:
+        """pydantic would read "5" and true as numbers, and 1 as true; JSON may hold an infinity as text."""
+        if cls.model_config.get("allow_inf_nan"):
+            return value
+        annotation = cls.model_fields[info.field_name or ""].annotation
+        wanted = {annotation, *get_args(annotation)}
+        entries = (
+            value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else [value]
+        )
+        if wanted & {float, int} and not wanted & {str, bool}:
+            for entry in entries:
+                if isinstance(entry, bool | str):
+                    raise ValueError(f"write a number (got {entry!r})")
+        if annotation is bool and not isinstance(value, bool):
+            raise ValueError(f"write true or false (got {value!r})")
+        return value
+
+    @model_validator(mode="after")
+    def _within_range(self) -> Self:
+        for name in type(self).model_fields:
+            for number in _numbers(getattr(self, name)):
+                if LARGEST < abs(number) < math.inf:
+                    raise ValueError(
+                        f"{name} is {number:g}; write a number between -{LARGEST:g} and {LARGEST:g}"
+                    )
+        return self
+
+
+def _numbers(value: object) -> Iterator[float]:
+    """The floating-point numbers of a field, which may be a list or a table of them."""
+    if isinstance(value, float):
+        yield value
+    elif isinstance(value, tuple | list):
+        yield from (one for one in value if isinstance(one, float))
+    elif isinstance(value, Mapping):
+        yield from (one for one in value.values() if isinstance(one, float))
+
 
 class Quantity(Strict):
-    """A value in SI with its standard uncertainty and where it comes from.
+    """A value in SI with its standard uncertainty and its source.
 
     Attributes
     ----------
     value : value in SI.
-    std : standard uncertainty in SI, 0 if it is not stated.
-    source : where the figure comes from.
+    std : standard uncertainty in SI, 0 if the file gives none.
+    source : publication or measurement behind the value.
     """
 
     value: float
@@ -36,25 +90,48 @@ class Quantity(Strict):
     source: str = ""
 
 
-def _from_table(dimension: str) -> BeforeValidator:
-    def convert(raw: Any) -> Any:
+@dataclass(frozen=True)
+class FromTable:
+    """Reads a quantity table of a dimension; a schema asks for the dimension.
+
+    Attributes
+    ----------
+    dimension : key of `airtruth.units.UNITS`.
+    """
+
+    dimension: str
+
+    def __call__(self, raw: Any) -> Any:
+        """Return the table in SI, a `Quantity` as it is.
+
+        Raises
+        ------
+        ValueError
+            If it is no table, or its unit is of another dimension.
+        """
+        units = UNITS[self.dimension]
         if isinstance(raw, Quantity):
             return raw
         if not isinstance(raw, Mapping):
-            raise ValueError(f'write it as {{ value = ..., unit = "..." }}; units: {_units(dimension)}')
+            raise ValueError(f'write it as {{ value = ..., unit = "..." }}; units: {_units(self.dimension)}')
         table = dict(raw)
-        unit = table.pop("unit", "" if dimension == "ratio" else None)
-        if unit not in UNITS[dimension]:
+        unit = table.pop("unit", "" if self.dimension == "ratio" else None)
+        if not isinstance(unit, str) or unit not in units:
             raise ValueError(
-                f"unit {unit!r} is not a unit of {dimension.replace('_', ' ')}; {_units(dimension)}"
+                f"unit {unit!r} is not a unit of {_plain(self.dimension)}; {_units(self.dimension)}"
             )
-        factor = UNITS[dimension][unit]
         for key in ("value", "std"):
             if isinstance(table.get(key), int | float):
-                table[key] = table[key] * factor
+                table[key] = table[key] * units[unit]
         return table
 
-    return BeforeValidator(convert)
+
+def _from_table(dimension: str) -> BeforeValidator:
+    return BeforeValidator(FromTable(dimension))
+
+
+def _plain(dimension: str) -> str:
+    return dimension.replace("_", " ")
 
 
 def _units(dimension: str) -> str:
@@ -74,40 +151,47 @@ Ratio = Annotated[Quantity, _from_table("ratio")]
 
 
 def table_in(dimension: str, raw: Any) -> Quantity:
-    """Read one quantity table of a dimension that is known only at run time.
+    """Read one quantity table of a dimension.
+
+    Parameters
+    ----------
+    dimension : key of `airtruth.units.UNITS`.
+    raw : the table.
 
     Raises
     ------
     ValueError
-        If it is not a table, the unit is of another dimension, or a key is unknown.
+        If it is not a table, the unit belongs to another dimension, or a key is unknown.
     """
-    converted = _from_table(dimension).func(raw)  # type: ignore[call-arg]
+    converted = FromTable(dimension)(raw)
     return converted if isinstance(converted, Quantity) else Quantity.model_validate(converted)
 
 
-def keys_to_si(raw: Mapping[str, Any], dimensions: Mapping[str, str]) -> dict[str, Any]:
+def keys_to_si(raw: Mapping[str, object], dimensions: Mapping[str, str]) -> dict[str, object]:
     """Rename ``eas_kt = 75`` to ``eas = 38.58`` for every name in ``dimensions``.
 
     Parameters
     ----------
-    raw : table as read. Keys that are no such name, or whose unit is of another dimension, stay as they
-        are, for the model to refuse and `explain` to explain.
-    dimensions : bare name -> dimension. Numbers, and the numbers in lists and tables (distributions),
-        are multiplied by the unit's factor.
+    raw : table of the file. A key that is no such name, or has a unit of another dimension, is kept: the model
+        then refuses it, and `explain` explains why.
+    dimensions : name without unit -> dimension. Numbers, also in lists and tables (distributions), are
+        multiplied by the factor of the unit.
 
     Raises
     ------
     ValueError
         If a quantity is given twice, in two units.
     """
-    result: dict[str, Any] = {}
+    result: dict[str, object] = {}
     for key, value in raw.items():
         name = _longest_name(key, dimensions)
         unit = "" if name is None else key[len(name) + 1 :]
         if name is None:
             result[key] = value
         elif unit not in UNITS[dimensions[name]]:
-            result[key if unit else key + _NO_UNIT] = value  # not the field's own name, so it is refused
+            result[key if unit else key + _NO_UNIT] = (
+                value  # differs from the field's name, so the model refuses it
+            )
         elif name in result:
             raise ValueError(f"{key}: {name} is given twice, in two units")
         else:
@@ -116,6 +200,7 @@ def keys_to_si(raw: Mapping[str, Any], dimensions: Mapping[str, str]) -> dict[st
 
 
 _NO_UNIT = "_?"
+"""Suffix of a key without a unit: it makes the key unknown to the model, and `explain` recognises it."""
 
 
 def _longest_name(key: str, dimensions: Mapping[str, str]) -> str | None:
@@ -140,12 +225,12 @@ def _scaled(value: Any, factor: float) -> Any:
 
 
 def explain(error: ValidationError, model: type[BaseModel]) -> list[str]:
-    """One sentence per problem of a file: its path, what is wrong, and the allowed or nearest names.
+    """Return one sentence per problem of a file: its key, the fault, and the allowed or nearest names.
 
     Parameters
     ----------
-    error : what pydantic found, all of it.
-    model : the model that was read.
+    error : all problems that pydantic reports.
+    model : the model that refused the file.
     """
     items = error.errors()
     unknown = [
@@ -159,44 +244,49 @@ def explain(error: ValidationError, model: type[BaseModel]) -> list[str]:
         if item["type"] == "missing" and any(
             at == table and name.startswith(f"{key}_") for at, name in unknown
         ):
-            continue  # it is there, with a unit that the other sentence is about
-        if item["type"] == "extra_forbidden":
+            continue  # present with a wrong unit, which another sentence explains
+        if item["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
             message = _explain_key(key, _model_at(model, table))
         elif item["type"] not in ("value_error", "missing"):
-            message = f"{message} (found {item['input']!r})"
+            message = f"{message} (got {item['input']!r})"
         sentences.append(f"{path}: {message}")
     return sentences
 
 
-def _explain_key(key: str, model: type[BaseModel] | None) -> str:
+def _explain_key(key: str, model: type[Any] | None) -> str:
     dimensions: Mapping[str, str] = getattr(model, "dimensions", {})
     name = _longest_name(key, dimensions)
     if name is not None:
         unit, dimension = key[len(name) + 1 :], dimensions[name]
         allowed = ", ".join(f"{name}_{u}" if u else name for u in UNITS[dimension])
-        found = (
-            "no unit is stated" if unit == "?" else f"{unit!r} is not a unit of {dimension.replace('_', ' ')}"
-        )
-        return f"{found}; write {allowed}"
-    fields = [field.alias or name for name, field in model.model_fields.items()] if model else []
-    shown = [f"{n}_{next(iter(UNITS[dimensions[n]]))}" if n in dimensions else n for n in fields]
+        fault = "the unit is missing" if unit == "?" else f"{unit!r} is not a unit of {_plain(dimension)}"
+        return f"{fault}; write {allowed}"
+    keys = _keys(model) if model else []
+    shown = [f"{n}_{next(iter(UNITS[dimensions[n]]))}" if n in dimensions else n for n in keys]
     return f"unknown key; {choices(key, shown)}"
 
 
-def _model_at(model: type[BaseModel], path: tuple[int | str, ...]) -> type[BaseModel] | None:
-    current: type[BaseModel] | None = model
+def _keys(model: type[Any]) -> list[str]:
+    """Keys of a table of a file: the fields of its model, or of a plain dataclass."""
+    if is_dataclass(model):
+        return [field.name for field in fields(model)]
+    return [field.alias or name for name, field in model.model_fields.items()]
+
+
+def _model_at(model: type[BaseModel], path: tuple[int | str, ...]) -> type[Any] | None:
+    current: type[Any] | None = model
     for part in path:
-        field = current.model_fields.get(str(part)) if current else None
-        if field is not None:  # else an index into a list or a key of a mapping: its items' model stays
+        field = getattr(current, "model_fields", {}).get(str(part))
+        if field is not None:  # an index of a list or a key of a mapping keeps the model of its items
             current = _model_of(field.annotation)
     return current
 
 
-def _model_of(annotation: Any) -> type[BaseModel] | None:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def _model_of(annotation: Any) -> type[Any] | None:
+    if isinstance(annotation, type) and (issubclass(annotation, BaseModel) or is_dataclass(annotation)):
         return annotation
     for argument in getattr(annotation, "__args__", ()):
-        found = _model_of(argument)
-        if found is not None:
-            return found
+        model = _model_of(argument)
+        if model is not None:
+            return model
     return None

@@ -1,7 +1,7 @@
-"""Units at the border. Inside airtruth everything is SI and radians.
+"""Units of files and options; inside the package every quantity is in SI and radians.
 
-A quantity carries its unit at the end of its name (``eas_kt``, ``duration_s``). `UNITS` lists, for
-each dimension, the suffixes that are understood and the factor to SI.
+The unit of a quantity ends its name (``eas_kt``, ``duration_s``). `UNITS` lists the suffixes of each dimension and
+their factors to SI.
 """
 
 from __future__ import annotations
@@ -10,14 +10,23 @@ import math
 from typing import Final
 
 DEG: Final = math.pi / 180.0
-FT: Final = 0.3048  # international foot, exact [m]
-INCH: Final = 0.0254  # exact [m]
-KT: Final = 1852.0 / 3600.0  # international knot, exact [m/s]
-LB: Final = 0.45359237  # avoirdupois pound, exact [kg]
-G0: Final = 9.80665  # standard gravity, exact [m/s2]
-LBF: Final = LB * G0  # [N]
-SLUG: Final = LBF / FT  # [kg]
-PSF: Final = LBF / FT**2  # [Pa]
+"""Degree [rad]."""
+FT: Final = 0.3048
+"""International foot [m], exact (NIST SP 811, 2008, appendix B)."""
+INCH: Final = 0.0254
+"""International inch [m], exact (NIST SP 811)."""
+KT: Final = 1852.0 / 3600.0
+"""International knot [m/s], exact (NIST SP 811)."""
+LB: Final = 0.45359237
+"""Avoirdupois pound [kg], exact (NIST SP 811)."""
+G0: Final = 9.80665
+"""Standard gravity [m/s2], exact (3rd CGPM, 1901)."""
+LBF: Final = LB * G0
+"""Pound-force [N], from the pound and standard gravity."""
+SLUG: Final = LBF / FT
+"""Slug [kg]: the mass that one pound-force accelerates by 1 ft/s2."""
+PSF: Final = LBF / FT**2
+"""Pound-force per square foot [Pa]."""
 
 UNITS: Final[dict[str, dict[str, float]]] = {
     "angle": {"rad": 1.0, "deg": DEG},
@@ -33,14 +42,20 @@ UNITS: Final[dict[str, dict[str, float]]] = {
     "inertia": {"kg_m2": 1.0, "slug_ft2": SLUG * FT**2},
     "force": {"n": 1.0, "lbf": LBF},
     "moment": {"n_m": 1.0, "lbf_ft": LBF * FT},
-    "pressure": {"pa": 1.0, "psf": PSF},
+    "pressure": {"pa": 1.0, "hpa": 100.0, "kpa": 1e3, "psf": PSF, "psi": LBF / INCH**2},
     "density": {"kg_m3": 1.0, "slug_ft3": SLUG / FT**3},
     "ratio": {"": 1.0, "pct": 0.01},
 }
+"""Dimension -> suffix of a unit -> factor to SI."""
 
 
 def factor(dimension: str, unit: str) -> float:
-    """Factor that takes a value in ``unit`` to SI.
+    """Return the factor from a unit to SI.
+
+    Parameters
+    ----------
+    dimension : key of `UNITS`.
+    unit : suffix of the unit.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""The independent flight of tests/fly is used here too."""
+"""The independent flight of tests/simulation is used here too."""
 
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "fly"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "simulation"))

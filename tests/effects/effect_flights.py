@@ -8,18 +8,29 @@ from pathlib import Path
 import numpy as np
 import oracle
 
-from airtruth.effects import writing
-from airtruth.effects.change import Change
-from airtruth.fly.engine import Condition
-from airtruth.fly.flight import Flight, Inputs
-from airtruth.fly.manoeuvres import Manoeuvre, sample
-from airtruth.fly.trim import trim
+from airtruth.aircraft import write as writing
+from airtruth.physics.resolution import LinearPoint, resolved
+from airtruth.physics.terms import Change
+from airtruth.simulation.flight import Flight, Inputs
+from airtruth.simulation.manoeuvres import Manoeuvre, sample
+from airtruth.simulation.resolution import linear_point
+from airtruth.simulation.simulator import Condition
+from airtruth.simulation.trim import trim
 from airtruth.units import DEG
 
 CHANNELS = ("alpha_rad", "q_rad_s", "az_m_s2", "airspeed_m_s", "theta_rad", "elevator_rad")
 
 
-def changed(plane, change: Change, folder: Path, **options):
+_POINTS: dict[tuple[str, Condition], LinearPoint] = {}
+
+
+def changed(plane, change: Change, folder: Path, at: Condition | None = None, **options):
+    """The aircraft with the change; ``at``: condition at which changes of the derivatives are counted."""
+    if at is not None and change.derivatives:
+        key = (plane.name, at)
+        if key not in _POINTS:
+            _POINTS[key] = linear_point(plane, at)
+        change = resolved(change, _POINTS[key])
     return writing.changed(plane, change, folder / plane.name, **options)
 
 

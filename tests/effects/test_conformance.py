@@ -1,37 +1,44 @@
 """What every effect of the library keeps, those that other packages bring too."""
 
 import math
+from typing import get_args, get_type_hints
 
 import effect_flights as flights
 import numpy as np
 import pytest
 
 from airtruth.aircraft import Sensor
-from airtruth.effects.change import (
-    AIR,
+from airtruth.aircraft.neutral import effective, fitted
+from airtruth.channels import SIGNALS as LOG_CHANNELS
+from airtruth.effects.registry import EFFECTS
+from airtruth.errors import ConfigurationError
+from airtruth.physics.sensor_errors import Kind
+from airtruth.physics.terms import (
+    CAUSES,
     DECLARED,
-    SENSOR_KINDS,
     SHAPES,
     SIGNALS,
     STATE_KINDS,
-    SURFACE_KINDS,
+    AirTerm,
     Change,
+    SurfaceTerm,
 )
-from airtruth.effects.library import EFFECTS
-from airtruth.effects.neutral import effective, fitted
-from airtruth.errors import ConfigurationError
-from airtruth.fly import measure
-from airtruth.signals import SIGNALS as LOG_CHANNELS
+from airtruth.simulation import instruments as measure
 from airtruth.units import UNITS
 
 ALL = sorted(EFFECTS)
 DELAY = EFFECTS["elevator_delay"].change({"delay_s": 0.03})
 
 
+def kinds(term, field):
+    """Values that the type of a term's field allows."""
+    return get_args(get_type_hints(term)[field])
+
+
 def values(effect, share):
-    """Parameter values at a multiple of the material size; places in the middle of their range."""
-    size, *places = effect.parameters
-    found = {p.name: 0.5 * (p.low + p.high) for p in places}
+    """Parameter values at a multiple of the material size; places in the middle of their range, further sizes none."""
+    size, *others = effect.parameters
+    found = {p.name: 0.5 * (p.low + p.high) if p.is_location else p.neutral for p in others}
     return {size.name: size.value(share * size.material)} | found
 
 
@@ -43,10 +50,11 @@ def neutral(effect):
 @pytest.mark.parametrize("key", ALL)
 def test_parameters_are_consistent(key):
     effect = EFFECTS[key]
-    size, *places = effect.parameters
+    size, *others = effect.parameters
     assert effect.key == key
-    assert not size.place
-    assert all(p.place for p in places)
+    assert not size.is_location
+    assert all(p.is_location or effect.in_derivatives for p in others)
+    assert effect.in_derivatives == bool(effect.change(values(effect, 1.0)).derivatives)
     assert effect.explanation.endswith(".")
     assert effect.source
     assert effect.where in ("surface", "dynamics", "declared", "sensor", "air")
@@ -56,7 +64,6 @@ def test_parameters_are_consistent(key):
     for p in effect.parameters:
         assert p.low < p.high
         assert p.step > 0.0
-        assert p.prior_std is None or p.prior_std > 0.0
         assert p.unit == "-" or any(p.unit in units for units in UNITS.values())
         assert p.unit == "-" or p.name == "value" or p.name.endswith(f"_{p.unit}")
         for value in np.linspace(p.low, p.high, 5):
@@ -74,7 +81,7 @@ def test_values_are_checked(key):
     effect = EFFECTS[key]
     good = values(effect, 1.0)
     assert effect.read(good) == good
-    with pytest.raises(ConfigurationError, match=r"is missing \("):
+    with pytest.raises(ConfigurationError, match=r"is missing \(.*write one of"):
         effect.read({})
     with pytest.raises(ConfigurationError, match=r"is not a parameter; .*allowed"):
         effect.read(good | {"nonsense": 1.0})
@@ -94,13 +101,14 @@ def test_change_is_in_plain_known_terms(key):
     assert change != Change()
     assert effective(change) == change
     signals = (*SIGNALS, *(s.name for s in change.states))
-    assert all(t.kind in SURFACE_KINDS for t in change.surface)
+    assert all(t.kind in kinds(SurfaceTerm, "kind") for t in change.surface)
     assert all(t.kind in STATE_KINDS and t.signal in SIGNALS and t.time_s > 0.0 for t in change.states)
     assert all(t.coefficient in ("CL", "Cm") and t.shape in SHAPES for t in change.aero)
     assert all(t.signal in signals for t in change.aero)
     assert all(t.quantity in DECLARED for t in change.declared)
-    assert all(t.kind in SENSOR_KINDS and t.channel in LOG_CHANNELS for t in change.sensors)
-    assert all(t.level in AIR for t in change.air)
+    assert all(t.cause in CAUSES for t in change.derivatives)
+    assert all(t.kind in get_args(Kind) and t.channel in LOG_CHANNELS for t in change.sensors)
+    assert all(t.level in kinds(AirTerm, "level") for t in change.air)
 
 
 @pytest.mark.parametrize("key", ALL)
@@ -117,12 +125,8 @@ def test_effects_compose(key):
     assert change + Change() == change == Change() + change
     both = effective(change + DELAY)
     assert both.surface == change.surface + DELAY.surface
-    assert (both.aero, both.declared, both.sensors, both.air) == (
-        change.aero,
-        change.declared,
-        change.sensors,
-        change.air,
-    )
+    for field in ("aero", "declared", "derivatives", "sensors", "air"):
+        assert getattr(both, field) == getattr(change, field)
 
 
 def test_a_written_aircraft_without_a_change_flies_the_same_bits(gtm, paper_condition, tmp_path):
@@ -156,7 +160,8 @@ def test_written_effect_grows_from_nothing_and_composes(gtm, paper_condition, pl
     effect = EFFECTS[key]
 
     def fly(change, name):
-        return flights.fly(flights.changed(gtm, change, tmp_path / name), paper_condition)[1]
+        plane = flights.changed(gtm, change, tmp_path / name, paper_condition)
+        return flights.fly(plane, paper_condition)[1]
 
     material = fly(effect.change(values(effect, 3.0)), "material")
     seen = distance(material, plain)
@@ -172,8 +177,9 @@ def test_sensor_effect_shows_in_its_channel_alone(plain, key):
     effect = EFFECTS[key]
     truth = {name: channel[None] for name, channel in plain.items()}
     terms = effect.change(values(effect, 3.0)).sensors
+    errors = {name: sensor.errors() for name, sensor in fitted({}, terms).items()}
     before = measure.log_channels(truth, {}, {}, 1 / 200, 4)
-    after = measure.log_channels(truth, fitted({}, terms), {}, 1 / 200, 4)
+    after = measure.log_channels(truth, errors, {}, 1 / 200, 4)
     moved = {name for name in before if not np.array_equal(before[name], after[name])}
     assert moved == {t.channel for t in terms}
 

@@ -10,8 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from airtruth.errors import ConfigurationError
-from airtruth.fly import plan
 from airtruth.logs import store
+from airtruth.simulation.campaign import plan
+
+pytestmark = pytest.mark.slow
 
 LATE = {"name": "elevator_delay", "delay_ms": 60}
 QUIET = {"gust": {"level": "none"}, "sensors": {"ideal": True}, "runs": 1}

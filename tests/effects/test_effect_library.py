@@ -7,7 +7,7 @@ from importlib.metadata import EntryPoint
 import fly_campaigns as campaigns
 import pytest
 
-from airtruth.effects import library
+from airtruth.effects import registry as library
 from airtruth.errors import ConfigurationError
 
 CONTRACT = {
@@ -21,6 +21,12 @@ CONTRACT = {
     "cl_alpha_nonlinear": ["dCLalpha", "at_alpha_rad", "CLalpha2"],
     "downwash_lag": ["Cmalphadot"],
     "thrust_moment": ["arm_m"],
+    "tail_effectiveness": ["factor"],
+    "wing_effectiveness": ["factor"],
+    "dynamic_pressure": ["factor"],
+    "aerodynamic_center": ["dx_mac"],
+    "icing": ["severity"],
+    "derivatives": ["dCLalpha", "dCLq", "dCLde", "dCmalpha", "dCmq", "dCmde"],
     "cg_shift": ["dx_mac"],
     "inertia_error": ["factor"],
     "mass_error": ["factor"],
@@ -84,15 +90,15 @@ class Brought(EntryPoint):
 
 
 def brought(thing):
-    return Brought(name="icing", value=thing, group=library.GROUP)
+    return Brought(name="ice", value=thing, group=library.GROUP)
 
 
 def test_other_packages_bring_effects():
-    icing = replace(library.OWN[0], name="icing")
-    rime = replace(icing, name="rime")
-    found = library.merged(library.OWN, [brought(icing), brought([rime])])
-    assert list(found)[-2:] == ["icing", "rime"]
-    assert found["icing"] is icing
+    frost = replace(library.OWN[0], name="frost")
+    rime = replace(frost, name="rime")
+    found = library.merged(library.OWN, [brought(frost), brought([rime])])
+    assert list(found)[-2:] == ["frost", "rime"]
+    assert found["frost"] is frost
 
 
 def test_what_other_packages_must_not_bring():
@@ -100,6 +106,12 @@ def test_what_other_packages_must_not_bring():
         library.merged(library.OWN, [brought([3])])
     with pytest.raises(ConfigurationError, match="'elevator_delay' exists already"):
         library.merged(library.OWN, [brought(library.OWN[0])])
+
+
+def test_shifts_of_derivatives_may_be_left_out():
+    effect, values = library.stated({"name": "derivatives", "dCmalpha": 0.2})
+    assert values == dict.fromkeys(CONTRACT["derivatives"], 0.0) | {"dCmalpha": 0.2}
+    assert effect.change({"dCmalpha": 0.2}) == effect.change(values)
 
 
 def test_command_lists_all_or_some():

@@ -5,13 +5,15 @@ import numpy as np
 import oracle
 import pytest
 
-from airtruth.effects.change import AeroTerm, Change, StateTerm, SurfaceTerm
-from airtruth.effects.library import EFFECTS
-from airtruth.effects.writing import Corrections
-from airtruth.fly.linearise import linearise
-from airtruth.fly.trim import trim
+from airtruth.aircraft.write import Corrections
+from airtruth.effects.registry import EFFECTS
 from airtruth.physics import sensors
+from airtruth.physics.terms import AeroTerm, Change, StateTerm, SurfaceTerm
+from airtruth.simulation.linearise import linearise
+from airtruth.simulation.trim import trim
 from airtruth.units import DEG
+
+pytestmark = pytest.mark.slow
 
 HZ = 200.0
 

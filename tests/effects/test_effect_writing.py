@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from airtruth import aircraft
-from airtruth.effects import toml_text, writing
-from airtruth.effects.change import AeroTerm, Change, DeclaredTerm, SurfaceTerm
-from airtruth.effects.library import EFFECTS
+from airtruth.aircraft import toml as toml_text
+from airtruth.aircraft import write as writing
+from airtruth.effects.registry import EFFECTS
 from airtruth.errors import AircraftError, ConfigurationError, StoreError
-from airtruth.fly.engine import Condition
-from airtruth.fly.linearise import linearise
-from airtruth.fly.trim import trim
+from airtruth.physics.terms import AeroTerm, Change, DeclaredTerm, SurfaceTerm
+from airtruth.simulation.linearise import linearise
+from airtruth.simulation.simulator import Condition
+from airtruth.simulation.trim import trim
 from airtruth.units import DEG, FT, KT
 
 FOREIGN = {

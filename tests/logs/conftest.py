@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from airtruth.channels import SIGNALS
 from airtruth.logs.flight_log import FlightLog
-from airtruth.signals import SIGNALS
 
 
 @pytest.fixture

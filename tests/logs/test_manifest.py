@@ -61,3 +61,38 @@ def test_unwritable_folder(tmp_path: Path) -> None:
         manifest.append(tmp_path / "nowhere" / "m.jsonl", {})
     with pytest.raises(StoreError, match="cannot be read"):
         manifest.read(tmp_path)
+
+
+@pytest.mark.parametrize(("count", "more"), [(5, ""), (6, "; and 1 more"), (8, "; and 3 more")])
+def test_many_damaged_lines_are_counted(tmp_path: Path, count: int, more: str) -> None:
+    path = tmp_path / "m.jsonl"
+    path.write_bytes(b"x\n" * count)
+    with pytest.raises(StoreError) as error:
+        manifest.read(path)
+    message = str(error.value)
+    assert message.count("is not JSON (") == 5
+    assert f"{more}. An interrupted write damages only the last line" in message
+    assert ("more" in message) == bool(more)
+
+
+def test_a_number_that_is_not_finite_is_refused(tmp_path: Path) -> None:
+    """JSON has no NaN, and other programs read the manifest."""
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        manifest.append(tmp_path / "m.jsonl", {"x": float("nan")})
+    assert not (tmp_path / "m.jsonl").exists()
+
+
+def test_an_empty_first_line_is_kept_by_append(tmp_path: Path) -> None:
+    path = tmp_path / "m.jsonl"
+    path.write_bytes(b"\ntorn")
+    manifest.append(path, {"a": 1})
+    assert path.read_bytes() == b'\n{"a": 1}\n'
+
+
+def test_a_new_manifest_is_an_entry_on_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The folder is flushed once, when the file appears: otherwise a power cut could lose the file as a whole."""
+    flushed: list[Path] = []
+    monkeypatch.setattr(manifest, "sync_folder", flushed.append)
+    manifest.append(tmp_path / "m.jsonl", {})
+    manifest.append(tmp_path / "m.jsonl", {})
+    assert flushed == [tmp_path]

@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,11 +17,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from airtruth.channels import SIGNALS
 from airtruth.errors import LogError, StoreError
 from airtruth.logs import atomic, store
 from airtruth.logs.flight_log import FlightLog
+from airtruth.logs.tables import readable
 from airtruth.logs.validate import validate
-from airtruth.signals import SIGNALS
 
 
 def test_float64_round_trip_is_exact(log: FlightLog, tmp_path: Path) -> None:
@@ -165,7 +167,11 @@ def test_what_is_not_a_log_is_named(tmp_path: Path, columns: dict[str, object], 
 
 @pytest.mark.parametrize(
     ("document", "message"),
-    [(b"{", "malformed"), (b"[1]", "not an object"), (b'{"schema": 2}', "log schema 2 is not known")],
+    [
+        (b"{", "malformed"),
+        (b"[1]", "not an object"),
+        (b'{"schema": 2}', "log schema 2, but this version reads schema 1"),
+    ],
 )
 def test_bad_metadata(tmp_path: Path, document: bytes, message: str) -> None:
     path = tmp_path / "odd.parquet"
@@ -198,6 +204,71 @@ def test_truncated_and_damaged_files(log: FlightLog, tmp_path: Path) -> None:
         store.read_log(path)
     with pytest.raises(StoreError, match="no such file"):
         store.read_log(tmp_path / "absent.parquet")
+
+
+def test_a_column_that_occurs_twice_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "odd.parquet"
+    columns = [pa.array(["a"]), pa.array([0.0]), pa.array([1.0]), pa.array([2.0])]
+    pq.write_table(pa.Table.from_arrays(columns, names=["run_id", "t_s", "q_rad_s", "q_rad_s"]), path)
+    with pytest.raises(StoreError, match=r"odd\.parquet: column 'q_rad_s' occurs more than once"):
+        store.read_log(path)
+
+
+@pytest.mark.parametrize("read", [store.read_log, store.read_table])
+def test_a_column_name_that_is_not_utf8_is_an_error(tmp_path: Path, read: Callable[[Path], object]) -> None:
+    path = tmp_path / "odd.parquet"
+    table = pa.table({"run_id": ["a"], "t_s": [0.0], "zzzz": [1.0]})
+    pq.write_table(table, path, store_schema=False)
+    path.write_bytes(path.read_bytes().replace(b"zzzz", b"\xff\xfezz"))
+    with pytest.raises(StoreError, match=r"odd\.parquet: a column name or text is not UTF-8"):
+        read(path)
+
+
+@pytest.mark.parametrize(
+    "metadata",
+    [b"{", b"[]", b'{"columns": 3}', b'{"index_columns": [], "columns": [{"name": 7}]}', b"\xff"],
+)
+def test_damaged_pandas_metadata_are_an_error_or_ignored(tmp_path: Path, metadata: bytes) -> None:
+    path = tmp_path / "odd.parquet"
+    pq.write_table(pa.table({"x": [1.0]}).replace_schema_metadata({b"pandas": metadata}), path)
+    with pytest.raises(StoreError, match=r"odd\.parquet: (the pandas metadata|a column name or text)"):
+        store.read_table(path)
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (OSError(errno.EMFILE, "Too many open files"), "too many files are open: raise the limit"),
+        (
+            pa.ArrowException("Failed to launch worker thread: busy"),
+            "no thread can be started: raise the limits",
+        ),
+        (pa.ArrowException(""), r"truncated or damaged \(ArrowException\)"),
+    ],
+)
+def test_limits_of_the_system_are_no_damage(tmp_path: Path, error: Exception, words: str) -> None:
+    with pytest.raises(StoreError, match=rf"log\.parquet: .*{words}"), readable(tmp_path / "log.parquet"):
+        raise error
+
+
+def test_a_name_that_is_not_utf8(log: FlightLog, tmp_path: Path) -> None:
+    path = tmp_path / "gr\udcf6\udcdfe.parquet"
+    store.write_log(tmp_path / "log.parquet", log)
+    (tmp_path / "log.parquet").rename(path)
+    assert store.read_log(path).run_ids == log.run_ids
+    assert store.read_metadata(path)["aircraft"] == "gtm"
+
+
+@pytest.mark.parametrize(("read", "runs"), [("read_log", None), ("read_log", ["a"]), ("read_table", None)])
+def test_more_rows_than_memory_are_refused_before_they_are_read(
+    log: FlightLog, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, read: str, runs: list[str] | None
+) -> None:
+    store.write_log(tmp_path / "log.parquet", log)
+    monkeypatch.setattr("airtruth.logs.tables.BYTES_PER_VALUE", 1e14)
+    with pytest.raises(
+        StoreError, match=r"log\.parquet: declares \d+ rows, which need .* GB .*; write it again"
+    ):
+        getattr(store, read)(tmp_path / "log.parquet", None, *([runs] if runs else []))
 
 
 def test_places(log: FlightLog, tmp_path: Path) -> None:
@@ -261,7 +332,7 @@ def test_a_failed_write_keeps_the_old_file(
 
     monkeypatch.setattr(atomic.os, "fsync", refuse)
     with pytest.raises(
-        StoreError, match=r"log\.parquet: not written \(the file that was there is unchanged\); "
+        StoreError, match=r"log\.parquet: not written \(the existing file is unchanged\); "
     ) as caught:
         store.write_log(path, replace(log, metadata={}))
     assert {

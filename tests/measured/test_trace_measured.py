@@ -11,16 +11,15 @@ import pytest
 
 from airtruth import aircraft
 from airtruth.aircraft import Sensor
-from airtruth.logs.importers import import_log, read_mapping
+from airtruth.importers import import_log, read_mapping
 from airtruth.quantity import Quantity
-from airtruth.trace import TraceOptions
-from airtruth.trace.tracing import traced
+from airtruth.tracing import TraceOptions, trace
 
 HERE = Path(__file__).resolve().parent
 RECORDS = ("fAttasElv1", "fAttasElv2")
 ARM_M = 13.08
 
-pytestmark = pytest.mark.xdist_group("attas")
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("attas")]
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +36,7 @@ def logs(measured):
 @pytest.fixture(scope="module")
 def lacking(logs):
     """Answers where nobody declares the arm, by the record held out."""
-    return {held: traced(logs, declared(), TraceOptions(hold_out=(held,))).answer for held in RECORDS}
+    return {held: trace(logs, declared(), TraceOptions(hold_out=(held,))).to_dict() for held in RECORDS}
 
 
 def members(effect):
@@ -82,9 +81,10 @@ def test_the_arm_is_traced_and_nothing_else(lacking, held):
     assert found["CLq"] < 0.5 * answer["derivatives"]["before"]["CLq"]  # the arm no longer hides there
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("held", RECORDS)
 def test_declared_it_is_not_traced_again(logs, lacking, held):
-    answer = traced(logs, declared(ARM_M), TraceOptions(hold_out=(held,))).answer
+    answer = trace(logs, declared(ARM_M), TraceOptions(hold_out=(held,))).to_dict()
     print(answer["verdict"], answer["effects"])
     row = next(c for c in answer["candidates"] if c["name"] == "vane_arm")
     assert row["testable"]
@@ -102,8 +102,9 @@ def test_the_second_record_s_interval_holds_the_arm(lacking):
     assert low < ARM_M < high
 
 
+@pytest.mark.study
 def test_without_its_declaration_the_answer_says_that_the_model_is_linear(logs):
     one = replace(logs[0], metadata={})
-    answer = traced([one], declared(), TraceOptions(effects=("vane_arm", "cg_shift"))).answer
+    answer = trace(one, declared(), TraceOptions(effects=("vane_arm", "cg_shift"))).to_dict()
     assert answer["provisional"]
     assert any("no JSBSim model" in note for note in answer["notes"])

@@ -168,3 +168,15 @@ def test_runs_are_independent() -> None:
     together = respond(c, DT, 5.0, 3.0, -0.3, 0.3, 0.015)
     for i in range(5):
         np.testing.assert_array_equal(together[i], respond(c[i : i + 1], DT, 5.0, 3.0, -0.3, 0.3, 0.015)[0])
+
+
+@pytest.mark.parametrize("slope", [0.5, -0.5])
+def test_a_command_that_moves_exactly_at_the_rate_limit(slope: float) -> None:
+    """The error tends to the edge of the band and never leaves it: y = s (t - (1 - exp(-w t))/w), as without a limit.
+
+    dt = 1/4 s and s = 1/2 rad/s are exact in binary, so that the command's slope equals the limit to the last bit.
+    """
+    t = np.arange(20) * 0.25
+    y = respond(slope * t[None], 0.25, 0.2, rate_limit_rad_s=0.5)[0]
+    w = 2.0 * np.pi * 0.2
+    np.testing.assert_allclose(y, slope * (t + np.expm1(-w * t) / w), rtol=0, atol=1e-12)

@@ -58,14 +58,6 @@ def test_mil_at_1000_ft_is_isotropic() -> None:
     assert lw == pytest.approx(1000 * FT, rel=1e-12)
 
 
-@pytest.mark.parametrize(("level", "sigma_ft_s"), [("light", 6.7), ("moderate", 10.1), ("severe", 23.6)])
-def test_mil_high_altitude(level: str, sigma_ft_s: float) -> None:
-    """Figure 7 at 7500 ft."""
-    su, sw, lu, lw = gust_scales("mil-f-8785c", level, 7500 * FT)
-    assert su == sw == pytest.approx(sigma_ft_s * FT, rel=1e-12)
-    assert lu == lw == pytest.approx(1750 * FT, rel=1e-12)
-
-
 def test_mil_is_continuous_and_linear_between_1000_and_2000_ft() -> None:
     at = [np.array(gust_scales("mil-f-8785c", "severe", h * FT)) for h in (1000, 1500, 2000)]
     np.testing.assert_allclose(at[1], (at[0] + at[2]) / 2, rtol=1e-12)
@@ -93,3 +85,39 @@ def test_factor_scales_sigma_only() -> None:
 def test_errors_name_the_choices(figures: str, level: str, altitude_ft: float, message: str) -> None:
     with pytest.raises(ConfigurationError, match=message):
         gust_scales(figures, level, altitude_ft * FT)
+
+
+MIL_FIGURE_7 = {
+    2000.0: (6.9 + 0.125 * (7.4 - 6.9), 9.6 + 0.125 * (10.6 - 9.6), 17.6 + 0.125 * (23.0 - 17.6)),
+    3750.0: (7.4, 10.6, 23.0),
+    7500.0: (6.7, 10.1, 23.6),
+    15000.0: (4.6, 8.0, 22.1),
+    25000.0: (2.7, 6.6, 20.0),
+    35000.0: (0.4, 5.0, 16.0),
+    45000.0: (0.0, 4.2, 15.1),
+    55000.0: (0.0, 2.7, 12.1),
+    65000.0: (0.0, 0.0, 7.9),
+    75000.0: (0.0, 0.0, 6.2),
+    80000.0: (0.0, 0.0, 5.1),
+}
+"""Altitude [ft] -> sigma [ft/s] of light, moderate and severe turbulence: MIL-F-8785C, figure 7, rows 3, 4 and 6 of the
+table of exceedance as two simulators other than JSBSim print it (1750 ft: 6.9, 9.6, 17.6)."""
+
+
+@pytest.mark.parametrize("altitude_ft", MIL_FIGURE_7)
+def test_mil_medium_and_high_altitude(altitude_ft: float) -> None:
+    for level, sigma_ft_s in zip(("light", "moderate", "severe"), MIL_FIGURE_7[altitude_ft], strict=True):
+        s = gust_scales("mil-f-8785c", level, altitude_ft * FT)
+        assert s.sigma_u_m_s == s.sigma_w_m_s == pytest.approx(sigma_ft_s * FT, rel=1e-12, abs=1e-12)
+        assert s.length_u_m == s.length_w_m == pytest.approx(1750.0 * FT, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("figures", "lowest_ft", "highest_ft"), [("gtm", 800, 7000), ("mil-f-8785c", 10, 80000)]
+)
+def test_the_ends_of_a_table_belong_to_it(figures: str, lowest_ft: float, highest_ft: float) -> None:
+    for altitude_ft in (lowest_ft, highest_ft):
+        gust_scales(figures, "severe", altitude_ft * FT)
+    for altitude_ft in (lowest_ft - 1.0, highest_ft + 1.0):
+        with pytest.raises(ConfigurationError, match=f"cover {lowest_ft} to {highest_ft} ft"):
+            gust_scales(figures, "severe", altitude_ft * FT)

@@ -1,5 +1,7 @@
 """Nonlinear longitudinal motion against exact solutions, and the auxiliary model made of it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -56,6 +58,24 @@ def test_small_motion_is_the_linear_short_period():
     az = -G0 - SCALE.normal[0] * lift
     np.testing.assert_allclose(motion.az_m_s2[0], az, atol=5e-6 * np.ptp(az))
     assert (motion.airspeed_m_s == AIRSPEED).all()  # drift = 0
+
+
+def test_small_motion_about_a_climb_with_a_deflected_elevator():
+    """Elevator and flight path of the trim are neither zero nor equal. The thrust that holds the climb turns the path with
+    alpha, as a larger CLalpha would."""
+    level, elevator, gamma = planes(), -0.02, 0.03
+    values = level.tables.values.copy()
+    values[..., 0] += MASS * G0 * np.sin(gamma)
+    values[..., 1] += MASS * G0 * (1.0 - np.cos(gamma))
+    tables = replace(level.tables, elevator_rad=level.tables.elevator_rad + elevator, values=values)
+    u = 1e-6 * doublet()
+    climb = replace(level, tables=tables, elevator_rad=elevator, gamma_rad=gamma)
+    motion = simulate(climb, elevator + u[None], 0.02)
+    theta = THETA.copy()
+    theta[0] += G0 * np.sin(gamma) / (AIRSPEED * SCALE.lift[0])
+    alpha, q = exact(theta, u, 0.02)
+    np.testing.assert_allclose(motion.alpha_rad[0], alpha, atol=5e-6 * np.ptp(alpha))
+    np.testing.assert_allclose(motion.q_rad_s[0], q, atol=5e-6 * np.ptp(q))
 
 
 def test_runge_kutta_is_of_fourth_order():

@@ -10,20 +10,21 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 
 from airtruth.physics import sensors
-from airtruth.physics.sensors import SensorModel, measure
+from airtruth.physics.sensor_errors import SensorErrors
+from airtruth.physics.sensors import measure
 
 Array = NDArray[np.float64]
 DT = 0.005
 T = np.arange(1000) * DT
 
 
-def reading(model: SensorModel, truth: Array, dt: float = DT) -> Array:
+def reading(model: SensorErrors, truth: Array, dt: float = DT) -> Array:
     return measure(model, truth[None, :], dt, np.zeros((1, truth.size)))[0]
 
 
 def test_the_default_sensor_copies() -> None:
     truth = np.random.default_rng(0).standard_normal((3, 50))
-    seen = measure(SensorModel(), truth, DT, np.ones_like(truth))
+    seen = measure(SensorErrors(), truth, DT, np.ones_like(truth))
     np.testing.assert_array_equal(seen, truth)
     assert not np.shares_memory(seen, truth)
 
@@ -31,7 +32,7 @@ def test_the_default_sensor_copies() -> None:
 def test_the_truth_is_left_alone() -> None:
     truth = np.random.default_rng(0).standard_normal((3, 50))
     before = truth.copy()
-    model = SensorModel(0.1, 0.2, 1.1, 0.01, 0.007, 0.05, -1.0, 1.0, 0.02)
+    model = SensorErrors(0.1, 0.2, 1.1, 0.01, 0.007, 0.05, -1.0, 1.0, 0.02)
     measure(model, truth, DT, np.ones_like(truth))
     np.testing.assert_array_equal(truth, before)
 
@@ -39,7 +40,7 @@ def test_the_truth_is_left_alone() -> None:
 def test_scale_bias_and_noise() -> None:
     truth = np.random.default_rng(0).standard_normal((2, 50))
     normals = np.random.default_rng(1).standard_normal((2, 50))
-    seen = measure(SensorModel(noise_std=0.3, bias=-0.5, scale=1.1), truth, DT, normals)
+    seen = measure(SensorErrors(noise_std=0.3, bias=-0.5, scale=1.1), truth, DT, normals)
     np.testing.assert_allclose(seen, 1.1 * truth - 0.5 + 0.3 * normals, rtol=0, atol=1e-15)
 
 
@@ -109,20 +110,20 @@ def test_hold_between_samples_takes_the_last_one() -> None:
 
 
 def test_hold_shorter_than_a_sample_does_nothing() -> None:
-    np.testing.assert_array_equal(reading(SensorModel(hold_s=0.004), np.sin(T)), np.sin(T))
+    np.testing.assert_array_equal(reading(SensorErrors(hold_s=0.004), np.sin(T)), np.sin(T))
 
 
 @given(st.floats(1e-3, 1.0))
 def test_quantisation(quantum: float) -> None:
     x = np.linspace(-3, 3, 501)
-    y = reading(SensorModel(quantum=quantum), x)
+    y = reading(SensorErrors(quantum=quantum), x)
     assert np.abs(y - x).max() <= quantum / 2 * (1 + 1e-9)
     np.testing.assert_allclose(y / quantum, np.round(y / quantum), rtol=0, atol=1e-9)
 
 
 def test_saturation() -> None:
     np.testing.assert_array_equal(
-        reading(SensorModel(minimum=-1.0, maximum=0.5), np.array([-2.0, -1.0, 0.2, 0.9])),
+        reading(SensorErrors(minimum=-1.0, maximum=0.5), np.array([-2.0, -1.0, 0.2, 0.9])),
         [-1.0, -1.0, 0.2, 0.5],
     )
 
@@ -131,7 +132,7 @@ def test_order_of_the_steps() -> None:
     """Lag, delay, scale, bias, noise, hold, quantum, saturation, written out by hand."""
     rng = np.random.default_rng(4)
     truth, normals = np.cumsum(rng.standard_normal((2, 200)), axis=1), rng.standard_normal((2, 200))
-    model = SensorModel(
+    model = SensorErrors(
         noise_std=0.2,
         bias=0.7,
         scale=0.9,
@@ -151,7 +152,7 @@ def test_noise_statistics() -> None:
     """Standard deviation within 4 standard errors, std/sqrt(2 n), and no correlation between samples."""
     n = 200_000
     y = measure(
-        SensorModel(noise_std=0.3857), np.zeros((1, n)), DT, np.random.default_rng(0).standard_normal((1, n))
+        SensorErrors(noise_std=0.3857), np.zeros((1, n)), DT, np.random.default_rng(0).standard_normal((1, n))
     )
     assert y.std() == pytest.approx(0.3857, rel=4 / np.sqrt(2 * n))
     assert abs(np.corrcoef(y[0, 1:], y[0, :-1])[0, 1]) < 4 / np.sqrt(n)
@@ -213,3 +214,41 @@ def test_lag_against_the_convolution_integral() -> None:
         return float(total)
 
     np.testing.assert_allclose(sensors.lag(x, DT, tau), [exact(i) for i in range(6)], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("x", "z"), [(0.0, 0.0), (2.0, 0.0), (0.0, -1.5), (2.0, -1.5), (-2.0, 1.5)])
+def test_each_channel_is_moved_to_its_instrument(x: float, z: float) -> None:
+    """Rigid-body kinematics written out: alpha - q x/V, az - q_dot x - q^2 z, ax + q_dot z - q^2 x."""
+    rng = np.random.default_rng(5)
+    names = ("airspeed_m_s", "alpha_rad", "theta_rad", "q_rad_s", "q_dot_rad_s2", "ax_m_s2", "az_m_s2")
+    truth = {name: rng.standard_normal((2, 7)) + 3.0 for name in names}
+    v, alpha, _, q, q_dot, ax, az = truth.values()
+    expected = truth | {
+        "alpha_rad": alpha - q * x / v,
+        "ax_m_s2": ax + q_dot * z - q**2 * x,
+        "az_m_s2": az - q_dot * x - q**2 * z,
+    }
+    for name in ("airspeed_m_s", "alpha_rad", "theta_rad", "q_rad_s", "ax_m_s2", "az_m_s2"):
+        moved = sensors.at_instrument(name, truth, SensorErrors(x_m=x, z_m=z))
+        np.testing.assert_allclose(moved, expected[name], rtol=1e-14)
+
+
+def test_an_instrument_at_the_centre_of_gravity_needs_no_rates() -> None:
+    truth = {"alpha_rad": np.zeros((1, 3))}
+    assert sensors.at_instrument("alpha_rad", truth, SensorErrors()) is truth["alpha_rad"]
+
+
+def test_an_accelerometer_on_the_x_axis_needs_no_pitch_rate() -> None:
+    assert sensors.accelerometer_az(-9.0, 2.0, 0.5) == pytest.approx(-10.0, abs=1e-15)
+    assert sensors.accelerometer_az(-9.0, 2.0, 0.5, 3.0) == pytest.approx(-10.0, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("errors", "expected"),
+    [
+        (SensorErrors(minimum=-1.0), [-1.0, 0.2, 0.9]),
+        (SensorErrors(maximum=0.5), [-2.0, 0.2, 0.5]),
+    ],
+)
+def test_one_end_of_a_range_may_be_open(errors: SensorErrors, expected: list[float]) -> None:
+    np.testing.assert_array_equal(reading(errors, np.array([-2.0, 0.2, 0.9])), expected)

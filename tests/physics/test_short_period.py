@@ -95,3 +95,32 @@ def test_divergence_has_no_frequency() -> None:
     wn, zeta = short_period.modal(unstable, GTM)
     assert np.isnan(wn)
     assert np.isnan(zeta)
+
+
+def test_a_motion_without_stiffness_has_no_frequency() -> None:
+    """All derivatives zero: A = [[0, 1], [0, 0]], det(A) = 0, the limit between oscillation and divergence."""
+    wn, zeta = short_period.modal(np.zeros(6), GTM)
+    assert np.isnan(wn)
+    assert np.isnan(zeta)
+
+
+def test_indices_are_the_positions_of_the_names() -> None:
+    indices = {
+        "CLalpha": short_period.CL_ALPHA,
+        "CLq": short_period.CL_Q,
+        "CLde": short_period.CL_DE,
+        "Cmalpha": short_period.CM_ALPHA,
+        "Cmq": short_period.CM_Q,
+        "Cmde": short_period.CM_DE,
+    }
+    assert {name: short_period.PARAMETERS[i] for name, i in indices.items()} == dict(
+        zip(short_period.PARAMETERS, short_period.PARAMETERS, strict=True)
+    )
+
+
+def test_derivatives_of_many_runs_are_those_of_each() -> None:
+    """Matrices of four aircraft at once: the derivatives of each in a row of its own."""
+    theta = TRUTH * np.linspace(0.7, 1.3, 4)[:, None]
+    s = short_period.scale(S, C, M, I, np.full(4, V), np.full(4, 2 * Q_BAR / V**2))
+    a, b = short_period.system(theta, s)
+    np.testing.assert_allclose(short_period.derivatives(a, b, s), theta, rtol=1e-12)

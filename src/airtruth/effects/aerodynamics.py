@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Final
+from typing import Final, Literal
 
-from airtruth.effects.change import AeroTerm, Change, StateTerm
 from airtruth.effects.effect import Effect, Parameter
+from airtruth.physics.terms import AeroTerm, Change, StateTerm
 
 Values = Mapping[str, float]
 
 _UNSTEADY: Final = "Etkin and Reid, Dynamics of Flight, 3rd ed., 1996, ch. 5"
+"""Source of the terms in alpha_dot."""
 
 
 def _asymmetry(values: Values) -> Change:
@@ -68,33 +69,27 @@ _AT_ALPHA: Final = Parameter(
     low=-0.1,
     high=0.3,
     material=0.0,
-    place=True,
+    is_location=True,
     step=5e-3,
 )
+"""Break of a slope: from below zero lift to the stall of a wing of moderate aspect ratio (judgement)."""
 
 
-def _slope(name: str, meaning: str, reach: float, material: float, step: float) -> Parameter:
-    return Parameter(
-        name,
-        "-",
-        meaning,
-        low=-reach,
-        high=reach,
-        material=material,
-        prior_std=reach / 2.0,
-        step=step,
-    )
+def _slope(
+    name: str, meaning: str, reach: float, material: float, step: float, sign: Literal[-1, 0, 1] = 0
+) -> Parameter:
+    return Parameter(name, "-", meaning, low=-reach, high=reach, material=material, step=step, sign=sign)
 
 
 EFFECTS: Final = (
     Effect(
         name="elevator_asymmetry",
         where="dynamics",
-        parameters=(_slope("dCmde", "change of Cmde below zero deflection [1/rad]", 1.5, 0.05, 0.05),),
+        parameters=(_slope("dCmde", "change of Cmde at deflections below zero [1/rad]", 1.5, 0.05, 0.05),),
         describe=_asymmetry,
-        explanation="The elevator is more or less effective trailing edge up than down.",
+        explanation="The effectiveness of the elevator differs between trailing edge up and trailing edge down.",
         source="Cm += dCmde min(0, elevator). Material: 3 % of the GTM's Cmde of -1.8.",
-        splits="Manoeuvres in both signs.",
+        distinguished_by="Manoeuvres in both signs.",
     ),
     Effect(
         name="cm_alpha_nonlinear",
@@ -105,20 +100,21 @@ EFFECTS: Final = (
             _AT_ALPHA,
         ),
         describe=_cm_break,
-        explanation="Pitch stiffness changes at an angle of attack: separation, or a tail that leaves the wake.",
+        explanation="Pitch stiffness changes at an angle of attack: the flow separates, or the tail leaves the wake of "
+        "the wing.",
         source="Cm += dCmalpha max(0, alpha - at). Material: 6 % of the GTM's Cmalpha of -1.8.",
-        splits="Larger amplitudes tell a break from a curve; records on both sides of the break place it.",
+        distinguished_by="Larger amplitudes distinguish a break from a curve; records on both sides locate the break.",
     ),
     Effect(
         name="cm_alpha_nonlinear",
         variant="quadratic",
         where="dynamics",
-        parameters=(_slope("Cmalpha2", "curvature of Cm in alpha [1/rad2]", 20.0, 0.5, 0.5),),
+        parameters=(_slope("Cmalpha2", "curvature of Cm over alpha [1/rad2]", 20.0, 0.5, 0.5),),
         describe=_cm_quadratic,
-        explanation="Pitch stiffness changes gradually with angle of attack.",
-        source="Cm += Cmalpha2 alpha^2; about the trim its linear part is one of Cmalpha. Material: Cmalpha changes by "
-        "0.1 over 0.1 rad.",
-        splits="Two amplitudes, or two trims.",
+        explanation="Pitch stiffness changes gradually with the angle of attack.",
+        source="Cm += Cmalpha2 alpha^2; near a trim its linear part adds to Cmalpha. Material: Cmalpha changes by 0.1 "
+        "over 0.1 rad.",
+        distinguished_by="Two amplitudes, or two trims.",
     ),
     Effect(
         name="cl_alpha_nonlinear",
@@ -129,64 +125,75 @@ EFFECTS: Final = (
             _AT_ALPHA,
         ),
         describe=_cl_break,
-        explanation="The lift slope changes at an angle of attack: separation.",
-        source="CL += dCLalpha max(0, alpha - at), force along -z of the body through the CG. Material: 5 % of a "
-        "lift slope of 5.",
-        splits="A normal accelerometer, and records on both sides of the break.",
+        explanation="The lift slope changes at an angle of attack: the flow separates.",
+        source="CL += dCLalpha max(0, alpha - at), a force along -z of the body through the CG. Material: 5 % of a lift "
+        "slope of 5.",
+        distinguished_by="A normal accelerometer, and records on both sides of the break.",
     ),
     Effect(
         name="cl_alpha_nonlinear",
         variant="quadratic",
         where="dynamics",
-        parameters=(_slope("CLalpha2", "curvature of CL in alpha [1/rad2]", 40.0, 1.25, 1.0),),
+        parameters=(_slope("CLalpha2", "curvature of CL over alpha [1/rad2]", 40.0, 1.25, 1.0),),
         describe=_cl_quadratic,
-        explanation="The lift slope changes gradually with angle of attack.",
-        source="CL += CLalpha2 alpha^2, force along -z of the body through the CG. Material: CLalpha changes by 0.25 "
+        explanation="The lift slope changes gradually with the angle of attack.",
+        source="CL += CLalpha2 alpha^2, a force along -z of the body through the CG. Material: CLalpha changes by 0.25 "
         "over 0.1 rad.",
-        splits="A normal accelerometer, two amplitudes or two trims.",
+        distinguished_by="A normal accelerometer, and two amplitudes or two trims.",
     ),
     Effect(
         name="downwash_lag",
         where="dynamics",
         parameters=(
-            _slope("Cmalphadot", "moment per alpha_dot c/(2V), inertial alpha_dot [-]", 40.0, 2.5, 1.0),
+            _slope(
+                "Cmalphadot", "moment per alpha_dot c/(2V), alpha_dot over ground [-]", 40.0, 2.5, 1.0, -1
+            ),
         ),
         describe=_downwash,
-        explanation="The tail meets the downwash that left the wing l/V earlier, so Cm has a term in alpha_dot.",
+        explanation="The downwash at the tail left the wing a time l/V earlier, so that Cm depends on alpha_dot.",
         source=f"Cm += Cmalphadot alpha_dot c/(2V); {_UNSTEADY} (Cm alpha_dot by downwash lag). Material: 6 % of the "
         "GTM's Cmq of -41.",
-        splits="Nearly one with Cmq in a single manoeuvre; motions in which alpha_dot and q differ (pull-up, roller "
-        "coaster, gusts, slow climb and push) tell them apart.",
+        distinguished_by="In a single manoeuvre it is nearly collinear with Cmq. Motions in which alpha_dot and q differ "
+        "(pull-up, roller coaster, gusts, slow climb and push) separate the two.",
     ),
     Effect(
         name="lift_alpha_dot",
         where="dynamics",
         parameters=(
-            _slope("CLalphadot", "lift per alpha_dot c/(2V), inertial alpha_dot [-]", 20.0, 2.0, 0.5),
+            _slope("CLalphadot", "lift per alpha_dot c/(2V), alpha_dot over ground [-]", 20.0, 2.0, 0.5, 1),
         ),
         describe=_plunge_lift,
-        explanation="Lift has a term in alpha_dot: the tail's late downwash, and the air that the wing must accelerate.",
-        source=f"CL += CLalphadot alpha_dot c/(2V), force along -z of the body through the CG; {_UNSTEADY}.",
-        splits="A normal accelerometer at a known place, high frequencies.",
+        explanation="Lift depends on alpha_dot: the downwash reaches the tail late, and the wing accelerates air.",
+        source=f"CL += CLalphadot alpha_dot c/(2V), a force along -z of the body through the CG; {_UNSTEADY}.",
+        distinguished_by="A normal accelerometer at a surveyed position, and high frequencies.",
     ),
     Effect(
         name="lift_lag",
         where="dynamics",
         parameters=(
-            _slope("dCLalpha", "share of the lift slope that comes late [1/rad]", 3.0, 0.25, 0.1),
-            Parameter("tau_s", "s", "time constant", low=0.02, high=1.0, material=0.0, place=True, step=0.01),
+            _slope("dCLalpha", "lagging part of the lift slope [1/rad]", 3.0, 0.25, 0.1, 1),
+            Parameter(
+                "tau_s",
+                "s",
+                "time constant",
+                low=0.02,
+                high=1.0,
+                material=0.0,
+                is_location=True,
+                step=0.01,
+            ),
         ),
         describe=_lift_lag,
-        explanation="A share of the lift follows the angle of attack with a first-order lag (separation, wake).",
+        explanation="Part of the lift follows the angle of attack with a first-order lag (wake, separation).",
         source="CL += dCLalpha (x - alpha), tau x' = alpha - x: the one-term indicial response; Klein and Morelli, "
         "Aircraft System Identification, 2006, ch. 4 (unsteady aerodynamics).",
-        splits="A normal accelerometer and a wide band of frequencies.",
+        distinguished_by="A normal accelerometer, and a wide band of frequencies.",
     ),
     Effect(
         name="elastic_mode",
         where="dynamics",
         parameters=(
-            _slope("dCmalpha", "share of Cmalpha that passes through the mode [1/rad]", 2.0, 0.1, 0.05),
+            _slope("dCmalpha", "part of Cmalpha that acts through the mode [1/rad]", 2.0, 0.1, 0.05),
             Parameter(
                 "frequency_hz",
                 "hz",
@@ -194,19 +201,26 @@ EFFECTS: Final = (
                 low=0.5,
                 high=15.0,
                 material=0.0,
-                place=True,
+                is_location=True,
                 step=0.05,
             ),
             Parameter(
-                "damping", "-", "damping ratio", low=0.01, high=0.5, material=0.0, place=True, step=0.01
+                "damping",
+                "-",
+                "damping ratio",
+                low=0.01,
+                high=0.5,
+                material=0.0,
+                is_location=True,
+                step=0.01,
             ),
         ),
         describe=_elastic_mode,
-        explanation="A share of the pitching moment passes through a lightly damped mode: bending of the fuselage, or "
-        "a liquid that sloshes.",
-        source="Cm += dCmalpha (x - alpha), x'' + 2 zeta wn x' + wn^2 x = wn^2 alpha: a mode driven by the load, "
+        explanation="Part of the pitching moment acts through a lightly damped mode: bending of the fuselage, or a "
+        "liquid that sloshes.",
+        source="Cm += dCmalpha (x - alpha), x'' + 2 zeta wn x' + wn^2 x = wn^2 alpha: a mode driven by the load, its "
         "quasi-steady part in Cmalpha.",
-        splits="A sweep or multisine through its frequency.",
+        distinguished_by="A sweep or multisine through its frequency.",
     ),
 )
-"""Effects of this family."""
+"""Effects of this module."""

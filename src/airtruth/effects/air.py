@@ -1,12 +1,12 @@
-"""Effects in the air: gusts of another level than declared."""
+"""Effects in the air: gusts of another level than declared; a module of its own, as the aircraft has no part in them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Final
 
-from airtruth.effects.change import AirTerm, Change
 from airtruth.effects.effect import Effect, Parameter
+from airtruth.physics.terms import AirTerm, Change
 
 Values = Mapping[str, float]
 
@@ -20,17 +20,7 @@ def _level(values: Values) -> Change:
 
 
 def _factor(meaning: str, material: float) -> Parameter:
-    return Parameter(
-        "factor",
-        "-",
-        meaning,
-        low=0.0,
-        high=5.0,
-        material=material,
-        neutral=1.0,
-        prior_std=1.0,
-        step=0.05,
-    )
+    return Parameter("factor", "-", meaning, low=0.0, high=5.0, material=material, neutral=1.0, step=0.05)
 
 
 EFFECTS: Final = (
@@ -41,16 +31,16 @@ EFFECTS: Final = (
         describe=_horizontal,
         explanation="Horizontal gusts are stronger or weaker than declared.",
         source="Dryden spectra, `airtruth.physics.dryden`: sigma_u times factor.",
-        splits="Airspeed and ax.",
+        distinguished_by="Airspeed and ax.",
     ),
     Effect(
         name="gust_level",
         where="air",
-        parameters=(_factor("on the standard deviations of both gusts", 0.3),),
+        parameters=(_factor("on the standard deviations of both gust components", 0.3),),
         describe=_level,
         explanation="The air is rougher or smoother than declared.",
         source="Dryden spectra, `airtruth.physics.dryden`: sigma_u and sigma_w times factor.",
-        splits="Longer records; it changes the scatter of the residuals and not their mean.",
+        distinguished_by="Longer records: it changes the scatter of the residuals and not their mean.",
     ),
 )
-"""Effects of this family."""
+"""Effects of this module."""

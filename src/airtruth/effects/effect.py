@@ -1,4 +1,4 @@
-"""An effect: its name, its parameters, and what it changes at given values."""
+"""An effect: its name, its parameters, and the terms that it changes at given values."""
 
 from __future__ import annotations
 
@@ -7,29 +7,33 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from airtruth.effects.change import Change
 from airtruth.errors import ConfigurationError, choices
+from airtruth.physics.terms import Change
 from airtruth.units import UNITS
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of an effect.
+    """One parameter of an effect: its size, or a location at which it acts.
 
     Attributes
     ----------
-    name, unit, meaning : ``name`` ends in its unit where it has one; a unit is a key of `airtruth.units.UNITS`,
+    name, unit, meaning : ``name`` ends in its unit if it has one; a unit is a key of `airtruth.units.UNITS`,
         "-" for none.
     low, high : plausible range [unit].
-    material : smallest distance from neutral that matters, in the coordinate `size` [see there].
-    neutral : value at which the effect changes nothing; infinite for a reciprocal coordinate. A place
-        (where something happens, rather than how much) has none that counts.
-    reciprocal : the size is 1/value (a bandwidth, a rate limit) rather than value - neutral.
-    time_constant : with ``reciprocal``: the size is 1/(2 pi value), a bandwidth in Hz as a time constant [s].
-    place : the parameter is a place: it cannot be seen while the effect's size is zero.
-    one_sided : sizes below zero mean nothing.
-    prior_std : standard deviation of the size before any data, None for none.
-    step : size of a step for differences about neutral; for an effect that begins non-smoothly, a finite one.
+    material : smallest `size` that matters to a user; see the effect's source for the reason.
+    neutral : value at which the effect changes nothing; infinite for a reciprocal parameter. A location has none.
+    reciprocal : whether the size is 1/value (a bandwidth, a rate limit) instead of value - neutral.
+    time_constant : with ``reciprocal``: the size is 1/(2 pi value), the time constant [s] of a bandwidth in Hz.
+    is_location : whether it is a location (an angle of attack, a frequency): it has no influence while the size of the
+        effect is zero.
+    one_sided : whether sizes below zero have no meaning.
+    step : size of a step for differences about neutral; a finite one where the effect sets in abruptly.
+    default : value where a file or a caller states none; None where it has to be stated.
+    sign : sign of the size of every real aircraft, 0 where both occur. A campaign may fly the other; a trace does not
+        accept it.
+    spans : largest size in wing spans of a real aircraft; a trace accepts no larger one.
+    prior_std : standard deviation of a normal prior of the size about zero; infinite for none.
     """
 
     name: str
@@ -41,14 +45,17 @@ class Parameter:
     neutral: float = 0.0
     reciprocal: bool = False
     time_constant: bool = False
-    place: bool = False
+    is_location: bool = False
     one_sided: bool = False
-    prior_std: float | None = None
     step: float = 1e-4
+    default: float | None = None
+    sign: Literal[-1, 0, 1] = 0
+    spans: float = math.inf
+    prior_std: float = math.inf
 
     @property
     def is_limit(self) -> bool:
-        """Whether nothing happens until the value is low enough: the size zero has no slope to begin with."""
+        """Whether nothing happens until the value is low enough, so that the slope at size zero vanishes."""
         return self.reciprocal and not self.time_constant
 
     @property
@@ -59,29 +66,51 @@ class Parameter:
 
     @property
     def reach(self) -> tuple[float, float]:
-        """Plausible sizes, and none: a reciprocal may vanish, and one-sided sizes begin at zero."""
+        """Range of plausible sizes; that of a reciprocal or one-sided parameter begins at zero."""
         low, high = self.ends
         return (0.0 if self.reciprocal else max(low, 0.0) if self.one_sided else low), high
 
     def size(self, value: float) -> float:
-        """Coordinate that is zero at neutral and in which the effect grows smoothly."""
+        """Coordinate that is zero at neutral and in which the effect grows smoothly.
+
+        Examples
+        --------
+        >>> Parameter("factor", "-", "on the mass", 0.7, 1.4, 0.02, neutral=1.0).size(1.25)
+        0.25
+        """
         if not self.reciprocal:
-            return value - (0.0 if self.place else self.neutral)
+            return value - (0.0 if self.is_location else self.neutral)
         return 1.0 / (value * (2.0 * math.pi if self.time_constant else 1.0))
 
+    def value(self, size: float) -> float:
+        """Inverse of `size`.
+
+        Examples
+        --------
+        >>> Parameter("rate_rad_s", "rad_s", "limit", 0.1, 20.0, 0.5, math.inf, reciprocal=True).value(0.5)
+        2.0
+        """
+        if not self.reciprocal:
+            return size + (0.0 if self.is_location else self.neutral)
+        if size <= 0.0:
+            return math.inf
+        return 1.0 / (size * (2.0 * math.pi if self.time_constant else 1.0))
+
     def spellings(self) -> dict[str, float]:
-        """Keys by which a file may state the value, and the factor of each to the parameter's unit."""
+        """Keys by which a file may state the value, with the factor of each to the parameter's unit."""
         units = next((u for u in UNITS.values() if self.unit in u), {})
         stem = self.name.removesuffix(f"_{self.unit}")
         return {self.name: 1.0} | {f"{stem}_{u}": f / units[self.unit] for u, f in units.items() if u}
 
-    def value(self, size: float) -> float:
-        """The inverse of `size`."""
-        if not self.reciprocal:
-            return size + (0.0 if self.place else self.neutral)
-        if size <= 0.0:
-            return math.inf
-        return 1.0 / (size * (2.0 * math.pi if self.time_constant else 1.0))
+
+def factor(meaning: str, low: float, high: float, material: float) -> Parameter:
+    """A parameter named ``factor`` that multiplies a declared quantity; one is neutral.
+
+    Parameters
+    ----------
+    meaning, low, high, material : as of `Parameter` [-].
+    """
+    return Parameter("factor", "-", meaning, low=low, high=high, material=material, neutral=1.0, step=1e-3)
 
 
 @dataclass(frozen=True)
@@ -91,14 +120,15 @@ class Effect:
     Attributes
     ----------
     name : public name; several variants (a break or a curve, one channel or another) may share it.
-    variant : which of them, "" if there is only one.
     where : "surface", "dynamics", "declared", "sensor" or "air".
-    parameters : the size comes first; places after it.
-    describe : values by name -> what changes.
-    channels : columns of the log that it needs beyond those every log has.
+    parameters : the size first, then locations; the sizes alone where there are several (`in_derivatives`).
+    describe : values by name -> the terms that the effect changes.
     explanation : one or two sentences for `airtruth effects`.
-    source : where the equation and the material size come from.
-    splits : manoeuvre or sensor that tells it from its look-alikes.
+    source : equation with its source, and the reason of the material size.
+    variant : name of the variant, "" if there is only one.
+    distinguished_by : manoeuvre or sensor that separates it from effects with a similar response, as a sentence.
+    in_derivatives : whether it changes the six derivatives alone, by an amount that depends on the aircraft at its trim
+        (`airtruth.physics.terms.DerivativeTerm`).
     """
 
     name: str
@@ -108,16 +138,26 @@ class Effect:
     explanation: str
     source: str
     variant: str = ""
-    channels: tuple[str, ...] = ()
-    splits: str = ""
+    distinguished_by: str = ""
+    in_derivatives: bool = False
 
     @property
     def key(self) -> str:
         """Unique name: NAME, or NAME:VARIANT."""
         return f"{self.name}:{self.variant}" if self.variant else self.name
 
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Columns of a log on which it acts as an error of an instrument, sorted."""
+        middle = {p.name: 0.5 * (p.low + p.high) for p in self.parameters}
+        return tuple(sorted({term.channel for term in self.describe(middle).sensors}))
+
     def change(self, values: Mapping[str, float]) -> Change:
-        """What the effect changes at these values.
+        """Return the terms that the effect changes at these values.
+
+        Parameters
+        ----------
+        values : parameter -> value [its unit].
 
         Raises
         ------
@@ -130,13 +170,17 @@ class Effect:
                 raise ConfigurationError(f"effect {self.key}: parameter {name!r}: {choices(name, names)}")
             if math.isnan(value):
                 raise ConfigurationError(f"effect {self.key}: parameter {name!r} is not a number")
-        missing = [name for name in names if name not in values]
+        filled = self._defaults() | dict(values)
+        missing = [name for name in names if name not in filled]
         if missing:
             raise ConfigurationError(f"effect {self.key}: parameter {missing[0]!r} is missing")
-        return self.describe(values)
+        return self.describe(filled)
+
+    def _defaults(self) -> dict[str, float]:
+        return {p.name: p.default for p in self.parameters if p.default is not None}
 
     def read(self, raw: Mapping[str, Any]) -> dict[str, float]:
-        """Values as a file states them, turned into the parameters' own units.
+        """Read values from a table of a file, in the parameters' own units.
 
         Parameters
         ----------
@@ -150,7 +194,7 @@ class Effect:
             the parameter's range. The neutral value is always allowed.
         """
         keys = {key: (p.name, factor) for p in self.parameters for key, factor in p.spellings().items()}
-        found: dict[str, float] = {}
+        values: dict[str, float] = {}
         for key, value in raw.items():
             if key not in keys:
                 raise ConfigurationError(
@@ -158,18 +202,24 @@ class Effect:
                 )
             name, factor = keys[key]
             if isinstance(value, bool) or not isinstance(value, int | float):
-                raise ConfigurationError(f"effect {self.key}: {key} has to be a number (found {value!r})")
-            if name in found:
+                raise ConfigurationError(f"effect {self.key}: {key} has to be a number (is {value!r})")
+            if name in values:
                 raise ConfigurationError(f"effect {self.key}: {key}: {name} is given twice")
-            found[name] = value * factor
+            values[name] = value * factor
+        if not values and self._defaults():
+            raise ConfigurationError(
+                f"effect {self.key}: every parameter is missing (each may be left out, all of them may not); write one "
+                f"of {', '.join(keys)}"
+            )
+        values = self._defaults() | values
         for p in self.parameters:
-            if p.name not in found:
+            if p.name not in values:
                 raise ConfigurationError(
                     f"effect {self.key}: {p.name} is missing ({p.meaning}); write one of {', '.join(p.spellings())}"
                 )
-            value = found[p.name]
-            if not (p.low <= value <= p.high or (value == p.neutral and not p.place)):
+            value = values[p.name]
+            if not (p.low <= value <= p.high or (value == p.neutral and not p.is_location)):
                 raise ConfigurationError(
                     f"effect {self.key}: {p.name} = {value:g} is outside its range of {p.low:g} to {p.high:g} {p.unit}"
                 )
-        return found
+        return values

@@ -12,10 +12,11 @@ from typing import Any, Final
 from airtruth.effects.effect import Effect, Parameter
 
 _WIDTH: Final = 100
+"""Width of a line of text [characters]."""
 
 
 def as_text(effects: Iterable[Effect]) -> str:
-    """One paragraph per effect: its parameters, what it is, and what tells it from its look-alikes."""
+    """One paragraph per effect: parameters, explanation, source, and the means to distinguish it from similar ones."""
     return "\n\n".join(_paragraph(effect) for effect in effects)
 
 
@@ -27,7 +28,12 @@ def as_json(effects: Iterable[Effect]) -> str:
 def _paragraph(effect: Effect) -> str:
     lines = [f"{effect.key}  ({effect.where})"]
     lines += [f"  {_parameter(p)}" for p in effect.parameters]
-    for label, text in (("", effect.explanation), ("source: ", effect.source), ("splits: ", effect.splits)):
+    paragraphs = (
+        ("", effect.explanation),
+        ("source: ", effect.source),
+        ("distinguished by: ", effect.distinguished_by),
+    )
+    for label, text in paragraphs:
         if text:
             lines += textwrap.wrap(label + text, _WIDTH, initial_indent="  ", subsequent_indent="  ")
     return "\n".join(lines)
@@ -36,15 +42,19 @@ def _paragraph(effect: Effect) -> str:
 def _parameter(p: Parameter) -> str:
     unit = "" if p.unit == "-" else f" {p.unit}"
     parts = [f"{p.low:g} to {p.high:g}{unit}"]
-    if p.place:
-        parts.append("a place")
-    else:
+    if not p.is_location:
         parts += [f"neutral {p.neutral:g}", f"matters from {_material(p)}"]
+    if p.sign:
+        parts.append(f"{'above' if p.sign > 0 else 'below'} zero on every real aircraft")
+    if math.isfinite(p.spans):
+        parts.append(f"at most {p.spans:g} wing spans on a real aircraft")
+    if p.default is not None:
+        parts.append(f"{p.default:g} if omitted")
     return f"{p.name}: {p.meaning}; {', '.join(parts)}"
 
 
 def _material(p: Parameter) -> str:
-    """The smallest material value as people state it: below a limit, or away from neutral."""
+    """The smallest material value in the parameter's unit: below a limit, or away from neutral."""
     unit = "" if p.unit == "-" else f" {p.unit}"
     if p.reciprocal:
         return f"{p.value(p.material):.3g}{unit} down"
@@ -57,6 +67,7 @@ def _entry(effect: Effect) -> dict[str, Any]:
         "name": effect.name,
         "variant": effect.variant,
         "where": effect.where,
+        "in_derivatives": effect.in_derivatives,
         "parameters": [
             {k: None if isinstance(v, float) and math.isinf(v) else v for k, v in asdict(p).items()}
             for p in effect.parameters
@@ -64,5 +75,5 @@ def _entry(effect: Effect) -> dict[str, Any]:
         "channels": list(effect.channels),
         "explanation": effect.explanation,
         "source": effect.source,
-        "splits": effect.splits,
+        "distinguished_by": effect.distinguished_by,
     }

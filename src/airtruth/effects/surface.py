@@ -1,4 +1,4 @@
-"""Effects between the measured elevator surface and the surface that the air sees."""
+"""Effects between the measured elevator surface and the surface that causes the forces."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
-from airtruth.effects.change import Change, SurfaceTerm
 from airtruth.effects.effect import Effect, Parameter
+from airtruth.physics.terms import Change, SurfaceTerm
 from airtruth.units import DEG
 
 Values = Mapping[str, float]
@@ -39,21 +39,20 @@ EFFECTS: Final = (
             Parameter(
                 "delay_s",
                 "s",
-                "time from the measured surface to the forces it causes",
+                "time from the measured deflection to the forces that it causes",
                 low=0.0,
                 high=0.2,
                 material=0.002,
                 one_sided=True,
-                prior_std=0.05,
                 step=1e-3,
             ),
         ),
         describe=_delay,
-        explanation="The air sees the surface later than it is measured: a time stamp, a bus, or a position "
+        explanation="The forces follow the measured surface with a delay: a wrong time stamp, a data bus, or a position "
         "transducer ahead of the linkage.",
         source="y(t) = x(t - delay). Material: 2 ms, a tenth of a sample at 50 Hz and 2 deg of phase at 3 Hz.",
-        splits="A measured surface and a multisine up to 5 Hz tell it from a lag; a delay of every sensor looks the "
-        "same if the surface is not measured.",
+        distinguished_by="A measured surface and a multisine up to 5 Hz distinguish it from a lag. If the surface is not "
+        "measured, an equal delay of every sensor looks the same.",
     ),
     Effect(
         name="actuator_lag",
@@ -62,7 +61,7 @@ EFFECTS: Final = (
             Parameter(
                 "bandwidth_hz",
                 "hz",
-                "-3 dB frequency from the measured surface to the one that the air sees",
+                "-3 dB frequency from the measured deflection to the deflection that causes the forces",
                 low=0.5,
                 high=200.0,
                 material=0.002,
@@ -70,15 +69,15 @@ EFFECTS: Final = (
                 reciprocal=True,
                 time_constant=True,
                 one_sided=True,
-                prior_std=0.05,
                 step=1e-3,
             ),
         ),
         describe=_lag,
-        explanation="The surface follows what is measured of it with a first-order lag: a soft linkage, or a "
-        "position measured at the servo and not at the surface.",
+        explanation="The surface follows its measurement with a first-order lag: a soft linkage, or a position measured "
+        "at the servo instead of the surface.",
         source="tau y' = x - y, tau = 1/(2 pi bandwidth). Material: tau of 2 ms, a bandwidth of 80 Hz.",
-        splits="High-frequency content in the elevator (multisine, doublets of short steps) tells it from a delay.",
+        distinguished_by="High frequencies in the elevator (multisine, doublets of short steps) distinguish it from a "
+        "delay.",
     ),
     Effect(
         name="rate_limit",
@@ -87,22 +86,21 @@ EFFECTS: Final = (
             Parameter(
                 "rate_rad_s",
                 "rad_s",
-                "largest rate of the surface that the air sees",
+                "largest rate of the surface that causes the forces",
                 low=0.1,
                 high=20.0,
                 material=0.5,
                 neutral=math.inf,
                 reciprocal=True,
                 one_sided=True,
-                prior_std=3.0,
                 step=0.3,
             ),
         ),
         describe=_rate_limit,
-        explanation="The surface moves no faster than a rate that its measurement does not show.",
+        explanation="The surface moves no faster than a limit that its measurement does not show.",
         source="|y'| <= rate. Material: a limit below 2 rad/s (115 deg/s), which a doublet of 2 deg through a servo of "
         "5 Hz reaches.",
-        splits="Two amplitudes: a limit is seen in the larger one alone.",
+        distinguished_by="Two amplitudes: only the larger one reaches the limit.",
     ),
     Effect(
         name="backlash",
@@ -116,15 +114,14 @@ EFFECTS: Final = (
                 high=4.0 * DEG,
                 material=0.03 * DEG,
                 one_sided=True,
-                prior_std=1.0 * DEG,
                 step=0.1 * DEG,
             ),
         ),
         describe=_backlash,
-        explanation="Play in the linkage: the surface stays where it is until the measured position has crossed the play.",
-        source="y stays within width/2 of x and moves only when pushed, starting in the middle. Material: 3 % of a "
+        explanation="Play in the linkage: the surface rests until the measured position has crossed the play.",
+        source="y stays within width/2 of x and moves only when pushed; it starts in the middle. Material: 3 % of a "
         "doublet of 1 deg.",
-        splits="A small multisine: the share that is lost falls with amplitude.",
+        distinguished_by="A small multisine: play removes a larger share of a smaller motion.",
     ),
 )
-"""Effects of this family."""
+"""Effects of this module."""

@@ -1,1 +1,1 @@
-"""The flight log: arrays and metadata, validated once at the border, and its Parquet store."""
+"""Flight logs: arrays and metadata in memory, structural validation, the Parquet store."""

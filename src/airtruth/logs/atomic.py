@@ -1,18 +1,22 @@
-"""Files that appear whole or not at all."""
+"""Atomic writing: a file appears complete or not at all."""
 
 from __future__ import annotations
 
 import errno
+import logging
 import os
-import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import partial
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Final, Protocol
 
 from airtruth.errors import StoreError
+from airtruth.logs.remote import RemotePath, location, uploaded
+from airtruth.logs.temporary import remove, temporary_folder, temporary_name
 
-_NEXT_STEP = {
+_NEXT_STEP: Final = {
     errno.ENOSPC: "the disk is full: free some space and run again",
     errno.EDQUOT: "the disk quota is used up: free some space and run again",
     errno.EFBIG: "the file would pass the size limit (ulimit -f): raise it and run again",
@@ -23,41 +27,77 @@ _NEXT_STEP = {
     errno.EEXIST: "a file of that name is in the way: choose another name",
     errno.ENOTDIR: "a part of the path is a file, not a folder: choose another path",
     errno.EISDIR: "a folder of that name is in the way: choose another name",
+    errno.ENAMETOOLONG: "the name is too long: choose a shorter one",
+    errno.EMFILE: "too many files are open: raise the limit (ulimit -n) and run again",
+    errno.ENFILE: "too many files are open on this machine: close some and run again",
 }
+"""Error number -> reason and next step of a failed write."""
+
+
+class Guard(Protocol):
+    """Permits and records every file that a command writes, see `airtruth.logs.outputs`."""
+
+    def before(self, path: Path) -> None:
+        """Raise `StoreError` if the file may not be written."""
+
+    def record(self, path: Path, written: Path) -> None:
+        """Record the content of ``path``, which ``written`` holds and which appears there next."""
+
+
+guard: ContextVar[Guard | None] = ContextVar("guard", default=None)
+"""The guard of the command that runs; None writes without one."""
 
 
 @contextmanager
 def atomic_file(path: Path | str) -> Iterator[BinaryIO]:
-    """Open a new file that replaces ``path`` when the block ends, or leaves it as it was when it fails.
+    """Open a new file that replaces ``path`` when the block ends; if the block fails, ``path`` does not change.
 
-    The bytes go to a hidden temporary file in the same folder, are flushed to the disk, renamed over
-    ``path``, and the folder is flushed; a reader sees the old file or the new one.
+    The bytes go to a hidden temporary file in the same folder, which is flushed to the disk and renamed to
+    ``path``; the folder is flushed too. A reader sees the old file or the new one. A key of a store is written by one
+    upload.
 
     Raises
     ------
     StoreError
         If the file cannot be written; the temporary file is removed.
     """
-    path = Path(path)
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    path = location(path)
+    active = guard.get()
+    if active is not None:
+        active.before(path)
+    if isinstance(path, RemotePath):
+        try:
+            with uploaded(path, partial(_record, active, path)) as file:
+                yield file
+        except OSError as error:  # of the local file
+            raise write_error(path, error) from error
+        return
+    temporary = path.with_name(temporary_name(path.name))
     try:
         try:
-            # not tempfile: it would leave the file unreadable for others
+            # tempfile would create a file that other users cannot read
             with open(temporary, "xb") as file:
                 yield file
                 file.flush()
                 os.fsync(file.fileno())
+            _record(active, path, temporary)
             os.replace(temporary, path)
+            logging.getLogger("airtruth").debug("wrote %s", path)
         except BaseException:
-            temporary.unlink(missing_ok=True)
+            remove(temporary)
             raise
         sync_folder(path.parent)
     except OSError as error:
         raise write_error(path, error) from error
 
 
+def _record(active: Guard | None, path: Path, written: Path) -> None:
+    if active is not None:
+        active.record(path, written)
+
+
 def write_text(path: Path | str, text: str) -> None:
-    """Write a text file (UTF-8) whole or not at all.
+    """Write a text file (UTF-8) atomically.
 
     Raises
     ------
@@ -68,24 +108,67 @@ def write_text(path: Path | str, text: str) -> None:
         file.write(text.encode())
 
 
-def make_folder(path: Path) -> None:
-    """Make a folder and those above it, where they are not there yet.
+@contextmanager
+def new_folder(path: Path) -> Iterator[Path]:
+    """Create a folder that appears under its name when the block ends, complete, or not at all.
+
+    The block writes into the folder of the same name that it receives. An earlier folder is moved aside and removed.
 
     Raises
     ------
     StoreError
-        If it cannot be made, or nothing can be written there.
+        If the folder cannot be created or renamed.
+    """
+    make_folder(path.parent)
+    try:
+        with temporary_folder(path.parent, path.name) as beside:
+            made = beside / path.name
+            made.mkdir()
+            yield made
+            if path.exists():
+                path.rename(beside / "earlier")
+            made.rename(path)
+    except OSError as error:
+        raise write_error(path, error) from None
+
+
+def remove_folder(path: Path) -> None:
+    """Remove a folder if it exists; whoever looks sees all of it or nothing.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be removed.
+    """
+    if not path.exists():
+        return
+    aside = path.with_name(temporary_name(path.name))
+    try:
+        path.rename(aside)
+    except OSError as error:
+        raise write_error(path, error) from None
+    remove(aside)
+
+
+def make_folder(path: Path) -> None:
+    """Create a folder and its parents, unless they exist.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be created or is not writable.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
-        if not os.access(path, os.W_OK | os.X_OK):
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        if not isinstance(path, RemotePath) and not os.access(path, os.W_OK | os.X_OK):
+            read_only = hasattr(os, "ST_RDONLY") and os.statvfs(path).f_flag & os.ST_RDONLY
+            raise OSError(errno.EROFS if read_only else errno.EACCES, "")
     except OSError as error:
         raise write_error(path, error) from None
 
 
 def sync_folder(folder: Path) -> None:
-    """Flush a folder's entries to the disk, where the system can."""
+    """Flush the entries of a folder to the disk, if the system supports it."""
     if not hasattr(os, "O_DIRECTORY"):
         return
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
@@ -96,11 +179,21 @@ def sync_folder(folder: Path) -> None:
 
 
 def write_error(path: Path, error: OSError) -> StoreError:
-    """The message for a failed write: which file, why, and what to do."""
+    """Return the error for a failed write: the file, the reason and the next step."""
     reason = error.strerror or str(error)
-    step = _NEXT_STEP.get(error.errno or 0, f"{reason}: see that the folder can be written and run again")
-    kept = " (the file that was there is unchanged)" if path.is_file() else ""
+    step = _NEXT_STEP.get(error.errno or 0, f"{reason}: make the folder writable and run again")
+    kept = " (the existing file is unchanged)" if path.is_file() else ""
     return StoreError(f"{path}: not written{kept}; {step}")
 
 
-__all__ = ["atomic_file", "sync_folder", "write_error", "write_text"]
+__all__ = [
+    "Guard",
+    "atomic_file",
+    "guard",
+    "make_folder",
+    "new_folder",
+    "remove_folder",
+    "sync_folder",
+    "write_error",
+    "write_text",
+]

@@ -1,9 +1,11 @@
-"""The Parquet store of flight logs, and the way to the plain tables that stand beside them."""
+"""The Parquet store of flight logs."""
 
 from __future__ import annotations
 
-import difflib
 import json
+import logging
+import os
+from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, Final, Literal
@@ -13,20 +15,32 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from airtruth.channels import RUN_ID, SIGNALS, TIME
 from airtruth.errors import LogError, StoreError, choices
 from airtruth.logs.atomic import atomic_file, write_text
-from airtruth.logs.flight_log import FlightLog
-from airtruth.logs.tables import KEY, metadata_of, read_metadata, read_table, readable, write_table
-from airtruth.signals import RUN_ID, SIGNALS, TIME
+from airtruth.logs.flight_log import FlightLog, unknown_runs
+from airtruth.logs.remote import location
+from airtruth.logs.tables import (
+    KEY,
+    metadata_of,
+    opened,
+    read_metadata,
+    read_table,
+    require_memory,
+    write_table,
+)
 
 Array = NDArray[np.float64]
 
 SCHEMA: Final = 1
-"""Version of the log format that is written and the newest that is read."""
+"""Version of the log format, the only one that is written and read [-]."""
 RUNS_PER_GROUP: Final = 25
-"""Runs in a row group; a group per run costs seven times as much to write and nine to read (250 samples)."""
+"""Runs per row group [-]. Measured with runs of 250 samples: a group per run takes seven times as long to write
+and nine times as long to read."""
+STATED_UNITS: Final = "stated_units"
+"""Key of a log's metadata: column -> unit in the file's metadata, where it is not the unit of the channel."""
 CAMPAIGN_TABLES: Final = ("plan.parquet", "truth.parquet", "estimates.parquet")
-"""Files beside logs that are never taken for one."""
+"""Tables in the folder of logs, which are not logs."""
 
 
 def write_log(
@@ -36,19 +50,26 @@ def write_log(
     dtype: Literal["float32", "float64"] = "float32",
     runs_per_group: int = RUNS_PER_GROUP,
 ) -> None:
-    """Write a flight log, its runs sorted by name, whole or not at all.
+    """Write a flight log atomically, its runs sorted by name.
 
     Parameters
     ----------
     path : file to write; its folder must exist.
-    log : the log; ``metadata`` must be JSON.
-    dtype : type of the channels; time is float64 always.
+    log : the log; its metadata must be JSON.
+    dtype : type of the channels; time is always float64.
     runs_per_group : runs per row group, the unit of random access.
 
     Raises
     ------
     StoreError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> log = at.read_log("out/light")
+    >>> at.write_log("first.parquet", log.select(log.run_ids[0]))
+    >>> at.read_log("first.parquet")
+    FlightLog(1 run of 5 s at 50 Hz, 11 channels: airspeed_m_s, alpha_rad, theta_rad, q_rad_s, ...)
     """
     fields = [pa.field(RUN_ID, pa.string()), _field(TIME, "float64")]
     fields += [_field(name, dtype) for name in log.channels]
@@ -63,13 +84,13 @@ def write_log(
 def read_log(
     path: Path | str, columns: Sequence[str] | None = None, run_ids: Collection[str] | None = None
 ) -> FlightLog:
-    """Read a flight log; `airtruth.logs.validate.validate` judges what it holds.
+    """Read a flight log; the values are not checked, see `airtruth.checks.gate`.
 
     Parameters
     ----------
     path : Parquet file.
     columns : channels to read, any numeric column; None reads those of the vocabulary
-        (`airtruth.signals.SIGNALS`) and all other floating-point ones.
+        (`airtruth.channels.SIGNALS`) and all other floating-point ones.
     run_ids : runs to read, in the file's order; None reads all.
 
     Returns
@@ -80,22 +101,27 @@ def read_log(
     Raises
     ------
     StoreError
-        If the file cannot be read or is damaged.
+        If the file cannot be read, is damaged, or has two columns of one name.
     LogError
-        If it is not a flight log, or lacks a column or run that was asked for.
+        If it is not a flight log, or lacks a column or run that was requested.
     """
-    path = Path(path)
-    with readable(path), pq.ParquetFile(path, page_checksum_verification=True) as file:
+    path = location(path)
+    with opened(path) as file:
         names = _channels(path, file.schema_arrow, columns)
+        require_memory(path, file.metadata.num_rows, len(names) + 2 if run_ids is None else 1)
         ids, offsets = _runs(path, file.read([RUN_ID]).column(RUN_ID))
         keep: slice | NDArray[np.int64] = slice(None)
         if run_ids is None:
             table = file.read([TIME, *names])
         else:
             ids, offsets, groups, keep = _select(path, file.metadata, ids, offsets, run_ids)
+            require_memory(path, sum(file.metadata.row_group(g).num_rows for g in groups), len(names) + 2)
             table = file.read_row_groups(groups, [TIME, *names])
+    logging.getLogger("airtruth").debug("read %s: %d runs", path, len(ids))
+    metadata = metadata_of(path, file.schema_arrow)
+    stated = _stated_units(file.schema_arrow, names)
     return FlightLog(
-        metadata=metadata_of(path, file.schema_arrow),
+        metadata={**metadata, STATED_UNITS: stated} if stated else metadata,
         run_ids=ids,
         offsets=offsets,
         t_s=_floats(table.column(TIME), keep),
@@ -103,22 +129,33 @@ def read_log(
     )
 
 
-def log_paths(place: Path | str) -> list[Path]:
-    """Flight log files of a place: the file itself, those of its folder ``logs``, or those of the folder.
+def log_paths(path: str | os.PathLike[str]) -> list[Path]:
+    """Flight log files at a path: the file itself, or those in its folder ``logs`` or in the folder.
 
-    Sorted by name; tables that stand beside logs (`CAMPAIGN_TABLES`) are left out.
+    Parameters
+    ----------
+    path : log file, campaign folder, or folder of logs.
+
+    Returns
+    -------
+    list of Path
+        Sorted by name, without `CAMPAIGN_TABLES`.
 
     Raises
     ------
     StoreError
-        If the place does not exist or holds no log.
+        If the path does not exist or holds no log.
     """
-    place = Path(place)
-    if place.is_file():
-        return [place]
-    if not place.exists():
-        raise StoreError(f"{place}: no such file or folder; state a log (.parquet) or a folder of logs")
-    folder = place / "logs" if (place / "logs").is_dir() else place
+    path = location(path)
+    try:
+        if path.is_file():
+            return [path]
+        exists = path.exists()
+    except OSError:  # a name that the file system does not take
+        exists = False
+    if not exists:
+        raise StoreError(f"{path}: no such file or folder; give a log (.parquet) or a folder of logs")
+    folder = path / "logs" if (path / "logs").is_dir() else path
     paths = sorted(p for p in folder.glob("*.parquet") if p.name not in CAMPAIGN_TABLES)
     if not paths:
         raise StoreError(
@@ -127,10 +164,21 @@ def log_paths(place: Path | str) -> list[Path]:
     return paths
 
 
-def iter_logs(place: Path | str, columns: Sequence[str] | None = None) -> Iterator[FlightLog]:
-    """Read the logs of a place one file at a time; see `log_paths` and `read_log`."""
-    for path in log_paths(place):
-        yield read_log(path, columns)
+def iter_logs(path: Path | str, columns: Sequence[str] | None = None) -> Iterator[FlightLog]:
+    """Read the logs at a path one file at a time; see `log_paths` and `read_log`."""
+    for file in log_paths(path):
+        yield read_log(file, columns)
+
+
+def _stated_units(schema: pa.Schema, names: Sequence[str]) -> dict[str, str]:
+    """Units in the metadata of the columns, where they are not those of the channels."""
+    result = {}
+    for name in names:
+        facts = schema.field(name).metadata or {}
+        unit = (facts.get(b"unit") or facts.get(b"units") or b"").decode(errors="replace").strip()
+        if name in SIGNALS and unit and unit != SIGNALS[name].unit:
+            result[name] = unit
+    return result
 
 
 def _field(name: str, dtype: str) -> pa.Field:
@@ -162,6 +210,11 @@ def _group(log: FlightLog, runs: Sequence[int], schema: pa.Schema) -> pa.Table:
 
 
 def _channels(path: Path, schema: pa.Schema, columns: Sequence[str] | None) -> list[str]:
+    repeated = [name for name, count in Counter(schema.names).items() if count > 1]
+    if repeated:
+        raise StoreError(
+            f"{path}: column {repeated[0]!r} occurs more than once; rename or remove all but one"
+        )
     lacking = [name for name in (RUN_ID, TIME) if name not in schema.names]
     if lacking:
         raise LogError(
@@ -170,7 +223,9 @@ def _channels(path: Path, schema: pa.Schema, columns: Sequence[str] | None) -> l
         )
     version = metadata_of(path, schema).get("schema", SCHEMA)
     if version != SCHEMA:
-        raise LogError(f"{path}: log schema {version!r} is not known, {SCHEMA} is; use a newer airtruth")
+        raise LogError(
+            f"{path}: log schema {version!r}, but this version reads schema {SCHEMA}; use a newer airtruth"
+        )
     kinds = {f.name: f.type for f in schema}
     if not pa.types.is_floating(kinds[TIME]):
         raise LogError(f"{path}: {TIME} is {kinds[TIME]}, not a floating-point time in seconds")
@@ -220,14 +275,9 @@ def _select(
 ) -> tuple[tuple[str, ...], NDArray[np.int64], list[int], NDArray[np.int64]]:
     """Names and offsets of the wanted runs, the row groups that hold them, and their rows in those groups."""
     runs = [run for run, name in enumerate(ids) if name in set(wanted)]
-    missing = sorted(set(wanted) - set(ids))
+    missing = set(wanted) - set(ids)
     if missing:
-        near = difflib.get_close_matches(missing[0], ids, n=1)
-        hint = f"did you mean {near[0]!r}? " if near else ""
-        raise LogError(
-            f"{path}: no run {', '.join(map(repr, missing[:5]))}; {hint}the log holds {len(ids)} runs, "
-            f"{ids[0]!r} to {ids[-1]!r}"
-        )
+        raise LogError(f"{path}: {unknown_runs(missing, ids)}")
     rows = np.concatenate([np.arange(0), *(np.arange(offsets[run], offsets[run + 1]) for run in runs)])
     sizes = np.array([metadata.row_group(g).num_rows for g in range(metadata.num_row_groups)])
     ends = np.cumsum(sizes)
@@ -247,6 +297,7 @@ __all__ = [
     "CAMPAIGN_TABLES",
     "RUNS_PER_GROUP",
     "SCHEMA",
+    "STATED_UNITS",
     "iter_logs",
     "log_paths",
     "read_log",

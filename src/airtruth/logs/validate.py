@@ -1,4 +1,7 @@
-"""The gate of the flight log: what breaks the contract is found once, all of it, and named."""
+"""Structural validation of a flight log: every breach of the log contract, named with run, row and cure.
+
+Physical plausibility is the business of `airtruth.checks.gate`, which calls this first.
+"""
 
 from __future__ import annotations
 
@@ -10,40 +13,47 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.channels import REQUIRED, SIGNALS
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
-from airtruth.signals import REQUIRED, SIGNALS
 
 Index = NDArray[np.int64]
 
 MINIMUM_SAMPLES: Final = 20
-"""Shortest run that is accepted: below it the zero-phase filters and six free parameters have no meaning."""
+"""Shortest run that is accepted [samples] (judgement: zero-phase filters and six parameters need more than ten)."""
 JITTER: Final = 0.01
-"""Largest deviation of a time step from the run's own, and of a rate from the stated one, relative."""
+"""Largest deviation of a time step from the run's mean step, and of a rate from the stated one [-] (judgement:
+clocks that round to 0.1 ms at 100 Hz pass)."""
 
-_SHOWN: Final = 3  # runs named per problem
-_GAP: Final = 1.5  # steps
+LARGEST: Final = 1e9
+"""Largest magnitude of a value [SI], of a time and of its inverse step [s, 1/s], and of the inverse of a positive channel
+(judgement: no flight comes near it, and its powers do not overflow)."""
+
+_SHOWN: Final = 3
+"""Number of runs that a sentence names."""
+_GAP: Final = 1.5
+"""Least length of a gap [steps]."""
 _POSITIVE: Final = ("airspeed_m_s", "density_kg_m3")
+"""Channels whose values must be positive."""
 
 
 def validate(log: FlightLog, *, minimum_samples: int = MINIMUM_SAMPLES, source: str = "flight log") -> None:
-    """Raise one error that lists everything in which a log breaks the contract.
+    """Raise one error that lists every breach of the log contract.
 
-    Looked for: a missing channel, a run in two places, too few samples, times that are not finite,
-    increasing and uniform, gaps, a rate other than the metadata's, values that are not finite, beyond
-    the limits of `airtruth.signals.SIGNALS` (degrees for radians are recognised so), or not positive
-    where they must be. Columns outside the vocabulary are not judged.
+    A breach is a missing channel, a run in two parts, too few samples, times that are not finite, increasing
+    and uniform, a gap, a rate other than that of the metadata, a value that is not finite, or an airspeed or
+    density that is not positive. Columns outside the vocabulary are not checked.
 
     Parameters
     ----------
-    log : the log.
-    minimum_samples : shortest run that is accepted.
-    source : name of the log in the message, its file usually.
+    log : flight log.
+    minimum_samples : length of the shortest run that is accepted [samples].
+    source : name of the log in the message, usually its file.
 
     Raises
     ------
     LogError
-        If anything is wrong.
+        One sentence per breach.
     """
     problems = list(_structure(log))
     if not problems:
@@ -79,6 +89,8 @@ def _missing(log: FlightLog) -> Iterator[str]:
         if name not in log.channels:
             near = difflib.get_close_matches(name, present, n=1, cutoff=0.5)
             step = f"the nearest column is {near[0]!r}: map it" if near else "map a column to it"
+            if name == "alpha_rad" and not near:
+                step += ", or without a vane state [reconstruct] alpha = true,"
             yield f"{name}: required channel is missing ({SIGNALS[name].description}); {step} on import"
     if "density_kg_m3" not in log.channels and "altitude_m" not in log.channels:
         yield "density_kg_m3 or altitude_m: one of the two is required, both are missing; map one on import"
@@ -88,7 +100,7 @@ def _runs(log: FlightLog, minimum_samples: int) -> Iterator[str]:
     counts = Counter(log.run_ids)
     if len(counts) < len(log.run_ids):
         names = _listed([repr(name) for name, count in counts.items() if count > 1], "run")
-        yield f"run_id: {names} in more than one place; sort by run_id and t_s, or rename the runs"
+        yield f"run_id: {names} in more than one part; sort by run_id and t_s, or rename the runs"
     lengths = np.diff(log.offsets)
     short = np.flatnonzero(lengths < minimum_samples)
     if len(short):
@@ -102,6 +114,12 @@ def _time(log: FlightLog) -> Iterator[str]:
         bad = np.flatnonzero(~np.isfinite(log.t_s))
         where = _where(log, bad, with_time=False)
         yield f"t_s: {len(bad)} values are NaN or infinite, {where}; repair them or cut the run there"
+        return
+    steps = np.diff(log.t_s)
+    if np.abs(log.t_s).max(initial=0.0) > LARGEST or (np.abs(steps[steps != 0.0]) < 1.0 / LARGEST).any():
+        yield (
+            f"t_s: times beyond {LARGEST:g} s or steps below {1.0 / LARGEST:g} s; write seconds from the start of the run"
+        )
         return
     timed = np.flatnonzero(lengths >= 2)
     first, last = log.offsets[timed], log.offsets[timed + 1] - 1
@@ -123,7 +141,7 @@ def _time(log: FlightLog) -> Iterator[str]:
 
 
 def _irregular(log: FlightLog, runs: Index) -> Iterator[str]:
-    """Sort the runs whose steps differ into times that go back, gaps and unequal steps."""
+    """Sort the runs with unequal steps into those whose time goes back, has gaps, or jitters."""
     back: list[int] = []
     gaps: list[int] = []
     uneven: list[int] = []
@@ -147,11 +165,31 @@ def _irregular(log: FlightLog, runs: Index) -> Iterator[str]:
             f"{_where(log, np.array(gaps))}; "
             "split the run there into two runs, or resample it on import"
         )
-    if uneven:
+    rounding = single_precision_s(log.t_s)
+    if uneven and rounding > 0.0:
+        yield (
+            f"t_s: single precision (float32), which resolves {1e3 * rounding:.2g} ms at {np.abs(log.t_s).max():.6g} s, "
+            f"so that steps differ by more than {JITTER:.0%} {_where(log, np.array(uneven))}; write t_s as float64, "
+            "or start every run at zero"
+        )
+    elif uneven:
         yield (
             f"t_s: steps differ by more than {JITTER:.0%} {_where(log, np.array(uneven))}; "
             "resample to a uniform rate on import"
         )
+
+
+def single_precision_s(t: NDArray[np.float64]) -> float:
+    """Resolution of times that are float32 numbers, in their unit; 0 if they are not or it does not matter.
+
+    It matters where it exceeds `JITTER` of the mean step.
+    """
+    with np.errstate(over="ignore"):
+        single = t.astype(np.float32)
+    if len(t) < 2 or not (single == t).all():
+        return 0.0
+    resolution = float(np.spacing(np.abs(single).max()))
+    return resolution if resolution > JITTER * float(np.median(np.abs(np.diff(t)))) else 0.0
 
 
 def _rate(log: FlightLog, runs: Index, period: NDArray[np.float64]) -> Iterator[str]:
@@ -167,18 +205,12 @@ def _rate(log: FlightLog, runs: Index, period: NDArray[np.float64]) -> Iterator[
             f"{log.run_ids[run]!r} ({1 / step:.6g} Hz)"
             for run, step in zip(runs[off], period[off], strict=True)
         ]
-        found = _listed(which, "run")
-        yield f"t_s: not the {stated:g} Hz of the metadata (sample_rate_hz) in {found}; correct either"
+        yield f"t_s: not the {stated:g} Hz of the metadata (sample_rate_hz) in {_listed(which, 'run')}; correct either"
 
 
 def _values(log: FlightLog) -> Iterator[str]:
     for name, values in log.channels.items():
         if name not in SIGNALS or not len(values):
-            continue
-        signal = SIGNALS[name]
-        low, high = float(values.min()), float(values.max())  # NaN if any is
-        inside = -signal.limit <= low and high <= signal.limit
-        if inside and (low > 0.0 or name not in _POSITIVE):
             continue
         finite = np.isfinite(values)
         if not finite.all():
@@ -187,23 +219,20 @@ def _values(log: FlightLog) -> Iterator[str]:
                 f"{name}: {len(bad)} values are NaN or infinite, {_where(log, bad)}; "
                 "cut the run there, or leave the channel out if it is optional"
             )
-        beyond = finite & (np.abs(values) > signal.limit)
-        if beyond.any():
-            peak = float(np.abs(values[finite]).max())
-            yield (
-                f"{name}: up to {peak:.4g} {signal.unit}, beyond +-{signal.limit:g}, "
-                f"{_where(log, np.flatnonzero(beyond))}; {_remedy(signal.dimension, signal.unit)}"
-            )
         below = finite & (values <= 0.0)
         if name in _POSITIVE and below.any():
             yield f"{name}: not positive {_where(log, np.flatnonzero(below))}; cut the run there"
-
-
-def _remedy(dimension: str, unit: str) -> str:
-    if dimension in ("angle", "angular_rate"):
-        wrong = unit.replace("rad", "deg")
-        return f"this looks like {wrong} in place of {unit}: state the unit {wrong} in the import mapping"
-    return "state the right unit in the import mapping"
+        with np.errstate(invalid="ignore"):
+            size = np.abs(values)
+            beyond = (finite & (size > LARGEST)) | (
+                (size < 1.0 / LARGEST) & (values > 0.0) if name in _POSITIVE else False
+            )
+        if beyond.any():
+            rows = np.flatnonzero(beyond)
+            yield (
+                f"{name}: {values[rows[0]]:.3g} is no measurement, {_where(log, rows)}; correct its unit, or cut the "
+                "run there"
+            )
 
 
 def _where(log: FlightLog, rows: Index, *, with_time: bool = True) -> str:
@@ -224,4 +253,4 @@ def _listed(items: list[str], noun: str, count: int | None = None) -> str:
     return f"{count} {noun}{'s' if count > 1 else ''}: {', '.join(items[:_SHOWN])}{more}"
 
 
-__all__ = ["JITTER", "MINIMUM_SAMPLES", "validate"]
+__all__ = ["JITTER", "MINIMUM_SAMPLES", "single_precision_s", "validate"]

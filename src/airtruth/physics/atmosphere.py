@@ -1,13 +1,14 @@
 """The standard atmosphere up to 20 km, and equivalent and true airspeed.
 
-Source: U.S. Standard Atmosphere, 1976 (NOAA-S/T 76-1562), part 1; identical with the ICAO standard
-atmosphere (Doc 7488) in this range. Altitude means geopotential pressure altitude throughout, as an
-altimeter set to 1013.25 hPa shows it. Two layers are held: the troposphere (-5 to 11 km) and the
-isothermal layer (11 to 20 km); outside them every function returns NaN.
+Source: U.S. Standard Atmosphere, 1976 (NOAA-S/T 76-1562), part 1; identical to the ICAO standard atmosphere
+(Doc 7488) in this range. Altitude is geopotential pressure altitude, as an altimeter set to 1013.25 hPa shows it. Two
+layers are modelled: the troposphere (-5 to 11 km) and the isothermal layer (11 to 20 km). Outside them every function
+returns NaN.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -30,22 +31,32 @@ EARTH_RADIUS_M: Final = 6356766.0
 """Effective earth's radius of eq. (18) [m]."""
 
 LOWEST_M: Final = -5000.0
+"""Lowest altitude of the tables of the source [m]."""
 TROPOPAUSE_M: Final = 11000.0
+"""Top of the troposphere (table 4) [m]."""
 HIGHEST_M: Final = 20000.0
+"""Top of the isothermal layer (table 4) [m]."""
 
-_ROUNDING_M: Final = 1e-6  # keeps a round trip at an end of the range inside it
-_LAPSE_K_M: Final = -0.0065  # table 4, b = 0
+_ROUNDING_M: Final = 1e-6
+"""Tolerance at the ends of the range [m]: a round trip at an end stays inside."""
+_LAPSE_K_M: Final = -0.0065
+"""Temperature gradient of the troposphere (table 4) [K/m]."""
 _T11_K: Final = T0_K + _LAPSE_K_M * TROPOPAUSE_M
-_EXPONENT: Final = -G0 / (GAS_CONSTANT_J_KG_K * _LAPSE_K_M)  # 5.2559
+"""Temperature of the isothermal layer, eq. (23) [K]."""
+_EXPONENT: Final = -G0 / (GAS_CONSTANT_J_KG_K * _LAPSE_K_M)
+"""Exponent of the temperature ratio in the pressure, eq. (33a) [-]; 5.2559."""
 _P11_PA: Final = P0_PA * (_T11_K / T0_K) ** _EXPONENT
+"""Pressure at the tropopause, eq. (33a) [Pa]."""
 _RHO11_KG_M3: Final = _P11_PA / (GAS_CONSTANT_J_KG_K * _T11_K)
-_SCALE_HEIGHT_M: Final = GAS_CONSTANT_J_KG_K * _T11_K / G0  # of the isothermal layer
+"""Density at the tropopause, eq. (42) [kg/m3]."""
+_SCALE_HEIGHT_M: Final = GAS_CONSTANT_J_KG_K * _T11_K / G0
+"""Scale height of the isothermal layer, eq. (33b) [m]."""
 
 
 def geopotential_m(geometric_m: ArrayLike) -> Array:
     """Geopotential altitude [m] of a geometric altitude above sea level [m], eq. (18).
 
-    JSBSim's position/h-sl-ft is geometric; at 7000 ft it stands 0.7 m above the geopotential altitude.
+    JSBSim's position/h-sl-ft is geometric; at 7000 ft it exceeds the geopotential altitude by 0.7 m.
     """
     z = np.asarray(geometric_m, dtype=np.float64)
     return EARTH_RADIUS_M * z / (EARTH_RADIUS_M + z)
@@ -64,21 +75,50 @@ def pressure_pa(altitude_m: ArrayLike) -> Array:
 
 
 def density_kg_m3(altitude_m: ArrayLike) -> Array:
-    """Density [kg/m3] at pressure altitude [m], eq. (42); any shape."""
+    """Density [kg/m3] at pressure altitude [m], eq. (42); any shape.
+
+    Examples
+    --------
+    >>> density_kg_m3([0.0, 11000.0]).round(4).tolist()
+    [1.225, 0.3639]
+    """
     h = _inside(altitude_m)
     return RHO0_KG_M3 * (temperature_k(h) / T0_K) ** (_EXPONENT - 1.0) * _isothermal(h)
 
 
-def altitude_of_pressure_m(pressure_pa: ArrayLike) -> Array:
-    """Pressure altitude [m] of a pressure [Pa]; inverts `pressure_pa`."""
-    p = np.asarray(pressure_pa, dtype=np.float64)
-    return _inverse(p / P0_PA, 1.0 / _EXPONENT, p / _P11_PA)
+def air_density(channels: Mapping[str, Array]) -> Array:
+    """Air density [kg/m3] of a record: as measured, or else that of its pressure altitude.
+
+    Parameters
+    ----------
+    channels : columns of a flight log; density_kg_m3 or altitude_m, of any shape.
+
+    Returns
+    -------
+    Density, of the shape of the channel.
+
+    Raises
+    ------
+    KeyError
+        If both channels are absent; the log's validation excludes that.
+
+    Examples
+    --------
+    >>> air_density({"altitude_m": np.array([0.0])}).round(4).tolist()
+    [1.225]
+    """
+    if "density_kg_m3" in channels:
+        return channels["density_kg_m3"]
+    return density_kg_m3(channels["altitude_m"])
 
 
 def altitude_of_density_m(density_kg_m3: ArrayLike) -> Array:
-    """Density altitude [m] of a density [kg/m3]; inverts `density_kg_m3`."""
+    """Density altitude [m] of a density [kg/m3]; the inverse of `density_kg_m3` in closed form, any shape."""
     rho = np.asarray(density_kg_m3, dtype=np.float64)
-    return _inverse(rho / RHO0_KG_M3, 1.0 / (_EXPONENT - 1.0), rho / _RHO11_KG_M3)
+    rho = np.where(rho > 0.0, rho, np.nan)
+    troposphere = T0_K / _LAPSE_K_M * ((rho / RHO0_KG_M3) ** (1.0 / (_EXPONENT - 1.0)) - 1.0)
+    isothermal = TROPOPAUSE_M - _SCALE_HEIGHT_M * np.log(rho / _RHO11_KG_M3)
+    return _inside(np.where(rho > _RHO11_KG_M3, troposphere, isothermal))
 
 
 def true_airspeed_m_s(equivalent_airspeed_m_s: ArrayLike, density_kg_m3: ArrayLike) -> Array:
@@ -102,13 +142,6 @@ def _isothermal(h: Array) -> Array:
     return np.exp(-np.maximum(h - TROPOPAUSE_M, 0.0) / _SCALE_HEIGHT_M)
 
 
-def _inverse(ratio: Array, power: float, ratio_11: Array) -> Array:
-    ratio = np.where(ratio > 0.0, ratio, np.nan)
-    low = T0_K / _LAPSE_K_M * (ratio**power - 1.0)
-    high = TROPOPAUSE_M - _SCALE_HEIGHT_M * np.log(np.where(ratio > 0.0, ratio_11, np.nan))
-    return _inside(np.where(ratio_11 > 1.0, low, high))
-
-
 __all__ = [
     "EARTH_RADIUS_M",
     "GAS_CONSTANT_J_KG_K",
@@ -118,8 +151,8 @@ __all__ = [
     "RHO0_KG_M3",
     "T0_K",
     "TROPOPAUSE_M",
+    "air_density",
     "altitude_of_density_m",
-    "altitude_of_pressure_m",
     "density_kg_m3",
     "equivalent_airspeed_m_s",
     "geopotential_m",

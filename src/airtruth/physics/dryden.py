@@ -28,7 +28,9 @@ from airtruth.physics.gust_figures import FIGURES, LEVELS, GustScales, gust_scal
 Array = NDArray[np.float64]
 
 STARTS: Final = ("stationary", "rest")
-_ZERO: Final = 1.0 / math.sqrt(3.0)  # zero of H_w in units of V/Lw
+"""Initial states of a gust: a draw from its stationary distribution, or zero."""
+_ZERO: Final = 1.0 / math.sqrt(3.0)
+"""Zero of H_w in units of V/Lw [-]."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class Dryden:
     sigma_u_m_s, sigma_w_m_s : standard deviations [m/s].
     length_u_m, length_w_m : scale lengths Lu, Lw [m].
     airspeed_m_s : true airspeed V [m/s].
-    span_m : span b [m]; None leaves out the rotary gust.
+    span_m : span b [m]; None for no rotary gust.
     """
 
     sigma_u_m_s: Array | float
@@ -75,7 +77,7 @@ def discretise(d: Dryden, dt_s: float) -> DiscreteGust:
     """Exact discrete model of the gusts at a time step [s].
 
     The states of w and q are a cascade of first-order lags, x1' = -r1 x1 + noise, xi' = -ri xi + x(i-1),
-    with rates (V/Lw, V/Lw), preceded by pi V/(4 b) if the rotary gust is asked for. In this order w and
+    with rates (V/Lw, V/Lw), preceded by pi V/(4 b) with the rotary gust. In this order w and
     q are sums without cancellation. The noise of a step comes from Van Loan (IEEE Trans. Automatic
     Control 23, 1978, eqs (2.1) and following) over a step short enough to be exact, then by doubling.
     """

@@ -22,10 +22,8 @@ class GustScales(NamedTuple):
 
 
 LEVELS: Final = ("light", "moderate", "severe")
+"""Named severities of gusts."""
 
-# NASA TM-4511 "severe" at full scale as tabulated in NASA GTM_DesignSim: altitude [ft], Lu, Lw [m],
-# sigma_u, sigma_w [m/s]; the levels multiply sigma. As shipped, the GTM's severe has the gains of
-# moderate in u and w; here it is the table itself.
 _GTM_TABLE: Final = np.array(
     [
         [800.0, 168.661, 151.864, 3.8162, 3.6184],
@@ -34,17 +32,23 @@ _GTM_TABLE: Final = np.array(
         [7000.0, 911.218, 840.419, 5.8294, 4.7754],
     ]
 )
+"""NASA TM-4511 "severe" at full scale, as tabulated in NASA GTM_DesignSim: altitude [ft], Lu, Lw [m], sigma_u,
+sigma_w [m/s]."""
 _GTM_GAINS: Final = {"light": (0.2, 0.17), "moderate": (0.4, 0.34), "severe": (1.0, 1.0)}
+"""Factors of a level on sigma_u and sigma_w of the table [-], from GTM_DesignSim. As shipped, its "severe" has the
+factors of "moderate"; here it is the table itself."""
 
 _MIL_W20_KT: Final = {"light": 15.0, "moderate": 30.0, "severe": 45.0}
-# MIL-F-8785C, figure 7: sigma [ft/s] over altitude [ft] at a probability of exceedance of 1e-2 (light),
-# 1e-3 (moderate) and 1e-5 (severe), as read off in JSBSim's FGWinds.
-_MIL_ALTITUDE_FT: Final = (500.0, 1750.0, 3750.0, 7500.0, 15e3, 25e3, 35e3, 45e3, 55e3, 65e3, 75e3, 80e3)
+"""Wind speed at 20 ft (MIL-F-8785C, 3.7.3.4) [kt]."""
+_MIL_ALTITUDE_FT: Final = (1750.0, 3750.0, 7500.0, 15e3, 25e3, 35e3, 45e3, 55e3, 65e3, 75e3, 80e3)
+"""Altitudes of `_MIL_SIGMA_FT_S` [ft]."""
 _MIL_SIGMA_FT_S: Final = {
-    "light": (6.6, 6.9, 7.4, 6.7, 4.6, 2.7, 0.4, 0.0, 0.0, 0.0, 0.0, 0.0),
-    "moderate": (8.6, 9.6, 10.6, 10.1, 8.0, 6.6, 5.0, 4.2, 2.7, 0.0, 0.0, 0.0),
-    "severe": (15.6, 17.6, 23.0, 23.6, 22.1, 20.0, 16.0, 15.1, 12.1, 7.9, 6.2, 5.1),
+    "light": (6.9, 7.4, 6.7, 4.6, 2.7, 0.4, 0.0, 0.0, 0.0, 0.0, 0.0),
+    "moderate": (9.6, 10.6, 10.1, 8.0, 6.6, 5.0, 4.2, 2.7, 0.0, 0.0, 0.0),
+    "severe": (17.6, 23.0, 23.6, 22.1, 20.0, 16.0, 15.1, 12.1, 7.9, 6.2, 5.1),
 }
+"""MIL-F-8785C, figure 7: sigma over altitude at a probability of exceedance of 1e-2 (light), 1e-3 (moderate) and 1e-5
+(severe) [ft/s], as digitised in JSBSim's FGWinds."""
 
 
 def _gtm(level: str, altitude_ft: float) -> GustScales:
@@ -69,7 +73,13 @@ def _mil_f_8785c(level: str, altitude_ft: float) -> GustScales:
 
 @dataclass(frozen=True)
 class Figures:
-    """A source of gust figures: its function of level and altitude [ft], and the range it covers [ft]."""
+    """A source of gust figures.
+
+    Attributes
+    ----------
+    scales : function of level and altitude [ft].
+    lowest_ft, highest_ft : range of altitudes that it covers [ft].
+    """
 
     scales: Callable[[str, float], GustScales]
     lowest_ft: float
@@ -80,6 +90,7 @@ FIGURES: Final[dict[str, Figures]] = {
     "gtm": Figures(_gtm, 800.0, 7000.0),
     "mil-f-8785c": Figures(_mil_f_8785c, 10.0, 80000.0),
 }
+"""Sources of gust figures by name."""
 
 
 def gust_scales(figures: str, level: str, altitude_m: float, factor: float = 1.0) -> GustScales:
@@ -109,8 +120,7 @@ def gust_scales(figures: str, level: str, altitude_m: float, factor: float = 1.0
         raise ConfigurationError(
             f"gust figures {figures!r} cover {source.lowest_ft:g} to {source.highest_ft:g} ft "
             f"({source.lowest_ft * FT:.0f} to {source.highest_ft * FT:.0f} m), not {altitude_ft:.0f} ft; "
-            f"fly inside that range, choose other figures ({', '.join(sorted(FIGURES))}), "
-            "or state sigma and length yourself"
+            f"fly inside that range, or choose other figures ({', '.join(sorted(FIGURES))})"
         )
     s = source.scales(level, altitude_ft)
     return GustScales(factor * s.sigma_u_m_s, factor * s.sigma_w_m_s, s.length_u_m, s.length_w_m)

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ForceTables:
-    """X, Z, M over four increasing axes; linear between points, the end values held outside.
+    """X, Z, M over four increasing axes; linear between points, constant outside.
 
     Attributes
     ----------
@@ -52,8 +52,8 @@ class Longitudinal:
     tables : forces and moment at the throttle of the steady state.
     mass_kg, inertia_kg_m2, gravity_m_s2 : mass [kg], pitch inertia [kg m2], gravity [m/s2].
     airspeed_m_s, alpha_rad, elevator_rad, gamma_rad : the steady state [m/s], [rad].
-    drift : factor on what airspeed and flight path do to the motion [-]: 1 is the aircraft; 0 holds the
-        airspeed and the direction of gravity, so that the short period is left.
+    drift : factor on the influence of airspeed and flight path [-]: 1 for the aircraft; 0 keeps the airspeed and the
+        direction of gravity constant and leaves the short period.
     """
 
     tables: ForceTables
@@ -153,8 +153,8 @@ def _rates(
 ) -> None:
     """V', alpha', q', gamma', ax, az into out (6,).
 
-    trim : V, alpha, elevator, gamma, mass, inertia, gravity, drift. shift : (6,) what lift [1/s per rad,
-    1, 1/s per rad] and moment [1/s2 per rad, 1/s, 1/s2 per rad] gain per alpha, q and elevator.
+    trim : V, alpha, elevator, gamma, mass, inertia, gravity, drift. shift : (6,) increments of gamma' [1/s per rad,
+    1, 1/s per rad] and q' [1/s2 per rad, 1/s, 1/s2 per rad] per alpha, q and elevator.
     """
     v, alpha, q, gamma = state[0], state[1], state[2], state[3]
     x, z, m = _look_up(v_axis, alpha_axis, elevator_axis, q_axis, values, v, alpha, elevator, q)
@@ -227,8 +227,13 @@ def simulate(model: Longitudinal, elevator_rad: Array, dt_s: float, shift: Array
     model : aircraft and steady state.
     elevator_rad : (runs, samples) surface, linear between samples [rad].
     dt_s : sample period and step [s].
-    shift : (runs, 6) what is added to the tables, linear about the steady state: to gamma' per alpha, q and
-        elevator [1/s, 1, 1/s], then to q' [1/s2, 1/s, 1/s2]; None adds nothing.
+    shift : (runs, 6) increments to the tables, linear about the steady state: of gamma' per alpha, q and elevator
+        [1/s, 1, 1/s], then of q' [1/s2, 1/s, 1/s2]; None for none.
+
+    Returns
+    -------
+    Motion
+        Channels of shape (runs, samples).
     """
     t = model.tables
     trim = np.array(
@@ -255,17 +260,17 @@ def simulate(model: Longitudinal, elevator_rad: Array, dt_s: float, shift: Array
 def auxiliary(
     model: Longitudinal, declared: Array
 ) -> Callable[[Array, Array, float, Scale], tuple[Array, Array]]:
-    """The nonlinear aircraft as the auxiliary model of instrumental variables.
+    """Return the nonlinear aircraft as the auxiliary model of instrumental variables.
 
-    The current estimate enters linearly about the steady state: the tables stay, and the lift and moment
-    coefficients gain (theta - declared) times alpha, q c/(2V) and elevator, deviations. With theta equal
-    to ``declared`` the model is the tables alone. Where a linear model is fitted to curved tables,
-    ``declared`` ought to be what such a fit makes of the tables themselves, not a slope at a point.
+    The current estimate enters linearly about the steady state: (theta - declared) times the deviations of alpha,
+    q c/(2V) and elevator adds to the coefficients of the tables. With theta equal to ``declared`` the model is the
+    tables alone. If a linear model is fitted to curved tables, ``declared`` should be the result of such a fit to the
+    tables themselves, not a slope at a point.
 
     Parameters
     ----------
-    model : aircraft and steady state; all runs are taken to start there.
-    declared : (6,) derivatives that stand for the tables [-].
+    model : aircraft and steady state; all runs start there.
+    declared : (6,) derivatives that represent the tables [-].
 
     Returns
     -------

@@ -1,53 +1,29 @@
-"""Sensor equations: where a sensor sits, and what it makes of the truth.
+"""Sensor equations: from the motion of the centre of gravity to the reading of an instrument.
 
 Body axes x forward, z down, origin at the centre of gravity; q nose-up positive.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from airtruth.physics.sensor_errors import SensorErrors
+
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class SensorModel:
-    """One channel of an instrument; the defaults do nothing. Applied in the order of `measure`.
+def measure(errors: SensorErrors, truth: Array, dt_s: float, normals: Array) -> Array:
+    """Reading of an instrument: lag, delay, scale, bias, noise, hold, quantisation, limits, in this order.
 
-    Attributes
-    ----------
-    noise_std : standard deviation of white noise per sample [unit of the channel].
-    bias : constant added [unit of the channel].
-    scale : factor on the truth [-].
-    lag_s : time constant of a first-order lag [s].
-    delay_s : transport delay [s], at least 0.
-    quantum : size of a quantisation step, rounding to nearest [unit of the channel]; 0 for none.
-    minimum, maximum : ends of the range [unit of the channel].
-    hold_s : update period of a slower instrument, which holds its value between [s]; 0 for none.
-    """
-
-    noise_std: float = 0.0
-    bias: float = 0.0
-    scale: float = 1.0
-    lag_s: float = 0.0
-    delay_s: float = 0.0
-    quantum: float = 0.0
-    minimum: float = -np.inf
-    maximum: float = np.inf
-    hold_s: float = 0.0
-
-
-def measure(model: SensorModel, truth: Array, dt_s: float, normals: Array) -> Array:
-    """Reading of a sensor: lag, delay, scale, bias, noise, hold, quantisation, saturation, in this order.
-
-    The record starts in equilibrium: what lag and delay need of the time before is the first sample.
+    The record starts in equilibrium: before it, the truth is its first sample. The position of the instrument is
+    the matter of `at_instrument`.
 
     Parameters
     ----------
-    model : the sensor.
+    errors : errors of the instrument.
     truth : (runs, samples) noise-free channel at the sensor.
     dt_s : sample period [s].
     normals : (runs, samples) independent standard normals.
@@ -57,21 +33,21 @@ def measure(model: SensorModel, truth: Array, dt_s: float, normals: Array) -> Ar
     (runs, samples), a new array; ``truth`` stays as it is.
     """
     y = truth
-    if model.lag_s > 0.0:
-        y = lag(y, dt_s, model.lag_s)
-    if model.delay_s > 0.0:
-        y = delay(y, dt_s, model.delay_s)
-    y = y * model.scale if model.scale != 1.0 else y.copy()
-    if model.bias != 0.0:
-        y += model.bias
-    if model.noise_std > 0.0:
-        y += model.noise_std * normals
-    if model.hold_s > dt_s:
-        y = hold(y, dt_s, model.hold_s)
-    if model.quantum > 0.0:
-        y = np.round(y / model.quantum) * model.quantum
-    if model.minimum > -np.inf or model.maximum < np.inf:
-        np.clip(y, model.minimum, model.maximum, out=y)
+    if errors.lag_s > 0.0:
+        y = lag(y, dt_s, errors.lag_s)
+    if errors.delay_s > 0.0:
+        y = delay(y, dt_s, errors.delay_s)
+    y = y * errors.scale if errors.scale != 1.0 else y.copy()
+    if errors.bias != 0.0:
+        y += errors.bias
+    if errors.noise_std > 0.0:
+        y += errors.noise_std * normals
+    if errors.hold_s > dt_s:
+        y = hold(y, dt_s, errors.hold_s)
+    if errors.quantum > 0.0:
+        y = np.round(y / errors.quantum) * errors.quantum
+    if errors.minimum > -np.inf or errors.maximum < np.inf:
+        np.clip(y, errors.minimum, errors.maximum, out=y)
     return y
 
 
@@ -103,7 +79,7 @@ def delay(x: Array, dt_s: float, delay_s: float) -> Array:
 
     Parameters
     ----------
-    x : (..., samples); before the record it is held at the first sample.
+    x : (..., samples); before the record it is constant at its first sample.
     dt_s, delay_s : sample period and delay [s].
     """
     samples = x.shape[-1]
@@ -140,8 +116,13 @@ def vane_alpha(alpha_rad: ArrayLike, q_rad_s: ArrayLike, x_m: float, airspeed_m_
 
     The vane moves up with q x (nose up), which lowers the flow angle there; to first order in q x/V.
     """
-    q = np.asarray(q_rad_s, dtype=np.float64)
-    return np.asarray(alpha_rad, dtype=np.float64) - q * x_m / np.asarray(airspeed_m_s, dtype=np.float64)
+    alpha, q, v = (np.asarray(x, dtype=np.float64) for x in (alpha_rad, q_rad_s, airspeed_m_s))
+    return vane_equation(alpha, q, x_m, v)
+
+
+def vane_equation(alpha_rad: Array, q_rad_s: Array, x_m: float, airspeed_m_s: Array) -> Array:
+    """`vane_alpha` as arithmetic alone, which the tracer's filter compiles for single numbers."""
+    return alpha_rad - q_rad_s * x_m / airspeed_m_s
 
 
 def accelerometer_ax(
@@ -168,13 +149,40 @@ def accelerometer_az(
     return np.asarray(az_m_s2, dtype=np.float64) - q_dot * x_m - np.square(q) * z_m
 
 
+def at_instrument(channel: str, truth: Mapping[str, Array], errors: SensorErrors) -> Array:
+    """True value of a channel where its instrument is: the arms of vane and accelerometers applied.
+
+    Parameters
+    ----------
+    channel : column of a log.
+    truth : channel -> values of one shape at the centre of gravity [SI]; alpha_rad needs q_rad_s and airspeed_m_s,
+        the accelerometers need q_rad_s and q_dot_rad_s2.
+    errors : position of the instrument.
+
+    Returns
+    -------
+    Values of that shape [unit of the channel]; those of ``truth`` itself where the position does not matter.
+    """
+    x, z = errors.x_m, errors.z_m
+    if x == 0.0 and z == 0.0:
+        return truth[channel]
+    if channel == "alpha_rad":
+        return vane_alpha(truth["alpha_rad"], truth["q_rad_s"], x, truth["airspeed_m_s"])
+    if channel == "az_m_s2":
+        return accelerometer_az(truth["az_m_s2"], truth["q_dot_rad_s2"], x, truth["q_rad_s"], z)
+    if channel == "ax_m_s2":
+        return accelerometer_ax(truth["ax_m_s2"], truth["q_rad_s"], truth["q_dot_rad_s2"], x, z)
+    return truth[channel]
+
+
 __all__ = [
-    "SensorModel",
     "accelerometer_ax",
     "accelerometer_az",
+    "at_instrument",
     "delay",
     "hold",
     "lag",
     "measure",
     "vane_alpha",
+    "vane_equation",
 ]

@@ -15,7 +15,21 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 PARAMETERS: Final = ("CLalpha", "CLq", "CLde", "Cmalpha", "Cmq", "Cmde")
+"""Names of the six derivatives [-], in the order of every array of derivatives."""
+CL_ALPHA: Final = 0
+"""Index of CLalpha in `PARAMETERS`."""
+CL_Q: Final = 1
+"""Index of CLq in `PARAMETERS`."""
+CL_DE: Final = 2
+"""Index of CLde in `PARAMETERS`."""
+CM_ALPHA: Final = 3
+"""Index of Cmalpha in `PARAMETERS`."""
+CM_Q: Final = 4
+"""Index of Cmq in `PARAMETERS`."""
+CM_DE: Final = 5
+"""Index of Cmde in `PARAMETERS`."""
 MODAL: Final = ("wn_rad_s", "zeta")
+"""Names of the modal parameters: natural frequency [rad/s] and damping ratio [-]."""
 
 
 @dataclass(frozen=True)
@@ -129,4 +143,19 @@ def derivatives(a: Array, b: Array, s: Scale) -> Array:
     )
 
 
-__all__ = ["MODAL", "PARAMETERS", "Scale", "derivatives", "modal", "normal_force_row", "scale", "system"]
+__all__ = [
+    "CL_ALPHA",
+    "CL_DE",
+    "CL_Q",
+    "CM_ALPHA",
+    "CM_DE",
+    "CM_Q",
+    "MODAL",
+    "PARAMETERS",
+    "Scale",
+    "derivatives",
+    "modal",
+    "normal_force_row",
+    "scale",
+    "system",
+]

@@ -1,0 +1,64 @@
+"""Compile the numba kernels into their cache: one identification and one trace side by side.
+
+    python -m scripts.compile_kernels
+
+With a full cache this takes a few seconds. Without it, every process that meets a kernel first compiles it.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Final
+
+LOG: Final = Path(__file__).resolve().parents[1] / "data" / "undeclared" / "a.parquet"
+"""A short log that every kernel accepts."""
+METHODS: Final = (
+    "ls",
+    "iv-lowpass",
+    "iv-actuator",
+    "iv-f1",
+    "iv-f2",
+    "iv-refined",
+    "frequency",
+    "filter-error",
+    "output-error",
+)
+"""Methods that together run every kernel of the identification."""
+
+
+def main() -> None:
+    """Run both commands; exit with the first failure."""
+    with tempfile.TemporaryDirectory() as folder:
+        shared = [sys.executable, "-m", "airtruth"]
+        identify = [
+            *shared,
+            "identify",
+            str(LOG),
+            "--aircraft",
+            "gtm",
+            "--quiet",
+            "--out",
+            f"{folder}/estimates.parquet",
+        ]
+        identify += [word for name in METHODS for word in ("--method", name)]
+        trace = [
+            *shared,
+            "trace",
+            str(LOG),
+            "--aircraft",
+            "gtm",
+            "--quiet",
+            "--out",
+            folder,
+            "--effect",
+            "vane_lag",
+        ]
+        running = [subprocess.Popen(command, stdout=subprocess.DEVNULL) for command in (identify, trace)]
+        sys.exit(max(process.wait() for process in running))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,71 @@
+"""The dynamics that an aircraft.toml declares, and those that a change adds to them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+from airtruth.aircraft.file import Dynamics
+from airtruth.physics.terms import AeroTerm, Change
+
+ALPHA_DOT: Final = "alpha_dot_hat"
+"""The one signal that is zero in a steady state without being a state."""
+_DECLARED: Final = "declared "
+"""Prefix of the names of an aircraft's own states, which an effect's states may share."""
+
+
+def with_change(declared: Dynamics | None, change: Change) -> Dynamics | None:
+    """Return the declared dynamics followed by those of a change; None if there are none.
+
+    A state takes another name where the aircraft has one of its name. Increments without dynamics are left out: the
+    JSBSim model holds them.
+
+    Parameters
+    ----------
+    declared : dynamics of an aircraft.toml.
+    change : what an effect adds.
+    """
+    own = Dynamics() if declared is None else declared
+    taken = {state.name for state in own.states}
+    names: dict[str, str] = {}
+    for state in change.states:
+        name, count = state.name, 2
+        while name in taken:
+            name, count = f"{state.name}_{count}", count + 1
+        names[state.name] = name
+        taken.add(name)
+    dynamic = [t for t in change.aero if t.signal == ALPHA_DOT or t.signal in names]
+    result = Dynamics(
+        surface=(*own.surface, *change.surface),
+        states=(*own.states, *(replace(s, name=names[s.name]) for s in change.states)),
+        aero=(*own.aero, *(replace(t, signal=names.get(t.signal, t.signal)) for t in dynamic)),
+    )
+    return None if result == Dynamics() else result
+
+
+def declared_dynamics(dynamics: Dynamics | None) -> Change:
+    """Return an aircraft's dynamics as a change of its steady forces.
+
+    In a steady state a lag or mode equals its input, and the tables of steady forces hold its increment at that value:
+    the increment of the input itself is subtracted.
+    """
+    if dynamics is None:
+        return Change()
+    inputs = {state.name: state.signal for state in dynamics.states}
+    aero: list[AeroTerm] = []
+    for term in dynamics.aero:
+        source = inputs.get(term.signal)
+        if source is None:
+            aero.append(term)
+            continue
+        aero.append(replace(term, signal=_DECLARED + term.signal))
+        if source != ALPHA_DOT:
+            aero.append(replace(term, signal=source, amplitude=-term.amplitude))
+    return Change(
+        surface=dynamics.surface,
+        states=tuple(replace(state, name=_DECLARED + state.name) for state in dynamics.states),
+        aero=tuple(aero),
+    )
+
+
+__all__ = ["ALPHA_DOT", "declared_dynamics", "with_change"]

@@ -1,0 +1,347 @@
+"""An aircraft: a folder with aircraft.toml and, usually, a JSBSim model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from pydantic import Field, ValidationError, field_validator, model_validator
+
+from airtruth import quantity as qt
+from airtruth.aircraft.model import JsbsimModel
+from airtruth.aircraft.probe import Constants, probe
+from airtruth.channels import SIGNALS
+from airtruth.documents import read_toml
+from airtruth.errors import AircraftError, choices
+from airtruth.physics.sensor_errors import KINDS, SensorErrors
+from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.terms import AeroTerm, StateTerm, SurfaceTerm
+from airtruth.quantity import Quantity, Strict
+
+FILE: Final = "aircraft.toml"
+"""Name of the file that makes a folder an aircraft."""
+
+_SENSOR_DIMENSIONS: Final = {kind.key: kind.dimension for kind in KINDS.values() if kind.dimension}
+"""Dimension of a sensor's entry where it is not that of its channel."""
+
+
+class Sensor(Strict):
+    """How one channel is measured; every quantity in SI of the channel.
+
+    noise_std: white, one sample to the next [unit of the channel]; bias, quantum, minimum, maximum
+    likewise; scale: factor [-]; lag: time constant [s]; delay, hold (sample and hold) [s];
+    x, z: position ahead of and below the CG [m] (vane, accelerometer).
+    """
+
+    noise_std: Quantity = Quantity(value=0.0)
+    bias: Quantity = Quantity(value=0.0)
+    scale: Quantity = Quantity(value=1.0)
+    lag: Quantity = Quantity(value=0.0)
+    delay: Quantity = Quantity(value=0.0)
+    hold: Quantity = Quantity(value=0.0)
+    quantum: Quantity = Quantity(value=0.0)
+    minimum: Quantity | None = None
+    maximum: Quantity | None = None
+    x: Quantity = Quantity(value=0.0)
+    z: Quantity = Quantity(value=0.0)
+
+    @field_validator(*(kind.key for kind in KINDS.values() if not kind.may_be_negative))
+    @classmethod
+    def _not_negative(cls, value: Quantity) -> Quantity:
+        if value.value < 0.0:
+            raise ValueError(f"must not be negative (is {value.value:g} in SI)")
+        return value
+
+    def errors(self) -> SensorErrors:
+        """The errors as numbers in SI, without their uncertainties and sources."""
+        stated = {kind.field: getattr(self, kind.key) for kind in KINDS.values()}
+        return SensorErrors(**{name: entry.value for name, entry in stated.items() if entry is not None})
+
+
+class Actuator(Strict):
+    """First-order elevator servo; the delay counts from command to surface."""
+
+    bandwidth: qt.Frequency
+    rate_limit: qt.Rate
+    minimum: qt.Angle
+    maximum: qt.Angle
+    delay: qt.Time = Quantity(value=0.0)
+
+
+class Geometry(Strict):
+    """Reference lengths and areas."""
+
+    wing_area: qt.Area
+    chord: qt.Length
+    span: qt.Length
+
+
+class MassProperties(Strict):
+    """Mass, pitch inertia about the CG, and CG behind the leading edge of the MAC as a fraction of it."""
+
+    mass: qt.Mass
+    inertia_yy: qt.Inertia
+    cg: qt.Ratio = Quantity(value=0.25)
+
+
+class Tail(Strict):
+    """Horizontal tail; an entry that is not stated is inferred from the derivatives.
+
+    arm: distance from the CG aft to the tail's aerodynamic centre; area: exposed to the stream; lift_slope: of the
+    isolated tail per its area [1/rad]; efficiency: dynamic pressure at the tail over that of the free stream.
+    """
+
+    arm: qt.Length | None = None
+    area: qt.Area | None = None
+    lift_slope: qt.Ratio | None = None
+    efficiency: qt.Ratio = Quantity(value=1.0)
+
+    @model_validator(mode="after")
+    def _complete(self) -> Tail:
+        for name in type(self).model_fields:
+            entry = getattr(self, name)
+            if entry is not None and not entry.value > 0.0:
+                raise ValueError(f"{name} has to be above 0 (is {entry.value:g} in SI)")
+        if (self.area is None) != (self.lift_slope is None):
+            raise ValueError("area and lift_slope give the lift of the tail together; state both or neither")
+        return self
+
+
+class Dynamics(Strict):
+    """Dynamics of the JSBSim model that its forces in a steady state do not show; a trace adds them to its filter.
+
+    `airtruth trace` writes them into an updated aircraft. surface: terms between the measured surface and the air, in
+    sequence; states: lags and modes; aero: increments of CL and Cm whose signal is alpha_dot c/(2V) or a state.
+    """
+
+    surface: tuple[SurfaceTerm, ...] = ()
+    states: tuple[StateTerm, ...] = ()
+    aero: tuple[AeroTerm, ...] = ()
+
+    @model_validator(mode="after")
+    def _positive(self) -> Dynamics:
+        values = [(f"surface {t.kind}: value", t.value) for t in self.surface]
+        values += [(f"state {t.name}: time_s", t.time_s) for t in self.states]
+        for name, value in values:
+            if value <= 0.0:
+                raise ValueError(f"{name} has to be above 0 (is {value:g})")
+        return self
+
+
+class AircraftFile(Strict):
+    """aircraft.toml.
+
+    derivatives: the six short-period derivatives about the CG, by the names of
+    `airtruth.physics.short_period.PARAMETERS`, with their uncertainty. Where there is a JSBSim model its
+    own values count, and only the ratio std/value is taken from here.
+    """
+
+    schema_: Literal[1] = Field(default=1, alias="schema")
+    name: str = Field(pattern=r"^[A-Za-z0-9_.-]+$")
+    description: str = ""
+    geometry: Geometry | None = None
+    mass: MassProperties | None = None
+    tail: Tail | None = None
+    jsbsim: JsbsimModel | None = None
+    elevator_actuator: Actuator | None = None
+    dynamics: Dynamics | None = None
+    derivatives: dict[str, qt.Ratio] = Field(default_factory=dict)
+    sensors: dict[str, Sensor] = Field(default_factory=dict)
+
+    @field_validator("derivatives")
+    @classmethod
+    def _known_derivatives(cls, value: dict[str, Quantity]) -> dict[str, Quantity]:
+        for name in value:
+            if name not in PARAMETERS:
+                raise ValueError(f"{name!r} is not a derivative; {choices(name, PARAMETERS)}")
+        return value
+
+    @field_validator("sensors", mode="before")
+    @classmethod
+    def _sensors_in_si(cls, raw: Any) -> Any:
+        if not isinstance(raw, dict):
+            return raw
+        return {name: sensor_tables(name, table) for name, table in raw.items()}
+
+
+def sensor_tables(channel: str, raw: Any) -> Any:
+    """Turn the quantity tables of one sensor into SI of its channel.
+
+    Raises
+    ------
+    ValueError
+        If the channel is unknown, or a unit is of another dimension.
+    """
+    if channel not in SIGNALS:
+        raise ValueError(f"{channel!r} is not a channel; {choices(channel, SIGNALS)}")
+    if not isinstance(raw, dict):
+        return raw
+    dimension = SIGNALS[channel].dimension
+    result = {}
+    for key, table in raw.items():
+        if key not in Sensor.model_fields:
+            result[key] = table
+            continue
+        try:
+            result[key] = qt.table_in(_SENSOR_DIMENSIONS.get(key, dimension), table)
+        except ValidationError as error:
+            raise ValueError(f"{channel}.{key}: {'; '.join(qt.explain(error, Quantity))}") from None
+        except ValueError as error:
+            raise ValueError(f"{channel}.{key}: {error}") from None
+    return result
+
+
+class Aircraft(Strict):
+    """An aircraft that was read and checked.
+
+    Attributes
+    ----------
+    folder : folder of aircraft.toml.
+    file : its content.
+    constants : geometry and mass; from aircraft.toml, or else as the JSBSim model has them.
+    """
+
+    folder: Path
+    file: AircraftFile
+    constants: Constants
+
+    @property
+    def name(self) -> str:
+        """Name of the aircraft, as logs state it."""
+        return self.file.name
+
+    @property
+    def wing_area_m2(self) -> float:
+        """Reference area S [m2]."""
+        return self.constants.wing_area_m2
+
+    @property
+    def chord_m(self) -> float:
+        """Mean aerodynamic chord c [m]."""
+        return self.constants.chord_m
+
+    @property
+    def mass_kg(self) -> float:
+        """Mass [kg]."""
+        return self.constants.mass_kg
+
+    @property
+    def inertia_yy_kg_m2(self) -> float:
+        """Pitch inertia about the CG [kg m2]."""
+        return self.constants.inertia_yy_kg_m2
+
+
+def find(name: str | Path, near: Path | None = None) -> Path:
+    """Folder of an aircraft given by path or by name.
+
+    Looked for, in this order: the path itself (a folder or an aircraft.toml), then the folder
+    ``aircraft/NAME`` beside ``near``, in the working folder, and among those shipped.
+
+    Raises
+    ------
+    AircraftError
+        If there is none; the message lists the names that exist.
+    """
+    try:
+        return _find(Path(name), near)
+    except OSError as error:  # a name that the file system does not take
+        raise AircraftError(
+            f"aircraft {str(name)[:80]!r} cannot be looked up ({error.strerror}); give a folder that holds {FILE}"
+        ) from None
+
+
+def _find(path: Path, near: Path | None) -> Path:
+    for candidate in (path, (near / path) if near else path):
+        if candidate.is_file() and candidate.name == FILE:
+            return candidate.parent
+        if (candidate / FILE).is_file():
+            return candidate
+    roots = [*([near / "aircraft", near] if near else []), Path("aircraft"), *shipped_roots()]
+    for root in roots:
+        if (root / path / FILE).is_file():
+            return root / path
+    known = {p.parent.name for root in roots if root.is_dir() for p in root.glob(f"*/{FILE}")}
+    if path.is_dir():
+        raise AircraftError(f"{path}: no {FILE} in this folder; see docs/aircraft.md for a minimal one")
+    raise AircraftError(
+        f"aircraft {str(path)!r} not found; {choices(path.name, known)}; or give a folder that holds {FILE}"
+    )
+
+
+def shipped_roots() -> list[Path]:
+    """Folders of the aircraft that come with airtruth, in a wheel or in a checkout."""
+    here = Path(__file__).resolve().parents[1]
+    return [p for p in (here / "shipped_aircraft", here.parents[1] / "aircraft") if p.is_dir()]
+
+
+def read_file(folder: Path) -> AircraftFile:
+    """Read and validate aircraft.toml.
+
+    Raises
+    ------
+    AircraftError
+        With every problem of the file, not only the first.
+    """
+    path = folder / FILE
+    raw = read_toml(path, AircraftError, "correct it, or see docs/aircraft.md for a minimal one")
+    try:
+        return AircraftFile.model_validate(raw)
+    except ValidationError as error:
+        problems = "\n  ".join(qt.explain(error, AircraftFile))
+        raise AircraftError(f"{path}:\n  {problems}") from None
+
+
+def load(name: str | Path, near: Path | None = None) -> Aircraft:
+    """Find, read and check an aircraft; its JSBSim model is first loaded in a child process.
+
+    Raises
+    ------
+    AircraftError
+        If a file is missing or malformed, JSBSim refuses the model, or a property does not exist.
+    """
+    folder = find(name, near)
+    file = read_file(folder)
+    model_constants = probe(folder, file.jsbsim.model_dump_json()) if file.jsbsim else None
+    if model_constants is None and (file.geometry is None or file.mass is None):
+        raise AircraftError(f"{folder / FILE}: without [jsbsim] it needs [geometry] and [mass]")
+    return Aircraft(folder=folder, file=file, constants=_constants(file, model_constants))
+
+
+def _constants(file: AircraftFile, model: Constants | None) -> Constants:
+    base = model.model_dump() if model else {"cg_fraction": 0.25}
+    if file.geometry:
+        base |= {
+            "wing_area_m2": file.geometry.wing_area.value,
+            "chord_m": file.geometry.chord.value,
+            "span_m": file.geometry.span.value,
+        }
+    if file.mass:
+        base |= {
+            "mass_kg": file.mass.mass.value,
+            "inertia_yy_kg_m2": file.mass.inertia_yy.value,
+            "cg_fraction": file.mass.cg.value,
+        }
+    constants = Constants.model_validate(base)
+    if model and (file.geometry or file.mass):
+        for field in ("wing_area_m2", "chord_m", "mass_kg", "inertia_yy_kg_m2"):
+            stated, flown = getattr(constants, field), getattr(model, field)
+            if abs(stated - flown) > 1e-3 * abs(flown):
+                raise AircraftError(
+                    f"{file.name}: {field} is {stated:.6g} in {FILE} but {flown:.6g} in the JSBSim model; "
+                    "make them agree, or leave the value out of aircraft.toml to use the model's"
+                )
+    return constants
+
+
+__all__ = [
+    "FILE",
+    "Actuator",
+    "Aircraft",
+    "AircraftFile",
+    "Sensor",
+    "find",
+    "load",
+    "read_file",
+    "sensor_tables",
+    "shipped_roots",
+]

@@ -1,0 +1,279 @@
+"""Increments of CL and Cm, and their states, as functions of a JSBSim model's <aerodynamics>.
+
+Signals are read inside <aerodynamics>, where the state is that of the present step. A control channel copies the
+values that a state needs of the previous step, at the start of the next one, before anything has changed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+from xml.etree.ElementTree import Element, SubElement
+
+from airtruth.aircraft.jsbsim.functions import (
+    STEP,
+    TIME,
+    component,
+    from_start,
+    function,
+    lag,
+    op,
+    prop,
+    step,
+)
+from airtruth.aircraft.jsbsim.surface import Components, Names
+from airtruth.errors import AircraftError, ConfigurationError, choices
+from airtruth.physics.terms import FORMULAS, AeroTerm, StateTerm, shape_of
+
+_ALPHA_DOT: Final = "aero/alphadot-rad_sec"
+"""Property of alpha_dot over ground, one step old [rad/s]."""
+_LEAST_BENDS: Final = 3
+"""Least number of bends that are written as a table [-]; a single break is a formula (convention)."""
+_ROUNDING: Final = 1e-9
+"""Sum of slopes beyond the last bend, over the largest, that counts as zero [-] (judgement: above rounding)."""
+_UP: Final = {"Z": -1.0, "NORMAL": 1.0}
+"""Axis that carries a force along -z of the body, and its sign."""
+
+
+def write(
+    aerodynamics: Element,
+    terms: Sequence[AeroTerm],
+    states: Sequence[StateTerm],
+    named: Names,
+    surface_rad: float,
+    rotary_gust: str | None,
+    where: str,
+) -> Components:
+    """Add the terms to the axes, and return the components that have to run in a control channel.
+
+    Parameters
+    ----------
+    aerodynamics : the model's element, changed.
+    terms, states : see `airtruth.physics.terms`.
+    named : names of the new properties.
+    surface_rad : radians per unit of the surface's property.
+    rotary_gust : property that holds the rotation of the air [rad/s], or None.
+    where : subject of error messages.
+
+    Raises
+    ------
+    ConfigurationError
+        If a term's signal is unknown, or two states have one name.
+    AircraftError
+        If the model has no axis that can carry lift.
+    """
+    root = f"aero/{named.label}/"
+    twice = {s.name for s in states if sum(o.name == s.name for o in states) > 1}
+    if twice:
+        raise ConfigurationError(
+            f"two states are named {twice.pop()!r}; an effect with a state can be written once"
+        )
+    made: dict[str, str] = {}
+    functions: list[Element] = []
+    memory = Components()
+    for name in dict.fromkeys([s.signal for s in states] + [t.signal for t in terms]):
+        if name in (s.name for s in states):
+            continue
+        made[name] = f"{root}{name.replace('_', '-')}"
+        extra, more = _signal(name, made[name], named.effective, surface_rad, rotary_gust)
+        functions += extra
+        memory += more
+    for state in states:
+        made[state.name] = f"{root}state-{state.name}"
+        functions.append(_state(state, made[state.name], made[state.signal]))
+        memory += _memory(state, made[state.name], made[state.signal])
+    by_coefficient: dict[str, list[str]] = {"CL": [], "Cm": []}
+    learned, single = _grouped(terms)
+    for number, group in enumerate(learned, start=1):
+        output = f"{root}{group[0].coefficient}-table-{number}"
+        functions += _table(output, group, made[group[0].signal])
+        by_coefficient[group[0].coefficient].append(output)
+    for number, term in enumerate(single, start=1):
+        output = f"{root}{term.coefficient}-{number}"
+        functions.append(
+            function(
+                output,
+                _description(term),
+                op("product", term.amplitude, _shape(term, op("sum", made[term.signal], -term.at))),
+            )
+        )
+        by_coefficient[term.coefficient].append(output)
+    first = next((i for i, e in enumerate(aerodynamics) if e.tag == "axis"), len(aerodynamics))
+    for offset, element in enumerate(functions):
+        aerodynamics.insert(first + offset, element)
+    _to_axes(aerodynamics, by_coefficient, root, where)
+    return memory
+
+
+def _grouped(terms: Sequence[AeroTerm]) -> tuple[list[list[AeroTerm]], list[AeroTerm]]:
+    """Bends of one coefficient over one signal that are constant beyond their ends, and the other terms."""
+    bends: dict[tuple[str, str], list[AeroTerm]] = {}
+    for term in terms:
+        if term.shape in ("above", "below"):
+            bends.setdefault((term.coefficient, term.signal), []).append(term)
+    learned = [group for group in bends.values() if len(group) >= _LEAST_BENDS and _is_constant_beyond(group)]
+    taken = {id(term) for group in learned for term in group}
+    return learned, [term for term in terms if id(term) not in taken]
+
+
+def _is_constant_beyond(group: Sequence[AeroTerm]) -> bool:
+    for shape in ("above", "below"):
+        slopes = [term.amplitude for term in group if term.shape == shape]
+        if abs(math.fsum(slopes)) > _ROUNDING * max(map(abs, slopes), default=0.0):
+            return False
+    return True
+
+
+def _table(output: str, group: Sequence[AeroTerm], signal: str) -> list[Element]:
+    """The bends as a table, which JSBSim holds constant outside, and a flag that is 1 there."""
+    points = sorted({term.at for term in group})
+    values = [math.fsum(t.amplitude * float(shape_of(t, point)) for t in group) for point in points]
+    first = group[0]
+    table = Element("table")
+    SubElement(table, "independentVar", {"lookup": "row"}).text = signal
+    rows = "\n".join(f"{x!r} {y!r}" for x, y in zip(points, values, strict=True))
+    SubElement(table, "tableData").text = f"\n{rows}\n"
+    words = f"{first.coefficient} over {first.signal}, learned from {points[0]!r} to {points[-1]!r}, constant outside"
+    outside = op("ifthen", op("or", op("lt", signal, points[0]), op("gt", signal, points[-1])), 1.0, 0.0)
+    return [
+        function(output, words, table),
+        function(f"{output}-outside", f"1 where {first.signal} is outside the table's range", outside),
+    ]
+
+
+def _description(term: AeroTerm) -> str:
+    return f"{term.coefficient} += {term.amplitude!r} {FORMULAS[term.shape]}, s = {term.signal}, at = {term.at!r}"
+
+
+def _shape(term: AeroTerm, deviation: Element) -> Element:
+    if term.shape == "linear":
+        return deviation
+    if term.shape == "quadratic":
+        return op("pow", deviation, 2.0)
+    return op("max" if term.shape == "above" else "min", 0.0, deviation)
+
+
+def _signal(
+    name: str, output: str, surface: str, surface_rad: float, rotary_gust: str | None
+) -> tuple[list[Element], Components]:
+    if name == "alpha":
+        return [
+            function(output, "Angle of attack of the air at the CG [rad]", prop("aero/alpha-rad"))
+        ], Components()
+    if name == "elevator":
+        formula = op("product", surface_rad, surface)
+        return [
+            function(output, "Surface as the air sees it, trailing edge down [rad]", formula)
+        ], Components()
+    if name == "qhat":
+        rate = (
+            op("difference", "velocities/q-rad_sec", rotary_gust)
+            if rotary_gust
+            else prop("velocities/q-rad_sec")
+        )
+        formula = op("product", rate, "aero/ci2vel")
+        return [function(output, "q c/(2V) of the air [-]", formula)], Components()
+    if name == "alpha_dot_hat":
+        # JSBSim's value is one step old; the line through it and the one before reaches the present. A
+        # settled state is taken as steady: JSBSim's value there may be that of the state it was in before
+        before = f"{output}-before"
+        now = from_start(0.0, op("difference", op("product", 2.0, _ALPHA_DOT), before))
+        formula = op("product", now, "aero/ci2vel")
+        memory = Components((component(before, "", prop(_ALPHA_DOT)),), (before,))
+        return [function(output, "alpha_dot c/(2V), inertial [-]", formula)], memory
+    raise ConfigurationError(
+        f"signal {name!r}: {choices(name, ('alpha', 'elevator', 'qhat', 'alpha_dot_hat'))}, or a state of the change"
+    )
+
+
+def _state(state: StateTerm, output: str, source: str) -> Element:
+    if state.kind == "lag":
+        later = lag(state.time_s, source, f"{output}-input-before", f"{output}-before")
+        return function(output, f"Lag of {state.signal}, tau = {state.time_s!r} s", from_start(source, later))
+    return function(
+        output,
+        f"Mode driven by {state.signal}, wn = {1.0 / state.time_s!r} rad/s, zeta = {state.damping!r}",
+        from_start(source, _mode(state, output, source)),
+    )
+
+
+def _mode(state: StateTerm, output: str, source: str) -> Element:
+    """Bilinear transform, exact at the natural frequency: s -> (wn/tan(wn dt/2)) (z - 1)/(z + 1).
+
+    Over wn^2, with k = 1/tan(wn dt/2): (k^2 + 2 zeta k + 1) y = x + 2 x[-1] + x[-2] - (2 - 2 k^2) y[-1]
+    - (k^2 - 2 zeta k + 1) y[-2].
+    """
+    wn = 1.0 / state.time_s
+    k = op("quotient", 1.0, op("tan", op("product", 0.5 * wn, step())))
+    k2 = op("pow", k, 2.0)
+    damping = op("product", 2.0 * state.damping, k)
+    drive = op("sum", source, op("product", 2.0, f"{output}-input-before"), f"{output}-input-before-2")
+    old = op("product", op("difference", op("product", 2.0, k2), 2.0), f"{output}-before")
+    older = op("product", op("sum", k2, op("product", -1.0, damping), 1.0), f"{output}-before-2")
+    return op("quotient", op("difference", op("sum", drive, old), older), op("sum", k2, damping, 1.0))
+
+
+def _memory(state: StateTerm, output: str, source: str) -> Components:
+    held = [(f"{output}-input-before", source), (f"{output}-before", output)]
+    parts: list[Element] = []
+    if state.kind == "mode":
+        # at the first step what was two steps ago is the settled state, which the functions still hold
+        later = op("gt", TIME, op("product", 1.5, STEP))
+        parts = [component(f"{to}-2", "", op("ifthen", later, to, now)) for to, now in held]
+    parts += [component(to, "", prop(now)) for to, now in held]
+    names = tuple(to for to, _ in held)
+    return Components(tuple(parts), names + tuple(f"{to}-2" for to in names if state.kind == "mode"))
+
+
+def _to_axes(aerodynamics: Element, by_coefficient: dict[str, list[str]], root: str, where: str) -> None:
+    if by_coefficient["CL"]:
+        force = op("product", "aero/qbar-psf", "metrics/Sw-sqft", op("sum", *by_coefficient["CL"], 0.0))
+        total = function(
+            f"{root}force-lbs", "Sum of the increments of CL: force along -z of the body [lbf]", force
+        )
+        first = next((i for i, e in enumerate(aerodynamics) if e.tag == "axis"), len(aerodynamics))
+        aerodynamics.insert(first, total)
+        _force(aerodynamics, root, where)
+    moments: list[Element | float | str] = []
+    if by_coefficient["Cm"]:
+        moments.append(
+            op(
+                "product",
+                "aero/qbar-psf",
+                "metrics/Sw-sqft",
+                "metrics/cbarw-ft",
+                op("sum", *by_coefficient["Cm"], 0.0),
+            )
+        )
+    if by_coefficient["CL"]:
+        # JSBSim applies forces at its reference point; this takes them back to the CG
+        ahead = op("quotient", op("difference", "inertia/cg-x-in", "metrics/aero-rp-x-in"), 12.0)
+        moments.append(op("product", -1.0, ahead, f"{root}force-lbs"))
+    if moments:
+        _axis(aerodynamics, "PITCH").append(
+            function(
+                f"{root}moment-lbsft", "Increments of Cm about the CG [lbf ft]", op("sum", *moments, 0.0)
+            )
+        )
+
+
+def _axis(aerodynamics: Element, name: str) -> Element:
+    axis = next((a for a in aerodynamics.findall("axis") if a.get("name", "").upper() == name), None)
+    return SubElement(aerodynamics, "axis", {"name": name}) if axis is None else axis
+
+
+def _force(aerodynamics: Element, root: str, where: str) -> None:
+    names = {a.get("name", "").upper() for a in aerodynamics.findall("axis")}
+    for name, sign in _UP.items():
+        if name in names or (name == "Z" and "X" in names):
+            formula = op("product", sign, f"{root}force-lbs")
+            _axis(aerodynamics, name).append(function(f"{root}{name}-lbs", "Increments of CL [lbf]", formula))
+            return
+    if not names & {"LIFT", "DRAG"}:
+        raise AircraftError(
+            f"{where}: its <aerodynamics> have no axis LIFT, Z or NORMAL that could carry lift"
+        )
+    for name, component_of in (("LIFT", "cos"), ("DRAG", "sin")):
+        formula = op("product", f"{root}force-lbs", op(component_of, "aero/alpha-rad"))
+        _axis(aerodynamics, name).append(function(f"{root}{name}-lbs", "Increments of CL [lbf]", formula))

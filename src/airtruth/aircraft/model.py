@@ -1,0 +1,85 @@
+"""The [jsbsim] table of aircraft.toml: where the model lies, and which of its properties mean what."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from airtruth.quantity import Strict
+
+
+class ElevatorProperties(Strict):
+    """JSBSim properties of the elevator.
+
+    command: property that a command is added to; command_per_rad: its units per radian of command;
+    surface: property of the surface; surface_rad: radians per unit of it (negative if the model
+    counts trailing edge up); command_frames: frames between reading a command and acting on it,
+    see aircraft/gtm/gtm.xml; feedback: augmentation of the model moves the surface at a held command.
+    """
+
+    command: str
+    command_per_rad: float = 1.0
+    surface: str = "fcs/elevator-pos-rad"
+    surface_rad: float = 1.0
+    command_frames: int = Field(default=0, ge=0, le=1)
+    feedback: bool = False
+
+
+class ThrottleProperties(Strict):
+    """JSBSim properties that hold the lever (0 to 1), all set together; trim: those that hold its trim.
+
+    Without a command the aircraft glides: a trim solves for the flight-path angle instead of the lever.
+    """
+
+    command: tuple[str, ...] = ("fcs/throttle-cmd-norm",)
+    trim: tuple[str, ...] = ()
+
+
+class LateralProperties(Strict):
+    """JSBSim properties of aileron and rudder, -1 to 1, for a trim that holds an asymmetric aircraft straight."""
+
+    aileron: str = "fcs/aileron-cmd-norm"
+    rudder: str = "fcs/rudder-cmd-norm"
+
+
+class AugmentationProperties(Strict):
+    """JSBSim properties of a pitch damper and attitude hold, and of the sensor errors in its inputs."""
+
+    damper_gain: str
+    attitude_gain: str
+    theta_reference: str
+    q_error: str
+    theta_error: str
+
+
+class JsbsimModel(Strict):
+    """Where the JSBSim model lies and which of its properties mean what.
+
+    root: "." for a model in the folder of aircraft.toml, "wheel" for one that jsbsim ships.
+    set: properties written once before each run (gear up, flaps, mixture ...).
+    declare: properties of a simulator around the model, created with these values before the model is loaded.
+    lateral: aileron and rudder; with them a trim holds roll, yaw and side force at zero, with a small bank.
+    engine_start_s: longest time for which the engines are started and run at a held state before a flight [s]; 0 for
+    JSBSim's own steady state, which stalls many propellers.
+    """
+
+    model: str
+    root: Literal[".", "wheel"] = "."
+    elevator: ElevatorProperties
+    throttle: ThrottleProperties = ThrottleProperties()
+    augmentation: AugmentationProperties | None = None
+    rotary_gust: str | None = None
+    set: dict[str, float] = Field(default_factory=dict)
+    declare: dict[str, float] = Field(default_factory=dict)
+    lateral: LateralProperties | None = None
+    engine_start_s: float = Field(default=0.0, ge=0.0, le=300.0)
+
+
+__all__ = [
+    "AugmentationProperties",
+    "ElevatorProperties",
+    "JsbsimModel",
+    "LateralProperties",
+    "ThrottleProperties",
+]

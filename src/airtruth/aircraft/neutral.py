@@ -1,0 +1,58 @@
+"""The effective terms of a change, and sensors with the errors of a change."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from airtruth.aircraft import Sensor
+from airtruth.errors import ConfigurationError
+from airtruth.physics.sensor_errors import KINDS
+from airtruth.physics.terms import CAUSES, DECLARED, Change, SensorTerm, SurfaceTerm
+
+
+def effective(change: Change) -> Change:
+    """Return the change without neutral terms, and without states that no term reads."""
+    aero = tuple(term for term in change.aero if term.amplitude != 0.0)
+    signals = {term.signal for term in aero}
+    return replace(
+        change,
+        surface=tuple(term for term in change.surface if not _neutral_surface(term)),
+        states=tuple(state for state in change.states if state.name in signals),
+        aero=aero,
+        declared=tuple(term for term in change.declared if term.value != DECLARED[term.quantity]),
+        derivatives=tuple(term for term in change.derivatives if term.value != CAUSES[term.cause]),
+        sensors=tuple(term for term in change.sensors if term.value != KINDS[term.kind].neutral),
+        air=tuple(term for term in change.air if term.factor != 1.0),
+    )
+
+
+def _neutral_surface(term: SurfaceTerm) -> bool:
+    return math.isinf(term.value) if term.kind == "rate_limit" else term.value == 0.0
+
+
+def fitted(sensors: Mapping[str, Sensor], terms: Iterable[SensorTerm]) -> dict[str, Sensor]:
+    """Return the declared sensors with the errors of terms added, see `airtruth.physics.sensor_errors.ErrorKind`.
+
+    A channel without a sensor gets one with these errors alone.
+
+    Raises
+    ------
+    ConfigurationError
+        If a lag or delay becomes negative.
+    """
+    result = dict(sensors)
+    for term in terms:
+        sensor = result.get(term.channel, Sensor())
+        kind = KINDS[term.kind]
+        declared = getattr(sensor, kind.key)
+        value = kind.combined(declared.value, term.value)
+        if value < 0.0 and not kind.may_be_negative:
+            raise ConfigurationError(
+                f"{term.channel}: a {term.kind} of {value:g} s in all is not possible; "
+                f"{declared.value:g} s is declared, so the effect may take off no more than that"
+            )
+        changed = declared.model_copy(update={"value": value})
+        result[term.channel] = sensor.model_copy(update={kind.key: changed})
+    return result

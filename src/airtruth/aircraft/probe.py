@@ -1,0 +1,125 @@
+"""Load a JSBSim model in a child process, where an abort inside JSBSim cannot take the caller down.
+
+JSBSim aborts the process (SIGABRT) on some malformed models, segfaults on others, and creates a misspelt property
+instead of refusing it. A child process therefore loads the model first, looks up its properties and answers as JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Final
+
+from airtruth.aircraft.jsbsim.confine import controls_simulation, model_files
+from airtruth.errors import AircraftError
+from airtruth.isolation.interpreter import environment, module_command
+from airtruth.quantity import Strict
+
+_TIMEOUT_S: Final = 60.0
+"""Time for JSBSim to load a model [s] (judgement: far above the time of any shipped model, and a user still waits
+for the message)."""
+
+
+class Constants(Strict):
+    """Geometry and mass of a model as loaded: S [m2], c and span [m], mass [kg], Iyy [kg m2].
+
+    cg_fraction is the position of the CG behind the leading edge of the MAC, as a fraction of it; 0.25 for a model
+    that does not state it.
+    """
+
+    wing_area_m2: float
+    chord_m: float
+    span_m: float
+    mass_kg: float
+    inertia_yy_kg_m2: float
+    cg_fraction: float = 0.25
+
+
+def probe(folder: Path, jsbsim_json: str) -> Constants:
+    """Load the model that aircraft.toml names and return its constants.
+
+    Parameters
+    ----------
+    folder : folder of aircraft.toml.
+    jsbsim_json : its [jsbsim] table as JSON.
+
+    Raises
+    ------
+    AircraftError
+        If the model is missing or may not be loaded (`airtruth.aircraft.jsbsim.confine`), JSBSim refuses it or dies
+        on it, or a named property does not exist.
+    """
+    table = json.loads(jsbsim_json)
+    _refuse_control(folder, table)
+    xml = model_file(folder, table["root"], table["model"])
+    if xml.is_file():
+        model_files(xml, wheel_root())
+    try:
+        str(folder.resolve()).encode()
+    except UnicodeEncodeError:
+        raise AircraftError(
+            f"{folder}: JSBSim cannot open a folder whose name is not UTF-8; rename it, or use a UTF-8 locale"
+        ) from None
+    command = module_command("airtruth.aircraft.probe_child", str(folder), jsbsim_json)
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=_TIMEOUT_S, check=False, env=environment()
+        )
+    except subprocess.TimeoutExpired:
+        raise AircraftError(
+            f"{folder}: JSBSim did not finish loading the model within {_TIMEOUT_S:.0f} s"
+        ) from None
+    lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
+    answer: dict[str, Any] = json.loads(lines[-1]) if lines else {}
+    if "error" in answer:
+        raise AircraftError(f"{folder}: {answer['error']}")
+    if done.returncode != 0 or "constants" not in answer:
+        output = "\n  ".join((done.stderr + done.stdout).strip().splitlines()[-6:])
+        raise AircraftError(
+            f"{folder}: JSBSim died while loading the model (exit {done.returncode}); its output:\n  {output}"
+        )
+    return Constants.model_validate(answer["constants"])
+
+
+def _refuse_control(folder: Path, table: dict[str, Any]) -> None:
+    names = [*table["set"], *table["declare"], table["elevator"]["command"], *table["throttle"]["command"]]
+    names += (table["lateral"] or {}).values()
+    for name in filter(controls_simulation, names):
+        raise AircraftError(
+            f"{folder}: [jsbsim] writes {name}: an aircraft must not stop, trim, rewind or re-time the simulation; "
+            "remove this property"
+        )
+
+
+def wheel_root() -> Path:
+    """Root folder of the installed JSBSim package, with its aircraft, engines and systems."""
+    package = find_spec("jsbsim")
+    if package is None or package.origin is None:
+        raise AircraftError("the package jsbsim is not installed; run `pip install jsbsim`")
+    return Path(package.origin).resolve().parent
+
+
+def model_root(folder: Path, root: str) -> tuple[Path, Path, Path, Path]:
+    """Root, aircraft, engine and systems folders that JSBSim searches for a model."""
+    wheel = wheel_root()
+    base = wheel if root == "wheel" else folder.resolve().parent
+    return base, base / "aircraft" if root == "wheel" else base, wheel / "engine", wheel / "systems"
+
+
+def model_file(folder: Path, root: str, model: str) -> Path:
+    """XML of a model: in the folder of aircraft.toml, whatever its name, or else in one of the model's name."""
+    own = folder.resolve() / f"{model}.xml"
+    if root == "." and own.is_file():
+        return own
+    return model_root(folder, root)[1] / model / f"{model}.xml"
+
+
+def load_model(fdm: Any, folder: Path, root: str, model: str) -> bool:
+    """Load a model into an executive; False if JSBSim refuses it."""
+    _, _, engine, systems = model_root(folder, root)
+    fdm.set_aircraft_path(str(model_file(folder, root, model).parent))
+    fdm.set_engine_path(str(engine))
+    fdm.set_systems_path(str(systems))
+    return bool(fdm.load_model(model, False))  # False: that folder itself, a copy may have another name

@@ -1,0 +1,70 @@
+"""Child process of `airtruth.aircraft.probe`: load a JSBSim model and print its constants, or its fault, as JSON."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from airtruth.aircraft.probe import load_model, model_file, model_root
+from airtruth.errors import choices
+from airtruth.units import FT, SLUG
+
+
+def _load(folder: Path, table: dict[str, Any]) -> dict[str, Any]:
+    import jsbsim
+
+    root, aircraft, *_ = model_root(folder, table["root"])
+    model = table["model"]
+    xml = model_file(folder, table["root"], model)
+    if not xml.is_file():
+        known = {p.name for p in aircraft.iterdir() if (p / f"{p.name}.xml").is_file()}
+        return {"error": f"jsbsim.model: no {model}.xml below {aircraft}; {choices(model, known)}"}
+    try:
+        fdm = jsbsim.FGFDMExec(str(root))
+        fdm.set_debug_level(0)
+        for name, value in table["declare"].items():
+            fdm[name] = value
+        if not load_model(fdm, folder, table["root"], model):
+            return {"error": f"JSBSim refused {xml} for the reason above"}
+        fdm.disable_output()
+        manager = fdm.get_property_manager()
+        missing = [p for p in _named(table) if not manager.hasNode(p)]
+        if missing:
+            return {"error": _explain_missing(fdm, missing)}
+        fdm["ic/h-sl-ft"] = 3000.0
+        fdm["ic/vt-fps"] = 300.0
+        fdm.run_ic()
+    except (jsbsim.BaseError, RuntimeError, KeyError) as error:
+        return {"error": f"JSBSim refused {xml}: {error}"}
+    return {
+        "constants": {
+            "wing_area_m2": fdm["metrics/Sw-sqft"] * FT**2,
+            "chord_m": fdm["metrics/cbarw-ft"] * FT,
+            "span_m": fdm["metrics/bw-ft"] * FT,
+            "mass_kg": fdm["inertia/mass-slugs"] * SLUG,
+            "inertia_yy_kg_m2": fdm["inertia/iyy-slugs_ft2"] * SLUG * FT**2,
+        }
+    }
+
+
+def _named(table: dict[str, Any]) -> list[str]:
+    elevator, throttle = table["elevator"], table["throttle"]
+    names = [elevator["command"], elevator["surface"], *throttle["command"], *throttle["trim"], *table["set"]]
+    names += [*(table["augmentation"] or {}).values(), *(table["lateral"] or {}).values()]
+    return names + ([table["rotary_gust"]] if table["rotary_gust"] else [])
+
+
+def _explain_missing(fdm: Any, missing: list[str]) -> str:
+    catalogue = [line.split(" ")[0] for line in fdm.get_property_catalog()]
+    sentences = []
+    for name in missing:
+        same_end = [p for p in catalogue if p.split("/")[0] == name.split("/")[0]]
+        hint = choices(name, same_end or catalogue)
+        sentences.append(f"property {name!r} does not exist in the model; {hint[:400]}")
+    return "; ".join(sentences)
+
+
+if __name__ == "__main__":
+    print(json.dumps(_load(Path(sys.argv[1]), json.loads(sys.argv[2]))), flush=True)

@@ -1,0 +1,106 @@
+"""Write an aircraft.toml: every quantity in SI, with its uncertainty and source."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any, Final
+
+from airtruth.aircraft import AircraftFile, Dynamics
+from airtruth.channels import SIGNALS
+from airtruth.physics.sensor_errors import KINDS
+from airtruth.quantity import Quantity
+from airtruth.units import UNITS
+
+_UNITS: Final = {
+    "wing_area": "m2",
+    "chord": "m",
+    "span": "m",
+    "arm": "m",
+    "area": "m2",
+    "mass": "kg",
+    "inertia_yy": "kg_m2",
+    "cg": "",
+    "bandwidth": "hz",
+    "rate_limit": "rad_s",
+    "minimum": "rad",
+    "maximum": "rad",
+    "delay": "s",
+}
+"""SI unit of each quantity."""
+_SENSOR_UNITS: Final = {k.key: next(iter(UNITS[k.dimension])) for k in KINDS.values() if k.dimension}
+"""SI unit of a sensor's entry where it is not that of its channel."""
+
+
+def write(file: AircraftFile, heading: str) -> str:
+    """The file as TOML; reading it gives the same values to the last bit.
+
+    Parameters
+    ----------
+    file : content; entries that were not stated stay out.
+    heading : comment at the head of the file.
+    """
+    lines = [f"# {line}".rstrip() for line in heading.splitlines()]
+    content = {k: getattr(file, k) for k in type(file).model_fields if k in file.model_fields_set}
+    lines += ["schema = 1", f"name = {_text(file.name)}", f"description = {_text(file.description)}"]
+    for name, table in content.items():
+        if name in ("schema_", "name", "description") or table is None:
+            continue
+        if name == "sensors":
+            for channel, sensor in table.items():
+                unit = next(iter(UNITS[SIGNALS[channel].dimension]))
+                lines += _table(f"sensors.{channel}", _stated(sensor), _SENSOR_UNITS, unit)
+        elif isinstance(table, Mapping):
+            lines += _table(name, table, {}, "")
+        elif isinstance(table, Dynamics):
+            for key, rows in table:
+                for row in rows:
+                    lines += [f"\n[[{name}.{key}]]", *(f"{k} = {_plain(v)}" for k, v in asdict(row).items())]
+        else:
+            lines += _table(name, _stated(table), _UNITS, "")
+    return "\n".join(lines) + "\n"
+
+
+def _stated(model: Any) -> dict[str, Any]:
+    return {k: getattr(model, k) for k in type(model).model_fields if k in model.model_fields_set}
+
+
+def _table(name: str, entries: Mapping[str, Any], units: Mapping[str, str], unit: str) -> list[str]:
+    plain, tables = [f"\n[{name}]"], []
+    for key, value in entries.items():
+        if value is None:
+            continue
+        if isinstance(value, Quantity):
+            plain.append(f"{key} = {_quantity(value, units.get(key, unit))}")
+        elif isinstance(value, Mapping):
+            if value:
+                inner = ", ".join(f"{_text(k)} = {_plain(v)}" for k, v in value.items())
+                plain.append(f"{key} = {{ {inner} }}")
+        elif hasattr(value, "model_fields_set"):
+            tables += _table(f"{name}.{key}", _stated(value), units, unit)
+        else:
+            plain.append(f"{key} = {_plain(value)}")
+    return plain + tables
+
+
+def _quantity(quantity: Quantity, unit: str) -> str:
+    parts = [f"value = {quantity.value!r}"]
+    parts += [f"unit = {_text(unit)}"] if unit else []
+    parts += [f"std = {quantity.std!r}"] if quantity.std else []
+    parts += [f"source = {_text(quantity.source)}"] if quantity.source else []
+    return f"{{ {', '.join(parts)} }}"
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, str):
+        return _text(value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(_plain(v) for v in value)}]"
+    return repr(value)
+
+
+def _text(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)

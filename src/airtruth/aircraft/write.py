@@ -1,0 +1,241 @@
+"""Write a change into an aircraft: a copy of its folder that flies with the effect."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any, Final
+
+from airtruth import aircraft as planes
+from airtruth.aircraft import Aircraft, AircraftFile, JsbsimModel
+from airtruth.aircraft import toml as toml_text
+from airtruth.aircraft.dynamics import with_change
+from airtruth.aircraft.jsbsim import aerodynamics as aerodynamics_xml
+from airtruth.aircraft.jsbsim import files as model_files
+from airtruth.aircraft.jsbsim import mass_balance as declared_xml
+from airtruth.aircraft.jsbsim import surface as surface_xml
+from airtruth.aircraft.jsbsim.mass_balance import Masses
+from airtruth.aircraft.neutral import effective, fitted
+from airtruth.errors import AircraftError, ConfigurationError, StoreError
+from airtruth.logs import ledger
+from airtruth.logs.atomic import new_folder
+from airtruth.physics.resolution import linear_terms
+from airtruth.physics.terms import AeroTerm, Change, declared_total
+
+MARK: Final = "changed by airtruth"
+"""In the heads of both files of a changed aircraft."""
+HIGHEST_HZ: Final = 400.0
+"""Simulation rate up to which a written delay holds, unless another is asked for [Hz]."""
+
+
+@dataclass(frozen=True)
+class Corrections:
+    """Increments of the six derivatives, linear about a trim.
+
+    Attributes
+    ----------
+    increments : name of `airtruth.physics.short_period.PARAMETERS` -> increment [1/rad]; may leave some out.
+    alpha_rad, elevator_rad : the trim, where lift and moment stay as they are [rad].
+    """
+
+    increments: Mapping[str, float]
+    alpha_rad: float
+    elevator_rad: float
+
+    def terms(self) -> tuple[AeroTerm, ...]:
+        """The increments as terms.
+
+        Raises
+        ------
+        ConfigurationError
+            If a name is not a derivative.
+        """
+        return linear_terms(self.increments, self.alpha_rad, self.elevator_rad)
+
+
+def write_aircraft(
+    aircraft: Aircraft | Path | str,
+    change: Change,
+    out_folder: Path,
+    note: str = "",
+    derivatives: Corrections | None = None,
+    highest_hz: float = HIGHEST_HZ,
+) -> Path:
+    """Copy an aircraft's folder with a change written in, in its JSBSim model and its aircraft.toml.
+
+    The copy is complete: models that ship with JSBSim are copied out of its package, with their engines and systems.
+    Neutral terms write nothing. Terms in the air do not belong to an aircraft and are left out.
+
+    Parameters
+    ----------
+    aircraft : an aircraft, or its folder or name.
+    change : terms to add.
+    out_folder : folder to write, new or empty; the JSBSim model takes its name.
+    note : added to the heads of both files: the reason of the change.
+    derivatives : increments of the declared derivatives, to be added as well.
+    highest_hz : simulation rate up to which a delay is valid [Hz]; above it the delay is shorter.
+
+    Returns
+    -------
+    out_folder
+
+    Raises
+    ------
+    AircraftError
+        If the model cannot take the change, or JSBSim refuses the result.
+    ConfigurationError
+        If a term or derivative is not known, or a `DerivativeTerm` is not resolved.
+    StoreError
+        If the folder is not empty or cannot be written.
+    """
+    return changed(aircraft, change, out_folder, note, derivatives, highest_hz).folder
+
+
+def changed(
+    aircraft: Aircraft | Path | str,
+    change: Change,
+    out_folder: Path,
+    note: str = "",
+    derivatives: Corrections | None = None,
+    highest_hz: float = HIGHEST_HZ,
+) -> Aircraft:
+    """Write as `write_aircraft`, and return the aircraft, read back and checked."""
+    plane = aircraft if isinstance(aircraft, Aircraft) else planes.load(aircraft)
+    if derivatives is not None:
+        change = replace(change, aero=change.aero + derivatives.terms())
+    change = effective(change)
+    if change.derivatives:
+        raise ConfigurationError(
+            f"{plane.folder}: {change.derivatives[0].cause} changes the derivatives by an amount that depends on the trim; "
+            "resolve the change at a trim first (airtruth.simulation.resolution.at_condition)"
+        )
+    file = plane.file
+    if file.jsbsim is None and change.in_aircraft:
+        raise AircraftError(
+            f"{plane.folder}: aircraft.toml has no [jsbsim] table, so there is no model to write the change into"
+        )
+    require_new(out_folder)
+    heading = _heading(plane, change, note)
+    with new_folder(out_folder) as folder:
+        if file.jsbsim is not None:
+            _write_model(plane, file.jsbsim, change, folder, heading, highest_hz)
+        text = toml_text.write(_changed_file(plane, change, folder.name), heading)
+        (folder / planes.FILE).write_text(text, encoding="utf-8")
+        ledger.add_folder(folder, "aircraft")
+    return planes.load(out_folder)
+
+
+def require_new(folder: Path) -> None:
+    """Refuse a folder for an aircraft that is not new or empty.
+
+    Raises
+    ------
+    StoreError
+        If its name cannot be that of a JSBSim model, or the folder is not empty or cannot be read.
+    """
+    if not re.fullmatch(r"[A-Za-z0-9_.-]+", folder.name):
+        raise StoreError(f"{folder}: the folder's name is the model's; use letters, digits, '_', '.' and '-'")
+    try:
+        if folder.exists() and any(folder.iterdir()):
+            raise StoreError(f"{folder}: is not empty; choose a new folder for the changed aircraft")
+    except OSError as error:
+        raise StoreError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
+
+
+def _heading(plane: Aircraft, change: Change, note: str) -> str:
+    lines = [f"{plane.name}, {MARK}. Every quantity in SI."]
+    lines += [note] if note else []
+    for field in fields(Change):
+        lines += [
+            f"{field.name}: {_entries(term)}" for term in getattr(change, field.name) if field.name != "air"
+        ]
+    return "\n".join(lines)
+
+
+def _entries(term: Any) -> str:
+    return ", ".join(f"{f.name} = {getattr(term, f.name)}" for f in fields(term))
+
+
+def _write_model(
+    plane: Aircraft, model: JsbsimModel, change: Change, out: Path, heading: str, highest_hz: float
+) -> None:
+    read = model_files.read(plane.folder, model)
+    model_files.copy(read, out)
+    root, where = read.root, f"{plane.name} ({read.source.name})"
+    constants = plane.constants
+    masses = Masses(
+        mass_kg=constants.mass_kg, inertia_kg_m2=constants.inertia_yy_kg_m2, chord_m=constants.chord_m
+    )
+    declared_xml.write(root, change.declared, masses, where)
+    _write_functions(root, model, change, where, highest_hz)
+    if change.in_aircraft:
+        _document(root, heading)
+    model_files.write(read, out / f"{out.name}.xml")
+
+
+def _write_functions(
+    root: ET.Element, model: JsbsimModel, change: Change, where: str, highest_hz: float
+) -> None:
+    factor = declared_total(change.declared, "elevator")
+    signals = {t.signal for t in change.aero} | {s.signal for s in change.states}
+    surface = bool(change.surface) or factor != 1.0
+    if not surface and not change.aero:
+        return
+    aerodynamics = root.find("aerodynamics")
+    if aerodynamics is None:
+        raise AircraftError(f"{where}: the model has no <aerodynamics>")
+    elevator, control = model.elevator, root.find("flight_control")
+    named = surface_xml.names(control, elevator.surface)
+    components = surface_xml.Components()
+    if surface or "elevator" in signals:
+        components += surface_xml.chain(named, elevator.surface_rad, change.surface, factor, highest_hz)
+    if surface:
+        components += surface_xml.redirect(aerodynamics, named, where)
+    if change.aero:
+        components += aerodynamics_xml.write(
+            aerodynamics, change.aero, change.states, named, elevator.surface_rad, model.rotary_gust, where
+        )
+    if control is None:
+        control = ET.SubElement(root, "flight_control", {"name": "Effects"})
+    control.extend(surface_xml.channel(components))
+
+
+def _document(root: ET.Element, heading: str) -> None:
+    header = root.find("fileheader")
+    if header is None:
+        header = ET.Element("fileheader")
+        root.insert(0, header)
+    for line in heading.splitlines():
+        ET.SubElement(header, "note").text = line
+
+
+def _changed_file(plane: Aircraft, change: Change, model_name: str) -> AircraftFile:
+    """aircraft.toml of the copy: the model beside it, its mass, inertia and CG, and the sensors."""
+    file = plane.file
+    updates: dict[str, Any] = {}
+    shift = declared_total(change.declared, "cg")
+    if file.jsbsim is not None:
+        updates["jsbsim"] = file.jsbsim.model_copy(update={"model": model_name, "root": "."})
+    if file.mass is not None:
+        mass, inertia = declared_total(change.declared, "mass"), declared_total(change.declared, "inertia")
+        old = file.mass
+        updates["mass"] = old.model_copy(
+            update={
+                "mass": old.mass.model_copy(update={"value": old.mass.value * mass}),
+                "inertia_yy": old.inertia_yy.model_copy(update={"value": old.inertia_yy.value * inertia}),
+                "cg": old.cg.model_copy(update={"value": old.cg.value + shift}),
+            }
+        )
+    if shift and file.tail is not None and file.tail.arm is not None:
+        arm = file.tail.arm
+        shorter = arm.model_copy(update={"value": arm.value - shift * plane.chord_m})
+        updates["tail"] = file.tail.model_copy(update={"arm": shorter})
+    dynamics = with_change(file.dynamics, change)
+    if dynamics is not None:
+        updates["dynamics"] = dynamics
+    if change.sensors:
+        updates["sensors"] = fitted(file.sensors, change.sensors)
+    return file.model_copy(update=updates)

@@ -1,0 +1,135 @@
+"""Public functions of flight logs: read, import and check them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from airtruth.api.campaigns import load_aircraft
+
+if TYPE_CHECKING:
+    from airtruth.api.arguments import AircraftSource, FilePath
+    from airtruth.checks.result import CheckResult
+    from airtruth.importers import Imported
+    from airtruth.logs.flight_log import FlightLog
+    from airtruth.logs.sources import Logs
+
+
+def read_log(
+    logs: Logs, *, channels: Sequence[str] | None = None, run_ids: Collection[str] | None = None
+) -> FlightLog:
+    """Read flight logs into one log in memory; their values are checked by the function that uses them.
+
+    Parameters
+    ----------
+    logs : files, folders or logs; several are joined.
+    channels : channels to read; None for all.
+    run_ids : runs to read; None for all.
+
+    Returns
+    -------
+    FlightLog
+        Channels (rows,) in SI; the run with index k has the rows ``log.rows(k)``.
+
+    Raises
+    ------
+    StoreError
+        If a file does not exist, cannot be read or is damaged.
+    LogError
+        If a file is not a flight log, lacks a channel or run, or a run occurs twice.
+
+    Examples
+    --------
+    >>> at.read_log("out/light", channels=["alpha_rad", "q_rad_s"])
+    FlightLog(6 runs of 5 s at 50 Hz, 2 channels: alpha_rad, q_rad_s)
+    """
+    from airtruth.logs.flight_log import FlightLog
+    from airtruth.logs.sources import named_logs
+
+    return FlightLog.concat([log for _, log in named_logs(logs, channels, run_ids)])
+
+
+def import_log(
+    file: FilePath | Sequence[FilePath],
+    mapping: FilePath | Sequence[FilePath],
+    *,
+    manoeuvres: FilePath | None = None,
+    force: bool = False,
+) -> Imported:
+    """Convert measured logs of another format: .csv, .txt, .mat, .parquet, .ulg, .bin, .mf4 or .h5.
+
+    Parameters
+    ----------
+    file : measured log, or several.
+    mapping : mapping file that names a column, unit and sign per channel, see docs/measured.md. One for several files
+        makes a run of each; one for each file merges recorders of one flight.
+    manoeuvres : table of start and stop times, as ``airtruth import --find-manoeuvres`` writes it.
+    force : keep a log that contradicts physics.
+
+    Returns
+    -------
+    Imported
+        The log, which `write_log` stores, and the problems that the checks found in it.
+
+    Raises
+    ------
+    StoreError
+        If a file cannot be read.
+    ConfigurationError
+        If the mapping cannot be used as written.
+    LogError
+        If a column is missing or not numeric, times do not increase, clocks cannot be aligned, or the log contradicts
+        physics.
+
+    Examples
+    --------
+    >>> imported = at.import_log("flight.csv", "flight.toml")
+    >>> imported.log.run_ids
+    ('flight',)
+    >>> at.write_log("flight.parquet", imported.log, dtype="float64")
+    """
+    from airtruth import importers
+
+    table = None if manoeuvres is None else Path(manoeuvres)
+    return importers.import_log(_paths(file), _paths(mapping), manoeuvres=table, force=force)
+
+
+def _paths(files: FilePath | Sequence[FilePath]) -> list[Path]:
+    """One path, or several, as a list."""
+    return [Path(files)] if isinstance(files, str | os.PathLike) else [Path(one) for one in files]
+
+
+def check(
+    logs: Logs,
+    aircraft: AircraftSource | None = None,
+    *,
+    run_ids: Collection[str] | None = None,
+    force: bool = False,
+) -> CheckResult:
+    """Check the channels of logs against each other: biases, scales, arms, lags, with their uncertainty.
+
+    Parameters
+    ----------
+    logs : logs of one instrumentation; all their runs are judged together, with noise of their own.
+    aircraft : aircraft whose declared sensor errors are taken as known; None assumes ideal sensors.
+    run_ids : runs to use; None for all.
+    force : continue although a log contradicts physics; the result lists the faults.
+
+    Raises
+    ------
+    LogError
+        If a log breaks the contract or contradicts physics, or no run is long enough and has an elevator that moves.
+    AircraftError, StoreError
+        If the aircraft or a log cannot be read.
+
+    Examples
+    --------
+    >>> checked = at.check("out/light", "gtm")
+    """
+    from airtruth.checks.kinematics import check_logs
+    from airtruth.logs.sources import named_logs
+
+    declared = None if aircraft is None else load_aircraft(aircraft)
+    return check_logs(list(named_logs(logs, run_ids=run_ids)), declared, force=force)

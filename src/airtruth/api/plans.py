@@ -1,0 +1,142 @@
+"""Public function that plans flights: the accuracy of a campaign, or the input that separates two effects."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, overload
+
+from airtruth.api.campaigns import campaign_of
+
+if TYPE_CHECKING:
+    from airtruth.api.arguments import FilePath
+    from airtruth.design import ForecastResult, Limits, SplitResult
+    from airtruth.simulation.campaign.file import Campaign
+
+
+@overload
+def plan(
+    campaign: FilePath | Campaign, *, records: int | None = None, pressure: str = "constant"
+) -> ForecastResult: ...
+
+
+@overload
+def plan(
+    campaign: FilePath | Campaign | None = None,
+    *,
+    records: int | None = None,
+    split: Sequence[str],
+    sizes: Mapping[str, float] | None = None,
+    aircraft: str | None = None,
+    limits: Limits | None = None,
+    seed: int = 0,
+    out: FilePath | None = None,
+    force: bool = False,
+) -> SplitResult: ...
+
+
+@overload
+def plan(
+    campaign: FilePath | Campaign | None = None,
+    *,
+    records: int | None = None,
+    trace: FilePath,
+    aircraft: str | None = None,
+    limits: Limits | None = None,
+    seed: int = 0,
+    out: FilePath | None = None,
+    force: bool = False,
+) -> SplitResult: ...
+
+
+def plan(
+    campaign: FilePath | Campaign | None = None,
+    *,
+    records: int | None = None,
+    pressure: str = "constant",
+    split: Sequence[str] = (),
+    trace: FilePath | None = None,
+    sizes: Mapping[str, float] | None = None,
+    aircraft: str | None = None,
+    limits: Limits | None = None,
+    seed: int = 0,
+    out: FilePath | None = None,
+    force: bool = False,
+) -> ForecastResult | SplitResult:
+    """Predict the standard errors of a campaign (the Cramer-Rao bound), or compute the flight that separates effects.
+
+    Parameters
+    ----------
+    campaign : campaign file or a `Campaign`. To separate effects it states aircraft, condition, gusts and sensors, and
+        may be None: the condition is then that of the trace, or the default one of a shipped aircraft.
+    records : number of records; None for the campaign's runs, or as many as separate the effects with 95 % probability.
+    pressure : "constant", the airspeed is not an output of the filter, or "measured", it is one.
+    split : keys of two or more effects to separate.
+    trace : folder of a trace, or its trace.json, whose tied effects are to be separated.
+    sizes : EFFECT.PARAMETER -> value [its unit]; an effect without sizes imitates the first.
+    aircraft : shipped name or folder, instead of that of the campaign or of the trace.
+    limits : of the elevator and of the motion.
+    seed : seed of the search.
+    out : campaign file to write, with a figure of the same name; None to write nothing.
+    force : replace files that this command did not write or that changed since.
+
+    Returns
+    -------
+    ForecastResult or SplitResult
+        The latter where ``split`` or ``trace`` is given; its ``campaign`` can be flown.
+
+    Raises
+    ------
+    ConfigurationError
+        If an input cannot be used as written, or the trace has no tied effects.
+    AircraftError, TrimError, FlightError, StoreError
+        If the aircraft cannot be loaded, trimmed or flown, or a file cannot be read or written.
+
+    Examples
+    --------
+    >>> forecast = at.plan("light.toml", records=6)
+    >>> forecast.theta.shape, forecast.together.shape
+    ((6,), (6,))
+    """
+    from airtruth.design import forecast
+    from airtruth.errors import ConfigurationError
+
+    if not split and trace is None:
+        if campaign is None:
+            raise ConfigurationError("plan: nothing to plan; give a campaign, effects to split, or a trace")
+        return forecast(campaign_of(campaign), records, pressure)
+    from airtruth.design import SplitOptions
+    from airtruth.design.from_files import split_from
+
+    options = (
+        SplitOptions(records=records, seed=seed) if limits is None else SplitOptions(limits, records, seed)
+    )
+    source = base_campaign(None if campaign is None else campaign_of(campaign), trace is not None, aircraft)
+    target = None if out is None else Path(out)
+    answer = None if trace is None else Path(os.fspath(trace))
+    return split_from(source, split, answer, sizes or {}, aircraft, options, target, force=force)
+
+
+def base_campaign(
+    campaign: Path | Campaign | None, traced: bool, aircraft: str | None
+) -> Path | Campaign | None:
+    """The campaign whose manoeuvres are replaced; where none is given, the default one of a shipped aircraft.
+
+    Parameters
+    ----------
+    campaign : campaign file or campaign; None for none.
+    traced : whether a trace states the flight condition.
+    aircraft : shipped name; None for none.
+    """
+    import tomllib
+
+    from airtruth.simulation.campaign.file import Campaign
+    from airtruth.starting import CONDITIONS, campaign_text
+
+    if campaign is not None or traced or aircraft not in CONDITIONS:
+        return campaign
+    return Campaign.model_validate(tomllib.loads(campaign_text("next", aircraft)))
+
+
+__all__ = ["base_campaign", "plan"]

@@ -1,0 +1,113 @@
+"""The channels of a flight log: name, unit, axis, sign and JSBSim property of each, in one table.
+
+Body axes: x forward, z down, pitch nose-up positive; elevator trailing edge down positive.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from airtruth import units
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One channel of a flight log.
+
+    Attributes
+    ----------
+    name : column name; its unit ends it.
+    unit : unit in messages and tables.
+    dimension : key of `airtruth.units.UNITS`.
+    description : the quantity, with axis and sign.
+    jsbsim : JSBSim property with the noise-free value, "" if no standard property exists.
+    to_si : factor from the JSBSim property to SI.
+    limit : largest plausible magnitude [SI]; a larger one is usually a wrong unit (judgement: beyond any aircraft
+        that the package models, and below the value of the same motion in degrees or feet).
+    """
+
+    name: str
+    unit: str
+    dimension: str
+    description: str
+    jsbsim: str = ""
+    to_si: float = 1.0
+    limit: float = float("inf")
+
+
+_ALL = (
+    Signal("airspeed_m_s", "m/s", "speed", "true airspeed", "velocities/vt-fps", units.FT, 1000.0),
+    Signal("alpha_rad", "rad", "angle", "angle of attack, nose-up positive", "aero/alpha-rad", 1.0, 1.6),
+    Signal("theta_rad", "rad", "angle", "pitch attitude, nose-up positive", "attitude/theta-rad", 1.0, 1.6),
+    Signal(
+        "q_rad_s",
+        "rad/s",
+        "angular_rate",
+        "body pitch rate, nose-up positive",
+        "velocities/q-rad_sec",
+        1.0,
+        10.0,
+    ),
+    Signal("ax_m_s2", "m/s2", "acceleration", "specific force along body x (forward)", "", 1.0, 200.0),
+    Signal(
+        "az_m_s2",
+        "m/s2",
+        "acceleration",
+        "specific force along body z (down); level flight about -9.8",
+        "",
+        1.0,
+        200.0,
+    ),
+    Signal(
+        "elevator_rad",
+        "rad",
+        "angle",
+        "elevator surface, mean of all; trailing edge down positive",
+        "",
+        1.0,
+        1.6,
+    ),
+    Signal(
+        "elevator_command_rad",
+        "rad",
+        "angle",
+        "elevator command sent to the actuator; trailing edge down positive",
+        "",
+        1.0,
+        1.6,
+    ),
+    Signal("throttle", "-", "ratio", "throttle lever, 0 to 1", "", 1.0, 1.0),
+    Signal("altitude_m", "m", "length", "pressure altitude", "position/h-sl-ft", units.FT, 30000.0),
+    Signal(
+        "density_kg_m3",
+        "kg/m3",
+        "density",
+        "air density",
+        "atmosphere/rho-slugs_ft3",
+        units.SLUG / units.FT**3,
+        2.0,
+    ),
+)
+
+SIGNALS: Final[dict[str, Signal]] = {s.name: s for s in _ALL}
+"""Column name -> channel, in the order of the columns of a log (contract 1)."""
+
+RUN_ID: Final = "run_id"
+"""Column with the name of the run."""
+TIME: Final = "t_s"
+"""Column with the time from the start of the run [s]."""
+REQUIRED: Final = ("airspeed_m_s", "alpha_rad", "q_rad_s", "az_m_s2", "elevator_rad")
+"""Channels that every log holds, besides density_kg_m3 or altitude_m."""
+
+
+def shown(channel: str) -> tuple[str, float]:
+    """Name of a channel with its display unit, and the factor to this unit from SI."""
+    if channel.endswith("_rad"):
+        return f"{channel.removesuffix('_rad')} [deg]", 1.0 / units.DEG
+    if channel.endswith("_rad_s"):
+        return f"{channel.removesuffix('_rad_s')} [deg/s]", 1.0 / units.DEG
+    for ending, unit in (("_m_s2", "m/s2"), ("_m_s", "m/s")):
+        if channel.endswith(ending):
+            return f"{channel.removesuffix(ending)} [{unit}]", 1.0
+    return channel, 1.0

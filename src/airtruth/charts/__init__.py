@@ -1,0 +1,19 @@
+"""Charts as data, and their writers: SVG for pages, Matplotlib for papers."""
+
+from airtruth.charts.figure import as_figure
+from airtruth.charts.model import Band, Bar, Chart, Colour, Line, Mark, Panel, Rule, Stroke
+from airtruth.charts.svg import as_html
+
+__all__ = [
+    "Band",
+    "Bar",
+    "Chart",
+    "Colour",
+    "Line",
+    "Mark",
+    "Panel",
+    "Rule",
+    "Stroke",
+    "as_figure",
+    "as_html",
+]

@@ -1,0 +1,217 @@
+"""A chart: panels of lines, marks with intervals, bars, rules and bands, without a medium."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Final, Literal
+
+Colour = Literal["blue", "vermillion", "green", "purple", "orange", "sky", "ink", "grey"]
+"""Role of a colour; each medium and each theme has its own shade of it."""
+Stroke = Literal["solid", "dashed", "dotted", "points"]
+"""How a line is drawn."""
+
+LARGEST: Final = 1e30
+"""Largest magnitude that is drawn [-]; judgement: beyond any quantity, and its square does not overflow."""
+
+
+SMALLEST: Final = 1e-30
+"""Width of a scale below which its ends are one value [-]; judgement: below any quantity."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A curve, or points; a pair that is not finite is a gap.
+
+    Attributes
+    ----------
+    x, y : coordinates in the units of the axes, one length.
+    label : entry of the legend, "" for none.
+    """
+
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    label: str = ""
+    colour: Colour = "blue"
+    stroke: Stroke = "solid"
+
+    def __post_init__(self) -> None:
+        """Refuse coordinates of two lengths.
+
+        Raises
+        ------
+        ValueError
+            Stating both lengths.
+        """
+        if len(self.x) != len(self.y):
+            raise ValueError(f"a line has {len(self.x)} values of x and {len(self.y)} of y")
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A value with an interval in a row of a panel.
+
+    Attributes
+    ----------
+    row : position among the rows of the panel; fractions set marks of one row apart.
+    value : the value; lower, upper : ends of its interval, NaN for none.
+    widest : ends of a second, wider interval, None for none.
+    """
+
+    row: float
+    value: float
+    lower: float = math.nan
+    upper: float = math.nan
+    widest: tuple[float, float] | None = None
+    label: str = ""
+    colour: Colour = "blue"
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A bar from zero in a row of a panel, with words behind its end."""
+
+    row: float
+    value: float
+    label: str = ""
+    colour: Colour = "blue"
+    words: str = ""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A straight line at a value of one axis over the whole panel."""
+
+    at: float
+    axis: Literal["x", "y"] = "x"
+    label: str = ""
+    colour: Colour = "grey"
+
+
+@dataclass(frozen=True)
+class Band:
+    """A shaded range of one axis over the whole panel."""
+
+    low: float
+    high: float
+    axis: Literal["x", "y"] = "y"
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes.
+
+    Attributes
+    ----------
+    title, x_label, y_label : words, with units.
+    lines, marks, bars, rules, bands : what it shows.
+    rows : names of the rows from top to bottom; a panel with rows has no scale of y.
+    y_limits : ends of the scale of y, None for those of the data.
+    words : text in the centre of a panel without data.
+    """
+
+    title: str = ""
+    x_label: str = ""
+    y_label: str = ""
+    lines: tuple[Line, ...] = ()
+    marks: tuple[Mark, ...] = ()
+    bars: tuple[Bar, ...] = ()
+    rules: tuple[Rule, ...] = ()
+    bands: tuple[Band, ...] = ()
+    rows: tuple[str, ...] = ()
+    y_limits: tuple[float, float] | None = None
+    words: str = ""
+
+    def x_range(self) -> tuple[float, float]:
+        """Ends of the scale of x: the data with a margin; zero to one if there are none."""
+        values = [x for line in self.lines for x, y in zip(line.x, line.y, strict=True) if drawable(y)]
+        for mark in self.marks:
+            values += [mark.value, mark.lower, mark.upper, *(mark.widest or ())]
+        values += [bar.value for bar in self.bars] + ([0.0] if self.bars else [])
+        values += [rule.at for rule in self.rules if rule.axis == "x"]
+        values += [x for band in self.bands if band.axis == "x" for x in (band.low, band.high)]
+        return _range(values, 0.0 if self.lines and not self.rows else 0.06)
+
+    def y_range(self) -> tuple[float, float]:
+        """Ends of the scale of y of a panel without rows."""
+        if self.y_limits is not None and all(map(drawable, self.y_limits)):
+            return _range(self.y_limits, 0.0)
+        values = [y for line in self.lines for y in line.y]
+        values += [rule.at for rule in self.rules if rule.axis == "y"]
+        values += [y for band in self.bands if band.axis == "y" for y in (band.low, band.high)]
+        return _range(values, 0.06)
+
+    def legend(self) -> Iterator[tuple[str, Line | Mark | Bar | Rule | Band]]:
+        """Each label once, with the first item that has it."""
+        seen: set[str] = set()
+        items: tuple[Line | Mark | Bar | Rule | Band, ...]
+        for items in (self.lines, self.marks, self.bars, self.rules, self.bands):
+            for item in items:
+                if item.label and item.label not in seen:
+                    seen.add(item.label)
+                    yield item.label, item
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Panels in rows and columns.
+
+    Attributes
+    ----------
+    name : name of its file, without folder and suffix.
+    title : heading.
+    panels : from left to right and from top to bottom.
+    columns : number of panels side by side, where the medium is wide enough.
+    caption : sentence below the chart.
+    legend : whether one legend serves all panels; else each panel has its own.
+    """
+
+    name: str
+    title: str
+    panels: tuple[Panel, ...]
+    columns: int
+    caption: str = ""
+    legend: bool = field(default=True)
+
+    def entries(self) -> list[tuple[str, Line | Mark | Bar | Rule | Band]]:
+        """Entries of the common legend: each label once."""
+        found: dict[str, Line | Mark | Bar | Rule | Band] = {}
+        for panel in self.panels:
+            for label, item in panel.legend():
+                found.setdefault(label, item)
+        return list(found.items())
+
+
+def drawable(value: float) -> bool:
+    """Whether a number can be drawn."""
+    return math.isfinite(value) and abs(value) < LARGEST
+
+
+def _range(values: Iterable[float], margin: float) -> tuple[float, float]:
+    finite = [v for v in values if drawable(v)]
+    if not finite:
+        return 0.0, 1.0
+    low, high = min(finite), max(finite)
+    size = max(abs(low), abs(high))
+    if high - low <= max(1e-12 * size, SMALLEST):
+        half = 0.5 * size if size > SMALLEST else 0.5
+        return low - half, high + half
+    return low - margin * (high - low), high + margin * (high - low)
+
+
+__all__ = [
+    "LARGEST",
+    "SMALLEST",
+    "Band",
+    "Bar",
+    "Chart",
+    "Colour",
+    "Line",
+    "Mark",
+    "Panel",
+    "Rule",
+    "Stroke",
+    "drawable",
+]

@@ -1,0 +1,257 @@
+"""Columns of a log that cannot be what they are named: misspelt, of another unit, copied, constant, frozen."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.aircraft import Aircraft
+from airtruth.channels import SIGNALS
+from airtruth.checks.fault import Fault
+from airtruth.checks.spectra import integral
+from airtruth.logs.flight_log import Batch, FlightLog
+from airtruth.logs.store import STATED_UNITS
+from airtruth.physics.reconstruction import COLUMNS
+from airtruth.units import G0, UNITS
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+OTHERS: Final = frozenset(
+    {
+        "ay_m_s2", "p_rad_s", "r_rad_s", "beta_rad", "phi_rad", "psi_rad", "aileron_rad", "rudder_rad",
+        "flap_rad", "gamma_rad", "latitude_rad", "longitude_rad", "latitude_deg", "longitude_deg",
+    }
+)  # fmt: skip
+"""Columns that resemble a channel and are none: the lateral motion and the position."""
+ALIKE: Final = 0.84
+"""Similarity (`difflib`) above which a column is taken for a misspelt channel; elevator_cmd_rad has 0.89."""
+COPIED: Final = 1e-9
+"""One minus the correlation of two channels below which one is a copy; float32 of one signal has 1e-13."""
+MOVED: Final = 1e-12
+"""Standard deviation below which a channel does not move [SI]; rounding of a constant."""
+FROZEN_S: Final = 0.25
+"""Shortest time of equal samples that counts as frozen [s]."""
+FROZEN_SAMPLES: Final = 8
+"""Fewest equal samples that count as frozen: coarse instruments repeat some."""
+FROZEN_SHARE: Final = 0.15
+"""Share of a channel's range by which a frozen stretch must differ from what the other channels require [-]."""
+COARSE: Final = (0.2, 4)
+"""Share of equal neighbours elsewhere in a run above which a channel is coarse [-], and how many times longer it then has
+to be still [-] (judgement): a quantised accelerometer in calm air repeats a value for a quarter of a second.
+"""
+JUMP: Final = 8.0
+"""Jump to or from zero, in robust standard deviations of the channel's steps, that marks a dropout."""
+FAR: Final = 3.0
+"""Standard deviations of a channel between its median and zero above which a zero is a dropout."""
+FEWEST_DROPOUTS: Final = 3
+"""Fewest samples in a log that are dropouts: one or two may be real."""
+
+
+def names(log: FlightLog) -> Iterator[Fault]:
+    """Columns that resemble a channel that the log lacks."""
+    absent = [name for name in SIGNALS if name not in log.channels]
+    for column in log.channels:
+        if column in SIGNALS or column.casefold() in OTHERS:
+            continue
+        near = _resembled(column.casefold(), absent)
+        if near is None:
+            continue
+        name, likeness = near
+        yield Fault(
+            name, log.run_ids[0], "name",
+            f"{column}: no channel has this name, and the log lacks {name}, which it resembles: the column would "
+            f"be ignored; rename it to {name} if it is that channel, in {SIGNALS[name].unit}, or leave it out",
+            True, likeness,
+        )  # fmt: skip
+
+
+def _resembled(column: str, absent: list[str]) -> tuple[str, float] | None:
+    best: tuple[str, float] | None = None
+    for name in absent:
+        likeness = difflib.SequenceMatcher(None, column, name).ratio()
+        stem = name.removesuffix("_" + SIGNALS[name].unit.replace("/", "_"))
+        if column == stem or (column.startswith(stem + "_") and len(column) <= len(name) + 4):
+            likeness = max(likeness, 0.95)
+        if likeness >= ALIKE and (best is None or likeness > best[1]):
+            best = name, likeness
+    return best
+
+
+def units(log: FlightLog) -> Iterator[Fault]:
+    """Units in the file's metadata that contradict the names of the columns; unknown units are left alone."""
+    stated = log.metadata.get(STATED_UNITS)
+    if not isinstance(stated, Mapping):
+        return
+    for name, unit in stated.items():
+        if name not in log.channels or name not in SIGNALS:
+            continue
+        own, plain = SIGNALS[name], _plain(str(unit))
+        if plain == _plain(own.unit) or not any(plain in table for table in UNITS.values()):
+            continue
+        cure = (
+            f'import the file with unit = "{plain}" under [channels.{name}]'
+            if plain in UNITS[own.dimension]
+            else "rename the column"
+        )
+        yield Fault(
+            name, log.run_ids[0], "metadata",
+            f"{name}: the file's metadata state the unit {unit}, the column's name states {own.unit}; {cure}, or "
+            "correct the metadata", True, 1.0,
+        )  # fmt: skip
+
+
+def reconstructed(log: FlightLog) -> Iterator[Fault]:
+    """An angle of attack that no vane measured, which the import marks by the columns of its errors."""
+    if not set(COLUMNS) & log.channels.keys():
+        return
+    yield Fault(
+        "alpha_rad", log.run_ids[0], "reconstructed",
+        "alpha_rad: reconstructed from inertial measurements and airspeed, no vane was recorded: gusts are not in it, it "
+        "agrees with q_rad_s and az_m_s2 by construction, and no error of a vane can be estimated; identify adds its "
+        "uncertainty to the intervals, trace does not", False, 1.0,
+    )  # fmt: skip
+
+
+def _plain(unit: str) -> str:
+    """ "deg/s", "m/s^2", "degrees" as the keys of `airtruth.units.UNITS`."""
+    text = unit.strip().lower().replace("²", "2").replace("³", "3").replace("^", "").replace("**", "")
+    words = {
+        "degrees": "deg",
+        "degree": "deg",
+        "radians": "rad",
+        "radian": "rad",
+        "sec": "s",
+        "knots": "kt",
+        "kts": "kt",
+    }
+    parts = [words.get(part, part) for part in text.replace(" ", "_").replace("/", "_").split("_")]
+    return "" if text in ("-", "1") else "_".join(parts)
+
+
+def copies(batch: Batch, aircraft: Aircraft | None) -> Iterator[tuple[str, str]]:
+    """Pairs of channels that hold the same values, up to a factor and a constant, in every run."""
+    moving = {n: v for n, v in batch.channels.items() if n in SIGNALS and (v.std(axis=1) > MOVED).all()}
+    actuator = aircraft.file.elevator_actuator if aircraft is not None else None
+    for one, other in combinations(moving, 2):
+        pair = {one, other}
+        if pair == {"altitude_m", "density_kg_m3"} or (
+            pair == {"elevator_rad", "elevator_command_rad"} and actuator is None
+        ):
+            continue
+        a, b = (moving[n] - moving[n].mean(axis=1, keepdims=True) for n in (one, other))
+        product = np.einsum("rn,rn->r", a, b) ** 2
+        power = np.einsum("rn,rn->r", a, a) * np.einsum("rn,rn->r", b, b)
+        if (product > (1.0 - COPIED) * power).all():
+            yield one, other
+
+
+def constant(batch: Batch) -> Iterator[tuple[str, Bools]]:
+    """Channels that keep one value in runs in which the others move."""
+    c = batch.channels
+    judged = [
+        n for n in ("alpha_rad", "q_rad_s", "az_m_s2", "theta_rad", "ax_m_s2", "elevator_rad") if n in c
+    ]
+    still = {n: np.ptp(c[n], axis=1) == 0.0 for n in judged}
+    moving = sum((~still[n]).astype(int) for n in judged if n != "elevator_rad")
+    for name in judged:
+        bad = still[name] & (moving > 0)
+        if bad.any():
+            yield name, np.asarray(bad)
+
+
+def dropouts(batch: Batch) -> Iterator[tuple[str, Bools, int]]:
+    """Channels with samples of exactly zero amid others, and the runs and number of samples.
+
+    A channel that is about zero (a rate) drops out only where it jumps to zero and back: at rest it may be zero.
+    """
+    for name in ("alpha_rad", "q_rad_s", "az_m_s2", "theta_rad", "ax_m_s2", "airspeed_m_s", "density_kg_m3"):
+        x = batch.channels.get(name)
+        if x is None:
+            continue
+        zero = x == 0.0
+        bad = np.array([_drops_out(*run) for run in zip(x, zero, strict=True)])
+        count = int(zero[bad].sum())
+        if count >= FEWEST_DROPOUTS:
+            yield name, bad, count
+
+
+def _drops_out(x: Array, zero: Bools) -> bool:
+    if not zero.any() or zero.all():
+        return False
+    rest = x[~zero]
+    if abs(np.median(rest)) > FAR * max(float(rest.std()), 1e-12):
+        return True
+    steps = np.diff(x)
+    inside = ~zero[1:] & ~zero[:-1]
+    if not inside.any():
+        return False
+    usual = max(1.4826 * float(np.median(np.abs(steps[inside]))), 1e-3 * float(np.ptp(x)))
+    jumps = (zero[1:] != zero[:-1]) & (np.abs(steps) > JUMP * usual)
+    to_zero, from_zero = int((jumps & zero[1:]).sum()), int((jumps & zero[:-1]).sum())
+    return to_zero > 0 and from_zero > 0
+
+
+def frozen(batch: Batch) -> Iterator[tuple[str, Bools, float]]:
+    """Channels that stay at one value while the others require a change, and the longest such time [s]."""
+    c, dt = batch.channels, batch.dt_s
+    required = _required(c, dt)
+    fewest = max(FROZEN_SAMPLES, round(FROZEN_S / dt))
+    for name, change in required.items():
+        x = c[name]
+        equal = np.diff(x, axis=1) == 0.0
+        bad, longest = np.zeros(len(x), dtype=np.bool_), 0.0
+        for run in np.flatnonzero((equal.sum(axis=1) >= fewest) & ~equal.all(axis=1)):
+            for start, stop in _still(equal[run], fewest):
+                missing = float(np.ptp(change[run, start : stop + 1]))
+                scale = max(float(np.ptp(x[run])), float(np.ptp(change[run])))
+                if missing > FROZEN_SHARE * scale:
+                    bad[run] = True
+                    longest = max(longest, (stop - start) * dt)
+        if bad.any():
+            yield name, bad, longest
+
+
+def _required(c: Mapping[str, Array], dt_s: float) -> dict[str, Array]:
+    """Channels as the others require them, up to a constant and a slope."""
+    result: dict[str, Array] = {}
+    if not {"alpha_rad", "q_rad_s", "az_m_s2", "airspeed_m_s"} <= c.keys():
+        return result
+    turned = integral(c["q_rad_s"], dt_s)
+    if "theta_rad" in c:
+        result["theta_rad"] = turned
+        result["q_rad_s"] = np.gradient(c["theta_rad"], dt_s, axis=1)
+    attitude = c.get("theta_rad", turned)
+    heave = (c["az_m_s2"] + G0 * np.cos(attitude - c["alpha_rad"])) / c["airspeed_m_s"]
+    path = integral(heave, dt_s)
+    result["alpha_rad"] = turned + path
+    result.setdefault("q_rad_s", np.gradient(c["alpha_rad"] - path, dt_s, axis=1))
+    slope = np.gradient(c["alpha_rad"], dt_s, axis=1)
+    result["az_m_s2"] = c["airspeed_m_s"] * (slope - c["q_rad_s"])
+    return result
+
+
+def _still(equal: Bools, fewest: int) -> list[tuple[int, int]]:
+    """Stretches of equal samples that the resolution of a channel does not explain."""
+    found = list(_stretches(equal, fewest))
+    inside = sum(stop - start for start, stop in found)
+    share, longer = COARSE
+    if equal.sum() - inside <= share * (equal.size - inside):
+        return found
+    return [(start, stop) for start, stop in found if stop - start >= longer * fewest]
+
+
+def _stretches(equal: Bools, fewest: int) -> Iterator[tuple[int, int]]:
+    """First and last sample of stretches of at least so many equal samples."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], equal.astype(np.int8), [0]])))
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        if stop - start >= fewest:
+            yield int(start), int(stop)
+
+
+__all__ = ["constant", "copies", "dropouts", "frozen", "names", "reconstructed", "units"]

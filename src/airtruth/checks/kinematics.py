@@ -1,0 +1,308 @@
+"""Are the channels of a log consistent with each other? Flight-path reconstruction without aerodynamics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.aircraft import Aircraft
+from airtruth.channels import REQUIRED
+from airtruth.checks.gate import require
+from airtruth.checks.kinematics_average import averaged
+from airtruth.checks.kinematics_bias import mean_of, ramps, rms
+from airtruth.checks.kinematics_fit import limits_of, problem_of
+from airtruth.checks.kinematics_model import ERRORS, Record, thinned
+from airtruth.checks.kinematics_search import Search, completed, price, search
+from airtruth.checks.kinematics_words import conclusions, verdict_of
+from airtruth.checks.result import Cause, CheckResult, Finding, State
+from airtruth.errors import LogError
+from airtruth.logs.flight_log import FlightLog
+from airtruth.logs.validate import validate
+from airtruth.numerics.prefilter import butterworth, edge_samples
+from airtruth.units import G0
+
+Array = NDArray[np.float64]
+
+MOST_RECORDS: Final = 20
+"""Records judged together [-]: judgement; more add little, and time grows with them."""
+LONGEST_ARM_CHORDS: Final = 7.0
+"""Largest arm [chords]: judgement; the nose boom of ATTAS is 4.1 chords ahead of the CG, and the fuselage of a Boeing
+747 is 8.5 chords long."""
+LONGEST_ARM_M: Final = 40.0
+"""Largest arm where no chord is known [m]: judgement, half the length of the largest aircraft."""
+USUAL_ARM_M: Final = 10.0
+"""Arm that is not unusual where no chord is known [m]: judgement."""
+AIRSPEED_DELAY: Final = "sensor_delay:airspeed_m_s"
+"""The error that the equation of airspeed shows."""
+ATTITUDE: Final = ("gyro_lag", "attitude_lag", "sensor_delay:theta_rad", "sensor_delay:q_rad_s", "gyro_scale")
+"""Errors that need theta, because without it nothing predicts q but alpha, whose own errors are the same."""
+
+
+def check_log(
+    log: FlightLog, aircraft: Aircraft | None = None, *, source: str = "", force: bool = False
+) -> CheckResult:
+    """Pass a log through the gate, then estimate the errors of its instruments; see `check_logs`."""
+    return check_logs([(source, log)], aircraft, force=force)
+
+
+def check_logs(
+    logs: Sequence[tuple[str, FlightLog]], aircraft: Aircraft | None = None, *, force: bool = False
+) -> CheckResult:
+    """Pass logs through the gate, then estimate the errors of their instruments, common to all.
+
+    Parameters
+    ----------
+    logs : logs of one instrumentation, each with its name in messages, usually its file.
+    aircraft : aircraft whose declared sensor errors are known; None assumes ideal sensors.
+    force : continue although a log contradicts physics; the result lists the faults.
+
+    Raises
+    ------
+    LogError
+        As `airtruth.checks.gate.require` and `check_kinematics`.
+    """
+    faults = [fault for name, log in logs for fault in require(log, aircraft, source=name, force=force)]
+    known = None if aircraft is None else declared_errors(aircraft)
+    result = check_kinematics([log for _, log in logs], known, None if aircraft is None else aircraft.chord_m)
+    return replace(result, forced=tuple(fault.sentence for fault in faults if fault.certain))
+
+
+def check_kinematics(
+    log: FlightLog | Sequence[FlightLog],
+    declared: Mapping[str, float] | None = None,
+    chord_m: float | None = None,
+) -> CheckResult:
+    """Estimate the errors of instruments from all runs together; the gate is not passed.
+
+    The errors are common to all runs. The noise is estimated for each run.
+
+    Parameters
+    ----------
+    log : flight log, or several; of many runs the first `MOST_RECORDS` with an elevator that moves are taken.
+    declared : instrument errors that are known, names of
+        `airtruth.checks.kinematics_model.ERRORS` in SI; see `declared_errors`.
+    chord_m : mean aerodynamic chord, which limits arms to `LONGEST_ARM_CHORDS` [m]; None takes that of the log.
+
+    Raises
+    ------
+    LogError
+        If a log breaks its contract, or no run is long enough and has an elevator that moves.
+    """
+    logs = [log] if isinstance(log, FlightLog) else list(log)
+    for one in logs:
+        validate(one)
+    records, remarks = _records(logs)
+    chord = chord_m or _chord_of(logs)
+    usual = _candidates(records, chord)
+    limits = limits_of(records, LONGEST_ARM_M if chord is None else LONGEST_ARM_CHORDS * chord)
+    known = {n: v for n, v in (declared or {}).items() if n in ERRORS}
+    equations = ("alpha",) if records[0].theta is None else ("theta", "alpha")
+    found = completed(search(problem_of(records, equations, known, limits), usual), usual)
+    findings = (*_errors(found, usual), *_airspeed(found), *_biases(found))
+    findings = _scale_or_bias(findings)
+    verdict = verdict_of(found, findings)
+    causes = tuple(_cause(found, i, findings) for i in range(len(found.tried)))
+    if chord is None:
+        remarks.append(
+            f"No chord is known: arms up to {LONGEST_ARM_M:g} m are allowed; --aircraft narrows them."
+        )
+    return CheckResult(
+        verdict=verdict,
+        run_ids=tuple(r.run_id for r in records),
+        findings=findings,
+        causes=causes,
+        statistic=found.statistic,
+        degrees=found.degrees,
+        p_value=found.p_value,
+        enlargement=found.enlargement,
+        residual_rms=rms(found.problem, found.best.fit),
+        sentences=(*conclusions(verdict, found, findings, causes), *remarks),
+    )
+
+
+def declared_errors(aircraft: Aircraft) -> dict[str, float]:
+    """Errors of instruments that aircraft.toml declares, as `check_kinematics` takes them."""
+    result = {}
+    for error in ERRORS.values():
+        sensor = aircraft.file.sensors.get(error.channel)
+        value = error.neutral if sensor is None else sensor.errors().value(error.kind)
+        if value != error.neutral:
+            result[error.name] = value
+    return result
+
+
+def _records(logs: Sequence[FlightLog]) -> tuple[list[Record], list[str]]:
+    """Runs worth judging, with the channels that all of them have, and remarks on absent ones."""
+    records: list[Record] = []
+    runs = sum(len(log.run_ids) for log in logs)
+    present = {n: all(n in log.channels for log in logs) for n in ("ax_m_s2", "theta_rad")}
+    for log in logs:
+        for run, run_id in enumerate(log.run_ids):
+            rows = log.rows(run)
+            dt = float(np.mean(np.diff(log.t_s[rows])))
+            needed = [log.channels[name][rows] for name in REQUIRED]
+            long_enough = rows.stop - rows.start >= 4 * edge_samples(butterworth(min(5.0, 0.2 / dt), 4, dt))
+            airspeed, alpha, q, az, elevator = needed
+            if not long_enough or min(np.ptp(x) for x in (elevator, q, alpha)) == 0.0:
+                continue
+            if len(records) < MOST_RECORDS:
+                ax, theta = (log.channels[n][rows] if there else None for n, there in present.items())
+                records.append(thinned(Record(run_id, dt, airspeed, alpha, q, az, elevator, ax, theta)))
+    if not records:
+        raise LogError(
+            f"no run can be judged: {runs} runs are shorter than two seconds or so, or elevator, "
+            "q or alpha does not move in them; give a record with a manoeuvre"
+        )
+    remarks = []
+    if len(records) < runs:
+        remarks.append(f"{len(records)} of {runs} runs were judged.")
+    if not present["theta_rad"]:
+        remarks.append(
+            "theta_rad is absent: q is not judged by itself, airspeed is not judged, and the flight path is "
+            "taken as level at the start."
+        )
+    if not present["ax_m_s2"]:
+        remarks.append("ax_m_s2 is absent: airspeed is not judged, and ax alpha is left out of alpha'.")
+    return records, remarks
+
+
+def _chord_of(logs: Sequence[FlightLog]) -> float | None:
+    """Chord that the logs state for their runs [m]; None if none does."""
+    for log in logs:
+        table = log.metadata.get("record_constants", {})
+        for constants in table.values() if isinstance(table, Mapping) else ():
+            value = constants.get("chord_m") if isinstance(constants, Mapping) else None
+            if isinstance(value, int | float) and value > 0.0:
+                return float(value)
+    return None
+
+
+def _candidates(records: Sequence[Record], chord_m: float | None) -> dict[str, float]:
+    """Errors that the channels can show, with their usual sizes [SI]."""
+    result = {}
+    for name, error in ERRORS.items():
+        if name == AIRSPEED_DELAY or (name in ATTITUDE and records[0].theta is None):
+            continue
+        arm = USUAL_ARM_M if chord_m is None else error.usual * chord_m
+        result[name] = arm if error.kind == "arm" else error.usual
+    return result
+
+
+def _errors(found: Search, usual: Mapping[str, float]) -> list[Finding]:
+    result = []
+    for name, size in usual.items():
+        error = ERRORS[name]
+        one = averaged(found, name, usual)
+        smallest = float(np.sqrt(price(found.problem)) * one.alone)
+        inside = [name in e.names for e in found.equals]
+        state: State = "present" if all(inside) else "one of" if any(inside) else "not needed"
+        if state == "not needed" and smallest > size:
+            state = "not shown"
+        result.append(
+            Finding(
+                name,
+                error.unit,
+                error.meaning,
+                one.value,
+                one.std,
+                one.lower,
+                one.upper,
+                found.problem.start(name),
+                smallest,
+                state,
+            )
+        )
+    return result
+
+
+def _airspeed(found: Search) -> list[Finding]:
+    """Delay of airspeed, by the equation of airspeed alone.
+
+    That equation needs the vertical position of the longitudinal accelerometer, its alignment and the lag of the
+    pneumatic lines, which no log states. It therefore has no part in the errors of the other instruments.
+    """
+    problem, one = found.problem, found.best.fit
+    if problem.records[0].ax is None or problem.records[0].theta is None:
+        return []
+    known = {**problem.known, **dict(zip(one.names, one.value, strict=True))}
+    usual = {AIRSPEED_DELAY: ERRORS[AIRSPEED_DELAY].usual}
+    alone = problem_of(problem.records, ("airspeed",), known, problem.limits, lines=problem.lines)
+    return _errors(completed(search(alone, usual), usual), usual)
+
+
+def _biases(found: Search) -> list[Finding]:
+    """Biases of gyro, az and ax from the ramps of the equations."""
+    problem, one = found.problem, found.best.fit
+    scale = dict(zip(one.names, one.value, strict=True)).get("vane_scale", problem.start("vane_scale"))
+    ramp, std = mean_of(*ramps(problem, one, "alpha", found.enlargement))
+    ramp, std = -ramp / scale, std / scale
+    if "theta" not in problem.equations:
+        meaning = "constants in q and az, which theta would separate"
+        return [_bias(found, "gyro_bias + accelerometer_bias/V", "rad/s", meaning, ramp, std)]
+    turn, turn_std = mean_of(*ramps(problem, one, "theta", found.enlargement))
+    meaning = "constant in q, by the drift of its integral from theta"
+    result = [_bias(found, "gyro_bias", "rad/s", meaning, -turn, turn_std)]
+    airspeed = float(np.mean([r.airspeed.mean() for r in problem.records]))
+    meaning = "constant in az, by the drift of the integral of q + az/V from alpha"
+    bias, spread = airspeed * (ramp + turn), airspeed * float(np.hypot(std, turn_std))
+    result.append(_bias(found, "accelerometer_bias", "m/s2", meaning, bias, spread))
+    if problem.records[0].ax is not None:
+        meaning = (
+            "constant in ax + az alpha - g (theta - alpha): biases that airspeed alone does not separate"
+        )
+        slope, slope_std = mean_of(*ramps(problem, one, "airspeed", found.enlargement))
+        result.append(_bias(found, "forward_bias", "m/s2", meaning, -slope, slope_std))
+    return result
+
+
+def _bias(found: Search, name: str, unit: str, meaning: str, value: float, std: float) -> Finding:
+    smallest = float(np.sqrt(price(found.problem))) * std
+    state: State = "present" if abs(value) > smallest else "not needed"
+    half = 1.96 * std
+    return Finding(name, unit, meaning, value, std, value - half, value + half, 0.0, smallest, state)
+
+
+def _scale_or_bias(findings: tuple[Finding, ...]) -> tuple[Finding, ...]:
+    """A scale of az multiplies gravity too: it leaves the ramp of a bias."""
+    by_name = {f.name: f for f in findings}
+    bias, scale = by_name.get("accelerometer_bias"), by_name.get("accelerometer_scale")
+    if bias is None or scale is None or bias.state != "present" or scale.state == "present":
+        return findings
+    needed, std = scale.declared * (1.0 - bias.value / G0), scale.declared * bias.std / G0
+    if abs(needed - scale.value) > 3.0 * float(np.hypot(scale.std, std)):
+        return findings
+    if scale.state != "one of":
+        scale = replace(scale, value=needed, std=std, lower=needed - 1.96 * std, upper=needed + 1.96 * std)
+    both = {bias.name: replace(bias, state="one of"), scale.name: replace(scale, state="one of")}
+    return tuple(both.get(f.name, f) for f in findings)
+
+
+def _cause(found: Search, place: int, findings: Sequence[Finding]) -> Cause:
+    one = found.tried[place]
+    of_name = {f.name: f for f in findings}
+    errors = []
+    for name, value, std in zip(one.fit.names, one.fit.value, one.fit.std, strict=True):
+        spread = float(std) * float(np.sqrt(found.enlargement))
+        half = 1.96 * spread
+        errors.append(
+            replace(
+                of_name[name],
+                value=float(value),
+                std=spread,
+                lower=float(value) - half,
+                upper=float(value) + half,
+            )
+        )
+    return Cause(
+        tuple(errors),
+        one.fit.statistic,
+        one.cost - found.best.cost,
+        any(one.names == e.names for e in found.equals),
+    )
+
+
+__all__ = ["check_kinematics", "check_log", "check_logs", "declared_errors"]

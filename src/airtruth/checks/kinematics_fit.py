@@ -1,0 +1,216 @@
+"""Sizes of instrument errors: the least energy of the elevator's motion in the whitened differences."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.checks.kinematics_lines import Lines, Weight, lines_of, weigh, whitened
+from airtruth.checks.kinematics_model import ERRORS, Record, compare
+
+Array = NDArray[np.float64]
+
+STEPS: Final = 25
+"""Largest number of Gauss-Newton steps of a fit [-]: judgement; a fit that needs more is reported as unconverged."""
+CLOSE: Final = 0.02
+"""Step below which a search ends, in standard errors [-]: judgement."""
+SHORTENED: Final = 4
+"""Largest number of times that a step is shortened to 30 % [-]: judgement; a hundredth of a step is left then."""
+EDGE: Final = 1e-3
+"""Share of the range within which an estimate counts as at its limit [-]: judgement."""
+SCALES: Final = (0.4, 2.5)
+"""Range of a scale [-]: judgement; an error beyond is one of units, which the gate tests."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Errors that were fitted together.
+
+    Attributes
+    ----------
+    names : errors that were free.
+    value, covariance : (k,), (k, k).
+    free : (k,) least value of the statistic to first order without the limits.
+    statistic : energy of the elevator's motion that is left, chi-square where the errors explain all.
+    converged : whether the search ended.
+    at_limit : errors whose estimate is at an end of its range.
+    """
+
+    names: tuple[str, ...]
+    value: Array
+    free: Array
+    covariance: Array
+    statistic: float
+    converged: bool
+    at_limit: tuple[str, ...] = ()
+
+    @property
+    def std(self) -> Array:
+        """(k,) standard errors."""
+        return np.asarray(np.sqrt(np.maximum(np.diagonal(self.covariance), 0.0)))
+
+    @property
+    def sound(self) -> bool:
+        """Whether the fit may be used: it converged inside its range."""
+        return self.converged and not self.at_limit and bool(np.isfinite(self.covariance).all())
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Records, their lines, the common weight, and the ranges of the errors.
+
+    Attributes
+    ----------
+    records, lines : of each record.
+    equations : equations that are used, of `airtruth.checks.kinematics_model.compare`.
+    known : errors that are declared, name -> value.
+    limits : name -> smallest and largest value.
+    weight : common weight of all fits.
+    """
+
+    records: tuple[Record, ...]
+    lines: tuple[Lines, ...]
+    equations: tuple[str, ...]
+    known: Mapping[str, float]
+    limits: Mapping[str, tuple[float, float]]
+    weight: Weight
+
+    def differences(self, errors: Mapping[str, float]) -> list[dict[str, Array]]:
+        """Differences of every record at given errors; the others as declared."""
+        return [compare(r, {**self.known, **errors}, self.equations) for r in self.records]
+
+    def white(self, errors: Mapping[str, float]) -> Array:
+        """(rows,) whitened lines at given errors."""
+        return whitened(self.lines, self.weight, self.differences(errors))
+
+    def start(self, name: str) -> float:
+        """Value without a further error: the declared one, or none."""
+        return self.known.get(name, ERRORS[name].neutral)
+
+    def moments(self, errors: Mapping[str, float]) -> Array:
+        """(m,) components of the whitened lines along the pooled motions of the elevator."""
+        return np.asarray(self.weight.span.T @ self.white(errors))
+
+    def slope(self, name: str, errors: Mapping[str, float], moments: Array) -> Array:
+        """(m,) derivative of the moments by one error; ``moments`` are those at the errors."""
+        value = errors.get(name, self.start(name))
+        step = ERRORS[name].step if value < self.limits[name][1] - ERRORS[name].step else -ERRORS[name].step
+        return (self.moments({**errors, name: value + step}) - moments) / step
+
+
+def problem_of(
+    records: Sequence[Record],
+    equations: Sequence[str],
+    known: Mapping[str, float],
+    limits: Mapping[str, tuple[float, float]],
+    errors: Mapping[str, float] | None = None,
+    lines: Sequence[Lines] | None = None,
+) -> Problem:
+    """Weigh records at given errors.
+
+    Parameters
+    ----------
+    records, equations, known, limits : see `Problem`.
+    errors : errors at which the noise is judged; None for those declared.
+    lines : lines of the records; None makes them.
+    """
+    lines = tuple(lines or (lines_of(r) for r in records))
+    differences = [compare(r, {**known, **(errors or {})}) for r in records]
+    weight = weigh(records, lines, differences, equations)
+    return Problem(tuple(records), lines, tuple(equations), known, limits, weight)
+
+
+def fit(problem: Problem, names: Sequence[str], start: Mapping[str, float] | None = None) -> Fit:
+    """Fit errors by Gauss-Newton steps, shortened where the statistic would grow.
+
+    The derivatives are updated between steps (C. G. Broyden, *Mathematics of Computation* 19, 1965) and renewed where
+    a step fails and at the end.
+
+    Parameters
+    ----------
+    problem : records and weight.
+    names : free errors; none gives the statistic as it is.
+    start : values at which the search starts; an error without an entry starts at its declared value.
+    """
+    names = tuple(names)
+    low, high = (np.array([problem.limits[n][i] for n in names]) for i in (0, 1))
+    first = [(start or {}).get(n, problem.start(n)) for n in names]
+    value = np.clip(np.array(first, dtype=np.float64), low, high)
+    moments = problem.moments(dict(zip(names, value, strict=True)))
+    if not names:
+        return Fit((), value, value, np.zeros((0, 0)), float(moments @ moments), True)
+    slopes, fresh, converged = _slopes(problem, names, value, moments), True, False
+    for _ in range(STEPS):
+        covariance = _inverse(slopes @ slopes.T)
+        step = -covariance @ (slopes @ moments)
+        trial = np.clip(value + step, low, high)
+        after = problem.moments(dict(zip(names, trial, strict=True)))
+        for _ in range(SHORTENED):
+            if after @ after <= moments @ moments + 1e-9:
+                break
+            trial = value + 0.3 * (trial - value)
+            after = problem.moments(dict(zip(names, trial, strict=True)))
+        moved = trial - value
+        close = bool((np.abs(moved) <= CLOSE * np.sqrt(np.diagonal(covariance))).all())
+        better = after @ after <= moments @ moments + 1e-9
+        if better:
+            slopes = slopes + np.outer(moved, after - moments - moved @ slopes) / max(
+                float(moved @ moved), 1e-300
+            )
+            value, moments = trial, after
+        if (close or not better) and fresh:
+            converged = close
+            break
+        fresh = close or not better
+        if fresh:
+            slopes = _slopes(problem, names, value, moments)
+    slopes = _slopes(problem, names, value, moments)
+    edge = EDGE * (high - low)
+    at = ((value <= low + edge) | (value >= high - edge)) & (
+        np.abs(value - np.array([problem.start(n) for n in names])) > edge
+    )
+    covariance = _inverse(slopes @ slopes.T)
+    return Fit(
+        names,
+        value,
+        value - covariance @ (slopes @ moments),
+        covariance,
+        float(moments @ moments),
+        converged,
+        tuple(n for n, end in zip(names, at, strict=True) if end),
+    )
+
+
+def _slopes(problem: Problem, names: Sequence[str], value: Array, moments: Array) -> Array:
+    errors = dict(zip(names, value, strict=True))
+    return np.array([problem.slope(n, errors, moments) for n in names])
+
+
+def _inverse(normal: Array) -> Array:
+    size = np.sqrt(np.maximum(np.diagonal(normal), 1e-300))
+    unit = normal / np.outer(size, size)
+    return np.asarray(np.linalg.pinv(unit, rcond=1e-10, hermitian=True) / np.outer(size, size))
+
+
+def limits_of(records: Sequence[Record], longest_arm_m: float) -> dict[str, tuple[float, float]]:
+    """Smallest and largest value of each error.
+
+    A lag or a delay may last an eighth of the shortest record. An arm may be as long as ``longest_arm_m``.
+    """
+    longest = min(r.duration_s for r in records) / 8.0
+    result = {}
+    for name, error in ERRORS.items():
+        result[name] = {
+            "scale": SCALES,
+            "lag": (0.0, longest),
+            "delay": (0.0, longest),
+            "arm": (-longest_arm_m, longest_arm_m),
+        }[error.kind]
+    return result
+
+
+__all__ = ["Fit", "Problem", "fit", "limits_of", "problem_of"]

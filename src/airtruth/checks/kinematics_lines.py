@@ -1,0 +1,232 @@
+"""One weight for all causes: the lines of the cosine transform, their noise, and the motion of the elevator.
+
+The difference between a measured channel and its reconstruction is noise, moving air and the motion that an error
+leaves. Gusts move alpha and airspeed but no inertial quantity, and the aircraft answers them, so that least squares
+is biased. The elevator of an open loop has no part in gusts and noise. The statistic of every cause is therefore the
+energy of the whitened difference in the span of motions that the elevator causes (two-stage least squares, generalised
+method of moments with one weight).
+
+The lines of the cosine transform of stationary and of integrated noise are nearly uncorrelated (K. R. Rao and P. Yip,
+*Discrete Cosine Transform*, 1990, chapter 3), so that the noise is one smooth spectrum. It is estimated for each
+record and equation from the part of the difference outside the elevator's span, by P. Whittle's likelihood (*Arkiv
+foer Matematik* 2, 1953) with the leverage of that span taken into account.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct
+from scipy.signal import lfilter
+
+from airtruth.checks.kinematics_model import Record
+from airtruth.checks.samples import integral, lagged
+from airtruth.numerics.prefilter import butterworth, zero_phase
+from airtruth.numerics.srivc import simulate, srivc
+
+Array = NDArray[np.float64]
+
+LOW_HZ: Final = 0.12
+"""Lowest line [Hz]: judgement; below it drifts of instruments and slow changes of the air dominate."""
+HIGH_HZ: Final = 5.0
+"""Highest line [Hz]: judgement; the motion of a pitching aircraft lies below."""
+HIGH_RATE: Final = 0.35
+"""Highest line as a share of the sample rate [-]: judgement; a cubic through samples fails above."""
+LINES_PER_DEGREE: Final = 9.0
+"""Lines for each degree of freedom of the noise near the motion [-]. With this figure 4.7 % of 300 flights without an
+error exceed the 95 % point of the absolute test (`studies.check_study --calibrate`): the motion occupies the lowest
+lines, where it leaves little evidence of noise."""
+FLOOR: Final = 1e-3
+"""Accuracy of a reconstruction from samples as a share of the motion [-]: judgement; test_kinematics measures it."""
+CUTOFF_HZ: Final = 5.0
+"""Cutoff of the low-pass that smooths the measured elevator [Hz], lowered for slow records: judgement."""
+_LAGS: Final = (0.3, 1.0, 3.0)
+"""Time constants of the low-passes of the simulated pitch rate, over the period of the motion per radian [-]."""
+_BANK_HZ: Final = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
+"""Corner frequencies of the low-passes of the elevator where no model is identified [Hz]: judgement, an octave
+apart."""
+WHITTLE_STEPS: Final = 60
+"""Multiplicative steps for a spectrum [-]: judgement; more change it by less than its uncertainty."""
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Motions of the elevator of one record, in lines.
+
+    Attributes
+    ----------
+    keep : (lines,) numbers of the lines that are used.
+    hz : (lines,) their frequencies [Hz].
+    basis : (k, lines) motions that the elevator causes.
+    ramp : (lines,) lines of a ramp.
+    """
+
+    keep: NDArray[np.int64]
+    hz: Array
+    basis: Array
+    ramp: Array
+
+    def of(self, x: Array) -> Array:
+        """Lines of (..., samples)."""
+        return np.asarray(dct(x, axis=-1, norm="ortho")[..., self.keep])
+
+
+@dataclass(frozen=True)
+class Weight:
+    """The common weight: whitened motions of the elevator of all records.
+
+    Attributes
+    ----------
+    std : for each record, equation -> (lines,) standard deviation of the noise.
+    span : (rows, m) orthonormal columns over the lines of all records and equations: the pooled instruments.
+    own : for each record and equation, (lines, k) orthonormal columns.
+    ramps : for each record and equation, (lines,) the whitened ramp of unit length.
+    degrees : degrees of freedom of the noise of one equation near the motion [-].
+    """
+
+    std: tuple[dict[str, Array], ...]
+    span: Array
+    own: tuple[tuple[Array, ...], ...]
+    ramps: tuple[tuple[Array, ...], ...]
+    degrees: float
+
+
+def lines_of(record: Record) -> Lines:
+    """Lines of a record and the motions that its elevator causes.
+
+    From the second-order transfer function of elevator to pitch rate that fits the record (SRIVC): simulated q, q',
+    its integral and lags of that; the elevator. Where none fits, the elevator through a bank of low-passes.
+    """
+    samples, dt = len(record.q), record.dt_s
+    hz = np.arange(samples) / (2.0 * samples * dt)
+    keep = np.flatnonzero((hz >= LOW_HZ) & (hz <= min(HIGH_HZ, HIGH_RATE / dt)))
+    rows = dct(_motions(record), axis=-1, norm="ortho")[:, keep]
+    ramp = dct(np.linspace(-1.0, 1.0, samples), norm="ortho")[keep]
+    return Lines(keep, hz[keep], np.asarray(rows), ramp)
+
+
+def _motions(record: Record) -> Array:
+    dt = record.dt_s
+    elevator = (record.elevator - record.elevator[0])[None]
+    smooth = zero_phase(record.elevator[None], butterworth(min(CUTOFF_HZ, 0.2 / dt), 4, dt))
+    smooth = (smooth - smooth[:, :1])[0]
+    model = srivc(elevator, record.q[None], dt, 2, 2, 3.0, "foh")
+    if not np.isfinite(model.a).all():
+        rows = [smooth]
+        for corner in _BANK_HZ:
+            pole = np.exp(-2.0 * np.pi * corner * dt)
+            rows.append(lfilter([1.0 - pole], [1.0, -pole], smooth))
+        return np.array(rows)
+    q = simulate(model, elevator, dt, "foh")[0]
+    unit = 1.0 / np.sqrt(max(float(model.a[0, 1]), 1e-6))
+    once = integral(q, dt)
+    rows = [q, np.gradient(q, dt), once, smooth]
+    rows += [lagged(once, dt, share * unit) for share in _LAGS]
+    return np.array(rows)
+
+
+def noise_spectrum(y: Array, hz: Array, outside: Array, floor: float) -> Array:
+    """(lines,) standard deviation of the noise of lines.
+
+    A sum of white noise, integrated noise (which is also the upper part of a gust's spectrum) and differentiated
+    noise, none of them negative, by the multiplicative steps of the restricted likelihood. More shapes make the
+    lowest lines, where the elevator's motions leave little evidence of noise, too uncertain for a test.
+
+    Parameters
+    ----------
+    y : (lines,) lines of a difference.
+    hz : (lines,) frequencies [Hz].
+    outside : (k, lines) rows whose span is no evidence of noise.
+    floor : smallest standard deviation of a line.
+    """
+    floor = max(floor, 1e-150)
+    shape = np.array([np.ones_like(hz), (hz[0] / hz) ** 2, (hz / hz[-1]) ** 2])
+    size = np.full(len(shape), max(float(np.mean(y**2)), floor**2) / len(shape))
+    for step in range(WHITTLE_STEPS):
+        variance = size @ shape + floor**2
+        if step % 10 == 0:
+            std = np.sqrt(variance)
+            span = np.linalg.qr((outside / std).T)[0]
+            white = y / std
+            rest = ((white - span @ (span.T @ white)) * std) ** 2
+            free = 1.0 - np.minimum(np.einsum("nk,nk->n", span, span), 1.0)
+        size = size * np.sqrt((shape @ (rest / variance**2)) / (shape @ (free / variance)))
+    return np.asarray(np.sqrt(size @ shape + floor**2))
+
+
+def weigh(
+    records: Sequence[Record],
+    lines: Sequence[Lines],
+    differences: Sequence[Mapping[str, Array]],
+    equations: Sequence[str],
+) -> Weight:
+    """Estimate the noise of each record and equation, and whiten the motions of the elevator.
+
+    Parameters
+    ----------
+    records, lines : of each record.
+    differences : of each record, equation -> (samples,) difference at the errors where the noise is judged.
+    equations : equations that are used.
+    """
+    stds, own, ramps, blocks = [], [], [], []
+    count = lines[0].basis.shape[0]
+    for record, line, difference in zip(records, lines, differences, strict=True):
+        std, mine, rising = {}, [], []
+        block = []
+        for place, equation in enumerate(equations):
+            y = line.of(difference[equation])
+            outside = np.vstack([line.basis, line.ramp[None]])
+            s = noise_spectrum(y, line.hz, outside, _floor(record, line, equation))
+            std[equation] = s
+            ramp = line.ramp / s
+            ramp = ramp / np.linalg.norm(ramp)
+            white = line.basis / s
+            white = white - np.outer(white @ ramp, ramp)
+            mine.append(_orthonormal(white))
+            rising.append(ramp)
+            part = np.zeros((len(s), count * len(equations)))
+            part[:, place * count : (place + 1) * count] = _padded(white, count).T
+            block.append(part)
+        stds.append(std)
+        own.append(tuple(mine))
+        ramps.append(tuple(rising))
+        blocks.append(np.concatenate(block))
+    span = _orthonormal(np.concatenate(blocks).T)
+    degrees = sum(len(line.keep) - count - 1 for line in lines) / LINES_PER_DEGREE
+    return Weight(tuple(stds), span, tuple(own), tuple(ramps), max(degrees, 3.0))
+
+
+def _padded(rows: Array, count: int) -> Array:
+    return np.concatenate([rows, np.zeros((count - len(rows), rows.shape[1]))])[:count]
+
+
+def _floor(record: Record, line: Lines, equation: str) -> float:
+    """Smallest standard deviation of a line: the accuracy of the reconstruction."""
+    channel = {"theta": record.theta, "alpha": record.alpha, "airspeed": record.airspeed}[equation]
+    assert channel is not None
+    return FLOOR * max(float(np.std(line.of(channel))), 1e-12)
+
+
+def _orthonormal(rows: Array) -> Array:
+    """(n, m) orthonormal columns of the span of rows, all but dependent ones left out."""
+    size = np.linalg.norm(rows, axis=1, keepdims=True)
+    left, singular, right = np.linalg.svd(rows / np.maximum(size, 1e-300), full_matrices=False)
+    del left
+    return np.asarray(right[singular > 1e-5 * singular[0]].T)
+
+
+def whitened(lines: Sequence[Lines], weight: Weight, differences: Sequence[Mapping[str, Array]]) -> Array:
+    """(rows,) whitened lines of all records and equations, the ramp of each taken out."""
+    parts = []
+    for line, std, ramps, difference in zip(lines, weight.std, weight.ramps, differences, strict=True):
+        for (equation, s), ramp in zip(std.items(), ramps, strict=True):
+            white = line.of(difference[equation]) / s
+            parts.append(white - (white @ ramp) * ramp)
+    return np.concatenate(parts)
+
+
+__all__ = ["Lines", "Weight", "lines_of", "noise_spectrum", "weigh", "whitened"]

@@ -1,0 +1,131 @@
+"""The verdict of a kinematic check, and its conclusions in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from airtruth.checks.kinematics_search import Search
+from airtruth.checks.result import Cause, Finding, Verdict, digits_of, shown
+from airtruth.units import G0
+
+AGREES: Final = 0.05
+"""Probability of the absolute test below which the channels are not called consistent."""
+TELLING: Final = {"gyro_scale": 0.05, "vane_scale": 0.15, "vane_lag": 0.1}
+"""Sizes that records have to show before the channels are called consistent [SI]: judgement; a smaller error does not
+change a derivative by more than its usual uncertainty."""
+
+
+def verdict_of(found: Search, findings: Sequence[Finding]) -> Verdict:
+    """Answer of a check."""
+    if limiting(found):
+        return "failed"
+    states = {f.state for f in findings if f.name != "forward_bias"}
+    if not found.best.names and not states & {"present", "one of"}:
+        telling = all(f.smallest <= TELLING.get(f.name, f.smallest) for f in findings)
+        return "agrees" if telling and found.p_value > AGREES else "cannot_tell"
+    return "one_of" if "one of" in states else "errors"
+
+
+def limiting(found: Search) -> tuple[str, ...]:
+    """Errors whose fit ended at a limit or unconverged although it explains more than the best set."""
+    names = [
+        n
+        for e in found.unsound
+        if e.cost < found.best.cost - found.margin
+        for n in (e.fit.at_limit or e.fit.names)
+    ]
+    return tuple(sorted(set(names)))
+
+
+def conclusions(
+    verdict: Verdict, found: Search, findings: Sequence[Finding], causes: Sequence[Cause]
+) -> list[str]:
+    """Conclusions in words, the most important first."""
+    result = _headline(verdict, found, findings, causes)
+    if verdict != "agrees" and found.enlargement > 1.0:
+        result.append(
+            f"The errors leave motion of the elevator unexplained (p = {found.p_value:.1g}): noise of the instruments is "
+            f"enlarged by {found.enlargement**0.5:.2g} for it. Terms outside this check (sideslip, roll, flexibility, "
+            "other sensor errors) are present."
+        )
+    if not found.stable:
+        result.append("The weight of the noise did not settle: take sizes with reserve.")
+    dark = [f.name for f in findings if f.state == "not shown"]
+    if dark:
+        result.append(
+            f"These records cannot show {', '.join(dark)} of usual size; fly a stronger manoeuvre, or more records."
+        )
+    return result
+
+
+def _headline(
+    verdict: Verdict, found: Search, findings: Sequence[Finding], causes: Sequence[Cause]
+) -> list[str]:
+    if verdict == "failed":
+        return [
+            f"The check failed: the fit of {', '.join(limiting(found))} ended at a limit of its range or did not converge, "
+            "and explains more than every other set. No size below may be used; inspect the channels, cut the record to one "
+            "manoeuvre, or declare what is known of the sensors with --aircraft."
+        ]
+    if verdict == "agrees":
+        limits = ", ".join(
+            f"{f.name} {f.smallest:.{digits_of(f.smallest)}f}{'' if f.unit == '-' else ' ' + f.unit}"
+            for f in findings
+            if f.state == "not needed" and "bias" not in f.name
+        )
+        return [
+            f"The channels agree (chi-square {found.statistic:.1f}, {found.degrees} degrees of freedom, "
+            f"p = {found.p_value:.2f}).",
+            f"Larger errors than these would have been seen: {limits}.",
+        ]
+    if verdict == "cannot_tell":
+        weak = [f for f in findings if f.name in TELLING and f.smallest > TELLING[f.name]]
+        reasons = [
+            f"{f.name} below {f.smallest:.2g}{'' if f.unit == '-' else ' ' + f.unit} would not be seen"
+            for f in weak
+        ]
+        if found.p_value <= AGREES:
+            reasons.append(f"motion remains that no error explains (p = {found.p_value:.2g})")
+        return [
+            f"These records cannot tell whether the channels agree: {'; '.join(reasons)}. Fly a stronger manoeuvre, or "
+            "more records."
+        ]
+    return _named(findings, causes)
+
+
+def _named(findings: Sequence[Finding], causes: Sequence[Cause]) -> list[str]:
+    result = []
+    possible = [c for c in causes if c.possible]
+    for one in findings:
+        if one.state == "present":
+            declared = f"{one.declared:g}{'' if one.unit == '-' else ' ' + one.unit}"
+            note = f", where {declared} is declared" if "bias" not in one.name else ""
+            result.append(f"{one.name} is {shown(one)}{note}.")
+    common = (
+        frozenset.intersection(*(frozenset(f.name for f in c.errors) for c in possible))
+        if possible
+        else frozenset()
+    )
+    options = [[f for f in c.errors if f.name not in common] for c in possible]
+    by_name = {f.name: f for f in findings}
+    if len(options) > 1:
+        words = " or ".join(
+            " with ".join(f"{f.name} {shown(by_name[f.name] if len(o) == 1 else f)}" for f in o)
+            for o in options
+        )
+        result.append(
+            f"One of several: {words}. These records do not tell them apart; a surveyed position, a known scale or "
+            "a manoeuvre of higher frequency does."
+        )
+    bias, scale = by_name.get("accelerometer_bias"), by_name.get("accelerometer_scale")
+    if bias is not None and scale is not None and bias.state == "one of":
+        factor = scale.declared * (1.0 - bias.value / G0)
+        result.append(
+            f"accelerometer_bias is {shown(bias)}, or accelerometer_scale is {factor:.3f}: "
+            "gravity alone does not tell them apart."
+        )
+    return result
+
+
+__all__ = ["conclusions", "limiting", "verdict_of"]

@@ -1,0 +1,83 @@
+"""Sentences for failed tests: the evidence with its figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from airtruth.channels import SIGNALS
+from airtruth.checks.evidence import LIMITS, MEANS
+from airtruth.checks.relation import Relation
+
+SHOWN: Final = 3
+"""Number of runs that a sentence names."""
+PASSED: Final = 4.0
+"""Squared distance below which a test passes: two standard deviations."""
+FAILED: Final = 50.0
+"""Squared distance above which a test has failed as clearly as it can."""
+
+
+def evidence(test: Relation) -> str:
+    """What a test measured and what physics requires, for all runs together."""
+    f = [float(x) for x in test.figures[-1]]
+    name = test.channels[0]
+    if test.name == "range":
+        unit = SIGNALS[name].unit
+        low, high = MEANS.get(name, LIMITS[name])
+        return f"{name} reaches {f[0]:.4g} to {f[2]:.4g} {unit}, outside {low:.3g} to {high:.3g} {unit}"
+    if test.name == "air":
+        return (
+            f"density_kg_m3 averages {f[0]:.3g} kg/m3, where the standard atmosphere has {f[2]:.3g} kg/m3 at the "
+            f"altitude_m of {f[1]:.5g} m"
+        )
+    if test.name in ("az_mean", "ax_mean"):
+        return f"{name} averages {f[0]:.3g} m/s2, where gravity and the path require {f[1]:.3g} +- {f[2]:.2g} m/s2"
+    if test.name == "theta":
+        return (
+            f"theta_rad changes by {f[0]:.3g} +- {f[1]:.2g} of the integral of q_rad_s (squared correlation "
+            f"{f[2]:.2f}), where 1 is required"
+        )
+    if test.name == "alpha":
+        return (
+            f"alpha_rad changes by {f[0]:.3g} +- {f[2]:.2g} of the integral of q_rad_s and by {f[1]:.3g} +- {f[3]:.2g} "
+            "of that of (az + g cos(gamma))/V, where 1 and 1 are required"
+        )
+    if test.name == "elevator":
+        return (
+            f"with alpha and q held, elevator_rad changes q' by {f[0]:+.3g} +- {f[1]:.2g} 1/s2, where a trailing edge "
+            "down (positive) pitches the nose down"
+        )
+    if test.name == "ax_slope":
+        return (
+            f"ax_m_s2 changes by {f[0]:.2g} +- {f[1]:.2g} g per radian of alpha_rad, where about 1 g is usual"
+        )
+    if test.name == "command":
+        return (
+            f"elevator_rad follows {f[0]:.3g} +- {f[1]:.2g} of elevator_command_rad after {1e3 * f[2]:+.0f} "
+            f"+- {1e3 * f[3]:.0f} ms, where a positive factor and a delay are required"
+        )
+    return f"the records give {test.name} = {f[0]:.3g} +- {f[1]:.2g}, where about {f[2]:.3g} is expected"
+
+
+def runs(run_ids: Sequence[str], total: int) -> str:
+    """ "all 6 runs", "run 'a'" or "2 of 6 runs ('a', 'b')"."""
+    if len(run_ids) == total:
+        return f"all {total} runs" if total > 1 else f"run {run_ids[0]!r}"
+    shown = ", ".join(map(repr, run_ids[:SHOWN])) + (", ..." if len(run_ids) > SHOWN else "")
+    return f"{len(run_ids)} of {total} runs ({shown})"
+
+
+def culprit(results: Sequence[Relation], one: str, other: str) -> str:
+    """Which of two equal channels is wrong: the tests without the wrong one pass, those with it fail."""
+
+    def innocence(name: str) -> float:
+        elsewhere = sum(min(np.max(t.distance), FAILED) for t in results if name not in t.channels)
+        passed = sum(bool(np.max(t.distance) < PASSED) for t in results if name in t.channels)
+        return float(elsewhere + PASSED * passed)
+
+    return min((one, other), key=innocence)
+
+
+__all__ = ["culprit", "evidence", "runs"]

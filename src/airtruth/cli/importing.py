@@ -1,0 +1,121 @@
+"""`airtruth import`: measured logs of other formats, cut, merged and converted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from airtruth.cli.application import app
+from airtruth.cli.arguments import Quiet
+from airtruth.cli.output import notice, print_result
+from airtruth.cli.progress import working
+
+
+@app.command(
+    name="import", epilog="Example: airtruth import flight7.mat --mapping flight7.toml --out flight7.parquet"
+)
+def import_(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE...",
+            help=".csv, .txt, .mat, .parquet, .ulg, .bin, .mf4 or .h5; several files are one log.",
+        ),
+    ],
+    mapping: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="MAP.toml",
+            help="Which column is which channel, see docs/measured.md. One for each file merges recorders of one flight.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="LOG.parquet", help="Flight log to write, or TABLE.csv of --find-manoeuvres."),
+    ] = None,
+    guess: Annotated[
+        bool, typer.Option("--guess", help="Print a mapping to start from, import nothing.")
+    ] = False,
+    dictionary: Annotated[
+        Path | None,
+        typer.Option(metavar="WORDS.toml", help="Further names and units of columns for --guess."),
+    ] = None,
+    find_manoeuvres: Annotated[
+        bool,
+        typer.Option(
+            "--find-manoeuvres",
+            help="Write a table of start and stop times, and a picture, to accept or edit.",
+        ),
+    ] = False,
+    manoeuvres: Annotated[
+        Path | None,
+        typer.Option(metavar="TABLE.csv", help="Table of start and stop times; each row becomes a run."),
+    ] = None,
+    force: Annotated[
+        bool,
+        typer.Option(
+            "--force",
+            help="Write the log although its mapping contradicts physics, and replace a file that import did not write.",
+        ),
+    ] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Convert measured logs of other formats to a flight log."""
+    from airtruth import importers
+    from airtruth.errors import ConfigurationError
+
+    if guess:
+        if len(files) > 1:
+            raise ConfigurationError(
+                "--guess: proposes a mapping for one file; call it for each of the files"
+            )
+        words = importers.read_dictionary(dictionary) if dictionary else None
+        print_result(importers.guess_mapping(files[0], words=words), end="")
+        return
+    if mapping is None or out is None:
+        raise ConfigurationError(
+            "import needs --mapping MAP.toml and --out LOG.parquet; "
+            f"`airtruth import --guess {files[0]}` prints a mapping to start from"
+        )
+    if find_manoeuvres:
+        _find(files, mapping, out, force=force, quiet=quiet)
+        return
+    from airtruth.logs.outputs import writing
+    from airtruth.logs.store import write_log
+
+    inputs = [*files, *mapping, *([manoeuvres] if manoeuvres else [])]
+    with working("import", quiet), writing("import", inputs, force=force) as outputs:
+        outputs.require(out)
+        imported = importers.import_log(files, mapping, manoeuvres=manoeuvres, force=force)
+        write_log(out, imported.log, dtype="float64")
+    for sentence in (*imported.notes, *(fault.sentence for fault in imported.faults)):
+        notice(sentence)
+    log = imported.log
+    print_result(f"{len(log.run_ids)} runs, {len(log.t_s)} rows in {out}: {', '.join(log.channels)}")
+
+
+def _find(files: list[Path], mapping: list[Path], out: Path, *, force: bool, quiet: bool) -> None:
+    """Write the table of manoeuvres and its picture, and print a summary."""
+    from airtruth import importers, style
+    from airtruth.errors import ConfigurationError
+    from airtruth.importers.figure import draw
+    from airtruth.importers.manoeuvres import summary
+    from airtruth.logs.atomic import write_text
+    from airtruth.logs.outputs import writing
+
+    if out.suffix.lower() != ".csv":
+        raise ConfigurationError(f"{out}: --find-manoeuvres writes a table; name it with the suffix .csv")
+    picture = out.with_suffix(".png")
+    with working("import", quiet), writing("import", [*files, *mapping], force=force) as outputs:
+        outputs.require(out, picture)
+        found = importers.find_manoeuvres(files, mapping)
+        write_text(out, found.table())
+        style.save(draw(found), picture)
+    print_result(
+        f"{summary(found)}\n{out} and {picture}: edit the table, then import with --manoeuvres {out}"
+    )
+
+
+__all__ = ["import_"]

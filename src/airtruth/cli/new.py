@@ -1,0 +1,140 @@
+"""`airtruth new` and `airtruth example`: commented files to start from, and the examples that come with airtruth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from airtruth.cli.application import app, new_app
+from airtruth.cli.arguments import Replace
+from airtruth.cli.completion import complete_aircraft, complete_example
+from airtruth.cli.output import print_result
+
+Out = Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write.")]
+
+
+@new_app.command("campaign", epilog="Example: airtruth new campaign --out first.toml")
+def campaign(
+    out: Out,
+    aircraft: Annotated[
+        str,
+        typer.Option(
+            metavar="A",
+            help="Shipped name (gtm, c172x, f16, T38), or folder with aircraft.toml.",
+            autocompletion=complete_aircraft,
+        ),
+    ] = "gtm",
+    eas_kt: Annotated[
+        float | None,
+        typer.Option(min=1.0, help="Equivalent airspeed [kt]; a shipped aircraft has a default."),
+    ] = None,
+    altitude_ft: Annotated[
+        float | None, typer.Option(help="Altitude [ft]; a shipped aircraft has a default.")
+    ] = None,
+    force: Replace = False,
+) -> None:
+    """Write a commented campaign of six runs in light turbulence."""
+    from airtruth.starting import campaign_text
+
+    text = campaign_text(_name(out), aircraft, eas_kt, altitude_ft)
+    _write(out, text, [f"airtruth plan {out}", f"airtruth fly {out} --out out/{_name(out)}"], force)
+
+
+@new_app.command("mapping", epilog="Example: airtruth new mapping flight7.csv --out flight7.toml")
+def mapping(
+    out: Out,
+    file: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[FILE]",
+            help="Measured file whose columns are guessed; without it, a sample with every key.",
+        ),
+    ] = None,
+    force: Replace = False,
+) -> None:
+    """Write a commented mapping: which column of a measured file is which channel."""
+    from airtruth.importers import guess_mapping
+    from airtruth.starting import mapping_text
+
+    text = mapping_text() if file is None else guess_mapping(file)
+    measured = "data/foreign/flight7.csv" if file is None else file
+    log = Path(measured).with_suffix(".parquet").name
+    steps = [] if file is not None else ["airtruth example csv"]
+    _write(out, text, [*steps, f"airtruth import {measured} --mapping {out} --out {log}"], force)
+
+
+@new_app.command("aircraft", epilog="Example: airtruth new aircraft --jsbsim c182 --out aircraft/mine")
+def aircraft(
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder of the aircraft; its name is the aircraft's.")
+    ],
+    jsbsim: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|PATH", help="JSBSim model: a name that JSBSim ships, an XML file, or its folder."
+        ),
+    ] = None,
+    force: Replace = False,
+) -> None:
+    """Write an aircraft: for a JSBSim model, which is surveyed and trimmed, or a commented aircraft.toml without one."""
+    if jsbsim is not None:
+        from airtruth.simulation.foreign_aircraft import new_from_jsbsim
+
+        print_result(new_from_jsbsim(jsbsim, out).summary())
+        return
+    from airtruth.starting import aircraft_text
+
+    folder = out.parent if out.suffix == ".toml" else out
+    file = folder / "aircraft.toml"
+    steps = [
+        f"airtruth identify LOG.parquet --aircraft {folder}",
+        f"airtruth check LOG.parquet --aircraft {folder}",
+    ]
+    _write(file, aircraft_text(_name(folder.absolute())), steps, force)
+
+
+@app.command(epilog="Example: airtruth example vane")
+def example(
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[NAME]", help="Example to copy; without it, the list.", autocompletion=complete_example
+        ),
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the copies.")] = Path(),
+    force: Replace = False,
+) -> None:
+    """List the examples that come with airtruth, or copy one."""
+    from airtruth.starting import EXAMPLES, copy_example
+
+    if name is None:
+        width = max(map(len, EXAMPLES))
+        lines = [f"{entry.name:<{width}}  {entry.title}" for entry in EXAMPLES.values()]
+        print_result("\n".join([*lines, "", "airtruth example NAME copies one into the working folder"]))
+        return
+    copies = copy_example(name, out, force=force)
+    print_result("\n".join([*map(str, copies), *_next(EXAMPLES[name].commands)]))
+
+
+def _write(file: Path, text: str, steps: list[str], force: bool) -> None:
+    from airtruth.logs.atomic import make_folder, write_text
+    from airtruth.logs.outputs import writing
+
+    with writing("new", force=force) as outputs:
+        outputs.require(file)
+        make_folder(file.parent)
+        write_text(file, text)
+    print_result("\n".join([str(file), *_next(steps)]))
+
+
+def _next(commands: list[str] | tuple[str, ...]) -> list[str]:
+    return ["", "next:", *(f"  {command}" for command in commands)]
+
+
+def _name(path: Path) -> str:
+    """A name that campaigns and aircraft accept, from that of a file."""
+    import re
+
+    return re.sub(r"[^A-Za-z0-9_.-]+", "-", path.stem).strip("-") or "first"

@@ -1,0 +1,141 @@
+"""`airtruth plan`: standard errors of a campaign beforehand, and the flight that separates effects."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from airtruth.cli.application import app
+from airtruth.cli.arguments import Json, PlanPressure, Quiet, Replace
+from airtruth.cli.completion import complete_aircraft, complete_effect
+from airtruth.cli.output import print_result
+from airtruth.cli.progress import progress_bar, status
+from airtruth.errors import ConfigurationError
+from airtruth.units import DEG
+
+if TYPE_CHECKING:
+    from airtruth.design import Limits
+
+
+@app.command(
+    epilog="Example: airtruth plan --split elevator_delay,actuator_lag --aircraft gtm --out next.toml"
+)
+def plan(
+    campaign: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[CAMPAIGN.toml]",
+            help="Campaign whose accuracy is predicted; with --split or --from, the source of condition, gusts and sensors.",
+        ),
+    ] = None,
+    records: Annotated[
+        int | None,
+        typer.Option(
+            min=1, help="Number of records; default: the file's runs, or as many as separate the effects."
+        ),
+    ] = None,
+    pressure: Annotated[
+        PlanPressure,
+        typer.Option(help="constant: airspeed is not an output of the filter; measured: it is one."),
+    ] = "constant",
+    split: Annotated[
+        str | None,
+        typer.Option(metavar="A,B", help="Effects to separate, by key.", autocompletion=complete_effect),
+    ] = None,
+    trace: Annotated[
+        Path | None,
+        typer.Option(
+            "--from", metavar="DIR|trace.json", help="Trace whose tied effects are to be separated."
+        ),
+    ] = None,
+    size: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="EFFECT.PARAMETER=VALUE",
+            help="Size to plan for, may be repeated; an effect without one imitates the first.",
+        ),
+    ] = None,
+    aircraft: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A",
+            help="Aircraft, instead of that of the campaign or trace.",
+            autocompletion=complete_aircraft,
+        ),
+    ] = None,
+    amplitude_deg: Annotated[float, typer.Option(help="Largest elevator about its trim [deg].")] = 2.0,
+    rate_deg_s: Annotated[
+        float | None, typer.Option(help="Largest rate of the surface [deg/s]; default: none but the servo's.")
+    ] = None,
+    alpha_deg: Annotated[float, typer.Option(help="Largest angle of attack about its trim [deg].")] = 6.0,
+    load_factor: Annotated[
+        str, typer.Option(metavar="LOW,HIGH", help="Lowest and highest normal load factor.")
+    ] = "0,2",
+    airspeed_percent: Annotated[float, typer.Option(help="Largest change of the airspeed [%].")] = 10.0,
+    length_s: Annotated[float, typer.Option(help="Length of the input [s].")] = 8.0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the search.")] = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.toml", help="Campaign file to write, with a figure FILE.png."),
+    ] = None,
+    force: Replace = False,
+    json_: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Predict the standard errors of a campaign, or compute the flight that separates effects."""
+    import json
+
+    from airtruth.api.plans import base_campaign
+    from airtruth.design import ForecastResult, SplitOptions, SplitResult, forecast
+    from airtruth.design.from_files import split_from
+
+    result: ForecastResult | SplitResult
+    if split is None and trace is None:
+        if campaign is None:
+            raise ConfigurationError("plan: state a CAMPAIGN.toml, --split A,B or --from DIR")
+        with progress_bar("plan", "kinds of runs", quiet) as advance:
+            result = forecast(campaign, records, pressure, advance)
+    else:
+        keys = [] if split is None else [key.strip() for key in split.split(",") if key.strip()]
+        limits = _limits(amplitude_deg, rate_deg_s, alpha_deg, load_factor, length_s, airspeed_percent)
+        options = SplitOptions(limits, records, seed)
+        with status("plan", quiet) as step:
+            base = base_campaign(campaign, trace is not None, aircraft)
+            result = split_from(
+                base, keys, trace, _sizes(size or []), aircraft, options, out, force=force, step=step
+            )
+    print_result(json.dumps(result.to_dict(), indent=1) if json_ else result.summary())
+
+
+def _limits(
+    amplitude_deg: float,
+    rate_deg_s: float | None,
+    alpha_deg: float,
+    load_factor: str,
+    length_s: float,
+    airspeed_percent: float,
+) -> Limits:
+    from airtruth.design import Limits
+
+    try:
+        low, high = (float(part) for part in load_factor.split(","))
+    except ValueError:
+        raise ConfigurationError(f"--load-factor {load_factor!r}: write LOW,HIGH, such as 0,2") from None
+    rate = math.inf if rate_deg_s is None else rate_deg_s * DEG
+    return Limits(amplitude_deg * DEG, rate, alpha_deg * DEG, (low, high), length_s, 0.01 * airspeed_percent)
+
+
+def _sizes(stated: list[str]) -> dict[str, float]:
+    found = {}
+    for text in stated:
+        name, _, value = text.partition("=")
+        try:
+            found[name.strip()] = float(value)
+        except ValueError:
+            raise ConfigurationError(
+                f"--size {text!r}: write EFFECT.PARAMETER=VALUE, such as elevator_delay.delay_ms=8"
+            ) from None
+    return found

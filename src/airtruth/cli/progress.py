@@ -1,0 +1,252 @@
+"""Progress of a command on stderr, with the time that remains."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, Task
+    from rich.text import Text
+
+LOGGER: Final = logging.getLogger("airtruth")
+"""Logger of the package."""
+TRACE_STEPS: Final = (
+    ("identify before", 10.0),
+    ("probe", 0.2),
+    ("refit the declared aircraft", 2.0),
+    ("round 1: refit", 1.0),
+    ("round 1: score", 8.0),
+    ("refit", 20.0),
+    ("round", 2.0),
+    ("assess", 6.0),
+    ("write", 5.0),
+    ("identify after", 2.0),
+)
+"""Steps of a loop in their order, by their first words, and the time of each [s]: `airtruth loop` of
+data/undeclared/b.parquet, which accepts one effect. Only the ratios matter; those of a trace are a part of them."""
+AT_ONCE_S: Final = 0.5
+"""Time within which work that is reported was done by an earlier command [s] (judgement)."""
+EVERY_S: Final = 10.0
+"""Least time between two lines of progress where stderr is no terminal [s] (judgement: a log stays readable)."""
+
+
+class Remaining:
+    """Time that remains, from the typical shares of the steps.
+
+    Parameters
+    ----------
+    steps : first words of each step in order, and its typical time in any unit.
+    clock : time [s]; monotonic.
+    """
+
+    def __init__(
+        self, steps: Sequence[tuple[str, float]], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._steps = steps
+        self._clock = clock
+        self._started = clock()
+        self._index: int | None = None
+        self._first = 0
+        self._entered = self._started
+
+    def enter(self, what: str) -> None:
+        """Begin a step; one that is not known belongs to the step before.
+
+        Parameters
+        ----------
+        what : text of the step.
+        """
+        start = self._index or 0
+        order = [*range(start, len(self._steps)), *range(start)]
+        index = next((i for i in order if what.startswith(self._steps[i][0])), None)
+        if index is None:
+            return
+        if self._index is None:
+            self._first = index
+        if index != self._index:
+            self._entered = self._clock()
+        self._index = index
+
+    @property
+    def elapsed_s(self) -> float:
+        """Time since the start [s]."""
+        return self._clock() - self._started
+
+    @property
+    def left_s(self) -> float | None:
+        """Estimate of the time that remains [s]; None before the first step has ended."""
+        if self._index is None:
+            return None
+        done = sum(weight for _, weight in self._steps[self._first : self._index])
+        taken = self._entered - self._started
+        if done <= 0.0 or taken <= 0.0:
+            return None
+        left = sum(weight for _, weight in self._steps[self._index :])
+        within = self._clock() - self._entered
+        later = sum(weight for _, weight in self._steps[self._index + 1 :])
+        return max(left * taken / done - within, later * taken / done)
+
+    def text(self) -> str:
+        """Elapsed and remaining time in words."""
+        left = self.left_s
+        return f"{self.elapsed_s:.0f} s" + ("" if left is None else f", about {left:.0f} s left")
+
+
+def _is_terminal() -> bool:
+    """Whether stderr is a terminal on which a line can change; those of notebooks and editors are dumb."""
+    return sys.stderr is not None and sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
+
+
+@contextmanager
+def status(
+    verb: str, quiet: bool, steps: Sequence[tuple[str, float]] = ()
+) -> Iterator[Callable[[str], None]]:
+    """Show the current step on stderr: one changing line on a terminal, a line per step elsewhere.
+
+    Parameters
+    ----------
+    verb : name of the command.
+    quiet : show nothing.
+    steps : steps of the command and their typical times, for the time that remains.
+    """
+    remaining = Remaining(steps)
+
+    def enter(what: str) -> None:
+        remaining.enter(what)
+        LOGGER.info("%s (%s)", what, remaining.text())
+
+    if quiet:
+        yield enter
+        return
+    if not _is_terminal():
+
+        def line(what: str) -> None:
+            enter(what)
+            print(f"airtruth {verb}: {what} ({remaining.text()})", file=sys.stderr, flush=True)
+
+        yield line
+        return
+    with _spinner(remaining) as bar:
+        task = bar.add_task(verb, total=None)
+
+        def show(what: str) -> None:
+            enter(what)
+            bar.update(task, description=f"{verb}: {what}")
+
+        yield show
+
+
+def _spinner(remaining: Remaining) -> Progress:
+    """One line with the step, the time since the start and the time that remains."""
+    from rich.console import Console
+    from rich.progress import Progress, ProgressColumn, SpinnerColumn, TextColumn
+    from rich.text import Text
+
+    class Times(ProgressColumn):
+        def render(self, task: Task) -> Text:
+            return Text(f"({remaining.text()})")
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), Times())
+    return Progress(*columns, console=Console(stderr=True), transient=True, redirect_stdout=False)
+
+
+@contextmanager
+def working(verb: str, quiet: bool) -> Iterator[None]:
+    """Show the elapsed time on a terminal while a command works that has no steps to count.
+
+    Parameters
+    ----------
+    verb : name of the command.
+    quiet : show nothing.
+    """
+    if quiet or not _is_terminal():
+        yield
+        return
+    with _spinner(Remaining(())) as bar:
+        bar.add_task(verb, total=None)
+        yield
+
+
+@contextmanager
+def progress_bar(verb: str, things: str, quiet: bool) -> Iterator[Callable[[int, int, int], None]]:
+    """Show a bar with rate and remaining time on stderr; a line now and then where stderr is no terminal.
+
+    Parameters
+    ----------
+    verb : name of the command.
+    things : plural of what is counted.
+    quiet : show nothing.
+    """
+    if quiet or sys.stderr is None:
+        yield lambda done, total, failed: None
+        return
+    if not _is_terminal():
+        yield _Lines(verb, things)
+        return
+    with _bar(things) as bar:
+        task = bar.add_task(verb, total=None)
+
+        def advance(done: int, total: int, failed: int) -> None:
+            bar.update(
+                task, completed=done, total=total, description=f"{verb} ({failed} failed)" if failed else verb
+            )
+
+        yield advance
+
+
+class _Lines:
+    """Progress as lines of a log, at most one in `EVERY_S`."""
+
+    def __init__(self, verb: str, things: str) -> None:
+        self._verb = verb
+        self._things = things
+        self._started = self._last = time.monotonic()
+        self._before: int | None = None
+
+    def __call__(self, done: int, total: int, failed: int) -> None:
+        now = time.monotonic()
+        if self._before is None:  # a campaign that resumes reports at once the runs that were flown before
+            self._before = done if now - self._started < AT_ONCE_S else 0
+        if now - self._last < EVERY_S or done >= total:
+            return
+        self._last = now
+        made = done - self._before
+        left = f", about {(now - self._started) * (total - done) / made:.0f} s left" if made else ""
+        wrong = f", {failed} failed" if failed else ""
+        line = f"airtruth {self._verb}: {done} of {total} {self._things}{wrong}{left}"
+        print(line, file=sys.stderr, flush=True)
+
+
+def _bar(things: str) -> Progress:
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        ProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+    from rich.text import Text
+
+    class Rate(ProgressColumn):
+        def render(self, task: Task) -> Text:
+            return Text(f"{task.speed:.0f} {things}/s" if task.speed else "")
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        Rate(),
+        TimeRemainingColumn(),
+    )
+    return Progress(*columns, console=Console(stderr=True), redirect_stdout=False)
+
+
+__all__ = ["TRACE_STEPS", "Remaining", "progress_bar", "status", "working"]

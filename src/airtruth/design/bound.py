@@ -1,0 +1,264 @@
+"""Standard errors of the six derivatives that a campaign can reach, before it is flown.
+
+Each kind of run is flown once in still air. The Cramer-Rao bound of
+`airtruth.identification.likelihood.cramer_rao` is evaluated for its elevator, its gusts and the noise of the sensors,
+with unknown levels and biases. Information adds up over runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.errors import ConfigurationError, choices
+from airtruth.identification.likelihood.cramer_rao import experiment_bound
+from airtruth.identification.likelihood.options import CHANNELS, PRESSURES, FilterOptions
+from airtruth.logs.flight_log import Batch
+from airtruth.physics.short_period import PARAMETERS
+from airtruth.simulation.campaign.chunk import Pilot
+from airtruth.simulation.campaign.file import Campaign
+from airtruth.simulation.campaign.plan import Plan, PlannedRun, make, planned_runs
+from airtruth.simulation.campaign.run import Progress
+from airtruth.simulation.linearise import linearise
+from airtruth.simulation.trim import trim
+from airtruth.table import Table, as_html, as_text, flat
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+MOST_KINDS: Final = 20
+"""Largest number of kinds of runs that are evaluated (judgement: time against completeness); the first ones represent the
+rest."""
+_KIND: Final = (
+    "eas_m_s",
+    "altitude_m",
+    "gamma_rad",
+    "manoeuvre",
+    "amplitude_rad",
+    "sigma_u_m_s",
+    "sigma_w_m_s",
+    "length_u_m",
+    "length_w_m",
+)
+"""Columns of the run table that define a kind of run: the bound depends on nothing else."""
+
+
+@dataclass(frozen=True)
+class ForecastResult:
+    """Least standard errors of the six derivatives, in the order of `airtruth.physics.short_period.PARAMETERS`.
+
+    Attributes
+    ----------
+    campaign, aircraft : names.
+    pressure : whether the dynamic pressure is held "constant" or "measured".
+    records : number of records that ``together`` is for.
+    kinds : number of kinds of runs that were evaluated.
+    theta : (6,) declared derivatives, mean over the kinds [-].
+    single, together : (6,) least standard error of one record, and of all records jointly [-].
+    noise : channel -> standard deviation of the noise of its sensor [SI].
+    sigma_u_m_s, sigma_w_m_s : least and largest standard deviations of the gusts [m/s].
+    """
+
+    campaign: str
+    aircraft: str
+    pressure: str
+    records: int
+    kinds: int
+    theta: Array
+    single: Array
+    together: Array
+    noise: Mapping[str, float]
+    sigma_u_m_s: tuple[float, float]
+    sigma_w_m_s: tuple[float, float]
+
+    @property
+    def percent(self) -> Array:
+        """(2, 6) standard errors of one record and of all records, relative to the declared derivative [%]."""
+        return 100.0 * np.stack([self.single, self.together]) / np.abs(self.theta)
+
+    def table(self) -> Table:
+        """One row per derivative, with the gusts and the assumptions as notes."""
+        single, together = self.percent
+        columns = (self.theta, self.single, single, self.together, together)
+        gusts = ", ".join(
+            f"{name} {low:.3g}" + (f" to {high:.3g}" if high > low else "")
+            for name, (low, high) in (("sigma_u", self.sigma_u_m_s), ("sigma_w", self.sigma_w_m_s))
+        )
+        return flat(
+            title=f"Least standard errors to expect of {self.campaign} ({self.aircraft}, {self.pressure} pressure)",
+            columns=(
+                "parameter",
+                "declared",
+                "std of a record",
+                "percent",
+                f"std of {self.records} records",
+                "percent of these",
+            ),
+            rows=[(name, *(float(c[i]) for c in columns)) for i, name in enumerate(PARAMETERS)],
+            notes=(
+                f"Gusts [m/s]: {gusts}. Kinds of runs evaluated: {self.kinds}.",
+                "Cramer-Rao bound with noise levels, gust levels, biases and initial states unknown; "
+                "filter-error comes nearest to it (docs/plan.md).",
+            ),
+        )
+
+    def summary(self) -> str:
+        """The table as text."""
+        return as_text(self.table())
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per derivative: parameter, declared, std, percent, std_together, percent_together."""
+        import pandas as pd
+
+        single, together = self.percent
+        return pd.DataFrame(
+            {
+                "parameter": PARAMETERS,
+                "declared": self.theta,
+                "std": self.single,
+                "percent": single,
+                "std_together": self.together,
+                "percent_together": together,
+            }
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Facts of the campaign, and the rows of `to_frame` by parameter."""
+        rows = self.to_frame().set_index("parameter").to_dict("index")
+        return {
+            "campaign": self.campaign,
+            "aircraft": self.aircraft,
+            "pressure": self.pressure,
+            "records": self.records,
+            "kinds": self.kinds,
+            "sigma_u_m_s": list(self.sigma_u_m_s),
+            "sigma_w_m_s": list(self.sigma_w_m_s),
+            "noise": dict(self.noise),
+            "parameters": {str(name): row for name, row in rows.items()},
+        }
+
+    def plot(self) -> Figure:
+        """Relative standard errors of one record and of all records, as bars on a logarithmic scale [%]."""
+        from airtruth import style
+
+        with style.applied():
+            figure = style.new_figure(6.0, 3.2)
+            ax = figure.subplots()
+            at = np.arange(len(PARAMETERS))
+            labels = ("one record", f"{self.records} records together")
+            for offset, values, label, colour in zip(
+                (-0.2, 0.2), self.percent, labels, (style.BLUE, style.ORANGE), strict=True
+            ):
+                ax.bar(at + offset, values, width=0.4, label=label, color=colour)
+            ax.set_yscale("log")
+            ax.set_xticks(at, PARAMETERS)
+            ax.set_ylabel("least standard error [%]")
+            ax.legend()
+        return figure
+
+    def _repr_html_(self) -> str:
+        return as_html(self.table())
+
+
+def forecast(
+    campaign: Path | str | Campaign | Plan,
+    records: int | None = None,
+    pressure: str = "constant",
+    advance: Progress = lambda done, total, failed: None,
+) -> ForecastResult:
+    """Least standard errors of the derivatives from the runs of a campaign, before they are flown.
+
+    Parameters
+    ----------
+    campaign : campaign file, or a campaign that was read or planned.
+    records : instead of the campaign's number of runs; they are of its kinds, in its proportions.
+    pressure : "constant" uses nothing of the airspeed; "measured" makes it an output of the filter.
+    advance : called after each kind of run with their number, the number of all, and 0.
+
+    Raises
+    ------
+    ConfigurationError
+        If the campaign cannot be flown as written, ``pressure`` is not known, or a sensor has no noise.
+    AircraftError, StoreError
+        If the aircraft or a file cannot be loaded.
+    TrimError, FlightError
+        If a run cannot be flown.
+    """
+    if pressure not in PRESSURES:
+        raise ConfigurationError(f"plan: pressure = {pressure!r}: {choices(pressure, PRESSURES)}")
+    plan = campaign if isinstance(campaign, Plan) else make(campaign)
+    noise = _noise(plan, pressure)
+    groups = plan.table.groupby(list(_KIND), sort=False)
+    kinds = groups.head(1).head(MOST_KINDS)
+    counts = groups.size().to_numpy()[: len(kinds)].astype(np.float64)
+    pilot = Pilot(replace(plan, sensors={}))
+    theta, covariance = [], []
+    for run in planned_runs(kinds):
+        value, least = _run(plan, pilot, run, noise)
+        theta.append(value)
+        covariance.append(least)
+        advance(len(theta), len(kinds), 0)
+    share = counts / counts.sum()
+    each = np.stack(covariance)
+    information = np.tensordot(share, np.linalg.inv(each), axes=1)
+    total = records or plan.campaign.runs
+    return ForecastResult(
+        campaign=plan.campaign.name,
+        aircraft=plan.aircraft.name,
+        pressure=pressure,
+        records=total,
+        kinds=len(kinds),
+        theta=share @ np.stack(theta),
+        single=np.sqrt(np.diag(np.tensordot(share, each, axes=1))),
+        together=np.sqrt(np.diag(np.linalg.inv(information)) / total),
+        noise=noise,
+        sigma_u_m_s=(float(kinds["sigma_u_m_s"].min()), float(kinds["sigma_u_m_s"].max())),
+        sigma_w_m_s=(float(kinds["sigma_w_m_s"].min()), float(kinds["sigma_w_m_s"].max())),
+    )
+
+
+def _noise(plan: Plan, pressure: str) -> dict[str, float]:
+    """Standard deviation of the noise of each sensor that the bound needs [SI]."""
+    needed = [c for n, c in CHANNELS.items() if n != "airspeed" or pressure == "measured"]
+    noise = {c: plan.sensors[c].noise_std.value if c in plan.sensors else 0.0 for c in needed}
+    lacking = [c for c, std in noise.items() if std <= 0.0]
+    if lacking:
+        raise ConfigurationError(
+            f"plan: {plan.aircraft.name} states no noise of {', '.join(lacking)}, without which the bound is 0; "
+            f"state noise_std in [sensors.{lacking[0]}] of {plan.aircraft.folder / 'aircraft.toml'}, "
+            f"or in [sensors.channel.{lacking[0]}] of the campaign"
+        )
+    return noise
+
+
+def _run(plan: Plan, pilot: Pilot, run: PlannedRun, noise: Mapping[str, float]) -> tuple[Array, Array]:
+    """Declared derivatives (6,) and the bound (6, 6) of one run of the table."""
+    at = trim(plan.aircraft, run.condition, plan.dt_s)
+    theta = linearise(plan.aircraft, at, plan.dt_s).plus
+    flown = pilot.channels(replace(run, sigma_u_m_s=0.0, sigma_w_m_s=0.0))
+    channels = {name: np.ascontiguousarray(values[None]) for name, values in flown.items()}
+    samples = channels["alpha_rad"].shape[1]
+    dt_s = plan.dt_s * plan.log_every
+    t_s = dt_s * np.arange(samples, dtype=np.float64)[None]
+    options = FilterOptions(
+        noise["alpha_rad"],
+        noise["q_rad_s"],
+        noise["az_m_s2"],
+        sigma_u_m_s=run.sigma_u_m_s,
+        sigma_w_m_s=run.sigma_w_m_s,
+        length_u_m=run.length_u_m,
+        length_w_m=run.length_w_m,
+        airspeed_std_m_s=noise.get("airspeed_m_s"),
+        airspeed_m_s=at.airspeed_m_s,
+    )
+    batch = Batch((run.run_id,), dt_s, t_s, channels)
+    least = experiment_bound(batch, plan.aircraft, theta, options, plan.campaign.gust.start)[0]
+    return theta, least

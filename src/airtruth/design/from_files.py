@@ -1,0 +1,147 @@
+"""A planned flight from files: a campaign, a trace, or the defaults of a shipped aircraft; and its output files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from airtruth import aircraft as planes
+from airtruth import style
+from airtruth.aircraft import Aircraft
+from airtruth.design.question import Hypothesised, from_answer, from_names
+from airtruth.design.split_result import SplitResult
+from airtruth.design.splitting import SplitOptions, split
+from airtruth.errors import ConfigurationError
+from airtruth.logs.histories import FILE, Histories, read_histories
+from airtruth.logs.outputs import writing
+from airtruth.physics.atmosphere import RHO0_KG_M3
+from airtruth.simulation.campaign import file as campaign_file
+from airtruth.simulation.campaign.file import Campaign
+from airtruth.tracing.answer import ANSWER, TraceAnswer
+
+Step = Callable[[str], None]
+
+_NAME: Final = "next"
+"""Name of a planned campaign that is not written to a file."""
+_LOG_HZ: Final = 50.0
+"""Rate of the log where neither a campaign nor a trace states one [Hz]: that of the shipped campaigns."""
+
+
+def split_from(
+    campaign: Path | Campaign | None,
+    keys: Sequence[str],
+    trace: Path | None,
+    sizes: Mapping[str, float],
+    aircraft: str | None,
+    options: SplitOptions,
+    out: Path | None = None,
+    *,
+    force: bool = False,
+    step: Step = lambda text: None,
+) -> SplitResult:
+    """Plan the flight that separates the effects of ``keys``, or the tied effects of a trace.
+
+    Parameters
+    ----------
+    campaign : where condition, gusts and sensors come from; None for those of the trace or the default ones.
+    keys : effects; none for those of the trace.
+    trace : folder of a trace, or its trace.json; None for none.
+    sizes : EFFECT.PARAMETER -> value [its unit].
+    aircraft : shipped name or folder; None for that of the campaign or of the trace.
+    options : limits, records and seed.
+    out : campaign file to write, and a figure beside it; None to write nothing.
+    force : replace files that the command did not write, or that changed since.
+    step : receives each step.
+
+    Raises
+    ------
+    ConfigurationError, AircraftError, TrimError, StoreError
+        Naming what is wrong, where, and what to do.
+    """
+    answer_file = None if trace is None else (trace / ANSWER if trace.is_dir() else trace)
+    hypotheses = _hypotheses(keys, answer_file, sizes)
+    records = _records(answer_file)
+    declared, base = _base(campaign, aircraft, records, "" if out is None else out.stem)
+    inputs = [p for p in (campaign, answer_file) if isinstance(p, Path)]
+    with writing("plan", inputs, force=force) as outputs:
+        if out is not None:
+            outputs.require(out, out.with_suffix(".png"))
+        result = split(base, hypotheses, options, declared, step)
+        if out is not None:
+            result.write(out)
+            style.save(result.plot(), out.with_suffix(".png"))
+    return result
+
+
+def _hypotheses(
+    keys: Sequence[str], answer_file: Path | None, sizes: Mapping[str, float]
+) -> tuple[Hypothesised, ...]:
+    if keys or answer_file is None:
+        return from_names(keys, sizes)
+    if sizes:
+        raise ConfigurationError("plan: sizes are those of the trace; leave --size out, or state --split")
+    return from_answer(TraceAnswer.read(answer_file), str(answer_file))
+
+
+def _records(answer_file: Path | None) -> Histories | None:
+    if answer_file is None or not (answer_file.parent / FILE).is_file():
+        return None
+    return read_histories(answer_file.parent / FILE, "run `airtruth trace` again to write it")
+
+
+def _base(
+    campaign: Path | Campaign | None, aircraft: str | None, records: Histories | None, name: str
+) -> tuple[Aircraft, Campaign]:
+    """The declared aircraft and the campaign whose manoeuvres are replaced."""
+    if campaign is not None:
+        read = campaign if isinstance(campaign, Campaign) else campaign_file.read(campaign)
+        near = campaign.parent if isinstance(campaign, Path) else None
+        declared = planes.load(aircraft or read.aircraft, near=near)
+        own = name or read.name
+        return declared, read.model_copy(
+            update={"name": own, "aircraft": _stated(aircraft or read.aircraft, declared)}
+        )
+    facts = {} if records is None else dict(records.facts.get("provenance", {}))
+    source = aircraft or str(facts.get("aircraft", ""))
+    if not source:
+        raise ConfigurationError(
+            "plan: state --aircraft, or a CAMPAIGN.toml with the aircraft and its condition"
+        )
+    declared = planes.load(source)
+    raw = _default(declared, records) | {"name": name or _NAME, "aircraft": _stated(source, declared)}
+    return declared, Campaign.model_validate(raw)
+
+
+def _default(declared: Aircraft, records: Histories | None) -> dict[str, object]:
+    """Condition, rates and air of a trace's records."""
+    if records is None:
+        raise ConfigurationError(
+            f"plan: no flight condition of {declared.name} is known; give a CAMPAIGN.toml "
+            f"(`airtruth new campaign --aircraft {declared.name} --out FILE.toml` writes one)"
+        )
+    known = [r.conditions for r in records.records]
+    speed = np.array([c["airspeed_m_s"] for c in known])
+    density = np.array([c["density_kg_m3"] for c in known])
+    eas = float(np.mean(speed * np.sqrt(density / RHO0_KG_M3)))
+    rate = float(known[0].get("sample_rate_hz", _LOG_HZ))
+    return {
+        "runs": 1,
+        "duration_s": 1.0,
+        "log_hz": round(rate, 3),
+        "simulation_hz": round(rate, 3) * max(1, round(200.0 / rate)),
+        "condition": {"eas_m_s": eas, "altitude_m": float(np.mean([c["altitude_m"] for c in known]))},
+        "manoeuvre": [{"kind": "doublet", "amplitude_deg": 1.0, "step_ms": 100.0, "start_s": 0.0}],
+        "gust": {"figures": "mil-f-8785c", "level": "light"},
+    }
+
+
+def _stated(name: str, declared: Aircraft) -> str:
+    """A shipped name as it is; any other aircraft by its folder, which does not depend on the folder of the file."""
+    shipped = any((root / name).is_dir() for root in planes.shipped_roots())
+    return name if shipped else str(declared.folder.resolve())
+
+
+__all__ = ["split_from"]

@@ -1,0 +1,143 @@
+"""Limits of a planned input: what the elevator and the aircraft may reach in the flight."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.errors import ConfigurationError
+from airtruth.units import DEG, G0
+
+Array = NDArray[np.float64]
+
+LEAST_LENGTH_S: Final = 1.0
+"""Shortest input that is planned [s] (judgement: a short period of a small aircraft)."""
+MOST_LENGTH_S: Final = 60.0
+"""Longest input that is planned [s] (judgement: the search flies it some hundred times)."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of an input and of the motion that it causes.
+
+    Attributes
+    ----------
+    amplitude_rad : largest deviation of the elevator from its trim [rad].
+    rate_rad_s : largest rate of the surface [rad/s].
+    alpha_rad : largest deviation of the angle of attack from its trim [rad].
+    load_factor : lowest and highest normal load factor [-].
+    length_s : length of the input [s].
+    airspeed : largest change of the airspeed over that of the trim [-]; the tracer's tables are those of one speed.
+    """
+
+    amplitude_rad: float = 2.0 * DEG
+    rate_rad_s: float = math.inf
+    alpha_rad: float = 6.0 * DEG
+    load_factor: tuple[float, float] = (0.0, 2.0)
+    length_s: float = 8.0
+    airspeed: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Refuse limits that no flight keeps.
+
+        Raises
+        ------
+        ConfigurationError
+            Naming the limit, its value and what is allowed.
+        """
+        for name in ("amplitude_rad", "rate_rad_s", "alpha_rad", "airspeed"):
+            value = getattr(self, name)
+            if not value > 0.0:
+                raise ConfigurationError(f"plan: {name} = {value:g} has to be above 0")
+        if not self.load_factor[0] < 1.0 < self.load_factor[1]:
+            low, high = self.load_factor
+            raise ConfigurationError(
+                f"plan: load factors of {low:g} to {high:g} exclude steady flight; state LOW,HIGH around 1"
+            )
+        if not LEAST_LENGTH_S <= self.length_s <= MOST_LENGTH_S:
+            raise ConfigurationError(
+                f"plan: an input of {self.length_s:g} s; allowed are {LEAST_LENGTH_S:g} to {MOST_LENGTH_S:g} s"
+            )
+
+
+@dataclass(frozen=True)
+class Extremes:
+    """What a flight reached.
+
+    Attributes
+    ----------
+    elevator_rad, alpha_rad : largest deviations from the trim [rad].
+    rate_rad_s : largest rate of the surface between two samples of the log [rad/s].
+    load_factor : lowest and highest normal load factor [-].
+    airspeed : largest change of the airspeed over that of the trim [-].
+    """
+
+    elevator_rad: float
+    rate_rad_s: float
+    alpha_rad: float
+    load_factor: tuple[float, float]
+    airspeed: float
+
+    def share(self, limits: Limits) -> float:
+        """Largest share of a limit that is used [-]; above 1 a limit is exceeded.
+
+        The deviation of the load factor from 1 is compared with that of the limit on the same side.
+        """
+        low, high = self.load_factor
+        least, most = limits.load_factor
+        return max(
+            self.elevator_rad / limits.amplitude_rad,
+            self.rate_rad_s / limits.rate_rad_s,
+            self.alpha_rad / limits.alpha_rad,
+            (1.0 - low) / (1.0 - least),
+            (high - 1.0) / (most - 1.0),
+            self.airspeed / limits.airspeed,
+        )
+
+    def and_of(self, other: Extremes) -> Extremes:
+        """The larger of two flights in each respect."""
+        return Extremes(
+            elevator_rad=max(self.elevator_rad, other.elevator_rad),
+            rate_rad_s=max(self.rate_rad_s, other.rate_rad_s),
+            alpha_rad=max(self.alpha_rad, other.alpha_rad),
+            load_factor=(
+                min(self.load_factor[0], other.load_factor[0]),
+                max(self.load_factor[1], other.load_factor[1]),
+            ),
+            airspeed=max(self.airspeed, other.airspeed),
+        )
+
+
+def extremes(channels: Mapping[str, Array], dt_s: float) -> Extremes:
+    """Largest values of a flight that starts at its trim.
+
+    Parameters
+    ----------
+    channels : name -> (samples,) of the elevator, alpha, az and the airspeed, without sensor errors [SI].
+    dt_s : time between two samples [s].
+
+    Examples
+    --------
+    >>> flat = np.zeros(3)
+    >>> flown = {"elevator_rad": np.array([0.0, 0.01, 0.0]), "alpha_rad": flat, "az_m_s2": flat - 9.80665}
+    >>> flown["airspeed_m_s"] = flat + 40.0
+    >>> extremes(flown, 0.02).rate_rad_s
+    0.5
+    """
+    elevator, alpha = channels["elevator_rad"], channels["alpha_rad"]
+    factor, speed = -channels["az_m_s2"] / G0, channels["airspeed_m_s"]
+    return Extremes(
+        elevator_rad=float(np.abs(elevator - elevator[0]).max()),
+        rate_rad_s=float(np.abs(np.diff(elevator)).max() / dt_s),
+        alpha_rad=float(np.abs(alpha - alpha[0]).max()),
+        load_factor=(float(factor.min()), float(factor.max())),
+        airspeed=float(np.abs(speed / speed[0] - 1.0).max()),
+    )
+
+
+__all__ = ["Extremes", "Limits", "extremes"]

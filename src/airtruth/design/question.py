@@ -1,0 +1,184 @@
+"""The hypotheses that a flight has to separate: from the names of effects, or from the answer of a trace."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.design.separation import Member, clipped
+from airtruth.effects.effect import Effect, Parameter
+from airtruth.effects.registry import EFFECTS, named
+from airtruth.errors import ConfigurationError
+from airtruth.physics.resolution import LinearPoint, resolved
+from airtruth.tracing.answer import ParameterEstimate, TraceAnswer
+
+Array = NDArray[np.float64]
+
+MOST: Final = 4
+"""Hypotheses that one flight is planned to separate [-] (judgement: the time grows with the square of their number)."""
+_TYPICAL: Final = 4.0
+"""Size of an effect of which none is stated, over its material size [-] (judgement: an effect that a first flight
+shows)."""
+_SPREAD: Final = 0.3
+"""Relative standard deviation of a size that is stated without one [-] (judgement)."""
+
+
+@dataclass(frozen=True)
+class Hypothesised:
+    """An effect that may be the truth.
+
+    Attributes
+    ----------
+    effect : the effect.
+    sizes : (parameters,) in size coordinates; None where it imitates the first of the hypotheses.
+    std : (parameters,) their standard deviations, likewise.
+    """
+
+    effect: Effect
+    sizes: Array | None = None
+    std: Array | None = None
+
+    def member(self, sizes: Array) -> Member:
+        """The hypothesis at some sizes."""
+        return Member(self.effect, clipped(self.effect, sizes))
+
+
+def from_names(keys: Sequence[str], stated: Mapping[str, float]) -> tuple[Hypothesised, ...]:
+    """Hypotheses from keys of effects.
+
+    Parameters
+    ----------
+    keys : two or more keys; a name without a variant is each of its variants.
+    stated : KEY.PARAMETER -> value [its unit]; the first effect has a typical size where it is not stated, and the
+        others imitate the first.
+
+    Raises
+    ------
+    ConfigurationError
+        If an effect or a parameter does not exist, a value is outside its range, or there are too few or too many.
+    """
+    every = [e for key in keys for e in ([EFFECTS[key]] if key in EFFECTS else named(key))]
+    _require(every)
+    values: dict[str, dict[str, float]] = {e.key: {} for e in every}
+    for name, value in stated.items():
+        key, _, parameter = name.rpartition(".")
+        matching = [e for e in every if key in (e.key, e.name)]
+        if not matching:
+            raise ConfigurationError(
+                f"plan: size {name!r}: write EFFECT.PARAMETER=VALUE with an effect of --split: "
+                f"{', '.join(values)}"
+            )
+        for e in matching:
+            values[e.key][parameter] = value
+    found = []
+    for k, e in enumerate(every):
+        if not values[e.key] and k > 0:
+            found.append(Hypothesised(e))
+            continue
+        typical = {
+            p.name: p.value(_typical_size(p))
+            for p in e.parameters
+            if not values[e.key].keys() & p.spellings().keys()
+        }
+        filled = e.read(typical | values[e.key])
+        sizes = np.array([p.size(filled[p.name]) for p in e.parameters])
+        found.append(Hypothesised(e, sizes, _spread(e, sizes)))
+    return tuple(found)
+
+
+def from_answer(answer: TraceAnswer, source: str) -> tuple[Hypothesised, ...]:
+    """The first effect of an answer with those that explain its records as well.
+
+    Raises
+    ------
+    ConfigurationError
+        If the answer has no tied effects.
+    """
+    for accepted in answer.effects:
+        names = {accepted.name, *accepted.indistinguishable_from}
+        if len(names) == 1 and not accepted.other_variants:
+            continue
+        tied = [c.key for c in answer.candidates if c.testable and not c.why_not and c.name in names]
+        others = [key for key in tied if key != accepted.key and key in EFFECTS]
+        missing = names - {accepted.name} - {EFFECTS[key].name for key in others}
+        others += [e.key for name in sorted(missing) for e in named(name)[:1]]
+        first = _estimated(EFFECTS[accepted.key], accepted.parameters)
+        every = (first, *(Hypothesised(EFFECTS[key]) for key in others[: MOST - 1]))
+        _require([h.effect for h in every])
+        return every
+    sets = [a.effects for a in answer.alternatives[:2]]
+    if len(sets) == 2 and len(set(sets[0]) ^ set(sets[1])) == 2:
+        keys = [next(iter(set(sets[i]) - set(sets[1 - i]))) for i in range(2)]
+        if all(key in EFFECTS for key in keys):
+            return from_names(keys, {})
+    raise ConfigurationError(
+        f"{source}: the verdict is {answer.verdict} and no two effects are tied; state the effects to separate with --split"
+    )
+
+
+def _require(effects: Sequence[Effect]) -> None:
+    keys = [e.key for e in effects]
+    if len(set(keys)) < 2:
+        raise ConfigurationError(
+            f"plan: {len(set(keys))} effect(s) to separate ({', '.join(keys) or 'none'}); state two with --split A,B"
+        )
+    if len(keys) > MOST:
+        raise ConfigurationError(
+            f"plan: {len(keys)} effects ({', '.join(keys)}); state at most {MOST}, a variant as NAME:VARIANT"
+        )
+    air = [e.key for e in effects if e.where == "air"]
+    if air:
+        raise ConfigurationError(
+            f"plan: no elevator input shows {', '.join(air)}, which act on the gusts alone; state other effects"
+        )
+    if any(e.key == "derivatives" for e in effects):
+        raise ConfigurationError(
+            "plan: `derivatives` is refitted under every hypothesis; state an effect that changes more than them"
+        )
+
+
+def _estimated(effect: Effect, parameters: Mapping[str, ParameterEstimate]) -> Hypothesised:
+    sizes, std = np.zeros(len(effect.parameters)), np.zeros(len(effect.parameters))
+    for i, p in enumerate(effect.parameters):
+        estimate = parameters[p.name]
+        sizes[i] = p.size(estimate.value)
+        ends = [p.size(end) for end in estimate.ci95 if end is not None]
+        std[i] = (max(ends) - min(ends)) / 4.0 if len(ends) == 2 else _SPREAD * abs(sizes[i])
+    return Hypothesised(effect, clipped(effect, sizes), std)
+
+
+def _typical_size(p: Parameter) -> float:
+    low, high = p.reach
+    if p.is_location:
+        return math.sqrt(low * high) if low > 0.0 else 0.5 * (low + high)
+    size = _TYPICAL * p.material * (p.sign or 1)
+    return min(max(size, low), high)
+
+
+def _spread(effect: Effect, sizes: Array) -> Array:
+    """Standard deviations of sizes that are stated without one; a location is known as far as a break is."""
+    return np.array(
+        [0.0 if p.is_location else _SPREAD * abs(s) for p, s in zip(effect.parameters, sizes, strict=True)]
+    )
+
+
+def at_point(hypothesised: Hypothesised, point: LinearPoint) -> Hypothesised:
+    """The hypothesis with a cause of changed derivatives resolved into terms about a trim."""
+    effect = hypothesised.effect
+    if not effect.in_derivatives:
+        return hypothesised
+    describe = effect.describe
+    return replace(
+        hypothesised,
+        effect=replace(
+            effect, describe=lambda values: resolved(describe(values), point), in_derivatives=False
+        ),
+    )
+
+
+__all__ = ["MOST", "Hypothesised", "at_point", "from_answer", "from_names"]

@@ -1,0 +1,265 @@
+"""The planned flight: the input, the separation to expect, and the campaign that flies it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from airtruth.design.limits import Extremes, Limits
+from airtruth.design.separation import Member
+from airtruth.logs.atomic import write_text
+from airtruth.simulation.campaign.file import Campaign
+from airtruth.simulation.campaign.write import as_toml
+from airtruth.simulation.simulator import Condition
+from airtruth.table import Table, as_html, as_text, flat
+from airtruth.table.model import Number, Row, significant
+from airtruth.tracing.model.compile import CHANNELS
+from airtruth.tracing.selection.ranking import TIE
+from airtruth.units import DEG
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+_LABELS: Final = ("alpha [deg]", "q [deg/s]", "az [m/s2]")
+"""Names of the outputs in a figure."""
+_SCALES: Final = (1.0 / DEG, 1.0 / DEG, 1.0)
+"""Factors from SI to the units of `_LABELS`."""
+
+
+@dataclass(frozen=True)
+class InputRow:
+    """An input with its separations.
+
+    Attributes
+    ----------
+    family, shape : name of its family, and its segments or its spectrum in words.
+    amplitude_rad : peak of the elevator command about the trim [rad].
+    sigma : (hypotheses,) separation of each, where it is true, from the nearest other [standard deviations].
+    load_factor : lowest and highest normal load factor, as declared and with each hypothesis [-].
+    """
+
+    family: str
+    amplitude_rad: float
+    shape: str
+    sigma: tuple[float, ...]
+    load_factor: tuple[float, float]
+
+    @property
+    def least(self) -> float:
+        """Separation whichever hypothesis is true."""
+        return min(self.sigma)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """The planned flight as predicted, in still air.
+
+    Attributes
+    ----------
+    t_s : (samples,) [s].
+    elevator_rad, reference_rad : (samples,) surface about its trim, of the input and of the 3-2-1-1 [rad].
+    difference : (samples, 3) alpha [rad], q [rad/s], az [m/s2] under the first hypothesis less those under the nearest
+        other, at the size that fits best.
+    noise : (3,) standard deviation of the noise of a sample [same units].
+    """
+
+    t_s: Array
+    elevator_rad: Array
+    reference_rad: Array
+    difference: Array
+    noise: Array
+
+
+def split_probability(sigma: float) -> float:
+    """Probability that the true hypothesis leads by more than a tie in 2 log L [-].
+
+    The difference in 2 log L of two hypotheses at a separation d is normal with mean d^2 and standard deviation 2 d (as
+    of two simple hypotheses with normal errors).
+
+    Examples
+    --------
+    >>> round(split_probability(6.0**0.5), 3)
+    0.5
+    """
+    return float(norm.sf((TIE - sigma**2) / (2.0 * sigma))) if sigma > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class SplitResult:
+    """A planned flight; satisfies `airtruth.result.Result`.
+
+    Attributes
+    ----------
+    aircraft : name.
+    campaign : the campaign that flies it; reference_campaign : the same with the 3-2-1-1.
+    hypotheses : the effects at the sizes that are planned for.
+    limits, reached : limits, and what the aircraft reaches in still air, as declared and with each hypothesis.
+    condition : flight condition.
+    gust_m_s : vertical gust that is expected [m/s].
+    fitted : records that count: those that a trace does not hold out.
+    rows : the best input of each family, best first, then the 3-2-1-1 of equal length and limits, ``reference``.
+    tried : inputs that were flown.
+    prediction : time histories.
+    """
+
+    aircraft: str
+    campaign: Campaign
+    reference_campaign: Campaign
+    hypotheses: tuple[Member, ...]
+    limits: Limits
+    reached: Extremes
+    condition: Condition
+    gust_m_s: float
+    fitted: int
+    rows: tuple[InputRow, ...]
+    reference: InputRow
+    tried: int
+    prediction: Prediction
+
+    @property
+    def best(self) -> InputRow:
+        """The input that is flown."""
+        return max(self.rows, key=lambda row: row.least)
+
+    @property
+    def ratio(self) -> float:
+        """Separation over that of the 3-2-1-1 of equal length and limits [-]."""
+        return self.best.least / self.reference.least if self.reference.least > 0.0 else float("inf")
+
+    def table(self) -> Table:
+        """One row per family, best first."""
+        keys = [m.effect.key for m in self.hypotheses]
+        rows: list[Row] = [
+            (
+                row.family,
+                row.shape,
+                Number(row.amplitude_rad / DEG, digits=3),
+                *(Number(s, digits=3) for s in row.sigma),
+                Number(row.least / self.reference.least if self.reference.least else np.nan, digits=3),
+            )
+            for row in self.rows
+        ]
+        return flat(
+            title=f"Inputs that separate {', '.join(keys)} ({self.aircraft})",
+            columns=("input", "shape", "peak [deg]", *(f"sigma, {key} true" for key in keys), "over 3-2-1-1"),
+            rows=rows,
+            notes=self._notes(),
+        )
+
+    def _notes(self) -> tuple[str, ...]:
+        reached, limits, at = self.reached, self.limits, self.condition
+        sizes = "; ".join(
+            f"{m.effect.key} " + ", ".join(f"{k} = {significant(v)}" for k, v in m.values.items())
+            for m in self.hypotheses
+        )
+        return (
+            f"The input separates by {significant(self.best.least)} standard deviations or more, "
+            f"{significant(self.ratio)} times the 3-2-1-1 of equal length and limits; a trace then has one name with a "
+            f"probability of {significant(split_probability(self.best.least), 2)}.",
+            f"Sizes: {sizes}.",
+            f"Separation of {self.fitted} fitted of {self.campaign.runs} records at {at.eas_m_s:.4g} m/s EAS, "
+            f"{at.altitude_m:.4g} m, in vertical gusts of {significant(self.gust_m_s)} m/s; mean over draws of sizes and "
+            "derivatives.",
+            f"Reached in still air, as declared and with each effect: elevator {reached.elevator_rad / DEG:.3g} of "
+            f"{limits.amplitude_rad / DEG:.3g} deg, rate {reached.rate_rad_s / DEG:.3g} of "
+            f"{limits.rate_rad_s / DEG:.3g} deg/s, alpha {reached.alpha_rad / DEG:.3g} of {limits.alpha_rad / DEG:.3g} "
+            f"deg about the trim, load factor {reached.load_factor[0]:.3g} to {reached.load_factor[1]:.3g} of "
+            f"{limits.load_factor[0]:.3g} to {limits.load_factor[1]:.3g}, airspeed {100.0 * reached.airspeed:.3g} of "
+            f"{100.0 * limits.airspeed:.3g} % from the trim.",
+        )
+
+    def summary(self) -> str:
+        """The table as text."""
+        return as_text(self.table())
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per input: family, shape, amplitude_rad, sigma_KEY for each hypothesis, least, over_reference."""
+        import pandas as pd
+
+        return pd.DataFrame([self._row(row) for row in self.rows])
+
+    def _row(self, row: InputRow) -> dict[str, Any]:
+        sigma = {f"sigma_{m.effect.key}": s for m, s in zip(self.hypotheses, row.sigma, strict=True)}
+        share = row.least / self.reference.least if self.reference.least > 0.0 else None
+        return {
+            "family": row.family,
+            "shape": row.shape,
+            "amplitude_rad": row.amplitude_rad,
+            **sigma,
+            "least": row.least,
+            "over_reference": share,
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Hypotheses with their sizes, limits, what is reached, and the rows of `to_frame`."""
+        rate = self.limits.rate_rad_s
+        return {
+            "aircraft": self.aircraft,
+            "campaign": self.campaign.name,
+            "hypotheses": [{"name": m.effect.key, "parameters": m.values} for m in self.hypotheses],
+            "separation_sigma": self.best.least,
+            "reference_sigma": self.reference.least,
+            "probability_of_one_name": split_probability(self.best.least),
+            "records": self.campaign.runs,
+            "fitted": self.fitted,
+            "condition": asdict(self.condition),
+            "gust_m_s": self.gust_m_s,
+            "limits": asdict(self.limits) | {"rate_rad_s": rate if np.isfinite(rate) else None},
+            "reached": asdict(self.reached),
+            "inputs": [self._row(row) for row in self.rows],
+        }
+
+    def to_toml(self) -> str:
+        """Text of the campaign file."""
+        lines = [
+            self.campaign.title[:1].upper() + self.campaign.title[1:] + ", computed by airtruth plan.",
+            *self._notes(),
+        ]
+        return as_toml(self.campaign, "\n".join(lines))
+
+    def write(self, out: Path) -> None:
+        """Write the campaign file.
+
+        Raises
+        ------
+        StoreError
+            If the file cannot be written.
+        """
+        write_text(out, self.to_toml())
+
+    def plot(self) -> Figure:
+        """The elevator beside that of the 3-2-1-1, and the predicted differences over the noise of a sample."""
+        from airtruth import style
+
+        p = self.prediction
+        with style.applied():
+            figure, axes = style.panels(4, 1, width_in=6.5, height_in=6.5, sharex=True)
+            top = axes[0, 0]
+            top.plot(p.t_s, p.reference_rad / DEG, color=style.GREY, label="3-2-1-1 of equal length")
+            top.plot(p.t_s, p.elevator_rad / DEG, color=style.BLUE, label=self.best.family)
+            top.set_ylabel("elevator [deg]")
+            top.legend(loc="lower left")
+            for k, label in enumerate(_LABELS):
+                ax, scale = axes[k + 1, 0], _SCALES[k]
+                ax.axhspan(-scale * p.noise[k], scale * p.noise[k], color="#EEEEEE")
+                ax.plot(p.t_s, scale * p.difference[:, k], color=style.VERMILLION)
+                ax.set_ylabel(label)
+            axes[1, 0].set_title("difference of the hypotheses; grey: noise of a sample", loc="left")
+            axes[-1, 0].set_xlabel("time [s]")
+        return figure
+
+    def _repr_html_(self) -> str:
+        return as_html(self.table())
+
+
+assert len(_LABELS) == len(CHANNELS)
+
+__all__ = ["InputRow", "Prediction", "SplitResult", "split_probability"]

@@ -1,0 +1,232 @@
+"""Increments of a coefficient that have no name: piecewise linear functions of a signal, with memory or without.
+
+    dC = sum_k b_k/w h_k(s)  [+ a (x - s)],   h_k = max(0, s - s_k) above the trim, min(0, s - s_k) below it
+
+s is the signal, or the state x of a first-order lag or of a mode that the signal drives; w is the width of a cell. The
+function is zero in the cell that holds the trim, where the derivatives describe the aircraft, and constant outside the
+range in which it was learned. The bends b_k have independent normal priors, which is the prior of an integrated random
+walk: a penalised linear spline.
+
+Source: S. N. Wood, Generalized Additive Models, 2nd ed., 2017, sections 5.3 and 5.8 (splines as normal priors);
+D. Ruppert, M. P. Wand and R. J. Carroll, Semiparametric Regression, 2003, section 3.5 (truncated lines).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from airtruth.effects.effect import Effect, Parameter
+from airtruth.physics.terms import AeroTerm, Change, StateTerm, shape_of
+
+Array = NDArray[np.float64]
+
+NAME: Final = "increment"
+"""Name of every learned increment."""
+SIGNAL_NAMES: Final[Mapping[str, str]] = {
+    "alpha": "alpha_rad",
+    "elevator": "elevator_rad",
+    "qhat": "q_hat",
+    "alpha_dot_hat": "alpha_dot_hat",
+}
+"""Signal of a term -> its name in an answer; a rate is multiplied by c/(2V)."""
+_STEP: Final[Mapping[str, float]] = {"CL": 1e-3, "Cm": 1e-4}
+"""Step of the differences in a bend [-] (judgement: small against noise, large against rounding)."""
+_REACH: Final[Mapping[str, float]] = {"CL": 1.0, "Cm": 0.3}
+"""Largest bend over one cell [-] (judgement: the lift and the moment of a stall)."""
+_TIME_STEP: Final = 0.02
+"""Step of the differences in the logarithm of a time constant, as a share of it [-] (judgement)."""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """A state that a signal drives, see `airtruth.physics.terms.StateTerm`.
+
+    Attributes
+    ----------
+    kind : "lag" or "mode".
+    time_s : time constant of the lag, 1/wn of the mode [s].
+    damping : damping ratio of the mode [-].
+    """
+
+    kind: Literal["lag", "mode"]
+    time_s: float
+    damping: float = 0.0
+
+    @property
+    def longest_s(self) -> float:
+        """Largest time constant that a refit may reach [s]; the shortest is its inverse, relative to `time_s`."""
+        return 3.0 * self.time_s
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Where a learned increment acts, and by which functions.
+
+    Attributes
+    ----------
+    coefficient : "CL" or "Cm".
+    signal : one of `airtruth.physics.terms.SIGNALS`.
+    low, high : range of the signal in which the increment is learned [unit of the signal].
+    cells : number of equal cells of the range; 0 for a linear increment, which needs ``memory``.
+    trim : value of the signal at the trim.
+    memory : state between the signal and the increment; None for an increment of the signal itself.
+    """
+
+    coefficient: Literal["CL", "Cm"]
+    signal: str
+    low: float
+    high: float
+    cells: int
+    trim: float
+    memory: Memory | None = None
+
+    @property
+    def width(self) -> float:
+        """Width of a cell [unit of the signal]."""
+        return (self.high - self.low) / self.cells
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Points between the cells, where the increment may bend."""
+        return tuple(np.linspace(self.low, self.high, self.cells + 1)[1:-1].tolist()) if self.cells else ()
+
+    @property
+    def state(self) -> str:
+        """Name of the state; one for each coefficient, signal and kind."""
+        kind = self.memory.kind if self.memory is not None else ""
+        return f"{NAME}-{self.coefficient}-{self.signal.replace('_', '-')}-{kind}"
+
+    @property
+    def variant(self) -> str:
+        """Variant of the effect: coefficient, signal and memory."""
+        over = SIGNAL_NAMES[self.signal]
+        if self.memory is None:
+            return f"{self.coefficient} over {over}"
+        return f"{self.coefficient} over a {self.memory.kind} of {over}"
+
+    def terms(self, values: Mapping[str, float]) -> Change:
+        """Terms of the increment at given parameters."""
+        if self.memory is None:
+            return Change(aero=self._bends(values, self.signal))
+        state = StateTerm(
+            self.state, self.memory.kind, self.signal, values["time_s"], values.get("damping", 0.0)
+        )
+        if self.cells:
+            return Change(states=(state,), aero=self._bends(values, state.name))
+        share = values["share"]
+        return Change(
+            states=(state,),
+            aero=(
+                AeroTerm(self.coefficient, state.name, "linear", share, self.trim),
+                AeroTerm(self.coefficient, self.signal, "linear", -share, self.trim),
+            ),
+        )
+
+    def _bends(self, values: Mapping[str, float], signal: str) -> tuple[AeroTerm, ...]:
+        sides: tuple[Literal["below", "above"], ...] = ("below", "above")
+        above = [(at, values[_bend(k)] / self.width) for k, at in enumerate(self.knots) if at > self.trim]
+        below = [(at, values[_bend(k)] / self.width) for k, at in enumerate(self.knots) if at <= self.trim]
+        above.append((self.high, -sum(slope for _, slope in above)))
+        below.append((self.low, -sum(slope for _, slope in below)))
+        return tuple(
+            AeroTerm(self.coefficient, signal, shape, slope, at)
+            for shape, rows in zip(sides, (below, above), strict=True)
+            for at, slope in rows
+            if len(rows) > 1
+        )
+
+    def basis(self, signal: ArrayLike) -> Array:
+        """Increments by a unit of each bend.
+
+        Parameters
+        ----------
+        signal : (points,) of the signal, or of the state where there is one.
+
+        Returns
+        -------
+        (points, bends) [-].
+        """
+        at = np.asarray(signal, dtype=np.float64)
+        names = [_bend(k) for k in range(len(self.knots))]
+        columns = []
+        for name in names:
+            unit = dict.fromkeys(names, 0.0) | {name: 1.0}
+            terms = self._bends(unit, self.signal)
+            columns.append(sum((t.amplitude * shape_of(t, at) for t in terms), np.zeros(at.shape)))
+        return np.stack(columns, axis=-1)
+
+
+def _bend(k: int) -> str:
+    return f"bend_{k + 1}"
+
+
+@dataclass(frozen=True)
+class Increment(Effect):
+    """A learned increment as an effect; its parameters are the bends, or the share of a linear one, and its times.
+
+    Attributes
+    ----------
+    shape : where it acts, and by which functions.
+    """
+
+    shape: Shape = field(default=Shape("Cm", "alpha", 0.0, 1.0, 1, 0.0), kw_only=True)
+
+    @property
+    def bends(self) -> int:
+        """Number of bends; 1 for a linear increment."""
+        return max(len(self.shape.knots), 1)
+
+    def with_prior(self, std: float) -> Increment:
+        """The effect with another standard deviation of its bends' prior [-]."""
+        first = tuple(replace(p, prior_std=std) for p in self.parameters[: self.bends])
+        return replace(self, parameters=first + self.parameters[self.bends :])
+
+
+def increment(shape: Shape, prior_std: float = math.inf) -> Increment:
+    """The effect of a shape.
+
+    Parameters
+    ----------
+    shape : where it acts, and by which functions.
+    prior_std : standard deviation of the prior of its bends [-].
+    """
+    size = "share" if not shape.cells else ""
+    names = [size] if size else [_bend(k) for k in range(len(shape.knots))]
+    reach = 10.0 * _REACH[shape.coefficient] if size else _REACH[shape.coefficient]
+    step = (100.0 if size else 1.0) * _STEP[shape.coefficient]
+    meaning = "part that acts through the state [1/unit of the signal]" if size else "bend over one cell"
+    parameters = [
+        Parameter(name, "-", meaning, -reach, reach, 0.0, step=step, prior_std=prior_std) for name in names
+    ]
+    if shape.memory is not None:
+        parameters += _times(shape.memory)
+    acts = "pitching moment" if shape.coefficient == "Cm" else "lift"
+    return Increment(
+        name=NAME,
+        variant=shape.variant,
+        where="dynamics",
+        parameters=tuple(parameters),
+        describe=shape.terms,
+        explanation=f"An increment of the {acts} that no effect of the library describes, learned from the records.",
+        source="Penalised linear spline (S. N. Wood, Generalized Additive Models, 2nd ed., 2017, section 5.3).",
+        distinguished_by="Records that cover its range slowly and fast separate a function from memory.",
+        shape=shape,
+    )
+
+
+def _times(memory: Memory) -> list[Parameter]:
+    low, high = memory.time_s**2 / memory.longest_s, memory.longest_s
+    meaning = "time constant" if memory.kind == "lag" else "inverse of the natural frequency in rad/s"
+    times = [Parameter("time_s", "s", meaning, low, high, 0.0, is_location=True, step=memory.time_s)]
+    if memory.kind == "mode":
+        times.append(Parameter("damping", "-", "damping ratio", 0.01, 0.7, 0.0, is_location=True, step=0.5))
+    return times
+
+
+__all__ = ["NAME", "SIGNAL_NAMES", "Increment", "Memory", "Shape", "increment"]

@@ -1,1 +1,0 @@
-"""Fly: trim, linearise and fly an aircraft in JSBSim, one manoeuvre or a campaign of them."""

@@ -1,0 +1,95 @@
+"""A foreign file as named arrays, and its passage between processes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.isolation.protocol import Reply
+
+Array = NDArray[np.float64]
+
+_PLAIN_KINDS: Final = "biufcmMSU"
+"""Kinds of numpy types whose bytes can be sent; others are sent as JSON."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file that was read.
+
+    Attributes
+    ----------
+    path : the file.
+    arrays : name -> values, (rows,) or, of a matrix, (rows, columns); text columns hold strings.
+    clocks : name -> times [s] of an array that brings its own.
+    labels : matrix -> names of its columns, where the file states them.
+    ordered : whether the arrays are the columns of one table, so that a number means one of them.
+    first_line : line of the first row in a text file, 0 if it is none.
+    units : name -> unit as the file states it.
+    """
+
+    path: Path
+    arrays: Mapping[str, NDArray[Any]]
+    clocks: Mapping[str, Array] = field(default_factory=dict)
+    labels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    ordered: bool = True
+    first_line: int = 0
+    units: Mapping[str, str] = field(default_factory=dict)
+
+
+def packed(source: Source) -> Reply:
+    """Return a source as a reply; an array that several names share is sent once."""
+    sent: dict[int, int] = {}
+    arrays: list[NDArray[Any]] = []
+
+    def number(values: NDArray[Any]) -> int:
+        if id(values) not in sent:
+            sent[id(values)] = len(arrays)
+            arrays.append(values)
+        return sent[id(values)]
+
+    def entry(values: NDArray[Any]) -> Any:
+        return number(values) if values.dtype.kind in _PLAIN_KINDS else {"cells": [_cell(v) for v in values]}
+
+    facts = {
+        "arrays": [[name, entry(values)] for name, values in source.arrays.items()],
+        "clocks": [[name, number(values)] for name, values in source.clocks.items()],
+        "labels": [[name, list(names)] for name, names in source.labels.items()],
+        "ordered": source.ordered,
+        "first_line": source.first_line,
+        "units": dict(source.units),
+    }
+    return Reply(facts, tuple(arrays))
+
+
+def _cell(value: Any) -> Any:
+    """A cell of a column of mixed types as JSON has it."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    return value if value is None or isinstance(value, bool | int | float | str) else str(value)
+
+
+def unpacked(path: Path, reply: Reply) -> Source:
+    """Inverse of `packed`."""
+
+    def values(entry: Any) -> NDArray[Any]:
+        return reply.arrays[entry] if isinstance(entry, int) else np.array(entry["cells"], dtype=object)
+
+    facts = reply.facts
+    return Source(
+        path,
+        {name: values(entry) for name, entry in facts["arrays"]},
+        {name: values(entry) for name, entry in facts["clocks"]},
+        {name: tuple(names) for name, names in facts["labels"]},
+        facts["ordered"],
+        facts["first_line"],
+        facts["units"],
+    )
+
+
+__all__ = ["Source", "packed", "unpacked"]

@@ -1,0 +1,51 @@
+"""Identification: the six short-period derivatives of a flight log, by regression and by likelihood."""
+
+from airtruth.identification.condition import AircraftConstants
+from airtruth.identification.diagnostics import Diagnostics, diagnose, residuals
+from airtruth.identification.estimates import (
+    SENTENCES,
+    Estimates,
+    Quantities,
+    Status,
+    estimates_table,
+    quantities,
+)
+from airtruth.identification.methods import METHODS, Method
+from airtruth.identification.options import AuxiliaryModel, Options
+from airtruth.identification.regression.auxiliary import linear_auxiliary
+from airtruth.identification.regression.covariance import COVARIANCES
+from airtruth.identification.regression.lowpass import identify_actuator
+from airtruth.identification.result import IdentificationResult, Settings, Source, settings_of
+from airtruth.identification.run import identify, identify_batch, identify_joint
+from airtruth.identification.store import require_mergeable, write_estimates
+from airtruth.identification.tables import overview
+
+__all__ = [
+    "COVARIANCES",
+    "METHODS",
+    "SENTENCES",
+    "AircraftConstants",
+    "AuxiliaryModel",
+    "Diagnostics",
+    "Estimates",
+    "IdentificationResult",
+    "Method",
+    "Options",
+    "Quantities",
+    "Settings",
+    "Source",
+    "Status",
+    "diagnose",
+    "estimates_table",
+    "identify",
+    "identify_actuator",
+    "identify_batch",
+    "identify_joint",
+    "linear_auxiliary",
+    "overview",
+    "quantities",
+    "require_mergeable",
+    "residuals",
+    "settings_of",
+    "write_estimates",
+]

@@ -1,0 +1,242 @@
+"""From a batch of logs to the arrays of an identification: flight condition, signals, dynamic pressure.
+
+Measured dynamic pressure. With v = V(t)/V0 and p = q_bar(t)/q_bar0 the ratios to the constant flight
+condition of a record, eq. (4) of M. Brunot, "An Instrumental Variable Approach for Aircraft Identification",
+holds at every sample with the whole lift, that of the trim included:
+
+    alpha' - q - g/V = -lift0 (p/v) CL,   q' = moment0 p Cm,   az = -normal0 p CL,
+    CL = CL0 + CLalpha alpha + (c/2V0) CLq q/v + CLde de, and Cm alike.
+
+Divided by p/v, p and p, the equations have the form of constant pressure: the same factors, the regressors
+alpha, q/v and de, and one free constant each. A left side x a' becomes (x a)' - x' a, so that a filter can
+take the derivative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.identification.options import Options
+from airtruth.identification.regression.rows import row_factors
+from airtruth.logs.flight_log import Batch
+from airtruth.numerics.prefilter import butterworth, zero_phase
+from airtruth.physics.atmosphere import air_density
+from airtruth.physics.short_period import Scale, scale
+from airtruth.units import G0
+
+Array = NDArray[np.float64]
+
+COMMAND: Final = "elevator_command_rad"
+"""Channel of the elevator command [rad]."""
+ALPHA: Final = 0
+"""Index of alpha [rad] among the signals."""
+Q: Final = 1
+"""Index of q [rad/s] among the signals."""
+AZ: Final = 2
+"""Index of az [g] among the signals."""
+ELEVATOR: Final = 3
+"""Index of the elevator [rad] among the signals."""
+NO_LEFT: Final = np.empty((0, 4, 0))
+"""Left sides at constant pressure: the estimators form them from the signals."""
+
+
+class AircraftConstants(Protocol):
+    """Constants of the aircraft that an identification needs."""
+
+    @property
+    def wing_area_m2(self) -> float:
+        """Reference area S [m2]."""
+
+    @property
+    def chord_m(self) -> float:
+        """Mean aerodynamic chord c [m]."""
+
+    @property
+    def mass_kg(self) -> float:
+        """Mass m [kg]."""
+
+    @property
+    def inertia_yy_kg_m2(self) -> float:
+        """Pitch inertia Iyy [kg m2]."""
+
+
+OneOrEach = AircraftConstants | Sequence[AircraftConstants]
+"""Constants of all batches, or one entry for each of them: fuel burn changes mass and inertia between records."""
+
+
+def each_batch(parts: Sequence[Batch], constants: OneOrEach) -> list[tuple[Batch, AircraftConstants]]:
+    """Batches, each with its constants."""
+    own = constants if isinstance(constants, Sequence) else [constants] * len(parts)
+    return list(zip(parts, own, strict=True))
+
+
+@dataclass(frozen=True)
+class Observation:
+    """Signals of runs of one length, measured and low-passed.
+
+    Attributes
+    ----------
+    dt_s : sample period [s].
+    signals : (runs, 4, samples) alpha [rad], q [rad/s], az [g], elevator [rad].
+    smooth : (runs, 4, samples) the same after the low-pass.
+    left, left_smooth : (runs, 4, samples) left sides of lift and moment at measured dynamic pressure, from
+        `divide`; q and az of ``signals`` are then divided too. Without runs at constant pressure.
+    command : (runs, samples) elevator command [rad], or None.
+    scale : factors of shape (runs,).
+    factors : (runs, 4) from `airtruth.identification.regression.rows.row_factors`.
+    window : samples at the start of the record whose mean is the trim; 0 for a free intercept, with signals
+        relative to their first sample.
+    """
+
+    dt_s: float
+    signals: Array
+    smooth: Array
+    left: Array
+    left_smooth: Array
+    command: Array | None
+    scale: Scale
+    factors: Array
+    window: int
+
+
+def flight_condition(
+    batch: Batch, constants: AircraftConstants, options: Options, pitch_rate: Array
+) -> Scale:
+    """Factors (runs,) of a constant airspeed and density, by ``options.condition``.
+
+    Parameters
+    ----------
+    batch, constants, options : runs, aircraft, choices.
+    pitch_rate : (runs, samples) low-passed q [rad/s].
+    """
+    airspeed, density = batch.channels["airspeed_m_s"], air_density(batch.channels)
+    if options.condition == "motion":
+        weight = (pitch_rate - pitch_rate.mean(axis=1, keepdims=True)) ** 2
+        total = weight.sum(axis=1, keepdims=True)
+        # a record at rest has no motion to weigh by; the checks refuse it earlier
+        weight = np.where(total > 0.0, weight / np.where(total > 0.0, total, 1.0), 1.0 / weight.shape[1])
+        mean_airspeed = np.einsum("rn,rn->r", airspeed, weight)
+        mean_density = np.einsum("rn,rn->r", density, weight)
+    else:
+        last = window_samples(options, batch.dt_s) if options.condition == "window" else airspeed.shape[1]
+        mean_airspeed = airspeed[:, :last].mean(axis=1)
+        mean_density = density[:, :last].mean(axis=1)
+    if options.airspeed_m_s is not None:
+        mean_airspeed = np.full_like(mean_airspeed, options.airspeed_m_s)
+    return scale(
+        constants.wing_area_m2,
+        constants.chord_m,
+        constants.mass_kg,
+        constants.inertia_yy_kg_m2,
+        mean_airspeed,
+        mean_density,
+    )
+
+
+def window_samples(options: Options, dt_s: float) -> int:
+    """Samples of the trim window, at least one."""
+    return max(1, round(options.trim_window_s / dt_s))
+
+
+def measured_unless_given(options: Options) -> Options:
+    """The options with the pressure "method" resolved: measured, or constant if the airspeed is given."""
+    if options.pressure != "method":
+        return options
+    return replace(options, pressure="measured" if options.airspeed_m_s is None else "constant")
+
+
+def ratios_of(batch: Batch, constants: AircraftConstants, condition: Scale) -> tuple[Array, Array]:
+    """Measured airspeed v and dynamic pressure p over those of the flight condition, (runs, samples) [-]."""
+    airspeed = batch.channels["airspeed_m_s"]
+    return ratios(airspeed, air_density(batch.channels), constants.wing_area_m2, constants.mass_kg, condition)
+
+
+def ratios(
+    airspeed_m_s: Array, density_kg_m3: Array, wing_area_m2: float, mass_kg: float, scale: Scale
+) -> tuple[Array, Array]:
+    """Airspeed and dynamic pressure over those of the flight condition.
+
+    Parameters
+    ----------
+    airspeed_m_s, density_kg_m3 : (runs, samples) measured.
+    wing_area_m2, mass_kg : S and m.
+    scale : constant flight condition, factors (runs,).
+
+    Returns
+    -------
+    v, p : (runs, samples) [-].
+    """
+    force = 0.5 * density_kg_m3 * airspeed_m_s**2 * (wing_area_m2 / mass_kg)
+    return airspeed_m_s / scale.airspeed_m_s[:, None], force / scale.normal[:, None]
+
+
+def divide(signals: Array, v: Array, p: Array, airspeed_m_s: Array, dt_s: float) -> Array:
+    """Divide q and az of ``signals`` by v and p, in place, and return the left sides.
+
+    Parameters
+    ----------
+    signals : (runs, 4, samples) alpha [rad], q [rad/s], az [g], elevator [rad].
+    v, p : (runs, samples) from `ratios`.
+    airspeed_m_s : (runs,) V0.
+    dt_s : sample period [s].
+
+    Returns
+    -------
+    (runs, 4, samples)
+        The first two are to be differentiated, the last two to be added, to give the left sides of lift and
+        moment: x alpha [rad], q/p [rad/s], -x' alpha - x q - g/(V0 p) [rad/s], -(1/p)' q [rad/s2], with
+        x = v/p and alpha relative to its mean.
+    """
+    by_lift, by_moment = v / p, 1.0 / p
+    alpha = signals[:, ALPHA] - signals[:, ALPHA].mean(axis=1, keepdims=True)
+    q = signals[:, Q].copy()
+    signals[:, Q] /= v
+    signals[:, AZ] /= p
+    slope_lift, slope_moment = (np.gradient(x, dt_s, axis=1) for x in (by_lift, by_moment))
+    added = -slope_lift * alpha - by_lift * q - G0 / airspeed_m_s[:, None] * by_moment
+    return np.stack([by_lift * alpha, by_moment * q, added, -slope_moment * q], axis=1)
+
+
+def observe(batch: Batch, constants: AircraftConstants, options: Options) -> Observation:
+    """Return the signals that the estimators read, az in g; nothing is checked."""
+    channels = batch.channels
+    signals = np.stack(
+        [channels["alpha_rad"], channels["q_rad_s"], channels["az_m_s2"] / G0, channels["elevator_rad"]],
+        axis=1,
+    )
+    sos = butterworth(options.cutoff_of(batch.dt_s), options.order, batch.dt_s)
+    smooth = zero_phase(signals, sos)
+    condition = flight_condition(batch, constants, options, smooth[:, Q])
+    left = left_smooth = NO_LEFT
+    if options.pressure == "measured":
+        v, p = ratios_of(batch, constants, condition)
+        left = divide(signals, v, p, condition.airspeed_m_s, batch.dt_s)
+        smooth, left_smooth = zero_phase(signals, sos), zero_phase(left, sos)
+    return Observation(
+        dt_s=batch.dt_s,
+        signals=signals,
+        smooth=smooth,
+        left=left,
+        left_smooth=left_smooth,
+        command=channels.get(COMMAND),
+        scale=condition,
+        factors=row_factors(condition),
+        window=window_samples(options, batch.dt_s) if options.trim == "mean" else 0,
+    )
+
+
+def relative(left: Array, window: int) -> Array:
+    """Left sides (runs, 4, samples) of an observation as deviations, by `origin_of`; unchanged if empty."""
+    return left - origin_of(left, window)[:, :, None] if left.shape[0] > 0 else left
+
+
+def origin_of(signals: Array, window: int) -> Array:
+    """Reference value along the last axis: the first sample, or the mean over ``window`` samples if > 0."""
+    if window > 0:
+        return np.asarray(signals[..., :window].mean(axis=-1))
+    return signals[..., 0].copy()

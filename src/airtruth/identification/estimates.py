@@ -1,0 +1,228 @@
+"""Estimates of one method as arrays, the quantities derived from them, and their rows of contract 2."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from typing import Final
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from airtruth.physics.short_period import MODAL, PARAMETERS, Scale, modal, system
+
+Array = NDArray[np.float64]
+
+
+class Status(IntEnum):
+    """How the identification of one run ended; `SENTENCES` has the words."""
+
+    CONVERGED = 0
+    MAXIMUM_ITERATIONS = 1
+    DIVERGED = 2
+    UNSTABLE = 3
+    SINGULAR = 4
+    ACTUATOR = 5
+
+
+JOINT: Final = "joint"
+"""run_id of an estimate that all runs share."""
+
+SENTENCES: Final[dict[Status, str]] = {
+    Status.CONVERGED: "converged",
+    Status.MAXIMUM_ITERATIONS: "maximum number of iterations reached before convergence",
+    Status.DIVERGED: "diverged: an estimate left every plausible range",
+    Status.UNSTABLE: "unstable auxiliary model: its simulation grows without bound over the record",
+    Status.SINGULAR: "singular: the instruments do not separate the parameters",
+    Status.ACTUATOR: "no stable first-order actuator fits command and surface",
+}
+"""Sentence for each status."""
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """Estimates of one method for a batch of runs, or for all of them jointly (one row).
+
+    Attributes
+    ----------
+    method : name of the method.
+    run_ids : names of the runs; of a joint estimate the single name "joint".
+    theta : (runs, 6) in the order of PARAMETERS [-]; NaN where there is no estimate.
+    covariance : (runs, 6, 6) by the rule ``covariance_name``.
+    covariance_name : name of the covariance: of `COVARIANCES`, or the method's own.
+    status : (runs,) values of `Status`.
+    iterations : (runs,) iterations of the instrumental variables; 0 for least squares.
+    scale : factors (runs,) of the flight condition that theta refers to.
+    confidence : probability of the intervals [-].
+    """
+
+    method: str
+    run_ids: tuple[str, ...]
+    theta: Array
+    covariance: Array
+    covariance_name: str
+    status: NDArray[np.int8]
+    iterations: NDArray[np.int32]
+    scale: Scale
+    confidence: float
+
+    @property
+    def converged(self) -> NDArray[np.bool_]:
+        """(runs,) whether the estimate converged."""
+        return np.asarray(self.status == Status.CONVERGED)
+
+    def rows(self, first: int, end: int) -> Estimates:
+        """Estimates of the runs from number ``first`` to before number ``end``."""
+        part = slice(first, end)
+        return replace(
+            self,
+            run_ids=self.run_ids[part],
+            theta=self.theta[part],
+            covariance=self.covariance[part],
+            status=self.status[part],
+            iterations=self.iterations[part],
+            scale=Scale(*(np.asarray(getattr(self.scale, f))[part] for f in Scale.__dataclass_fields__)),
+        )
+
+
+@dataclass(frozen=True)
+class Quantities:
+    """The six derivatives and the modal parameters with their uncertainty.
+
+    Attributes
+    ----------
+    names : CLalpha ... Cmde [-], wn_rad_s [rad/s], zeta [-].
+    value, std, lower, upper : (runs, 8); the interval is symmetric and normal.
+    """
+
+    names: tuple[str, ...]
+    value: Array
+    std: Array
+    lower: Array
+    upper: Array
+
+
+def concatenated(parts: Sequence[Estimates], run_ids: Sequence[str]) -> Estimates:
+    """Estimates of one method from several batches as one, in the order of ``run_ids``.
+
+    Parameters
+    ----------
+    parts : estimates of one method with the same options; each run in one of them.
+    run_ids : names of all their runs.
+    """
+    scale = joined([part.scale for part in parts])
+    given = [run_id for part in parts for run_id in part.run_ids]
+    if given == list(run_ids):
+        order: slice | NDArray[np.int64] = slice(None)
+    else:
+        index = {run_id: i for i, run_id in enumerate(given)}
+        order = np.array([index[run_id] for run_id in run_ids], dtype=np.int64)
+    return replace(
+        parts[0],
+        run_ids=tuple(run_ids),
+        theta=np.concatenate([part.theta for part in parts])[order],
+        covariance=np.concatenate([part.covariance for part in parts])[order],
+        status=np.concatenate([part.status for part in parts])[order],
+        iterations=np.concatenate([part.iterations for part in parts])[order],
+        scale=Scale(*(getattr(scale, f)[order] for f in Scale.__dataclass_fields__)),
+    )
+
+
+def joined(scales: Sequence[Scale]) -> Scale:
+    """Factors (runs,) of several batches, one after another."""
+    return Scale(*(np.concatenate([getattr(s, f) for s in scales]) for f in Scale.__dataclass_fields__))
+
+
+def mean_scale(scales: Sequence[Scale]) -> Scale:
+    """Factors (1,): their means over the runs of several batches."""
+    scale = joined(scales)
+    return Scale(*(getattr(scale, f).mean(keepdims=True) for f in Scale.__dataclass_fields__))
+
+
+def modal_jacobian(theta: Array, s: Scale) -> Array:
+    """d(wn, zeta)/d theta, (..., 2, 6): wn^2 = det A and 2 zeta wn = -tr A of eq. (2).
+
+    Source of A: M. Brunot, "An Instrumental Variable Approach for Aircraft Identification", eq. (2).
+    The elevator derivatives do not enter. NaN where det A is not positive.
+    """
+    a, _ = system(theta, s)
+    wn, zeta = modal(theta, s)
+    h = s.half_chord_time
+    zero = np.zeros_like(wn)
+    # dA/dtheta: each of the four derivatives enters one element of A
+    trace = np.stack([-s.lift + zero, zero, zero, zero, s.moment * h + zero, zero], axis=-1)
+    det = np.stack(
+        [
+            -s.lift * a[..., 1, 1],
+            s.lift * h * a[..., 1, 0],
+            zero,
+            -a[..., 0, 1] * s.moment,
+            a[..., 0, 0] * s.moment * h,
+            zero,
+        ],
+        axis=-1,
+    )
+    d_wn = det / (2.0 * wn)[..., None]
+    d_zeta = -trace / (2.0 * wn)[..., None] - (zeta / wn)[..., None] * d_wn
+    return np.stack([d_wn, d_zeta], axis=-2)
+
+
+def modal_with_covariance(theta: Array, covariance: Array, s: Scale) -> tuple[Array, Array]:
+    """wn [rad/s] and zeta [-], (..., 2), and their covariance (..., 2, 2), by the delta method."""
+    jacobian = modal_jacobian(theta, s)
+    return np.stack(modal(theta, s), axis=-1), jacobian @ covariance @ np.swapaxes(jacobian, -1, -2)
+
+
+def quantities(estimates: Estimates) -> Quantities:
+    """Values, standard deviations and intervals of derivatives and modal parameters."""
+    modal, modal_covariance = modal_with_covariance(estimates.theta, estimates.covariance, estimates.scale)
+    value = np.concatenate([estimates.theta, modal], axis=-1)
+    variance = np.concatenate(
+        [
+            np.diagonal(estimates.covariance, axis1=-2, axis2=-1),
+            np.diagonal(modal_covariance, axis1=-2, axis2=-1),
+        ],
+        axis=-1,
+    )
+    std = np.sqrt(np.where(variance >= 0.0, variance, np.nan))
+    half = half_width(estimates.confidence) * std
+    return Quantities(PARAMETERS + MODAL, value, std, value - half, value + half)
+
+
+def point_values(estimates: Estimates) -> Array:
+    """(runs, 8) derivatives [-], wn [rad/s] and zeta [-]: those of `quantities`, without their uncertainty."""
+    return np.concatenate(
+        [estimates.theta, np.stack(modal(estimates.theta, estimates.scale), axis=-1)], axis=-1
+    )
+
+
+def deviations(estimates: Estimates) -> Array:
+    """(runs, 6) standard deviations of the derivatives [-]: those of `quantities`; NaN for a negative variance."""
+    variance = np.diagonal(estimates.covariance, axis1=-2, axis2=-1)
+    return np.asarray(np.sqrt(np.where(variance >= 0.0, variance, np.nan)))
+
+
+def half_width(confidence: float) -> float:
+    """Half the width of an interval of a normal variable [standard deviations]."""
+    return float(norm.ppf(0.5 + 0.5 * confidence))
+
+
+def estimates_table(estimates: Estimates) -> pd.DataFrame:
+    """One row per run: run_id, method, converged, iterations, status, then NAME, NAME_std, ..._upper."""
+    q = quantities(estimates)
+    columns: dict[str, object] = {
+        "run_id": list(estimates.run_ids),
+        "method": [estimates.method] * len(estimates.run_ids),
+        "converged": estimates.converged,
+        "iterations": estimates.iterations,
+        "status": [SENTENCES[Status(int(s))] for s in estimates.status],
+    }
+    for i, name in enumerate(q.names):
+        columns[name] = q.value[:, i]
+        columns[f"{name}_std"] = q.std[:, i]
+        columns[f"{name}_lower"] = q.lower[:, i]
+        columns[f"{name}_upper"] = q.upper[:, i]
+    return pd.DataFrame(columns)

@@ -1,0 +1,1 @@
+"""Filter error and output error by maximum likelihood, and the Cramer-Rao bound."""

@@ -1,0 +1,193 @@
+"""Filter error: the derivatives by maximum likelihood with turbulence in the model.
+
+Kalman innovations of the linear short period in Dryden gusts (`airtruth.identification.likelihood.predictor`), their
+likelihood maximised by scoring with a Levenberg-Marquardt damping. Output biases and initial states are
+each record's own and exact at every step; noise and gust levels are known, or estimated about declared
+values. Without gusts it is output error.
+
+Source: R. E. Maine and K. W. Iliff, "Identification of Dynamic Systems", NASA RP-1138 (1985).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.identification.condition import AircraftConstants, OneOrEach, each_batch, observe
+from airtruth.identification.estimates import JOINT, Estimates, mean_scale
+from airtruth.identification.likelihood.kalman import score
+from airtruth.identification.likelihood.kalman_kernel import Signals
+from airtruth.identification.likelihood.options import CHANNELS, FilterOptions, free_parameters
+from airtruth.identification.likelihood.predictor import Layout, Term, extended, layout, short_period
+from airtruth.identification.likelihood.pressure import products, with_pressure, with_trim_moment
+from airtruth.identification.likelihood.scoring import Maxima, Scored, maximise
+from airtruth.identification.options import Options
+from airtruth.logs.flight_log import Batch
+from airtruth.numerics.intersample import servo_bend
+from airtruth.physics.short_period import PARAMETERS, Scale
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+MOMENT_NOISE: Final = "noise_moment"
+"""Name of the parameter: intensity of the noise in q_dot [rad/s per root second]."""
+_FLOOR: Final = 1e-5
+"""Least noise of every output over its spread [-]; judgement: a record without noise has no likelihood."""
+
+
+@dataclass(frozen=True)
+class Records:
+    """Runs of one length as the filter reads them.
+
+    Attributes
+    ----------
+    dt_s : sample period [s].
+    signals : outputs relative to their first sample; elevator relative to its first sample [rad] and further
+        inputs.
+    layout : the predictor's arrays.
+    scale : factors of shape (runs,).
+    """
+
+    dt_s: float
+    signals: Signals
+    layout: Layout
+    scale: Scale
+
+
+def records(batch: Batch, constants: AircraftConstants, options: FilterOptions) -> Records:
+    """Signals and predictor of a batch; nothing is checked.
+
+    The elevator between samples has the area of the cubic through the four nearest samples, and the
+    corners of a first-order servo behind a held command where the record shows one
+    (`airtruth.numerics.intersample`).
+    """
+    condition = Options(condition=options.condition, airspeed_m_s=options.airspeed_m_s)
+    scale = observe(batch, constants, condition).scale
+    y = np.stack([batch.channels[CHANNELS[name]] for name in options.outputs], axis=2)
+    elevator = batch.channels["elevator_rad"]
+    u = elevator - elevator[:, :1]
+    bend = servo_bend(u)
+    predictor = short_period(scale, options.length_u_m, options.length_w_m, options.outputs)
+    u, bend = u[:, :, None], bend[:, :, None]
+    if options.pressure == "measured":
+        more = products(batch, constants, scale)
+        servo = np.zeros_like(more)
+        u, bend = np.concatenate([u, more], axis=2), np.concatenate([bend, servo], axis=2)
+        predictor = with_pressure(predictor, scale, batch, constants)
+    if options.moment_noise > 0.0:
+        noise = (MOMENT_NOISE,)
+        predictor = extended(predictor, [Term("Q", "q", "", 1.0, noise * 2)], (), (), noise, noise)
+    if options.trim_moment_prior is not None:
+        predictor = with_trim_moment(predictor, scale)
+    floor = _FLOOR * y.std(axis=1)
+    least = [Term("R", name, "", floor[:, i] ** 2) for i, name in enumerate(options.outputs)]
+    edge = np.concatenate([u[:, :1], u, u[:, -1:]], axis=1)
+    bend[:, 1:] += (edge[:, 1:-2] + edge[:, 2:-1] - edge[:, :-3] - edge[:, 3:]) / 24.0
+    return Records(
+        dt_s=batch.dt_s,
+        signals=Signals(y - y[:, :1], np.ascontiguousarray(u), np.ascontiguousarray(bend)),
+        layout=layout(extended(predictor, least), y.shape[0]),
+        scale=scale,
+    )
+
+
+def fit(
+    batch: Batch,
+    constants: AircraftConstants,
+    start: Array,
+    options: FilterOptions,
+    levels: Array | None = None,
+) -> Estimates:
+    """Estimate the six derivatives of each run; nothing is checked.
+
+    A result does not depend on the other runs of the batch.
+
+    Parameters
+    ----------
+    batch : runs of one length and sample period, with density, airspeed, the outputs and the elevator.
+    constants : aircraft, any object with wing_area_m2, chord_m, mass_kg, inertia_yy_kg_m2.
+    start : (runs, 6) start of the search, such as the estimates of iv-f1; a row that is not finite has no
+        estimate (DIVERGED).
+    options : declared noise and air, and how to search.
+    levels : (runs, levels) declared levels of each run; None: those of the options. A level that the options
+        declare 0 stays 0.
+    """
+    data = records(batch, constants, options)
+    free = free_parameters(options)
+    each = np.tile(options.levels, (start.shape[0], 1)) if levels is None else levels
+
+    def evaluate(z: Array, active: Ints) -> Scored:
+        return scored(data, z, active, free)
+
+    maxima = maximise(evaluate, start, each, options)
+    return _estimates(maxima, batch.run_ids, data.scale, options)
+
+
+def fit_joint(
+    parts: Sequence[Batch], constants: OneOrEach, start: Array, options: FilterOptions
+) -> Estimates:
+    """One estimate for all runs together: derivatives and levels are shared, nothing is checked.
+
+    Flight condition, biases and initial states stay each run's own. All runs are held in memory.
+
+    Parameters
+    ----------
+    parts : batches; lengths and rates may differ.
+    constants, options : as in `fit`.
+    start : (6,) start of the search.
+    """
+    data = [records(batch, own, options) for batch, own in each_batch(parts, constants)]
+    free = free_parameters(options)
+
+    def evaluate(z: Array, active: Ints) -> Scored:
+        cost, gradient, information = (
+            np.zeros(1),
+            np.zeros((1, free.size)),
+            np.zeros((1, free.size, free.size)),
+        )
+        for part in data:
+            runs = part.signals.y.shape[0]
+            c, g, i = scored(part, np.repeat(z, runs, axis=0), np.arange(runs), free)
+            cost += c.sum()
+            gradient += g.sum(axis=0)
+            information += i.sum(axis=0)
+        return cost, gradient, information
+
+    maxima = maximise(evaluate, start[None, :], options.levels[None, :], options)
+    return _estimates(maxima, (JOINT,), mean_scale([part.scale for part in data]), options)
+
+
+def scored(data: Records, z: Array, active: Ints, free: Ints) -> Scored:
+    """Negative log-likelihood, gradient and information of the runs ``active``, no prior.
+
+    Parameters
+    ----------
+    z : (active, parameters) derivatives, then logarithms of the levels.
+    active, free : runs; parameters to differentiate for.
+
+    Returns
+    -------
+    (active,), (active, free), (active, free, free).
+    """
+    made = score(data.layout, active, z, free, data.signals, data.dt_s)
+    return made.cost, made.gradient, made.information
+
+
+def _estimates(maxima: Maxima, run_ids: tuple[str, ...], scale: Scale, options: FilterOptions) -> Estimates:
+    six = len(PARAMETERS)
+    gusts = options.sigma_u_m_s > 0.0 or options.sigma_w_m_s > 0.0
+    return Estimates(
+        method="filter-error" if gusts else "output-error",
+        run_ids=run_ids,
+        theta=maxima.z[:, :six],
+        covariance=maxima.covariance[:, :six, :six],
+        covariance_name="fisher",
+        status=maxima.status,
+        iterations=maxima.iterations,
+        scale=scale,
+        confidence=options.confidence,
+    )

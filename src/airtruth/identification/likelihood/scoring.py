@@ -1,0 +1,175 @@
+"""Maximum of a likelihood by Fisher scoring with Levenberg-Marquardt damping, many groups of runs at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.identification.estimates import Status
+from airtruth.identification.likelihood.options import (
+    FilterOptions,
+    declared_values,
+    free_parameters,
+    prior_weights,
+)
+from airtruth.numerics import levenberg_marquardt as solver
+from airtruth.numerics import normal_equations
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Scored = tuple[Array, Array, Array]
+"""Negative log-likelihood (active,), its gradient (active, free), information (active, free, free)."""
+
+DAMPING: Final = solver.Damping(initial=1e-3, least=1e-3, most=0.9e9)
+"""Damping relative to the information; judgement: from nearly undamped to steps of rounding size."""
+RIDGE: Final = 1e-14
+"""Added to the unit diagonal of the scaled information [-]; judgement: keeps a factorisation from an exact zero, far
+below rounding of the information."""
+LARGEST: Final = 1e6
+"""Size of a derivative that counts as divergence [-]; judgement: the largest plausible one, CLq, is of order 100."""
+
+
+@dataclass(frozen=True)
+class Maxima:
+    """Maximum of the likelihood of each group of runs.
+
+    Attributes
+    ----------
+    z : (groups, parameters) derivatives, then logarithms of the levels; NaN without a maximum.
+    covariance : (groups, free, free) inverse of the information, prior of the levels included.
+    status, iterations : (groups,).
+    """
+
+    z: Array
+    covariance: Array
+    status: NDArray[np.int8]
+    iterations: NDArray[np.int32]
+
+
+class _Point(NamedTuple):
+    """Posterior at a point: cost, gradient, information, and the curvature that a step uses."""
+
+    cost: float
+    gradient: Array
+    information: Array
+    curvature: Array
+
+
+@dataclass(frozen=True)
+class _Posterior:
+    """The solver's problems: one for each group.
+
+    Attributes
+    ----------
+    evaluate_likelihood : (z (active, parameters), active) -> `Scored` of those groups.
+    declared : (groups, parameters) centre of the prior.
+    weight : (free,) inverse variances of the prior.
+    free : indices of the estimated parameters; level : positions of the levels among them.
+    """
+
+    evaluate_likelihood: Callable[[Array, Ints], Scored]
+    declared: Array
+    weight: Array
+    free: Ints
+    level: slice
+
+    def evaluate(self, x: Array, index: Ints, near: Sequence[_Point] | None) -> list[_Point | None]:
+        """Posterior at points x (rows, free); None where the cost is not finite."""
+        points: list[_Point | None] = [None] * len(index)
+        sound = np.flatnonzero(np.isfinite(x).all(axis=1))
+        if sound.size == 0:
+            return points
+        x, index = x[sound], index[sound]
+        z = self.declared[index]
+        z[:, self.free] = x
+        cost, gradient, information = self.evaluate_likelihood(z, index)
+        # a level that the record does not show enters J by its square s^2 alone: information ~ s^4, while
+        # the curvature in log s is twice the gradient
+        hidden = np.zeros_like(gradient)
+        known = np.diagonal(information, axis1=1, axis2=2)
+        hidden[:, self.level] = np.maximum(2.0 * gradient - known, 0.0)[:, self.level]
+        off = x - self.declared[np.ix_(index, self.free)]
+        cost = cost + 0.5 * (self.weight * off**2).sum(axis=1)
+        gradient = gradient + self.weight * off
+        information = information + np.diag(self.weight)
+        curvature = information + hidden[:, :, None] * np.eye(self.free.size)
+        for row, i in enumerate(sound):
+            if np.isfinite(cost[row]):
+                points[i] = _Point(float(cost[row]), gradient[row], information[row], curvature[row])
+        return points
+
+    def step(self, x: Array, at: Sequence[_Point], damping: Array, index: Ints) -> tuple[Array, Array]:
+        """Steps (rows, free), and the decreases (rows,) of the cost that they promise; NaN where singular."""
+        gradient = np.stack([point.gradient for point in at])
+        curvature = np.stack([point.curvature for point in at])
+        known = np.stack([np.diagonal(point.information) for point in at])
+        regular = (known > 0.0).all(axis=1)
+        step = np.full(gradient.shape, np.nan)
+        step[regular] = normal_equations.scaled_step(
+            gradient[regular], curvature[regular], damping[regular] + RIDGE
+        )
+        # a level changes by a factor of e at most at a time
+        largest = np.abs(step[:, self.level]).max(axis=1, initial=0.0)
+        step /= np.maximum(1.0, largest)[:, None]
+        bent = np.einsum("gi,gij,gj->g", step, curvature, step)
+        return step, -(gradient * step).sum(axis=1) - 0.5 * bent
+
+    def move(self, x: Array, step: Array, index: Ints) -> Array:
+        """Points after a step; the parameters have no bounds."""
+        return x + step
+
+
+def maximise(
+    evaluate: Callable[[Array, Ints], Scored], start: Array, levels: Array, options: FilterOptions
+) -> Maxima:
+    """Maximise the likelihood of each group.
+
+    Parameters
+    ----------
+    evaluate : (z (active, parameters), active) -> `Scored` of those groups.
+    start : (groups, 6) derivatives.
+    levels : (groups, levels) declared values: centre of the prior and start of the search.
+    options : which levels are estimated, their prior, and how to search.
+    """
+    six = start.shape[1]
+    free = free_parameters(options)
+    declared = declared_values(options, levels)
+    # of the free parameters, the levels: all between the derivatives and the moment of the trim
+    level = slice(six, int(np.searchsorted(free, six + levels.shape[1])))
+    problems = _Posterior(evaluate, declared, prior_weights(options), free, level)
+    x = declared[:, free]
+    x[:, :six] = start
+    how = solver.Options(
+        iterations=options.maximum_iterations,
+        damping=DAMPING,
+        # the decrement of the last step: tolerance^2/2 for a step of `tolerance` standard errors
+        stopping=solver.Stopping(undamped=0.5 * options.tolerance**2),
+    )
+    end = solver.minimise(problems, x, how)
+    z = declared.copy()
+    z[:, free] = end.x
+    status = np.array([_STATUS[s] for s in end.status], dtype=np.int8)
+    ended = np.isin(status, (Status.CONVERGED, Status.MAXIMUM_ITERATIONS))
+    status[ended & ~(np.abs(z[:, :six]) < LARGEST).all(axis=1)] = Status.DIVERGED
+    covariance = np.full((len(z), free.size, free.size), np.nan)
+    for group in range(len(z)):
+        point = end.at[group]
+        if status[group] in (Status.CONVERGED, Status.MAXIMUM_ITERATIONS) and point is not None:
+            covariance[group] = normal_equations.scaled_inverse(point.information, RIDGE)
+        else:
+            z[group] = np.nan
+    return Maxima(z, covariance, status, np.array(end.iterations, dtype=np.int32))
+
+
+_STATUS: Final = {
+    solver.Status.CONVERGED: Status.CONVERGED,
+    solver.Status.ITERATIONS: Status.MAXIMUM_ITERATIONS,
+    solver.Status.STALLED: Status.MAXIMUM_ITERATIONS,
+    solver.Status.SINGULAR: Status.SINGULAR,
+    solver.Status.FAILED: Status.DIVERGED,
+}
+"""Status of an estimate for the end of its search."""

@@ -1,0 +1,166 @@
+"""Mass, inertia and reference lengths that records state, which replace those of the aircraft.
+
+An imported log keeps them in its metadata under ``record_constants``, run by run (docs/measured.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass, fields, replace
+from typing import Final
+
+import numpy as np
+
+from airtruth.aircraft import Aircraft
+from airtruth.errors import ConfigurationError, LogError, choices
+from airtruth.identification.condition import AircraftConstants
+from airtruth.logs.flight_log import Batch, FlightLog, batches
+
+
+@dataclass(frozen=True)
+class Constants:
+    """Constants of an aircraft: S [m2], c [m], m [kg], Iyy [kg m2]."""
+
+    wing_area_m2: float
+    chord_m: float
+    mass_kg: float
+    inertia_yy_kg_m2: float
+
+
+NAMES: Final = tuple(f.name for f in fields(Constants))
+"""Names of the constants."""
+CG: Final = "cg_mac"
+"""Centre of gravity aft of the leading edge of the mean aerodynamic chord, in chords [-]; only differences count."""
+REFERENCE: Final = ("wing_area_m2", "chord_m")
+"""Constants that normalise the derivatives, which a joint estimate therefore needs in common."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """Runs of one length, rate and loading.
+
+    Attributes
+    ----------
+    batch : the runs.
+    constants : those of these runs.
+    cg_mac : centre of gravity that the log states for them [-], see `CG`; None if it states none.
+    """
+
+    batch: Batch
+    constants: AircraftConstants
+    cg_mac: float | None
+
+
+def stated(metadata: Mapping[str, object], run_id: str) -> dict[str, float]:
+    """Constants that a log's metadata states for a run, in SI; {} if none.
+
+    Raises
+    ------
+    LogError
+        If it states anything but positive numbers under known names.
+    """
+    table = metadata.get("record_constants", {})
+    raw = table.get(run_id, {}) if isinstance(table, Mapping) else table
+    if not isinstance(raw, Mapping):
+        raise LogError(f"record_constants of run {run_id!r}: must be a table of {', '.join(NAMES)}")
+    known: dict[str, float] = {}
+    for name, value in raw.items():
+        if name not in (*NAMES, CG):
+            raise LogError(f"record_constants of run {run_id!r}: {name!r}: {choices(name, (*NAMES, CG))}")
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not 0.0 < value < np.inf:
+            raise LogError(f"record_constants of run {run_id!r}: {name} = {value!r}: must be above 0")
+        known[name] = float(value)
+    return known
+
+
+def of_run(constants: AircraftConstants, metadata: Mapping[str, object], run_id: str) -> AircraftConstants:
+    """The aircraft with the constants that the log states for a run; itself if it states none.
+
+    Raises
+    ------
+    LogError
+        As `stated`.
+    """
+    known = {name: value for name, value in stated(metadata, run_id).items() if name != CG}
+    if not known:
+        return constants
+    if isinstance(constants, Aircraft):  # its declared sensors remain
+        return constants.model_copy(update={"constants": constants.constants.model_copy(update=known)})
+    return Constants(**{name: known.get(name, getattr(constants, name)) for name in NAMES})
+
+
+def values_of(constants: AircraftConstants) -> Constants:
+    """The four constants alone."""
+    return Constants(**{name: float(getattr(constants, name)) for name in NAMES})
+
+
+def with_constants(log: FlightLog, constants: AircraftConstants) -> Iterator[Part]:
+    """Batches of a log whose runs share their constants and centre of gravity.
+
+    Raises
+    ------
+    LogError
+        As `stated`.
+    """
+    for batch in batches(log):
+        groups: dict[tuple[float, ...], list[int]] = {}
+        owners: dict[tuple[float, ...], tuple[AircraftConstants, float | None]] = {}
+        for run, run_id in enumerate(batch.run_ids):
+            own = of_run(constants, log.metadata, run_id)
+            cg = stated(log.metadata, run_id).get(CG)
+            key = (*astuple(values_of(own)), -1.0 if cg is None else cg)
+            groups.setdefault(key, []).append(run)
+            owners.setdefault(key, (own, cg))
+        for key, runs in groups.items():
+            yield Part(batch if len(groups) == 1 else _some(batch, runs), *owners[key])
+
+
+def by_loading(parts: Sequence[Part]) -> dict[float | None, list[Part]]:
+    """Parts of a joint estimate by their centre of gravity; mass and inertia may differ within a group.
+
+    Raises
+    ------
+    ConfigurationError
+        If reference lengths differ, or only some runs state a centre of gravity.
+    """
+    first = parts[0]
+    groups: dict[float | None, list[Part]] = {}
+    for part in parts:
+        for name in REFERENCE:
+            a, b = (float(getattr(one.constants, name)) for one in (first, part))
+            if a != b:
+                raise ConfigurationError(
+                    f"--joint: {name} is {a:.6g} in run {first.batch.run_ids[0]!r} and {b:.6g} in run "
+                    f"{part.batch.run_ids[0]!r}, and the derivatives are normalised by it; state one value for all runs"
+                )
+        if (part.cg_mac is None) != (first.cg_mac is None):
+            lacking = part if part.cg_mac is None else first
+            raise ConfigurationError(
+                f"--joint: run {lacking.batch.run_ids[0]!r} states no {CG} and others do; state it under [constants] in "
+                "all mappings, or in none"
+            )
+        groups.setdefault(part.cg_mac, []).append(part)
+    return groups
+
+
+def differing(
+    metadata: Mapping[str, object], run_ids: Sequence[str], constants: AircraftConstants
+) -> list[tuple[str, str, float, float]]:
+    """(run, name, value of the record, value of the aircraft) where a record states another value."""
+    return [
+        (run, name, value, float(getattr(constants, name)))
+        for run in run_ids
+        for name, value in stated(metadata, run).items()
+        if name != CG and value != float(getattr(constants, name))
+    ]
+
+
+def _some(batch: Batch, runs: Sequence[int]) -> Batch:
+    index = np.asarray(runs)
+    return replace(
+        batch,
+        run_ids=tuple(batch.run_ids[i] for i in runs),
+        t_s=batch.t_s[index],
+        channels={name: np.ascontiguousarray(values[index]) for name, values in batch.channels.items()},
+    )

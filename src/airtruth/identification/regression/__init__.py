@@ -1,0 +1,1 @@
+"""Least squares, instrumental variables and equation error in the frequency domain."""

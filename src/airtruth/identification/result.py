@@ -1,0 +1,219 @@
+"""The result of an identification."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from airtruth.aircraft import Aircraft
+from airtruth.errors import ConfigurationError, choices
+from airtruth.identification import tables
+from airtruth.identification.condition import AircraftConstants
+from airtruth.identification.estimates import Estimates, estimates_table
+from airtruth.identification.options import Options
+from airtruth.identification.record_constants import Constants, values_of
+from airtruth.logs.histories import Histories
+from airtruth.logs.sources import Logs
+from airtruth.table import Table, as_html, as_text
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Source:
+    """A log that was read from a file: its name, the SHA-256 of its bytes and its number of runs."""
+
+    name: str
+    sha256: str
+    runs: int
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The choices that decide the numbers of an identification.
+
+    Attributes
+    ----------
+    options : choices that all methods share.
+    joint : whether all runs share one estimate.
+    aircraft : name of the aircraft.
+    constants : its constants.
+    """
+
+    options: Options
+    joint: bool
+    aircraft: str
+    constants: Constants
+
+    def to_dict(self) -> dict[str, Any]:
+        """The settings in types that JSON has."""
+        options = {f.name: getattr(self.options, f.name) for f in dataclasses.fields(self.options)}
+        if self.options.auxiliary is not None:
+            options["auxiliary"] = getattr(self.options.auxiliary, "__qualname__", "custom")
+        if self.options.band_hz is not None:
+            options["band_hz"] = list(self.options.band_hz)
+        return {
+            "options": options,
+            "joint": self.joint,
+            "aircraft": self.aircraft,
+            "constants": dataclasses.asdict(self.constants),
+        }
+
+
+def settings_of(aircraft: AircraftConstants, options: Options, joint: bool) -> Settings:
+    """Settings of an identification of this aircraft."""
+    name = aircraft.name if isinstance(aircraft, Aircraft) else type(aircraft).__name__
+    return Settings(options, joint, name, values_of(aircraft))
+
+
+RUNS_PER_FRAME: Final = 10_000
+"""Runs in a part of `IdentificationResult.frames` [-] (judgement: 3 MB for each method)."""
+
+
+@dataclass(frozen=True)
+class IdentificationResult:
+    """Estimates of the six derivatives by one or more methods, with their provenance.
+
+    Attributes
+    ----------
+    estimates : one per method, in the order asked for; all have the same runs.
+    settings : options, joint, aircraft and its constants; ``notes`` lists the runs that state other constants.
+    notes : sentences that a reader of the estimates should know.
+    forced : faults of the logs that ``force`` overrode.
+    version : of airtruth.
+    sources : logs that were read from files.
+    logs : the logs as they were given, which figures read again.
+    """
+
+    estimates: tuple[Estimates, ...]
+    settings: Settings
+    notes: tuple[str, ...]
+    forced: tuple[str, ...]
+    version: str
+    sources: tuple[Source, ...]
+    logs: Logs | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Names of the methods."""
+        return tuple(e.method for e in self.estimates)
+
+    @property
+    def run_ids(self) -> tuple[str, ...]:
+        """Names of the runs; of a joint estimate the single name "joint"."""
+        return self.estimates[0].run_ids
+
+    def of(self, method: str) -> Estimates:
+        """Estimates of one method.
+
+        Raises
+        ------
+        ConfigurationError
+            If the method is not in the result.
+        """
+        for estimates in self.estimates:
+            if estimates.method == method:
+                return estimates
+        raise ConfigurationError(f"method {method!r} is not in this result: {choices(method, self.methods)}")
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per run and method, the columns of estimates.parquet (docs/methods.md).
+
+        run_id, method, converged, iterations, status; then NAME, NAME_std, NAME_lower, NAME_upper of each of
+        CLalpha ... Cmde [-], wn_rad_s [rad/s] and zeta [-]. Runs keep their order, and each run the order of
+        the methods.
+        """
+        return _frame(self.estimates)
+
+    def frames(self) -> Iterator[pd.DataFrame]:
+        """The rows of `to_frame` in parts of up to `RUNS_PER_FRAME` runs, so that the memory need not hold them all."""
+        for first in range(0, len(self.run_ids), RUNS_PER_FRAME):
+            yield _frame([e.rows(first, first + RUNS_PER_FRAME) for e in self.estimates])
+
+    def summary(self) -> str:
+        """Estimates of each method with their intervals, or mean and spread over runs; then the notes."""
+        return as_text(self.table())
+
+    def table(self) -> Table:
+        """The table of `summary`."""
+        forced = tuple(f"Overridden by --force: {sentence}" for sentence in self.forced)
+        return dataclasses.replace(tables.overview_of(self.estimates), notes=(*forced, *self.notes))
+
+    def details(self, method: str, run_id: str | None = None) -> Table:
+        """Estimates of one method: of one run, or their distribution over the converged runs.
+
+        Raises
+        ------
+        ConfigurationError
+            If the method or the run is not in the result.
+        """
+        return tables.details(self.of(method), run_id)
+
+    def compare(self, run_id: str | None = None) -> Table:
+        """Methods side by side: estimate and standard deviation of one run, or mean and spread over runs.
+
+        Raises
+        ------
+        ConfigurationError
+            If the run is not in the result.
+        """
+        return tables.comparison(self.estimates, run_id)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Settings, provenance, notes and the rows of `to_frame`; null for a number that is not finite."""
+        rows = [
+            {
+                name: None if isinstance(value, float) and not math.isfinite(value) else value
+                for name, value in row.items()
+            }
+            for row in self.to_frame().to_dict(orient="records")
+        ]
+        return {
+            "version": self.version,
+            **self.settings.to_dict(),
+            "methods": list(self.methods),
+            "sources": [dataclasses.asdict(source) for source in self.sources],
+            "notes": list(self.notes),
+            "forced": list(self.forced),
+            "estimates": rows,
+        }
+
+    def plot(self) -> Figure:
+        """Intervals of the methods side by side, one panel for each derivative and modal parameter."""
+        from airtruth.charts import as_figure
+        from airtruth.identification.charts import intervals_chart
+
+        return as_figure(intervals_chart(self.to_frame(), confidence=self.estimates[0].confidence))
+
+    def histories(self) -> Histories | None:
+        """Records of the logs beside the simulations by each method; None where the logs are unknown.
+
+        Raises
+        ------
+        StoreError, LogError
+            If a log cannot be read again.
+        """
+        from airtruth.identification.simulated import simulated_records
+
+        if self.logs is None:
+            return None
+        return simulated_records(self.logs, self.to_frame(), self.settings.constants)
+
+    def _repr_html_(self) -> str:
+        return as_html(self.table())
+
+
+def _frame(estimates: Sequence[Estimates]) -> pd.DataFrame:
+    """Rows of several methods for the same runs: run by run, and of each run the methods in their order."""
+    import pandas as pd
+
+    table = pd.concat([estimates_table(e) for e in estimates], ignore_index=True)
+    order = np.arange(len(table)).reshape(len(estimates), -1).T.ravel()
+    return table.iloc[order].reset_index(drop=True)

@@ -1,0 +1,171 @@
+"""Records beside the motion that identified derivatives predict.
+
+The linear short period (M. Brunot, "An Instrumental Variable Approach for Aircraft Identification", eqs (2) and (3))
+is simulated from the measured elevator at the mean airspeed and density of the record. Initial state, trim and the
+offset of az are each record's own, and every method has the same of them: they enter the outputs linearly and are
+fitted by least squares, the channels weighted by their standard deviations.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from airtruth.identification.condition import AircraftConstants
+from airtruth.identification.estimates import JOINT
+from airtruth.identification.record_constants import of_run, values_of
+from airtruth.logs.flight_log import FlightLog
+from airtruth.logs.histories import Histories, History
+from airtruth.logs.sources import Logs, named_logs
+from airtruth.physics.atmosphere import air_density
+from airtruth.physics.short_period import PARAMETERS, Scale, normal_force_row, scale, system
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+OUTPUTS: Final = ("alpha_rad", "q_rad_s", "az_m_s2")
+"""Channels that are simulated."""
+MOST_RECORDS: Final = 12
+"""Largest number of records that are simulated for a report [-]; judgement: a reader looks through a dozen."""
+
+
+_LARGEST: Final = 1e6
+"""Largest derivative that is simulated [1/rad] (judgement: beyond any aircraft)."""
+
+
+def simulate(theta: Array, s: Scale, dt_s: float, elevator_rad: Array, measured: Array) -> Array:
+    """Outputs of the linear short period for a record, its initial state, trim and az offset fitted.
+
+    Parameters
+    ----------
+    theta : (6,) derivatives in the order of `PARAMETERS` [1/rad, rates as q c/(2V)].
+    s : factors of the flight condition, scalars.
+    dt_s : sample period [s].
+    elevator_rad : (samples,) elevator, linear between samples [rad].
+    measured : (samples, 3) alpha [rad], q [rad/s], az [m/s2].
+
+    Returns
+    -------
+    (samples, 3)
+        Simulated outputs in the same units; NaN where the motion diverges.
+    """
+    a, b = system(theta, s)
+    elevator = elevator_rad - elevator_rad[0]
+    step = expm(
+        dt_s
+        * np.block(
+            [[a, b[:, None], np.zeros((2, 1))], [np.zeros((1, 3)), np.ones((1, 1))], [np.zeros((1, 4))]]
+        )
+    )
+    phi, early = step[:2, :2], step[:2, 2]
+    late = step[:2, 3] / dt_s  # of the change of the elevator over the step
+    # columns: forced motion, two initial states, two constants that trim the equations
+    x = np.zeros((len(elevator), 2, 5))
+    x[0, :, 1:3] = np.eye(2)
+    constant = _integral(a, dt_s)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for k in range(len(elevator) - 1):
+            x[k + 1] = phi @ x[k]
+            x[k + 1, :, 0] += early * elevator[k] + late * (elevator[k + 1] - elevator[k])
+            x[k + 1, :, 3:] += constant
+        row = normal_force_row(theta, s)
+        az = np.einsum("i,nij->nj", row[:2], x)
+        az[:, 0] += row[2] * elevator
+        basis = np.concatenate([x, az[:, None, :]], axis=1)  # (samples, 3, 5)
+    offset = np.zeros((*basis.shape[:2], 1))
+    offset[:, 2] = 1.0
+    basis = np.concatenate([basis, offset], axis=2)
+    if not np.isfinite(basis).all():
+        return np.full_like(measured, np.nan)
+    weight = 1.0 / np.maximum(measured.std(axis=0), np.finfo(np.float64).tiny)
+    columns = (basis * weight[None, :, None]).reshape(-1, 6)
+    target = (measured * weight).reshape(-1) - columns[:, 0]
+    size = np.maximum(np.linalg.norm(columns[:, 1:], axis=0), np.finfo(np.float64).tiny)
+    free = np.linalg.lstsq(columns[:, 1:] / size, target, rcond=None)[0] / size
+    return np.asarray(basis @ np.concatenate([[1.0], free]))
+
+
+def _integral(a: Array, dt_s: float) -> Array:
+    """Integral of exp(A t) over a sample period, (2, 2)."""
+    return np.asarray(expm(dt_s * np.block([[a, np.eye(2)], [np.zeros((2, 4))]]))[:2, 2:])
+
+
+def simulated_records(
+    logs: Logs, estimates: pd.DataFrame, constants: AircraftConstants, most: int = MOST_RECORDS
+) -> Histories:
+    """Records beside the simulations by each method that has an estimate of them.
+
+    Parameters
+    ----------
+    logs : the identified logs.
+    estimates : rows of contract 2, see `airtruth.identification.result.IdentificationResult.to_frame`.
+    constants : the aircraft; mass, inertia and lengths that a log states for a run replace its own.
+    most : largest number of records; of more, that many evenly spaced ones are chosen.
+
+    Raises
+    ------
+    LogError, StoreError
+        If a log cannot be read, or the logs lack a run of the estimates.
+    """
+    methods = tuple(dict.fromkeys(estimates["method"]))
+    rows = {
+        (str(run), str(method)): part.iloc[0]
+        for (run, method), part in estimates.groupby(["run_id", "method"], sort=False)
+    }
+    runs = list(dict.fromkeys(estimates["run_id"]))
+    joint = runs == [JOINT]
+    if joint:
+        runs = [run for _, log in named_logs(logs) for run in log.run_ids]
+    chosen = [runs[round(k)] for k in np.linspace(0, len(runs) - 1, min(most, len(runs)))]
+    found = {}
+    for _, log in named_logs(logs, run_ids=chosen):
+        for run in log.run_ids:
+            own = {method: rows.get((JOINT if joint else run, method)) for method in methods}
+            found[run] = _record(log, run, own, of_run(constants, log.metadata, run))
+    return Histories(tuple(found[run] for run in chosen), methods, chosen[0], len(runs))
+
+
+def _record(
+    log: FlightLog, run_id: str, rows: dict[str, pd.Series[float] | None], constants: AircraftConstants
+) -> History:
+    at = log.rows(log.run_ids.index(run_id))
+    channels = {name: values[at] for name, values in log.channels.items()}
+    t_s = log.t_s[at]
+    dt = float((t_s[-1] - t_s[0]) / (len(t_s) - 1))
+    airspeed, density = float(channels["airspeed_m_s"].mean()), float(air_density(channels).mean())
+    own = values_of(constants)
+    s = scale(own.wing_area_m2, own.chord_m, own.mass_kg, own.inertia_yy_kg_m2, airspeed, density)
+    measured = np.stack([channels[c] for c in OUTPUTS], axis=1)
+    models = {}
+    for method, row in rows.items():
+        y = np.full_like(measured, np.nan)
+        if row is not None:
+            theta = np.array([float(row[name]) for name in PARAMETERS])
+            if (np.abs(theta) < _LARGEST).all():
+                y = simulate(theta, s, dt, channels["elevator_rad"], measured)
+        models[method] = {c: y[:, i] for i, c in enumerate(OUTPUTS)}
+    return History(
+        run_id=run_id,
+        group="",
+        t_s=t_s,
+        elevator_rad=channels["elevator_rad"],
+        measured={c: channels[c] for c in OUTPUTS},
+        models=models,
+        conditions={
+            "airspeed_m_s": airspeed,
+            "density_kg_m3": density,
+            **({"altitude_m": float(channels["altitude_m"].mean())} if "altitude_m" in channels else {}),
+            "mass_kg": own.mass_kg,
+            "inertia_yy_kg_m2": own.inertia_yy_kg_m2,
+            "duration_s": float(t_s[-1] - t_s[0]),
+            "sample_rate_hz": 1.0 / dt,
+        },
+    )
+
+
+__all__ = ["MOST_RECORDS", "OUTPUTS", "simulate", "simulated_records"]

@@ -1,0 +1,378 @@
+"""From foreign files and their mappings to a flight log that holds the contract."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.checks.fault import Fault
+from airtruth.checks.gate import require
+from airtruth.errors import ConfigurationError, LogError
+from airtruth.importers.align import Alignment, aligned
+from airtruth.importers.derived import airspeed_from_pressure, with_alpha
+from airtruth.importers.manoeuvres import Found, find, read_table
+from airtruth.importers.mapping import CONSTANTS, MappingFile, Place, Resample, read_mapping, unit_factor
+from airtruth.importers.series import Series, base_clock, read_series
+from airtruth.importers.sources import Source, column, numbers, open_source
+from airtruth.importers.uniform import uniform
+from airtruth.logs.flight_log import RECORD_CONSTANTS, FlightLog
+from airtruth.units import DEG
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Imported:
+    """An imported log and the faults that did not stop the import.
+
+    Attributes
+    ----------
+    log : keeps the log contract; its metadata list the faults that ``force`` overruled under "forced".
+    faults : uncertain faults of `airtruth.checks.gate`; with ``force`` the certain ones too.
+    notes : sentences on what the import decided by itself: offsets of clocks, a reconstructed channel.
+    """
+
+    log: FlightLog
+    faults: tuple[Fault, ...]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A foreign file with its mapping and the alignment of its clock."""
+
+    source: Source
+    mapping: MappingFile
+    alignment: Alignment | None = None
+
+
+@dataclass(frozen=True)
+class Merged:
+    """Channels of one or several files on the clock of the first one, before they are cut and resampled.
+
+    Attributes
+    ----------
+    pieces : the files; the first one's mapping states runs and resampling.
+    series : channel -> samples.
+    resample : common rate; None if all channels share their times.
+    notes : sentences on the alignment.
+    """
+
+    pieces: tuple[Piece, ...]
+    series: Mapping[str, Series]
+    resample: Resample | None
+    notes: tuple[str, ...] = field(default=())
+
+
+def import_log(
+    path: Path | str | Sequence[Path | str],
+    mapping: MappingFile | Path | str | Sequence[MappingFile | Path | str],
+    *,
+    manoeuvres: Path | str | None = None,
+    force: bool = False,
+) -> Imported:
+    """Read foreign files through mappings, and test the result against physics.
+
+    Parameters
+    ----------
+    path : a file, or several. With one mapping for several files each file is a record of its own; with as many mappings
+        as files they are recorders of one flight, which are merged on the clock of the first.
+    mapping : mapping or its file, or one for each file.
+    manoeuvres : table of start and stop times (`airtruth.importers.manoeuvres.read_table`), which replaces [[manoeuvre]].
+    force : keep a log that contradicts physics; a breach of the log contract is refused nevertheless.
+
+    Raises
+    ------
+    StoreError
+        If a file cannot be read.
+    ConfigurationError
+        If a mapping or table cannot be used as written, or there are neither one nor as many mappings as files.
+    LogError
+        If a column is missing or not numeric, times do not increase, clocks cannot be aligned, the mapping contradicts
+        physics, or the result breaks the contract; the message says which and what to do.
+    """
+    paths, mappings = _given(path, mapping)
+    if manoeuvres is not None:
+        if len(mappings) < len(paths):
+            raise ConfigurationError(
+                f"{manoeuvres}: a table of manoeuvres has the times of one flight; import its files one by one"
+            )
+        mappings[0] = _with_manoeuvres(mappings[0], manoeuvres)
+    notes: tuple[str, ...] = ()
+    if len(mappings) == 1:
+        logs = [_recorded(one, mappings[0], single=len(paths) == 1) for one in paths]
+        log = logs[0] if len(logs) == 1 else FlightLog.concat(logs)
+    else:
+        parts = _opened(paths, mappings)
+        log, notes = built(parts), parts.notes
+    faults = require(log, source=", ".join(map(str, paths)), force=force)
+    forced = [fault.sentence for fault in faults if fault.certain]
+    if forced:
+        log = replace(log, metadata={**log.metadata, "forced": forced})
+    return Imported(log, faults, notes)
+
+
+def find_manoeuvres(
+    path: Path | str | Sequence[Path | str],
+    mapping: MappingFile | Path | str | Sequence[MappingFile | Path | str],
+) -> Found:
+    """Manoeuvres of one flight, for a person to accept or edit.
+
+    Parameters
+    ----------
+    path, mapping : as in `import_log`; several files need a mapping each.
+
+    Raises
+    ------
+    StoreError, ConfigurationError, LogError
+        As `import_log`, and if elevator or q is not mapped.
+    """
+    paths, mappings = _given(path, mapping)
+    if len(mappings) < len(paths):
+        raise ConfigurationError(
+            "--find-manoeuvres: searches one flight; state one file, or a mapping for each"
+        )
+    if mappings[0].time.run is not None:
+        raise ConfigurationError(
+            "--find-manoeuvres: [time] run divides the file into runs already; leave it out"
+        )
+    merged = _opened(paths, mappings)
+    return find(str(paths[0]), merged.series)
+
+
+def _given(
+    path: Path | str | Sequence[Path | str],
+    mapping: MappingFile | Path | str | Sequence[MappingFile | Path | str],
+) -> tuple[list[Path | str], list[MappingFile]]:
+    """Files and mappings as lists, of fitting length."""
+    paths = [path] if isinstance(path, Path | str) else list(path)
+    stated = [mapping] if isinstance(mapping, MappingFile | Path | str) else list(mapping)
+    mappings = [one if isinstance(one, MappingFile) else read_mapping(one) for one in stated]
+    if len(mappings) not in (1, len(paths)) or not paths:
+        raise ConfigurationError(
+            f"import: {len(paths)} files and {len(mappings)} mappings; state one mapping for records of one layout, or "
+            "one for each recorder of a flight"
+        )
+    return paths, mappings
+
+
+def _with_manoeuvres(mapping: MappingFile, table: Path | str) -> MappingFile:
+    if mapping.time.run is not None:
+        raise ConfigurationError(
+            f"{table}: [time] run of the mapping divides the file into runs already; leave one of the two out"
+        )
+    return mapping.model_copy(update={"manoeuvre": read_table(table)})
+
+
+def _opened(paths: Sequence[Path | str], mappings: Sequence[MappingFile]) -> Merged:
+    return merge([(open_source(one, m.source), m) for one, m in zip(paths, mappings, strict=True)])
+
+
+def _recorded(path: Path | str, mapping: MappingFile, *, single: bool) -> FlightLog:
+    """The runs of one of several records of a layout; each needs names of its own."""
+    source = open_source(path, mapping.source)
+    if single:
+        return convert(source, mapping)
+    if not mapping.manoeuvre and mapping.time.run is None:
+        return convert(source, mapping.model_copy(update={"run_id": source.path.stem}))
+    named = convert(source, mapping)
+    return replace(
+        named,
+        run_ids=tuple(f"{source.path.stem}:{run}" for run in named.run_ids),
+        metadata={**named.metadata, **_renamed(named, source.path.stem)},
+    )
+
+
+def _renamed(log: FlightLog, stem: str) -> dict[str, object]:
+    facts = log.metadata.get(RECORD_CONSTANTS)
+    if not isinstance(facts, Mapping):
+        return {}
+    return {RECORD_CONSTANTS: {f"{stem}:{run}": values for run, values in facts.items()}}
+
+
+def convert(source: Source, mapping: MappingFile) -> FlightLog:
+    """Channels in SI and float64, runs, uniform times; nothing is judged by physics here.
+
+    Raises
+    ------
+    LogError, ConfigurationError
+        As `import_log`.
+    """
+    return built(merge([(source, mapping)]))
+
+
+def merge(parts: Sequence[tuple[Source, MappingFile]]) -> Merged:
+    """Channels of one or several files on the clock of the first one.
+
+    A channel that several files hold is that of the first one of them. Without [resample] several files get the rate of
+    the first file's fastest channel.
+
+    Raises
+    ------
+    LogError, ConfigurationError
+        As `import_log`.
+    """
+    source, mapping = parts[0]
+    series = read_series(source, mapping)
+    pieces, notes, reference = [Piece(source, mapping)], [], dict(series)
+    for other, own in parts[1:]:
+        read = read_series(other, own)
+        name = str(other.path)
+        if own.time.run is not None or mapping.time.run is not None:
+            raise ConfigurationError(
+                f"{name}: files whose rows name their runs cannot be merged; leave [time] run out"
+            )
+        stated = own.align
+        if stated is not None and stated.offset_s is not None:
+            alignment = Alignment(stated.offset_s, stated.std_s)
+        else:
+            alignment = aligned(name, reference, read, stated.channel if stated else None)
+        pieces.append(Piece(other, own, alignment))
+        notes.append(alignment.sentence(other.path.name))
+        for channel, one in read.items():
+            if channel not in series:
+                series[channel] = one if one.constant else replace(one, t_s=alignment.applied(one.t_s))
+    resample = next((m.resample for _, m in parts if m.resample), None)
+    if resample is None and len(parts) > 1:
+        rates = [1.0 / float(np.median(np.diff(s.t_s))) for s in reference.values() if not s.constant]
+        resample = Resample(rate_hz=float(f"{max(rates):.4g}"), method="cubic")
+        notes.append(f"channels are resampled to {resample.rate_hz:g} Hz, the rate of {source.path.name}")
+    return Merged(tuple(pieces), series, resample, tuple(notes))
+
+
+def built(merged: Merged) -> FlightLog:
+    """The runs of merged files as a log.
+
+    Raises
+    ------
+    LogError, ConfigurationError
+        As `import_log`.
+    """
+    source, mapping = merged.pieces[0].source, merged.pieces[0].mapping
+    ids, times, blocks, facts, drifts = [], [], [], {}, []
+    for run_id, start, end, rows in _runs(source, mapping, merged.series):
+        where = f"{source.path}, run {run_id!r}"
+        cut = {name: one.between(start, end, rows) for name, one in merged.series.items()}
+        t, values = uniform(where, cut, merged.resample)
+        values = airspeed_from_pressure(where, values)
+        if mapping.reconstruct.alpha:
+            values, drift = with_alpha(where, values, (t[-1] - t[0]) / (len(t) - 1), mapping.reconstruct)
+            drifts.append(drift)
+        ids.append(run_id)
+        times.append(t)
+        blocks.append(values)
+        known = [_constants(piece, start, end, rows) for piece in reversed(merged.pieces)]
+        stated = {name: value for one in known for name, value in one.items()}
+        if stated:
+            facts[run_id] = stated
+    metadata = _metadata(merged, times)
+    if facts:
+        metadata[RECORD_CONSTANTS] = facts
+    if drifts:
+        metadata["reconstructed"] = {"alpha_rad": {"drift_std_deg": float(np.median(drifts)) / DEG}}
+    return FlightLog(
+        metadata=metadata,
+        run_ids=tuple(ids),
+        offsets=np.cumsum([0, *(len(t) for t in times)]).astype(np.int64),
+        t_s=np.concatenate(times),
+        channels={name: np.concatenate([b[name] for b in blocks]) for name in blocks[0]},
+    )
+
+
+def _metadata(merged: Merged, times: Sequence[Array]) -> dict[str, object]:
+    mapping = merged.pieces[0].mapping
+    metadata: dict[str, object] = {"source": ", ".join(p.source.path.name for p in merged.pieces)}
+    if mapping.aircraft:
+        metadata["aircraft"] = mapping.aircraft
+    if merged.resample:
+        metadata["resampled"] = {"rate_hz": merged.resample.rate_hz, "method": merged.resample.method}
+    moved = [
+        {
+            "file": p.source.path.name,
+            "offset_s": p.alignment.offset_s,
+            "std_s": p.alignment.std_s,
+            "drift_ppm": 1e6 * p.alignment.drift,
+            "channel": p.alignment.channel,
+        }
+        for p in merged.pieces
+        if p.alignment is not None
+    ]
+    if moved:
+        metadata["alignment"] = moved
+    rates = {round((len(t) - 1) / (t[-1] - t[0]), 6) for t in times if len(t) > 1}
+    if len(rates) == 1:
+        metadata["sample_rate_hz"] = rates.pop()
+    return metadata
+
+
+def record_constants(log: FlightLog, run_id: str) -> Mapping[str, float]:
+    """Mass, inertia and reference lengths that the mapping stated for a run, in SI; {} if none."""
+    facts = log.metadata.get(RECORD_CONSTANTS, {})
+    return dict(facts.get(run_id, {})) if isinstance(facts, Mapping) else {}
+
+
+def _runs(
+    source: Source, mapping: MappingFile, series: Mapping[str, Series]
+) -> list[tuple[str, float, float, NDArray[np.bool_] | None]]:
+    """Name, start and end on the first file's clock, and rows (where a column names them) of each run."""
+    if mapping.time.run is not None:
+        place = Place(column=mapping.time.run, variable=mapping.time.variable)
+        names = np.array([str(x) for x in column(source, place, mapping.source.variable)[0]])
+        return [(str(n), -np.inf, np.inf, names == n) for n in dict.fromkeys(names.tolist())]
+    finite = [one.t_s[np.isfinite(one.t_s)] for one in series.values()]
+    edges = [(t.min(), t.max()) for t in finite if len(t)]
+    if not edges:
+        raise LogError(f"{source.path}: no time is finite; state [time] column and unit")
+    low, high = min(e[0] for e in edges), max(e[1] for e in edges)
+    if not mapping.manoeuvre:
+        return [(mapping.run_id or source.path.stem, -np.inf, np.inf, None)]
+    for one in mapping.manoeuvre:
+        if one.end_s <= low or one.start_s >= high:
+            raise LogError(
+                f"{source.path}: manoeuvre {one.run_id!r} from {one.start_s:g} to {one.end_s:g} s lies outside "
+                f"the file, whose clock runs from {low:g} to {high:g} s"
+            )
+    return [(one.run_id, one.start_s, one.end_s, None) for one in mapping.manoeuvre]
+
+
+def _constants(piece: Piece, start: float, end: float, rows: NDArray[np.bool_] | None) -> dict[str, float]:
+    result: dict[str, float] = {}
+    source, mapping = piece.source, piece.mapping
+    for name, one in mapping.constants.items():
+        factor = unit_factor(CONSTANTS[name], one.unit)
+        if one.column is None:
+            assert one.value is not None
+            result[name] = factor * one.value
+            continue
+        values, own = numbers(
+            source, Place(column=one.column, variable=one.variable), mapping.source.variable
+        )
+        clock = base_clock(source, mapping)
+        t = clock.t_s if clock is not None else own
+        if len(values) > 1 and t is not None and len(t) == len(values):
+            moved = t if piece.alignment is None else piece.alignment.applied(t)
+            values = Series(moved, values).between(start, end, rows).values
+        mean = float(np.nanmean(values)) * factor
+        if not np.isfinite(mean) or mean <= 0.0:
+            raise LogError(
+                f"{source.path}: {name} comes out as {mean:g}; map another column, or state a value"
+            )
+        result[name] = mean
+    return result
+
+
+__all__ = [
+    "Imported",
+    "Merged",
+    "Piece",
+    "built",
+    "convert",
+    "find_manoeuvres",
+    "import_log",
+    "merge",
+    "record_constants",
+]

@@ -1,0 +1,329 @@
+"""Manoeuvres in a long record: where the elevator moves deliberately, from a trimmed state, and the aircraft responds.
+
+The elevator's deviation from its running median marks the inputs. A background level, below which three quarters of a
+flight usually lie, and the largest inputs set the threshold, so that neither units nor the size of the aircraft matter.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.documents import read_plain
+from airtruth.errors import ConfigurationError, LogError, StoreError
+from airtruth.importers.mapping import Manoeuvre, Resample
+from airtruth.importers.series import Series
+from airtruth.importers.uniform import gaps, resampled
+from airtruth.units import DEG, G0
+
+Array = NDArray[np.float64]
+
+RATE_HZ: Final = 20.0
+"""Rate of the search [Hz] (judgement: pilots and test inputs have no content above 5 Hz)."""
+TREND_S: Final = 20.0
+"""Length of the running median that is the trimmed elevator [s] (judgement: twice the longest 3-2-1-1)."""
+REACH_S: Final = 1.0
+"""Time over which the largest deviation counts [s] (judgement: the dwell within a doublet is shorter)."""
+BACKGROUND: Final = (25.0, 4.0)
+"""Percentile of the deviation that is the background, and its multiple that an input exceeds [%, -] (judgement)."""
+SHARE: Final = (99.5, 0.1)
+"""Percentile of the deviation that is a large input, and its share that an input exceeds [%, -] (judgement)."""
+LEAST_RAD: Final = 0.1 * DEG
+"""Deviation of the elevator below which nothing is an input [rad] (judgement: play and noise)."""
+GAP_S: Final = 2.5
+"""Pause within a manoeuvre [s] (judgement: the longest step of a 3-2-1-1 of 0.8 s)."""
+TRIM_S: Final = 2.0
+"""Time before the input that belongs to the manoeuvre [s] (judgement: the trim of a record is estimated from it)."""
+SETTLE_S: Final = (3.0, 8.0)
+"""Shortest and longest time after the input that belongs to the manoeuvre [s] (judgement: one to four short periods)."""
+QUIET: Final = 2.0
+"""Multiple of the background of q at which the response has ended [-] (judgement)."""
+LONGEST_S: Final = 60.0
+"""Input beyond which it is piloting and no manoeuvre [s] (judgement: a slow frequency sweep)."""
+EXCITED: Final = 3.0
+"""Least ratio of the response of q to its background [-] (judgement: 10 dB)."""
+TRIMMED: Final = 0.3
+"""Largest share of the elevator's range that lies in the time before the input [-] (judgement)."""
+SPEED_CHANGE: Final = 0.15
+"""Largest relative change of airspeed [-] (judgement: the dynamic pressure changes by a third)."""
+TURNING: Final = 1.15
+"""Mean load factor above which the aircraft turns [-]: a bank of 30 deg."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A part of a flight that may become a run; the columns of the table.
+
+    Attributes
+    ----------
+    run_id : name of the run.
+    accept : "yes" or "no"; the import takes the rows with yes.
+    start_s, end_s : on the clock of the first file [s].
+    input_deg : range of the elevator [deg].
+    energy_deg2_s : integral of its squared deviation from trim [deg2 s].
+    excitation : rms of q over that of the background [-].
+    trim_range : range of the elevator before the input over that of the input [-].
+    airspeed_m_s, airspeed_change : mean [m/s] and relative range [-]; nan without airspeed.
+    load_factor : mean of -az/g [-]; nan without az.
+    reason : why it is not accepted.
+    """
+
+    run_id: str
+    accept: str
+    start_s: float
+    end_s: float
+    input_deg: float
+    energy_deg2_s: float
+    excitation: float
+    trim_range: float
+    airspeed_m_s: float
+    airspeed_change: float
+    load_factor: float
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Found:
+    """Manoeuvres of a flight, with what their picture shows.
+
+    Attributes
+    ----------
+    candidates : in the order of time.
+    t_s : (samples,) times on the clock of the first file [s].
+    elevator_rad, q_rad_s : (samples,) what was searched.
+    threshold_rad : deviation of the elevator that counts as an input [rad].
+    """
+
+    candidates: tuple[Candidate, ...]
+    t_s: Array
+    elevator_rad: Array
+    q_rad_s: Array
+    threshold_rad: float
+
+    @property
+    def accepted(self) -> tuple[Candidate, ...]:
+        """Candidates that the import would take."""
+        return tuple(c for c in self.candidates if c.accept == "yes")
+
+    def table(self) -> str:
+        """The candidates as CSV, which `read_table` accepts after any edit."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        names = [f.name for f in fields(Candidate)]
+        writer.writerow(names)
+        for one in self.candidates:
+            cells = [getattr(one, name) for name in names]
+            writer.writerow([f"{c:.10g}" if isinstance(c, float) else c for c in cells])
+        return text.getvalue()
+
+
+def find(where: str, series: Mapping[str, Series]) -> Found:
+    """Search a flight for manoeuvres.
+
+    Parameters
+    ----------
+    where : name of the file in messages.
+    series : elevator_rad and q_rad_s, and airspeed_m_s and az_m_s2 where they are measured.
+
+    Raises
+    ------
+    LogError
+        If elevator or q is missing, or the record is shorter than a manoeuvre.
+    """
+    needed = ("elevator_rad", "q_rad_s")
+    missing = [n for n in needed if n not in series or series[n].constant]
+    if missing:
+        raise LogError(f"{where}: the search for manoeuvres needs {', '.join(missing)}; map a column")
+    used = {n: _clean(series[n]) for n in (*needed, "airspeed_m_s", "az_m_s2") if n in series}
+    used = {n: one for n, one in used.items() if len(one.t_s) > 3}
+    start, end = max(one.t_s[0] for one in used.values()), min(one.t_s[-1] for one in used.values())
+    count = int((end - start) * RATE_HZ) + 1
+    if not set(needed) <= used.keys() or count < (TRIM_S + SETTLE_S[0]) * RATE_HZ:
+        raise LogError(f"{where}: lasts {max(end - start, 0.0):.3g} s, which is shorter than a manoeuvre")
+    t = start + np.arange(count) / RATE_HZ
+    how = Resample(rate_hz=RATE_HZ, method="linear")
+    c = {name: resampled(one, t, how) for name, one in used.items()}
+    deviation, threshold = _deviation(c["elevator_rad"])
+    background = _background(c["q_rad_s"])
+    spans = _spans(deviation, threshold)
+    candidates = []
+    for number, (first, last) in enumerate(spans):
+        before = spans[number - 1][1] if number else 0
+        after = spans[number + 1][0] if number + 1 < len(spans) else count - 1
+        low = max(first - round(TRIM_S * RATE_HZ), before)
+        high = _settled(c["q_rad_s"], last, min(after, count - 1), background)
+        one = _candidate(f"m{number + 1:02d}", c, deviation, (low, first, last, high), background, t)
+        candidates.append(_without_gaps(one, used))
+    return Found(tuple(candidates), t, c["elevator_rad"], c["q_rad_s"], threshold)
+
+
+def _without_gaps(candidate: Candidate, used: Mapping[str, Series]) -> Candidate:
+    """The candidate, not accepted where a recorder paused within it."""
+    for name, one in used.items():
+        for low, high in gaps(one):
+            if high > candidate.start_s and low < candidate.end_s:
+                reason = f"{name} has a gap of {high - low:.3g} s"
+                text = f"{candidate.reason}; {reason}" if candidate.reason else reason
+                return replace(candidate, accept="no", reason=text)
+    return candidate
+
+
+def _clean(one: Series) -> Series:
+    if one.constant:
+        return Series(np.empty(0), np.empty(0))
+    ok = np.isfinite(one.t_s) & np.isfinite(one.values)
+    keep = np.concatenate([[True], np.diff(one.t_s[ok]) > 0.0]) if ok.any() else np.zeros(0, dtype=np.bool_)
+    return Series(one.t_s[ok][keep], one.values[ok][keep])
+
+
+def _deviation(elevator: Array) -> tuple[Array, float]:
+    """Deviation of the elevator from its running median, and the threshold of an input [rad]."""
+    from scipy.ndimage import maximum_filter1d, median_filter
+
+    size = min(2 * round(0.5 * TREND_S * RATE_HZ) + 1, 2 * (len(elevator) // 2) - 1)
+    deviation = elevator - median_filter(elevator, size, mode="nearest")
+    reach = maximum_filter1d(np.abs(deviation), max(1, round(REACH_S * RATE_HZ)))
+    quiet, large = np.percentile(reach, [BACKGROUND[0], SHARE[0]])
+    return np.asarray(deviation), float(max(BACKGROUND[1] * quiet, SHARE[1] * large, LEAST_RAD))
+
+
+def _background(q: Array) -> float:
+    """Root mean square of q, without its slow part, in the quiet quarter of windows of one second."""
+    size = round(RATE_HZ)
+    windows = q[: len(q) // size * size].reshape(-1, size)
+    return float(np.percentile(windows.std(axis=1), BACKGROUND[0]))
+
+
+def _spans(deviation: Array, threshold: float) -> list[tuple[int, int]]:
+    """First and last sample of each input; inputs with a short pause between are one."""
+    over = np.flatnonzero(np.abs(deviation) > threshold)
+    if not len(over):
+        return []
+    cuts = np.flatnonzero(np.diff(over) > GAP_S * RATE_HZ)
+    firsts = over[np.concatenate([[0], cuts + 1])]
+    lasts = over[np.concatenate([cuts, [len(over) - 1]])]
+    return [(int(a), int(b)) for a, b in zip(firsts, lasts, strict=True)]
+
+
+def _settled(q: Array, last: int, limit: int, background: float) -> int:
+    """Sample at which the response has ended, between the shortest and the longest time after the input."""
+    least, most = (last + round(s * RATE_HZ) for s in SETTLE_S)
+    size = round(RATE_HZ)
+    for at in range(least, min(most, limit)):
+        if q[max(at - size, last) : at].std() < QUIET * background:
+            return min(at, limit)
+    return min(most, limit)
+
+
+def _candidate(
+    run_id: str,
+    c: Mapping[str, Array],
+    deviation: Array,
+    at: tuple[int, int, int, int],
+    background: float,
+    t: Array,
+) -> Candidate:
+    """Measures of one candidate: start, first and last sample of the input, and end."""
+    low, first, last, high = at
+    part = slice(low, high + 1)
+    elevator = c["elevator_rad"]
+    size = float(np.ptp(elevator[first : last + 1])) or float(np.ptp(elevator[part]))
+    quiet = elevator[low : max(first - round(0.2 * RATE_HZ), low + 1)]
+    trim = float(np.ptp(quiet)) / size if size > 0.0 else np.inf
+    response = float(c["q_rad_s"][first : high + 1].std()) / max(background, 1e-9)
+    speed = c["airspeed_m_s"][part] if "airspeed_m_s" in c else np.array([np.nan])
+    change = (
+        float(np.ptp(speed)) / max(abs(float(speed.mean())), 1e-9) if np.isfinite(speed).all() else np.nan
+    )
+    load = float(np.median(c["az_m_s2"][part])) / -G0 if "az_m_s2" in c else np.nan
+    reasons = []
+    if (last - first) / RATE_HZ > LONGEST_S:
+        reasons.append(f"input of {(last - first) / RATE_HZ:.0f} s, longer than a manoeuvre")
+    if response < EXCITED:
+        reasons.append(f"q moves {response:.1f} times its background")
+    if first - low < 0.5 * TRIM_S * RATE_HZ:
+        reasons.append("no trim before the input")
+    elif trim > TRIMMED:
+        reasons.append(f"the elevator moves by {100 * trim:.0f} % of the input before it")
+    if change > SPEED_CHANGE:
+        reasons.append(f"airspeed changes by {100 * change:.0f} %")
+    if load > TURNING:
+        reasons.append(f"mean load factor of {load:.2f}: a turn or a pull-up")
+    energy = float((deviation[first : last + 1] ** 2).sum()) / RATE_HZ / DEG**2
+    return Candidate(
+        run_id=run_id,
+        accept="no" if reasons else "yes",
+        start_s=float(t[low]),
+        end_s=float(t[high]),
+        input_deg=size / DEG,
+        energy_deg2_s=energy,
+        excitation=response,
+        trim_range=trim,
+        airspeed_m_s=float(speed.mean()),
+        airspeed_change=change,
+        load_factor=load,
+        reason="; ".join(reasons),
+    )
+
+
+def read_table(path: Path | str) -> tuple[Manoeuvre, ...]:
+    """Accepted manoeuvres of a table, as written by `Found.table` or by hand.
+
+    Columns start_s and end_s are needed; run_id is numbered where it is missing, and rows with accept = no are left out.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be read.
+    ConfigurationError
+        Naming the line, if a time is no number, an end is not after its start, or no row is accepted.
+    """
+    path = Path(path)
+    rows = list(
+        csv.DictReader(
+            io.StringIO(read_plain(path, StoreError, "`airtruth import --find-manoeuvres` writes one"))
+        )
+    )
+    if not rows or not {"start_s", "end_s"} <= set(rows[0]):
+        raise ConfigurationError(f"{path}: needs the columns start_s and end_s and a row for each manoeuvre")
+    result: list[Manoeuvre] = []
+    for line, row in enumerate(rows, start=2):
+        accept = (row.get("accept") or "yes").strip().lower()
+        if accept not in ("yes", "no"):
+            raise ConfigurationError(f"{path}, line {line}: accept is {accept!r}; write yes or no")
+        if accept == "no":
+            continue
+        try:
+            start, end = float(row["start_s"] or ""), float(row["end_s"] or "")
+        except ValueError:
+            raise ConfigurationError(
+                f"{path}, line {line}: start_s {row['start_s']!r} and end_s {row['end_s']!r} must be numbers [s]"
+            ) from None
+        if not end > start:
+            raise ConfigurationError(f"{path}, line {line}: end_s {end:g} is not after start_s {start:g}")
+        name = (row.get("run_id") or f"m{line - 1:02d}").strip()
+        result.append(Manoeuvre(run_id=name, start_s=start, end_s=end))
+    if not result:
+        raise ConfigurationError(f"{path}: accepts no manoeuvre; write yes under accept in a row")
+    names = [one.run_id for one in result]
+    twice = sorted({n for n in names if names.count(n) > 1})
+    if twice:
+        raise ConfigurationError(f"{path}: run_id {', '.join(map(repr, twice))} is given twice; rename one")
+    return tuple(result)
+
+
+def summary(found: Found) -> str:
+    """One sentence on the number of candidates and the reasons of those that are not accepted."""
+    rejected: Sequence[Candidate] = [c for c in found.candidates if c.accept != "yes"]
+    text = f"{len(found.accepted)} of {len(found.candidates)} manoeuvres accepted"
+    return text + "".join(f"\n  {c.run_id} not: {c.reason}" for c in rejected)
+
+
+__all__ = ["Candidate", "Found", "find", "read_table", "summary"]

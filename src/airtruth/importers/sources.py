@@ -1,0 +1,134 @@
+"""Foreign files as named arrays; what the arrays mean is for the mapping to say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.errors import ConfigurationError, LogError, StoreError, choices
+from airtruth.foreign.formats import FORMATS, SUFFIXES
+from airtruth.foreign.source import Source, unpacked
+from airtruth.importers.mapping import Place, SourceSection
+from airtruth.isolation.client import call
+from airtruth.isolation.limits import limits_of
+from airtruth.isolation.protocol import IsolatedError, Task
+
+Array = NDArray[np.float64]
+
+
+def open_source(path: Path | str, section: SourceSection | None = None) -> Source:
+    """Read a file of any supported format, in a disposable process (`airtruth.isolation`).
+
+    Raises
+    ------
+    StoreError
+        If it is missing, empty, truncated or not of its format, or its reader dies or exceeds a limit.
+    ConfigurationError
+        If the format is unknown or its optional package is not installed.
+    """
+    path = Path(path)
+    section = section or SourceSection()
+    name = section.format or SUFFIXES.get(path.suffix.lower())
+    if name is None:
+        raise ConfigurationError(
+            f"{path}: suffix {path.suffix!r} names no format; state [source] format, one of {', '.join(FORMATS)}"
+        )
+    if not path.is_file():
+        raise StoreError(f"{path}: no such file")
+    if path.stat().st_size == 0:
+        raise StoreError(f"{path}: the file is empty; export it again")
+    return _isolated(path, name, section)
+
+
+def _isolated(path: Path, name: str, section: SourceSection) -> Source:
+    limits = limits_of(path.stat().st_size)
+    layout = {key: getattr(section, key) for key in ("delimiter", "decimal", "skip_rows", "header")}
+    arguments = {"path": str(path.absolute()), "name": name, "layout": layout}
+    try:
+        return unpacked(path, call(Task("airtruth.foreign.formats:read", arguments, limits, FORMATS[name])))
+    except IsolatedError as error:
+        what = {
+            "crash": f"the reader of {name} files died on it ({error.detail}), so it is damaged; export it again",
+            "time": f"is not read within {limits.seconds:.0f} s; it is damaged, or export a shorter part of the flight",
+            "memory": f"reading it needs more than {limits.memory_bytes / 1e9:.1f} GB of memory; it is damaged, or "
+            "export fewer channels or a shorter part of the flight",
+            "start": f"the process that reads it does not start ({error.detail}); raise the limits of memory and files "
+            "(ulimit -v, -n)",
+        }
+        raise StoreError(f"{path}: {what[error.kind]}") from None
+
+
+def numbers(source: Source, place: Place, variable: str | None = None) -> tuple[Array, Array | None]:
+    """Values of a column (rows,) float64, and their own times [s] if the file has such.
+
+    Raises
+    ------
+    LogError
+        If there is no such column, or it holds text.
+    """
+    values, name = column(source, place, variable)
+    shown = f"{source.path}: column {place.column!r}"
+    if values.dtype.kind in "biuf":
+        with np.errstate(invalid="ignore", over="ignore"):  # a signalling NaN
+            return values.astype(np.float64), source.clocks.get(name)
+    result = np.empty(len(values))
+    for row, text in enumerate(values):
+        try:
+            result[row] = np.nan if text is None or str(text).strip() == "" else float(text)
+        except (TypeError, ValueError):
+            line = f"line {row + source.first_line}" if source.first_line else f"row {row + 1}"
+            raise LogError(
+                f"{shown}, {line}: {str(text)[:40]!r} is not a number; repair it, "
+                "or set [source] skip_rows, delimiter or decimal"
+            ) from None
+    return result, source.clocks.get(name)
+
+
+def column(source: Source, place: Place, variable: str | None = None) -> tuple[NDArray[Any], str]:
+    """Values as the file has them, and the name of their array; raises `LogError` if there are none."""
+    variable = place.variable or variable
+    key = place.column
+    if variable is None and source.ordered and isinstance(key, int):
+        if key > len(source.arrays):
+            raise LogError(
+                f"{source.path}: no column {key}; the file has {len(source.arrays)}, counted from 1"
+            )
+        name = list(source.arrays)[key - 1]
+        return source.arrays[name], name
+    if isinstance(key, str) and key in source.arrays and place.variable is None:
+        values = source.arrays[key]
+        if values.ndim == 2:
+            raise LogError(
+                f"{source.path}: {key!r} is a matrix of {values.shape[0]} x {values.shape[1]}; "
+                f'state variable = "{key}" and a column number'
+            )
+        return values, key
+    if variable is None:
+        what = repr(key) if isinstance(key, str) else f"{key} (of which matrix? state variable)"
+        raise LogError(f"{source.path}: no column {what}; {choices(str(key), source.arrays)}")
+    if variable not in source.arrays:
+        raise LogError(f"{source.path}: no variable {variable!r}; {choices(variable, source.arrays)}")
+    matrix = source.arrays[variable]
+    if matrix.ndim == 1:
+        matrix = matrix[:, None]
+    if isinstance(key, str):
+        labels = source.labels.get(variable, ())
+        if key not in labels:
+            known = (
+                choices(key, labels)
+                if labels
+                else f"its columns have no names, only numbers 1 to {matrix.shape[1]}"
+            )
+            raise LogError(f"{source.path}: no column {key!r} in {variable!r}; {known}")
+        key = labels.index(key) + 1
+    if key > matrix.shape[1]:
+        raise LogError(
+            f"{source.path}: no column {key} in {variable!r}, which has {matrix.shape[1]}, counted from 1"
+        )
+    return matrix[:, key - 1], variable
+
+
+__all__ = ["FORMATS", "SUFFIXES", "Source", "column", "numbers", "open_source"]

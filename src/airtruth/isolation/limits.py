@@ -1,0 +1,64 @@
+"""Limits of time and memory that a process imposes on itself before it reads a file of a stranger."""
+
+from __future__ import annotations
+
+import importlib
+import signal
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+LEAST_SECONDS: Final = 15.0
+"""Time for a small file [s] (judgement: the slowest reader needs 0.2 s for a file of 1 MB, and a user still waits)."""
+BYTES_PER_SECOND: Final = 2e6
+"""Rate at which the time grows with the size of the file [byte/s] (judgement: a tenth of the rate of the slowest
+reader, CSV, on the developers' machine)."""
+LEAST_MEMORY_BYTES: Final = 2_500_000_000
+"""Address space for a small file [byte]; an interpreter with pandas, scipy, pyarrow and h5py has 1.2 GB of it."""
+MEMORY_PER_BYTE: Final = 40.0
+"""Address space per byte of the file [-] (judgement: a compressed .mat or Parquet file expands at most twentyfold, and
+two copies exist for a moment)."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Time [s] and address space [byte] of one call."""
+
+    seconds: float
+    memory_bytes: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """Both limits by name."""
+        return asdict(self)
+
+
+def limits_of(file_bytes: int) -> Limits:
+    """Return the limits for reading a file of a size [byte]."""
+    return Limits(
+        seconds=LEAST_SECONDS + file_bytes / BYTES_PER_SECOND,
+        memory_bytes=LEAST_MEMORY_BYTES + round(MEMORY_PER_BYTE * file_bytes),
+    )
+
+
+def impose(limits: Limits) -> None:
+    """Limit this process; the system ends it when the time is over, whatever it does.
+
+    Windows has neither limit and macOS does not enforce that of memory: there the caller's own clock is the only limit.
+    """
+    if hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_REAL, limits.seconds)
+    try:
+        resource = importlib.import_module("resource")
+    except ImportError:
+        return
+    _lower(resource, resource.RLIMIT_AS, limits.memory_bytes)
+    _lower(resource, resource.RLIMIT_CORE, 0)
+
+
+def _lower(resource: Any, kind: int, value: int) -> None:
+    soft, hard = resource.getrlimit(kind)
+    stated = [limit for limit in (soft, hard) if limit != resource.RLIM_INFINITY]
+    resource.setrlimit(kind, (min([value, *stated]), hard))
+
+
+__all__ = ["Limits", "impose", "limits_of"]

@@ -1,0 +1,28 @@
+"""Names whose order as text is that of their numbers, however large they become."""
+
+from __future__ import annotations
+
+from string import ascii_lowercase
+
+
+def ordered_number(number: int, digits: int) -> str:
+    """A number as text whose order is that of the numbers: a letter for each digit beyond ``digits`` precedes it.
+
+    With six digits, 999999 is followed by a1000000, and a9999999 by b10000000. Letters follow digits in ASCII.
+
+    Parameters
+    ----------
+    number : not negative, of at most ``digits`` + 26 digits.
+    digits : least number of digits.
+    """
+    text = f"{number:0{digits}d}"
+    longer = len(text) - digits
+    return text if longer == 0 else f"{ascii_lowercase[longer - 1]}{text}"
+
+
+def chunk_file(chunk: int) -> str:
+    """Return the name of the files of a chunk; names in the order of text are in the order of the chunks."""
+    return f"{ordered_number(chunk, 5)}.parquet"
+
+
+__all__ = ["chunk_file", "ordered_number"]

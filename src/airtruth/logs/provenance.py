@@ -1,0 +1,52 @@
+"""Where the numbers of a result come from: version, options, and digests of the inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from airtruth.logs.digest import sha256_of
+from airtruth.logs.sources import Logs, sources
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Origin of a result.
+
+    Attributes
+    ----------
+    version : of airtruth.
+    aircraft : name of the aircraft.
+    options : name of a choice -> its value in words.
+    digests : name of a log or of a file of the aircraft -> SHA-256 of its bytes.
+    """
+
+    version: str = ""
+    aircraft: str = ""
+    options: Mapping[str, str] = field(default_factory=dict)
+    digests: Mapping[str, str] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fields in types that JSON has."""
+        return asdict(self)
+
+
+def digests_of(logs: Logs, folder: Path) -> dict[str, str]:
+    """SHA-256 of the files among logs, and of aircraft.toml and the XML files of an aircraft's folder.
+
+    Raises
+    ------
+    StoreError, ConfigurationError
+        If a file cannot be read, or a log does not exist.
+    """
+    files = {path.name: path for path in sources(logs) if isinstance(path, Path)}
+    for suffix in ("toml", "xml"):
+        for path in sorted(folder.rglob(f"*.{suffix}")):
+            files[path.relative_to(folder).as_posix()] = path
+    found = {name: sha256_of(path) for name, path in files.items()}
+    return {name: digest for name, digest in found.items() if digest is not None}
+
+
+__all__ = ["Provenance", "digests_of"]

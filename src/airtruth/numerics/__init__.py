@@ -1,0 +1,1 @@
+"""Discretisation, zero-phase filters, intersample behaviour, transfer functions and the Levenberg-Marquardt solver."""

@@ -1,0 +1,154 @@
+"""Contributions of tail, wing and flow to the six derivatives, from the declared derivatives and the geometry.
+
+A cause that acts on a whole part of the aircraft moves several derivatives in one direction. The directions are first
+order: a fraction s of the cause adds s times its direction to the derivatives.
+
+Sources: B. Etkin and L. D. Reid, Dynamics of Flight, 3rd ed., 1996, ch. 2 and 5 (tail, downwash, transfer of moments);
+M. B. Bragg et al., Effect of Ice Accretion on Aircraft Flight Dynamics, AIAA 2000-0360, table 1 (icing).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.physics.short_period import CL_ALPHA, CL_DE, CL_Q, CM_ALPHA, CM_DE, CM_Q
+
+Array = NDArray[np.float64]
+
+_TAIL_SHARE: Final = 1.0 / 1.1
+"""Share of the tail in Cmq [-]: the wing adds 10 % (Etkin and Reid, section 5.4)."""
+_ASPECT_RATIO: Final = 8.0
+"""Aspect ratio where no span is declared [-] (judgement: transports and light aircraft have 7 to 10)."""
+_SMALLEST: Final = 1e-6
+"""Least CLde that gives a tail arm [-] (judgement: below rounding of any declared value)."""
+ICED: Final = (-0.100, -0.0135, -0.095, -0.099, -0.035, -0.100)
+"""Relative change of the six derivatives by the reference ice of a Twin Otter [-] (Bragg et al., table 1)."""
+
+
+@dataclass(frozen=True)
+class TailGeometry:
+    """What is declared of the tail; None where it has to be inferred.
+
+    Attributes
+    ----------
+    aspect_ratio : of the wing [-].
+    arm : distance from the CG to the tail's aerodynamic centre over the chord [-].
+    lift : lift slope of the tail by the wing area and the free dynamic pressure, a_t S_t/S efficiency [1/rad].
+    """
+
+    aspect_ratio: float | None = None
+    arm: float | None = None
+    lift: float | None = None
+
+
+def tail_part(derivatives: Array, geometry: TailGeometry) -> Array:
+    """Contribution of the horizontal tail to the six derivatives.
+
+    Parameters
+    ----------
+    derivatives : (6,) of the aircraft [-].
+    geometry : what is declared of the tail. An undeclared arm is -Cmde/CLde, an undeclared lift slope follows from Cmq.
+
+    Returns
+    -------
+    (6,) CLalpha = a (1 - e), CLq = 2 a l, CLde, and the moments -l CL of each; a the lift slope, l the arm, and
+    e = 2 CLalpha_w/(pi A) the slope of the downwash.
+    """
+    a, arm, downwash = _tail(derivatives, geometry)
+    part = np.zeros(6)
+    part[[CL_ALPHA, CL_Q, CL_DE]] = a * (1.0 - downwash), 2.0 * a * arm, derivatives[CL_DE]
+    part[[CM_ALPHA, CM_Q, CM_DE]] = -arm * part[CL_ALPHA], -arm * part[CL_Q], derivatives[CM_DE]
+    return part
+
+
+def wing_part(derivatives: Array, geometry: TailGeometry) -> Array:
+    """Change of the six derivatives per relative change of the wing's lift, the downwash at the tail included.
+
+    Parameters
+    ----------
+    derivatives, geometry : as in `tail_part`.
+    """
+    a, arm, downwash = _tail(derivatives, geometry)
+    tail = tail_part(derivatives, geometry)
+    part = derivatives - tail
+    part[[CL_DE, CM_DE]] = 0.0
+    part[CL_ALPHA] -= a * downwash
+    part[CM_ALPHA] += arm * a * downwash
+    return part
+
+
+def _tail(derivatives: Array, geometry: TailGeometry) -> tuple[float, float, float]:
+    """Lift slope and arm of the tail, and slope of the downwash."""
+    arm = geometry.arm
+    if arm is None:
+        arm = float(-derivatives[CM_DE] / max(abs(derivatives[CL_DE]), _SMALLEST))
+    a = geometry.lift
+    if a is None:
+        a = float(-_TAIL_SHARE * derivatives[CM_Q] / (2.0 * arm**2)) if arm else 0.0
+    slope = 2.0 / (np.pi * (geometry.aspect_ratio or _ASPECT_RATIO))
+    # CLalpha_w = CLalpha - a (1 - e) with e = slope CLalpha_w
+    wing = (derivatives[CL_ALPHA] - a) / (1.0 - a * slope)
+    return a, arm, float(slope * wing)
+
+
+def directions(derivatives: Array, geometry: TailGeometry) -> Mapping[str, Array]:
+    """Change of the six apparent derivatives per unit of each declared quantity, at its neutral value.
+
+    Parameters
+    ----------
+    derivatives, geometry : as in `tail_part`.
+
+    Returns
+    -------
+    quantity -> (6,). "mass" and "inertia" are factors on what divides the coefficients; "cg" and "aerodynamic_center"
+    count aft in chords; "icing" is a severity, 1 for the reference ice; the others are factors.
+    """
+    lift, moment = derivatives.copy(), derivatives.copy()
+    lift[[CM_ALPHA, CM_Q, CM_DE]] = 0.0
+    moment[[CL_ALPHA, CL_Q, CL_DE]] = 0.0
+    transfer, elevator, centre = np.zeros(6), np.zeros(6), np.zeros(6)
+    transfer[[CM_ALPHA, CM_Q, CM_DE]] = derivatives[[CL_ALPHA, CL_Q, CL_DE]]
+    elevator[[CL_DE, CM_DE]] = derivatives[[CL_DE, CM_DE]]
+    centre[CM_ALPHA] = -derivatives[CL_ALPHA]
+    return MappingProxyType(
+        {
+            "mass": -lift,
+            "inertia": -moment,
+            "cg": transfer,
+            "elevator": elevator,
+            "tail": tail_part(derivatives, geometry),
+            "wing": wing_part(derivatives, geometry),
+            "dynamic_pressure": derivatives.copy(),
+            "aerodynamic_center": centre,
+            "icing": np.array(ICED) * derivatives,
+        }
+    )
+
+
+def cg_transfer(shift: float) -> Array:
+    """Matrix (6, 6) that turns derivatives about one centre of gravity into those about another, in the same motion.
+
+    The lift acts at the old centre of gravity, which is ahead of the new one by ``shift``: dCm = shift CL, and there
+    alpha is lower by 2 shift q c/(2V) (Etkin and Reid, ch. 2 and 5). Exact for linear CL and Cm; T(a) T(b) = T(a + b).
+
+    Parameters
+    ----------
+    shift : new centre of gravity behind the old one [chords].
+    """
+    matrix = np.eye(6)
+    matrix[CL_Q, CL_ALPHA] = -2.0 * shift
+    matrix[CM_ALPHA, CL_ALPHA] = shift
+    matrix[CM_Q, CL_ALPHA] = -2.0 * shift**2
+    matrix[CM_Q, CL_Q] = shift
+    matrix[CM_Q, CM_ALPHA] = -2.0 * shift
+    matrix[CM_DE, CL_DE] = shift
+    return matrix
+
+
+__all__ = ["ICED", "TailGeometry", "cg_transfer", "directions", "tail_part", "wing_part"]

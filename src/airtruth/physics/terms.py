@@ -1,0 +1,244 @@
+"""Terms that an effect adds to a model, in plain values; simulation, tracing and the aircraft writer read them.
+
+Every term has no influence at its neutral value. Signs and axes are those of the flight log: body axes, x forward, z
+down, nose-up positive, elevator trailing edge down positive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from airtruth.physics.sensor_errors import Kind
+from airtruth.physics.short_period import PARAMETERS
+
+Array = NDArray[np.float64]
+
+SIGNALS: Final = ("alpha", "elevator", "qhat", "alpha_dot_hat")
+"""Signals of a `StateTerm` or `AeroTerm`, which may name a state as well; their order numbers them for compiled code."""
+SHAPES: Final = ("linear", "quadratic", "above", "below")
+"""Functions f of an `AeroTerm`, see `shape_of`; their order numbers them for compiled code."""
+FORMULAS: Final[Mapping[str, str]] = {
+    "linear": "(s - at)",
+    "quadratic": "(s - at)^2",
+    "above": "max(0, s - at)",
+    "below": "min(0, s - at)",
+}
+"""The same functions as text, s the signal."""
+STATE_KINDS: Final = ("lag", "mode")
+"""Kinds of a `StateTerm`; their order numbers them for compiled code."""
+Quantity = Literal["mass", "inertia", "elevator", "cg", "thrust_arm"]
+"""Quantities that an aircraft declares and an effect may change."""
+DECLARED: Final[Mapping[str, float]] = {
+    "mass": 1.0,
+    "inertia": 1.0,
+    "elevator": 1.0,
+    "cg": 0.0,
+    "thrust_arm": 0.0,
+}
+"""Neutral value of each `Quantity`: 1 for a factor, 0 for a shift; their order numbers them for compiled code."""
+CAUSES: Final[Mapping[str, float]] = {
+    "tail": 1.0,
+    "wing": 1.0,
+    "dynamic_pressure": 1.0,
+    "aerodynamic_center": 0.0,
+    "icing": 0.0,
+    **dict.fromkeys(PARAMETERS, 0.0),
+}
+"""Causes of a change of the six derivatives (`DerivativeTerm`) and their neutral values; a derivative is its own cause."""
+
+
+@dataclass(frozen=True)
+class SurfaceTerm:
+    """An element between the measured surface and the surface that causes the forces; several act in sequence.
+
+    Attributes
+    ----------
+    kind : "delay" [s]; "lag", time constant of a first-order lag [s]; "rate_limit" [rad/s];
+        "backlash", full width of the play [rad], the surface starts in its middle.
+    value : neutral 0; for "rate_limit" infinite.
+    """
+
+    kind: Literal["delay", "lag", "rate_limit", "backlash"]
+    value: float
+
+
+@dataclass(frozen=True)
+class StateTerm:
+    """A state x driven by a signal s; an `AeroTerm` may name it as its signal.
+
+    Attributes
+    ----------
+    name : of the state.
+    kind : "lag": tau x' = s - x; "mode": x'' + 2 zeta wn x' + wn^2 x = wn^2 s. Both start in equilibrium.
+    signal : one of `SIGNALS`.
+    time_s : tau of a lag [s]; 1/wn of a mode [s].
+    damping : zeta of a mode [-].
+    """
+
+    name: str
+    kind: Literal["lag", "mode"]
+    signal: str
+    time_s: float
+    damping: float = 0.0
+
+
+@dataclass(frozen=True)
+class AeroTerm:
+    """An increment of a coefficient: coefficient += amplitude f(signal), f by `shape_of`.
+
+    Attributes
+    ----------
+    coefficient : "CL" (force along -z of the body over q_bar S) or "Cm" (about the CG, over q_bar S c).
+    signal : one of `SIGNALS` or the name of a `StateTerm`: alpha [rad] of the air at the CG; elevator [rad] that causes
+        the forces (surface terms and effectiveness included); qhat = q c/(2V); alpha_dot_hat = alpha_dot c/(2V) of the
+        motion over ground, the influence of this term on it included; zero at a trim.
+    shape : name of f, see `FORMULAS`.
+    amplitude : per unit of f; neutral 0.
+    at : origin of f [unit of the signal].
+    """
+
+    coefficient: Literal["CL", "Cm"]
+    signal: str
+    shape: Literal["linear", "quadratic", "above", "below"]
+    amplitude: float
+    at: float = 0.0
+
+
+def shape_of(term: AeroTerm, signal: ArrayLike) -> Array:
+    """Evaluate f of a term, without its amplitude.
+
+    Parameters
+    ----------
+    term : the increment; its shape and origin count.
+    signal : values of its signal, any shape [unit of the signal].
+
+    Returns
+    -------
+    f, of the shape of ``signal``; see `FORMULAS`.
+
+    Examples
+    --------
+    >>> shape_of(AeroTerm("Cm", "alpha", "above", -0.4, at=0.1), [0.05, 0.3]).tolist()
+    [0.0, 0.19999999999999998]
+    """
+    return numbered_shape(SHAPES.index(term.shape), np.asarray(signal, dtype=np.float64) - term.at)
+
+
+def numbered_shape(number: int, s: Array) -> Array:
+    """f by its number in `SHAPES`, s counted from the origin; the tracer's filter compiles it for single numbers."""
+    if number == 1:
+        return s * s
+    if number == 2:
+        return np.maximum(s, 0.0)
+    if number == 3:
+        return np.minimum(s, 0.0)
+    return s
+
+
+@dataclass(frozen=True)
+class DeclaredTerm:
+    """An error of a declared quantity.
+
+    Attributes
+    ----------
+    quantity : "mass", "inertia" (Iyy), "elevator" (all forces and moments of the surface's deflection from trim): a
+        factor, neutral 1. "cg": shift of the CG aft [chords]; "thrust_arm": shift of the thrust line down, nose-up
+        positive [m]: neutral 0. Sensors keep their position relative to the CG.
+    """
+
+    quantity: Quantity
+    value: float
+
+
+def declared_total(terms: Iterable[DeclaredTerm], quantity: str) -> float:
+    """All terms of a declared quantity together: the product of factors, the sum of shifts.
+
+    Examples
+    --------
+    >>> declared_total(
+    ...     [DeclaredTerm("mass", 1.5), DeclaredTerm("cg", 0.1), DeclaredTerm("mass", 2.0)], "mass"
+    ... )
+    3.0
+    """
+    total = DECLARED[quantity]
+    for term in terms:
+        if term.quantity == quantity:
+            total = total * term.value if DECLARED[quantity] == 1.0 else total + term.value
+    return total
+
+
+@dataclass(frozen=True)
+class DerivativeTerm:
+    """A cause that changes derivatives by an amount that depends on the aircraft and its trim.
+
+    `airtruth.physics.resolution.resolved` turns it into linear `AeroTerm`s; the simulator, the filter and the aircraft
+    writer take those only.
+
+    Attributes
+    ----------
+    cause : key of `CAUSES`: "tail", "wing" (lift and moment of the part) and "dynamic_pressure": a factor, neutral 1.
+        "aerodynamic_center": its shift aft [chords]; "icing": severity, 1 for the reference ice; the name of a
+        derivative: its increment: neutral 0.
+    value : see ``cause``.
+    """
+
+    cause: str
+    value: float
+
+
+@dataclass(frozen=True)
+class SensorTerm:
+    """An error of a sensor beyond those that aircraft.toml declares.
+
+    Attributes
+    ----------
+    channel : column of the log.
+    kind : "bias" [unit of the channel]; "scale", a factor; "lag", time constant [s]; "delay" [s]; "arm",
+        position ahead of the CG [m] (alpha_rad: alpha - q x/V; az_m_s2: az - x q_dot).
+    value : neutral 0, for "scale" 1.
+    """
+
+    channel: str
+    kind: Kind
+    value: float
+
+
+@dataclass(frozen=True)
+class AirTerm:
+    """An error of a declared gust level.
+
+    Attributes
+    ----------
+    level : "sigma_u" or "sigma_w", standard deviation of a gust component.
+    factor : on the declared level [-]; neutral 1. A declared level of zero counts as that of the other component.
+    """
+
+    level: Literal["sigma_u", "sigma_w"]
+    factor: float
+
+
+@dataclass(frozen=True)
+class Change:
+    """All terms of one or several effects."""
+
+    surface: tuple[SurfaceTerm, ...] = ()
+    states: tuple[StateTerm, ...] = ()
+    aero: tuple[AeroTerm, ...] = ()
+    declared: tuple[DeclaredTerm, ...] = ()
+    derivatives: tuple[DerivativeTerm, ...] = ()
+    sensors: tuple[SensorTerm, ...] = ()
+    air: tuple[AirTerm, ...] = ()
+
+    def __add__(self, other: Change) -> Change:
+        """Return the terms of both changes; the surface terms of the first act first."""
+        return Change(**{f.name: getattr(self, f.name) + getattr(other, f.name) for f in fields(Change)})
+
+    @property
+    def in_aircraft(self) -> bool:
+        """Whether it changes the JSBSim model itself, and not its sensors or the air alone."""
+        return bool(self.surface or self.states or self.aero or self.declared or self.derivatives)

@@ -1,0 +1,144 @@
+"""The page of an identification, from its file or from its result in memory."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from airtruth.aircraft import Aircraft
+from airtruth.charts import Chart
+from airtruth.charts import as_html as chart_html
+from airtruth.identification import overview
+from airtruth.identification.charts import intervals_chart
+from airtruth.identification.result import IdentificationResult
+from airtruth.identification.simulated import simulated_records
+from airtruth.physics.short_period import MODAL, PARAMETERS
+from airtruth.reporting.pages.identified import SIMULATED, Identified, answer_of
+from airtruth.reporting.pages.origin import of_methods, origin_section
+from airtruth.reporting.pages.page import Report, Section, answer_html, data_table, page_of
+from airtruth.reporting.pages.records import records_section, records_tables
+from airtruth.reporting.paper.published import SYMBOLS
+from airtruth.table import Number, Row, as_csv, as_latex, flat
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def estimates_report(title: str, identified: Identified) -> Report:
+    """Return the report of estimates.
+
+    Parameters
+    ----------
+    title : heading.
+    identified : the estimates with their origin.
+    """
+    frame, histories = identified.frame, identified.histories
+    with np.errstate(over="ignore", invalid="ignore"):  # diverged estimates overflow in means
+        table = overview(frame)
+    declared = identified.declared
+    references = {"declared": declared.values} if declared else None
+    chart = intervals_chart(frame, references, confidence=identified.confidence)
+    shifts, shift_section = shifts_of(identified)
+    notes = [n for record in identified.records.values() for n in record["notes"]]
+    notes += [
+        f"Overridden by --force: {s}" for record in identified.records.values() for s in record["forced"]
+    ]
+    sections = [
+        records_section(histories, identified.reason, SIMULATED),
+        Section("Estimates of all methods", "estimates", data_table(table, "estimates")),
+        shift_section,
+        Section("Estimates of each run", "runs", runs_tables(frame)),
+        Section("Error per record", "errors", records_tables(histories) if histories else ""),
+        origin_section(histories, of_methods(identified.records), dict.fromkeys(notes)),
+    ]
+    return Report(
+        page=page_of(title, answer_html(*answer_of(frame)), chart, sections),
+        csv=as_csv(table),
+        latex=as_latex(table, "estimates", SYMBOLS),
+        charts=(chart, *shifts),
+    )
+
+
+def shifts_of(identified: Identified) -> tuple[tuple[Chart, ...], Section]:
+    """Return chart and section of the shifts from the declared aircraft; without one, none and an empty section."""
+    heading, anchor = "Shifts from the declared aircraft", "shifts"
+    if identified.declared is None:
+        return (), Section(heading, anchor, "")
+    from airtruth.reporting.pages.declared import shifts_chart, shifts_table
+
+    chart = shifts_chart(identified.declared, identified.frame)
+    table = shifts_table(identified.declared, identified.frame)
+    return (chart,), Section(heading, anchor, chart_html(chart) + data_table(table, "shifts"))
+
+
+def identification_report(result: IdentificationResult, aircraft: Aircraft | None = None) -> Report:
+    """Return the report of an identification in memory.
+
+    Parameters
+    ----------
+    aircraft : the declared aircraft; None for none.
+    """
+    stated = result.to_dict()
+    record = {
+        name: stated[name]
+        for name in ("version", "options", "joint", "aircraft", "constants", "notes", "forced")
+    }
+    sources = [(s.name, s.sha256, s.runs) for s in result.sources]
+    records = {method: {**record, "sources": sources} for method in result.methods}
+    histories, declared = result.histories(), None
+    if aircraft is not None and histories is not None and result.logs is not None:
+        from airtruth.reporting.pages.declared import declared_at
+
+        declared = declared_at(aircraft, histories)
+        rows = declared.before(result.to_frame())
+        histories = simulated_records(result.logs, rows, result.settings.constants)
+    identified = Identified(
+        frame=result.to_frame(),
+        records=records,  # type: ignore[arg-type]  # to_dict gives the keys of Record
+        histories=histories,
+        reason="The result holds no logs, so the records are not shown.",
+        declared=declared,
+    )
+    return estimates_report(f"Identification of {result.settings.aircraft}", identified)
+
+
+def runs_tables(frame: pd.DataFrame) -> str:
+    """Return the table of every run and method as HTML; of many runs, the first `MOST_RUNS` alone."""
+    runs = list(dict.fromkeys(frame["run_id"]))
+    if len(runs) == 1:
+        return ""  # the table of all methods holds them
+    kept = frame[frame["run_id"].isin(runs[:MOST_RUNS])]
+    names = [name for name in (*PARAMETERS, *MODAL) if name in frame]
+    shown = [column for name in names for column in (name, f"{name}_std") if column in frame]
+    values = kept[shown].to_numpy(dtype=np.float64)
+    rows: list[Row] = [
+        (
+            str(run),
+            str(method),
+            "yes" if converged else "no",
+            *(
+                Number(float(x), digits=2 if c.endswith("_std") else 4)
+                for c, x in zip(shown, row, strict=True)
+            ),
+        )
+        for run, method, converged, row in zip(
+            kept["run_id"], kept["method"], kept["converged"], values, strict=True
+        )
+    ]
+    columns = ["run", "method", "converged", *(c.replace("_std", " std") for c in shown)]
+    notes = (
+        (
+            f"The first {MOST_RUNS} of {len(runs)} runs; estimates.parquet holds all, the table above counts all.",
+        )
+        if len(runs) > MOST_RUNS
+        else ()
+    )
+    return data_table(replace(flat("Estimates of each run", columns, rows, notes), keys=2), "runs")
+
+
+MOST_RUNS: Final = 30
+"""Most runs in a table of single runs [-] (judgement: a page stays small)."""
+
+__all__ = ["MOST_RUNS", "estimates_report", "identification_report", "runs_tables", "shifts_of"]

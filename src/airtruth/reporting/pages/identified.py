@@ -1,0 +1,196 @@
+"""What a page shows of estimates: the answer, intervals, records against model, provenance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from airtruth.aircraft import Aircraft
+from airtruth.errors import AirtruthError, StoreError
+from airtruth.identification.estimates import JOINT
+from airtruth.identification.record_constants import Constants
+from airtruth.identification.simulated import simulated_records
+from airtruth.identification.stored import Record, read_stored
+from airtruth.logs.digest import sha256_of
+from airtruth.logs.histories import Histories
+from airtruth.logs.sources import Logs
+from airtruth.physics.short_period import PARAMETERS
+from airtruth.table import significant
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from airtruth.reporting.pages.declared import Declared
+
+SIMULATED: Final = (
+    "Simulation: the linear short period with the derivatives of each method, from the measured elevator, at the mean "
+    "airspeed and density of the record; initial state, trim and offset of az are fitted to each record, alike for all methods."
+)
+"""How the models of an identification are simulated."""
+_LEADING: Final = "iv-f1"
+"""Method whose estimates the answer states, if it is among those that were run: the default of the command."""
+
+
+@dataclass(frozen=True)
+class Identified:
+    """Estimates with what is known of their origin.
+
+    Attributes
+    ----------
+    frame : rows of contract 2.
+    records : method -> how its rows were made; empty in old files.
+    histories : records against model, None where they cannot be simulated; ``reason`` says why.
+    declared : derivatives of the declared aircraft, None where it was not given.
+    """
+
+    frame: pd.DataFrame
+    records: Mapping[str, Record]
+    histories: Histories | None
+    reason: str = ""
+    declared: Declared | None = None
+
+    @property
+    def confidence(self) -> float:
+        """Probability of the intervals [-]."""
+        stated = next(iter(self.records.values()), None)
+        value = stated["options"].get("confidence", 0.95) if stated else 0.95
+        return float(value) if isinstance(value, int | float) else 0.95
+
+
+def read_identified(path: Path, logs: Logs | None = None, aircraft: Aircraft | None = None) -> Identified:
+    """Read a file of estimates, and simulate the records of its logs.
+
+    Parameters
+    ----------
+    path : the file.
+    logs : its logs; None looks for them beside the file and in the folder ``logs`` there.
+    aircraft : the declared aircraft, another model of the records; None for none.
+
+    Raises
+    ------
+    StoreError, LogError
+        If the file cannot be read or is damaged, or a log that is given cannot be used.
+    AircraftError, TrimError
+        If the aircraft cannot be trimmed at the condition of the records.
+    """
+    frame, records = read_stored(path)
+    if logs is None:
+        logs, reason = _beside(path.parent, records)
+        if reason:
+            return Identified(frame, records, None, reason)
+        try:
+            histories = _simulated(logs, frame, records)
+        except AirtruthError as error:
+            return Identified(frame, records, None, f"The records cannot be simulated: {error}.")
+    else:
+        histories = _simulated(logs, frame, records)
+    if aircraft is None:
+        return Identified(frame, records, histories)
+    from airtruth.reporting.pages.declared import declared_at  # the tracer takes seconds
+
+    declared = declared_at(aircraft, histories)
+    histories = _simulated(logs, declared.before(frame), records)
+    return Identified(frame, records, histories, declared=declared)
+
+
+def _simulated(logs: Logs, frame: pd.DataFrame, records: Mapping[str, Record]) -> Histories:
+    if not records:
+        raise StoreError("the estimates do not state the constants of their aircraft; identify again")
+    own = next(iter(records.values()))["constants"]
+    return simulated_records(logs, frame, Constants(**own))
+
+
+def _beside(folder: Path, records: Mapping[str, Record]) -> tuple[list[str], str]:
+    """The logs of estimates beside their file, or a sentence that says why they cannot be used."""
+    sources = {name: digest for record in records.values() for name, digest, _ in record["sources"]}
+    if not sources:
+        return (
+            [],
+            "The estimates do not state their logs, so the records are not shown; name them with --log.",
+        )
+    found = []
+    for name, digest in sources.items():
+        path = next((p for p in (folder / "logs" / name, folder / name) if p.is_file()), None)
+        if path is None:
+            return (
+                [],
+                f"The log {name} is not beside the estimates, so the records are not shown; name it with --log.",
+            )
+        if sha256_of(path) != digest:
+            return (
+                [],
+                f"The log {name} has changed since the estimates were made, so the records are not shown.",
+            )
+        found.append(str(path))
+    return found, ""
+
+
+def answer_of(frame: pd.DataFrame) -> list[str]:
+    """Sentences of the answer: the short period by the leading method, and where methods disagree."""
+    methods = list(dict.fromkeys(map(str, frame["method"])))
+    leading = _LEADING if _LEADING in methods else methods[0]
+    own = frame[(frame["method"] == leading) & frame["converged"]]
+    runs = int((frame["method"] == leading).sum())
+    joint = list(dict.fromkeys(frame["run_id"])) == [JOINT]
+    if own.empty:
+        return [f"{leading} converged in none of {runs} runs."]
+    words = ", ".join(
+        f"{symbol} = {_with_error(own, name)} {unit}".rstrip()
+        for name, (symbol, unit) in _ANSWERED.items()
+        if name in own
+    )
+    if joint:
+        of = "all runs jointly, with the standard deviation"
+    elif runs > 1:
+        of = f"mean of {len(own)} of {runs} runs, with its standard error"
+    else:
+        of = f"run {own['run_id'].iloc[0]}, with the standard deviation"
+    sentences = [f"{leading} estimates {words} ({of})."]
+    if len(methods) > 1:
+        apart = [name for name in PARAMETERS if _disagree(frame, methods, name)]
+        sentences.append(
+            f"The methods differ by more than their intervals in {', '.join(apart)}."
+            if apart
+            else f"The {len(methods)} methods agree within their intervals."
+        )
+    return sentences
+
+
+_ANSWERED: Final = {"wn_rad_s": ("wn", "rad/s"), "zeta": ("zeta", ""), "Cmalpha": ("Cmalpha", "1/rad")}
+"""Column -> symbol and unit in the answer."""
+
+
+def _with_error(rows: pd.DataFrame, name: str) -> str:
+    """Mean and its standard error; of one row, its value and standard deviation."""
+    values = rows[name].to_numpy(dtype=np.float64)
+    with np.errstate(over="ignore", invalid="ignore"):
+        if len(values) > 1:
+            mean, error = float(values.mean()), float(values.std(ddof=1)) / math.sqrt(len(values))
+        else:
+            mean, error = (
+                float(values[0]),
+                float(rows[f"{name}_std"].iloc[0]) if f"{name}_std" in rows else math.nan,
+            )
+    return (
+        f"{significant(mean, 4)} +- {significant(error, 2)}" if math.isfinite(error) else significant(mean, 4)
+    )
+
+
+def _disagree(frame: pd.DataFrame, methods: Sequence[str], name: str) -> bool:
+    """Whether two methods have mean intervals that do not overlap."""
+    ends = []
+    for method in methods:
+        own = frame[(frame["method"] == method) & frame["converged"]]
+        with np.errstate(over="ignore", invalid="ignore"):
+            low, high = float(own[f"{name}_lower"].mean()), float(own[f"{name}_upper"].mean())
+        if np.isfinite(low) and np.isfinite(high):
+            ends.append((low, high))
+    return bool(ends) and max(low for low, _ in ends) > min(high for _, high in ends)
+
+
+__all__ = ["SIMULATED", "Identified", "answer_of", "read_identified"]

@@ -1,0 +1,123 @@
+"""The page of a closed loop, from its folder or from its result in memory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from airtruth.charts import as_html as chart_html
+from airtruth.documents import read_json
+from airtruth.errors import StoreError
+from airtruth.identification.charts import intervals_chart
+from airtruth.identification.stored import read_stored
+from airtruth.logs.histories import Histories
+from airtruth.loop import NAME, DerivativeChange, LoopResult, loop_chart, loop_table
+from airtruth.reporting.pages.origin import of_trace, origin_section, provenance_of
+from airtruth.reporting.pages.page import Report, Section, data_table, page_of
+from airtruth.reporting.pages.trace_page import closing, read_records, trace_sections
+from airtruth.reporting.paper.published import SYMBOLS
+from airtruth.table import as_csv, as_latex, flat
+from airtruth.tracing.answer import TraceAnswer
+from airtruth.tracing.compensate import Treatment
+from airtruth.tracing.presentation.charts import trace_charts
+from airtruth.tracing.presentation.html import verdict_html
+from airtruth.tracing.presentation.trace_histories import PROVENANCE
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+DOCUMENT: Final = f"{NAME}.json"
+"""File that makes a folder the folder of a loop."""
+
+
+def loop_report(result: LoopResult) -> Report:
+    """Return the report of a loop in memory."""
+    trace = result.trace
+    frames = {"before": result.before.to_frame(), "after": result.after.to_frame()}
+    return _report(trace.answer, trace.histories, result.changes, result.treatments, frames)
+
+
+def stored_loop_report(folder: Path) -> Report:
+    """Return the report of the folder of a loop.
+
+    Raises
+    ------
+    StoreError, LogError
+        If loop.json or a file of the trace or of the estimates cannot be read, or is incomplete.
+    """
+    path = folder / DOCUMENT
+    cure = "run `airtruth loop` again to write it"
+    document = read_json(path, StoreError, cure)
+    if not isinstance(document, Mapping):
+        raise StoreError(f"{path}: is not the result of a loop; {cure}")
+    answer = TraceAnswer.from_dict(document.get("trace"), str(path))
+    changes, treatments = _stored(document, path, cure)
+    histories = read_records(folder / "trace", cure)
+    frames = {
+        stage: read_stored(folder / f"estimates-{stage}.parquet")[0]
+        for stage in ("before", "after")
+        if (folder / f"estimates-{stage}.parquet").is_file()
+    }
+    return _report(answer, histories, changes, treatments, frames)
+
+
+def _stored(
+    document: Mapping[str, Any], path: Path, cure: str
+) -> tuple[tuple[DerivativeChange, ...], tuple[Treatment, ...]]:
+    from pydantic import TypeAdapter, ValidationError
+
+    rows = document.get("estimates")
+    if isinstance(rows, list):  # JSON has no NaN
+        rows = [
+            {k: math.nan if v is None else v for k, v in row.items()} if isinstance(row, dict) else row
+            for row in rows
+        ]
+    try:
+        changes = TypeAdapter(tuple[DerivativeChange, ...]).validate_python(rows)
+        treatments = TypeAdapter(tuple[Treatment, ...]).validate_python(document.get("treatments"))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise StoreError(f"{path}: is incomplete ({where}: {first['msg'].lower()}); {cure}") from None
+    try:
+        loop_table(changes, treatments)
+    except (KeyError, ValueError):
+        raise StoreError(f"{path}: does not hold every derivative of every method once; {cure}") from None
+    return changes, treatments
+
+
+def _report(
+    answer: TraceAnswer,
+    histories: Histories | None,
+    changes: Sequence[DerivativeChange],
+    treatments: Sequence[Treatment],
+    frames: Mapping[str, pd.DataFrame],
+) -> Report:
+    table = loop_table(changes, treatments)
+    names = tuple(asdict(changes[0])) if changes else ("method", "derivative")
+    long = flat(table.title, names, [tuple(asdict(change).values()) for change in changes])
+    chart = loop_chart(changes)
+    intervals = [
+        replace(drawn, name=f"intervals-{stage}", title=f"{stage.capitalize()}: {drawn.title}")
+        for stage, frame in frames.items()
+        for drawn in [intervals_chart(frame)]
+    ]
+    origin = of_trace(provenance_of(histories.facts if histories else {}, PROVENANCE))
+    sections = [
+        Section("Derivatives before and after", NAME, data_table(table, NAME)),
+        Section("Intervals of all methods", "intervals", "".join(map(chart_html, intervals))),
+        *trace_sections(answer, histories),
+        origin_section(histories, origin, closing(answer)),
+    ]
+    return Report(
+        page=page_of("Closed loop", verdict_html(answer), chart, sections),
+        csv=as_csv(long),
+        latex=as_latex(table, NAME, SYMBOLS),
+        charts=(chart, *intervals, *trace_charts(answer, histories)),
+    )
+
+
+__all__ = ["DOCUMENT", "loop_report", "stored_loop_report"]

@@ -1,0 +1,235 @@
+"""The part of a page that shows every record against the models, and the tables of these records."""
+
+from __future__ import annotations
+
+import base64
+import html
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.channels import shown
+from airtruth.logs.histories import Histories, History
+from airtruth.reporting.pages.page import Section, as_json, data_table, notes_html
+from airtruth.table import MISSING, Number, Row, Table, flat
+from airtruth.units import DEG
+
+Array = NDArray[np.float64]
+
+BUDGET: Final = 900_000
+"""Size of the records on a page [byte]; judgement: with uPlot, charts and tables a page stays below 1.5 MB."""
+MOST: Final = 24
+"""Most records on a page [-]; judgement: as many as a reader looks through."""
+_LEAST: Final = 200
+"""Least samples of a record on a page [-]; judgement: a doublet remains visible."""
+_BYTES: Final = 16.0 / 3.0
+"""Size of a number as base64 of float32 [byte]."""
+_COLOURS: Final = ("blue", "vermillion", "green", "purple", "orange", "sky")
+"""Colours of the models, the last model first: it is the answer."""
+_DASHES: Final = ((), (7, 3), (2, 3))
+"""Dashes of the first six models, of the next six, and of the rest [px]."""
+_QUANTITIES: Final = (
+    ("airspeed_m_s", "true airspeed [m/s]", 1.0, 2),
+    ("density_kg_m3", "density [kg/m3]", 1.0, 4),
+    ("altitude_m", "altitude [m]", 1.0, 0),
+    ("trim_alpha_rad", "trim alpha [deg]", DEG, 2),
+    ("trim_elevator_rad", "trim elevator [deg]", DEG, 2),
+    ("mass_kg", "mass [kg]", 1.0, 3),
+    ("inertia_yy_kg_m2", "Iyy [kg m2]", 1.0, 3),
+    ("duration_s", "duration [s]", 1.0, 2),
+    ("sample_rate_hz", "sample rate [Hz]", 1.0, 1),
+)
+"""Conditions of a record: key, heading with the display unit, that unit in SI, decimals."""
+
+
+@dataclass(frozen=True)
+class Extract:
+    """The records that fit on a page.
+
+    Attributes
+    ----------
+    records : the chosen ones, that which is shown first among them.
+    step : every how many samples one is kept.
+    notes : sentences that say what was left out.
+    """
+
+    records: tuple[History, ...]
+    step: int
+    notes: tuple[str, ...]
+
+
+def extract(histories: Histories) -> Extract:
+    """Choose records and samples so that a page keeps to its size."""
+    own = list(histories.records)
+    kept = {round(k) for k in np.linspace(0, len(own) - 1, min(MOST, len(own)))}
+    kept |= {own.index(histories.first)}
+    records = tuple(own[k] for k in sorted(kept))
+    series = 2 + max(len(r.measured) * (1 + len(r.models) + len(r.innovations)) for r in records)
+    samples = max(len(r.t_s) for r in records)
+    allowed = max(_LEAST, int(BUDGET / (_BYTES * series * len(records))))
+    step = max(1, math.ceil(samples / allowed))
+    notes = []
+    if len(records) < histories.of_records:
+        notes.append(f"{len(records)} of {histories.of_records} records are shown, evenly spaced.")
+    if step > 1:
+        notes.append(
+            f"The plots show one sample in {step}, so that the page stays small; the errors count every sample."
+        )
+    return Extract(records, step, tuple(notes))
+
+
+def records_section(histories: Histories | None, reason: str = "", note: str = "") -> Section:
+    """Return the section of the plots.
+
+    Parameters
+    ----------
+    histories : the records; None where there are none.
+    reason : sentence that says why there are none.
+    note : sentence that says how the models were simulated.
+    """
+    heading, anchor = "Measured against model", "records"
+    if histories is None:
+        return Section(heading, anchor, notes_html([reason]) if reason else "")
+    chosen = extract(histories)
+    options = "".join(
+        f"<option>{html.escape(r.run_id)}{f' ({html.escape(r.group)})' if r.group else ''}</option>"
+        for r in chosen.records
+    )
+    below = '<option value="residual">residual</option>'
+    if all(r.innovations for r in chosen.records):
+        below += '<option value="innovation">innovation</option>'
+    controls = (
+        f'<div class="controls"><label>Record <select id="record">{options}</select></label>'
+        '<button type="button" id="record-previous" title="previous record">&lsaquo;</button>'
+        '<button type="button" id="record-next" title="next record">&rsaquo;</button>'
+        f'<label>Below <select id="below">{below}</select></label>'
+        '<label>From <input id="from" type="number" step="0.1"></label>'
+        '<label>to <input id="to" type="number" step="0.1"> s</label>'
+        '<button type="button" id="whole">whole record</button></div>'
+    )
+    data = as_json(_data(histories, chosen))
+    return Section(
+        heading,
+        anchor,
+        f'{controls}<div class="controls toggles" id="toggles"></div><p class="note" id="condition"></p>'
+        f'<div id="plots"></div><script type="application/json" id="records-data">{data}</script>\n'
+        + notes_html(
+            [
+                "Drag over a plot to zoom all of them; a double click shows the whole record."
+                + (
+                    " Shaded: two standard deviations of what gusts and sensor noise explain."
+                    if _floors(chosen)
+                    else ""
+                ),
+                *([note] if note else []),
+                *chosen.notes,
+            ]
+        ),
+    )
+
+
+def _floors(chosen: Extract) -> bool:
+    return any(r.floor for r in chosen.records)
+
+
+def _data(histories: Histories, chosen: Extract) -> dict[str, object]:
+    first = chosen.records[0]
+    colours = dict(zip(reversed(histories.models), _COLOURS * len(histories.models), strict=False))
+    ranks = {name: k // len(_COLOURS) for k, name in enumerate(reversed(histories.models))}
+    return {
+        "first": [r.run_id for r in chosen.records].index(histories.first.run_id),
+        "channels": [shown(c)[0] for c in first.measured],
+        "models": [
+            {"name": m, "colour": colours[m], "dash": list(_DASHES[min(ranks[m], 2)])}
+            for m in histories.models
+        ],
+        "records": [_record(r, histories.models, chosen.step) for r in chosen.records],
+    }
+
+
+def _record(record: History, models: tuple[str, ...], step: int) -> dict[str, object]:
+    channels = list(record.measured)
+    factors = [shown(c)[1] for c in channels]
+
+    def encoded(values: Array, factor: float = 1.0) -> str:
+        with np.errstate(over="ignore", invalid="ignore"):
+            single = np.ascontiguousarray(values[::step] * factor, dtype="<f4")
+        return base64.b64encode(single.tobytes()).decode("ascii")
+
+    floor = [record.floor.get(c, 0.0) * f for c, f in zip(channels, factors, strict=True)]
+    return {
+        "name": record.run_id,
+        "words": _words(record),
+        "t": encoded(record.t_s),
+        "elevator": encoded(record.elevator_rad, 1.0 / DEG),
+        "measured": [encoded(record.measured[c], f) for c, f in zip(channels, factors, strict=True)],
+        "models": [
+            [encoded(record.models[m][c], f) for c, f in zip(channels, factors, strict=True)] for m in models
+        ],
+        "innovations": [[encoded(record.innovations[m][c]) for c in channels] for m in models]
+        if record.innovations
+        else [],
+        "floor": [x if math.isfinite(x) else 0.0 for x in floor],
+    }
+
+
+def _words(record: History) -> str:
+    parts = [record.group] if record.group else []
+    for key, heading, unit, decimals in _QUANTITIES:
+        if key in record.conditions:
+            name, _, symbol = heading.partition(" [")
+            parts.append(
+                f"{name} {Number(record.conditions[key] / unit, decimals=decimals)} {symbol.rstrip(']')}"
+            )
+    return ", ".join(parts)
+
+
+def record_errors(histories: Histories) -> Table:
+    """Root mean square of the free run's error, per record, channel and model."""
+    floors = any(r.floor for r in histories.records)
+    rows: list[Row] = []
+    for record in histories.records:
+        for channel in record.measured:
+            name, factor = shown(channel)
+            cells = [Number(record.rms(m, channel) * factor, digits=3) for m in histories.models]
+            if floors:
+                cells.append(Number(record.floor.get(channel, math.nan) * factor, digits=3))
+            rows.append((record.run_id, record.group or MISSING, name, *cells))
+    columns = ("record", "group", "channel", *histories.models, *(("floor (shaded)",) if floors else ()))
+    return replace(flat("Root mean square of measured less simulated, per record", columns, rows), keys=3)
+
+
+def conditions_table(histories: Histories) -> Table:
+    """Flight condition, mass properties and sampling of every record."""
+    known = [q for q in _QUANTITIES if any(q[0] in r.conditions for r in histories.records)]
+    rows: list[Row] = [
+        (
+            record.run_id,
+            record.group or MISSING,
+            *(
+                Number(record.conditions.get(key, math.nan) / unit, decimals=decimals)
+                for key, _, unit, decimals in known
+            ),
+        )
+        for record in histories.records
+    ]
+    return flat("Conditions of the records", ("record", "group", *(q[1] for q in known)), rows)
+
+
+def records_tables(histories: Histories) -> str:
+    """Return the table of the errors of each record as HTML."""
+    return data_table(record_errors(histories), "record-errors")
+
+
+__all__ = [
+    "BUDGET",
+    "MOST",
+    "conditions_table",
+    "extract",
+    "record_errors",
+    "records_section",
+    "records_tables",
+]

@@ -1,0 +1,28 @@
+"""The page of any result: its summary, its figure and its main table."""
+
+from __future__ import annotations
+
+import html
+import re
+
+from airtruth import style
+from airtruth.reporting.pages.page import Report, Section, data_table, page_of, preformatted
+from airtruth.result import Result
+from airtruth.table import as_csv, as_latex, from_frame
+
+
+def result_report(result: Result) -> Report:
+    """Return the report of a result, titled with the name of its type."""
+    title = " ".join(re.findall(r"[A-Z][a-z]*|[a-z]+", type(result).__name__)).capitalize()
+    table = from_frame(result.to_frame(), title)
+    first, *rest = result.summary().splitlines() or [""]
+    figure = result.plot()
+    picture = style.as_html(style.as_png(figure), title)
+    answer = f'<p class="verdict">{html.escape(first)}</p>\n{preformatted(rest) if rest else ""}\n{picture}'
+    sections = [Section("Table", "table", data_table(table, "result"))]
+    return Report(
+        page=page_of(title, answer, None, sections),
+        csv=as_csv(table),
+        latex=as_latex(table, "result"),
+        figures={"result": figure},
+    )

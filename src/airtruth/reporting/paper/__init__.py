@@ -1,0 +1,1 @@
+"""The tables and figures of M. Brunot's paper, beside the published values."""

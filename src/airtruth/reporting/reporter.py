@@ -1,0 +1,139 @@
+"""The report of a result: one HTML page with its tables as CSV and LaTeX, or its charts as figures for papers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from airtruth.errors import ConfigurationError, StoreError
+from airtruth.logs.remote import location
+from airtruth.logs.sources import Logs
+from airtruth.reporting.campaign import ESTIMATES, TRUTH, Campaign, read_campaign
+from airtruth.result import Result
+
+if TYPE_CHECKING:
+    from airtruth.aircraft import Aircraft
+    from airtruth.reporting.pages.page import Report
+
+Source = Path | str | Campaign | Result
+"""A folder of a trace, a loop or a campaign, a file of estimates, or a result in memory."""
+
+
+def report(
+    source: Source,
+    out: Path | str,
+    kind: str | None = None,
+    logs: Logs | None = None,
+    aircraft: Aircraft | None = None,
+    announce: Callable[[tuple[Path, ...]], None] = lambda paths: None,
+) -> tuple[Path, ...]:
+    """Write one HTML page about a result with its tables as CSV and LaTeX, or its charts as figures.
+
+    Parameters
+    ----------
+    source : folder that `airtruth trace`, `airtruth loop`, or `airtruth fly` and `airtruth identify` wrote; file of estimates;
+        or a result in memory.
+    out : the page, .html, beside which the tables have the suffixes .csv and .tex; or the stem of the figures, which
+        are the files STEM-NAME.
+    kind : "html", "png", "svg" or "pdf"; None for what the suffix of ``out`` states.
+    logs : logs of a file of estimates that does not have them beside it.
+    aircraft : the declared aircraft, another model of the records of an identification.
+    announce : receives the files before any of them is written.
+
+    Returns
+    -------
+    The files, the page first.
+
+    Raises
+    ------
+    StoreError, LogError
+        If there is nothing to report, or a file cannot be read or written.
+    ConfigurationError
+        If logs or an aircraft are given for something other than estimates.
+    AircraftError, TrimError
+        If the aircraft cannot be trimmed at the condition of the records.
+    """
+    from airtruth.reporting.pages.page import files_of, format_of, write_files
+
+    page = location(out)
+    chosen = format_of(page, kind)
+    made = _report(source, logs, aircraft)
+    announce(files_of(made, page, chosen))
+    return write_files(made, page, chosen)
+
+
+# The pages are imported where they are needed: the tracer and matplotlib take seconds, and `airtruth tables`, which
+# imports this room as well, needs neither.
+
+
+def _report(source: Source, logs: Logs | None, aircraft: Aircraft | None) -> Report:
+    if isinstance(source, Campaign):
+        return _of_campaign(source, logs, aircraft)
+    if isinstance(source, Path | str):
+        return _of_path(location(source), logs, aircraft)
+    return _of_result(source, logs, aircraft)
+
+
+def _of_result(result: Result, logs: Logs | None, aircraft: Aircraft | None) -> Report:
+    from airtruth.identification.result import IdentificationResult
+    from airtruth.loop import LoopResult
+    from airtruth.reporting.pages.estimates_page import identification_report
+    from airtruth.reporting.pages.loop_page import loop_report
+    from airtruth.reporting.pages.result_page import result_report
+    from airtruth.reporting.pages.trace_page import trace_report
+    from airtruth.tracing.result import TraceResult
+
+    if isinstance(result, IdentificationResult):
+        return identification_report(result, aircraft)
+    _refuse(logs, aircraft)
+    if isinstance(result, TraceResult):
+        return trace_report(result.answer, result.histories)
+    if isinstance(result, LoopResult):
+        return loop_report(result)
+    return result_report(result)
+
+
+def _of_path(path: Path, logs: Logs | None, aircraft: Aircraft | None) -> Report:
+    if (path / "loop.json").is_file():
+        from airtruth.reporting.pages.loop_page import stored_loop_report
+
+        _refuse(logs, aircraft)
+        return stored_loop_report(path)
+    if (path / "trace.json").is_file():
+        from airtruth.reporting.pages.trace_page import read_trace, trace_report
+
+        _refuse(logs, aircraft)
+        return trace_report(*read_trace(path))
+    if (path / TRUTH).is_file():
+        return _of_campaign(read_campaign(path), logs, aircraft)
+    estimates = path if path.is_file() else path / ESTIMATES
+    if estimates.is_file():
+        from airtruth.reporting.campaign import read_estimates
+        from airtruth.reporting.pages.estimates_page import estimates_report
+        from airtruth.reporting.pages.identified import read_identified
+
+        read_estimates(estimates, "`airtruth identify`")
+        identified = read_identified(estimates, logs, aircraft)
+        name = next((record["aircraft"] for record in identified.records.values()), "")
+        title = f"Identification of {name}" if name else estimates.stem
+        return estimates_report(title, identified)
+    raise StoreError(
+        f"{path}: nothing to report; expected trace.json (`airtruth trace ... --out {path}`) or {ESTIMATES} "
+        f"(`airtruth identify {path} --aircraft A`)"
+    )
+
+
+def _of_campaign(campaign: Campaign, logs: Logs | None, aircraft: Aircraft | None) -> Report:
+    from airtruth.reporting.pages.campaign_page import campaign_report
+
+    return campaign_report(campaign, logs, aircraft)
+
+
+def _refuse(logs: Logs | None, aircraft: Aircraft | None) -> None:
+    """Refuse what only a page of estimates shows."""
+    for option, value in (("--log", logs), ("--aircraft", aircraft)):
+        if value is not None:
+            raise ConfigurationError(
+                f"{option} is for estimates; a trace and a loop hold their records and their aircraft, so leave it out"
+            )

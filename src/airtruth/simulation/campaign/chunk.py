@@ -1,0 +1,305 @@
+"""Fly the runs of one chunk of a campaign and write their log: the unit of work of a process."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from airtruth.errors import AirtruthError
+from airtruth.logs import store
+from airtruth.logs.digest import sha256_of
+from airtruth.logs.flight_log import FlightLog
+from airtruth.logs.names import chunk_file
+from airtruth.physics import dryden
+from airtruth.physics.short_period import MODAL, PARAMETERS
+from airtruth.simulation import instruments as measure
+from airtruth.simulation import manoeuvres
+from airtruth.simulation.campaign import streams
+from airtruth.simulation.campaign.effects import EFFECTS
+from airtruth.simulation.campaign.plan import Plan, PlannedRun
+from airtruth.simulation.flight import Flight, Inputs
+from airtruth.simulation.linearise import Linearisation, linearise
+from airtruth.simulation.simulator import Condition
+from airtruth.simulation.trim import Trim, trim
+
+Array = NDArray[np.float64]
+
+_CACHED_CONDITIONS: Final = 4
+"""Flight conditions that a pilot keeps loaded (judgement: memory against the time to load a condition again)."""
+
+
+OK: Final = "ok"
+"""Status of a run that was flown."""
+FAILED: Final = "failed"
+"""Status of a run that failed by itself, and fails again whenever it is flown."""
+INTERRUPTED: Final = "interrupted"
+"""Status of a run whose process was killed or could not work; the next command flies it again."""
+
+
+@dataclass(frozen=True)
+class ChunkOrder:
+    """A chunk to fly: its number and its runs."""
+
+    chunk: int
+    runs: tuple[PlannedRun, ...]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The end of one run: status `OK`, `FAILED` or `INTERRUPTED`, and the reason of the latter two."""
+
+    run_id: str
+    status: str
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class FlownChunk:
+    """A chunk whose runs have ended.
+
+    Attributes
+    ----------
+    chunk : its number.
+    runs : number of its runs.
+    unflown : its runs that have no log, because they failed or were interrupted, in the order of the runs.
+    log_sha256 : digest of its log; None if no run was flown.
+    truth_sha256 : digest of its part of the truth; None if the chunk was interrupted.
+    """
+
+    chunk: int
+    runs: int
+    unflown: tuple[Outcome, ...]
+    log_sha256: str | None
+    truth_sha256: str | None
+
+    @property
+    def failed(self) -> int:
+        """Number of runs that failed by themselves."""
+        return sum(outcome.status == FAILED for outcome in self.unflown)
+
+    @property
+    def complete(self) -> bool:
+        """Whether every run was flown or failed by itself."""
+        return all(outcome.status != INTERRUPTED for outcome in self.unflown)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A flight condition, trimmed, linearised and loaded."""
+
+    trim: Trim
+    linear: Linearisation
+    flight: Flight
+
+
+class Pilot:
+    """Flies runs of one plan, whose table it does not read; keeps the last few conditions loaded. One per process."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        models = {name: sensor.errors() for name, sensor in plan.sensors.items()}
+        dynamic = measure.needs_every_step(models, 1.0 / plan.campaign.log_hz)
+        self._record_every = 1 if dynamic else plan.log_every
+        self._noisy = tuple(
+            name for name in measure.LOGGED if name in models and models[name].noise_std > 0.0
+        )
+        self._models = models
+        self._prepared: OrderedDict[Condition, Prepared] = OrderedDict()
+        time = np.arange(plan.samples, dtype=np.float64) * plan.dt_s
+        self._shapes = [manoeuvres.sample(m, time) for m in plan.manoeuvres]
+
+    def fly_chunk(
+        self,
+        order: ChunkOrder,
+        logs: Path,
+        truths: Path,
+        crashed: Mapping[str, str] | None = None,
+        starts: Callable[[str], None] = lambda run_id: None,
+    ) -> FlownChunk:
+        """Fly one chunk, and write its log and its truth.
+
+        Parameters
+        ----------
+        order : the chunk and its runs.
+        logs, truths : folders of the two files.
+        crashed : runs that end their process, with the reason; they are not flown and count as failed.
+        starts : receives each run before it is flown.
+
+        Raises
+        ------
+        StoreError
+            If a file cannot be written.
+        """
+        unflown, truth_rows, flown = [], [], []
+        for run in order.runs:
+            reason = (crashed or {}).get(run.run_id)
+            prepared = None
+            if reason is None:
+                starts(run.run_id)
+                try:
+                    prepared = self._prepare(run.condition)
+                    flown.append((run, self.channels(run)))
+                except AirtruthError as error:
+                    reason, prepared = str(error), None
+            if reason is not None:
+                unflown.append(Outcome(run.run_id, FAILED, reason))
+            truth_rows.append(truth_row(run, prepared))
+        log, truth = (folder / chunk_file(order.chunk) for folder in (logs, truths))
+        if flown:
+            store.write_log(log, self._log([r for r, _ in flown], [c for _, c in flown]))
+        store.write_table(truth, pd.DataFrame(truth_rows))
+        return FlownChunk(
+            order.chunk,
+            len(order.runs),
+            tuple(unflown),
+            sha256_of(log) if flown else None,
+            sha256_of(truth),
+        )
+
+    def _prepare(self, at: Condition) -> Prepared:
+        prepared = self._prepared.pop(at, None)
+        if prepared is None:
+            plan = self.plan
+            at_trim = trim(plan.aircraft, at, plan.dt_s)
+            prepared = Prepared(
+                trim=at_trim,
+                linear=linearise(plan.aircraft, at_trim, plan.dt_s),
+                flight=Flight(plan.aircraft, at_trim, plan.dt_s, self._record_every),
+            )
+        self._prepared[at] = prepared
+        if len(self._prepared) > _CACHED_CONDITIONS:
+            self._prepared.popitem(last=False)
+        return prepared
+
+    def channels(self, run: PlannedRun) -> dict[str, Array]:
+        """Fly one run of the table and return its noise-free channels, as `Flight.fly` does.
+
+        Raises
+        ------
+        TrimError, FlightError
+            If the run's condition cannot be trimmed, or the flight leaves the simulation's range.
+        """
+        plan = self.plan
+        prepared = self._prepare(run.condition)
+        gust = self._gust(prepared.trim, run)
+        manoeuvre = plan.manoeuvres[run.manoeuvre]
+        amplitude = 1.0 if manoeuvre.kind == "replay" else run.amplitude_rad
+        gains = plan.campaign.augmentation
+        inputs = Inputs(
+            command_rad=amplitude * self._shapes[run.manoeuvre],
+            gust_u_m_s=gust[:, 0],
+            gust_w_m_s=gust[:, 1],
+            gust_q_rad_s=-gust[:, 2] if plan.campaign.gust.rotary else None,
+            damper_gain_s=gains.damper_gain_s,
+            attitude_gain=gains.attitude_gain,
+            surface=manoeuvre.surface,
+        )
+        if gains.damper_gain_s or gains.attitude_gain:
+            inputs = replace(
+                inputs,
+                q_error_rad_s=self._error("q_rad_s", run),
+                theta_error_rad=self._error("theta_rad", run),
+            )
+        return prepared.flight.fly(inputs)
+
+    def _gust(self, at: Trim, run: PlannedRun) -> Array:
+        gust, samples = self.plan.campaign.gust, self.plan.samples
+        sigma_u, sigma_w = run.sigma_u_m_s, run.sigma_w_m_s
+        if sigma_u == 0.0 and sigma_w == 0.0:
+            return np.zeros((samples, 3))
+        span = self.plan.aircraft.constants.span_m if gust.rotary else None
+        unit = _unit_gust(run.length_u_m, run.length_w_m, at.airspeed_m_s, span, self.plan.dt_s)
+        states = unit.phi.shape[-1]
+        normals = streams.normals(self.plan.seed, run.run, streams.GUST, samples * states)
+        velocities = dryden.simulate(unit, normals.reshape(1, samples, states), gust.start)[0]
+        return np.asarray(velocities * np.array([sigma_u, sigma_w, sigma_w])[: velocities.shape[1]])
+
+    def _error(self, channel: str, run: PlannedRun) -> Array:
+        """Noise and bias that the augmentation's own sensor adds, the same as in the log."""
+        sensor = self._models.get(channel)
+        if sensor is None:
+            return np.zeros(self.plan.samples)
+        noise = streams.normals(self.plan.seed, run.run, streams.SENSORS[channel], self.plan.samples)
+        return sensor.bias + sensor.noise_std * noise
+
+    def _log(self, flown: list[PlannedRun], channels: list[dict[str, Array]]) -> FlightLog:
+        plan, every = self.plan, self._record_every
+        truth = {name: np.stack([c[name] for c in channels]) for name in channels[0]}
+        noise: dict[str, Array] = {
+            name: np.stack(
+                [
+                    streams.normals(plan.seed, run.run, streams.SENSORS[name], plan.samples)[::every]
+                    for run in flown
+                ]
+            )
+            for name in self._noisy
+        }
+        logged = measure.log_channels(truth, self._models, noise, plan.dt_s * every, plan.log_every // every)
+        samples = logged["alpha_rad"].shape[1]
+        return FlightLog(
+            metadata=_log_metadata(plan),
+            run_ids=tuple(run.run_id for run in flown),
+            offsets=np.arange(len(flown) + 1, dtype=np.int64) * samples,
+            t_s=np.tile(np.arange(samples) / plan.campaign.log_hz, len(flown)),
+            channels={name: values.ravel() for name, values in logged.items()},
+        )
+
+
+@lru_cache(maxsize=64)
+def _unit_gust(
+    length_u: float, length_w: float, airspeed: float, span: float | None, dt_s: float
+) -> dryden.DiscreteGust:
+    """Gusts of unit standard deviation; the rotary gust goes with w."""
+    return dryden.discretise(dryden.Dryden(1.0, 1.0, length_u, length_w, airspeed, span), dt_s)
+
+
+def _log_metadata(plan: Plan) -> Mapping[str, object]:
+    """Metadata of a log, without gusts, draws or the truth."""
+    return {"aircraft": plan.aircraft.name, "sample_rate_hz": plan.campaign.log_hz}
+
+
+def truth_row(run: PlannedRun, prepared: Prepared | None) -> dict[str, object]:
+    """Return a row of truth.parquet: the declared derivatives at the run's own trim, and its air.
+
+    Parameters
+    ----------
+    run : the planned run.
+    prepared : its flight condition; None for a run that failed.
+    """
+    result: dict[str, object] = {"run_id": run.run_id, "status": "ok" if prepared else "failed"}
+    sides = {"": "plus", "_minus": "minus", "_central": "central"}
+    for suffix, side in sides.items():
+        values = getattr(prepared.linear, side) if prepared else np.full(len(PARAMETERS), np.nan)
+        result |= {name + suffix: float(v) for name, v in zip(PARAMETERS, values, strict=True)}
+    modal = (prepared.linear.wn_rad_s, prepared.linear.zeta) if prepared else (np.nan, np.nan)
+    result |= dict(zip(MODAL, modal, strict=True))
+    at = prepared.trim if prepared else None
+    result |= {
+        "trim_alpha_rad": at.alpha_rad if at else np.nan,
+        "trim_elevator_rad": at.elevator_rad if at else np.nan,
+        "trim_throttle": at.controls.throttle if at else np.nan,
+        "airspeed_m_s": at.airspeed_m_s if at else np.nan,
+        "density_kg_m3": at.density_kg_m3 if at else np.nan,
+        "dynamic_pressure_pa": 0.5 * at.density_kg_m3 * at.airspeed_m_s**2 if at else np.nan,
+    }
+    for name in (
+        "eas_m_s",
+        "altitude_m",
+        "wind_m_s",
+        "sigma_u_m_s",
+        "sigma_w_m_s",
+        "length_u_m",
+        "length_w_m",
+    ):
+        result[name] = getattr(run, name)
+    if run.effects is not None:
+        result[EFFECTS] = run.effects
+    return result

@@ -1,0 +1,82 @@
+"""A campaign as the text of a campaign file, in SI."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from pydantic import BaseModel
+
+from airtruth.simulation.campaign.file import Campaign, Constant, Distribution, EffectTable, Table
+from airtruth.units import UNITS
+
+
+def as_toml(campaign: Campaign, heading: str = "") -> str:
+    """Return the text of a campaign file; reading it gives the same campaign.
+
+    Parameters
+    ----------
+    campaign : the campaign.
+    heading : comment at the head of the file.
+    """
+    lines = [f"# {line}".rstrip() for line in heading.splitlines()]
+    lines += [f"{key} = {_value(value)}" for key, value in _entries(campaign) if not _is_table(value)]
+    for key, value in _entries(campaign):
+        if isinstance(value, BaseModel) and not isinstance(value, Distribution):
+            lines += ["", f"[{key}]", *_lines(value)]
+        elif isinstance(value, tuple) and value and isinstance(value[0], BaseModel):
+            for row in value:
+                lines += ["", f"[[{key}]]", *_lines(row)]
+    return "\n".join(lines) + "\n"
+
+
+def _is_table(value: object) -> bool:
+    if isinstance(value, Distribution):
+        return False
+    return isinstance(value, BaseModel) or (
+        isinstance(value, tuple) and bool(value) and isinstance(value[0], BaseModel)
+    )
+
+
+def _entries(model: BaseModel) -> Iterator[tuple[str, Any]]:
+    """Keys with their SI unit, and values, of the fields that differ from their defaults."""
+    dimensions = model.dimensions if isinstance(model, Table) else {}
+    for name, field in type(model).model_fields.items():
+        value = getattr(model, name)
+        if (
+            not field.is_required()
+            and value == field.get_default(call_default_factory=True)
+            and name != "schema_"
+        ):
+            continue
+        key = field.alias or name
+        unit = next(iter(UNITS[dimensions[name]])) if name in dimensions else ""
+        yield (f"{key}_{unit}" if unit else key), value
+
+
+def _lines(model: BaseModel) -> list[str]:
+    if isinstance(model, EffectTable):
+        variant = {"variant": model.variant} if model.variant else {}
+        stated = {"name": model.name, **variant, **model.parameters}
+        return [f"{key} = {_value(value)}" for key, value in stated.items()]
+    return [f"{key} = {_value(value)}" for key, value in _entries(model)]
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, Constant):
+        return repr(value.value)
+    if isinstance(value, Distribution):
+        return _value({name: getattr(value, name) for name in type(value).model_fields})
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{json.dumps(str(k))} = {_value(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_value(v) for v in value) + "]"
+    return repr(value)
+
+
+__all__ = ["as_toml"]

@@ -1,0 +1,335 @@
+"""An aircraft from any JSBSim model: surveyed in a disposable process, written as a folder that works at once."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final, Literal
+
+from airtruth.aircraft import Aircraft, AircraftFile, JsbsimModel, Sensor, load, toml
+from airtruth.aircraft.file import FILE
+from airtruth.aircraft.jsbsim import files
+from airtruth.aircraft.jsbsim.bypass import bypass
+from airtruth.aircraft.jsbsim.confine import model_files
+from airtruth.aircraft.model import ElevatorProperties, LateralProperties, ThrottleProperties
+from airtruth.aircraft.probe import Constants, wheel_root
+from airtruth.aircraft.write import require_new
+from airtruth.errors import AircraftError, choices
+from airtruth.isolation.client import call
+from airtruth.isolation.limits import Limits
+from airtruth.isolation.protocol import IsolatedError, Task
+from airtruth.logs import ledger
+from airtruth.logs.atomic import new_folder
+from airtruth.quantity import Quantity
+from airtruth.simulation.survey.envelope import EnvelopeRow, FlightTest
+from airtruth.units import DEG, FT, G0, KT
+
+CAMPAIGN: Final = "first.toml"
+"""Name of the campaign that is written beside aircraft.toml."""
+REPORT: Final = "SURVEY.txt"
+"""Name of the report in the folder."""
+_LIMITS: Final = Limits(seconds=900.0, memory_bytes=4_000_000_000)
+"""Limits of a survey (judgement: four engines and a slow machine need two minutes)."""
+_STICK_RAD: Final = 25.0 * DEG
+"""Travel of the surface per unit of the stick where a fly-by-wire is bypassed [rad] (judgement: that of a fighter)."""
+_SENSORS: Final = {
+    "alpha_rad": 0.05 * DEG,
+    "q_rad_s": 0.05 * DEG,
+    "az_m_s2": 0.005 * G0,
+    "elevator_rad": 0.02 * DEG,
+}
+"""Noise of the sensors of a new aircraft [units of the channels] (judgement: good flight-test instruments)."""
+_TURN: Final = (1.6, 0.3, 1.2)
+"""Step of a manoeuvre: turn of the short period in it [rad], shortest and longest step [s] (judgement)."""
+
+
+@dataclass(frozen=True)
+class ForeignAircraft:
+    """An aircraft that was written for a JSBSim model, and what the survey of the model found.
+
+    Attributes
+    ----------
+    aircraft : as written and read back.
+    notes : what was found.
+    decisions : what the user has to decide.
+    rows : of the envelope, one line per altitude.
+    flight : the first condition, derivatives and test flight there; empty where it cannot fly.
+    cause : why it cannot fly; "" where it can.
+    has_campaign : whether a record was identified in which it keeps to its range, for `CAMPAIGN`.
+    """
+
+    aircraft: Aircraft
+    notes: tuple[str, ...]
+    decisions: tuple[str, ...]
+    rows: tuple[str, ...]
+    flight: tuple[str, ...]
+    cause: str
+    has_campaign: bool
+
+    @property
+    def flies(self) -> bool:
+        """Whether a trim was found."""
+        return not self.cause
+
+    def summary(self) -> str:
+        """The report."""
+        folder = self.aircraft.folder
+        lines = [f"{folder}: {self.aircraft.name}"]
+        sections = (
+            ("found", self.notes),
+            (
+                "flies" if self.flies else "does not fly",
+                self.rows if self.flies else (self.cause, *self.rows),
+            ),
+            ("first condition", self.flight),
+            ("to decide", self.decisions),
+        )
+        for title, entries in sections:
+            if entries:
+                lines += ["", f"{title}:", *(f"  {entry}" for entry in entries)]
+        if self.has_campaign:
+            name = self.aircraft.name
+            lines += [
+                "",
+                "next:",
+                f"  airtruth fly {folder / CAMPAIGN} --out out/{name}",
+                f"  airtruth identify out/{name} --aircraft {folder}",
+                f"  airtruth trace out/{name} --aircraft {folder} --out out/{name}-trace",
+            ]
+        return "\n".join(lines)
+
+
+def new_from_jsbsim(source: str | Path, out: Path) -> ForeignAircraft:
+    """Survey a JSBSim model and write an aircraft for it.
+
+    Parameters
+    ----------
+    source : name of a model that the JSBSim package ships; a model's XML file; or a folder that holds one.
+    out : folder to write, new or empty.
+
+    Raises
+    ------
+    AircraftError
+        If the model does not exist, may not be loaded (`airtruth.aircraft.jsbsim.confine`), JSBSim refuses it or dies
+        on it, or no elevator is found.
+    StoreError
+        If the folder is not empty or cannot be written.
+    """
+    require_new(out)
+    folder, model, root = _located(source)
+    model_files(folder / f"{model}.xml", wheel_root())
+    facts = _survey(folder, model, root)
+    if "integrating" not in facts:
+        return _written(out, folder, model, root, facts)
+    with TemporaryDirectory() as scratch:
+        beside = Path(scratch) / out.name
+        note = _bypassed(beside, folder, model, root, facts)
+        again = _survey(beside, model, ".")
+        if "integrating" in again:
+            raise AircraftError(
+                f"{model}: a fly-by-wire integrates {', '.join(again['integrating'])} and is not bypassed"
+            )
+        return _written(out, beside, model, ".", {**again, "notes": [note, *again["notes"]]})
+
+
+def _bypassed(
+    beside: Path, folder: Path, model: str, root: Literal[".", "wheel"], facts: Mapping[str, Any]
+) -> str:
+    """Copy a model with its fly-by-wire bypassed; return a note."""
+    found = JsbsimModel.model_validate({**facts["jsbsim"], "root": root})
+    read = files.read(folder, found)
+    elevator = found.elevator
+    held = [name for name in facts["integrating"] if name != elevator.surface]
+    bypass(read.root, elevator.command, elevator.surface, _STICK_RAD / elevator.surface_rad, held)
+    files.copy(read, beside)
+    files.write(read, beside / f"{model}.xml")
+    also = f"; {', '.join(held)} held at 0" if held else ""
+    return (
+        f"augmentation: the fly-by-wire integrates and no property switches it off; {elevator.command} drives "
+        f"{elevator.surface} in a copy of the model{also}"
+    )
+
+
+def _written(
+    out: Path, folder: Path, model: str, root: Literal[".", "wheel"], facts: Mapping[str, Any]
+) -> ForeignAircraft:
+    """Write the folder of a surveyed model."""
+    sections = ("notes", "decisions")
+    notes, decisions = (tuple(str(x) for x in facts[key]) for key in sections)
+    decisions += (
+        "sensors: the noise of alpha, q, az and elevator in aircraft.toml is an assumption; state your own",
+    )
+    table = _table(facts["jsbsim"], out.name, model, root)
+    rows, flight = _rows(facts), _flight(facts)
+    file = AircraftFile.model_construct(
+        name=out.name, description=f"{model} of JSBSim", jsbsim=table, sensors=_sensors()
+    )
+    heading = f"{model} of JSBSim, surveyed by airtruth; {REPORT} has the report. Author and licence: the JSBSim file."
+    with new_folder(out) as made:
+        if root == ".":
+            read = files.read(folder, table.model_copy(update={"model": model}))
+            files.copy(read, made)
+            files.write(read, made / f"{out.name}.xml")
+        (made / FILE).write_text(toml.write(file, heading), encoding="utf-8")
+        unread = Aircraft(folder=out, file=file, constants=Constants.model_validate(facts["constants"]))
+        records = facts["flight"] is not None and facts["flight"]["duration_s"] > 0.0
+        written = ForeignAircraft(unread, notes, decisions, rows, flight, str(facts["cause"]), records)
+        if records:
+            (made / CAMPAIGN).write_text(_campaign(out.name, facts), encoding="utf-8")
+        (made / REPORT).write_text(written.summary() + "\n", encoding="utf-8")
+        ledger.add_folder(made, "aircraft")
+    return replace(written, aircraft=load(out))
+
+
+def _located(source: str | Path) -> tuple[Path, str, Literal[".", "wheel"]]:
+    """Folder of a model, its name, and where it lies."""
+    path = Path(source)
+    if path.is_file():
+        return path.resolve().parent, path.stem, "."
+    if path.is_dir():
+        own = path / f"{path.resolve().name}.xml"
+        found = [own] if own.is_file() else [p for p in sorted(path.glob("*.xml")) if _is_model(p)]
+        if len(found) != 1:
+            names = ", ".join(p.name for p in found) or "none"
+            raise AircraftError(
+                f"{path}: has to hold one JSBSim model (found: {names}); give the XML file itself"
+            )
+        return path.resolve(), found[0].stem, "."
+    wheel = wheel_root() / "aircraft"
+    name = str(source)
+    known = sorted(p.name for p in wheel.iterdir() if (p / f"{p.name}.xml").is_file())
+    if name not in known:
+        raise AircraftError(
+            f"--jsbsim {name!r}: no such file, folder or model of JSBSim; {choices(name, known)}"
+        )
+    return wheel / name, name, "wheel"
+
+
+def _is_model(path: Path) -> bool:
+    try:
+        return ET.parse(path).getroot().tag == "fdm_config"
+    except (ET.ParseError, OSError):
+        return False
+
+
+def _survey(folder: Path, model: str, root: str) -> Mapping[str, Any]:
+    task = Task(
+        "airtruth.simulation.survey.task:survey",
+        {"folder": str(folder), "model": model, "root": root},
+        _LIMITS,
+        ("airtruth.simulation.survey.task",),
+    )
+    try:
+        return call(task).facts
+    except IsolatedError as error:
+        reason = {
+            "time": f"did not finish within {_LIMITS.seconds:.0f} s",
+            "memory": "needs more memory than a model may",
+        }.get(error.kind, f"ended the process of JSBSim ({error.detail})")
+        raise AircraftError(f"{model}: the survey of this model {reason}; JSBSim cannot fly it") from None
+
+
+def _table(found: Mapping[str, Any], name: str, model: str, root: Literal[".", "wheel"]) -> JsbsimModel:
+    """The [jsbsim] table with the entries that differ from their defaults."""
+    elevator = {k: v for k, v in found["elevator"].items() if v != ElevatorProperties.model_fields[k].default}
+    entries: dict[str, Any] = {
+        "model": name if root == "." else model,
+        "root": root,
+        "elevator": ElevatorProperties(**{"surface": found["elevator"]["surface"], **elevator}),
+        "throttle": ThrottleProperties(command=tuple(found["throttle"]["command"])),
+    }
+    entries |= {key: found[key] for key in ("set", "declare", "engine_start_s") if found[key]}
+    if found["lateral"] is not None:
+        entries["lateral"] = LateralProperties(**found["lateral"])
+    return JsbsimModel(**entries)
+
+
+def _sensors() -> dict[str, Sensor]:
+    source = "assumed by airtruth"
+    return {name: Sensor(noise_std=Quantity(value=std, source=source)) for name, std in _SENSORS.items()}
+
+
+def _rows(facts: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple(_row(EnvelopeRow(**row)) for row in facts["envelope"])
+
+
+def _row(row: EnvelopeRow) -> str:
+    text = f"{row.altitude_m / FT:6.0f} ft: {row.trimmed} of {row.tried} speeds trimmed"
+    if not row.trimmed:
+        return text
+    slow, fast = (v / KT for v in row.eas_m_s)
+    alpha = " to ".join(f"{a / DEG:.1f}" for a in row.alpha_rad)
+    if any(row.throttle):
+        lever = "throttle " + " to ".join(f"{x:.2f}" for x in row.throttle)
+    else:
+        lever = "flight path " + " to ".join(f"{x / DEG:.1f}" for x in row.gamma_rad) + " deg"
+    return f"{text}, {slow:.0f} to {fast:.0f} kt EAS, alpha {alpha} deg, {lever}"
+
+
+def _flight(facts: Mapping[str, Any]) -> tuple[str, ...]:
+    at = facts["condition"]
+    if at is None:
+        return ()
+    flight = FlightTest(**facts["flight"])
+    derivatives = ", ".join(f"{name} {value:.4g}" for name, value in flight.derivatives.items())
+    lines = [
+        f"{at['eas_m_s'] / KT:.1f} kt EAS, {at['altitude_m'] / FT:.0f} ft, flight path {at['gamma_rad'] / DEG:.2f} deg",
+        derivatives,
+        f"short period {flight.wn_rad_s:.3g} rad/s, damping {flight.zeta:.2f}",
+    ]
+    if flight.alpha_range_deg:
+        still, moved = flight.alpha_range_deg
+        lines.append(
+            f"{flight.duration_s:g} s with fixed controls: alpha moves {still:.2g} deg; with a doublet of "
+            f"{flight.amplitude_deg:g} deg {moved:.2g} deg"
+        )
+    if flight.derivatives["Cmalpha"] > 0.0:
+        lines.append(
+            "the aircraft is unstable at every airspeed that was trimmed at this altitude (Cmalpha above 0)"
+        )
+    if flight.fault:
+        lines.append(f"another record fails: {flight.fault}")
+    return tuple(lines)
+
+
+def _campaign(name: str, facts: Mapping[str, Any]) -> str:
+    at, flight = facts["condition"], FlightTest(**facts["flight"])
+    wn, duration, amplitude = flight.wn_rad_s, flight.duration_s, flight.amplitude_deg
+    turn, shortest, longest = _TURN
+    step = longest if not wn > 0.0 else min(max(turn / wn, shortest), longest)
+    return f"""# Six records in light turbulence at the first condition of {REPORT}; every key: docs/campaigns.md
+schema = 1
+name = "{name}"
+title = "{name}: doublets and 3-2-1-1 in light turbulence"
+aircraft = "{FILE}" # beside this file
+runs = 6
+seed = 1
+duration_s = {duration:g}
+
+[condition]
+eas_m_s = {at["eas_m_s"]:.6g}
+altitude_m = {at["altitude_m"]:.6g}
+flight_path_deg = {at["gamma_rad"] / DEG:.6g}
+
+[[manoeuvre]]
+kind = "doublet"
+amplitude_deg = {amplitude:g}
+start_s = 1.0
+step_s = {step:.2f}
+
+[[manoeuvre]]
+kind = "3211"
+amplitude_deg = {0.8 * amplitude:g}
+start_s = 1.0
+step_s = {0.6 * step:.2f}
+
+[gust]
+figures = "mil-f-8785c"
+level = "light"
+"""
+
+
+__all__ = ["CAMPAIGN", "REPORT", "ForeignAircraft", "new_from_jsbsim"]

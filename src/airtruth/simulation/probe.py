@@ -1,0 +1,175 @@
+"""The aircraft's forces and moment as tables, from JSBSim's response in every state of a grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.aircraft import Aircraft
+from airtruth.errors import AircraftError
+from airtruth.physics.longitudinal import ForceTables, Longitudinal
+from airtruth.simulation.simulator import Condition, Controls, Executive, Response
+from airtruth.simulation.trim import Trim
+from airtruth.units import DEG, FT, LBF
+
+Array = NDArray[np.float64]
+
+_FILTERS_S: Final = 0.25
+"""Time for the filters of a model in each state, where engines have to run [s] (judgement: several lags of a servo)."""
+_HOLDS: Final = 12
+"""Largest number of commands that hold a surface against augmentation [-] (judgement: each reduces the error tenfold)."""
+_SAME_SURFACE_RAD: Final = 1e-6
+"""Largest difference of the surface at one command that counts as rounding [rad]."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """States to evaluate; the trim's own value is added to each axis.
+
+    Attributes
+    ----------
+    alpha_rad, command_rad : angle of attack and elevator command (points,) [rad].
+    q_rad_s : pitch rate (points,) [rad/s].
+    airspeed : true airspeed over that of the trim (points,) [-].
+    """
+
+    alpha_rad: Array
+    command_rad: Array
+    q_rad_s: Array
+    airspeed: Array
+
+
+def grid_about(
+    trim: Trim, alpha_rad: float = 10.0 * DEG, command_rad: float = 6.0 * DEG, q_rad_s: float = 60.0 * DEG
+) -> Grid:
+    """Return whole degrees of alpha and elevator near the trim, and pitch rates 12 deg/s apart.
+
+    Whole degrees put points on the breaks of tables that are stated in degrees; q has one at zero.
+    Airspeed has 95, 100 and 105 % of the trim's.
+    """
+
+    def whole(centre: float, reach: float, step: float) -> Array:
+        first, last = np.ceil((centre - reach) / step), np.floor((centre + reach) / step)
+        return np.arange(first, last + 1.0) * step
+
+    return Grid(
+        alpha_rad=whole(trim.alpha_rad, alpha_rad, DEG),
+        command_rad=whole(trim.controls.elevator_command_rad, command_rad, DEG),
+        q_rad_s=whole(0.0, q_rad_s, 12.0 * DEG),
+        airspeed=np.array([0.95, 1.0, 1.05]),
+    )
+
+
+def probe(
+    aircraft: Aircraft, trim: Trim, grid: Grid | None = None, dt_s: float = 1.0 / 200.0
+) -> Longitudinal:
+    """Tabulate X, Z, M of the aircraft at the trim's throttle and altitude, engines settled.
+
+    Terms in alpha_dot, if a model has them, are those of the state itself, as in `airtruth.simulation.linearise`.
+
+    Parameters
+    ----------
+    aircraft, trim : the aircraft and its equilibrium.
+    grid : states to evaluate; None for `grid_about` the trim.
+    dt_s : simulation step of the executive [s].
+
+    Raises
+    ------
+    AircraftError
+        If the surface does not rise with its command, or moves with alpha, q or airspeed.
+    """
+    grid = grid or grid_about(trim)
+    executive = Executive(aircraft, dt_s)
+    axes = (
+        _with(grid.airspeed, 1.0) * trim.airspeed_m_s,
+        _with(grid.alpha_rad, trim.alpha_rad),
+        _with(grid.command_rad, trim.controls.elevator_command_rad),
+        _with(grid.q_rad_s, 0.0),
+    )
+    forces = executive.nodes(["forces/fbx-total-lbs", "forces/fbz-total-lbs"])
+    inertia = aircraft.constants.inertia_yy_kg_m2
+    states = _States(executive, trim)
+    values = np.empty((*(axis.size for axis in axes), 3))
+    surface = np.empty(values.shape[:-1])
+    for at in product(*(range(axis.size) for axis in axes)):
+        v, alpha, command, q = (float(axis[i]) for axis, i in zip(axes, at, strict=True))
+        condition = replace(trim.condition, eas_m_s=trim.condition.eas_m_s * v / trim.airspeed_m_s)
+        controls = replace(trim.controls, elevator_command_rad=command)
+        answer = states.respond(condition, alpha, controls, q)
+        surface[at] = answer.elevator_rad
+        values[at] = [*(node.get_double_value() * LBF for node in forces), answer.q_dot_rad_s2 * inertia]
+    gravity = executive.node("accelerations/gravity-ft_sec2").get_double_value() * FT
+    return Longitudinal(
+        tables=ForceTables(axes[0], axes[1], _surface(aircraft, surface), axes[3], values),
+        mass_kg=trim.mass_kg,
+        inertia_kg_m2=inertia,
+        gravity_m_s2=gravity,
+        airspeed_m_s=trim.airspeed_m_s,
+        alpha_rad=trim.alpha_rad,
+        elevator_rad=trim.elevator_rad,
+        gamma_rad=trim.condition.gamma_rad,
+    )
+
+
+class _States:
+    """States of the grid, one after the other in one executive.
+
+    Engines that run until they are steady keep the speed of the trim, because they cannot follow the motion of a flight
+    test; the filters of the model have time to settle. Where augmentation moves the surface, the command follows until
+    the surface is where the same command puts it at the trim.
+    """
+
+    def __init__(self, executive: Executive, trim: Trim) -> None:
+        self.executive, self.trim = executive, trim
+        self.holds = executive.model.elevator.feedback
+        if executive.model.engine_start_s > 0.0:
+            executive.initialise(trim.condition, trim.alpha_rad, trim.controls)
+
+    def respond(self, condition: Condition, alpha_rad: float, controls: Controls, q_rad_s: float) -> Response:
+        """Response in a state of the grid."""
+        if not self.holds:
+            return self._settled(condition, alpha_rad, controls, q_rad_s)
+        command = controls.elevator_command_rad
+        wanted = self.trim.elevator_rad + command - self.trim.controls.elevator_command_rad
+        for _ in range(_HOLDS):
+            answer = self._settled(
+                condition, alpha_rad, replace(controls, elevator_command_rad=command), q_rad_s
+            )
+            error = wanted - answer.elevator_rad
+            if abs(error) < _SAME_SURFACE_RAD:
+                break
+            command += error
+        return answer
+
+    def _settled(
+        self, condition: Condition, alpha_rad: float, controls: Controls, q_rad_s: float
+    ) -> Response:
+        self.executive.initialise(condition, alpha_rad, controls, q_rad_s, _FILTERS_S)
+        return self.executive.respond()
+
+
+def _with(axis: Array, value: float) -> Array:
+    """The axis and one value more, unless a point is there already."""
+    kept = axis[np.abs(axis - value) > 1e-9 * (1.0 + abs(value))]
+    return np.sort(np.append(kept, value))
+
+
+def _surface(aircraft: Aircraft, surface: Array) -> Array:
+    """Surface of each command, where it depends on nothing else."""
+    axis = surface[0, 0, :, 0]
+    spread = np.abs(surface - axis[:, None])
+    if spread.max() > _SAME_SURFACE_RAD:
+        raise AircraftError(
+            f"{aircraft.name}: the elevator moves by up to {spread.max() / DEG:.3g} deg with alpha, q or airspeed at a "
+            "held command; switch its feedback off (jsbsim.set in aircraft.toml) or probe a smaller range"
+        )
+    if not np.all(np.diff(axis) > 0.0):
+        raise AircraftError(
+            f"{aircraft.name}: the elevator surface does not rise with its command between {axis[0] / DEG:.3g} and "
+            f"{axis[-1] / DEG:.3g} deg; stay within its limits, or check jsbsim.elevator in aircraft.toml"
+        )
+    return np.ascontiguousarray(axis)

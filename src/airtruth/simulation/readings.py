@@ -1,0 +1,81 @@
+"""JSBSim's properties of a flight as channels in SI, at the centre of gravity and without sensors."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.channels import SIGNALS
+from airtruth.errors import FlightError
+from airtruth.physics import atmosphere
+from airtruth.units import FT, SLUG
+
+Array = NDArray[np.float64]
+
+_STATE: Final = ("airspeed_m_s", "alpha_rad", "theta_rad", "q_rad_s", "altitude_m", "density_kg_m3")
+"""Channels with a JSBSim property of their own, see `airtruth.channels.Signal.jsbsim`."""
+READ: Final = (
+    *(SIGNALS[name].jsbsim for name in _STATE),
+    "forces/fbx-total-lbs",
+    "forces/fbz-total-lbs",
+    "accelerations/qdot-rad_sec2",
+)
+"""Properties that `channels` takes, in its order; the surface's own property follows them."""
+MOST_ALPHA_RAD: Final = 1.5
+"""Largest angle of attack of a sound flight [rad] (judgement: 86 deg, beyond any table)."""
+
+
+def channels(columns: Array, mass_kg: float, surface_rad: float) -> dict[str, Array]:
+    """Convert properties to the channels of a log that exist without sensors, and q_dot_rad_s2.
+
+    Parameters
+    ----------
+    columns : (10, records) values of `READ` and of the surface's property [JSBSim's units].
+    mass_kg : mass of the aircraft [kg].
+    surface_rad : radians per unit of the surface's property.
+
+    Returns
+    -------
+    dict
+        Channel -> (records,) values at the centre of gravity [SI].
+    """
+    *state, fx, fz, q_dot, surface = columns
+    result = {name: column * SIGNALS[name].to_si for name, column in zip(_STATE, state, strict=True)}
+    result["altitude_m"] = atmosphere.geopotential_m(result["altitude_m"])
+    acceleration = SLUG * FT / mass_kg
+    return result | {
+        "ax_m_s2": fx * acceleration,
+        "az_m_s2": fz * acceleration,
+        "q_dot_rad_s2": q_dot,
+        "elevator_rad": surface * surface_rad,
+    }
+
+
+def require_sound(columns: Array, record_s: float, flight: str) -> None:
+    """Refuse a flight that left the range in which the simulation has a meaning.
+
+    Parameters
+    ----------
+    columns : (10, records) as in `channels`.
+    record_s : time between two records [s].
+    flight : subject of the message.
+
+    Raises
+    ------
+    FlightError
+        If a value is not finite, the airspeed is not positive or the angle of attack exceeds `MOST_ALPHA_RAD`.
+    """
+    airspeed, alpha = columns[0], columns[1]
+    with np.errstate(over="ignore", invalid="ignore"):
+        sound = np.isfinite(columns).all(axis=0) & (airspeed > 0.0) & (np.abs(alpha) < MOST_ALPHA_RAD)
+    if not sound.all():
+        first = int(np.flatnonzero(~sound)[0])
+        raise FlightError(
+            f"{flight} left the simulation's range at {first * record_s:.3f} s "
+            f"(airspeed {airspeed[first] * FT:.3g} m/s, alpha {alpha[first]:.3g} rad)"
+        )
+
+
+__all__ = ["MOST_ALPHA_RAD", "READ", "channels", "require_sound"]

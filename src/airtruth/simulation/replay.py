@@ -1,0 +1,258 @@
+"""Replay of a measured record: the measured surface in JSBSim, at the measured airspeed.
+
+Each record has the free parameters of a trace: initial angle of attack and pitch rate, an offset of the surface (the
+moment at trim) and a bias of each output. At every step the horizontal velocity of the air is the difference between
+the simulated speed over ground and the measured airspeed, which contains the horizontal gusts; a change of that
+velocity exerts no force of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.aircraft import Aircraft
+from airtruth.simulation import instruments as measure
+from airtruth.simulation.readings import READ, channels, require_sound
+from airtruth.simulation.simulator import Executive
+from airtruth.simulation.trim import Trim
+from airtruth.units import FT
+
+Array = NDArray[np.float64]
+
+STEP_S: Final = 0.005
+"""Longest step of the simulation [s] (judgement: that of the campaigns)."""
+_FIT_PASSES: Final = 2
+"""Gauss-Newton steps with the same derivatives (judgement: the residual is nearly linear in the parameters, and each
+step costs a simulation)."""
+_BEYOND_RAD: Final = 0.02
+"""Range of the gearing beyond the surface of a record [rad] (judgement: a gearing differs by some percent)."""
+_GEARING: Final = 24
+"""Points of the gearing [-] (judgement: fewer than a degree apart in a record)."""
+_SAME_RAD: Final = 1e-9
+"""Difference of a surface that counts as rounding [rad] (judgement)."""
+_STEPS: Final = np.array([2e-3, 1e-2, 5e-4])
+"""Steps of initial alpha [rad], initial q [rad/s] and surface offset [rad] for differences."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """A record to replay.
+
+    Attributes
+    ----------
+    dt_s : sample period [s].
+    substeps : steps of the simulation per sample, see `substeps`.
+    outputs : channel -> (samples,) measured values to compare [SI].
+    weight : channel -> standard deviation that scales its residual [SI].
+    elevator_rad, airspeed_m_s : ((samples - 1) substeps + 1,) on the simulation's grid, the errors of their sensors
+        undone [rad], [m/s].
+    """
+
+    dt_s: float
+    substeps: int
+    outputs: Mapping[str, Array]
+    weight: Mapping[str, float]
+    elevator_rad: Array
+    airspeed_m_s: Array
+
+
+def substeps(dt_s: float) -> int:
+    """Number of steps of the simulation per sample of the log."""
+    return max(1, math.ceil(dt_s / STEP_S - 1e-9))
+
+
+def replay(aircraft: Aircraft, at: Trim, track: Track) -> dict[str, Array]:
+    """Replay a record and fit its free parameters.
+
+    Parameters
+    ----------
+    aircraft : aircraft to fly.
+    at : trim about which it starts.
+    track : the record.
+
+    Returns
+    -------
+    Channel of ``track.outputs`` -> (samples,) as the aircraft's sensors would log it without noise, biases
+    fitted.
+
+    Raises
+    ------
+    FlightError
+        If the motion leaves the range in which the simulation has a meaning.
+    AircraftError
+        If the aircraft has no JSBSim model.
+    """
+    executive = Executive(aircraft, track.dt_s / track.substeps)
+    names = list(track.outputs)
+    free = np.array([_first(track, "alpha_rad", at.alpha_rad), _first(track, "q_rad_s", 0.0), 0.0])
+    # the surface about the aircraft's own trim: the offset is free in any case
+    free[2] = at.elevator_rad - float(np.mean(track.elevator_rad[: max(1, track.substeps * 5)]))
+
+    def fly(x: Array) -> Array:
+        logged = _logged(aircraft, _run(executive, at, track, x), track)
+        return np.stack([logged[n] for n in names])
+
+    weight = np.array([[track.weight[n]] for n in names])
+    measured = np.stack([track.outputs[n] for n in names])
+    flown = fly(free)
+    tangents = np.stack([(fly(free + np.eye(3)[i] * _STEPS[i]) - flown) / _STEPS[i] for i in range(3)])
+    best = _residual(measured, flown, weight)
+    for _ in range(_FIT_PASSES):
+        centred = (tangents - tangents.mean(axis=2, keepdims=True)) / weight
+        step = np.linalg.lstsq(centred.reshape(3, -1).T, best.ravel(), rcond=None)[0]
+        trial = fly(free + step)
+        after = _residual(measured, trial, weight)
+        if not float((after**2).sum()) < float((best**2).sum()):
+            break
+        free, flown, best = free + step, trial, after
+    fitted = flown + (measured - flown).mean(axis=1, keepdims=True)
+    return dict(zip(names, fitted, strict=True))
+
+
+def flown_through(aircraft: Aircraft, at: Trim, track: Track) -> dict[str, Array]:
+    """Fly a record's surface and airspeed from a trim, without sensors and without a fit.
+
+    Parameters
+    ----------
+    aircraft : aircraft to fly.
+    at : trim about which it starts; the surface is counted from the record's start.
+    track : the record; its outputs do not count.
+
+    Returns
+    -------
+    Channel -> (steps,) at every step of the simulation, at the CG; see `airtruth.simulation.readings.channels`.
+
+    Raises
+    ------
+    FlightError
+        If the motion leaves the range in which the simulation has a meaning.
+    AircraftError
+        If the aircraft has no JSBSim model.
+    """
+    executive = Executive(aircraft, track.dt_s / track.substeps)
+    first = float(np.mean(track.elevator_rad[: max(1, track.substeps * 5)]))
+    return _run(executive, at, track, np.array([at.alpha_rad, 0.0, at.elevator_rad - first]))
+
+
+def _residual(measured: Array, flown: Array, weight: Array) -> Array:
+    difference = (measured - flown) / weight
+    return np.asarray(difference - difference.mean(axis=1, keepdims=True))
+
+
+def _first(track: Track, channel: str, otherwise: float) -> float:
+    return float(np.mean(track.outputs[channel][:5])) if channel in track.outputs else otherwise
+
+
+def _logged(aircraft: Aircraft, truth: Mapping[str, Array], track: Track) -> dict[str, Array]:
+    rows = {name: values[None, :] for name, values in truth.items()}
+    sensors = {name: s.errors() for name, s in aircraft.file.sensors.items() if name in track.outputs}
+    logged = measure.log_channels(rows, sensors, {}, track.dt_s / track.substeps, track.substeps)
+    return {name: values[0] for name, values in logged.items()}
+
+
+def _run(executive: Executive, at: Trim, track: Track, free: Array) -> dict[str, Array]:
+    """One simulation; channels at every step, at the CG, without sensors."""
+    command = _commands(executive, at, track.elevator_rad + free[2])
+    executive = executive.renewed()
+    fdm, elevator = executive.fdm, executive.model.elevator
+    fdm.set_trim_status(True)  # actuators pass their input through
+    fdm.reset_to_initial_conditions(2)  # time to zero; initialise() runs the initial conditions
+    executive.configure()
+    gust = executive.node("atmosphere/gust-north-fps")
+    gust.set_double_value((at.airspeed_m_s - float(track.airspeed_m_s[0])) / FT)
+    executive.initialise(
+        at.condition,
+        float(free[0]),
+        replace(at.controls, elevator_command_rad=float(command[0])),
+        float(free[1]),
+    )
+    executive.choose_integrator()
+    gets = [node.get_double_value for node in executive.nodes([*READ, elevator.surface])]
+    over_ground = executive.nodes(["velocities/v-north-fps", "velocities/v-down-fps"])
+    feedback = (
+        executive.node(elevator.surface).get_double_value,
+        elevator.surface_rad * elevator.command_per_rad,
+    )
+    columns = _stepped(
+        fdm,
+        gets,
+        [node.get_double_value for node in over_ground],
+        (executive.node(elevator.command).set_double_value, gust.set_double_value),
+        (command * elevator.command_per_rad, track.airspeed_m_s / FT),
+        ((track.elevator_rad + free[2]) / elevator.surface_rad, *feedback) if elevator.feedback else None,
+    )
+    require_sound(columns, executive.dt_s, f"{executive.aircraft.name}, flown through a measured surface,")
+    return channels(columns, at.mass_kg, elevator.surface_rad) | {
+        "elevator_command_rad": command,
+        "throttle": np.full(columns.shape[1], at.controls.throttle),
+    }
+
+
+def _commands(executive: Executive, at: Trim, surface: Array) -> Array:
+    """Commands that put the surface where it was measured; the gearing of a model is not the same up and down.
+
+    Parameters
+    ----------
+    surface : wanted (steps,) [rad].
+    """
+    offset = at.controls.elevator_command_rad - at.elevator_rad
+    if executive.model.elevator.feedback:
+        return np.asarray(surface + offset)
+    low, high = float(surface.min()) + offset, float(surface.max()) + offset
+    commands = np.union1d(
+        np.linspace(low - _BEYOND_RAD, high + _BEYOND_RAD, _GEARING), [at.controls.elevator_command_rad, 0.0]
+    )
+    reached = []
+    for command in commands:
+        executive.initialise(
+            at.condition, at.alpha_rad, replace(at.controls, elevator_command_rad=float(command)), 0.0, 0.0
+        )
+        reached.append(executive.respond().elevator_rad)
+    rising = np.maximum.accumulate(reached)
+    kept = np.append(True, np.diff(rising) > _SAME_RAD)
+    if kept.sum() < 2:
+        return np.asarray(surface + offset)
+    found = np.interp(surface, rising[kept], commands[kept])
+    linear = np.abs(np.asarray(reached) - commands + offset).max() < _SAME_RAD
+    return np.asarray(surface + offset if linear else found)
+
+
+def _stepped(
+    fdm: Any,
+    gets: Sequence[Any],
+    over_ground: Sequence[Any],
+    setters: tuple[Any, Any],
+    series: tuple[Array, Array],
+    feedback: tuple[Array, Any, float] | None,
+) -> Array:
+    """Values of ``gets`` at every step; setters and series are those of the command and of the airspeed.
+
+    Parameters
+    ----------
+    feedback : surface to fly, its getter, and units of the command per unit of it, where augmentation moves it.
+    """
+    north, down = over_ground
+    set_command, set_gust = setters
+    records = [get() for get in gets]
+    error = 0.0
+    for step, (command, airspeed) in enumerate(
+        zip(series[0][1:].tolist(), series[1][1:].tolist(), strict=True)
+    ):
+        if feedback is not None:
+            wanted, surface, gain = feedback
+            error += gain * (float(wanted[step]) - surface())
+        set_command(command + error)
+        sink = down()
+        set_gust(north() - math.sqrt(max(airspeed * airspeed - sink * sink, 0.0)))
+        fdm.run()
+        records.extend([get() for get in gets])
+    return np.array(records).reshape(-1, len(gets)).T
+
+
+__all__ = ["STEP_S", "Track", "replay", "substeps"]

@@ -1,0 +1,331 @@
+"""JSBSim behind a small interface: open an executive, put it into a state, read its response.
+
+Every flight condition has an executive of its own, whose initial conditions are written once: rewriting them drifts in
+the last bits, and a result must not depend on earlier runs.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable
+from dataclasses import astuple, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import jsbsim
+
+from airtruth.aircraft import Aircraft, JsbsimModel
+from airtruth.aircraft.probe import load_model, model_root
+from airtruth.errors import AircraftError
+from airtruth.units import FT, KT, SLUG
+
+_AB3: Final = 4.0
+"""JSBSim's number of the third-order Adams-Bashforth method."""
+_INTEGRATORS: Final = tuple(
+    f"simulation/integrator/{order}/{kind}"
+    for order in ("rate", "position")
+    for kind in ("rotational", "translational")
+)
+"""Properties that choose JSBSim's integrators."""
+_FROZEN: Final = 0.0
+"""JSBSim's number of no integration: the motion is held while engines and filters go on."""
+_BLOCK_S: Final = 0.25
+"""Time between two looks at the engines while they start [s] (judgement)."""
+_STEADY: Final = 1e-9
+"""Change of the accelerations over a block below which engines and filters are steady [m/s2], [rad/s2] (judgement: an
+engine that settles with a time constant of 10 s is then 4e-8 from its steady state, less than the residual of a trim)."""
+_ENGINE_ROUNDS: Final = 4
+"""Steady states of the engines before a run: the thrust of a piston engine is constant after two (measured)."""
+_PLANET: Final = Path(__file__).with_name("flat_planet.xml")
+"""A planet that is flat and does not rotate, see docs/design.md."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A steady flight condition, wings level, in still air.
+
+    Attributes
+    ----------
+    eas_m_s : equivalent airspeed [m/s].
+    altitude_m : geometric altitude above sea level in the standard atmosphere [m].
+    gamma_rad : flight-path angle, climb positive [rad].
+    """
+
+    eas_m_s: float
+    altitude_m: float
+    gamma_rad: float = 0.0
+
+
+@dataclass(frozen=True)
+class Controls:
+    """Elevator command [rad], trailing edge down positive, and throttle, 0 to 1 [-].
+
+    aileron, rudder : commands that hold an asymmetric aircraft straight, -1 to 1 [-]; bank_rad : its bank [rad].
+    """
+
+    elevator_command_rad: float
+    throttle: float
+    aileron: float = 0.0
+    rudder: float = 0.0
+    bank_rad: float = 0.0
+
+
+@dataclass(frozen=True)
+class Response:
+    """Accelerations in body axes [m/s2], [rad/s2] and the surface [rad] in one state."""
+
+    u_dot_m_s2: float
+    w_dot_m_s2: float
+    q_dot_rad_s2: float
+    elevator_rad: float
+    v_dot_m_s2: float = 0.0
+    p_dot_rad_s2: float = 0.0
+    r_dot_rad_s2: float = 0.0
+
+    def differs(self, other: Response) -> float:
+        """Largest difference to another response [m/s2], [rad/s2], [rad]; infinite where one is not finite."""
+        pairs = zip(astuple(self), astuple(other), strict=True)
+        return max(d if math.isfinite(d) else math.inf for d in (abs(a - b) for a, b in pairs))
+
+
+class Executive:
+    """One JSBSim executive with one aircraft; it has no state beyond JSBSim's own.
+
+    Parameters
+    ----------
+    aircraft : an aircraft of `airtruth.aircraft.load`, which has loaded the model in a child process before.
+    dt_s : simulation step [s].
+
+    Raises
+    ------
+    AircraftError
+        If the aircraft has no JSBSim model or JSBSim refuses it.
+    """
+
+    def __init__(self, aircraft: Aircraft, dt_s: float) -> None:
+        self.aircraft = aircraft
+        self.model = jsbsim_model(aircraft)
+        self.dt_s = dt_s
+        self.fdm = jsbsim.FGFDMExec(str(model_root(aircraft.folder, self.model.root)[0]))
+        self.fdm.set_debug_level(0)
+        self.fdm.load_planet(str(_PLANET), False)
+        self.fdm.set_dt(dt_s)
+        for name, value in self.model.declare.items():
+            self.fdm[name] = value
+        if not load_model(self.fdm, aircraft.folder, self.model.root, self.model.model):
+            raise AircraftError(f"{aircraft.folder}: JSBSim refused the model {self.model.model!r}")
+        _no_files(self.fdm)
+        self._manager = self.fdm.get_property_manager()
+        self._propulsion = self.fdm.get_propulsion()
+        self._has_engines = self._propulsion.get_num_engines() > 0
+        self.unsteadiness = (
+            0.0  # change of the accelerations in the last block of the last state [m/s2], [rad/s2]
+        )
+        self.choose_integrator()
+        self.configure()
+
+    def choose_integrator(self) -> None:
+        """Third-order Adams-Bashforth throughout; a reset restores Euler."""
+        for name in _INTEGRATORS:
+            self.fdm[name] = _AB3
+
+    def configure(self) -> None:
+        """Write the properties that aircraft.toml sets (engines running, gear up)."""
+        for name, value in self.model.set.items():
+            self.fdm[name] = value
+
+    def renewed(self) -> Executive:
+        """Return an executive in which nothing has run: itself, or a new one if it has engines, which keep their state."""
+        return Executive(self.aircraft, self.dt_s) if self._has_engines else self
+
+    def again(self) -> Executive:
+        """Return an executive for a further steady state: this one if its engines run until they are steady.
+
+        A steady state depends on earlier ones by less than the residual of a trim; a flight starts from a renewed one.
+        """
+        return self if self.model.engine_start_s > 0.0 else self.renewed()
+
+    def node(self, name: str) -> Any:
+        """Return a property's node; unlike JSBSim's own setters it never creates a property.
+
+        Raises
+        ------
+        AircraftError
+            If the property does not exist.
+        """
+        if not self._manager.hasNode(name):
+            raise AircraftError(f"JSBSim property {name!r} does not exist in {self.model.model}")
+        return self._manager.get_node(name)
+
+    def nodes(self, names: Iterable[str]) -> list[Any]:
+        """Return the nodes of several properties."""
+        return [self.node(name) for name in names]
+
+    def initialise(
+        self,
+        condition: Condition,
+        alpha_rad: float,
+        controls: Controls,
+        q_rad_s: float = 0.0,
+        engines_s: float | None = None,
+    ) -> None:
+        """Put the aircraft into a state at time zero, with lags, filters and engines settled.
+
+        Parameters
+        ----------
+        condition : airspeed, altitude and flight path.
+        alpha_rad : angle of attack [rad].
+        controls : elevator command and throttle.
+        q_rad_s : pitch rate [rad/s].
+        engines_s : longest time for which engines and filters run, instead of that of the model [s].
+        """
+        fdm = self.fdm
+        fdm.set_trim_status(True)  # actuators pass their input through
+        for name, value in (
+            ("ic/h-sl-ft", condition.altitude_m / FT),
+            ("ic/lat-gc-deg", 0.0),
+            ("ic/long-gc-deg", 0.0),
+            ("ic/psi-true-rad", 0.0),
+            ("ic/phi-rad", controls.bank_rad),
+            ("ic/ve-kts", condition.eas_m_s / KT),
+            ("ic/theta-rad", alpha_rad + condition.gamma_rad),
+            ("ic/alpha-rad", alpha_rad),
+            ("ic/beta-rad", 0.0),
+            ("ic/gamma-rad", condition.gamma_rad),
+            ("ic/p-rad_sec", 0.0),
+            ("ic/q-rad_sec", q_rad_s),
+            ("ic/r-rad_sec", 0.0),
+        ):
+            fdm[name] = value
+        self.hold(controls)
+        self.settle(engines_s)
+
+    def hold(self, controls: Controls) -> None:
+        """Write the controls, the throttle's trim included."""
+        self.fdm[self.model.elevator.command] = (
+            controls.elevator_command_rad * self.model.elevator.command_per_rad
+        )
+        for name in (*self.model.throttle.command, *self.model.throttle.trim):
+            self.fdm[name] = controls.throttle
+        if self.model.lateral is not None:
+            self.fdm[self.model.lateral.aileron] = controls.aileron
+            self.fdm[self.model.lateral.rudder] = controls.rudder
+
+    def settle(self, engines_s: float | None = None) -> None:
+        """Run the initial conditions and, where there are engines, bring them to their steady state.
+
+        Parameters
+        ----------
+        engines_s : as in `initialise`.
+        """
+        self.fdm.run_ic()
+        if self._has_engines and self.model.engine_start_s > 0.0:
+            self._start_engines(self.model.engine_start_s if engines_s is None else engines_s)
+        elif self._has_engines:
+            self.fdm.suspend_integration()
+            for _ in range(_ENGINE_ROUNDS):
+                self.fdm.run()  # engines see the controls of the frame before
+                self._propulsion.get_steady_state()
+            self.fdm.run()
+            self.fdm.resume_integration()
+
+    def _start_engines(self, longest_s: float) -> None:
+        """Run the engines, and start those that do not run, until the forces are steady; the motion is held."""
+        fdm, count = self.fdm, self._propulsion.get_num_engines()
+        running = [f"propulsion/engine[{i}]/set-running" for i in range(count)]
+        for name in _INTEGRATORS:
+            fdm[name] = _FROZEN
+        if not all(fdm[name] for name in running):
+            levers = {n: fdm[n] for n in self._levers}
+            fdm["propulsion/cutoff_cmd"] = 0.0
+            fdm["propulsion/set-running"] = -1.0  # moves the levers
+            for name, value in levers.items():
+                fdm[name] = value
+        last = None
+        for _ in range(math.ceil(longest_s / _BLOCK_S)):
+            still = not all(fdm[name] for name in running)
+            fdm["propulsion/starter_cmd"] = float(still)
+            for _ in range(math.ceil(_BLOCK_S / self.dt_s)):
+                fdm.run()
+            now = self.respond()
+            self.unsteadiness = math.inf if still or last is None else now.differs(last)
+            if self.unsteadiness < _STEADY:
+                break
+            last = now
+        fdm["propulsion/starter_cmd"] = 0.0
+        self.choose_integrator()
+
+    @property
+    def _levers(self) -> list[str]:
+        """Levers of the engines that exist."""
+        count = self._propulsion.get_num_engines()
+        kinds = ("throttle", "mixture", "advance")
+        names = [f"fcs/{kind}-cmd-norm[{i}]" for kind in kinds for i in range(count)]
+        return [name for name in names if self._manager.hasNode(name)]
+
+    def respond(self) -> Response:
+        """Return accelerations and surface in the present state."""
+        fdm = self.fdm
+        return Response(
+            u_dot_m_s2=fdm["accelerations/udot-ft_sec2"] * FT,
+            w_dot_m_s2=fdm["accelerations/wdot-ft_sec2"] * FT,
+            q_dot_rad_s2=fdm["accelerations/qdot-rad_sec2"],
+            elevator_rad=fdm[self.model.elevator.surface] * self.model.elevator.surface_rad,
+            v_dot_m_s2=fdm["accelerations/vdot-ft_sec2"] * FT,
+            p_dot_rad_s2=fdm["accelerations/pdot-rad_sec2"],
+            r_dot_rad_s2=fdm["accelerations/rdot-rad_sec2"],
+        )
+
+    def surroundings(self) -> tuple[float, float, float]:
+        """Return true airspeed [m/s], air density [kg/m3] and mass [kg] in the present state."""
+        return (
+            self.fdm["velocities/vt-fps"] * FT,
+            self.fdm["atmosphere/rho-slugs_ft3"] * SLUG / FT**3,
+            self.fdm["inertia/mass-slugs"] * SLUG,
+        )
+
+
+class _Silent(jsbsim.FGLogger):
+    """Logger that discards JSBSim's messages: stdout belongs to results, and the probe has shown them."""
+
+    def set_level(self, level: object) -> None:
+        """Discard."""
+
+    def message(self, message: str) -> None:
+        """Discard."""
+
+    def file_location(self, filename: str, line: int) -> None:
+        """Discard."""
+
+    def format(self, format: object) -> None:
+        """Discard."""
+
+    def flush(self) -> None:
+        """Discard."""
+
+
+jsbsim.set_logger(_Silent())
+
+
+def _no_files(fdm: Any) -> None:
+    """Discard the output files that some models write at every start."""
+    number = 0
+    while fdm.set_output_filename(number, os.devnull):
+        number += 1
+    fdm.disable_output()
+
+
+def jsbsim_model(aircraft: Aircraft) -> JsbsimModel:
+    """Return the [jsbsim] table of an aircraft.
+
+    Raises
+    ------
+    AircraftError
+        If aircraft.toml has no [jsbsim] table.
+    """
+    if aircraft.file.jsbsim is None:
+        raise AircraftError(
+            f"{aircraft.folder}: aircraft.toml has no [jsbsim] table, so there is nothing to fly"
+        )
+    return aircraft.file.jsbsim

@@ -1,0 +1,114 @@
+"""A model on the bench: one state after another, each in an executive of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.aircraft import Aircraft, AircraftFile, JsbsimModel
+from airtruth.aircraft.probe import Constants
+from airtruth.simulation.simulator import Condition, Controls, Executive
+from airtruth.units import DEG, FT, G0, SLUG
+
+Array = NDArray[np.float64]
+
+STEP_S: Final = 1.0 / 200.0
+"""Simulation step [s]: that of the campaigns."""
+_DENSITY: Final = 1.225
+"""Density of the air at sea level [kg/m3] (standard atmosphere)."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A model and a state to examine it in.
+
+    Attributes
+    ----------
+    folder, model : folder of aircraft.toml and its [jsbsim] table as known so far.
+    constants : geometry and mass.
+    condition : flight condition; alpha_rad, throttle : state in it.
+    """
+
+    folder: Path
+    model: JsbsimModel
+    constants: Constants
+    condition: Condition
+    alpha_rad: float = 4.0 * DEG
+    throttle: float = 0.6
+
+    @property
+    def aircraft(self) -> Aircraft:
+        """The aircraft as known so far."""
+        name = self.folder.name.replace(" ", "_") or "aircraft"
+        file = AircraftFile.model_construct(name=name, jsbsim=self.model)
+        return Aircraft(folder=self.folder, file=file, constants=self.constants)
+
+    def known(self, **changes: object) -> Bench:
+        """The bench with other entries of the [jsbsim] table."""
+        return replace(self, model=self.model.model_copy(update=changes))
+
+    def at(
+        self,
+        writes: Mapping[str, float] | None = None,
+        *,
+        alpha_rad: float | None = None,
+        q_rad_s: float = 0.0,
+        speed: float = 1.0,
+        throttle: float | None = None,
+    ) -> Executive:
+        """An executive in a steady state.
+
+        Parameters
+        ----------
+        writes : further properties, written after the controls.
+        alpha_rad, q_rad_s : of the state; speed : over that of the condition; throttle : lever.
+        """
+        executive = Executive(self.aircraft, STEP_S)
+        for name, value in (writes or {}).items():
+            executive.fdm[name] = value
+        condition = replace(self.condition, eas_m_s=self.condition.eas_m_s * speed)
+        lever = self.throttle if throttle is None else throttle
+        command = (writes or {}).get(self.model.elevator.command, 0.0) / self.model.elevator.command_per_rad
+        alpha = self.alpha_rad if alpha_rad is None else alpha_rad
+        executive.initialise(condition, alpha, Controls(command, lever), q_rad_s)
+        return executive
+
+
+def bench(folder: Path, model: JsbsimModel, altitude_m: float = 1500.0, lift: float = 0.45) -> Bench:
+    """A bench at the airspeed at which a lift coefficient carries the weight.
+
+    Parameters
+    ----------
+    altitude_m : altitude [m]; lift : coefficient [-].
+    """
+    unknown = Constants(wing_area_m2=1.0, chord_m=1.0, span_m=1.0, mass_kg=1.0, inertia_yy_kg_m2=1.0)
+    first = Bench(folder, model, unknown, Condition(60.0, altitude_m))
+    fdm = first.at().fdm
+    constants = Constants(
+        wing_area_m2=fdm["metrics/Sw-sqft"] * FT**2,
+        chord_m=fdm["metrics/cbarw-ft"] * FT,
+        span_m=fdm["metrics/bw-ft"] * FT,
+        mass_kg=fdm["inertia/mass-slugs"] * SLUG,
+        inertia_yy_kg_m2=fdm["inertia/iyy-slugs_ft2"] * SLUG * FT**2,
+    )
+    return replace(first, constants=constants, condition=Condition(eas_of(constants, lift), altitude_m))
+
+
+def eas_of(constants: Constants, lift: float) -> float:
+    """Equivalent airspeed [m/s] at which a lift coefficient carries the weight; 60 m/s without a wing."""
+    if not constants.wing_area_m2 > 0.0:
+        return 60.0
+    return float(np.sqrt(2.0 * constants.mass_kg * G0 / (_DENSITY * constants.wing_area_m2 * lift)))
+
+
+def read(executive: Executive, names: Sequence[str]) -> Array:
+    """(names,) values of properties in the present state."""
+    return np.array([executive.fdm[name] for name in names])
+
+
+__all__ = ["STEP_S", "Bench", "bench", "eas_of", "read"]

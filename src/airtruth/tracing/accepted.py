@@ -1,0 +1,149 @@
+"""An accepted effect as trace.json states it: estimates of its parameters, or the table of a learned increment."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+
+@dataclass(frozen=True)
+class IncrementTable:
+    """A learned increment over its signal; it is constant outside.
+
+    Attributes
+    ----------
+    at : (points,) of the signal, or of the state that it drives [unit of the signal].
+    value, low, high : increment of the coefficient, and its 95 % band [-].
+    samples : number of samples of the fitted records nearest to each point [-].
+    """
+
+    at: tuple[float, ...]
+    value: tuple[float, ...]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    samples: tuple[int, ...]
+
+    @property
+    def onset(self) -> tuple[float | None, float | None]:
+        """Points below and above the trim from which the band excludes zero; None where it contains zero to the end."""
+        sure = [x for x, low, high in zip(self.at, self.low, self.high, strict=True) if low * high > 0.0]
+        middle = next((x for x, v in zip(self.at, self.value, strict=True) if v == 0.0), 0.0)
+        return (
+            max((x for x in sure if x < middle), default=None),
+            min((x for x in sure if x > middle), default=None),
+        )
+
+
+@dataclass(frozen=True)
+class IncrementState:
+    """A state between a signal and a learned increment, see `airtruth.physics.terms.StateTerm`.
+
+    Attributes
+    ----------
+    kind : "lag" or "mode"; signal : what drives it.
+    time_s : time constant, or 1/wn of a mode [s].
+    damping : damping ratio of a mode [-].
+    """
+
+    kind: Literal["lag", "mode"]
+    signal: str
+    time_s: float
+    damping: float = 0.0
+
+
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """Estimate of one parameter of an effect, in the parameter's unit.
+
+    Attributes
+    ----------
+    value, std : estimate and standard deviation.
+    ci95 : ends of the 95 % interval; None for an end at infinity.
+    """
+
+    value: float
+    std: float
+    ci95: tuple[float | None, float | None]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Value, standard deviation and interval."""
+        return {"value": self.value, "std": self.std, "ci95": list(self.ci95)}
+
+
+@dataclass(frozen=True)
+class AcceptedEffect:
+    """An effect that the declared aircraft lacks.
+
+    Attributes
+    ----------
+    name, variant : of the effect; the variant is empty where the effect has only one.
+    parameters : name -> estimate.
+    p_value : probability of such a gain by chance, corrected for the number of candidates [-].
+    separation_sigma : distance to the next effect, the square root of the difference in 2 log L [-].
+    indistinguishable_from : names of the effects that explain the records as well.
+    gain_2_log_likelihood : gain in 2 log L of the refit [-]; None where an old file does not state it.
+    other_variants : variants of the same effect that explain the records as well.
+    channel : delayed channel, of `sensor_delay` alone.
+    about_alpha_rad : angle of attack about which a curvature counts [rad]; None for other effects.
+    acts_on, over : of a learned increment: coefficient, and the signal on which it depends; None for other effects.
+    relative_size : its swing over that of the declared derivative in the flown range [-]; of a linear one its share.
+    table : the increment with its band; None for a linear one, whose share is a parameter.
+    states : what lies between signal and increment; empty for a function of the signal itself.
+    """
+
+    name: str
+    parameters: dict[str, ParameterEstimate]
+    p_value: float
+    separation_sigma: float
+    indistinguishable_from: tuple[str, ...] = ()
+    variant: str = ""
+    gain_2_log_likelihood: float | None = None
+    other_variants: tuple[str, ...] = ()
+    channel: str | None = None
+    about_alpha_rad: float | None = None
+    acts_on: str | None = None
+    over: str | None = None
+    relative_size: float | None = None
+    table: IncrementTable | None = None
+    states: tuple[IncrementState, ...] = ()
+
+    @property
+    def key(self) -> str:
+        """Name with the variant."""
+        return effect_key(self.name, self.variant)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Keys of contract 3; those that do not apply are left out."""
+        row: dict[str, Any] = {
+            "name": self.name,
+            "variant": self.variant,
+            "parameters": {name: p.to_dict() for name, p in self.parameters.items()},
+            "p_value": self.p_value,
+            "separation_sigma": self.separation_sigma,
+            "indistinguishable_from": list(self.indistinguishable_from),
+        }
+        optional = {
+            "gain_2_log_likelihood": self.gain_2_log_likelihood,
+            "other_variants": list(self.other_variants) or None,
+            "channel": self.channel,
+            "about_alpha_rad": self.about_alpha_rad,
+        }
+        found = row | {name: value for name, value in optional.items() if value is not None}
+        return found | self._learned() if self.acts_on is not None else found
+
+    def _learned(self) -> dict[str, Any]:
+        return {
+            "acts_on": self.acts_on,
+            "over": self.over,
+            "relative_size": self.relative_size,
+            "table": None if self.table is None else {k: list(v) for k, v in asdict(self.table).items()},
+            "states": [asdict(state) for state in self.states],
+        }
+
+
+def effect_key(name: str, variant: str) -> str:
+    """Name of an effect with its variant, ``name:variant``."""
+    return f"{name}:{variant}" if variant else name
+
+
+__all__ = ["AcceptedEffect", "IncrementState", "IncrementTable", "ParameterEstimate", "effect_key"]

@@ -1,0 +1,383 @@
+"""The conclusion of a search: verdict, effects with their uncertainty, candidates and the next flight."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from airtruth.effects.effect import Effect
+from airtruth.effects.increment import Increment
+from airtruth.physics.short_period import PARAMETERS
+from airtruth.tracing.answer import (
+    ANOMALY_LEVEL,
+    Z95,
+    AcceptedEffect,
+    CandidateScore,
+    DeclaredModel,
+    Derivatives,
+    Evidence,
+    ParameterEstimate,
+    RecordNames,
+    TraceAnswer,
+    VerdictName,
+)
+from airtruth.tracing.confirmation import confirmation
+from airtruth.tracing.credit import credit
+from airtruth.tracing.declared_model import (
+    alternatives,
+    cause_scores,
+    cause_sizes,
+    declared_model,
+    detectable_causes,
+    explaining_effects,
+    inclusion,
+)
+from airtruth.tracing.increment_table import in_physical_terms, increment_rows, least_certain
+from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, derivative_likelihood
+from airtruth.tracing.inference.hypothesis import unconstrained_by
+from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.inference.profile import Profile, location_index
+from airtruth.tracing.inference.robust import inflation, scatter
+from airtruth.tracing.model.compile import CHANNELS
+from airtruth.tracing.model.parameters import COLOUR_TIME_S, Common
+from airtruth.tracing.prepare import Case
+from airtruth.tracing.replay import disagreement
+from airtruth.tracing.selection.acceptance import Candidate
+from airtruth.tracing.selection.omnibus import Anomaly, advice
+from airtruth.tracing.selection.release import CONTRADICTED
+from airtruth.tracing.selection.rounds import LEVEL, SearchRound
+from airtruth.tracing.selection.score_test import Table
+from airtruth.tracing.stage_errors import Replay
+from airtruth.tracing.stages import Stages, accepted, before_fit, stage_errors
+from airtruth.tracing.tolerances import tolerances
+
+Array = NDArray[np.float64]
+
+_WORTH_A_NOTE: Final = 0.02
+"""Share of slow noise in a sensor's variance from which a note mentions it [-] (judgement: a smaller share
+is of no use to a reader)."""
+_TRACEABLE: Final = 4.0
+"""Root of the noncentrality from which an effect counts as traceable [-] (judgement: after Holm's correction at 5 %
+over 33 candidates such an effect is significant in four of five flights, as norm.cdf(4 - norm.isf(0.05/66)) = 0.80)."""
+
+
+def conclude(
+    stages: Stages,
+    rounds: Sequence[SearchRound],
+    updated_aircraft: str | None = None,
+    replay: Replay | None = None,
+    forced: Sequence[str] = (),
+) -> TraceAnswer:
+    """State the answer of a trace.
+
+    Parameters
+    ----------
+    stages, rounds : assessed stages, and rounds of the search.
+    updated_aircraft : folder of the updated aircraft, None where none was written.
+    replay : records flown again in JSBSim, None where nothing was flown again.
+    forced : faults of the logs that the caller overruled.
+    """
+    case, first, last = stages.case, rounds[0], rounds[-1]
+    effects = accepted(rounds)
+    anomaly, remaining = first.anomaly, last.anomaly
+    covariance = _widened(case.fitted, reported(last))
+    stated = (
+        *(_effect(case.fitted, rounds, number, covariance) for number in range(len(effects))),
+        *explaining_effects(rounds, covariance),
+    )
+    declared = declared_model(case.fitted, rounds, covariance, case.declared)
+    sets = alternatives(rounds)
+    likelihood = derivative_likelihood(case.fitted, first.null)
+    sizes = cause_sizes(likelihood, case.declared)
+    verdict = _verdict(stated, declared)
+    confirmed = confirmation(stages)
+    errors = stage_errors(stages)
+    notes = [*case.notes, *_slow_noise(last.null.point.common)]
+    if case.left_out:
+        notes.append(
+            "the time budget ended the search, which is provisional for it; left out: "
+            + "; ".join(case.left_out)
+        )
+    if replay is not None:
+        notes += disagreement(replay, errors)
+    if forced:
+        notes.append(
+            "the logs contradict physics and were traced all the same (--force): " + "; ".join(forced)
+        )
+    return TraceAnswer(
+        verdict=verdict,
+        provisional=case.held is None
+        or confirmed is False
+        or bool(case.left_out)
+        or (bool(stated) and remaining.p_value <= ANOMALY_LEVEL),
+        anomaly=_evidence(anomaly),
+        remaining=_evidence(remaining),
+        effects=stated,
+        candidates=_candidates(case, rounds, stated, sizes),
+        error=errors,
+        derivatives=_derivatives(case, rounds, covariance),
+        updated_aircraft=updated_aircraft,
+        detectability=_detectability(case, rounds, likelihood, sizes),
+        next_flight=_next_flight(effects, verdict, remaining, list(least_certain(stated))),
+        model=case.model,
+        records=RecordNames(
+            tuple(r.signals.run_id for r in case.fitted.records),
+            tuple(r.signals.run_id for r in case.held.records) if case.held else (),
+        ),
+        notes=tuple(notes),
+        tolerances=tolerances(stages),
+        replay=replay,
+        forced=tuple(forced),
+        declared_model=declared,
+        confirmed=confirmed,
+        alternatives=sets,
+        inclusion=inclusion(sets),
+        credit=credit(stated, stages),
+    )
+
+
+def _verdict(effects: Sequence[AcceptedEffect], declared: DeclaredModel) -> VerdictName:
+    if not effects:
+        return "none" if declared.consistent else "unexplained"
+    if any(e.acts_on is not None for e in effects):
+        return "learned"
+    return "one_of" if any(e.indistinguishable_from for e in effects) else "traced"
+
+
+def _evidence(anomaly: Anomaly) -> Evidence:
+    return Evidence(anomaly.statistic, anomaly.p_value, anomaly.where)
+
+
+def _slow_noise(common: Array) -> Iterator[str]:
+    shares = {
+        channel: float(share) for channel, share in zip(CHANNELS, common[Common.colour_shares], strict=True)
+    }
+    named = [
+        f"{100.0 * share:.0f} % of {channel}" for channel, share in shares.items() if share > _WORTH_A_NOTE
+    ]
+    if named:
+        time_s = COLOUR_TIME_S * math.exp(common[Common.log_colour_time])
+        yield (
+            f"part of the sensor noise is slow: of the noise variance, {', '.join(named)} is correlated over "
+            f"{time_s:.2g} s"
+        )
+
+
+def estimates(effect: Effect, sizes: Array, covariance: Array) -> dict[str, ParameterEstimate]:
+    """Value, standard deviation and 95 % interval of each parameter of an effect.
+
+    Parameters
+    ----------
+    sizes, covariance : (parameters,) in the size coordinates of the effect, and their covariance.
+    """
+    found = {}
+    for i, p in enumerate(effect.parameters):
+        size, std = float(sizes[i]), float(np.sqrt(max(covariance[i, i], 0.0)))
+        value = p.value(size)
+        low, high = sorted((p.value(size - Z95 * std), p.value(size + Z95 * std)))
+        slope = abs(p.value(size + 0.01 * std) - value) / 0.01 if math.isfinite(value) else math.inf
+        found[p.name] = ParameterEstimate(value, slope, (_finite(low), _finite(high)))
+    return found
+
+
+def _finite(end: float) -> float | None:
+    return max(end, -1e300) if math.isfinite(end) else None
+
+
+def reported(last: SearchRound) -> PosteriorFit:
+    """The fit whose sizes are reported: that under the autoregression, where it moved away from the null."""
+    stayed = np.array_equal(last.gls.point.common, last.null.point.common)
+    return last.null if stayed else last.gls
+
+
+def _widened(problem: TraceProblem, fit: PosteriorFit) -> Array:
+    """Covariance with the serial correlation of the innovations and the scatter between records in it."""
+    ratio = np.maximum(inflation(problem, fit), scatter(problem, fit))
+    return np.asarray(fit.covariance * np.outer(ratio, ratio))
+
+
+def _effect(
+    problem: TraceProblem, rounds: Sequence[SearchRound], number: int, covariance: Array
+) -> AcceptedEffect:
+    own, final = [r for r in rounds if r.tied][number], reported(rounds[-1])
+    best, others = own.tied[0], own.tied[1:]
+    effect = best.score.effect
+    span = final.hypothesis.span(effect.key)
+    rest = [
+        c.gain
+        for c in own.candidates
+        if c is not best and c.score.effect.name != effect.name and c.gain <= best.gain
+    ]
+    stated = estimates(effect, final.point.sizes[span], covariance[Common.size :, Common.size :][span, span])
+    if own.profile is not None:
+        stated = _widened_by_profile(effect, stated, own.profile)
+    is_curvature = bool(unconstrained_by(effect, final.hypothesis.trim_alpha_rad))
+    accepted = AcceptedEffect(
+        name=effect.name,
+        variant=effect.variant,
+        parameters=stated,
+        p_value=_p_value(own, best),
+        separation_sigma=math.sqrt(max(0.0, best.gain - max([0.0, *rest]))),
+        indistinguishable_from=tuple(sorted({c.score.effect.name for c in others} - {effect.name})),
+        gain_2_log_likelihood=best.gain,
+        other_variants=tuple(
+            sorted(c.score.effect.variant for c in others if c.score.effect.name == effect.name)
+        ),
+        channel=effect.variant if effect.name == "sensor_delay" else None,
+        about_alpha_rad=final.hypothesis.trim_alpha_rad if is_curvature else None,
+    )
+    if isinstance(effect, Increment):
+        return in_physical_terms(problem, final, covariance, effect, accepted)
+    return accepted
+
+
+def _widened_by_profile(
+    effect: Effect, stated: dict[str, ParameterEstimate], profile: Profile
+) -> dict[str, ParameterEstimate]:
+    """Estimates whose intervals of size and location contain those of the profile likelihood."""
+    widened = dict(stated)
+    at = location_index(effect) or 0
+    for j, ends in ((0, profile.size_interval()), (at, profile.location_interval())):
+        p = effect.parameters[j]
+        all_ends = [*(e for e in widened[p.name].ci95 if e is not None), *map(p.value, ends)]
+        widened[p.name] = replace(widened[p.name], ci95=(min(all_ends), max(all_ends)))
+    return widened
+
+
+def _p_value(own: SearchRound, best: Candidate) -> float:
+    """Holm's p-value of the score, or Bonferroni's of the likelihood ratio where noise levels show more.
+
+    The p-value of an increment is the inverse of its posterior odds.
+    """
+    if isinstance(best.score.effect, Increment):
+        return best.score.p_value
+    index = [s.effect.key for s in own.table.scores].index(best.score.effect.key)
+    ratio = len(own.adjusted) * float(chi2.sf(max(best.gain, 0.0), 1))
+    return min(float(own.adjusted[index]), ratio)
+
+
+def _candidates(
+    case: Case,
+    rounds: Sequence[SearchRound],
+    stated: Sequence[AcceptedEffect],
+    sizes: Mapping[str, tuple[float, float]],
+) -> tuple[CandidateScore, ...]:
+    first = rounds[0]
+    refitted = {c.score.effect.key: c for c in first.candidates}
+    tied = {c.score.effect.key for r in rounds for c in r.tied}
+    tied |= {name for e in stated for name in (e.key, *e.indistinguishable_from)}
+    rows = list(cause_scores(sizes, rounds, case.declared, stated))
+    for s, p in zip(first.table.scores, first.adjusted, strict=True):
+        known = refitted.get(s.effect.key)
+        if s.effect.key in tied:
+            why = ""
+        elif known is not None:
+            why = "; ".join(known.reasons)
+        elif any(step.startswith(f"refit {s.effect.key}") for step in case.left_out):
+            why = "the time budget ended before its refit"
+        else:
+            why = "its score is not significant" if p > LEVEL else "other effects score higher"
+        rows.append(
+            CandidateScore(
+                name=s.effect.name,
+                variant=s.effect.variant,
+                score=s.z**2,
+                z=s.z,
+                p_value=float(p),
+                p_value_alone=s.p_value,
+                testable=True,
+                why_not=why,
+            )
+        )
+    rows += increment_rows(rounds)
+    scored = {s.effect.key for s in first.table.scores}
+    silent = "these records do not excite it, or the refitted derivatives absorb it"
+    untested = [*case.untestable, *((e, silent) for e in case.effects if e.key not in scored)]
+    rows += [
+        CandidateScore(e.name, score=0.0, p_value=1.0, testable=False, why_not=why, variant=e.variant)
+        for e, why in untested
+    ]
+    return tuple(sorted(rows, key=lambda r: (-r.testable, r.p_value_alone)))
+
+
+def _derivatives(case: Case, rounds: Sequence[SearchRound], covariance: Array) -> Derivatives:
+    """Declared and refitted derivatives at the trim, the mean over the records' flight conditions."""
+    declared = np.mean([r.plant.derivatives for r in case.fitted.records], axis=0)
+
+    def named(values: Array) -> dict[str, float]:
+        return dict(zip(PARAMETERS, values.tolist(), strict=True))
+
+    return Derivatives(
+        declared=named(declared),
+        before=named(declared + before_fit(rounds).point.common[Common.derivatives]),
+        after=named(declared + rounds[-1].null.point.common[Common.derivatives]),
+        after_std=named(np.sqrt(np.diag(covariance)[Common.derivatives])),
+    )
+
+
+def _detectability(
+    case: Case,
+    rounds: Sequence[SearchRound],
+    likelihood: DerivativeLikelihood,
+    sizes: Mapping[str, tuple[float, float]],
+) -> dict[str, float]:
+    """Smallest traceable sizes at a null that is probable; none where no round has one."""
+    if rounds[0].declared_test.p_value > CONTRADICTED:
+        return detectability(rounds[0].table) | detectable_causes(
+            likelihood, sizes, case.declared, _TRACEABLE
+        )
+    return detectability(rounds[-1].table) if rounds[-1].anomaly.p_value > ANOMALY_LEVEL else {}
+
+
+def detectability(table: Table) -> dict[str, float]:
+    """Smallest size of each effect that the records can trace (noncentrality 16), in its own unit.
+
+    A bandwidth or a rate limit is stated as its value. An effect with several variants is listed under its name with
+    the size of the variant that the records show best, and under the key of each variant.
+    """
+    found: dict[str, float] = {}
+    for s in table.scores:
+        p = s.effect.parameters[0]
+        size = _TRACEABLE / math.sqrt(s.information)
+        value = p.value(size) if p.reciprocal else size
+        if s.effect.variant:
+            found[s.effect.key] = value
+        kept = found.get(s.effect.name)
+        found[s.effect.name] = value if kept is None else (max if p.reciprocal else min)(kept, value)
+    return found
+
+
+def _next_flight(
+    effects: Sequence[tuple[Candidate, tuple[Candidate, ...]]],
+    verdict: VerdictName,
+    remaining: Anomaly,
+    learned: Sequence[str],
+) -> str:
+    if verdict == "none":
+        return (
+            "These records show no missing effect down to the sizes listed under detectability; larger or longer "
+            "manoeuvres lower these sizes."
+        )
+    lines = []
+    if verdict == "unexplained":
+        lines.append("The declared aircraft lacks something that no effect of the library explains.")
+    for best, others in effects:
+        names = {c.score.effect.key: c.score.effect for c in (best, *others)}
+        if len({e.name for e in names.values()}) > 1:
+            split = " ".join(dict.fromkeys(e.distinguished_by for e in names.values() if e.distinguished_by))
+            lines.append(
+                f"To separate {', '.join(names)}: {split} `airtruth plan --from` computes the input that separates them most."
+            )
+    lines += learned
+    if remaining.p_value <= ANOMALY_LEVEL:
+        lines.append(f"The remaining residual shows in {remaining.where}: {advice(remaining.where)}")
+    return " ".join(lines) or "Repeat the manoeuvre with the largest residual, with opposite elevator sign."
+
+
+__all__ = ["conclude", "detectability", "estimates", "reported"]

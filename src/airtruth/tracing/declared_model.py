@@ -1,0 +1,309 @@
+"""The declared model against the records: test, shifts of the derivatives, and what explains them, with its weight."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from airtruth.effects.registry import EFFECTS
+from airtruth.physics.short_period import PARAMETERS
+from airtruth.tracing.answer import (
+    ANOMALY_LEVEL,
+    Z95,
+    AcceptedEffect,
+    Alternative,
+    CandidateScore,
+    DeclaredModel,
+    DerivativeShift,
+    ParameterEstimate,
+)
+from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood
+from airtruth.tracing.inference.posterior import TraceProblem
+from airtruth.tracing.model.parameters import Common, size_index
+from airtruth.tracing.selection.explanation import DERIVATIVES, CauseSet, size_of
+from airtruth.tracing.selection.ranking import TIE
+from airtruth.tracing.selection.release import (
+    CONTRADICTED,
+    DIVISORS,
+    DeclaredCauses,
+    Release,
+    size_in_derivatives,
+    size_in_filter,
+)
+from airtruth.tracing.selection.rounds import SearchRound
+
+Array = NDArray[np.float64]
+
+_LEAST_WEIGHT: Final = 1e-3
+"""Posterior weight below which a set of causes is not listed [-] (judgement: one in a thousand)."""
+_MOST_SETS: Final = 400
+"""Number of sets that explain the derivatives and enter the weights [-] (judgement: the others weigh nothing)."""
+
+
+def declared_model(
+    problem: TraceProblem, rounds: Sequence[SearchRound], covariance: Array, causes: DeclaredCauses
+) -> DeclaredModel:
+    """Test the declared model: its derivatives with their uncertainty, and everything else by the strongest anomaly.
+
+    The shifts are those of the derivatives as they appear in the records. They include what an accepted shift of the CG,
+    mass, inertia or elevator brings.
+
+    Parameters
+    ----------
+    problem : fitted records; rounds : of the search; covariance : of the last fit's common parameters and sizes.
+    causes : the candidates, with the directions in which they move the derivatives.
+    """
+    first, last = rounds[0], rounds[-1]
+    test, anomaly = first.declared_test, first.anomaly
+    by_derivatives = test.p_value <= anomaly.p_value
+    statistic = test.statistic if by_derivatives else anomaly.statistic
+    p_value = declared_p_value(rounds)
+    declared = problem.declared_derivatives
+    declared_std = np.sqrt(np.diag(problem.declared_covariance))
+    shift, std = _apparent_shift(last, covariance, causes)
+    return DeclaredModel(
+        consistent=p_value > ANOMALY_LEVEL,
+        statistic=statistic,
+        degrees=test.degrees if by_derivatives else anomaly.degrees,
+        p_value=p_value,
+        shifts={
+            name: DerivativeShift(
+                declared=float(declared[i]),
+                declared_std=float(declared_std[i]),
+                estimate=float(declared[i] + shift[i]),
+                std=float(std[i]),
+                ci95=(
+                    float(declared[i] + shift[i] - Z95 * std[i]),
+                    float(declared[i] + shift[i] + Z95 * std[i]),
+                ),
+                sigma=float(shift[i] / declared_std[i]),
+            )
+            for i, name in enumerate(PARAMETERS)
+        },
+        where="the derivatives" if by_derivatives else anomaly.where,
+    )
+
+
+def _apparent_shift(last: SearchRound, covariance: Array, causes: DeclaredCauses) -> tuple[Array, Array]:
+    """(6,) Shift of the derivatives with what carried causes bring, to first order, and its standard deviation."""
+    point, hypothesis = last.null.point, last.null.hypothesis
+    shift = point.common[Common.derivatives].copy()
+    slopes = np.zeros((len(PARAMETERS), len(covariance)))
+    slopes[:, Common.derivatives] = np.eye(len(PARAMETERS))
+    directions = {c.key: c.direction for c in causes.causes}
+    for key in (e.key for e in hypothesis.effects if e.key in directions):
+        number = hypothesis.span(key).start
+        in_filter = float(point.sizes[number])
+        size = size_in_derivatives(key, in_filter)
+        slope = (1.0 + in_filter) ** -2 if key in DIVISORS else 1.0
+        shift += size * directions[key]
+        slopes[:, size_index(number)] = slope * directions[key]
+    return shift, np.sqrt(np.diag(slopes @ covariance @ slopes.T))
+
+
+def declared_p_value(rounds: Sequence[SearchRound]) -> float:
+    """Probability of stronger evidence against a true declaration, of the derivatives and of everything else [-]."""
+    return min(1.0, 2.0 * min(rounds[0].declared_test.p_value, rounds[0].anomaly.p_value))
+
+
+def explaining_effects(rounds: Sequence[SearchRound], covariance: Array) -> tuple[AcceptedEffect, ...]:
+    """The effects that explain released derivatives; none where they were not released.
+
+    Parameters
+    ----------
+    covariance : of the last fit's common parameters and sizes.
+    """
+    at = next((r for r in rounds if r.release is not None), None)
+    release = rounds[-1].release or (None if at is None else at.release)
+    if at is None or release is None:
+        return ()
+    best = release.sets[0]
+    rivals = [s.cost for s in release.sets if set(s.effects) != set(best.effects)]
+    separation = math.sqrt(max(0.0, 2.0 * (min(rivals) - best.cost))) if rivals else 0.0
+    return tuple(
+        AcceptedEffect(
+            name=key,
+            parameters=_estimates(key, best, rounds[-1], covariance),
+            p_value=release.test.p_value,
+            separation_sigma=separation,
+            indistinguishable_from=_look_alikes(key, best, release),
+            gain_2_log_likelihood=at.release_gain,
+        )
+        for key in best.effects
+    )
+
+
+def cause_sizes(likelihood: DerivativeLikelihood, declared: DeclaredCauses) -> dict[str, tuple[float, float]]:
+    """Key of each cause that the filter does not carry -> its size alone, and the standard deviation.
+
+    Parameters
+    ----------
+    likelihood : at the first null; declared : the candidates.
+    """
+    return {c.key: size_of(likelihood, c) for c in declared.causes if EFFECTS[c.key].in_derivatives}
+
+
+def cause_scores(
+    sizes: Mapping[str, tuple[float, float]],
+    rounds: Sequence[SearchRound],
+    declared: DeclaredCauses,
+    accepted: Sequence[AcceptedEffect],
+) -> tuple[CandidateScore, ...]:
+    """Scores of the causes that move the derivatives, and of wrong declarations, at the declared aircraft.
+
+    Parameters
+    ----------
+    sizes : see `cause_sizes`; declared : the candidates; accepted : effects of the answer.
+    """
+    first = rounds[0]
+    named = {name for e in accepted for name in (e.name, *e.indistinguishable_from)}
+    contradicted = first.declared_test.p_value <= CONTRADICTED
+    rejected = (
+        "other causes explain the derivatives better"
+        if contradicted
+        else "the records do not contradict the declared derivatives"
+    )
+    rows = []
+    for key, (size, std) in sizes.items():
+        z = size / std if std > 0.0 else 0.0
+        alone = float(chi2.sf(z**2, 1))
+        rows.append(_row(key, z**2, alone, len(declared.causes), named, rejected, z))
+    if declared.wrong_allowed:
+        test = first.declared_test
+        rows.append(
+            _row(DERIVATIVES, test.statistic, test.p_value, 1, named, rejected, math.sqrt(test.statistic))
+        )
+    return tuple(rows)
+
+
+def detectable_causes(
+    likelihood: DerivativeLikelihood,
+    sizes: Mapping[str, tuple[float, float]],
+    declared: DeclaredCauses,
+    errors: float,
+) -> dict[str, float]:
+    """Smallest size of each cause that the records can trace, in the unit of its first parameter.
+
+    Parameters
+    ----------
+    likelihood : at the first null; sizes : see `cause_sizes`; declared : the candidates.
+    errors : standard deviations from which a size counts as traceable [-].
+    """
+    found = {key: errors * std for key, (_, std) in sizes.items()}
+    if declared.wrong_allowed:
+        own = np.linalg.inv(likelihood.information + np.linalg.inv(likelihood.declared))
+        found[DERIVATIVES] = errors * float(np.sqrt(likelihood.declared[0, 0] + own[0, 0]))
+    return {key: size for key, size in found.items() if size > 0.0 and np.isfinite(size)}
+
+
+def _row(
+    key: str, score: float, alone: float, tests: int, named: Collection[str], rejected: str, z: float
+) -> CandidateScore:
+    return CandidateScore(
+        name=key,
+        score=score,
+        p_value=min(1.0, tests * alone),
+        testable=True,
+        why_not="" if key in named else rejected,
+        z=z,
+        p_value_alone=alone,
+    )
+
+
+def _look_alikes(key: str, best: CauseSet, release: Release) -> tuple[str, ...]:
+    """Effects that explain the derivatives as well in place of one effect of the best set."""
+    others = set(best.effects) - {key}
+    alike = {
+        extra
+        for s in release.sets
+        if 2.0 * (s.cost - best.cost) <= TIE and len(s.effects) == len(best.effects)
+        for extra in set(s.effects) - others
+        if others <= set(s.effects)
+    }
+    return tuple(sorted(alike - {key}))
+
+
+def _estimates(
+    key: str, best: CauseSet, last: SearchRound, covariance: Array
+) -> dict[str, ParameterEstimate]:
+    if key == DERIVATIVES:
+        shift, std = last.null.point.common, np.sqrt(np.diag(covariance))
+        return {
+            f"d{name}": _normal(float(shift[i]), float(std[i]))
+            for i, name in enumerate(PARAMETERS)
+            if name in best.wrong
+        }
+    first = EFFECTS[key].parameters[0]
+    if key in [e.key for e in last.null.hypothesis.effects]:
+        number = last.null.hypothesis.span(key).start
+        std_size = float(np.sqrt(max(covariance[size_index(number), size_index(number)], 0.0)))
+        return {first.name: _normal(first.value(float(last.null.point.sizes[number])), std_size)}
+    at = best.causes.index(key)
+    size, std_size = best.sizes[at], best.size_std[at]
+    low, value, high = (
+        first.value(size_in_filter(key, s)) for s in (size - Z95 * std_size, size, size + Z95 * std_size)
+    )
+    slope = value**2 if key in DIVISORS else 1.0
+    return {first.name: ParameterEstimate(value, std_size * slope, (low, high))}
+
+
+def _normal(value: float, std: float) -> ParameterEstimate:
+    return ParameterEstimate(value, std, (value - Z95 * std, value + Z95 * std))
+
+
+def alternatives(rounds: Sequence[SearchRound]) -> tuple[Alternative, ...]:
+    """Sets of effects with their posterior weights, the most probable first.
+
+    The sets combine the tied effects of every round with the sets that explain the derivatives, and contain the
+    branch of the search that lost.
+    """
+    weights: dict[tuple[str, ...], float] = {}
+    tied = [
+        [(c.score.effect.name, 0.5 * (c.gain - r.tied[0].gain)) for c in r.tied] for r in rounds if r.tied
+    ]
+    for added in itertools.product(*tied):
+        for explaining, log_weight in _explanations(rounds):
+            names = tuple(sorted({name for name, _ in added} | set(explaining)))
+            log_weight += sum(gain for _, gain in added)
+            weights[names] = weights.get(names, 0.0) + math.exp(min(0.0, log_weight))
+    for r in rounds:
+        if r.rival is not None:
+            names = tuple(sorted(r.rival.effects))
+            weights[names] = weights.get(names, 0.0) + math.exp(-max(0.0, min(r.rival.excess, 700.0)))
+    total = sum(weights.values())
+    ranked = sorted(weights.items(), key=lambda item: (-item[1], item[0]))
+    return tuple(Alternative(names, w / total) for names, w in ranked if w >= _LEAST_WEIGHT * total)
+
+
+def _explanations(rounds: Sequence[SearchRound]) -> Iterator[tuple[tuple[str, ...], float]]:
+    """Sets that explain released derivatives, each with the logarithm of its weight."""
+    release = next((r.release for r in reversed(rounds) if r.release is not None), None)
+    if release is None:
+        yield (), 0.0
+        return
+    for s in release.sets[:_MOST_SETS]:
+        yield s.effects, release.sets[0].cost - s.cost
+
+
+def inclusion(sets: Sequence[Alternative]) -> dict[str, float]:
+    """Probability of each effect: the weight of the sets that contain it."""
+    names = sorted({name for s in sets for name in s.effects})
+    return {name: min(1.0, sum(s.weight for s in sets if name in s.effects)) for name in names}
+
+
+__all__ = [
+    "alternatives",
+    "cause_scores",
+    "cause_sizes",
+    "declared_model",
+    "declared_p_value",
+    "detectable_causes",
+    "explaining_effects",
+    "inclusion",
+]

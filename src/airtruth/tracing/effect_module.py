@@ -1,0 +1,200 @@
+"""Learned increments as effects of a library: a Python package of one module, which campaigns and traces can use."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Final
+
+from airtruth.effects.closed_form import ClosedForm, closed_forms
+from airtruth.effects.increment import SIGNAL_NAMES
+from airtruth.errors import StoreError
+from airtruth.logs import atomic
+from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
+from airtruth.tracing.answer import Z95, TraceAnswer
+
+MODULE: Final = "learned_effects"
+"""Name of the module and of the package."""
+_SIGNALS: Final = {name: signal for signal, name in SIGNAL_NAMES.items()}
+"""Name of a signal in an answer -> its name in a term."""
+_RANGE: Final = 4.0
+"""Largest size that the effect may take, over the learned one [-] (judgement: another aircraft of its kind)."""
+_MATERIAL: Final = 0.2
+"""Material size over the learned one [-] (judgement: a fifth of what was worth learning)."""
+_TERMS: Final = {
+    "break above": '(AeroTerm("{c}", "{s}", "above", values["slope"], values["at"]),)',
+    "break below": '(AeroTerm("{c}", "{s}", "below", values["slope"], values["at"]),)',
+    "step above": """(
+            AeroTerm("{c}", "{s}", "above", values["step"] / values["width"], values["at"]),
+            AeroTerm("{c}", "{s}", "above", -values["step"] / values["width"], values["at"] + values["width"]),
+        )""",
+    "step below": """(
+            AeroTerm("{c}", "{s}", "below", -values["step"] / values["width"], values["at"]),
+            AeroTerm("{c}", "{s}", "below", values["step"] / values["width"], values["at"] - values["width"]),
+        )""",
+    "curve": '(AeroTerm("{c}", "{s}", "quadratic", values["curvature"], {trim!r}),)',
+    "share": """(
+            AeroTerm("{c}", "{s}", "linear", values["share"], {trim!r}),
+            AeroTerm("{c}", "{driver}", "linear", -values["share"], {trim!r}),
+        )""",
+}
+"""Closed form -> terms, as Python."""
+
+
+def effect_module(answer: TraceAnswer) -> str:
+    """Text of a module with one effect for each learned increment of an answer.
+
+    Raises
+    ------
+    StoreError
+        If the answer has no learned increment.
+    """
+    learned = [e for e in answer.effects if e.acts_on is not None]
+    if not learned:
+        raise StoreError(
+            f"the answer has no learned increment (its verdict is {answer.verdict!r}); `--from` writes effects from an "
+            "answer whose verdict is 'learned'"
+        )
+    parts = [_HEAD]
+    parts += [part for number, e in enumerate(learned, start=1) for part in _effect(e, number)]
+    names = ", ".join(f"EFFECT_{number}" for number in range(1, len(learned) + 1))
+    return "\n\n".join([*parts, "EFFECTS = (" + names + ",)\n"])
+
+
+def write_effect_package(answer: TraceAnswer, out: Path) -> Path:
+    """Write the module with a pyproject.toml that registers its effects; `pip install OUT` adds them to the library.
+
+    Raises
+    ------
+    StoreError
+        If the answer has no learned increment, or the folder cannot be written.
+    """
+    text = effect_module(answer)
+    atomic.make_folder(out)
+    atomic.write_text(out / f"{MODULE}.py", text)
+    atomic.write_text(out / "pyproject.toml", _PROJECT.format(module=MODULE))
+    return out
+
+
+_HEAD: Final = '''"""Effects that `airtruth trace` learned from flight logs.
+
+`pip install` of this folder adds them to the library: `airtruth effects` lists them, campaigns fly them, and
+traces test them.
+"""
+
+from airtruth.effects.effect import Effect, Parameter
+from airtruth.physics.terms import AeroTerm, Change, StateTerm
+'''
+"""First lines of a module."""
+_PROJECT: Final = """[build-system]
+requires = ["setuptools>=68"]
+build-backend = "setuptools.build_meta"
+
+[project]
+name = "learned-effects"
+version = "0.1"
+dependencies = ["airtruth"]
+
+[tool.setuptools]
+py-modules = ["{module}"]
+
+[project.entry-points."airtruth.effects"]
+{module} = "{module}:EFFECTS"
+"""
+"""pyproject.toml of the package."""
+
+
+def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
+    """Function of the terms and the effect, as Python."""
+    form = _form(e)
+    driver = _SIGNALS[e.over or ""]
+    signal = "learned-state" if e.states else driver
+    trim = _trim(e.table)
+    values = {name: p.value for name, p in e.parameters.items()} if form is None else form.values
+    sizes = {k: v for k, v in values.items() if k not in ("at", "width", "time_s", "damping")}
+    if form is not None:
+        terms = _TERMS[form.name].format(c=e.acts_on, s=signal, driver=driver, trim=trim)
+        sentence = (
+            f"Closed form of the learned table ({form.name}): chi-square {form.statistic:.3g} over "
+            f"{form.degrees} degrees of freedom."
+        )
+    elif e.table is None:
+        terms = _TERMS["share"].format(c=e.acts_on, s=signal, driver=driver, trim=0.0)
+        sentence = "Linear part behind a state."
+    else:
+        terms = _of_table(e.acts_on or "", e.table, signal)
+        sizes, values = {"factor": 1.0}, {"factor": 1.0}
+        sentence = "No closed form is as good as the learned table, so the effect scales the table."
+    state = [(s.kind, s.time_s, s.damping) for s in e.states]
+    states = "".join(f'StateTerm("learned-state", "{k}", "{driver}", {t!r}, {d!r}),' for k, t, d in state)
+    yield (
+        f"def _terms_{number}(values):\n    return Change(\n        states=({states}),\n        aero={terms},\n    )\n"
+    )
+    locations = {k: values[k] for k in ("at", "width") if k in values}
+    parameters = [_size(name, value) for name, value in sizes.items()]
+    if e.table is not None:
+        parameters += [_location(name, value, e.table) for name, value in locations.items()]
+    lines = "".join(f"        {p},\n" for p in parameters)
+    yield (
+        f"EFFECT_{number} = Effect(\n"
+        f'    name="learned_{(e.acts_on or "").lower()}_{driver}",\n'
+        f'    variant="{"-".join(k for k, _, _ in state)}",\n'
+        f'    where="dynamics",\n    parameters=(\n{lines}    ),\n'
+        f"    describe=_terms_{number},\n"
+        f'    explanation="Learned from flight logs: {e.variant}.",\n'
+        f'    source="{sentence}",\n)\n'
+    )
+
+
+def _form(e: AcceptedEffect) -> ClosedForm | None:
+    """The best closed form that is as good as the table; None where there is none."""
+    if e.table is None:
+        return None
+    t = e.table
+    rows = zip(t.low, t.high, t.samples, strict=True)
+    std = [(high - low) / (2.0 * Z95) if n else math.inf for low, high, n in rows]
+    return next((f for f in closed_forms(t.at, t.value, std) if f.is_as_good), None)
+
+
+def _trim(table: IncrementTable | None) -> float:
+    """Middle of the part where the increment is zero by definition."""
+    if table is None:
+        return 0.0
+    zero = [x for x, low, high in zip(table.at, table.low, table.high, strict=True) if low == high]
+    return sum(zero) / len(zero) if zero else 0.0
+
+
+def _of_table(coefficient: str, table: IncrementTable, signal: str) -> str:
+    """Terms of a table with a common factor: its bends, on either side of the trim, where it is flat."""
+    points, trim = list(table.at), _trim(table)
+    pieces = zip(pairwise(points), pairwise(table.value), strict=True)
+    slopes = [(b - a) / (y - x) for (x, y), (a, b) in pieces]
+    bends = [after - before for before, after in zip([0.0, *slopes], [*slopes, 0.0], strict=True)]
+    rows = "".join(
+        f'            AeroTerm("{coefficient}", "{signal}", "{"above" if x > trim else "below"}", '
+        f'{bend if x > trim else -bend!r} * values["factor"], {x!r}),\n'
+        for x, bend in zip(points, bends, strict=True)
+    )
+    return f"(\n{rows}        )"
+
+
+def _size(name: str, value: float) -> str:
+    reach = max(_RANGE * abs(value), 1e-9)
+    return (
+        f'Parameter("{name}", "-", "learned: {value:.4g}", low={-reach!r}, high={reach!r}, '
+        f"material={_MATERIAL * abs(value)!r}, step={0.1 * abs(value)!r})"
+    )
+
+
+def _location(name: str, value: float, table: IncrementTable) -> str:
+    span = table.at[-1] - table.at[0]
+    low, high = (table.at[0], table.at[-1]) if name == "at" else (0.05 * span, span)
+    return (
+        f'Parameter("{name}", "-", "learned: {value:.4g}", low={low!r}, high={high!r}, material=0.0, '
+        f"is_location=True, step={0.05 * span!r}, default={value!r})"
+    )
+
+
+__all__ = ["MODULE", "effect_module", "write_effect_package"]

@@ -1,0 +1,112 @@
+"""A learned increment in physical terms: its table with a band, and how large it is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.effects.increment import SIGNAL_NAMES, Increment
+from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable
+from airtruth.tracing.answer import CandidateScore
+from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.model.parameters import size_index
+from airtruth.tracing.selection.increments import flown
+from airtruth.tracing.selection.learn import relative_swing
+from airtruth.tracing.selection.rounds import SearchRound
+
+Array = NDArray[np.float64]
+
+_Z95: Final = 1.959964
+"""Quantile 0.975 of the standard normal distribution, the half width of the band [standard deviations]."""
+
+
+def in_physical_terms(
+    problem: TraceProblem, fitted: PosteriorFit, covariance: Array, effect: Increment, stated: AcceptedEffect
+) -> AcceptedEffect:
+    """The effect with coefficient, signal, states and table of a learned increment.
+
+    Parameters
+    ----------
+    fitted : the fit whose sizes are reported; covariance : of its common parameters and sizes.
+    effect, stated : the increment, and what is stated of its parameters.
+    """
+    shape = effect.shape
+    values = {name: estimate.value for name, estimate in stated.parameters.items()}
+    states = tuple(
+        IncrementState(s.kind, SIGNAL_NAMES[shape.signal], s.time_s, s.damping)
+        for s in shape.terms(values).states
+    )
+    return replace(
+        stated,
+        acts_on=shape.coefficient,
+        over=SIGNAL_NAMES[shape.signal],
+        relative_size=relative_swing(problem, fitted, effect),
+        table=increment_table(problem, fitted, covariance, effect) if shape.cells else None,
+        states=states,
+    )
+
+
+def increment_table(
+    problem: TraceProblem, fitted: PosteriorFit, covariance: Array, effect: Increment
+) -> IncrementTable:
+    """The increment at the ends of its cells, with its pointwise 95 % band and the samples about each point."""
+    shape = effect.shape
+    first = fitted.hypothesis.span(effect.key).start
+    bends = slice(size_index(first), size_index(first) + effect.bends)
+    at = np.linspace(shape.low, shape.high, shape.cells + 1)
+    basis = shape.basis(at)
+    value = basis @ fitted.point.sizes[first : first + effect.bends]
+    half = _Z95 * np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", basis, covariance[bends, bends], basis), 0.0))
+    signal = np.concatenate([flown(r, shape.signal) for r in problem.records])
+    edges = np.concatenate([[-np.inf], at[:-1] + 0.5 * shape.width, [np.inf]])
+    samples = np.histogram(signal, edges)[0]
+    return IncrementTable(
+        at=tuple(at.tolist()),
+        value=tuple(value.tolist()),
+        low=tuple((value - half).tolist()),
+        high=tuple((value + half).tolist()),
+        samples=tuple(int(n) for n in samples),
+    )
+
+
+def least_certain(effects: Sequence[AcceptedEffect]) -> Iterator[str]:
+    """For each learned table: where its band is widest, as a sentence."""
+    for effect in effects:
+        table = effect.table
+        if table is None:
+            continue
+        widths = [high - low for low, high in zip(table.low, table.high, strict=True)]
+        i = int(np.argmax(widths))
+        yield (
+            f"The increment of {effect.variant} is least certain at {table.at[i]:.3g} ({table.samples[i]} samples): "
+            "records that hold the signal there narrow its band."
+        )
+
+
+def increment_rows(rounds: Sequence[SearchRound]) -> Iterator[CandidateScore]:
+    """Increments that were refitted, each as it was last assessed."""
+    last = {
+        c.score.effect.key: (c, c in r.tied)
+        for r in rounds
+        for c in r.candidates
+        if isinstance(c.score.effect, Increment)
+    }
+    for c, is_accepted in last.values():
+        s = c.score
+        yield CandidateScore(
+            name=s.effect.name,
+            variant=s.effect.variant,
+            score=s.z**2,
+            z=s.z,
+            p_value=s.p_value,
+            p_value_alone=s.p_value,
+            testable=True,
+            why_not="" if is_accepted else "; ".join(c.reasons) or "another increment explains as much",
+        )
+
+
+__all__ = ["in_physical_terms", "increment_rows", "increment_table", "least_certain"]

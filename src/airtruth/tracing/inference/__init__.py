@@ -1,0 +1,1 @@
+"""Posterior, optimiser, robust covariance, profile likelihood and assessment of held-out records."""

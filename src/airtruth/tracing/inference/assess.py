@@ -1,0 +1,336 @@
+"""Assess records that a model was not fitted to: innovations and free runs, only their own parameters free."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_continuous_lyapunov
+
+from airtruth.numerics.discretise import step
+from airtruth.numerics.levenberg_marquardt import Damping, Options, Stopping, minimise
+from airtruth.numerics.normal_equations import scaled_step
+from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.posterior import TraceProblem, likelihood_terms, sensitivities_of
+from airtruth.tracing.inference.whitening import NO_WHITENER
+from airtruth.tracing.model.compile import CompiledChange, compile_change
+from airtruth.tracing.model.filter import linearise_at_reference
+from airtruth.tracing.model.linearise import process_intensity
+from airtruth.tracing.model.parameters import (
+    CORE,
+    GUST_1,
+    GUST_2,
+    LEAD,
+    OUTPUTS,
+    PER_RECORD_STEP,
+    Layout,
+    Parameters,
+    PerRecord,
+)
+from airtruth.tracing.model.records import TraceRecord
+from airtruth.tracing.model.response import filter_inputs, kernel_input, respond, respond_to
+from airtruth.tracing.model.settings import GUST_COVARIANCE, Settings, initial_per_record, per_record_prior
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_SEARCH: Final = Options(
+    iterations=30,
+    damping=Damping(initial=1e-6, least=1e-6, most=np.inf, poor=0.1, fair=0.1),
+    stopping=Stopping(decrease=0.01),
+)
+"""How a record's own parameters are searched; judgement: ten parameters that are well determined, so that steps are
+nearly undamped. A search ends once a step gains 0.01 in log-likelihood, 0.14 standard errors."""
+_MOST_LOG_STEP: Final = 1.0
+"""Largest step of the logarithm of the gust level [-]: a factor of e (judgement)."""
+_FREE_RUN_ITERATIONS: Final = 3
+"""Most Gauss-Newton iterations of a free run [-]; judgement: the simulation is nearly linear in what is free."""
+_FREE_RUN_GAIN: Final = 1e-3
+"""Relative decrease of the squared residuals that ends them [-]; judgement."""
+_UNSTABLE: Final = 10.0
+"""Noise floor of an unstable model, in standard deviations of the sensors' noise [-]; judgement: it has none."""
+_DRAWS: Final = 128
+"""Simulated records behind `fitted_noise_floor` [-]; judgement: its relative error is 1/sqrt(2 draws), 6 %."""
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """What one record shows of a model.
+
+    Attributes
+    ----------
+    likelihood : negative log-likelihood, own parameters at their best.
+    innovation, free_run : (3,) root mean squares [units of the channels].
+    residual : (samples, 3) of the free run [same units]; whitened : (samples, 3) innovations [-].
+    expected : (3,) root mean squares of innovations that are gusts and noise alone.
+    per_record : (per-record,) own parameters.
+    """
+
+    likelihood: float
+    innovation: Array
+    free_run: Array
+    residual: Array
+    whitened: Array
+    expected: Array
+    per_record: Array
+
+
+def assess(
+    problem: TraceProblem,
+    index: int,
+    hypothesis: Hypothesis,
+    common: Array,
+    sizes: Array,
+    per_record: Array | None = None,
+    *,
+    settled: bool = False,
+) -> Assessment:
+    """Innovations and free run of one record for given common parameters and sizes.
+
+    Parameters
+    ----------
+    index : number of the record.
+    per_record : own parameters to start from; None for `initial_per_record`.
+    settled : they are at their best already.
+    """
+    record, settings = problem.records[index], problem.settings
+    alone = TraceProblem((record,), settings)
+    own = initial_per_record(record, settings) if per_record is None else per_record.copy()
+    if not settled:
+        own = _fit_own(alone, hypothesis, common, sizes, own)
+    point = Parameters(common, own[None, :], sizes)
+    at = sensitivities_of(alone, 0, hypothesis, point, per_record_only=True)
+    compiled = compile_change(hypothesis.change(sizes))
+    response = respond(record, settings, compiled, common, own)
+    if at is None:
+        likelihood, whitened = np.inf, np.full_like(record.signals.y, np.nan)
+    else:
+        likelihood, whitened = likelihood_terms(at, NO_WHITENER, levels=False).cost, at.r
+    residual = free_run(record, settings, compiled, common, own, hypothesis.unconstrained)
+    with np.errstate(over="ignore", invalid="ignore"):  # the model may leave all bounds on this record
+        innovation, free = (np.sqrt((x**2).mean(axis=0)) for x in (response.e, residual))
+    return Assessment(
+        likelihood=float(likelihood),
+        innovation=innovation,
+        free_run=free,
+        residual=residual,
+        whitened=whitened,
+        expected=np.sqrt(np.diag(response.covariance)),
+        per_record=own,
+    )
+
+
+@dataclass(frozen=True)
+class _OwnEvaluated:
+    """Negative log-posterior of one record in its own parameters, gradient and information."""
+
+    cost: float
+    gradient: Array
+    information: Array
+
+
+@dataclass(frozen=True)
+class _OwnSearch:
+    """One minimisation problem over a record's own parameters; see `Problems`."""
+
+    problem: TraceProblem
+    hypothesis: Hypothesis
+    common: Array
+    sizes: Array
+    mean: Array
+    precision: Array
+
+    def evaluate(
+        self, x: Array, index: Ints, near: Sequence[_OwnEvaluated] | None
+    ) -> list[_OwnEvaluated | None]:
+        return [self._evaluate(row) for row in x]
+
+    def _evaluate(self, own: Array) -> _OwnEvaluated | None:
+        point = Parameters(self.common, own[None, :], self.sizes)
+        at = sensitivities_of(self.problem, 0, self.hypothesis, point, per_record_only=True)
+        if at is None:
+            return None
+        cost, gradient, information = likelihood_terms(at, NO_WHITENER, levels=True)
+        rows, off = Layout(len(self.sizes)).per_record, own - self.mean
+        return _OwnEvaluated(
+            cost + 0.5 * float(off @ self.precision @ off),
+            gradient[rows] + self.precision @ off,
+            information[rows, rows] + self.precision,
+        )
+
+    def step(self, x: Array, at: Sequence[_OwnEvaluated], damping: Array, index: Ints) -> tuple[Array, Array]:
+        gradient, information = np.array([a.gradient for a in at]), np.array([a.information for a in at])
+        steps = scaled_step(gradient, information, damping)
+        level = PerRecord.log_gust
+        steps[:, level] = np.clip(steps[:, level], -_MOST_LOG_STEP, _MOST_LOG_STEP)
+        bent = np.einsum("ni,nij,nj->n", steps, information, steps)
+        return steps, -(gradient * steps).sum(axis=1) - 0.5 * bent
+
+    def move(self, x: Array, step: Array, index: Ints) -> Array:
+        return x + step
+
+
+def _fit_own(alone: TraceProblem, hypothesis: Hypothesis, common: Array, sizes: Array, start: Array) -> Array:
+    """Own parameters of a single record at their best, all else given."""
+    ((mean, precision),) = alone.priors(hypothesis).per_record
+    search = _OwnSearch(alone, hypothesis, common, sizes, mean, precision)
+    return np.asarray(minimise(search, start[None, :], _SEARCH).x[0])
+
+
+def free_run(
+    record: TraceRecord,
+    settings: Settings,
+    compiled: CompiledChange,
+    common: Array,
+    per_record: Array,
+    unconstrained: Sequence[int] = (),
+) -> Array:
+    """(samples, 3) residuals of a simulation, initial state, biases and trim coefficients at their best.
+
+    Least squares with the channels weighted by `noise_floor`.
+
+    Parameters
+    ----------
+    unconstrained : indices of the derivatives whose coefficient is not constrained by what is declared.
+    """
+    weight = 1.0 / noise_floor(record, settings, compiled, common, per_record)
+    own = per_record.copy()
+    own[PerRecord.gusts] = 0.0
+    free = PerRecord.deterministic
+    mean, precision = per_record_prior(record, settings, unconstrained)
+    prior = np.diag(precision)[free]
+    residual = respond(record, settings, compiled, common, own, free_run=True).e
+    for _ in range(_FREE_RUN_ITERATIONS):
+        residual, t = _free_run_slopes(record, settings, compiled, common, own, weight)
+        off = (own - mean)[free]
+        move = -np.linalg.solve(t @ t.T + np.diag(prior), t @ (residual * weight).ravel() + prior * off)
+        if not np.isfinite(move).all():
+            break
+        trial = own.copy()
+        trial[free] += move
+        after = respond(record, settings, compiled, common, trial, free_run=True).e
+        better = float(((residual * weight) ** 2).sum() - ((after * weight) ** 2).sum())
+        if not np.isfinite(better) or better < 0.0:
+            break
+        own, residual = trial, after
+        if better < _FREE_RUN_GAIN * float(((residual * weight) ** 2).sum()):
+            break
+    return residual
+
+
+def _free_run_slopes(
+    record: TraceRecord,
+    settings: Settings,
+    compiled: CompiledChange,
+    common: Array,
+    own: Array,
+    weight: Array,
+) -> tuple[Array, Array]:
+    """Residual of a free run (samples, 3) and its weighted derivatives (own parameters but the gusts, samples * 3)."""
+    given = filter_inputs(record, compiled)
+    residual = respond_to(given, settings, common, own, free_run=True).e
+    columns = []
+    for i in PerRecord.deterministic:
+        moved = own.copy()
+        moved[i] += PER_RECORD_STEP[i]
+        e = respond_to(given, settings, common, moved, free_run=True).e
+        columns.append(((e - residual) * weight / PER_RECORD_STEP[i]).ravel())
+    return residual, np.array(columns)
+
+
+def noise_floor(
+    record: TraceRecord, settings: Settings, compiled: CompiledChange, common: Array, per_record: Array
+) -> Array:
+    """What gusts and sensors contribute to a free run to which nothing is fitted: (3,) standard deviations."""
+    linear = _linear_model(record, settings, compiled, common, per_record)
+    if np.linalg.eigvals(linear.a).real.max() >= 0.0:
+        return np.asarray(_UNSTABLE * np.sqrt(linear.variance))
+    spread = solve_continuous_lyapunov(linear.a, -np.diag(linear.process))
+    variance = np.maximum(np.einsum("ij,jk,ik->i", linear.c, spread, linear.c), 0.0) + linear.variance
+    return np.asarray(np.sqrt(variance))
+
+
+def fitted_noise_floor(
+    record: TraceRecord,
+    settings: Settings,
+    compiled: CompiledChange,
+    common: Array,
+    per_record: Array,
+    seed: int,
+    unconstrained: Sequence[int] = (),
+) -> Array:
+    """What gusts and sensors leave of a free run once initial state, biases and trim are fitted to it: (3,) rms.
+
+    The mean over `_DRAWS` records of the linear model in its gusts, treated as `free_run` treats the measured one.
+
+    Parameters
+    ----------
+    seed : of the draws.
+    unconstrained : see `free_run`.
+    """
+    y = _gust_records(record, _linear_model(record, settings, compiled, common, per_record), seed)
+    samples = record.samples
+    weight = 1.0 / noise_floor(record, settings, compiled, common, per_record)
+    t = _free_run_slopes(record, settings, compiled, common, per_record, weight)[1]
+    free = PerRecord.deterministic
+    prior = np.diag(np.diag(per_record_prior(record, settings, unconstrained)[1])[free])
+    flat = (y * weight[:, None]).reshape(-1, _DRAWS)
+    left = flat - t.T @ np.linalg.solve(t @ t.T + prior, t @ flat)
+    return np.asarray(np.sqrt((left.reshape(samples, OUTPUTS, _DRAWS) ** 2).mean(axis=(0, 2))) / weight)
+
+
+class _LinearModel(NamedTuple):
+    """The linearised filter.
+
+    Attributes
+    ----------
+    a, c : (n, n) and (3, n); process : (n,) intensities [1/s]; variance : (3,) of the white noise.
+    noise : first state of the sensors' slow noise; -1 for none.
+    """
+
+    a: Array
+    c: Array
+    process: Array
+    variance: Array
+    noise: int
+
+
+def _gust_records(record: TraceRecord, linear: _LinearModel, seed: int) -> Array:
+    """Outputs (samples, 3, draws) of the linear model in gusts, with noise."""
+    n, samples = linear.a.shape[0], record.samples
+    phi, spread = np.empty((n, n)), np.empty((n, n))
+    early, late = np.empty((n, 1)), np.empty((n, 1))
+    system = np.hstack([linear.a, np.zeros((n, 1))])
+    step(system, linear.process, n, record.signals.dt_s, phi, early, late, spread)
+    values, vectors = np.linalg.eigh(spread)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    rng = np.random.default_rng([seed, samples])
+    x = np.zeros((n, _DRAWS))
+    x[[GUST_1, GUST_2]] = np.linalg.cholesky(GUST_COVARIANCE) @ rng.standard_normal((2, _DRAWS))
+    x[LEAD:CORE] = x[GUST_1]
+    if linear.noise >= 0:
+        x[linear.noise :] = rng.standard_normal((OUTPUTS, _DRAWS))
+    y = np.empty((samples, OUTPUTS, _DRAWS))
+    for k in range(samples):
+        y[k] = linear.c @ x
+        x = phi @ x + root @ rng.standard_normal((n, _DRAWS))
+    y += np.sqrt(linear.variance)[:, None] * rng.standard_normal(y.shape)
+    return y
+
+
+def _linear_model(
+    record: TraceRecord, settings: Settings, compiled: CompiledChange, common: Array, per_record: Array
+) -> _LinearModel:
+    """The filter's linearisation about the record's mean."""
+    kernel = kernel_input(filter_inputs(record, compiled), settings, common, per_record)
+    n = kernel.model.states.size
+    a, c = np.empty((n, n)), np.empty((OUTPUTS, n))
+    linearise_at_reference(kernel, a, c)
+    process = process_intensity(kernel.reference.airspeed_m_s, kernel.model)
+    return _LinearModel(a, c, process, kernel.model.sensors.variance, kernel.model.states.noise)
+
+
+__all__ = ["Assessment", "assess", "fitted_noise_floor", "free_run", "noise_floor"]

@@ -1,0 +1,122 @@
+"""A hypothesis: the declared aircraft and some effects of unknown size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.effects.effect import Effect, Parameter
+from airtruth.physics.terms import AeroTerm, Change
+from airtruth.tracing.model.parameters import Common, size_index
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """The declared aircraft and some effects of free size.
+
+    Attributes
+    ----------
+    declared : what aircraft.toml declares of sensors and dynamics.
+    effects : the effects; none is the null hypothesis.
+    also_unconstrained : indices of derivatives that the declaration does not constrain, besides those of the effects
+        (`unconstrained_by`).
+    trim_alpha_rad : angle of attack about which a curvature is counted [rad]. About any other angle it is a slope and a
+        constant besides, which only the records can determine.
+    spread : (6, 6) covariance of the increments of the derivatives beyond the declared one, where the records
+        contradict the declared derivatives; None where they do not.
+    """
+
+    declared: Change
+    effects: tuple[Effect, ...] = ()
+    also_unconstrained: tuple[int, ...] = ()
+    trim_alpha_rad: float = 0.0
+    spread: Array | None = field(default=None, compare=False)
+
+    @cached_property
+    def unconstrained(self) -> tuple[int, ...]:
+        """Indices of the derivatives that the declaration does not constrain; nor does it their coefficient at trim."""
+        free = (i for e in self.effects for i in unconstrained_by(e, self.trim_alpha_rad))
+        return tuple(sorted({*self.also_unconstrained, *free}))
+
+    @cached_property
+    def parameters(self) -> tuple[tuple[int, int], ...]:
+        """(effect, parameter) of each element of the vector of sizes."""
+        return tuple((i, j) for i, e in enumerate(self.effects) for j in range(len(e.parameters)))
+
+    def parameter(self, size: int) -> Parameter:
+        """The parameter that an element of the vector of sizes belongs to."""
+        effect, j = self.parameters[size]
+        return self.effects[effect].parameters[j]
+
+    def span(self, key: str) -> slice:
+        """Where the parameters of an effect are in the vector of sizes.
+
+        Raises
+        ------
+        ValueError
+            If the hypothesis has no such effect.
+        """
+        at = [e.key for e in self.effects].index(key)
+        first = sum(len(e.parameters) for e in self.effects[:at])
+        return slice(first, first + len(self.effects[at].parameters))
+
+    def values(self, sizes: Array) -> list[dict[str, float]]:
+        """Parameters of each effect, in their own units."""
+        values: list[dict[str, float]] = [{} for _ in self.effects]
+        for size, (i, j) in zip(sizes, self.parameters, strict=True):
+            p = self.effects[i].parameters[j]
+            values[i][p.name] = p.value(float(size))
+        return values
+
+    def change(self, sizes: Array) -> Change:
+        """All that the hypothesis changes at these sizes."""
+        return self.declared + self.added(sizes)
+
+    def added(self, sizes: Array) -> Change:
+        """What the effects change at these sizes, without what is declared."""
+        total = Change()
+        for effect, values in zip(self.effects, self.values(sizes), strict=True):
+            total = total + effect.change(values)
+        return replace(total, aero=tuple(self._about_trim(t) for t in total.aero))
+
+    def _about_trim(self, term: AeroTerm) -> AeroTerm:
+        return replace(term, at=self.trim_alpha_rad) if _is_curvature(term) else term
+
+    @cached_property
+    def fixed(self) -> tuple[int, ...]:
+        """Indices among common parameters and sizes of the sizes whose range is a single value."""
+        ends = [self.effects[i].parameters[j].ends for i, j in self.parameters]
+        return tuple(size_index(k) for k, (low, high) in enumerate(ends) if low == high)
+
+    @cached_property
+    def size_precision(self) -> Array:
+        """(sizes,) precision of the normal prior of each size about zero; zero for none."""
+        return np.array([self.parameter(k).prior_std for k in range(len(self.parameters))]) ** -2.0
+
+    def plus(self, effect: Effect) -> Hypothesis:
+        """The hypothesis with one effect more."""
+        return replace(self, effects=(*self.effects, effect))
+
+
+def unconstrained_by(effect: Effect, trim_alpha_rad: float) -> tuple[int, ...]:
+    """Indices of the derivatives that the declaration cannot constrain beside an effect.
+
+    A curvature about an angle of attack other than the trim's is a slope and a constant at the trim besides. They
+    cannot be declared and present in addition, so that the records have to determine them.
+    """
+    change = effect.change({p.name: p.high for p in effect.parameters})
+    bent = {t.coefficient for t in change.aero if _is_curvature(t) and t.at != trim_alpha_rad}
+    slopes = ((Common.CLalpha, "CL"), (Common.Cmalpha, "Cm"))
+    return tuple(i for i, coefficient in slopes if coefficient in bent)
+
+
+def _is_curvature(term: AeroTerm) -> bool:
+    return term.signal == "alpha" and term.shape == "quadratic"
+
+
+__all__ = ["Hypothesis", "unconstrained_by"]

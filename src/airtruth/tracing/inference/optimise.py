@@ -1,0 +1,255 @@
+"""Maximise the posterior: a `Problems` of `airtruth.numerics.levenberg_marquardt`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.numerics.levenberg_marquardt import (
+    Damping,
+    Options,
+    Status,
+    Stopping,
+    minimise,
+)
+from airtruth.numerics.normal_equations import scaled_inverse, scaled_step
+from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.posterior import (
+    LikelihoodTerms,
+    PosteriorFit,
+    Priors,
+    Sensitivities,
+    TraceProblem,
+    at_bounds,
+    likelihood_terms,
+    marginal_information,
+    prior_cost,
+    sensitivities_of,
+)
+from airtruth.tracing.inference.whitening import NO_WHITENER, Whitener
+from airtruth.tracing.model.parameters import BOUNDS, Common, Layout, Parameters, PerRecord
+from airtruth.tracing.model.settings import initial_per_record
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+ITERATIONS: Final = 45
+"""Most iterations of a fit [-]; judgement: three times what a fit of one effect takes as a rule."""
+_FIRST_ITERATIONS: Final = 4
+"""Iterations with the levels held, before a search [-]; judgement."""
+_LEAST_DAMPING: Final = 1e-9
+"""Damping that is none but for rounding [-]."""
+_SEARCH: Final = Options(
+    iterations=ITERATIONS,
+    damping=Damping(initial=1e-3, least=_LEAST_DAMPING, most=1e7, restart=1e-3, poor=5.0, slack=-1e-9),
+    stopping=Stopping(
+        promised=0.002, promised_confirm=0.5, decrease=0.01, decrease_confirm=0.05, rejected=0.05
+    ),
+    reuse=True,
+    stale=1.0,
+    chords=3,
+    outrun=20.0,
+)
+"""How the posterior is searched; decreases in log-likelihood [-], judgements. A step that would gain 0.002 moves the
+estimates by 0.06 standard errors, one of 0.05 by 0.3. The last 0.5 is for tables with breaks, which give the gain of
+the filter, and with it the cost, small breaks too. Derivatives cost ten times what a trial costs, so that they serve
+until they gain less than 1."""
+_ROUGH_M_S: Final = 1.0
+"""Gust level in which a search starts where nothing is known [m/s]: the records then weigh little and no start is far
+(judgement)."""
+_MOST_LOG_STEP: Final = 1.0
+"""Largest step of a common parameter that is no derivative, and of the logarithm of a gust level [-]: a factor of e
+(judgement)."""
+_MOST_SIZE_STEP: Final = 0.25
+"""Largest step of a size over its range [-] (judgement)."""
+_RIDGE: Final = 1e-12
+"""Ridge on the scaled information before it is inverted [-]; far above rounding, far below any information."""
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """The posterior at a point: negative logarithm, and likelihood and sensitivities of each record."""
+
+    cost: float
+    terms: tuple[LikelihoodTerms, ...]
+    sensitivities: tuple[Sensitivities, ...]
+
+
+@dataclass(frozen=True)
+class PosteriorSearch:
+    """One minimisation problem over the vector of all parameters; see `Problems`.
+
+    Attributes
+    ----------
+    problem, hypothesis, priors : what is fitted.
+    whitener : an autoregression that is held.
+    levels : whether noise and gust levels and the share of slow noise are free.
+    shape : parameters of the shape that vectors have.
+    """
+
+    problem: TraceProblem
+    hypothesis: Hypothesis
+    priors: Priors
+    whitener: Whitener
+    levels: bool
+    shape: Parameters
+
+    def evaluate(self, x: Array, index: Ints, near: Sequence[Evaluated] | None) -> list[Evaluated | None]:
+        """The posterior at each row; see `Problems.evaluate`."""
+        return [
+            self._evaluate(self.shape.of_vector(row), None if near is None else near[k])
+            for k, row in enumerate(x)
+        ]
+
+    def _evaluate(self, point: Parameters, near: Evaluated | None) -> Evaluated | None:
+        if not np.isfinite(point.vector).all():
+            return None
+
+        def one(i: int) -> tuple[Sensitivities, LikelihoodTerms] | None:
+            old = None if near is None else near.sensitivities[i]
+            made = sensitivities_of(self.problem, i, self.hypothesis, point, old=old)
+            return None if made is None else (made, likelihood_terms(made, self.whitener, self.levels))
+
+        done = [d for d in self.problem.each(one, range(len(self.problem.records))) if d is not None]
+        if len(done) < len(self.problem.records):
+            return None
+        cost = sum(terms.cost for _, terms in done) + prior_cost(self.priors, point)
+        if not np.isfinite(cost):
+            return None
+        return Evaluated(cost, tuple(terms for _, terms in done), tuple(made for made, _ in done))
+
+    def step(self, x: Array, at: Sequence[Evaluated], damping: Array, index: Ints) -> tuple[Array, Array]:
+        """The damped step of each row and what it promises; see `Problems.step`."""
+        steps, promised = zip(
+            *(
+                self._step(self.shape.of_vector(row), there, float(d))
+                for row, there, d in zip(x, at, damping, strict=True)
+            ),
+            strict=True,
+        )
+        return np.array(steps), np.array(promised)
+
+    def _step(self, point: Parameters, at: Evaluated, damping: float) -> tuple[Array, float]:
+        fixed = self.hypothesis.fixed
+        while True:
+            gradient, information, eliminated = marginal_information(
+                self.priors, point, at.terms, levels=self.levels, damping=damping, fixed=fixed
+            )
+            shared = scaled_step(gradient, information, damping)
+            stopped = tuple(i for i in at_bounds(point) if i not in fixed and _outward(point, i, shared[i]))
+            if not stopped:
+                break
+            fixed += stopped
+        own = np.stack([-(e.solved[:, 0] + e.solved[:, 1:] @ shared) for e in eliminated])
+        own[:, PerRecord.log_gust] = np.clip(own[:, PerRecord.log_gust], -_MOST_LOG_STEP, _MOST_LOG_STEP)
+        gain = float(-gradient @ shared)
+        gain += sum(float(e.solved[:, 0] @ e.information @ e.solved[:, 0]) for e in eliminated)
+        return np.concatenate([shared, own.ravel()]), 0.5 * gain
+
+    def move(self, x: Array, step: Array, index: Ints) -> Array:
+        """Steps taken within the plausible ranges; see `Problems.move`."""
+        return np.array([self._move(row, by) for row, by in zip(x, step, strict=True)])
+
+    def _move(self, x: Array, step: Array) -> Array:
+        point, moved = self.shape.of_vector(x), x + step
+        layout = Layout(len(point.sizes))
+        for k, size in enumerate(point.sizes):
+            low, high = self.hypothesis.parameter(k).ends
+            room = _MOST_SIZE_STEP * (high - low)
+            at = layout.sizes.start + k
+            moved[at] = min(max(moved[at], max(low, size - room)), min(high, size + room))
+        nuisance = Common.nuisance
+        moved[nuisance] = x[nuisance] + np.clip(step[nuisance], -_MOST_LOG_STEP, _MOST_LOG_STEP)
+        for i, (low, high) in BOUNDS.items():
+            moved[i] = min(max(moved[i], low), high)
+        return moved
+
+    def shortfall(self, x: Array, at: Evaluated) -> float:
+        """Gain in log-likelihood that a step at the least damping promises."""
+        return self._step(self.shape.of_vector(x), at, _LEAST_DAMPING)[1]
+
+
+def _outward(point: Parameters, index: int, step: float) -> bool:
+    low, high = BOUNDS[index]
+    value = point.common[index]
+    return bool((value == low and step < 0.0) or (value == high and step > 0.0))
+
+
+def fit(
+    problem: TraceProblem,
+    hypothesis: Hypothesis,
+    start: Parameters,
+    whitener: Whitener = NO_WHITENER,
+    *,
+    iterations: int = ITERATIONS,
+    free_levels: bool = True,
+    rival: float = np.inf,
+) -> PosteriorFit | None:
+    """The largest posterior from a start; None where not even the start can be evaluated.
+
+    Parameters
+    ----------
+    whitener : an autoregression that is held; with one, levels should not be free.
+    free_levels : whether noise and gust levels and the share of slow noise are fitted.
+    rival : cost of a better hypothesis; the search ends early once it is plainly out of reach.
+    """
+    priors = problem.priors(hypothesis)
+    search = PosteriorSearch(problem, hypothesis, priors, whitener, free_levels, start)
+    options = replace(_SEARCH, iterations=iterations)
+    solution = minimise(search, start.vector[None, :], options, rival)
+    (at,), (x,), (status,) = solution.at, solution.x, solution.status
+    if at is None:
+        return None
+    converged = status in (Status.CONVERGED, Status.OUTRUN, Status.STALLED)
+    return PosteriorFit(
+        hypothesis=hypothesis,
+        point=start.of_vector(x),
+        cost=at.cost,
+        likelihood=np.array([t.cost for t in at.terms]),
+        sensitivities=at.sensitivities,
+        whitener=whitener,
+        covariance=_covariance(search, at),
+        converged=converged,
+        shortfall=0.0 if converged else search.shortfall(x, at),
+    )
+
+
+def initial_parameters(
+    problem: TraceProblem,
+    hypothesis: Hypothesis,
+    sizes: Array | None = None,
+    iterations: int = _FIRST_ITERATIONS,
+) -> Parameters:
+    """Where a search starts without prior knowledge: motions fitted with the levels held in rough air.
+
+    Parameters
+    ----------
+    sizes : where those of the effects start; None for zero.
+    """
+    own = np.stack([initial_per_record(record, problem.settings) for record in problem.records])
+    own[:, PerRecord.log_gust] = np.log(_ROUGH_M_S)
+    first = np.zeros(len(hypothesis.parameters)) if sizes is None else sizes
+    point = Parameters(np.zeros(Common.size), own, first)
+    fitted = fit(problem, hypothesis, point, iterations=iterations, free_levels=False)
+    return point if fitted is None else fitted.point
+
+
+def _covariance(search: PosteriorSearch, at: Evaluated) -> Array:
+    """Inverse of the marginal information."""
+    priors = search.priors
+    empty = Parameters(
+        np.zeros(Common.size),
+        np.stack([mean for mean, _ in priors.per_record]),
+        np.zeros(len(search.hypothesis.parameters)),
+    )
+    marginal = marginal_information(
+        priors, empty, at.terms, levels=search.levels, fixed=search.hypothesis.fixed
+    )
+    return scaled_inverse(marginal.information, _RIDGE)
+
+
+__all__ = ["ITERATIONS", "Evaluated", "PosteriorSearch", "fit", "initial_parameters"]

@@ -1,0 +1,373 @@
+"""Log-posterior of derivatives, levels, biases, initial states and sizes over several records.
+
+Fisher information, with derivatives by one-sided differences; the parameters of each record are eliminated record by
+record.
+
+Source: R. E. Maine and K. W. Iliff, NASA RP-1138 (1985), sections 5 and 6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.whitening import Whitener
+from airtruth.tracing.model.parameters import (
+    BOUNDS,
+    COMMON_STEP,
+    OUTPUTS,
+    PER_RECORD_STEP,
+    Common,
+    Layout,
+    Parameters,
+    PerRecord,
+    size_index,
+)
+from airtruth.tracing.model.records import TraceRecord
+from airtruth.tracing.model.response import Response, filter_inputs, respond, respond_to
+from airtruth.tracing.model.settings import (
+    Settings,
+    common_prior,
+    declared_covariance_of,
+    declared_derivatives_of,
+    free_common,
+    per_record_prior,
+)
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+R = TypeVar("R")
+
+_LOCATION_STEP: Final = 0.02
+"""Step of the differences in a size over `airtruth.effects.effect.Parameter.step`, where the effect is present or the
+parameter is a location [-]; judgement: as `COMMON_STEP`."""
+
+
+class Priors(NamedTuple):
+    """Normal priors of a hypothesis.
+
+    Attributes
+    ----------
+    common : (common, common) precision of the common parameters about zero.
+    sizes : (sizes,) precision of each size about zero.
+    per_record : mean (per-record,) and precision (per-record, per-record) of each record.
+    """
+
+    common: Array
+    sizes: Array
+    per_record: tuple[tuple[Array, Array], ...]
+
+
+@dataclass(frozen=True)
+class TraceProblem:
+    """Records, what is declared of their sensors, and how many threads work on them."""
+
+    records: tuple[TraceRecord, ...]
+    settings: Settings
+    threads: int = 1
+
+    def priors(self, hypothesis: Hypothesis) -> Priors:
+        """Priors of a hypothesis; each record's own is that of its flight condition."""
+        free = hypothesis.unconstrained
+        own = tuple(per_record_prior(r, self.settings, free) for r in self.records)
+        common = common_prior(self.records, self.settings, free, hypothesis.spread)
+        return Priors(common, hypothesis.size_precision, own)
+
+    @property
+    def declared_derivatives(self) -> Array:
+        """(6,) declared derivatives, averaged over the records' flight conditions [-]."""
+        return declared_derivatives_of(self.records)
+
+    @property
+    def declared_covariance(self) -> Array:
+        """(6, 6) covariance of the increments of the derivatives, averaged likewise [-]."""
+        return declared_covariance_of(self.records)
+
+    def each(self, function: Callable[[T], R], arguments: Sequence[T]) -> list[R]:
+        """Apply a function to each argument, in order."""
+        if self.threads <= 1 or len(arguments) <= 1:
+            return [function(a) for a in arguments]
+        with ThreadPoolExecutor(self.threads) as pool:
+            return list(pool.map(function, arguments))
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """Whitened innovations of one record and their derivatives.
+
+    Attributes
+    ----------
+    r : (samples, 3) whitened innovations.
+    logdet : mean of log|S| over the samples.
+    t : (parameters, samples, 3) derivatives of the whitened innovations at fixed whitener; parameters as in `Layout`.
+    w : (parameters, 3, 3) whitened derivatives of S.
+    white : (3, 3) whitener.
+    more : (parameters,) derivatives of the sum of log|S| beyond the steady one, by an uncertain surface; or a zero.
+    """
+
+    r: Array
+    logdet: float
+    t: Array
+    w: Array
+    white: Array
+    more: Array = field(default_factory=lambda: np.zeros(1))
+
+
+class LikelihoodTerms(NamedTuple):
+    """Negative log-likelihood of one record, its gradient (parameters,) and Fisher information."""
+
+    cost: float
+    gradient: Array
+    information: Array
+
+
+@dataclass(frozen=True)
+class PosteriorFit:
+    """Where the posterior is largest.
+
+    Attributes
+    ----------
+    hypothesis, point : what was fitted and where it ended.
+    cost : negative log-posterior without constants; it compares hypotheses with the same unconstrained derivatives and
+        trim coefficients.
+    likelihood : (records,) negative log-likelihood of each record.
+    sensitivities : of each record at ``point``.
+    whitener : of the innovations.
+    covariance : (common and sizes, common and sizes), per-record parameters free.
+    converged : whether the search ended by its tolerance.
+    shortfall : log-likelihood that an undamped step promises where it did not, else none.
+    """
+
+    hypothesis: Hypothesis
+    point: Parameters
+    cost: float
+    likelihood: Array
+    sensitivities: tuple[Sensitivities, ...]
+    whitener: Whitener
+    covariance: Array
+    converged: bool
+    shortfall: float = 0.0
+
+    @property
+    def layout(self) -> Layout:
+        """Where its parameters are."""
+        return Layout(len(self.point.sizes))
+
+    @property
+    def innovations(self) -> list[Array]:
+        """(samples, 3) whitened innovations of each record."""
+        return [s.r for s in self.sensitivities]
+
+    @property
+    def common_std(self) -> Array:
+        """(common,) standard deviations of the common parameters."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)[self.layout.common]))
+
+    def size_std(self, number: int) -> float:
+        """Standard deviation of a size."""
+        i = size_index(number)
+        return float(np.sqrt(max(self.covariance[i, i], 0.0)))
+
+
+def sensitivities_of(
+    problem: TraceProblem,
+    index: int,
+    hypothesis: Hypothesis,
+    point: Parameters,
+    *,
+    per_record_only: bool = False,
+    old: Sensitivities | None = None,
+) -> Sensitivities | None:
+    """Innovations of one record and their derivatives by one-sided differences; None where the motion is lost.
+
+    Parameters
+    ----------
+    index : number of the record.
+    per_record_only : differentiate in the record's own parameters alone.
+    old : derivatives at a nearby point, which are whitened again and kept for all parameters but the sizes.
+    """
+    record, settings = problem.records[index], problem.settings
+    common, own, sizes = point.common, point.per_record[index], point.sizes
+    given = filter_inputs(record, hypothesis.change(sizes))
+    base = respond_to(given, settings, common, own)
+    if not np.isfinite(base.logdet):
+        return None
+    layout = Layout(len(sizes))
+    differences = _Differences(base, layout.total)
+    if old is not None:
+        differences.take(old)
+    if not per_record_only:
+        for i in free_common(settings) if old is None else ():
+            h = COMMON_STEP[i]
+            differences.put(i, respond_to(given, settings, _moved(common, i, h), own), h)
+        for k in range(len(sizes)):
+            p = hypothesis.parameter(k)
+            h = _LOCATION_STEP * p.step if p.is_location or abs(sizes[k]) > p.step else p.step
+            change = hypothesis.change(_moved(sizes, k, h))
+            differences.put(size_index(k), respond(record, settings, change, common, own), h)
+    for i in range(PerRecord.size if old is None else 0):
+        h = PER_RECORD_STEP[i]
+        moved = respond_to(given, settings, common, _moved(own, i, h))
+        differences.put(layout.per_record.start + i, moved, h)
+    if not (np.isfinite(differences.t).all() and np.isfinite(differences.w).all()):
+        return None
+    r = base.e @ base.white.T
+    return Sensitivities(r, base.logdet, differences.t, differences.w, base.white, differences.more)
+
+
+def _moved(x: Array, index: int, step: float) -> Array:
+    moved = x.copy()
+    moved[index] += step
+    return moved
+
+
+class _Differences:
+    """Collects one-sided differences of a response."""
+
+    def __init__(self, base: Response, parameters: int) -> None:
+        self.base = base
+        self.t = np.zeros((parameters, *base.e.shape))
+        self.w = np.zeros((parameters, OUTPUTS, OUTPUTS))
+        self.more = np.zeros(parameters)
+
+    def put(self, index: int, moved: Response, h: float) -> None:
+        white, base = self.base.white, self.base
+        self.t[index] = (moved.e - base.e) @ white.T / h
+        self.w[index] = white @ ((moved.covariance - base.covariance) / h) @ white.T
+        self.more[index] = (moved.more_logdet - base.more_logdet) / h
+
+    def take(self, old: Sensitivities) -> None:
+        turn = np.linalg.solve(old.white.T, self.base.white.T)
+        self.t[:] = old.t @ turn
+        self.w[:] = turn.T @ old.w @ turn
+        self.more[:] = old.more
+
+
+def likelihood_terms(sensitivities: Sensitivities, whitener: Whitener, levels: bool) -> LikelihoodTerms:
+    """Negative log-likelihood, gradient and information (parameters,) of one record.
+
+    Parameters
+    ----------
+    levels : whether noise and gust levels count; an autoregression is made at fixed levels.
+    """
+    r, t = whitener.apply(sensitivities.r), whitener.apply(sensitivities.t)
+    w, samples = sensitivities.w, r.shape[0]
+    flat = t.reshape(t.shape[0], -1)
+    gradient = flat @ r.ravel()
+    information = flat @ flat.T
+    if levels:
+        moment = sensitivities.r.T @ sensitivities.r
+        gradient = gradient + 0.5 * (
+            samples * np.trace(w, axis1=1, axis2=2) - np.einsum("pij,ij->p", w, moment) + sensitivities.more
+        )
+        information = information + 0.5 * samples * np.einsum("pij,qij->pq", w, w)
+    cost = 0.5 * samples * sensitivities.logdet + 0.5 * float(r.ravel() @ r.ravel())
+    return LikelihoodTerms(cost, gradient, information)
+
+
+def prior_cost(priors: Priors, point: Parameters) -> float:
+    """Negative logarithm of the prior density, without constants."""
+    total = 0.5 * float(point.common @ priors.common @ point.common + priors.sizes @ point.sizes**2)
+    for (mean, precision), own in zip(priors.per_record, point.per_record, strict=True):
+        off = own - mean
+        total += 0.5 * float(off @ precision @ off)
+    return total
+
+
+class Eliminated(NamedTuple):
+    """What recovers a record's own step from the step of the common parameters and sizes.
+
+    Attributes
+    ----------
+    information : (per-record, per-record) with prior and damping.
+    solved : (per-record, 1 + marginal) its inverse times the gradient, and times the mixed information.
+    """
+
+    information: Array
+    solved: Array
+
+
+class Marginal(NamedTuple):
+    """Gradient and information of common parameters and sizes, per-record parameters eliminated, priors included."""
+
+    gradient: Array
+    information: Array
+    eliminated: tuple[Eliminated, ...]
+
+
+def marginal_information(
+    priors: Priors,
+    point: Parameters,
+    terms: Sequence[LikelihoodTerms],
+    *,
+    levels: bool,
+    damping: float = 0.0,
+    fixed: Sequence[int] = (),
+) -> Marginal:
+    """Eliminate the parameters of each record.
+
+    Parameters
+    ----------
+    point : where; further directions in ``terms`` behind its sizes are at zero.
+    levels : whether noise and gust levels are free.
+    damping : on the per-record parameters [-].
+    fixed : indices among common parameters and sizes that do not move.
+    """
+    layout = Layout(len(terms[0].gradient) - Common.size - PerRecord.size)
+    common, marginal, own = layout.common, layout.marginal, layout.per_record
+    gradient, information = np.zeros(marginal.stop), np.zeros((marginal.stop, marginal.stop))
+    information[common, common] = priors.common
+    gradient[common] = priors.common @ point.common
+    sizes = np.arange(len(priors.sizes)) + common.stop
+    information[sizes, sizes] = priors.sizes
+    gradient[sizes] = priors.sizes * point.sizes
+    eliminated = []
+    level = PerRecord.log_gust
+    for (mean, precision), values, (_, g, h) in zip(priors.per_record, point.per_record, terms, strict=True):
+        h_own = h[own, own] + precision
+        g_own = g[own] + precision @ (values - mean)
+        h_mixed = h[marginal, own].copy()
+        if not levels:
+            h_own[level], h_own[:, level], h_own[level, level] = 0.0, 0.0, 1.0
+            g_own[level] = 0.0
+            h_mixed[:, level] = 0.0
+        else:
+            # where the record puts the level at none, the observed information: J'' = 4 s^2 J_ss + 2 J' in log s
+            h_own[level, level] += 2.0 * max(g[own][level], 0.0)
+        h_own[np.diag_indices(PerRecord.size)] *= 1.0 + damping
+        solved = np.linalg.solve(h_own, np.column_stack([g_own, h_mixed.T]))
+        gradient += g[marginal] - h_mixed @ solved[:, 0]
+        information += h[marginal, marginal] - h_mixed @ solved[:, 1:]
+        eliminated.append(Eliminated(h_own, solved))
+    for i in (*(() if levels else Common.noise), *fixed):
+        information[i], information[:, i] = 0.0, 0.0
+        information[i, i] = 1.0
+        gradient[i] = 0.0
+    return Marginal(gradient, information, tuple(eliminated))
+
+
+def at_bounds(point: Parameters) -> tuple[int, ...]:
+    """Indices of the common parameters that are at an end of their range."""
+    return tuple(i for i, ends in BOUNDS.items() if point.common[i] in ends)
+
+
+__all__ = [
+    "Eliminated",
+    "LikelihoodTerms",
+    "Marginal",
+    "PosteriorFit",
+    "Priors",
+    "Sensitivities",
+    "TraceProblem",
+    "at_bounds",
+    "likelihood_terms",
+    "marginal_information",
+    "prior_cost",
+    "sensitivities_of",
+]

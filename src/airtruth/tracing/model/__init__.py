@@ -1,0 +1,1 @@
+"""The declared aircraft as a nonlinear filter: plant, records, parameters, equations and response."""

@@ -1,0 +1,147 @@
+"""Compile a `Change` into the arrays that the filter's kernel reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.errors import ConfigurationError, choices
+from airtruth.physics.sensor_errors import KINDS, Kind, SensorErrors
+from airtruth.physics.terms import (
+    DECLARED,
+    SHAPES,
+    SIGNALS,
+    STATE_KINDS,
+    Change,
+    SensorTerm,
+    SurfaceTerm,
+    declared_total,
+)
+from airtruth.tracing.model.kernel_input import EffectArrays
+from airtruth.tracing.model.parameters import OUTPUTS, StateLayout, effect_states, state_layout
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+CHANNELS: Final = ("alpha_rad", "q_rad_s", "az_m_s2")
+"""Outputs of the filter, columns of the log."""
+
+
+@dataclass(frozen=True)
+class CompiledChange:
+    """A change as arrays.
+
+    Air terms are left out: the level of the vertical gust is each record's own, and the measured airspeed carries the
+    horizontal one.
+
+    Attributes
+    ----------
+    surface : terms between the measured surface and the air.
+    effects : terms and states, for the filter's kernel.
+    effect_states, motion : first state of each effect with states; states up to the last of them.
+    declared : quantity of `airtruth.physics.terms.DECLARED` -> all its terms together.
+    bias, scale, lag_s, delay_s, arm_m : (3,) of the outputs [units of the outputs, -, s, s, m].
+    inputs : channel of an input -> scale and bias of its sensor.
+    """
+
+    surface: tuple[SurfaceTerm, ...]
+    effects: EffectArrays
+    effect_states: Ints
+    motion: int
+    declared: Mapping[str, float]
+    bias: Array
+    scale: Array
+    lag_s: Array
+    delay_s: Array
+    arm_m: Array
+    inputs: Mapping[str, SensorErrors]
+
+    def states(self, slow: bool) -> StateLayout:
+        """States of the filter; ``slow``: the sensors have slow noise."""
+        return state_layout(self.effect_states, self.motion, self.lag_s, self.delay_s, slow)
+
+
+def compile_change(change: Change) -> CompiledChange:
+    """Resolve names to numbers.
+
+    Raises
+    ------
+    ConfigurationError
+        If a term names a signal, shape or channel that the filter does not have.
+    """
+    if change.derivatives:
+        raise ConfigurationError(
+            f"cause {change.derivatives[0].cause!r}: has to be resolved at a trim before the filter takes it"
+        )
+    for shifted in change.declared:
+        _index(shifted.quantity, tuple(DECLARED), "declared quantity")
+    first, motion = effect_states([s.kind for s in change.states])
+    outputs = {kind: np.full(OUTPUTS, KINDS[kind].neutral) for kind in get_args(Kind)}
+    inputs: dict[str, SensorErrors] = {}
+    for sensor in change.sensors:
+        if sensor.channel in CHANNELS:
+            at = CHANNELS.index(sensor.channel)
+            of_kind = outputs[sensor.kind]
+            of_kind[at] = KINDS[sensor.kind].combined(float(of_kind[at]), sensor.value)
+        else:
+            inputs[sensor.channel] = _with_error(inputs.get(sensor.channel, SensorErrors()), sensor)
+    return CompiledChange(
+        surface=change.surface,
+        effects=_effects(change, first),
+        effect_states=first,
+        motion=motion,
+        declared={quantity: declared_total(change.declared, quantity) for quantity in DECLARED},
+        bias=outputs["bias"],
+        scale=outputs["scale"],
+        lag_s=np.maximum(outputs["lag"], 0.0),
+        delay_s=outputs["delay"],
+        arm_m=outputs["arm"],
+        inputs=inputs,
+    )
+
+
+def _effects(change: Change, first: Ints) -> EffectArrays:
+    """Aerodynamic terms and states by numbers; ``first``: first state of each effect with states."""
+    names = [s.name for s in change.states]
+    terms = np.zeros((len(change.aero), 4), dtype=np.int64)
+    for i, term in enumerate(change.aero):
+        signal = _index(term.signal, (*SIGNALS, *names), "signal")
+        own = signal >= len(SIGNALS)
+        terms[i] = (
+            _index(term.coefficient, ("CL", "Cm"), "coefficient"),
+            -1 if own else signal,
+            _index(term.shape, SHAPES, "shape"),
+            first[signal - len(SIGNALS)] if own else -1,
+        )
+    states = np.zeros((len(change.states), 2), dtype=np.int64)
+    for i, state in enumerate(change.states):
+        states[i] = _index(state.kind, STATE_KINDS, "state"), _index(state.signal, SIGNALS, "signal")
+    return EffectArrays(
+        term_index=terms,
+        amplitude=np.array([t.amplitude for t in change.aero], dtype=np.float64),
+        origin=np.array([t.at for t in change.aero], dtype=np.float64),
+        state_index=states,
+        time_s=np.array([s.time_s for s in change.states], dtype=np.float64),
+        damping=np.array([s.damping for s in change.states], dtype=np.float64),
+    )
+
+
+def _with_error(errors: SensorErrors, term: SensorTerm) -> SensorErrors:
+    """Errors of an input's sensor with one more."""
+    if term.kind == "scale":
+        return replace(errors, scale=errors.scale * term.value)
+    if term.kind == "bias":
+        return replace(errors, bias=errors.bias + term.value)
+    raise ConfigurationError(
+        f"effect on {term.channel}: {term.kind!r}; {choices(term.kind, ('bias', 'scale'))}"
+    )
+
+
+def _index(name: str, allowed: tuple[str, ...], what: str) -> int:
+    if name not in allowed:
+        raise ConfigurationError(f"effect: {what} {name!r}: {choices(name, allowed)}")
+    return allowed.index(name)

@@ -1,0 +1,296 @@
+"""Nonlinear equations of motion and of the sensors of an aircraft in gusts.
+
+States x (`airtruth.tracing.model.parameters`): alpha over ground [rad], q [rad/s], two Dryden states of unit variance,
+the upward gust as the tail meets it, three low-passed copies of the first Dryden state, then the states of effects.
+
+The upward gust is w = sigma (1.22 x_2 - 0.52 x_3 + rolloff sum_i g_i (x_2 - x_i)). Without rolloff its spectrum is
+Dryden's; with a rolloff of 1 it falls as von Karman's, with the power -5/3 instead of -2, in the band that a flight
+test excites. Airspeed, density, pitch attitude and the speed without the gust along the path are known inputs. The
+angle of attack of the air is theta - asin((V_ground sin(theta - alpha) - w)/V), its pitch rate
+q - (w - w_late)/(tau V) with tau = 4 b/(pi V).
+
+Forces: tables of X, Z, M over alpha, elevator and q c/(2V) times q_bar, the engines' constants, increments of the
+derivatives, and the terms of `airtruth.physics.terms`.
+
+Sources: equations of motion, `airtruth.physics.longitudinal`; gusts, MIL-F-8785C, 3.7.1.1 and 3.7.1.2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final, NamedTuple, cast
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from airtruth.physics.longitudinal import lower_point
+from airtruth.physics.sensors import vane_equation
+from airtruth.physics.terms import numbered_shape
+from airtruth.tracing.model.kernel_input import (
+    AircraftArrays,
+    AirPoint,
+    EffectArrays,
+    FilterModel,
+    GridSignals,
+    GustModel,
+)
+from airtruth.tracing.model.parameters import LEAD, LEAD_COUNT
+from airtruth.units import G0
+
+Array = NDArray[np.float64]
+
+FASTMATH: Final = {"contract", "reassoc", "arcp", "nsz"}
+"""LLVM fastmath flags of the tracer's kernels; nnan and ninf are left out, so that divergence is detected."""
+_W1: Final = math.sqrt(1.5)
+"""Gain of the first state of MIL-F-8785C's vertical Dryden filter, states of unit drive [-]."""
+_W2: Final = math.sqrt(1.5) * (1.0 / math.sqrt(3.0) - 1.0)
+"""Gain of its second state [-]."""
+_LEAD_RAD_S: Final = (2.1, 21.0, 217.0)
+"""Corners of the rolloff [rad/s]. Fitted here: with `_LEAD_GAIN` they turn Dryden's spectrum into von Karman's, both
+of 840 m at 43 m/s, within 6 % (rms 2 %) from 0.5 to 600 rad/s, the level left free. In this band both spectra are
+powers of the frequency, so that the corners serve any speed and length; a record of seconds shows little below it."""
+_LEAD_GAIN: Final = (0.58, 0.84, 1.39)
+"""Gains at these corners [-]; fitted with them."""
+_ALPHA_DOT: Final = 3
+"""Number of the signal alpha_dot_hat in `airtruth.physics.terms.SIGNALS`."""
+
+_compiled = njit(nogil=True, error_model="numpy", fastmath=FASTMATH)
+_shape = cast("Callable[[int, float], float]", _compiled(numbered_shape))
+_vane = cast("Callable[[float, float, float, float], float]", _compiled(vane_equation))
+
+
+class Signals(NamedTuple):
+    """Signals of aerodynamic terms, in the order of `airtruth.physics.terms.SIGNALS`.
+
+    Attributes
+    ----------
+    alpha, elevator : of the air, of the surface [rad]; qhat, alpha_dot_hat : q c/(2V), alpha' c/(2V) [-].
+    """
+
+    alpha: float
+    elevator: float
+    qhat: float
+    alpha_dot_hat: float
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def gust(x: Array, rolloff: float) -> float:
+    """Upward gust over the level of Dryden's part [-]."""
+    lead = 0.0
+    for i in range(LEAD_COUNT):
+        lead += _LEAD_GAIN[i] * (x[2] - x[LEAD + i])
+    return float(_W1 * x[2] + _W2 * x[3] + rolloff * lead)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def air_alpha(x: Array, upward: float, level_m_s: float, at: AirPoint) -> float:
+    """Angle of attack of the air at the CG [rad] in an upward gust [-] of a level [m/s]."""
+    sine = (math.sin(at.theta_rad - x[0]) * at.ground_m_s - level_m_s * upward) / at.airspeed_m_s
+    return at.theta_rad - math.asin(min(max(sine, -1.0), 1.0))
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def effective_elevator(elevator_rad: float, aircraft: AircraftArrays) -> float:
+    """Deflection whose forces the tables hold [rad]."""
+    neutral = aircraft.neutral_elevator_rad
+    return neutral + aircraft.effectiveness * (elevator_rad - neutral)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def _cell(axis: Array, x: float) -> tuple[int, float]:
+    """Lower point of the cell that holds x and the share of the cell below x; the end cells go on outside."""
+    low = lower_point(axis, x)
+    return low, (x - axis[low]) / (axis[low + 1] - axis[low])
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def _look_up(
+    aircraft: AircraftArrays, alpha: float, surface: float, qhat: float
+) -> tuple[float, float, float]:
+    """X, Z [m2] and M [m3] of the air over the dynamic pressure, trilinear in the tables."""
+    values = aircraft.values
+    i, si = _cell(aircraft.alpha_rad, alpha)
+    j, sj = _cell(aircraft.elevator_rad, surface)
+    n, sn = _cell(aircraft.qhat, qhat)
+    fx = fz = fm = 0.0
+    for a in range(2):
+        wa = si if a else 1.0 - si
+        for b in range(2):
+            w1 = wa * (sj if b else 1.0 - sj)
+            w0, w1 = w1 * (1.0 - sn), w1 * sn
+            fx += w0 * values[i + a, j + b, n, 0] + w1 * values[i + a, j + b, n + 1, 0]
+            fz += w0 * values[i + a, j + b, n, 1] + w1 * values[i + a, j + b, n + 1, 1]
+            fm += w0 * values[i + a, j + b, n, 2] + w1 * values[i + a, j + b, n + 1, 2]
+    return fx, fz, fm
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def _signal(signals: Signals, number: int) -> float:
+    if number == 0:
+        return signals.alpha
+    if number == 1:
+        return signals.elevator
+    return signals.qhat if number == 2 else signals.alpha_dot_hat
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def _terms(
+    x: Array, signals: Signals, effects: EffectArrays, in_alpha_dot: bool, feedback: float
+) -> tuple[float, float]:
+    """Increments of CL and Cm by the effects' terms in alpha', or by all others.
+
+    Parameters
+    ----------
+    feedback : loss of alpha_dot_hat by a unit of CL [-]; a term of CL in alpha' is part of the alpha' that it is
+        proportional to.
+    """
+    lift = moment = 0.0
+    for t in range(effects.amplitude.size):
+        number = effects.term_index[t, 1]
+        if (number == _ALPHA_DOT) != in_alpha_dot:
+            continue
+        state, amplitude = effects.term_index[t, 3], effects.amplitude[t]
+        s = x[state] if state >= 0 else _signal(signals, number)
+        if in_alpha_dot and effects.term_index[t, 0] == 0:
+            s /= 1.0 + amplitude * feedback
+        increment = amplitude * _shape(effects.term_index[t, 2], s - effects.origin[t])
+        if effects.term_index[t, 0] == 0:
+            lift += increment
+        else:
+            moment += increment
+    return lift, moment
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
+    """x' of the motion, the gusts and the effects' states into ``out``; returns az at the CG [m/s2]."""
+    aircraft, gusts = model.aircraft, model.gusts
+    v, ground, qbar = at.airspeed_m_s, at.ground_m_s, at.qbar_pa
+    upward = gust(x, gusts.rolloff)
+    alpha = air_alpha(x, upward, gusts.level_m_s, at)
+    cosine, sine = math.cos(alpha), math.sin(alpha)
+    weight = G0 * math.cos(at.theta_rad - x[0]) / ground
+    q = x[1]
+    late = (upward - x[4]) / gusts.rotary_time_s
+    surface = effective_elevator(at.elevator_rad, aircraft)
+    force, half = qbar * aircraft.area_m2, 0.5 * aircraft.chord_m / v
+    qhat = (q - gusts.rotary * gusts.level_m_s * late / v) * half
+    fx, fz, fm = _look_up(aircraft, alpha, surface, qhat)
+    fx = fx * qbar + aircraft.constant[0]
+    fz = fz * qbar + aircraft.constant[1]
+    fm = fm * qbar + aircraft.constant[2]
+    d_alpha, d_de, more = (
+        alpha - aircraft.trim_alpha_rad,
+        surface - aircraft.trim_elevator_rad,
+        aircraft.increments,
+    )
+    lift = at.lift + more[0] * d_alpha + more[1] * qhat + more[2] * d_de
+    moment = at.moment + more[3] * d_alpha + more[4] * qhat + more[5] * d_de
+    mass = aircraft.mass_kg
+    if model.effects.amplitude.size > 0:
+        signals = Signals(alpha, surface, qhat, 0.0)
+        added = _terms(x, signals, model.effects, False, 0.0)
+        lift, moment = lift + added[0], moment + added[1]
+        # terms in alpha' last: they take alpha' with everything else in it
+        first = q + ((fz - force * lift) * cosine - fx * sine) / (mass * ground) + weight
+        signals = Signals(alpha, surface, qhat, first * half)
+        added = _terms(x, signals, model.effects, True, half * force * cosine / (mass * v))
+        lift, moment = lift + added[0], moment + added[1]
+    fz -= force * lift
+    fm += (
+        force * aircraft.chord_m * (moment - aircraft.cg_shift * fz / force)
+        + (aircraft.thrust_n + aircraft.thrust_slope_m2 * qbar) * aircraft.thrust_arm_m
+    )
+    out[0] = q + (fz * cosine - fx * sine) / (mass * ground) + weight
+    out[1] = fm / aircraft.inertia_kg_m2
+    _gust_rates(x, v, late, gusts, out)
+    _effect_rates(x, Signals(alpha, surface, qhat, out[0] * half), model, out)
+    return float(fz / mass)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def _gust_rates(x: Array, v: float, late: float, gusts: GustModel, out: Array) -> None:
+    a = v / gusts.length_m
+    out[2] = -a * x[2]
+    out[3] = a * (x[2] - x[3])
+    out[4] = late
+    for i in range(LEAD_COUNT):
+        out[LEAD + i] = _LEAD_RAD_S[i] * (x[2] - x[LEAD + i])
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def _effect_rates(x: Array, signals: Signals, model: FilterModel, out: Array) -> None:
+    effects = model.effects
+    for k in range(effects.time_s.size):
+        at = model.states.effect[k]
+        s = _signal(signals, effects.state_index[k, 1])
+        if effects.state_index[k, 0] == 0:
+            out[at] = (s - x[at]) / effects.time_s[k]
+        else:
+            wn = 1.0 / effects.time_s[k]
+            out[at] = x[at + 1]
+            out[at + 1] = wn * wn * (s - x[at]) - 2.0 * effects.damping[k] * wn * x[at + 1]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def settle_effects(x: Array, alpha_rad: float, elevator_rad: float, model: FilterModel) -> None:
+    """Put the effects' states into equilibrium with a steady angle of attack and surface deflection [rad]."""
+    for k in range(model.effects.time_s.size):
+        signal, s = model.effects.state_index[k, 1], 0.0
+        if signal == 0:
+            s = alpha_rad
+        elif signal == 1:
+            s = elevator_rad
+        x[model.states.effect[k]] = s
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def air_at(grid: GridSignals, point: int) -> AirPoint:
+    """Inputs at a point of the filter's grid."""
+    return AirPoint(
+        grid.elevator_rad[point],
+        grid.airspeed_m_s[point],
+        grid.ground_m_s[point],
+        grid.qbar_pa[point],
+        grid.theta_rad[point],
+        grid.lift[point],
+        grid.moment[point],
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def outputs(x: Array, q_dot: float, az: float, at: AirPoint, model: FilterModel, y: Array) -> None:
+    """What the sensors read without bias, lag, delay and noise: alpha [rad], q [rad/s], az [m/s2].
+
+    Parameters
+    ----------
+    q_dot, az : pitch acceleration [rad/s2] and az at the CG [m/s2].
+    """
+    scale, arm = model.sensors.scale, model.sensors.arm_m
+    alpha = air_alpha(x, gust(x, model.gusts.rolloff), model.gusts.level_m_s, at)
+    y[0] = scale[0] * _vane(alpha, x[1], arm[0], at.airspeed_m_s)
+    y[1] = scale[1] * x[1]
+    y[2] = scale[2] * (az - arm[2] * q_dot)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def lead_decay(dt_s: float, i: int) -> tuple[float, float]:
+    """Decay of a low-passed copy over a time [s], and its mean over that time [-]."""
+    r = _LEAD_RAD_S[i] * dt_s
+    decay = math.exp(-r)
+    return decay, (1.0 - decay) / r
+
+
+__all__ = [
+    "FASTMATH",
+    "air_alpha",
+    "air_at",
+    "effective_elevator",
+    "gust",
+    "lead_decay",
+    "outputs",
+    "rates",
+    "settle_effects",
+]

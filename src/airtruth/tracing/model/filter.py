@@ -1,0 +1,367 @@
+"""Innovations of a record: the nonlinear motion, corrected with the steady gain of its linearisation.
+
+Between samples the motion is integrated by the classical Runge-Kutta method, whose weights are Simpson's: the middle
+value of an input carries its area. The low-passed copies of the gust, the lags and the delays of sensors are
+integrated exactly for a signal that is linear over half a step.
+
+Source: R. E. Maine and K. W. Iliff, NASA RP-1138 (1985), for the filter.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from airtruth.numerics.discretise import step
+from airtruth.tracing.model.corners import (
+    Corners,
+    corrected,
+    gain_at,
+    input_column,
+    predicted,
+    settled,
+    spread_of,
+)
+from airtruth.tracing.model.equations import (
+    FASTMATH,
+    air_at,
+    effective_elevator,
+    gust,
+    lead_decay,
+    outputs,
+    rates,
+    settle_effects,
+)
+from airtruth.tracing.model.kernel_input import FilterModel, GridSignals, KernelInput
+from airtruth.tracing.model.linearise import (
+    delay_system,
+    discrete,
+    gain_of,
+    linearise,
+    process_intensity,
+)
+from airtruth.tracing.model.parameters import CORE, DELAY_ORDER, LEAD, LEAD_COUNT, OUTPUTS
+
+Array = NDArray[np.float64]
+
+_LOST: Final = 1e6
+"""Magnitude of a state [its unit] beyond which the motion has left all bounds; judgement."""
+
+
+class Steps(NamedTuple):
+    """Exact steps of the linear states, over half a step of integration and a whole one.
+
+    Attributes
+    ----------
+    h : step of integration [s].
+    decay, mean : (2, leads) of the gust's low-passed copies [-].
+    phi, early, late : (outputs, order, order), (outputs, order) of the sensors' delays over half a step.
+    forget : decay of the slow noise over a sample [-].
+    has_late_sensors : whether any sensor has a lag or a delay.
+    """
+
+    h: float
+    decay: Array
+    mean: Array
+    phi: Array
+    early: Array
+    late: Array
+    forget: float
+    has_late_sensors: bool
+
+
+class Work(NamedTuple):
+    """Arrays that one record reuses.
+
+    Attributes
+    ----------
+    rate : (4, states) of the stages; tried : (states,) at a stage.
+    out, last : (outputs,) at the end and the start of a step; first : (2,) rates of alpha and q at its start.
+    ends : (3,) a signal at start, middle and end of a step; held : (order,) states of a delay.
+    """
+
+    rate: Array
+    tried: Array
+    out: Array
+    last: Array
+    first: Array
+    ends: Array
+    held: Array
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def _steps(model: FilterModel, dt_s: float, sub: int) -> Steps:
+    h = 2.0 * dt_s / sub
+    decay, mean = np.empty((2, LEAD_COUNT)), np.empty((2, LEAD_COUNT))
+    for j in range(2):
+        for i in range(LEAD_COUNT):
+            decay[j, i], mean[j, i] = lead_decay(0.5 * (j + 1) * h, i)
+    phi = np.zeros((OUTPUTS, DELAY_ORDER, DELAY_ORDER))
+    early, late = np.zeros((OUTPUTS, DELAY_ORDER)), np.zeros((OUTPUTS, DELAY_ORDER))
+    for i in range(OUTPUTS):
+        if model.states.delay[i] >= 0:
+            transition, noise = np.empty((DELAY_ORDER, DELAY_ORDER)), np.empty((DELAY_ORDER, DELAY_ORDER))
+            input0, input1 = np.empty((DELAY_ORDER, 1)), np.empty((DELAY_ORDER, 1))
+            system = delay_system(model.sensors.delay_s[i])
+            step(system, np.zeros(DELAY_ORDER), DELAY_ORDER, 0.5 * h, transition, input0, input1, noise)
+            phi[i] = transition
+            early[i] = input0[:, 0]
+            late[i] = input1[:, 0]
+    states = model.states
+    forget = math.exp(-dt_s / model.sensors.slow_time_s) if states.noise >= 0 else 0.0
+    has_late_sensors = states.size > states.motion + (OUTPUTS if states.noise >= 0 else 0)
+    return Steps(h, decay, mean, phi, early, late, forget, has_late_sensors)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def _initial_state(given: KernelInput) -> Array:
+    """The stated start; the gust at the tail and its copies, and the effects' states, in equilibrium with it."""
+    model = given.model
+    x = np.zeros(model.states.size)
+    x[:4] = given.start
+    x[LEAD:CORE] = given.start[2]
+    x[4] = gust(x, model.gusts.rolloff)
+    settle_effects(x, x[0], effective_elevator(given.grid.elevator_rad[0], model.aircraft), model)
+    return x
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def _settle_sensors(x: Array, out: Array, model: FilterModel) -> None:
+    """Put the sensors' lags and delays into equilibrium with their inputs."""
+    for i in range(OUTPUTS):
+        if model.states.lag[i] >= 0:
+            x[model.states.lag[i]] = out[i]
+        if model.states.delay[i] >= 0:
+            x[model.states.delay[i]] = out[i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def _reading(x: Array, value: float, i: int, model: FilterModel) -> float:
+    """What a sensor with lag, delay and slow noise reads of an output."""
+    at = model.states.lag[i]
+    if at >= 0:
+        value = x[at]
+    at = model.states.delay[i]
+    if at >= 0:
+        for row in range(1, DELAY_ORDER, 2):
+            value -= 2.0 * x[at + row]
+    if model.states.noise >= 0:
+        value += model.sensors.slow_std[i] * x[model.states.noise + i]
+    return value
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def _advance_motion(
+    x: Array, point: int, grid: GridSignals, model: FilterModel, steps: Steps, work: Work
+) -> None:
+    """One Runge-Kutta step of motion, gusts and effects; the outputs at its start into ``work`` for late sensors."""
+    h, rate, tried, motion = steps.h, work.rate, work.tried, model.states.motion
+    for stage in range(4):
+        share = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
+        at = air_at(grid, point + (0 if stage == 0 else (2 if stage == 3 else 1)))
+        for m in range(motion):
+            tried[m] = x[m] + (share * h * rate[stage - 1, m] if stage > 0 else 0.0)
+        if stage > 0:
+            j = 1 if stage == 3 else 0
+            for i in range(LEAD_COUNT):
+                decay, mean = steps.decay[j, i], steps.mean[j, i]
+                tried[LEAD + i] = decay * x[LEAD + i] + (mean - decay) * x[2] + (1.0 - mean) * tried[2]
+        az = rates(tried, at, model, rate[stage])
+        if stage == 0 and steps.has_late_sensors:
+            outputs(tried, rate[0, 1], az, at, model, work.last)
+            work.first[0], work.first[1] = rate[0, 0], rate[0, 1]
+    for m in range(motion):
+        slope = rate[0, m] + 2.0 * rate[1, m] + 2.0 * rate[2, m] + rate[3, m]
+        x[m] += h / 6.0 * slope
+    x[LEAD:CORE] = tried[LEAD:CORE]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def _advance_sensors(
+    x: Array, point: int, grid: GridSignals, model: FilterModel, steps: Steps, work: Work
+) -> None:
+    """Lags and delays over the step that `_advance_motion` has made, in two halves.
+
+    In between the signal has the motion's own curvature: a cubic through values and slopes.
+    """
+    at = air_at(grid, point + 2)
+    az = rates(x, at, model, work.rate[0])
+    outputs(x, work.rate[0, 1], az, at, model, work.out)
+    ends = work.ends
+    for i in range(OUTPUTS):
+        middle = 0.5 * (work.last[i] + work.out[i])
+        if i < 2:
+            middle += model.sensors.scale[i] * steps.h / 8.0 * (work.first[i] - work.rate[0, i])
+        ends[0], ends[1], ends[2] = work.last[i], middle, work.out[i]
+        if model.states.lag[i] >= 0:
+            _advance_lag(x, model.states.lag[i], 0.5 * steps.h / model.sensors.lag_s[i], ends)
+        if model.states.delay[i] >= 0:
+            _advance_delay(x, model.states.delay[i], i, steps, work)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def _advance_lag(x: Array, at: int, r: float, ends: Array) -> None:
+    """A lag over two half steps of r time constants each; its output replaces its input in ``ends``."""
+    decay = math.exp(-r)
+    mean = (1.0 - decay) / r
+    before = ends[0]
+    ends[0] = x[at]
+    for half in range(1, 3):
+        x[at] = decay * x[at] + (mean - decay) * before + (1.0 - mean) * ends[half]
+        before, ends[half] = ends[half], x[at]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def _advance_delay(x: Array, at: int, i: int, steps: Steps, work: Work) -> None:
+    ends, held = work.ends, work.held
+    for half in range(2):
+        for row in range(DELAY_ORDER):
+            held[row] = x[at + row]
+        for row in range(DELAY_ORDER):
+            total = steps.early[i, row] * ends[half] + steps.late[i, row] * ends[half + 1]
+            for m in range(DELAY_ORDER):
+                total += steps.phi[i, row, m] * held[m]
+            x[at + row] = total
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def _update(x: Array, k_gain: Array, e: Array) -> bool:
+    """x += K e; False if the motion leaves all bounds."""
+    for i in range(x.size):
+        total = 0.0
+        for m in range(OUTPUTS):
+            total += k_gain[i, m] * e[m]
+        x[i] += total
+        if not abs(x[i]) < _LOST:
+            return False
+    return True
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def innovations(given: KernelInput, k_gain: Array, corners: Corners, e: Array) -> tuple[bool, float]:
+    """Innovations of one record into ``e`` (samples, outputs).
+
+    Parameters
+    ----------
+    k_gain : (states, outputs) of the update; zeros for a free run.
+    corners : recursion where the surface is uncertain; unused if ``given.corner_rad2`` is empty.
+
+    Returns
+    -------
+    Whether the motion keeps its bounds, and the sum of log|S| beyond the steady one.
+    """
+    model, grid, states = given.model, given.grid, given.model.states
+    n, samples = states.size, given.y.shape[0]
+    steps = _steps(model, given.dt_s, given.sub)
+    work = Work(
+        np.zeros((4, n)),
+        np.zeros(n),
+        np.zeros(OUTPUTS),
+        np.zeros(OUTPUTS),
+        np.zeros(2),
+        np.zeros(3),
+        np.zeros(DELAY_ORDER),
+    )
+    x = _initial_state(given)
+    uncertain, more_logdet, p = False, 0.0, corners.steady
+    own_gain, scale, raw = k_gain.copy(), np.eye(OUTPUTS), np.empty(OUTPUTS)
+    for k in range(samples):
+        at = air_at(grid, k * given.sub)
+        az = rates(x, at, model, work.rate[0])
+        outputs(x, work.rate[0, 1], az, at, model, work.out)
+        if k == 0:
+            _settle_sensors(x, work.out, model)
+        for i in range(OUTPUTS):
+            value = _reading(x, work.out[i], i, model)
+            e[k, i] = given.y[k, i] - value - model.sensors.bias[i] - given.more[k, i]
+        raw[:] = e[k]
+        if given.corner_rad2.size > 0:
+            if uncertain:
+                more, away = gain_at(p, corners, own_gain, scale)
+                if not math.isfinite(more):
+                    return False, 0.0
+                more_logdet += more
+                e[k] = np.dot(scale, raw)
+                uncertain = not settled(away)
+            else:
+                own_gain[:] = k_gain
+                p = corners.steady
+        if k + 1 == samples:
+            break
+        if not _update(x, own_gain, raw):
+            return False, 0.0
+        if given.corner_rad2.size > 0 and (uncertain or given.corner_rad2[k + 1] > 0.0):
+            p = predicted(corrected(p, own_gain, corners.c), corners, given.corner_rad2[k + 1])
+            uncertain = True
+        if states.noise >= 0:
+            for i in range(states.noise, n):
+                x[i] *= steps.forget
+        for pair in range(given.sub // 2):
+            point = k * given.sub + 2 * pair
+            _advance_motion(x, point, grid, model, steps, work)
+            if steps.has_late_sensors:
+                _advance_sensors(x, point, grid, model, steps, work)
+    return True, more_logdet
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def evaluate(given: KernelInput, free_run: bool, e: Array, white: Array, s: Array) -> tuple[float, float]:
+    """Innovations of one record into ``e``, whitener and covariance of the steady filter into ``white`` and ``s``.
+
+    Where the surface is uncertain, the innovations are scaled to the steady covariance.
+
+    Parameters
+    ----------
+    free_run : no gain: the residuals of a simulation; ``white`` and ``s`` are left alone. The surface is then certain.
+
+    Returns
+    -------
+    log|S| of the steady filter, nan on failure, and the sum over the samples of log|S| beyond it.
+    """
+    model = given.model
+    n = model.states.size
+    k_gain = np.zeros((n, OUTPUTS))
+    none = np.zeros((0, 0))
+    corners = Corners(none, none, none, none, none, model.sensors.variance, none, none, 0.0)
+    if free_run:
+        sound, _ = innovations(given, k_gain, corners, e)
+        return (0.0 if sound else np.nan), 0.0
+    a, c = np.empty((n, n)), np.empty((OUTPUTS, n))
+    linearise_at_reference(given, a, c)
+    process = process_intensity(given.reference.airspeed_m_s, model)
+    phi, noise = discrete(a, process, given.dt_s)
+    k_gain, w, cov, logdet, p = gain_of(phi, c, noise, model.sensors.variance)
+    if not math.isfinite(logdet):
+        return np.nan, 0.0
+    white[:] = w
+    s[:] = cov
+    if given.corner_rad2.size > 0:
+        spread = spread_of(a, input_column(_reference_state(given), given.reference, model), phi, given.dt_s)
+        variance = model.sensors.variance
+        corners = Corners(
+            phi, noise, spread, p, c, variance, cov, np.ascontiguousarray(np.linalg.inv(w)), logdet
+        )
+    sound, more = innovations(given, k_gain, corners, e)
+    return (logdet if sound else np.nan), more
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def _reference_state(given: KernelInput) -> Array:
+    """The record's mean, effects' states in equilibrium with it."""
+    x = np.zeros(given.model.states.size)
+    x[0] = given.reference_alpha_rad
+    settle_effects(x, x[0], given.reference.elevator_rad, given.model)
+    return x
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def linearise_at_reference(given: KernelInput, a: Array, c: Array) -> None:
+    """`linearise` at the record's mean, effects' states in equilibrium with it."""
+    linearise(_reference_state(given), given.reference, given.model, a, c)
+
+
+__all__ = ["evaluate", "innovations", "linearise_at_reference"]

@@ -1,0 +1,193 @@
+"""What the compiled filter reads: named arrays, grouped by what they describe."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.tracing.model.parameters import StateLayout
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class AircraftArrays(NamedTuple):
+    """The declared aircraft with its changes of declared quantities.
+
+    Attributes
+    ----------
+    area_m2, chord_m : reference area [m2] and chord [m].
+    mass_kg, inertia_kg_m2 : mass [kg] and pitch inertia [kg m2].
+    trim_alpha_rad, trim_elevator_rad : about which increments of derivatives count [rad].
+    neutral_elevator_rad : about which a deflection is scaled [rad]; effectiveness : that scale [-].
+    cg_shift : CG aft of the declared one [chords].
+    thrust_arm_m : arm of the thrust below the CG beyond the declared one [m].
+    thrust_n, thrust_slope_m2 : thrust at no dynamic pressure [N], and its slope over that [m2].
+    constant : (3,) X, Z [N] and M [N m] that the dynamic pressure leaves alone.
+    increments : (6,) of CLalpha, CLq, CLde, Cmalpha, Cmq, Cmde [-].
+    alpha_rad, elevator_rad, qhat : axes of the tables [rad, rad, -].
+    values : (alpha, elevator, qhat, 3) X, Z [m2] and M [m3] of the air over the dynamic pressure.
+    """
+
+    area_m2: float
+    chord_m: float
+    mass_kg: float
+    inertia_kg_m2: float
+    trim_alpha_rad: float
+    trim_elevator_rad: float
+    neutral_elevator_rad: float
+    effectiveness: float
+    cg_shift: float
+    thrust_arm_m: float
+    thrust_n: float
+    thrust_slope_m2: float
+    constant: Array
+    increments: Array
+    alpha_rad: Array
+    elevator_rad: Array
+    qhat: Array
+    values: Array
+
+
+class GustModel(NamedTuple):
+    """Vertical gusts.
+
+    Attributes
+    ----------
+    level_m_s : standard deviation of Dryden's part [m/s].
+    length_m : scale length [m].
+    rolloff : 0 for Dryden's spectrum, 1 for von Karman's [-].
+    rotary : share of the rotary gust [-].
+    rotary_time_s : time the gust takes to the tail, 4 b/(pi V) [s].
+    """
+
+    level_m_s: float
+    length_m: float
+    rolloff: float
+    rotary: float
+    rotary_time_s: float
+
+
+class EffectArrays(NamedTuple):
+    """Aerodynamic terms and states of effects; numbers follow the order of the names in `airtruth.physics.terms`.
+
+    Attributes
+    ----------
+    term_index : (terms, 4) coefficient (0 CL, 1 Cm), signal (-1 for a state), shape, state (-1 for a signal).
+    amplitude, origin : (terms,) of each term.
+    state_index : (states, 2) kind (0 lag, 1 mode), signal.
+    time_s, damping : (states,) of each state [s], [-].
+    """
+
+    term_index: Ints
+    amplitude: Array
+    origin: Array
+    state_index: Ints
+    time_s: Array
+    damping: Array
+
+
+class SensorArrays(NamedTuple):
+    """Errors of the outputs alpha, q, az.
+
+    Attributes
+    ----------
+    bias : (3,) [units of the outputs]; scale : (3,) [-]; arm_m : (3,) position ahead of the CG [m].
+    lag_s, delay_s : (3,) [s]; 0 for none.
+    variance : (3,) of the white noise [units of the outputs squared].
+    slow_std : (3,) of the slow noise, a Gauss-Markov process [units of the outputs]; slow_time_s : its correlation
+        time [s].
+    """
+
+    bias: Array
+    scale: Array
+    arm_m: Array
+    lag_s: Array
+    delay_s: Array
+    variance: Array
+    slow_std: Array
+    slow_time_s: float
+
+
+class FilterModel(NamedTuple):
+    """Everything that does not change along a record."""
+
+    aircraft: AircraftArrays
+    gusts: GustModel
+    effects: EffectArrays
+    sensors: SensorArrays
+    states: StateLayout
+
+
+class AirPoint(NamedTuple):
+    """Known inputs at one time.
+
+    Attributes
+    ----------
+    elevator_rad : surface that the air sees [rad].
+    airspeed_m_s, ground_m_s : speed through the air, and without the gust along the path [m/s].
+    qbar_pa : dynamic pressure [Pa].
+    theta_rad : pitch attitude [rad].
+    lift, moment : increments of CL and Cm [-].
+    """
+
+    elevator_rad: float
+    airspeed_m_s: float
+    ground_m_s: float
+    qbar_pa: float
+    theta_rad: float
+    lift: float
+    moment: float
+
+
+class GridSignals(NamedTuple):
+    """The same on the filter's grid, (points,) each."""
+
+    elevator_rad: Array
+    airspeed_m_s: Array
+    ground_m_s: Array
+    qbar_pa: Array
+    theta_rad: Array
+    lift: Array
+    moment: Array
+
+
+class KernelInput(NamedTuple):
+    """One record, one model.
+
+    Attributes
+    ----------
+    y : (samples, 3) measured alpha [rad], q [rad/s], az [m/s2]; more : (samples, 3) added to the predicted outputs.
+    grid : known inputs, ``sub`` (even) cells to a sample.
+    corner_rad2 : (samples,) variance of the surface's mean over the cell that ends at each sample, about that of the
+        grid [rad2]; empty if the surface is known between the samples.
+    dt_s : sample period [s].
+    start : (4,) initial alpha [rad], q [rad/s] and gust states [-].
+    reference_alpha_rad, reference : state and inputs at which the gain is made.
+    model : see there.
+    """
+
+    y: Array
+    more: Array
+    grid: GridSignals
+    corner_rad2: Array
+    dt_s: float
+    sub: int
+    start: Array
+    reference_alpha_rad: float
+    reference: AirPoint
+    model: FilterModel
+
+
+__all__ = [
+    "AirPoint",
+    "AircraftArrays",
+    "EffectArrays",
+    "FilterModel",
+    "GridSignals",
+    "GustModel",
+    "KernelInput",
+    "SensorArrays",
+]

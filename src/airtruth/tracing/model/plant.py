@@ -1,0 +1,273 @@
+"""Forces of the declared aircraft over alpha, elevator and pitch rate: probed in JSBSim, or of the linear model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.aircraft import Aircraft
+from airtruth.errors import AircraftError
+from airtruth.physics.short_period import PARAMETERS
+from airtruth.simulation.linearise import linearise
+from airtruth.simulation.probe import Grid, probe
+from airtruth.simulation.simulator import Condition, Executive
+from airtruth.simulation.trim import Trim, trim
+from airtruth.units import DEG, G0, LBF
+
+Array = NDArray[np.float64]
+
+RELATIVE_STD: Final = (0.05, 0.30, 0.10, 0.05, 0.15, 0.05)
+"""Standard deviation of a declared derivative that states none, over its value [-] (judgement): smaller ones
+let a declared error pass for an effect, larger ones let the derivatives absorb an effect."""
+_LEAST_STD: Final = (0.005, 0.1, 0.002, 0.001, 0.05, 0.001)
+"""Least standard deviation of a declared derivative [-] (judgement): keeps the prior regular where a
+derivative is near zero."""
+_CERTAIN: Final = 1e-6
+"""Relative standard deviation of a pitch inertia that is declared without one [-]: none, but the prior stays regular."""
+_SPEEDS: Final = np.array([0.97, 1.0, 1.03])
+"""Airspeeds over the trim's at which the engines are probed [-] (judgement): a flight test's scatter."""
+_RATE_MARGIN: Final = 1.2
+"""Range of the tables' pitch rate over the largest measured one [-] (judgement)."""
+_LEAST_RATE_RAD_S: Final = 0.05
+"""Least range of the tables' pitch rate [rad/s] (judgement)."""
+_RATES: Final = 7
+"""Points of the tables' pitch-rate axis [-] (judgement): the forces are nearly linear in it."""
+
+
+@dataclass(frozen=True)
+class Plant:
+    """The declared aircraft about one trim, as the filter needs it.
+
+    Attributes
+    ----------
+    alpha_rad, elevator_rad, qhat : axes of the tables; qhat = q c/(2V).
+    values : (alpha, elevator, qhat, 3) X, Z [m2] and M [m3] of the air over the dynamic pressure.
+    constant : (3,) X, Z [N] and M [N m] that the dynamic pressure leaves alone: the engines'.
+    trim_alpha_rad, trim_elevator_rad : origin of the increments of the derivatives [rad].
+    neutral_elevator_rad : deflection that an effectiveness leaves alone [rad]: zero, for the linear model its trim.
+    alpha_shift_rad : subtracted from the measured alpha and theta [rad]; the linear model counts alpha from its trim.
+    thrust : (2,) thrust at no dynamic pressure [N], and its slope over the dynamic pressure [m2].
+    derivatives, derivative_cov : (6,) declared values and (6, 6) covariance, mass, inertia and CG
+        included.
+    trim : of the JSBSim aircraft, None for a linear one.
+    """
+
+    aircraft: Aircraft
+    alpha_rad: Array
+    elevator_rad: Array
+    qhat: Array
+    values: Array
+    constant: Array
+    trim_alpha_rad: float
+    trim_elevator_rad: float
+    neutral_elevator_rad: float
+    alpha_shift_rad: float
+    thrust: Array
+    derivatives: Array
+    derivative_cov: Array
+    trim: Trim | None
+
+
+def trim_of(
+    aircraft: Aircraft, airspeed_m_s: float, density_kg_m3: float, altitude_m: float, gamma_rad: float
+) -> Trim:
+    """Trim the declared JSBSim aircraft at a measured airspeed.
+
+    Raises
+    ------
+    TrimError
+        If it cannot fly there.
+    """
+    eas = airspeed_m_s * float(np.sqrt(density_kg_m3 / 1.225))
+    return trim(aircraft, Condition(eas, altitude_m, gamma_rad))
+
+
+def probed(
+    aircraft: Aircraft, at: Trim, alpha: tuple[float, float], elevator: tuple[float, float], q: float
+) -> Plant:
+    """Tables of the JSBSim aircraft over the stated ranges, on whole degrees where its own tables break.
+
+    Forces of the air are taken to go with the dynamic pressure at equal qhat, those of the engines to stay.
+
+    Parameters
+    ----------
+    alpha, elevator : lowest and highest angle [rad]; q : largest pitch rate [rad/s].
+    """
+
+    def whole(low: float, high: float, step: float) -> Array:
+        first, last = np.floor(low / step) - 1.0, np.ceil(high / step) + 1.0
+        return np.arange(first, last + 1.0) * step
+
+    offset = at.controls.elevator_command_rad - at.elevator_rad
+    rates = np.linspace(-1.0, 1.0, _RATES) * max(q * _RATE_MARGIN, _LEAST_RATE_RAD_S)
+    commands = whole(elevator[0] + offset, elevator[1] + offset, DEG)
+    tables = probe(aircraft, at, Grid(whole(alpha[0], alpha[1], DEG), commands, rates, np.ones(1))).tables
+    power = engines(aircraft, at)
+    constant = power.constant
+    pressure = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2
+    declared = linearise(aircraft, at)
+    constants = aircraft.constants
+    return Plant(
+        aircraft=aircraft,
+        alpha_rad=tables.alpha_rad,
+        elevator_rad=tables.elevator_rad,
+        qhat=tables.q_rad_s * constants.chord_m / (2.0 * at.airspeed_m_s),
+        values=np.ascontiguousarray((tables.values[0] - constant) / pressure),
+        constant=constant,
+        trim_alpha_rad=at.alpha_rad,
+        trim_elevator_rad=at.elevator_rad,
+        neutral_elevator_rad=0.0,
+        alpha_shift_rad=0.0,
+        thrust=power.thrust,
+        derivatives=declared.central,
+        derivative_cov=declared_covariance(aircraft, declared.central),
+        trim=at,
+    )
+
+
+@dataclass(frozen=True)
+class Engines:
+    """What the engines do at a trim, lines over the dynamic pressure.
+
+    Attributes
+    ----------
+    constant : (3,) X, Z [N] and M [N m] of the aircraft that do not go with the dynamic pressure.
+    thrust : (2,) thrust along body x at none [N], and its slope over the dynamic pressure [m2].
+    """
+
+    constant: Array
+    thrust: Array
+
+
+def engines(aircraft: Aircraft, at: Trim) -> Engines:
+    """The engines of the JSBSim aircraft, from three airspeeds about a trim."""
+    executive = Executive(aircraft, 1.0 / 200.0)
+    inertia = aircraft.constants.inertia_yy_kg_m2
+    rows = []
+    for ratio in _SPEEDS:
+        condition = replace(at.condition, eas_m_s=at.condition.eas_m_s * float(ratio))
+        executive = executive.again()
+        total = executive.nodes(["forces/fbx-total-lbs", "forces/fbz-total-lbs"])
+        air = executive.node("forces/fbx-aero-lbs")
+        executive.initialise(condition, at.alpha_rad, at.controls)
+        moment = executive.respond().q_dot_rad_s2 * inertia
+        x, z = (node.get_double_value() * LBF for node in total)
+        rows.append([x, z, moment, x - air.get_double_value() * LBF])
+    pressures = 0.5 * at.density_kg_m3 * (at.airspeed_m_s * _SPEEDS) ** 2
+    basis = np.column_stack([np.ones_like(pressures), pressures])
+    fitted = np.linalg.lstsq(basis, np.array(rows), rcond=None)[0]
+    return Engines(np.ascontiguousarray(fitted[0, :3]), np.ascontiguousarray(fitted[:, 3]))
+
+
+def linear(
+    aircraft: Aircraft,
+    derivatives: Array,
+    airspeed_m_s: float,
+    density_kg_m3: float,
+    alpha: float,
+    elevator: float,
+    power: Engines | None = None,
+) -> Plant:
+    """The linear short-period model about a measured trim, as tables of two points per axis.
+
+    Parameters
+    ----------
+    derivatives : (6,) declared.
+    alpha, elevator : the record's own trim [rad].
+    power : engines, whose pitching moment that of the air balances at trim; None for none, and a thrust of a
+        tenth of the weight for its arm.
+    """
+    engine_moment = 0.0 if power is None else float(power.constant[2])
+    c = aircraft.constants
+    s, chord = c.wing_area_m2, c.chord_m
+    pressure = 0.5 * density_kg_m3 * airspeed_m_s**2
+    axis = np.array([-1.0, 1.0])
+    values = np.zeros((2, 2, 2, 3))
+    for i, a in enumerate(axis):
+        for j, d in enumerate(axis):
+            for k, q in enumerate(axis):
+                x = np.array([a, q, d])
+                values[i, j, k, 1] = -s * float(derivatives[:3] @ x) - c.mass_kg * G0 / pressure
+                values[i, j, k, 2] = s * chord * float(derivatives[3:] @ x) - engine_moment / pressure
+    return Plant(
+        aircraft=aircraft,
+        alpha_rad=axis,
+        elevator_rad=axis + elevator,
+        qhat=axis,
+        values=values,
+        constant=np.array([0.0, 0.0, engine_moment]),
+        trim_alpha_rad=0.0,
+        trim_elevator_rad=elevator,
+        neutral_elevator_rad=elevator,
+        alpha_shift_rad=alpha,
+        thrust=np.array([0.1 * c.mass_kg * G0, 0.0]) if power is None else power.thrust,
+        derivatives=np.asarray(derivatives, dtype=np.float64),
+        derivative_cov=declared_covariance(aircraft, np.asarray(derivatives)),
+        trim=None,
+    )
+
+
+def declared_derivatives(aircraft: Aircraft, at: Trim | None) -> Array:
+    """(6,) of the JSBSim model at a trim, or as aircraft.toml states them.
+
+    Raises
+    ------
+    AircraftError
+        If neither is there.
+    """
+    if at is not None:
+        return linearise(aircraft, at).central
+    stated = aircraft.file.derivatives
+    missing = [name for name in PARAMETERS if name not in stated]
+    if missing:
+        raise AircraftError(
+            f"{aircraft.folder}: without a JSBSim model aircraft.toml needs [derivatives] with {', '.join(missing)}; "
+            "write what `airtruth identify` estimates there, each as { value = ..., std = ... }"
+        )
+    return np.array([stated[name].value for name in PARAMETERS])
+
+
+def declared_covariance(aircraft: Aircraft, derivatives: Array) -> Array:
+    """(6, 6) covariance of the derivatives as aircraft.toml declares it, with what mass, inertia and CG add.
+
+    A coefficient that acts on another mass or inertia looks like another coefficient: 1/m on the three of
+    lift, 1/Iyy on the three of moment; a CG aft by dx chords adds CLalpha dx, CLq dx, CLde dx to the moment.
+    """
+    stated = aircraft.file.derivatives
+    std = np.empty(6)
+    for i, name in enumerate(PARAMETERS):
+        quantity = stated.get(name)
+        relative = quantity.std / abs(quantity.value) if quantity and quantity.std > 0.0 else RELATIVE_STD[i]
+        std[i] = max(relative * abs(derivatives[i]), _LEAST_STD[i])
+    covariance = np.diag(std**2)
+    mass = aircraft.file.mass
+    if mass is not None:
+        for quantity, direction in (
+            (mass.mass, np.concatenate([derivatives[:3], np.zeros(3)])),
+            (mass.inertia_yy, np.concatenate([np.zeros(3), derivatives[3:]])),
+        ):
+            relative = quantity.std / quantity.value
+            covariance += relative**2 * np.outer(direction, direction)
+        shift = np.concatenate([np.zeros(3), derivatives[:3]])
+        covariance += mass.cg.std**2 * np.outer(shift, shift)
+    return covariance
+
+
+def inertia_std(aircraft: Aircraft) -> float:
+    """Relative standard deviation of the declared pitch inertia [-]; next to none where none is stated."""
+    mass = aircraft.file.mass
+    return _CERTAIN if mass is None else max(mass.inertia_yy.std / mass.inertia_yy.value, _CERTAIN)
+
+
+__all__ = [
+    "Plant",
+    "declared_covariance",
+    "declared_derivatives",
+    "inertia_std",
+    "linear",
+    "probed",
+    "trim_of",
+]

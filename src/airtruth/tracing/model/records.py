@@ -1,0 +1,270 @@
+"""Measured records for the filter: outputs at the samples, inputs on a fine grid."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.errors import LogError
+from airtruth.logs.flight_log import FlightLog
+from airtruth.numerics.intersample import servo_bend
+from airtruth.numerics.prefilter import butterworth
+from airtruth.physics.atmosphere import air_density, altitude_of_density_m
+from airtruth.tracing.model.compile import CHANNELS
+from airtruth.tracing.model.elevator import held_command, smooth
+from airtruth.tracing.model.plant import Plant
+from airtruth.units import G0
+
+Array = NDArray[np.float64]
+
+_STEP_S: Final = 0.0201
+"""Longest step of integration [s], with room for rounding (judgement): the short period turns 0.1 rad in it."""
+FINE: Final = 8
+"""Cells of the surface's own grid per cell of the filter's."""
+_CUTOFF_HZ: Final = 5.0
+"""Cutoff of the low-pass of airspeed and density [Hz] (judgement): above the phugoid and horizontal gusts, below the
+noise of the sensors."""
+_GROUND_SLOPE_M_S2: Final = 0.3
+"""Largest error of the acceleration along the path that a longitudinal accelerometer leaves [m/s2] (judgement: a bias of
+0.02 g and an error in attitude of half a degree). A steeper trend of the airspeed is one of the wind."""
+_QUIET_S: Final = 0.2
+"""Width of the median that replaces an elevator at rest [s] (judgement)."""
+_QUIET_STD: Final = 3.0
+"""Distance from that median up to which the elevator is at rest, in standard deviations of its noise [-] (convention)."""
+_CORNER_SHARE: Final = 0.05
+"""Least corner, as a share of the elevator's range [-] (judgement): a smaller one moves the aircraft by less."""
+_CORNER_NOISE: Final = 20.0
+"""The same in standard deviations of the elevator's noise [-]: five of half a fourth difference, sqrt(70)/2 each."""
+
+
+@dataclass(frozen=True)
+class Signals:
+    """One run of a log, before any model.
+
+    Attributes
+    ----------
+    run_id : name of the run.
+    dt_s : sample period [s].
+    sub : cells of the filter's grid per sample, two per step of integration.
+    y : (samples, 3) alpha [rad], q [rad/s], az [m/s2].
+    elevator_rad : (fine points,) `FINE` cells to a cell of the filter's grid.
+    airspeed_m_s, ground_m_s, density_kg_m3, theta_rad : (points,) on the filter's grid; ground: speed without the gust.
+    altitude_m : mean pressure altitude [m].
+    elevator_std_rad : standard deviation of the noise that remains in the smoothed elevator [rad].
+    throttle : its mean where it is logged, None elsewhere [0..1].
+    corner_rad2 : (samples,) variance of the elevator's mean over the cell that ends at each sample, about that of
+        ``elevator_rad``; empty where the samples show its motion.
+    """
+
+    run_id: str
+    dt_s: float
+    sub: int
+    y: Array
+    elevator_rad: Array
+    airspeed_m_s: Array
+    ground_m_s: Array
+    density_kg_m3: Array
+    theta_rad: Array
+    altitude_m: float
+    throttle: float | None
+    elevator_std_rad: float = 0.0
+    corner_rad2: Array = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True)
+class TraceRecord:
+    """A run and what is declared at its flight condition.
+
+    Attributes
+    ----------
+    signals : the run.
+    plant : the declared aircraft there.
+    gust_length_m : scale length of the vertical gust there [m].
+    remainder : (2, points) of CL and Cm on the filter's grid, which the declared JSBSim model has along this record
+        beyond the plant's tables (`airtruth.tracing.model.remainder`); None for none.
+    """
+
+    signals: Signals
+    plant: Plant
+    gust_length_m: float
+    remainder: Array | None = None
+
+    @property
+    def samples(self) -> int:
+        """Samples of the run."""
+        return int(self.signals.y.shape[0])
+
+
+def read(log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0) -> list[Signals]:
+    """The runs of a validated log.
+
+    Where the elevator is at rest but for the noise of its sensor it is smoothed, because backlash and rate limits
+    would take each new extreme of the noise for motion.
+    The elevator between samples has the area of the cubic through the four nearest samples and the
+    corners of a first-order servo where the record shows one (`airtruth.numerics.intersample`); in a coarse log it is
+    that of the declared servo, or a spline (`airtruth.tracing.model.elevator`). Airspeed
+    and density are low-passed forward and backward (5 Hz): they are inputs, and their noise is not motion.
+    Attitude is measured, or the integral of the pitch rate from alpha at the start, level flight.
+
+    Parameters
+    ----------
+    log : the log.
+    elevator_std_rad : declared noise of the measured surface.
+    servo_s : declared time constant of the elevator's servo [s]; 0 for none.
+    """
+    found = []
+    for run, run_id in enumerate(log.run_ids):
+        rows = log.rows(run)
+        channels = {name: values[rows] for name, values in log.channels.items()}
+        t = log.t_s[rows]
+        dt = float((t[-1] - t[0]) / (len(t) - 1))
+        sub = 2 * math.ceil(dt / _STEP_S - 1e-9)
+        y = np.stack([channels[name] for name in CHANNELS], axis=1)
+        density = air_density(channels)
+        altitude = channels.get("altitude_m")
+        if altitude is None:
+            altitude = np.full(len(t), _altitude(float(density.mean())))
+        theta = channels.get("theta_rad")
+        if theta is None:
+            q = channels["q_rad_s"]
+            theta = channels["alpha_rad"][0] + np.concatenate([[0.0], np.cumsum(0.5 * dt * (q[1:] + q[:-1]))])
+        quiet = _quiet(channels["elevator_rad"], dt, elevator_std_rad)
+        elevator, corners = _between(quiet, dt, sub * FINE, elevator_std_rad, servo_s)
+        found.append(
+            Signals(
+                run_id=run_id,
+                dt_s=dt,
+                sub=sub,
+                y=np.ascontiguousarray(y, dtype=np.float64),
+                elevator_rad=elevator,
+                airspeed_m_s=fine(_smooth(channels["airspeed_m_s"], dt), sub),
+                ground_m_s=fine(_ground(channels, theta, dt), sub),
+                density_kg_m3=fine(_smooth(density, dt), sub),
+                theta_rad=fine(theta, sub),
+                altitude_m=float(np.mean(altitude)),
+                elevator_std_rad=elevator_std_rad
+                * float(np.sqrt((quiet == channels["elevator_rad"]).mean())),
+                throttle=float(channels["throttle"].mean()) if "throttle" in channels else None,
+                corner_rad2=corners,
+            )
+        )
+    return found
+
+
+def _ground(channels: dict[str, Array], theta: Array, dt_s: float) -> Array:
+    """Speed without gusts: the integral of the acceleration along the path, plus the line that fits the airspeed.
+
+    The line takes up the accelerometer's bias and the steady wind; without ax, thrust less drag too. With ax its slope
+    is limited to what the sensors err by, so that a wind that grows along the path does not accelerate the aircraft.
+    """
+    alpha, v = channels["alpha_rad"], np.asarray(channels["airspeed_m_s"], dtype=np.float64)
+    along = -G0 * np.sin(theta - alpha)
+    if "ax_m_s2" in channels:
+        along = along + channels["ax_m_s2"] * np.cos(alpha) + channels["az_m_s2"] * np.sin(alpha)
+    speed = np.concatenate([[0.0], np.cumsum(0.5 * dt_s * (along[1:] + along[:-1]))])
+    time = dt_s * (np.arange(len(v)) - 0.5 * (len(v) - 1))
+    slope = float(time @ (v - speed) / (time @ time))
+    if "ax_m_s2" in channels:
+        slope = min(max(slope, -_GROUND_SLOPE_M_S2), _GROUND_SLOPE_M_S2)
+    return np.asarray(speed + float((v - speed).mean()) + slope * time)
+
+
+def _quiet(elevator: Array, dt_s: float, std: float) -> Array:
+    """The median over 0.2 s where that changes less than three standard deviations, as measured elsewhere."""
+    from scipy.ndimage import median_filter
+
+    raw = np.asarray(elevator, dtype=np.float64)
+    if std <= 0.0:
+        return raw
+    middle = median_filter(raw, size=2 * round(0.5 * _QUIET_S / dt_s) + 1, mode="nearest")
+    return np.where(np.abs(raw - middle) <= _QUIET_STD * std, middle, raw)
+
+
+def _between(elevator: Array, dt_s: float, cells: int, std_rad: float, servo_s: float) -> tuple[Array, Array]:
+    """The surface on a fine grid, and the variance of its mean over each cell (empty for none)."""
+    if dt_s > _STEP_S and servo_s > 0.0:  # a coarse log
+        path = held_command(elevator, dt_s, servo_s, cells)
+        return smooth(elevator, cells) if path is None else path, np.zeros(0)
+    bend = servo_bend((elevator - elevator[0])[None, :])[0]
+    corners = np.zeros(0) if bend.any() else corner_variance(elevator, std_rad)
+    return _elevator(elevator, bend, cells), corners
+
+
+def _elevator(elevator: Array, bend: Array, sub: int) -> Array:
+    relative = elevator - elevator[0]
+    edge = np.concatenate([relative[:1], relative, relative[-1:]])
+    bend = bend.copy()
+    bend[1:] += (edge[1:-2] + edge[2:-1] - edge[:-3] - edge[3:]) / 24.0
+    share = np.arange(sub) / sub
+    cells = elevator[:-1, None] + (elevator[1:] - elevator[:-1])[:, None] * share
+    cells += 6.0 * bend[1:, None] * share * (1.0 - share)
+    return np.append(cells.ravel(), elevator[-1])
+
+
+def corner_variance(elevator: Array, std_rad: float) -> Array:
+    """Variance of an elevator's mean over each cell where its samples show a corner; empty if they show none.
+
+    A surface that moves in one direction between two samples has any mean between them, all alike: the variance is the
+    square of the change over 12. Half the fourth difference bounds that change from above where the samples are smooth:
+    it is as large as the change at a step, and falls with the fourth power of the sample period elsewhere.
+
+    Parameters
+    ----------
+    elevator : (samples,) [rad]; std_rad : standard deviation of its noise [rad].
+    """
+    if len(elevator) < 5:
+        return np.zeros(0)
+    rough = np.pad(np.abs(np.diff(elevator, 4)) / 2.0, 2, mode="edge")
+    change = np.minimum(np.abs(np.diff(elevator)), np.maximum(rough[:-1], rough[1:]))
+    least = max(_CORNER_SHARE * float(np.ptp(elevator)), _CORNER_NOISE * std_rad)
+    change = np.where(change > least, change, 0.0)
+    return np.append(0.0, change**2 / 12.0) if change.any() else np.zeros(0)
+
+
+def fine(x: Array, sub: int) -> Array:
+    """Samples on the filter's grid, linear in between."""
+    return np.interp(np.arange((len(x) - 1) * sub + 1) / sub, np.arange(len(x)), x)
+
+
+def _smooth(x: Array, dt_s: float) -> Array:
+    from scipy.signal import sosfiltfilt
+
+    x = np.asarray(x, dtype=np.float64)
+    if 0.45 / dt_s <= _CUTOFF_HZ or len(x) < 40:
+        return x
+    return np.asarray(sosfiltfilt(butterworth(_CUTOFF_HZ, 2, dt_s).copy(), x))
+
+
+def _altitude(density: float) -> float:
+    """Altitude [m] of the standard atmosphere with that density [kg/m3].
+
+    Raises
+    ------
+    LogError
+        If no altitude in the range has it.
+    """
+    altitude = float(altitude_of_density_m(density))
+    if not np.isfinite(altitude):
+        raise LogError(
+            f"density_kg_m3 is {density:.4g} kg/m3 on average, which no altitude of the standard atmosphere has; "
+            "state its unit in the import mapping, or give altitude_m"
+        )
+    return altitude
+
+
+def nodes(fine: Array) -> Array:
+    """Values on the filter's grid: ends of steps as they are, middles such that Simpson's rule has the area."""
+    cells = 2 * FINE
+    steps = fine[:-1].reshape(-1, cells)
+    ends = np.append(fine[::cells][1:-1], fine[-1]) if fine.size > cells + 1 else fine[-1:]
+    start = steps[:, 0]
+    area = (steps.sum(axis=1) + 0.5 * (ends - start)) / cells
+    out = np.empty(2 * len(steps) + 1)
+    out[:-1:2] = start
+    out[-1] = fine[-1]
+    out[1::2] = (6.0 * area - start - ends) / 4.0
+    return out

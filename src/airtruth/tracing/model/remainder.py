@@ -1,0 +1,126 @@
+"""What the declared JSBSim model does beyond the tables of its forces at rest, along each record.
+
+The declared aircraft is flown in JSBSim through the surface and at the airspeed of the record. At each time the forces
+that it has are compared with those of the tables at its own angle of attack, surface and pitch rate:
+
+    dCL = (Z_tables - Z)/(q_bar S),    dCm = (I_yy q' - M_tables)/(q_bar S c).
+
+The differences hold everything that a state at rest does not show: servos and lags behind the surface, terms in
+alpha', engines that follow, asymmetry, flexibility of the tables between their points. They are known before anything is
+fitted, and the filter adds them to its coefficients. The dynamics that aircraft.toml declares are the filter's own: their
+increments are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.aircraft.dynamics import declared_dynamics
+from airtruth.physics.terms import Change
+from airtruth.simulation.replay import Track, flown_through, substeps
+from airtruth.tracing.increment_response import increments, state
+from airtruth.tracing.model.plant import Plant
+from airtruth.tracing.model.records import FINE, Signals
+from airtruth.tracing.model.surface import through
+
+Array = NDArray[np.float64]
+
+
+def remainder(signals: Signals, plant: Plant) -> Array:
+    """Return (2, points) increments of CL and Cm on the filter's grid.
+
+    Parameters
+    ----------
+    signals : a record, the errors of its input sensors undone.
+    plant : tables of the declared JSBSim aircraft about the trim of the record's condition.
+
+    Raises
+    ------
+    FlightError
+        If the motion leaves the range in which the simulation has a meaning.
+    """
+    at = plant.trim
+    assert at is not None
+    flown = flown_through(plant.aircraft, at, track_of(signals))
+    dt_s = signals.dt_s / substeps(signals.dt_s)
+    c = plant.aircraft.constants
+    speed = flown["airspeed_m_s"]
+    pressure = 0.5 * flown["density_kg_m3"] * speed**2
+    half = 0.5 * c.chord_m / speed
+    change = declared_dynamics(plant.aircraft.file.dynamics)
+    surface = through(change.surface, flown["elevator_rad"], dt_s)
+    qhat = flown["q_rad_s"] * half
+    _, fz, moment = looked_up(plant, flown["alpha_rad"], surface, qhat)
+    fz = fz * pressure + plant.constant[1]
+    moment = moment * pressure + plant.constant[2]
+    force = pressure * c.wing_area_m2
+    found = np.stack(
+        [
+            (fz - flown["az_m_s2"] * at.mass_kg) / force,
+            (c.inertia_yy_kg_m2 * flown["q_dot_rad_s2"] - moment) / (force * c.chord_m),
+        ]
+    )
+    if change.aero:
+        found -= _declared(change, flown, surface, qhat, half, dt_s)
+    grid = np.arange((signals.y.shape[0] - 1) * signals.sub + 1) * (signals.dt_s / signals.sub)
+    time = np.arange(found.shape[1]) * dt_s
+    return np.stack([np.interp(grid, time, row) for row in found])
+
+
+def track_of(signals: Signals) -> Track:
+    """Inputs of a record on the simulation's grid."""
+    steps = substeps(signals.dt_s)
+    grid = np.arange((signals.y.shape[0] - 1) * steps + 1) / steps
+
+    def on_grid(fine: Array, cells: int) -> Array:
+        return np.interp(grid, np.arange(len(fine)) / cells, fine)
+
+    return Track(
+        dt_s=signals.dt_s,
+        substeps=steps,
+        outputs={},
+        weight={},
+        elevator_rad=on_grid(signals.elevator_rad, signals.sub * FINE),
+        airspeed_m_s=on_grid(signals.airspeed_m_s, signals.sub),
+    )
+
+
+def _declared(
+    change: Change, flown: Mapping[str, Array], surface: Array, qhat: Array, half: Array, dt_s: float
+) -> Array:
+    """(2, steps) increments of the dynamics that aircraft.toml declares, along the flown motion."""
+    alpha = flown["alpha_rad"]
+    signals = {
+        "alpha": alpha[None],
+        "elevator": surface[None],
+        "qhat": qhat[None],
+        "alpha_dot_hat": (np.gradient(alpha, dt_s) * half)[None],
+    }
+    signals |= {s.name: state(s, signals[s.signal], dt_s) for s in change.states}
+    return increments(change.aero, signals)[:, 0]
+
+
+def looked_up(plant: Plant, alpha_rad: Array, elevator_rad: Array, qhat: Array) -> tuple[Array, Array, Array]:
+    """X, Z [m2] and M [m3] of the air over the dynamic pressure, trilinear in the tables of a plant.
+
+    Parameters
+    ----------
+    alpha_rad, elevator_rad, qhat : (points,); outside the tables their end cells go on.
+    """
+    axes = (plant.alpha_rad, plant.elevator_rad, plant.qhat)
+    cells = []
+    for axis, x in zip(axes, (alpha_rad, elevator_rad, qhat), strict=True):
+        low = np.clip(np.searchsorted(axis, x, side="right") - 1, 0, axis.size - 2)
+        cells.append((low, (x - axis[low]) / (axis[low + 1] - axis[low])))
+    (i, u), (j, v), (k, w) = cells
+    total = np.zeros((alpha_rad.size, 3))
+    for a, b, c in np.ndindex(2, 2, 2):
+        share = (u if a else 1.0 - u) * (v if b else 1.0 - v) * (w if c else 1.0 - w)
+        total += share[:, None] * plant.values[i + a, j + b, k + c]
+    return total[:, 0], total[:, 1], total[:, 2]
+
+
+__all__ = ["looked_up", "remainder", "track_of"]

@@ -1,0 +1,299 @@
+"""Innovations and their covariance from a record, a change of the aircraft and a vector of parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.physics.terms import Change
+from airtruth.tracing.model.compile import CompiledChange, compile_change
+from airtruth.tracing.model.filter import evaluate
+from airtruth.tracing.model.kernel_input import (
+    AircraftArrays,
+    AirPoint,
+    FilterModel,
+    GridSignals,
+    GustModel,
+    KernelInput,
+    SensorArrays,
+)
+from airtruth.tracing.model.parameters import COLOUR_TIME_S, OUTPUTS, Common, PerRecord
+from airtruth.tracing.model.plant import Plant
+from airtruth.tracing.model.records import FINE, Signals, TraceRecord, nodes
+from airtruth.tracing.model.settings import Settings
+from airtruth.tracing.model.surface import through
+
+Array = NDArray[np.float64]
+
+_MOST_SLOW: Final = 0.99
+"""Largest share of slow noise [-]: beyond the search's bound, where the differences need a slope."""
+
+
+@dataclass(frozen=True)
+class External:
+    """Signals added to CL, Cm (points,) [-] and to the outputs (samples, 3), for tests that name no effect."""
+
+    lift: Array
+    moment: Array
+    output: Array
+
+
+@dataclass(frozen=True)
+class Response:
+    """Innovations of one record.
+
+    Attributes
+    ----------
+    e : (samples, 3) innovations, or residuals of a free run [units of the outputs].
+    white, covariance : (3, 3) whitener W with W S W' = I, and S.
+    logdet : mean of log|S| over the samples; nan where the motion is lost.
+    more_logdet : sum over the samples of log|S| beyond that of ``covariance``, by an uncertain surface.
+    """
+
+    e: Array
+    white: Array
+    covariance: Array
+    logdet: float
+    more_logdet: float = 0.0
+
+
+@dataclass(frozen=True)
+class FilterInputs:
+    """What a record and a change give to the filter, whatever the parameters are.
+
+    Attributes
+    ----------
+    record, compiled : the record and the change.
+    y : (samples, 3) outputs.
+    grid : inputs on the filter's grid, the errors of their sensors undone.
+    corner_rad2 : see `KernelInput`.
+    reference_alpha_rad, reference : means at which the gain is made.
+    """
+
+    record: TraceRecord
+    compiled: CompiledChange
+    y: Array
+    grid: GridSignals
+    corner_rad2: Array
+    reference_alpha_rad: float
+    reference: AirPoint
+
+
+def filter_inputs(record: TraceRecord, change: Change | CompiledChange) -> FilterInputs:
+    """Undo what a change says of the inputs' sensors, and put what it says of the surface behind the elevator."""
+    compiled = change if isinstance(change, CompiledChange) else compile_change(change)
+    s, plant = record.signals, record.plant
+    y, theta = s.y, s.theta_rad
+    if plant.alpha_shift_rad != 0.0:
+        y = y - np.array([plant.alpha_shift_rad, 0.0, 0.0])
+        theta = theta - plant.alpha_shift_rad
+    fine = _undo(compiled, "elevator_rad", s.elevator_rad)
+    if compiled.surface:
+        fine = through(compiled.surface, fine, s.dt_s / (s.sub * FINE), s.elevator_std_rad)
+    elevator, v = nodes(fine), _undo(compiled, "airspeed_m_s", s.airspeed_m_s)
+    lift, moment = _remainder(record, compiled, elevator.size)
+    grid = GridSignals(
+        elevator_rad=elevator,
+        airspeed_m_s=v,
+        ground_m_s=_undo(compiled, "airspeed_m_s", s.ground_m_s),
+        qbar_pa=0.5 * s.density_kg_m3 * v * v,
+        theta_rad=theta,
+        lift=lift,
+        moment=moment,
+    )
+    speed = float(v.mean())
+    reference = AirPoint(
+        elevator_rad=float(elevator.mean()),
+        airspeed_m_s=speed,
+        ground_m_s=speed,
+        qbar_pa=0.5 * float(s.density_kg_m3.mean()) * speed * speed,
+        theta_rad=float(theta.mean()),
+        lift=0.0,
+        moment=0.0,
+    )
+    corner = _corners(s, compiled)
+    return FilterInputs(record, compiled, y, grid, corner, float(y[:, 0].mean()), reference)
+
+
+def _corners(s: Signals, compiled: CompiledChange) -> Array:
+    """Variance of the surface that the air sees, per sample; a delay or lag of the surface carries it to later cells."""
+    late = tuple(term for term in compiled.surface if term.kind in ("delay", "lag"))
+    if s.corner_rad2.size == 0 or not late:
+        return s.corner_rad2
+    cells = s.sub * FINE
+    fine = np.append(np.repeat(s.corner_rad2[1:], cells), 0.0)
+    moved = through(late, fine, s.dt_s / cells)
+    return np.append(0.0, moved[:-1].reshape(-1, cells).mean(axis=1))
+
+
+def _remainder(record: TraceRecord, compiled: CompiledChange, points: int) -> Array:
+    """(2, points) of what the JSBSim model has beyond the tables, later with the surface where a change is linear in it."""
+    if record.remainder is None:
+        return np.zeros((2, points))
+    late = [term for term in compiled.surface if term.kind in ("delay", "lag")]
+    step = record.signals.dt_s / record.signals.sub
+    return np.stack([through(late, row, step) for row in record.remainder])
+
+
+def _undo(compiled: CompiledChange, channel: str, x: Array) -> Array:
+    errors = compiled.inputs.get(channel)
+    return x if errors is None else errors.unscaled(x)
+
+
+def respond(
+    record: TraceRecord,
+    settings: Settings,
+    change: Change | CompiledChange,
+    common: Array,
+    per_record: Array,
+    *,
+    external: External | None = None,
+    free_run: bool = False,
+) -> Response:
+    """Innovations, or with ``free_run`` the residuals of a simulation, of one record.
+
+    Parameters
+    ----------
+    common, per_record : see `Common` and `PerRecord`.
+    external : further signals.
+    """
+    given = filter_inputs(record, change)
+    return respond_to(given, settings, common, per_record, external=external, free_run=free_run)
+
+
+def respond_to(
+    given: FilterInputs,
+    settings: Settings,
+    common: Array,
+    per_record: Array,
+    *,
+    external: External | None = None,
+    free_run: bool = False,
+) -> Response:
+    """`respond` where the same inputs serve many parameters."""
+    e = np.empty_like(given.y)
+    white, covariance = np.eye(OUTPUTS), np.eye(OUTPUTS)
+    kernel = kernel_input(given, settings, common, per_record, external)
+    if free_run:
+        kernel = kernel._replace(corner_rad2=np.zeros(0))
+    try:
+        logdet, more = evaluate(kernel, free_run, e, white, covariance)
+    except np.linalg.LinAlgError:  # the innovations have no covariance
+        logdet, more = float("nan"), 0.0
+    return Response(e, white, covariance, float(logdet + more / len(e)), float(more))
+
+
+def kernel_input(
+    given: FilterInputs,
+    settings: Settings,
+    common: Array,
+    per_record: Array,
+    external: External | None = None,
+) -> KernelInput:
+    """What the compiled filter reads."""
+    lift, moment = per_record[PerRecord.trim]
+    if external is None:
+        more = np.zeros_like(given.y)
+        grid = given.grid._replace(lift=given.grid.lift + lift, moment=given.grid.moment + moment)
+    else:
+        more = external.output
+        grid = given.grid._replace(
+            lift=given.grid.lift + external.lift + lift, moment=given.grid.moment + external.moment + moment
+        )
+    signals = given.record.signals
+    return KernelInput(
+        y=given.y,
+        more=more,
+        grid=grid,
+        corner_rad2=given.corner_rad2,
+        dt_s=signals.dt_s,
+        sub=signals.sub,
+        start=per_record[PerRecord.start],
+        reference_alpha_rad=given.reference_alpha_rad,
+        reference=given.reference,
+        model=filter_model(given, settings, common, per_record),
+    )
+
+
+def filter_model(given: FilterInputs, settings: Settings, common: Array, per_record: Array) -> FilterModel:
+    """Aircraft, gusts, effects and sensors at a vector of parameters."""
+    record, compiled = given.record, given.compiled
+    span = record.plant.aircraft.constants.span_m
+    gusts = GustModel(
+        level_m_s=float(np.exp(per_record[PerRecord.log_gust])),
+        length_m=record.gust_length_m,
+        rolloff=0.5 + float(common[Common.rolloff]),
+        rotary=0.5 + float(common[Common.rotary]),
+        rotary_time_s=4.0 * span / (np.pi * given.reference.airspeed_m_s),
+    )
+    sensors = pack_sensors(compiled, settings, common, per_record)
+    return FilterModel(
+        aircraft=pack_aircraft(record.plant, compiled, common),
+        gusts=gusts,
+        effects=compiled.effects,
+        sensors=sensors,
+        states=compiled.states(bool((sensors.slow_std > 0.0).any())),
+    )
+
+
+def pack_aircraft(plant: Plant, compiled: CompiledChange, common: Array) -> AircraftArrays:
+    """The declared aircraft of a flight condition, with its changes and increments."""
+    c, declared = plant.aircraft.constants, compiled.declared
+    inertia = float(common[Common.inertia])
+    increments = common[Common.derivatives].copy()
+    increments[Common.moment] += inertia * (plant.derivatives[Common.moment] + common[Common.moment])
+    return AircraftArrays(
+        area_m2=c.wing_area_m2,
+        chord_m=c.chord_m,
+        mass_kg=c.mass_kg * declared["mass"],
+        inertia_kg_m2=c.inertia_yy_kg_m2 * (declared["inertia"] * (1.0 + inertia)),
+        trim_alpha_rad=plant.trim_alpha_rad,
+        trim_elevator_rad=plant.trim_elevator_rad,
+        neutral_elevator_rad=plant.neutral_elevator_rad,
+        effectiveness=declared["elevator"],
+        cg_shift=declared["cg"],
+        thrust_arm_m=declared["thrust_arm"],
+        thrust_n=float(plant.thrust[0]),
+        thrust_slope_m2=float(plant.thrust[1]),
+        constant=plant.constant * (1.0 + common[Common.thrust]),
+        increments=increments,
+        alpha_rad=plant.alpha_rad,
+        elevator_rad=plant.elevator_rad,
+        qhat=plant.qhat,
+        values=plant.values,
+    )
+
+
+def pack_sensors(
+    compiled: CompiledChange, settings: Settings, common: Array, per_record: Array
+) -> SensorArrays:
+    """Errors and noise of the outputs' sensors."""
+    variance = (settings.noise * np.exp(common[Common.log_noise])) ** 2 + settings.resolution**2
+    share = np.clip(common[Common.colour_shares], 0.0, _MOST_SLOW)
+    return SensorArrays(
+        bias=per_record[PerRecord.bias] + compiled.bias,
+        scale=compiled.scale,
+        arm_m=compiled.arm_m,
+        lag_s=compiled.lag_s,
+        delay_s=compiled.delay_s,
+        variance=variance * (1.0 - share),
+        slow_std=np.sqrt(variance * share),
+        slow_time_s=COLOUR_TIME_S * float(np.exp(common[Common.log_colour_time])),
+    )
+
+
+__all__ = [
+    "External",
+    "FilterInputs",
+    "Response",
+    "filter_inputs",
+    "filter_model",
+    "kernel_input",
+    "pack_aircraft",
+    "pack_sensors",
+    "respond",
+    "respond_to",
+]

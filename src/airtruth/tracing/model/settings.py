@@ -1,0 +1,242 @@
+"""What is declared of sensors, gusts and aircraft: settings, priors, and where a search starts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.aircraft import Aircraft
+from airtruth.aircraft.dynamics import declared_dynamics
+from airtruth.physics.sensor_errors import KINDS, Kind
+from airtruth.physics.terms import Change, SensorTerm
+from airtruth.tracing.model.compile import CHANNELS
+from airtruth.tracing.model.parameters import Common, PerRecord
+from airtruth.tracing.model.plant import inertia_std
+from airtruth.tracing.model.records import TraceRecord
+from airtruth.units import DEG
+
+Array = NDArray[np.float64]
+
+_CARRIED: Final[tuple[Kind, ...]] = ("arm", "lag", "delay", "scale")
+"""Declared errors of a sensor that the filter carries; its bias is a per-record parameter."""
+_UNCONSTRAINED_STD: Final = 10.0
+"""Prior standard deviation of an unconstrained derivative in alpha [1/rad]: twice a lift slope (judgement)."""
+_UNCONSTRAINED_TRIM_STD: Final = 0.5
+"""The same of its coefficient at the trim [-]: a curvature of 40 about zero gives 0.4 at 0.1 rad (judgement)."""
+_ROTARY_STD: Final = 0.5
+"""Prior standard deviation of the share of the rotary gust [-]: none and all are one away from the middle (judgement)."""
+_ROLLOFF_STD: Final = 0.5
+"""The same of the rolloff between Dryden's and von Karman's spectrum [-] (judgement)."""
+_NOISE_STD: Final = 0.1
+"""Prior standard deviation of the logarithm of declared noise [-]: data sheets are right within 10 % (judgement)."""
+_NOISE_UNKNOWN_STD: Final = 1.0
+"""The same where the noise is not declared [-]: a factor of e (judgement)."""
+_COLOUR_STD: Final = (0.5, 0.5, 0.5, 0.7)
+"""Prior standard deviations of the three shares of slow noise and of the logarithm of its time [-] (judgement)."""
+_NOISE: Final = (0.1 * DEG, 0.3 * DEG, 0.1)
+"""Noise of alpha [rad], q [rad/s], az [m/s2] where none is declared: small flight-test instruments (judgement)."""
+_RESOLUTION: Final = 0.01
+"""Least error of a model, as a share of a channel's standard deviation [-] (judgement): tables, steps of integration and
+frames of a simulator. Sensors of flight tests have several times that noise, the GTM's 4 to 8 %."""
+_BIAS_STD: Final = (0.5 * DEG, 0.5 * DEG, 0.3)
+"""Prior standard deviations of their biases [same units] (judgement)."""
+_TRIM_STD: Final = (0.1, 0.03)
+"""Prior standard deviations of CL and Cm at the trim about the declared aircraft's [-] (judgement)."""
+_GUST_M_S: Final = 0.2
+"""Median of the prior of a record's gust level [m/s]: calm morning air (judgement)."""
+_LOG_GUST_STD: Final = 1.5
+"""Prior standard deviation of its logarithm [-]: a factor of 4.5 to either side (judgement)."""
+_START_STD: Final = (0.05, 0.2)
+"""Prior standard deviations of the initial alpha [rad] and q [rad/s] about the first samples (judgement)."""
+GUST_COVARIANCE: Final = np.array([[1.0, 0.5], [0.5, 0.5]])
+"""Stationary covariance of the two states of Dryden's vertical filter at unit gust variance [-] (MIL-F-8785C,
+3.7.1.2, by the Lyapunov equation)."""
+_FIRST_SAMPLES: Final = 5
+"""Samples whose mean starts alpha and q [-]: less noise than one, less motion than many (judgement)."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is declared of sensors and gusts, the same for all records.
+
+    Attributes
+    ----------
+    noise : (3,) standard deviation per sample of alpha [rad], q [rad/s], az [m/s2].
+    noise_prior : prior standard deviation of its logarithm [-].
+    bias_std : (3,) of the sensors' biases [same units].
+    gust_m_s, log_gust_std : median of the prior of a record's gust level [m/s], and standard deviation of its
+        logarithm [-].
+    thrust_std : relative standard deviation of the engines' thrust [-].
+    trim_std : (2,) of CL and Cm at the trim, about those of the declared aircraft [-].
+    coloured : whether part of the sensors' noise may be slow.
+    resolution : (3,) standard deviation of what the model does not resolve of the outputs, beside the noise [same units].
+    """
+
+    noise: Array
+    noise_prior: float
+    bias_std: Array
+    gust_m_s: float
+    log_gust_std: float
+    thrust_std: float
+    trim_std: Array
+    coloured: bool = False
+    resolution: Array = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def noise_is_declared(self) -> bool:
+        """Whether the sensors' noise levels are declared, not assumed."""
+        return self.noise_prior < _NOISE_UNKNOWN_STD
+
+
+def settings_of(aircraft: Aircraft, thrust_std: float) -> Settings:
+    """Read what aircraft.toml declares of the sensors; where it is silent, assume judgements with wide priors."""
+    noise, bias = np.array(_NOISE), np.array(_BIAS_STD)
+    prior = _NOISE_STD
+    for i, channel in enumerate(CHANNELS):
+        sensor = aircraft.file.sensors.get(channel)
+        if sensor is None or sensor.noise_std.value <= 0.0:
+            prior = _NOISE_UNKNOWN_STD
+            continue
+        # quantisation and white noise add
+        noise[i] = np.hypot(sensor.noise_std.value, sensor.quantum.value / np.sqrt(12.0))
+        bias[i] = max(abs(sensor.bias.value) * 2.0, bias[i])
+    return Settings(
+        noise=noise,
+        noise_prior=prior,
+        bias_std=bias,
+        gust_m_s=_GUST_M_S,
+        log_gust_std=_LOG_GUST_STD,
+        thrust_std=thrust_std,
+        trim_std=np.array(_TRIM_STD),
+    )
+
+
+def resolved(settings: Settings, records: Sequence[TraceRecord]) -> Settings:
+    """Settings with a resolution of the model where the noise is not declared.
+
+    Ideal sensors would otherwise have no noise, and gusts would explain them sample by sample.
+    """
+    if settings.noise_is_declared:
+        return settings
+    spread = np.sqrt(np.mean([r.signals.y.var(axis=0) for r in records], axis=0))
+    return replace(settings, resolution=_RESOLUTION * spread)
+
+
+def declared_change(aircraft: Aircraft) -> Change:
+    """What aircraft.toml declares beyond forces at rest: the sensors' position, lag, delay and scale, the dynamics."""
+    sensors = aircraft.file.sensors
+    terms = [
+        SensorTerm(channel, kind, sensors[channel].errors().value(kind))
+        for channel in CHANNELS
+        if channel in sensors
+        for kind in _CARRIED
+    ]
+    effective = tuple(t for t in terms if t.value != KINDS[t.kind].neutral)
+    return Change(sensors=effective) + declared_dynamics(aircraft.file.dynamics)
+
+
+def free_common(settings: Settings) -> tuple[int, ...]:
+    """Indices of the common parameters that are free."""
+    return tuple(range(Common.size if settings.coloured else Common.colour.start))
+
+
+def initial_per_record(record: TraceRecord, settings: Settings) -> Array:
+    """(per-record,) where the search for a record's own parameters starts."""
+    values = np.zeros(PerRecord.size)
+    y = record.signals.y
+    first = y[: min(_FIRST_SAMPLES, len(y))]
+    values[PerRecord.alpha] = first[:, 0].mean() - record.plant.alpha_shift_rad
+    values[PerRecord.q] = first[:, 1].mean()
+    values[PerRecord.log_gust] = np.log(settings.gust_m_s)
+    return values
+
+
+def per_record_prior(
+    record: TraceRecord, settings: Settings, unconstrained: Sequence[int] = ()
+) -> tuple[Array, Array]:
+    """Mean (per-record,) and precision (per-record, per-record) of the prior of a record's own parameters.
+
+    Parameters
+    ----------
+    unconstrained : indices of the derivatives whose coefficient is not constrained by what is declared.
+    """
+    std = np.ones(PerRecord.size)
+    std[PerRecord.motion_start] = _START_STD
+    std[PerRecord.bias] = settings.bias_std
+    free = [Common.CLalpha in unconstrained, Common.Cmalpha in unconstrained]
+    std[PerRecord.trim] = np.where(free, _UNCONSTRAINED_TRIM_STD, settings.trim_std)
+    std[PerRecord.log_gust] = settings.log_gust_std
+    precision = np.diag(std**-2.0)
+    precision[PerRecord.gusts, PerRecord.gusts] = np.linalg.inv(GUST_COVARIANCE)
+    return initial_per_record(record, settings), precision
+
+
+def declared_derivatives_of(records: Sequence[TraceRecord]) -> Array:
+    """(6,) declared derivatives, averaged over the records' flight conditions [-]."""
+    return np.asarray(np.mean([r.plant.derivatives for r in records], axis=0))
+
+
+def declared_covariance_of(records: Sequence[TraceRecord]) -> Array:
+    """(6, 6) covariance of the increments of the derivatives by what is declared.
+
+    The declaration states one uncertainty, relative to derivatives that depend on the flight condition. Its values at
+    several conditions are not independent statements about the common increments, so that their covariances are
+    averaged over the records; precisions are not added.
+    """
+    return np.asarray(np.mean([r.plant.derivative_cov for r in records], axis=0))
+
+
+def common_prior(
+    records: Sequence[TraceRecord],
+    settings: Settings,
+    unconstrained: Sequence[int] = (),
+    spread: Array | None = None,
+) -> Array:
+    """(common, common) precision of the common parameters about zero.
+
+    Parameters
+    ----------
+    records : records whose flight conditions count, see `declared_covariance_of`.
+    unconstrained : indices of the derivatives that are not constrained by what is declared.
+    spread : (6, 6) covariance of the increments of the derivatives beyond the declared one; None for none.
+    """
+    precision = np.zeros((Common.size, Common.size))
+    derivatives, inertia = Common.derivatives, Common.inertia
+    # an inertia larger by i makes the derivatives of the moment look smaller by i
+    std = inertia_std(records[0].plant.aircraft)
+    turn = np.zeros(derivatives.stop)
+    turn[Common.moment] = -declared_derivatives_of(records)[Common.moment]
+    covariance = declared_covariance_of(records) - std**2 * np.outer(turn, turn)
+    covariance[list(unconstrained), list(unconstrained)] += _UNCONSTRAINED_STD**2
+    if spread is not None:
+        covariance += spread
+    own = np.linalg.inv(covariance)
+    precision[derivatives, derivatives] = own
+    precision[inertia, derivatives] = precision[derivatives, inertia] = -own @ turn
+    precision[inertia, inertia] = turn @ own @ turn + std**-2
+    diagonal = np.zeros(Common.size)
+    diagonal[Common.log_noise] = settings.noise_prior**-2
+    diagonal[Common.rotary] = _ROTARY_STD**-2
+    diagonal[Common.thrust] = settings.thrust_std**-2
+    diagonal[Common.rolloff] = _ROLLOFF_STD**-2
+    diagonal[Common.colour] = np.array(_COLOUR_STD) ** -2.0
+    return precision + np.diag(diagonal)
+
+
+__all__ = [
+    "GUST_COVARIANCE",
+    "Settings",
+    "common_prior",
+    "declared_change",
+    "declared_covariance_of",
+    "declared_derivatives_of",
+    "free_common",
+    "initial_per_record",
+    "per_record_prior",
+    "resolved",
+    "settings_of",
+]

@@ -1,0 +1,61 @@
+"""Choices of a trace."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from airtruth.errors import ConfigurationError, choices
+
+MODELS: Final = ("aircraft", "linear")
+"""Models of the declared aircraft: forces probed in JSBSim, or the linear short-period model."""
+
+
+@dataclass(frozen=True)
+class TraceOptions:
+    """Choices of a trace.
+
+    Attributes
+    ----------
+    model : "aircraft" probes the forces of the declared JSBSim aircraft; "linear" uses the linear short-period
+        model of its derivatives. An aircraft without a JSBSim model is always linear.
+    hold_out : runs that serve the report alone; None holds out every third, never the only one.
+    threads : number of records processed at a time; the answer does not depend on it.
+    seed : seed of the random draws behind p-values.
+    effects : keys of the candidates; a name without a variant selects all of its variants; None for the library.
+    time_budget_s : time after which the search starts nothing new [s]; None for no limit. The answer then depends on the
+        machine, is provisional, and lists what was left out.
+    increments : whether increments are learned from what no named effect explains; None where the whole library is
+        searched.
+    """
+
+    model: str = "aircraft"
+    hold_out: tuple[str, ...] | None = None
+    threads: int = 1
+    seed: int = 0
+    effects: tuple[str, ...] | None = None
+    time_budget_s: float | None = None
+    increments: bool | None = None
+
+    @property
+    def learns(self) -> bool:
+        """Whether increments are learned."""
+        return self.effects is None if self.increments is None else self.increments
+
+    def __post_init__(self) -> None:
+        """Refuse values outside their range.
+
+        Raises
+        ------
+        ConfigurationError
+            Naming the option, its value and what is allowed.
+        """
+        if self.model not in MODELS:
+            raise ConfigurationError(f"--model {self.model!r}: {choices(self.model, MODELS)}")
+        if self.threads < 1:
+            raise ConfigurationError(f"--jobs {self.threads}: must be at least 1")
+        if self.time_budget_s is not None and not 0.0 <= self.time_budget_s < math.inf:
+            raise ConfigurationError(
+                f"--time-budget {self.time_budget_s}: must be a number of seconds, 0 or more"
+            )

@@ -1,0 +1,353 @@
+"""Records and declared aircraft of a trace: what the search fits, what is held out, which effects can be tested."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from statistics import fmean
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.aircraft import Aircraft, Sensor
+from airtruth.aircraft.tail import tail_geometry
+from airtruth.effects.effect import Effect
+from airtruth.errors import ConfigurationError, FlightError, LogError, TrimError, choices
+from airtruth.logs.flight_log import FlightLog
+from airtruth.physics.composition import directions
+from airtruth.physics.gust_figures import gust_scales
+from airtruth.simulation.trim import Trim
+from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.posterior import TraceProblem
+from airtruth.tracing.model.plant import Plant, declared_derivatives, engines, linear, probed, trim_of
+from airtruth.tracing.model.records import FINE, Signals, TraceRecord, read
+from airtruth.tracing.model.remainder import remainder
+from airtruth.tracing.model.settings import declared_change, resolved, settings_of
+from airtruth.tracing.options import TraceOptions
+from airtruth.tracing.selection.explanation import DERIVATIVES, causes_of
+from airtruth.tracing.selection.release import DeclaredCauses
+from airtruth.units import DEG
+
+Array = NDArray[np.float64]
+
+_SAME_SPEED: Final = 0.03
+"""Relative difference in airspeed within which records share a plant [-] (judgement: 6 % in dynamic pressure, which
+the filter follows; more plants cost more probes of JSBSim)."""
+_SAME_ALTITUDE_M: Final = 200.0
+"""Difference in altitude within which records share a plant [m] (judgement: 2 % in density)."""
+_LEAST_SAMPLES: Final = 40
+"""Least number of samples of a record [-] (judgement: fewer do not show a short period at 20 to 50 Hz)."""
+_LEAST_ELEVATOR_RAD: Final = 0.1 * DEG
+"""Least movement of the elevator in the fitted records [rad] (judgement: above the noise of a surface sensor)."""
+_THRUST_STD: Final = 0.05
+"""Prior standard deviation of the thrust over its trimmed value, throttle logged [-] (judgement)."""
+_THRUST_UNKNOWN_STD: Final = 0.25
+"""The same without a logged throttle [-] (judgement)."""
+_CLIMB_RAD: Final = 1.0 * DEG
+"""Flight-path angle below which a record starts in level flight [rad] (judgement: the noise of theta - alpha)."""
+_CLIMB_SAMPLES: Final = 10
+"""Number of samples at the start of a record whose mean is its flight-path angle [-] (judgement)."""
+_HEAD_S: Final = 0.1
+"""Start of a record whose mean is its trim with the linear model [s] (judgement: before the manoeuvre moves it)."""
+_HEAD_SAMPLES: Final = 3
+"""Least number of samples of that start [-] (judgement)."""
+_GUST_ALTITUDE_M: Final = (30.0, 20000.0)
+"""Altitudes between which the gust scales are evaluated [m] (judgement: within the range of MIL-F-8785C)."""
+_AIR: Final = "each record has its own gust level, and the measured airspeed contains the horizontal gusts"
+"""Why an effect of the air is not tested."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """The records and the declared aircraft of a trace.
+
+    Attributes
+    ----------
+    fitted, held : problems of the fitted and of the held-out records; ``held`` is None where there are none.
+    hypothesis : the declared aircraft.
+    effects : candidates that can be tested.
+    untestable : the other candidates, each with the reason.
+    model : "aircraft" or "linear".
+    notes : sentences for the report, without a final period.
+    declared : candidates that explain a contradiction of the declared derivatives.
+    left_out : steps of the search that a time budget left out.
+    """
+
+    fitted: TraceProblem
+    held: TraceProblem | None
+    hypothesis: Hypothesis
+    effects: tuple[Effect, ...]
+    untestable: tuple[tuple[Effect, str], ...]
+    model: str
+    notes: tuple[str, ...]
+    declared: DeclaredCauses
+    left_out: tuple[str, ...] = ()
+
+
+def prepare(
+    logs: Sequence[FlightLog], aircraft: Aircraft, effects: Sequence[Effect], options: TraceOptions
+) -> Case:
+    """Check the records, build the declared plant of each flight condition, and split off the held-out records.
+
+    Parameters
+    ----------
+    logs : logs that passed the gate.
+    effects : requested candidates.
+
+    Raises
+    ------
+    LogError, ConfigurationError, AircraftError
+        Naming what is wrong, where, and what to do.
+    """
+    _one_aircraft(logs, aircraft)
+    pots = aircraft.file.sensors.get("elevator_rad")
+    noise = pots.noise_std.value if pots else 0.0
+    servo = aircraft.file.elevator_actuator
+    servo_s = 0.0 if servo is None else 1.0 / (2.0 * np.pi * servo.bandwidth.value)
+    signals = [undo_input_sensors(s, aircraft) for log in logs for s in read(log, noise, servo_s)]
+    chosen = _hold_out([s.run_id for s in signals], options)
+    _check(signals, chosen)
+    signals.sort(key=lambda s: s.run_id)  # the answer does not depend on the order of the logs
+    model = options.model if aircraft.file.jsbsim is not None else "linear"
+    notes = []
+    if model != options.model:
+        notes.append("the aircraft has no JSBSim model: it is traced with the linear short-period model")
+    records = _records(signals, aircraft, model, chosen)
+    fitted = tuple(r for r in records if r.signals.run_id not in chosen)
+    has_throttle = all(r.signals.throttle is not None for r in fitted)
+    settings = settings_of(aircraft, _THRUST_STD if has_throttle else _THRUST_UNKNOWN_STD)
+    settings = resolved(settings, fitted)
+    held = tuple(r for r in records if r.signals.run_id in chosen)
+    if len(fitted) == 1:
+        notes.append("one record is fitted: each of its halves is left out in turn")
+        fitted = _halves(fitted[0])
+    if not held:
+        notes.append("nothing is held out: the verdict is provisional")
+    columns = set.intersection(*(set(log.channels) for log in logs))
+    reasons = {effect.key: _why_not(effect, columns) for effect in effects}
+    first = fitted[0].plant.trim_alpha_rad
+    trim_alpha_rad = first + fmean(r.plant.trim_alpha_rad - first for r in fitted)
+    return Case(
+        fitted=TraceProblem(fitted, settings, options.threads),
+        held=TraceProblem(held, settings, options.threads) if held else None,
+        hypothesis=Hypothesis(declared_change(aircraft), trim_alpha_rad=trim_alpha_rad),
+        effects=tuple(e for e in effects if not reasons[e.key]),
+        untestable=tuple((e, reasons[e.key]) for e in effects if reasons[e.key]),
+        model=model,
+        notes=tuple(notes),
+        declared=_declared_causes(fitted, aircraft, effects, options),
+    )
+
+
+def _declared_causes(
+    fitted: Sequence[TraceRecord], aircraft: Aircraft, effects: Sequence[Effect], options: TraceOptions
+) -> DeclaredCauses:
+    """Causes that move several derivatives, and wrong declarations, as far as they are requested."""
+    mean = np.mean([r.plant.derivatives for r in fitted], axis=0)
+    keys = options.effects
+    causes = causes_of(directions(mean, tail_geometry(aircraft)))
+    return DeclaredCauses(
+        tuple(c for c in causes if keys is None or c.key in keys),
+        keys is None or DERIVATIVES in keys,
+        tuple(e for e in effects if e.key in {c.key for c in causes}),
+    )
+
+
+def _why_not(effect: Effect, columns: Collection[str]) -> str:
+    """Why an effect cannot be tested; empty if it can."""
+    missing = [channel for channel in effect.channels if channel not in columns]
+    if missing:
+        return f"the log lacks {', '.join(missing)}"
+    return _AIR if effect.where == "air" else ""
+
+
+def _one_aircraft(logs: Sequence[FlightLog], aircraft: Aircraft) -> None:
+    names = sorted({str(log.metadata["aircraft"]) for log in logs if log.metadata.get("aircraft")})
+    if len(names) > 1:
+        raise LogError(
+            f"the records are of several aircraft ({', '.join(names)}): trace the records of one aircraft at a time"
+        )
+
+
+def undo_input_sensors(s: Signals, aircraft: Aircraft) -> Signals:
+    """A run with the declared errors of the elevator's and the airspeed's sensors undone."""
+
+    def true(channel: str, x: Array, cells: int) -> Array:
+        errors = aircraft.file.sensors.get(channel, Sensor()).errors()
+        late = errors.lead_s / s.dt_s * cells
+        if late > 0.0:
+            at = np.arange(len(x))
+            x = np.interp(at + late, at, x)
+        return errors.unscaled(x)
+
+    return replace(
+        s,
+        elevator_rad=true("elevator_rad", s.elevator_rad, s.sub * FINE),
+        airspeed_m_s=true("airspeed_m_s", s.airspeed_m_s, s.sub),
+        ground_m_s=true("airspeed_m_s", s.ground_m_s, s.sub),
+    )
+
+
+def _check(signals: Sequence[Signals], held: Sequence[str]) -> None:
+    for s in signals:
+        if s.y.shape[0] < _LEAST_SAMPLES:
+            raise LogError(
+                f"run {s.run_id}: {s.y.shape[0]} samples; a record needs at least {_LEAST_SAMPLES} to be traced"
+            )
+    moved = max(float(np.ptp(s.elevator_rad)) for s in signals if s.run_id not in held)
+    if moved < _LEAST_ELEVATOR_RAD:
+        which = "record that is not held out" if held else "record"
+        raise LogError(
+            f"no {which} moves the elevator by more than {moved / DEG:.3g} deg: without an input no effect can be "
+            "separated from another; fly doublets or 3-2-1-1 of at least 1 deg"
+        )
+
+
+def _hold_out(runs: Sequence[str], options: TraceOptions) -> tuple[str, ...]:
+    if options.hold_out is None:
+        return tuple(runs[2::3]) if len(runs) > 1 and len(runs) >= 3 else ()
+    for run in options.hold_out:
+        if run not in runs:
+            raise ConfigurationError(f"--hold-out {run!r}: no such run; {choices(run, runs)}")
+    if len(set(options.hold_out)) == len(runs):
+        raise ConfigurationError("--hold-out names every run: leave at least one to fit")
+    return tuple(options.hold_out)
+
+
+def _records(
+    signals: Sequence[Signals], aircraft: Aircraft, model: str, held: Sequence[str]
+) -> list[TraceRecord]:
+    """Records with the declared aircraft and the gusts of their flight conditions.
+
+    Fitted records of one condition share a plant. Held-out records have no influence on it; they have tables of their
+    own about the same trim, over the range that they reach.
+    """
+    records: dict[int, TraceRecord] = {}
+    for group in _conditions(signals, held):
+        everyone = [signals[i] for i in group]
+        members = [s for s in everyone if s.run_id not in held] or everyone
+        length = gust_length_m(float(np.mean([s.altitude_m for s in members])))
+        for i, plant in zip(group, _plants(everyone, members, aircraft, model), strict=True):
+            records[i] = TraceRecord(signals[i], plant, length, _remainder(signals[i], plant))
+    return [records[i] for i in range(len(signals))]
+
+
+def _conditions(signals: Sequence[Signals], held: Sequence[str]) -> list[list[int]]:
+    """Indices of the runs of each flight condition, fitted runs first."""
+    groups: list[list[int]] = []
+    for i, s in sorted(enumerate(signals), key=lambda item: item[1].run_id in held):
+        for group in groups:
+            first = signals[group[0]]
+            near = abs(s.airspeed_m_s.mean() / first.airspeed_m_s.mean() - 1.0) < _SAME_SPEED
+            if near and abs(s.altitude_m - first.altitude_m) < _SAME_ALTITUDE_M:
+                group.append(i)
+                break
+        else:
+            groups.append([i])
+    return groups
+
+
+def _plants(
+    everyone: Sequence[Signals], members: Sequence[Signals], aircraft: Aircraft, model: str
+) -> list[Plant]:
+    """The plant of each run of one flight condition; ``members`` are the runs that determine the condition."""
+    speed = float(np.mean([s.airspeed_m_s.mean() for s in members]))
+    density = float(np.mean([s.density_kg_m3.mean() for s in members]))
+    if model == "linear":
+        at = _trim(aircraft, members, speed, density) if aircraft.file.jsbsim is not None else None
+        derivatives = declared_derivatives(aircraft, at)
+        power = None if at is None else engines(aircraft, at)
+        starts = map(_start_of, everyone)
+        return [linear(aircraft, derivatives, speed, density, *start, power) for start in starts]
+    at = _trim(aircraft, members, speed, density)
+    plant = _probed(aircraft, at, members)
+    wider = plant if len(members) == len(everyone) else _probed(aircraft, at, everyone)
+    return [plant if any(s is m for m in members) else wider for s in everyone]
+
+
+def _remainder(s: Signals, plant: Plant) -> Array | None:
+    """What the JSBSim model has beyond the tables along a run; None for the linear model, and where it diverges."""
+    if plant.trim is None:
+        return None
+    try:
+        return remainder(s, plant)
+    except FlightError:
+        return None
+
+
+def _start_of(s: Signals) -> tuple[float, float]:
+    """Mean angle of attack and elevator [rad] over the start of a run."""
+    head = max(_HEAD_SAMPLES, int(_HEAD_S / s.dt_s))
+    return float(s.y[:head, 0].mean()), float(s.elevator_rad[: head * s.sub * FINE].mean())
+
+
+def _probed(aircraft: Aircraft, at: Trim, runs: Sequence[Signals]) -> Plant:
+    """Tables over the angles and pitch rates that the runs reach."""
+    rate = max(float(np.abs(s.y[:, 1]).max()) for s in runs)
+    return probed(
+        aircraft, at, _reach([s.y[:, 0] for s in runs]), _reach([s.elevator_rad for s in runs]), rate
+    )
+
+
+def _reach(series: Sequence[Array]) -> tuple[float, float]:
+    """Smallest and largest value."""
+    return min(float(x.min()) for x in series), max(float(x.max()) for x in series)
+
+
+def _trim(aircraft: Aircraft, members: Sequence[Signals], speed: float, density: float) -> Trim:
+    s = members[0]
+    climb = float(
+        np.mean(
+            [m.theta_rad[: _CLIMB_SAMPLES * m.sub].mean() - m.y[:_CLIMB_SAMPLES, 0].mean() for m in members]
+        )
+    )
+    gamma = climb if abs(climb) > _CLIMB_RAD else 0.0
+    for tried in (gamma, 0.0):
+        try:
+            at = trim_of(aircraft, speed, density, s.altitude_m, tried)
+            levers = [m.throttle for m in members if m.throttle is not None]
+            if levers:  # the logged throttle counts, not that of the declared trim
+                at = replace(at, controls=replace(at.controls, throttle=float(np.mean(levers))))
+            return at
+        except TrimError as error:
+            problem = error
+    raise LogError(
+        f"the declared aircraft {aircraft.name} cannot fly steadily at the {speed:.3g} m/s and {s.altitude_m:.0f} m of "
+        f"run {s.run_id} ({problem}): is it another aircraft, or another unit of airspeed?"
+    )
+
+
+def gust_length_m(altitude_m: float) -> float:
+    """Scale length of the vertical gust [m] in light turbulence at an altitude [m]."""
+    lowest, highest = _GUST_ALTITUDE_M
+    return gust_scales("mil-f-8785c", "light", min(max(altitude_m, lowest), highest)).length_w_m
+
+
+def _halves(record: TraceRecord) -> tuple[TraceRecord, TraceRecord]:
+    """The record cut where the elevator has made half of its travel, so that both parts are excited."""
+    s = record.signals
+    travel = np.cumsum(np.abs(np.diff(s.elevator_rad[:: s.sub * FINE])))
+    half = int(np.searchsorted(travel, 0.5 * travel[-1]))
+    middle = min(max(half, _LEAST_SAMPLES // 2), s.y.shape[0] - _LEAST_SAMPLES // 2)
+    halves = []
+    for name, first, last in (("first half", 0, middle), ("second half", middle, s.y.shape[0])):
+        points = slice(first * s.sub, (last - 1) * s.sub + 1)
+        fine = slice(first * s.sub * FINE, (last - 1) * s.sub * FINE + 1)
+        cut = replace(
+            s,
+            run_id=f"{s.run_id}, {name}",
+            y=np.ascontiguousarray(s.y[first:last]),
+            elevator_rad=s.elevator_rad[fine],
+            airspeed_m_s=s.airspeed_m_s[points],
+            ground_m_s=s.ground_m_s[points],
+            density_kg_m3=s.density_kg_m3[points],
+            theta_rad=s.theta_rad[points],
+            corner_rad2=s.corner_rad2[first:last],
+        )
+        beyond = None if record.remainder is None else np.ascontiguousarray(record.remainder[:, points])
+        halves.append(replace(record, signals=cut, remainder=beyond))
+    return halves[0], halves[1]
+
+
+__all__ = ["Case", "gust_length_m", "prepare", "undo_input_sensors"]

@@ -1,0 +1,224 @@
+"""A traced effect drawn by its kind: a surface, a curve of a coefficient, a declared value, a sensor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.channels import shown
+from airtruth.charts import Band, Line, Mark, Panel, Rule
+from airtruth.effects.registry import EFFECTS
+from airtruth.physics.terms import AeroTerm, Change, shape_of
+from airtruth.table import significant
+from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
+from airtruth.tracing.answer import TraceAnswer
+from airtruth.tracing.model.compile import CHANNELS
+from airtruth.tracing.model.plant import Plant
+from airtruth.tracing.model.records import FINE, TraceRecord
+from airtruth.tracing.model.surface import through
+from airtruth.tracing.presentation.shown_record import ShownRecord
+from airtruth.units import DEG
+
+Array = NDArray[np.float64]
+
+_CURVES: Final = ("alpha", "elevator")
+"""Signals over which a coefficient is drawn as a curve."""
+_AROUND_S: Final = 2.5
+"""Width of the shown part of a sensor's channel [s] (judgement: one doublet)."""
+_DENSITY: Final = 0.2
+"""Height of the density of the samples over that of the band [-] (judgement)."""
+_EDGE_S: Final = 0.8
+"""Width of the shown part of the elevator [s] (judgement: one edge of a doublet)."""
+
+
+def effect_panel(answer: TraceAnswer, shown_: ShownRecord) -> Panel:
+    """Draw the first effect in the form that suits its kind."""
+    change = shown_.change
+    table = next((e for e in answer.effects if e.table is not None), None)
+    if table is not None:
+        return _learned(table, table.table)
+    if change.surface:
+        return _surface(shown_.record, change)
+    if change.aero and change.aero[0].signal in _CURVES and not change.states:
+        return _curve(shown_, change.aero)
+    if change.sensors:
+        return _sensor(answer, shown_, change)
+    if change.declared or (answer.effects and not change.aero):
+        return _estimates(answer)
+    if change.aero:
+        return _motion(shown_)
+    return Panel(title="the effect", words="no effect accepted")
+
+
+def line(x: Iterable[float], y: Iterable[float]) -> Line:
+    """A solid curve of two arrays."""
+    return Line(tuple(map(float, x)), tuple(map(float, y)))
+
+
+def _surface(record: TraceRecord, change: Change) -> Panel:
+    s = record.signals
+    step = s.dt_s / (s.sub * FINE)
+    air = through(change.surface, s.elevator_rad, step)
+    time = np.arange(len(air)) * step
+    middle = float(time[int(np.argmax(np.abs(air - s.elevator_rad)))])
+    span = np.abs(time - middle) < 0.5 * _EDGE_S
+    measured, seen = (line(time[span], v[span] / DEG) for v in (s.elevator_rad, air))
+    return Panel(
+        title="the effect: surface",
+        x_label="time [s]",
+        y_label="elevator [deg]",
+        lines=(
+            replace(measured, label="measured", colour="grey"),
+            replace(seen, label="as the air sees it", colour="vermillion", stroke="dashed"),
+        ),
+    )
+
+
+def _curve(shown_: ShownRecord, terms: tuple[AeroTerm, ...]) -> Panel:
+    """Coefficient over its signal: the declared one, refitted, and with the effect."""
+    first, record = terms[0], shown_.record
+    plant = record.plant
+    over = plant.alpha_rad if first.signal == "alpha" else plant.elevator_rad
+    at = plant.trim_alpha_rad if first.signal == "alpha" else plant.trim_elevator_rad
+    fine = np.linspace(over[0], over[-1], 201)
+    declared = np.interp(fine, over, _declared_curve(plant, first))
+    derivative = (3 if first.coefficient == "Cm" else 0) + (0 if first.signal == "alpha" else 2)
+    models = shown_.stages.models
+    before = declared + models["before"].common[derivative] * (fine - at)
+    after = declared + models["after"].common[derivative] * (fine - at)
+    for term in terms:
+        if term.signal == first.signal and term.coefficient == first.coefficient:
+            after = after + term.amplitude * shape_of(term, fine)
+    flown = (
+        record.signals.y[:, 0] - plant.alpha_shift_rad
+        if first.signal == "alpha"
+        else record.signals.elevator_rad
+    )
+    return Panel(
+        title=f"the effect: {first.coefficient}",
+        x_label=f"{first.signal} [deg]",
+        y_label=first.coefficient,
+        lines=(
+            replace(line(fine / DEG, declared), label="declared", colour="grey"),
+            replace(line(fine / DEG, before), label="before", stroke="dotted"),
+            replace(line(fine / DEG, after), label="after", colour="vermillion", stroke="dashed"),
+        ),
+        bands=(Band(float(flown.min() / DEG), float(flown.max() / DEG), axis="x", label="flown"),),
+    )
+
+
+def _learned(effect: AcceptedEffect, table: IncrementTable | None) -> Panel:
+    """A learned increment with its band, and the density of the samples below it."""
+    if table is None:
+        return Panel(title="the effect", words="no table")
+    over = effect.over or ""
+    factor, unit = (1.0 / DEG, "deg") if over.endswith("_rad") else (1.0, "-")
+    x = [factor * at for at in table.at]
+    bottom, top = min(table.low), max(table.high)
+    most = max(*table.samples, 1)
+    density = [bottom - (top - bottom) * _DENSITY * (1.0 - n / most) for n in table.samples]
+    return Panel(
+        title=f"the effect: increment of {effect.acts_on}",
+        x_label=f"{'state driven by ' if effect.states else ''}{over.removesuffix('_rad')} [{unit}]",
+        y_label=f"increment of {effect.acts_on}",
+        lines=(
+            replace(line(x, table.value), label="learned", colour="vermillion"),
+            replace(line(x, table.low), label="95 % band", colour="vermillion", stroke="dotted"),
+            replace(line(x, table.high), colour="vermillion", stroke="dotted"),
+            replace(line(x, density), label="density of the samples", colour="grey"),
+        ),
+    )
+
+
+def _declared_curve(plant: Plant, term: AeroTerm) -> Array:
+    """The declared coefficient over the term's signal, the other angle at its trim and the pitch rate zero."""
+    c = plant.aircraft.constants
+    middle = plant.values[:, :, int(np.argmin(np.abs(plant.qhat)))]
+    if term.signal == "alpha":
+        column = middle[:, int(np.argmin(np.abs(plant.elevator_rad - plant.trim_elevator_rad)))]
+    else:
+        column = middle[int(np.argmin(np.abs(plant.alpha_rad - plant.trim_alpha_rad)))]
+    if term.coefficient == "Cm":
+        return np.asarray(column[:, 2] / (c.wing_area_m2 * c.chord_m))
+    return np.asarray(-column[:, 1] / c.wing_area_m2)
+
+
+def _sensor(answer: TraceAnswer, shown_: ShownRecord, change: Change) -> Panel:
+    """The measured channel about the largest difference, with the simulation through either sensor."""
+    channel = next((t.channel for t in change.sensors if t.channel in CHANNELS), None)
+    if channel is None:
+        return _estimates(answer)
+    model = shown_.stages.models["after"]
+    i, factor = CHANNELS.index(channel), shown(channel)[1]
+    full = model.hypothesis.change(model.sizes)
+    rest = replace(full, sensors=model.hypothesis.declared.sensors)
+    complete, declared = (shown_.free_run(model, c)[:, i] * factor for c in (full, rest))
+    time_s = shown_.time_s
+    middle = float(time_s[int(np.argmax(np.abs(complete - declared)))])
+    span = (time_s >= middle - 0.5 * _AROUND_S) & (time_s <= middle + 0.5 * _AROUND_S)
+    measured = shown_.record.signals.y[span, i] * factor
+    return Panel(
+        title="the effect: sensor",
+        x_label="time [s]",
+        y_label=shown(channel)[0],
+        lines=(
+            replace(line(time_s[span], measured), label="measured", colour="grey", stroke="points"),
+            replace(line(time_s[span], declared[span]), label="sensor as declared", stroke="dotted"),
+            replace(
+                line(time_s[span], complete[span]),
+                label="with the effect",
+                colour="vermillion",
+                stroke="dashed",
+            ),
+        ),
+    )
+
+
+def _estimates(answer: TraceAnswer) -> Panel:
+    """Estimates with their 95 % intervals, beside the declared values."""
+    rows: list[str] = []
+    marks = []
+    for effect in answer.effects:
+        for name, estimate in effect.parameters.items():
+            low, high = (estimate.value if x is None else x for x in estimate.ci95)
+            marks.append(
+                Mark(len(rows), estimate.value, low, high, label="estimate, 95 %", colour="vermillion")
+            )
+            rows.append(f"{effect.name} {name} = {significant(estimate.value)}")
+    known = (EFFECTS[e.key] for e in answer.effects if e.key in EFFECTS)
+    neutral = {p.neutral for effect in known for p in effect.parameters if not p.is_location}
+    return Panel(
+        title="the effect: value and 95 % interval",
+        rows=tuple(rows),
+        marks=tuple(marks),
+        rules=tuple(Rule(x, label="as declared") for x in sorted(neutral) if math.isfinite(x)),
+    )
+
+
+def _motion(shown_: ShownRecord) -> Panel:
+    """An effect with memory: the pitch rate of the simulation with it and without."""
+    model = shown_.stages.models["after"]
+    factor, time_s = shown("q_rad_s")[1], shown_.time_s
+    runs = (
+        shown_.free_run(model, change)[:, 1] * factor
+        for change in (model.hypothesis.declared, model.hypothesis.change(model.sizes))
+    )
+    measured, without, complete = (line(time_s, y) for y in (shown_.record.signals.y[:, 1] * factor, *runs))
+    return Panel(
+        title="the effect: motion with and without it",
+        x_label="time [s]",
+        y_label="pitch rate [deg/s]",
+        lines=(
+            replace(measured, label="measured", colour="grey", stroke="points"),
+            replace(without, label="without the effect", stroke="dotted"),
+            replace(complete, label="with the effect", colour="vermillion", stroke="dashed"),
+        ),
+    )
+
+
+__all__ = ["effect_panel", "line"]

@@ -1,0 +1,51 @@
+"""The files of a trace that show its evidence: figures, records and errors."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from airtruth import style
+from airtruth.charts import as_figure
+from airtruth.logs.atomic import make_folder, write_text
+from airtruth.logs.histories import FILE, Histories, write_histories
+from airtruth.tracing.answer import TraceAnswer
+from airtruth.tracing.presentation.charts import innovations_chart, scores_chart, trace_chart
+from airtruth.tracing.presentation.error_table import error_csv
+
+FIGURES: Final = ("trace.png", "scores.png", "innovations.png")
+"""Files of the figures: residuals of one record with the effect, the candidates, the innovations."""
+ERRORS: Final = "error.csv"
+"""File of the errors in long form."""
+EVIDENCE: Final = (*FIGURES, FILE, ERRORS)
+"""Every file of `write_evidence`."""
+
+
+def write_evidence(answer: TraceAnswer, histories: Histories, out: Path) -> tuple[Path, ...]:
+    """Write the figures of a trace, the records behind them and its errors into its folder.
+
+    Parameters
+    ----------
+    answer : of a finished trace.
+    histories : its records.
+    out : folder, created if it does not exist.
+
+    Returns
+    -------
+    The files, `EVIDENCE`.
+
+    Raises
+    ------
+    StoreError
+        If a file cannot be written.
+    """
+    make_folder(out)
+    drawn = (trace_chart(answer, histories), scores_chart(answer), innovations_chart(histories))
+    for name, chart in zip(FIGURES, drawn, strict=True):
+        style.save(as_figure(chart), out / name)
+    write_histories(out / FILE, histories)
+    write_text(out / ERRORS, error_csv(answer))
+    return tuple(out / name for name in EVIDENCE)
+
+
+__all__ = ["ERRORS", "EVIDENCE", "FIGURES", "write_evidence"]

@@ -1,0 +1,36 @@
+"""The answer of a trace as HTML, for notebooks and for the parts of a report."""
+
+from __future__ import annotations
+
+import html
+
+from airtruth.table import as_html
+from airtruth.tracing.answer import TraceAnswer
+from airtruth.tracing.presentation.candidates import candidate_table
+from airtruth.tracing.presentation.error_table import error_table
+from airtruth.tracing.presentation.text import effect_details, effect_line, verdict
+
+
+def as_trace_html(answer: TraceAnswer) -> str:
+    """Verdict, effects, errors, candidates and next flight as one HTML fragment."""
+    parts = [
+        verdict_html(answer),
+        as_html(error_table(answer)),
+        as_html(candidate_table(answer)),
+        f"<p>Next flight: {html.escape(answer.next_flight)}</p>",
+    ]
+    return "\n".join(parts)
+
+
+def verdict_html(answer: TraceAnswer) -> str:
+    """Verdict and effects as paragraphs; the verdict has the class "verdict"."""
+    paragraphs = [f'<p class="verdict">{html.escape(verdict(answer))}</p>']
+    for effect in answer.effects:
+        lines = (line.strip() for line in effect_details(effect, answer.credit.get(effect.key)))
+        details = "; ".join(lines) + "."
+        line = html.escape(effect_line(effect))
+        paragraphs.append(f"<p><strong>{line}</strong><br>{html.escape(details)}</p>")
+    return "\n".join(paragraphs)
+
+
+__all__ = ["as_trace_html", "verdict_html"]

@@ -1,0 +1,266 @@
+"""The text that `airtruth trace` prints: verdict, effects, errors, candidates and the next flight."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+from typing import Final
+
+from airtruth.effects.registry import EFFECTS
+from airtruth.table import WIDTH, as_text, significant
+from airtruth.tracing.accepted import AcceptedEffect, IncrementTable, ParameterEstimate
+from airtruth.tracing.answer import Evidence, TraceAnswer
+from airtruth.tracing.presentation.candidates import probability, ranked
+from airtruth.tracing.presentation.derivative_table import derivative_table
+from airtruth.tracing.presentation.error_table import error_table
+from airtruth.tracing.presentation.tolerances import tolerance_table
+from airtruth.tracing.selection.explanation import DERIVATIVES, EXPLAINING
+
+MOST_CANDIDATES: Final = 8
+"""Number of candidates in the text [-] (judgement: as many as a round refits)."""
+_FAR_SIGMA: Final = 2.0
+"""Declared standard deviations beyond which the verdict names a derivative [-] (convention)."""
+_PRINTED: Final = {
+    "-": "",
+    "1": "",
+    "hz": "Hz",
+    "rad_s": "rad/s",
+    "m_s": "m/s",
+    "m_s2": "m/s2",
+    "kg_m2": "kg m2",
+}
+"""Unit of a parameter -> its printed form; others are printed as they are."""
+
+
+def as_trace_text(answer: TraceAnswer) -> str:
+    """The answer of a trace as plain text."""
+    tolerances = tolerance_table(answer)
+    blocks = [
+        [*textwrap.wrap(verdict(answer), WIDTH), *textwrap.wrap(_records(answer), WIDTH)],
+        *([effect_line(e), *effect_details(e, answer.credit.get(e.key))] for e in answer.effects),
+        as_text(error_table(answer)).rstrip("\n").splitlines(),
+        *([as_text(tolerances).rstrip("\n").splitlines()] if tolerances else []),
+        as_text(derivative_table(answer)).rstrip("\n").splitlines(),
+        *([_wrapped("Sets of causes", _sets(answer))] if len(answer.alternatives) > 1 else []),
+        ["Candidates, accepted effects first, then by significance:", *_candidate_lines(answer)],
+        _wrapped("Smallest traceable sizes", "; ".join(detectable(answer)) + "."),
+        _wrapped("Next flight", answer.next_flight),
+    ]
+    if answer.updated_aircraft:
+        blocks.append([f"Updated aircraft: {answer.updated_aircraft}"])
+    blocks += [_wrapped("Note", note + ".") for note in answer.notes]
+    return "\n\n".join("\n".join(block) for block in blocks)
+
+
+def verdict(answer: TraceAnswer) -> str:
+    """The verdict in one or two sentences."""
+    sentence = _conclusion(answer)
+    if answer.provisional:
+        held = answer.records.held_out
+        if not held:
+            why = "no record was held out"
+        elif answer.confirmed is False:
+            why = "the held-out records are worse with the effects than without them"
+        else:
+            why = f"a significant anomaly remains ({_evidence(answer.remaining)})"
+        sentence += f" Provisional: {why}."
+    return sentence
+
+
+def _conclusion(answer: TraceAnswer) -> str:
+    if answer.verdict == "none":
+        return (
+            f"None: the declared aircraft explains these records ({probability(answer.anomaly.p_value)}); they show "
+            "no missing effect."
+        )
+    if answer.verdict == "unexplained":
+        return (
+            f"Unexplained: the declared aircraft lacks something ({_evidence(answer.anomaly)}), and no effect of the "
+            "library passes every acceptance test."
+        )
+    alike = sorted({name for e in answer.effects for name in e.indistinguishable_from})
+    kind = "Learned" if answer.verdict == "learned" else "One of several" if alike else "Traced"
+    sentence = f"{_contradiction(answer)}{kind}: {_causes(answer)}"
+    if alike:
+        sentence += f", or an effect that looks the same in these records: {', '.join(alike)}"
+    return sentence + "."
+
+
+def _contradiction(answer: TraceAnswer) -> str:
+    """That the records contradict the declared model, and the derivatives farthest from it."""
+    declared = answer.declared_model
+    if declared is None or declared.consistent:
+        return ""
+    far = [
+        f"{name} {significant(s.estimate)} for {significant(s.declared)}"
+        for name, s in declared.shifts.items()
+        if abs(s.sigma) > _FAR_SIGMA
+    ]
+    shifts = f": {', '.join(far)}" if far else ""
+    return f"The records contradict the declared model ({probability(declared.p_value)}){shifts}. "
+
+
+def _causes(answer: TraceAnswer) -> str:
+    """What the declared aircraft lacks, and what explains its derivatives."""
+    lacks = [e.key for e in answer.effects if not _in_derivatives(e.name) and e.acts_on is None]
+    learned = [f"an increment of {e.variant}" for e in answer.effects if e.acts_on is not None]
+    lacks += [f"{_listed(learned)}, which no effect of the library describes"] if learned else []
+    explains = [e.key for e in answer.effects if _in_derivatives(e.name) and e.name != DERIVATIVES]
+    parts = [f"the declared aircraft lacks {_listed(lacks)}"] if lacks else []
+    if explains:
+        parts.append(f"{_listed(explains)} explain{'' if len(explains) > 1 else 's'} the derivatives")
+    wrong = [p[1:] for e in answer.effects if e.name == DERIVATIVES for p in e.parameters]
+    if wrong:
+        parts.append(f"the declared {_listed(wrong)} {'are' if len(wrong) > 1 else 'is'} wrong")
+    return "; ".join(parts)
+
+
+def _sets(answer: TraceAnswer) -> str:
+    """Sets of causes with their posterior weights."""
+    shown = answer.alternatives[:MOST_CANDIDATES]
+    sets = "; ".join(f"{' + '.join(s.effects) or 'none'} {100.0 * s.weight:.0f} %" for s in shown)
+    rest = len(answer.alternatives) - len(shown)
+    return sets + (f"; and {rest} more." if rest else ".")
+
+
+def _in_derivatives(name: str) -> bool:
+    return name in EXPLAINING or name == DERIVATIVES
+
+
+def _listed(names: list[str]) -> str:
+    return " and ".join(", ".join(names).rsplit(", ", 1))
+
+
+def _evidence(evidence: Evidence) -> str:
+    where = f"; it shows in {evidence.where}" if evidence.where else ""
+    return probability(evidence.p_value) + where
+
+
+def unit_of(key: str, parameter: str) -> str:
+    """Printed unit of an effect's parameter; "" where it has none or the library lacks the effect."""
+    effect = EFFECTS.get(key) or next((e for e in EFFECTS.values() if e.name == key), None)
+    if effect is None:
+        return ""
+    unit = {p.name: p.unit for p in effect.parameters}.get(parameter, "")
+    return _PRINTED.get(unit, unit)
+
+
+def interval(estimate: ParameterEstimate) -> str:
+    """``0.0196 to 0.0214``, "-" for an end at infinity."""
+    low, high = (significant(end) if end is not None else "-" for end in estimate.ci95)
+    return f"{low} to {high}"
+
+
+def effect_line(effect: AcceptedEffect) -> str:
+    """Name and size: ``elevator_delay: delay_s = 0.0205 +- 0.00045 s (95 %: 0.0196 to 0.0214)``."""
+    if effect.table is not None:
+        return f"{effect.key}: {increment_words(effect)}"
+    parts = []
+    for name, estimate in effect.parameters.items():
+        unit = unit_of(effect.key, name)
+        size = f"{significant(estimate.value)} +- {significant(estimate.std, 2)} {unit}".rstrip()
+        parts.append(f"{name} = {size} (95 %: {interval(estimate)})")
+    words = f"; {increment_words(effect)}" if effect.acts_on is not None else ""
+    return f"{effect.key}: {', '.join(parts)}{words}"
+
+
+def increment_words(effect: AcceptedEffect) -> str:
+    """A learned increment in words: largest value, onset, memory, and size relative to the declared model."""
+    over, table = effect.over or "", effect.table
+    parts = []
+    if table is not None:
+        i = max(range(len(table.at)), key=lambda k: abs(table.value[k]))
+        low, high = significant(table.low[i], 2), significant(table.high[i], 2)
+        parts.append(
+            f"{effect.acts_on} {significant(table.value[i], 2)} at {over} = {significant(table.at[i])} "
+            f"(95 %: {low} to {high})"
+        )
+        parts.append(_onset(table, over))
+    parts += [
+        f"through a {s.kind} of {significant(s.time_s, 2)} s" + (" (1/wn)" if s.kind == "mode" else "")
+        for s in effect.states
+    ]
+    if effect.relative_size is not None:
+        parts.append(f"{100.0 * effect.relative_size:.0f} % of the declared derivative in the flown range")
+    return "; ".join(parts)
+
+
+def _onset(table: IncrementTable, over: str) -> str:
+    below, above = table.onset
+    sides = [f"below {significant(below)}"] if below is not None else []
+    sides += [f"above {significant(above)}"] if above is not None else []
+    if not sides:
+        return "its band contains zero at every single point"
+    return f"its band excludes zero where {over} is {' or '.join(sides)}"
+
+
+def effect_details(effect: AcceptedEffect, share: float | None = None) -> Iterator[str]:
+    """Significance of an effect, and the effects that look the same."""
+    line = f"  {probability(effect.p_value)} (Holm over all candidates)"
+    if effect.gain_2_log_likelihood is not None:
+        line += f"; its refit gains {significant(effect.gain_2_log_likelihood)} in 2 log L"
+    yield f"{line}; {significant(effect.separation_sigma)} sigma from the next effect"
+    if share is not None:
+        part = f"{100.0 * share:.0f} %"
+        yield f"  its removal costs {part} of the log-likelihood gained from the declared aircraft to this answer"
+    alike = effect.indistinguishable_from
+    yield (
+        f"  looks the same in these records: {', '.join(alike)}"
+        if alike
+        else "  no other effect that passes every test explains the records as well"
+    )
+    if effect.other_variants:
+        names = ", ".join(f"{effect.name}:{v}" for v in effect.other_variants)
+        yield f"  explains the records as well: {names}"
+
+
+def detectable(answer: TraceAnswer) -> Iterator[str]:
+    """``elevator_delay 0.0033 s`` for each effect; of several variants, each variant."""
+    stated = answer.detectability
+    with_variants = {name.partition(":")[0] for name in stated if ":" in name}
+    for name, value in stated.items():
+        if name in with_variants:
+            continue
+        effect = EFFECTS.get(name)
+        unit = unit_of(name, effect.parameters[0].name) if effect else ""
+        yield f"{name} {significant(value, 2)} {unit}".rstrip()
+
+
+def _candidate_lines(answer: TraceAnswer) -> Iterator[str]:
+    testable = [r for r in ranked(answer) if r.candidate.testable]
+    shown = testable[:MOST_CANDIDATES]
+    width = max((len(r.candidate.key) for r in shown), default=0)
+    for r in shown:
+        c = r.candidate
+        gain = "" if r.gain is None else f"; its refit gains {significant(r.gain)} in 2 log L"
+        score = f"score {significant(c.score).rjust(7)}  {probability(c.p_value).ljust(12)}"
+        yield f"  {c.key.ljust(width)}  {score}  {r.outcome}{gain}"
+    if len(testable) > len(shown):
+        yield f"  and {len(testable) - len(shown)} more"
+    silent = [c.key for c in answer.candidates if not c.testable]
+    if silent:
+        yield from textwrap.wrap(
+            f"Not testable here: {', '.join(silent)}", WIDTH, initial_indent="  ", subsequent_indent="  "
+        )
+
+
+def _records(answer: TraceAnswer) -> str:
+    records = answer.records
+    held = ", ".join(records.held_out) or "none"
+    model = "forces probed in JSBSim" if answer.model == "aircraft" else "linear short-period model"
+    return f"{len(records.fitted)} records fitted, held out: {held}; {model}."
+
+
+def _wrapped(heading: str, words: str) -> list[str]:
+    return textwrap.wrap(f"{heading}: {words}", WIDTH, subsequent_indent="  ")
+
+
+__all__ = [
+    "as_trace_text",
+    "detectable",
+    "effect_details",
+    "effect_line",
+    "interval",
+    "unit_of",
+    "verdict",
+]

@@ -1,0 +1,159 @@
+"""Records flown again in JSBSim, by the declared and by the updated aircraft."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth import aircraft as planes
+from airtruth.aircraft import Aircraft, Sensor
+from airtruth.errors import FlightError, TrimError
+from airtruth.simulation.replay import Track, replay, substeps
+from airtruth.simulation.simulator import Condition
+from airtruth.simulation.trim import Trim, trim
+from airtruth.tracing.inference.assess import noise_floor
+from airtruth.tracing.model.compile import CHANNELS, compile_change
+from airtruth.tracing.model.records import FINE, TraceRecord
+from airtruth.tracing.stage_errors import Errors, PerChannel, Replay
+from airtruth.tracing.stages import Stages
+
+Array = NDArray[np.float64]
+
+MOST_RECORDS: Final = 6
+"""Largest number of records that are flown again [-] (judgement: each costs about a second)."""
+_APART: Final = 0.25
+"""Logarithm of the ratio of two errors of one free run, in JSBSim and in the filter, from which they disagree [-]
+(judgement: they agree within 0.05 for the shipped aircraft)."""
+
+
+def flown_again(stages: Stages, aircraft: Aircraft, updated: str | Path | None) -> Replay:
+    """Free runs of the held-out records (of the fitted ones where none is held out) in JSBSim itself.
+
+    Parameters
+    ----------
+    stages : the assessed stages of a trace.
+    aircraft : the declared aircraft; updated : folder of the updated one, None where there is none.
+
+    Returns
+    -------
+    Errors of both aircraft; None for an aircraft without a JSBSim model, for a trace with the linear model, and where
+    the motion leaves the range of the simulation.
+
+    Raises
+    ------
+    AircraftError
+        If the updated aircraft cannot be read.
+    """
+    if aircraft.file.jsbsim is None or stages.case.model != "aircraft":
+        return Replay()
+    new = None if updated is None else planes.load(updated)
+    weights = _weights(stages)
+    records = stages.reported[0].records
+    try:
+        return Replay(
+            declared=_errors(records, aircraft, weights),
+            updated=None if new is None else _errors(records, new, weights),
+        )
+    except (FlightError, TrimError):
+        return Replay()
+
+
+def disagreement(replay: Replay, errors: Errors) -> list[str]:
+    """A sentence where JSBSim and the filter disagree on the motion of the declared aircraft.
+
+    The filter is built from forces at rest, so it lacks the servos, lags and alpha-dot terms of a JSBSim model.
+
+    Parameters
+    ----------
+    replay : errors in JSBSim; errors : those of the filter.
+    """
+    stage = errors.stages["declared"]
+    filtered = stage.held_out or stage.fit
+    if replay.declared is None or filtered is None:
+        return []
+    ratios = {c: rms / max(filtered.free_run[c], 1e-12) for c, rms in replay.declared.items()}
+    apart = [f"{channel} {ratio:.2f}" for channel, ratio in ratios.items() if abs(np.log(ratio)) > _APART]
+    if not apart:
+        return []
+    return [
+        "JSBSim and the filter disagree on the motion of the declared aircraft (error in JSBSim over error of the "
+        f"filter: {', '.join(apart)}): the JSBSim model has dynamics that forces at rest do not show, and the traced "
+        "effect may be these dynamics; declare them under [dynamics] in aircraft.toml (docs/aircraft.md)"
+    ]
+
+
+def _weights(stages: Stages) -> list[Array]:
+    """(3,) of each record: standard deviations of its free run that gusts and sensor noise explain."""
+    problem, assessed = stages.reported
+    model = stages.models["before"]
+    compiled = compile_change(model.hypothesis.change(model.sizes))
+    pairs = zip(problem.records[:MOST_RECORDS], assessed["before"], strict=False)
+    return [
+        noise_floor(record, problem.settings, compiled, model.common, own.per_record) for record, own in pairs
+    ]
+
+
+def _errors(records: Sequence[TraceRecord], aircraft: Aircraft, weights: list[Array]) -> PerChannel:
+    trims: dict[Condition, Trim] = {}
+    squares = []
+    for record, weight in zip(records, weights, strict=False):
+        declared = record.plant.trim
+        assert declared is not None
+        before = declared.airspeed_m_s
+        ratio = float(_corrected("airspeed_m_s", np.array(before), record.plant.aircraft, aircraft)) / before
+        at = replace(declared.condition, eas_m_s=declared.condition.eas_m_s * ratio)
+        if at not in trims:
+            trims[at] = trim(aircraft, at)
+        flown = replay(aircraft, trims[at], track(record, aircraft, weight))
+        residual = record.signals.y - np.stack([flown[c] for c in CHANNELS], axis=1)
+        squares.append((residual**2).mean(axis=0))
+    return dict(zip(CHANNELS, np.sqrt(np.mean(squares, axis=0)).tolist(), strict=True))
+
+
+def _corrected(channel: str, x: Array, declared: Aircraft, aircraft: Aircraft) -> Array:
+    """An input corrected for the declared aircraft's sensor, corrected for the sensor of ``aircraft`` instead."""
+    old, new = (plane.file.sensors.get(channel, Sensor()) for plane in (declared, aircraft))
+    return new.errors().unscaled(old.errors().scaled(x))
+
+
+def _lead_s(channel: str, declared: Aircraft, aircraft: Aircraft) -> float:
+    """Difference in delay and lag [s] of an input's sensor, ``aircraft`` less ``declared``."""
+    old, new = (plane.file.sensors.get(channel, Sensor()) for plane in (declared, aircraft))
+    return new.errors().lead_s - old.errors().lead_s
+
+
+def track(record: TraceRecord, aircraft: Aircraft, weight: Array) -> Track:
+    """A record on the simulation's grid, with the errors of the aircraft's sensors undone in its inputs.
+
+    Parameters
+    ----------
+    record : its inputs are corrected for the sensors of its plant's aircraft.
+    weight : (3,) standard deviations that weight the residuals of `CHANNELS`.
+    """
+    s = record.signals
+    steps = substeps(s.dt_s)
+    samples = s.y.shape[0]
+    grid = np.arange((samples - 1) * steps + 1) / steps
+
+    def true(channel: str, fine: Array, cells: int) -> Array:
+        late = _lead_s(channel, record.plant.aircraft, aircraft) / s.dt_s
+        values = np.interp(grid + late, np.arange(len(fine)) / cells, fine)
+        return _corrected(channel, values, record.plant.aircraft, aircraft)
+
+    outputs: Mapping[str, Array] = {c: s.y[:, i] for i, c in enumerate(CHANNELS)}
+    return Track(
+        dt_s=s.dt_s,
+        substeps=steps,
+        outputs=outputs,
+        weight=dict(zip(CHANNELS, weight.tolist(), strict=True)),
+        elevator_rad=true("elevator_rad", s.elevator_rad, s.sub * FINE),
+        airspeed_m_s=true("airspeed_m_s", s.airspeed_m_s, s.sub),
+    )
+
+
+__all__ = ["MOST_RECORDS", "disagreement", "flown_again", "track"]

@@ -1,0 +1,89 @@
+"""The result of a trace: the answer, the records and stages behind it, and its text, table and figures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from airtruth.logs.atomic import write_text
+from airtruth.logs.histories import Histories
+from airtruth.logs.provenance import Provenance
+from airtruth.tracing.answer import ANSWER, TraceAnswer
+from airtruth.tracing.prepare import Case
+from airtruth.tracing.presentation.html import as_trace_html
+from airtruth.tracing.presentation.text import as_trace_text
+from airtruth.tracing.selection.rounds import SearchRound
+from airtruth.tracing.stages import Stages
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class TraceResult:
+    """A finished trace; satisfies `airtruth.result.Result`.
+
+    Attributes
+    ----------
+    answer : what trace.json states.
+    rounds : rounds of the search, the last without an accepted effect.
+    stages : models of the report, assessed on every record.
+    provenance : version, options and digests of the inputs.
+    """
+
+    answer: TraceAnswer
+    rounds: tuple[SearchRound, ...]
+    stages: Stages
+    provenance: Provenance = field(default_factory=Provenance)
+
+    @cached_property
+    def histories(self) -> Histories:
+        """Every record beside the simulations of the stages."""
+        from airtruth.tracing.presentation.trace_histories import trace_histories
+
+        return trace_histories(self.answer, self.stages, self.provenance)
+
+    @property
+    def case(self) -> Case:
+        """Records, declared aircraft and candidates."""
+        return self.stages.case
+
+    def summary(self) -> str:
+        """The text that `airtruth trace` prints, the verdict first."""
+        return as_trace_text(self.answer)
+
+    def to_frame(self) -> pd.DataFrame:
+        """The candidates, one row each, most significant first."""
+        import pandas as pd
+
+        return pd.DataFrame([c.to_dict() for c in self.answer.candidates])
+
+    def to_dict(self) -> dict[str, Any]:
+        """What trace.json holds (docs/trace.md)."""
+        return self.answer.to_dict()
+
+    def plot(self) -> Figure:
+        """Residuals of one record's free run: as declared, the effect, before and after."""
+        from airtruth.charts import as_figure
+        from airtruth.tracing.presentation.charts import trace_chart
+
+        return as_figure(trace_chart(self.answer, self.histories))
+
+    def write(self, out: Path) -> None:
+        """Write trace.json, the figures, the records and the errors into the folder of the trace.
+
+        Raises
+        ------
+        StoreError
+            If a file cannot be written.
+        """
+        from airtruth.tracing.presentation.files import write_evidence
+
+        write_text(out / ANSWER, self.answer.to_json())
+        write_evidence(self.answer, self.histories, out)
+
+    def _repr_html_(self) -> str:
+        return as_trace_html(self.answer)

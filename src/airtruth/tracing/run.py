@@ -1,0 +1,173 @@
+"""The verb trace: logs and a declared aircraft in, a typed result and an updated aircraft out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from threadpoolctl import threadpool_limits
+
+from airtruth import __version__
+from airtruth import aircraft as planes
+from airtruth.aircraft import Aircraft
+from airtruth.checks import gate
+from airtruth.checks.result import CheckResult
+from airtruth.effects.effect import Effect
+from airtruth.effects.registry import EFFECTS
+from airtruth.errors import ConfigurationError, LogError, choices
+from airtruth.logs import atomic
+from airtruth.logs.flight_log import FlightLog
+from airtruth.logs.provenance import Provenance, digests_of
+from airtruth.logs.sources import Logs, named_logs
+from airtruth.tracing.answer import ANOMALY_LEVEL, TraceAnswer
+from airtruth.tracing.conclude import conclude
+from airtruth.tracing.declared_model import declared_p_value
+from airtruth.tracing.kinematic_start import disagreement, kinematic_check, starts_of
+from airtruth.tracing.options import TraceOptions
+from airtruth.tracing.prepare import Case, prepare
+from airtruth.tracing.replay import flown_again
+from airtruth.tracing.result import TraceResult
+from airtruth.tracing.selection.budget import Advance, Budget
+from airtruth.tracing.selection.learn import with_increments
+from airtruth.tracing.selection.noise_colour import with_coloured_noise
+from airtruth.tracing.selection.rounds import SearchRound
+from airtruth.tracing.selection.search import search
+from airtruth.tracing.stages import assess_stages
+from airtruth.tracing.update import updated_folder, write_update
+
+
+def trace(
+    logs: Logs,
+    aircraft: str | Path | Aircraft,
+    options: TraceOptions | None = None,
+    out: Path | None = None,
+    force: bool = False,
+    advance: Advance = lambda step: None,
+) -> TraceResult:
+    """Trace the residual of flight logs to the effects that the declared aircraft lacks.
+
+    Parameters
+    ----------
+    logs : logs of one aircraft: files, folders, campaign folders, logs in memory, or a sequence of these.
+    aircraft : folder with aircraft.toml, a shipped name, or a loaded aircraft.
+    options : choices; None for the defaults.
+    out : folder of trace.json, the figures and the updated aircraft; None to write nothing.
+    force : trace logs that contradict physics all the same; the answer lists the faults.
+    advance : receives the step that begins.
+
+    Raises
+    ------
+    LogError, ConfigurationError, AircraftError, StoreError
+        Naming what is wrong, where, and what to do.
+
+    Examples
+    --------
+    >>> result = trace("data/undeclared/d.parquet", "gtm")  # doctest: +SKIP
+    >>> result.answer.verdict  # doctest: +SKIP
+    'one_of'
+    """
+    with threadpool_limits(limits=1, user_api="blas"):  # threads for small matrices wait for each other
+        return _traced(logs, aircraft, options or TraceOptions(), out, force, advance)
+
+
+def _traced(
+    logs: Logs,
+    aircraft: str | Path | Aircraft,
+    options: TraceOptions,
+    out: Path | None,
+    force: bool,
+    advance: Advance,
+) -> TraceResult:
+    declared = aircraft if isinstance(aircraft, Aircraft) else planes.load(aircraft)
+    effects = _effects(options)
+    checked, forced = _checked(logs, declared, force)
+    if out is not None:  # both before the search, which takes minutes
+        updated_folder(declared, out)
+        atomic.make_folder(out)
+    advance("probe the declared aircraft")
+    case = prepare(checked, declared, effects, options)
+    advance("check the kinematics")
+    held = set() if case.held is None else {r.signals.run_id for r in case.held.records}
+    kinematics = kinematic_check(checked, declared, held)
+    case, rounds = _search(case, options, advance, starts_of(kinematics))
+    advance("assess every stage on fitted and held-out records")
+    stages = assess_stages(case, rounds)
+    origin = _provenance(logs, declared, options)
+    if out is None:
+        return TraceResult(
+            _with_notes(conclude(stages, rounds, forced=forced), kinematics), rounds, stages, origin
+        )
+    advance("write the updated aircraft")
+    updated = write_update(case, rounds, declared, out, declared_p_value(rounds) <= ANOMALY_LEVEL)
+    replay = flown_again(stages, declared, updated)
+    answer = _with_notes(conclude(stages, rounds, updated, replay, forced), kinematics)
+    result = TraceResult(answer, rounds, stages, origin)
+    result.write(out)
+    return result
+
+
+def _provenance(logs: Logs, aircraft: Aircraft, options: TraceOptions) -> Provenance:
+    stated = {
+        name: value for name, value in asdict(options).items() if name != "threads"
+    }  # which changes nothing
+    words = {name: "default" if value is None else _words(value) for name, value in stated.items()}
+    return Provenance(__version__, aircraft.name, words, digests_of(logs, aircraft.folder))
+
+
+def _words(value: object) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
+
+
+def _checked(logs: Logs, aircraft: Aircraft, force: bool) -> tuple[list[FlightLog], list[str]]:
+    """The logs behind the gate, and the faults that ``force`` overruled."""
+    checked, forced = [], []
+    for name, log in named_logs(logs):
+        faults = gate.require(log, aircraft, source=name, force=force)
+        forced += [fault.sentence for fault in faults if fault.certain]
+        checked.append(log)
+    return checked, forced
+
+
+def _with_notes(answer: TraceAnswer, kinematics: CheckResult | None) -> TraceAnswer:
+    """The answer with its contradictions to the kinematic check."""
+    return replace(answer, notes=(*answer.notes, *disagreement(kinematics, answer)))
+
+
+def _search(
+    case: Case, options: TraceOptions, advance: Advance, known: Mapping[str, float]
+) -> tuple[Case, tuple[SearchRound, ...]]:
+    """The case with coloured noise where its records show some, and the rounds of the search."""
+    advance("refit the declared aircraft")
+    limited = None if options.time_budget_s is None else Budget(options.time_budget_s, advance)
+    steps = advance if limited is None else limited
+    case, start = with_coloured_noise(case)
+    rounds = search(
+        case.fitted, case.hypothesis, start, case.effects, options.seed, steps, case.declared, known
+    )
+    if options.learns:
+        rounds = with_increments(case.fitted, rounds, case.effects, options.seed, steps)
+    if not rounds:
+        raise LogError(
+            f"the declared aircraft {case.fitted.records[0].plant.aircraft.name} does not fly like these records: its "
+            "motion diverges; check units and signs with `airtruth check`, and that it is the right aircraft"
+        )
+    return (case if limited is None else replace(case, left_out=limited.left_out)), rounds
+
+
+def _effects(options: TraceOptions) -> list[Effect]:
+    """The requested candidates, each once; a name without a variant selects all of its variants."""
+    if options.effects is None:
+        return [effect for effect in EFFECTS.values() if not effect.in_derivatives]
+    found: dict[str, Effect] = {}
+    for key in options.effects:
+        matching = {k: e for k, e in EFFECTS.items() if key in (k, e.name)}
+        if not matching:
+            raise ConfigurationError(
+                f"effect {key!r}: {choices(key, {*EFFECTS, *(e.name for e in EFFECTS.values())})}"
+            )
+        found |= {k: e for k, e in matching.items() if not e.in_derivatives}
+    return list(found.values())
+
+
+__all__ = ["trace"]

@@ -1,0 +1,1 @@
+"""Score tests, omnibus tests, acceptance rules and the search over effects."""

@@ -1,0 +1,260 @@
+"""The tests that a refitted effect has to pass: significant, material, and no worse on records left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from airtruth.tracing.inference.assess import Assessment, noise_floor
+from airtruth.tracing.inference.cross_validate import LeftOut, leave_one_out, one_by_the_other
+from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.inference.robust import MEMORY_S, inflation, long_run
+from airtruth.tracing.model.compile import compile_change
+from airtruth.tracing.model.parameters import OUTPUTS, Common, PerRecord, size_index
+from airtruth.tracing.selection.score_test import Score
+
+Array = NDArray[np.float64]
+
+UNCONVERGED: Final = "its refit did not converge"
+"""Reason of a candidate without an optimum."""
+OUTDONE: Final = "another effect explains more"
+"""Reason of a candidate that gains less than an accepted one."""
+SUPERSEDED: Final = "it explains nothing beside another effect"
+"""Reason of a candidate that became redundant."""
+IMMATERIAL: Final = "its size is immaterial"
+"""Reason of a candidate that is too small to matter."""
+IMPROBABLE: Final = 0.001
+"""Probability below which refitted derivatives contradict the declared ones [-] (convention: three standard errors)."""
+_ERRORS: Final = 2.0
+"""Standard errors that count as a difference [-] (convention)."""
+_FREE_ERRORS: Final = 3.0
+"""Standard errors by which a free run may seem worse [-] (judgement: in rough air it consists mostly of gusts, and a
+smaller number rejects true effects)."""
+_MOST_CHANNELS: Final = 2
+"""Number of channels, of three, whose free run may not get worse by `_ERRORS` each [-]: most of them."""
+_SMALL_SHORTFALL: Final = 0.02
+"""Share of its gain that a refit may still lack and count as converged [-] (judgement: rate limits and backlash give no
+smooth cost)."""
+_DIVERGED: Final = 1e6
+"""Residual over the share that gusts and sensors explain, beyond which a free run has diverged [-] (judgement)."""
+_SEVERAL: Final = 3
+"""Number of records from which the scatter between records is estimated [-]; with fewer none may get worse."""
+_AT_END: Final = 1e-6
+"""Distance from an end of the range, over the range, at which a size has ended there [-] (judgement: above rounding)."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A refitted effect.
+
+    Attributes
+    ----------
+    score, fit : its score, and the fit with all parameters free.
+    gain : gain in 2 log L over the null with equally free derivatives, less 2 for each parameter beyond the first.
+    likelihood_gain, free_run_gain : (records,) gains on records left out, in log L and in squared residual over the
+        share that gusts and sensors explain; NaN where they were not computed.
+    size, std : estimate of the first parameter in its size coordinate.
+    reasons : tests that it fails, in words; empty if it is accepted.
+    """
+
+    score: Score
+    fit: PosteriorFit
+    gain: float
+    likelihood_gain: Array
+    free_run_gain: Array
+    size: float
+    std: float
+    reasons: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The fit without the effect, on records left out.
+
+    Attributes
+    ----------
+    left_out : one for each way of leaving records out: `leave_one_out`, and with two records `one_by_the_other`.
+    weight : (3,) of each record, standard deviations of the free run that gusts and sensors explain.
+    """
+
+    left_out: tuple[LeftOut, ...]
+    weight: tuple[Array, ...]
+
+
+def reference_of(problem: TraceProblem, null: PosteriorFit) -> Reference:
+    """The null as the reference of every candidate of its round."""
+    compiled = compile_change(null.hypothesis.change(null.point.sizes))
+    weight = tuple(
+        noise_floor(record, problem.settings, compiled, null.point.common, local)
+        for record, local in zip(problem.records, null.point.per_record, strict=True)
+    )
+    return Reference(tuple(way(problem, null) for way in _ways(problem)), weight)
+
+
+def _ways(problem: TraceProblem) -> tuple[Callable[[TraceProblem, PosteriorFit], LeftOut], ...]:
+    return (leave_one_out, one_by_the_other) if len(problem.records) == 2 else (leave_one_out,)
+
+
+def untested(s: Score, own: PosteriorFit, gain: float, *reasons: str) -> Candidate:
+    """A candidate that is rejected without tests, and why."""
+    nothing = np.full(len(own.likelihood), np.nan)
+    return Candidate(s, own, gain, nothing, nothing, *_size(s, own), reasons)
+
+
+def assess_candidate(
+    problem: TraceProblem, s: Score, own: PosteriorFit, gain: float, reference: Reference, least: float
+) -> Candidate:
+    """Test a refitted effect.
+
+    Parameters
+    ----------
+    s, own, gain : its score, its fit, and its gain in 2 log L.
+    reference : the fit without it.
+    least : gain in 2 log L that is significant for white innovations; for correlated ones it is multiplied by the
+        ratio of robust to plain variance (J. T. Kent, Biometrika 69 (1982)).
+    """
+    size, std = _size(s, own)
+    excess = float(inflation(problem, own)[size_index(_first_size(s, own))])
+    left_out = tested_on_left_out(problem, own, reference)
+    reasons = [
+        *_fit_reasons(s, own, gain, least, excess),
+        *left_out.reasons,
+        *size_reasons(s, size, max(r.plant.aircraft.constants.span_m for r in problem.records)),
+    ]
+    return Candidate(
+        s, own, gain, left_out.likelihood_gain, left_out.free_run_gain, size, std, tuple(reasons)
+    )
+
+
+@dataclass(frozen=True)
+class LeftOutTest:
+    """A fit against its reference, on records left out.
+
+    Attributes
+    ----------
+    likelihood_gain, free_run_gain : (records,) as of `Candidate`.
+    reasons : what gets worse, in words.
+    """
+
+    likelihood_gain: Array
+    free_run_gain: Array
+    reasons: tuple[str, ...]
+
+
+def tested_on_left_out(problem: TraceProblem, own: PosteriorFit, reference: Reference) -> LeftOutTest:
+    """Whether a fit worsens likelihood or free run of records left out."""
+    for way, before in zip(_ways(problem), reference.left_out, strict=True):
+        likelihood, after = way(problem, own)
+        likelihood_gain, unaided = before[0] - likelihood, before[1]
+        if not _is_loss(likelihood_gain):
+            break
+    free, variance = _free_run_gain(problem, unaided, after, reference.weight)
+    loses = free.sum() <= -_FREE_ERRORS * np.sqrt(variance.sum())
+    in_channels = (free.sum(axis=0) < -_ERRORS * np.sqrt(variance)).sum()
+    reasons = (
+        *(["it worsens the likelihood of records left out"] if _is_loss(likelihood_gain) else []),
+        *(["it worsens the free run of records left out"] if loses or in_channels >= _MOST_CHANNELS else []),
+    )
+    return LeftOutTest(likelihood_gain, free.sum(axis=1), reasons)
+
+
+def _fit_reasons(s: Score, own: PosteriorFit, gain: float, least: float, excess: float) -> Iterator[str]:
+    size, std = _size(s, own)
+    if not has_converged(own, gain):
+        yield UNCONVERGED
+    if gain < least * excess**2:
+        yield "after its refit it explains nothing significant"
+    if not s.effect.parameters[0].one_sided and abs(size) < _ERRORS * std * excess:
+        yield "after its refit its size is no larger than its uncertainty"
+
+
+def size_reasons(s: Score, size: float, span_m: float) -> Iterator[str]:
+    """Why the size of an effect is not accepted, in words; ``span_m`` is the wing span of the aircraft [m]."""
+    first = s.effect.parameters[0]
+    if first.sign * size < 0.0:
+        yield "its size has a sign that no aircraft has"
+    if abs(size) > first.spans * span_m:
+        yield "its size is beyond the ends of the aircraft"
+    if abs(size) < first.material:
+        yield IMMATERIAL
+    low, high = first.reach
+    span = high - low
+    if high - size < _AT_END * span or (size - low < _AT_END * span and low != 0.0):
+        yield "its size ends at the limit of the plausible range"
+
+
+def _free_run_gain(
+    problem: TraceProblem, unaided: list[Assessment], after: list[Assessment], weights: tuple[Array, ...]
+) -> tuple[Array, Array]:
+    """(records, 3) gains in squared residual over the weight by channel, and (3,) variances of their sums."""
+    free, variance = np.zeros((len(after), OUTPUTS)), np.zeros(OUTPUTS)
+    for i, (old, new, weight) in enumerate(zip(unaided, after, weights, strict=True)):
+        if not (np.abs(old.residual) < _DIVERGED * weight).all():
+            free[i] = 0.0 if (np.abs(new.residual) < _DIVERGED * weight).all() else -np.inf
+            continue
+        gains = ((old.residual / weight) ** 2) - ((new.residual / weight) ** 2)
+        free[i] = gains.sum(axis=0)
+        lags = round(MEMORY_S / problem.records[i].signals.dt_s)
+        variance += np.maximum(np.diag(long_run(gains - gains.mean(axis=0), lags)), 0.0)
+    return free, variance
+
+
+def has_converged(own: PosteriorFit, gain: float) -> bool:
+    """Whether a fit has converged, or lacks next to nothing of its gain."""
+    return own.converged or 2.0 * own.shortfall < _SMALL_SHORTFALL * gain
+
+
+def declared_probability(problem: TraceProblem, own: PosteriorFit) -> float:
+    """Probability that refitted derivatives lie as far from the declared ones, by the declared uncertainty alone.
+
+    Source: G. E. P. Box, J. R. Statist. Soc. A 143 (1980), the prior predictive check. The mode is nearer to the
+    prior than the maximum of the likelihood, so the check is conservative.
+    """
+    off = own.point.common[Common.derivatives]
+    tight = [i for i in range(off.size) if i not in own.hypothesis.unconstrained]
+    covariance = problem.declared_covariance[np.ix_(tight, tight)]
+    return float(chi2.sf(float(off[tight] @ np.linalg.solve(covariance, off[tight])), len(tight)))
+
+
+def own_probability(problem: TraceProblem, own: PosteriorFit) -> float:
+    """Probability that biases and trim coefficients lie as far from the declared ones, as `declared_probability`."""
+    total, count = 0.0, 0
+    for (middle, precision), local in zip(
+        problem.priors(own.hypothesis).per_record, own.point.per_record, strict=True
+    ):
+        off = (local - middle)[PerRecord.offsets]
+        total += float(off**2 @ np.diag(precision)[PerRecord.offsets])
+        count += off.size
+    return float(chi2.sf(total, count))
+
+
+def _size(s: Score, own: PosteriorFit) -> tuple[float, float]:
+    at = _first_size(s, own)
+    return float(own.point.sizes[at]), own.size_std(at)
+
+
+def _first_size(s: Score, own: PosteriorFit) -> int:
+    """Index of the effect's first parameter among the sizes."""
+    return len(own.point.sizes) - len(s.effect.parameters)
+
+
+def _is_loss(gains: Array) -> bool:
+    """Whether the sum of the gains is negative by more than two of its own standard errors.
+
+    A record that only the effect can follow counts as a gain, one that only the null can follow as a loss. With fewer
+    than three records none may get worse, as their scatter is unknown.
+    """
+    if np.isnan(gains).any() or gains.min() == -np.inf:
+        return True
+    gains = gains[np.isfinite(gains)]
+    if gains.size == 0:
+        return False
+    if gains.size < _SEVERAL:
+        return bool(gains.min() < 0.0)
+    error = float(gains.std(ddof=1) * np.sqrt(gains.size))
+    return float(gains.sum()) < -_ERRORS * error

@@ -1,0 +1,279 @@
+"""Why the derivatives differ from the declared ones: sets of physical causes and of wrong declarations, by evidence.
+
+A cause k of size s adds s v_k to the six derivatives, v_k by `airtruth.physics.composition`; a wrong declaration
+leaves a derivative with a standard deviation ten times the declared one. Each set of causes is a normal prior of the
+increments, so that its evidence over the likelihood of the derivatives is known in closed form.
+
+Sources: D. J. C. MacKay, Neural Computation 4 (1992) 415-447 (evidence and its Occam factor); A. O'Hagan, J. R.
+Statist. Soc. B 41 (1979) 358-367 (declarations with heavy tails).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from airtruth.physics.short_period import PARAMETERS
+from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood
+
+Array = NDArray[np.float64]
+
+DERIVATIVES: Final = "derivatives"
+"""Key of the effect that states wrong declarations of derivatives."""
+WRONG_BY: Final = (3.0, 10.0)
+"""Standard deviation of a derivative whose declaration is wrong, over the declared one [-]: equal parts of a mixture
+(judgement: published uncertainties of derivatives are often too small by the first factor, and by up to the second)."""
+MOST_CAUSES: Final = 3
+"""Largest number of physical causes in a set, besides wrong declarations [-] (judgement: six derivatives do not tell
+more apart)."""
+_LOG_CAUSE: Final = -3.0
+"""Logarithm of the prior odds of a usual physical cause [-] (judgement: one in twenty)."""
+_LOADING: Final = ("mass_error", "inertia_error", "cg_shift")
+"""Causes that one event, a change of the loading, moves together."""
+_LOG_SAME_EVENT: Final = -1.0
+"""Logarithm of the prior odds of each further cause of the same event [-] (judgement: one in three)."""
+_LOG_WRONG: Final = -1.0
+"""Logarithm of the prior odds of wrong declarations, and of each derivative that they concern [-] (judgement: they are
+the most frequent cause)."""
+_REFERENCE: Final = 4.0
+"""Log-evidence that a single cause of usual size costs beyond one for its parameter [-]: prior odds of 3.0 and an Occam
+factor of 2.0; it makes sets comparable with the refit of an effect, whose size has no prior."""
+_CERTAIN_SHAPE: Final = 0.02
+"""Relative uncertainty of a direction that follows from definitions [-] (judgement: second order in the size)."""
+_LEAST_SHARE: Final = 1e-15
+"""Least probability of the plausible range of a size [-] (judgement: below it a set is out of the question)."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A physical cause that moves several derivatives together.
+
+    Attributes
+    ----------
+    key : of the effect; direction : (6,) change of the derivatives per unit of size.
+    std : prior standard deviation of the size [-]; low, high : its plausible range.
+    shape : relative uncertainty of each element of the direction [-].
+    log_odds : logarithm of its prior odds [-].
+    """
+
+    key: str
+    direction: Array
+    std: float
+    low: float
+    high: float
+    shape: float = _CERTAIN_SHAPE
+    log_odds: float = _LOG_CAUSE
+
+
+@dataclass(frozen=True)
+class CauseSet:
+    """A set of causes and its evidence.
+
+    Attributes
+    ----------
+    causes : keys of the physical causes; wrong : names of the derivatives whose declaration is wrong.
+    sizes, size_std : (causes,) estimates without the prior of the sizes, and their standard deviations.
+    covariance : (6, 6) prior covariance of the increments under the set.
+    cost : negative logarithm of posterior and prior odds; comparable with the cost of a refitted effect.
+    """
+
+    causes: tuple[str, ...]
+    wrong: tuple[str, ...]
+    sizes: tuple[float, ...]
+    size_std: tuple[float, ...]
+    covariance: Array
+    cost: float
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Keys of its effects: the causes, then `DERIVATIVES` where declarations are wrong."""
+        return (*self.causes, *([DERIVATIVES] if self.wrong else []))
+
+
+@dataclass(frozen=True)
+class _Prior:
+    """What a cause is known to be like before any record: see `Cause`."""
+
+    quantity: str
+    std: float
+    low: float
+    high: float
+    shape: float = _CERTAIN_SHAPE
+    log_odds: float = _LOG_CAUSE
+
+
+_PRIORS: Final[Mapping[str, _Prior]] = MappingProxyType(
+    {
+        "mass_error": _Prior("mass", 0.1, -0.3, 0.4),
+        "inertia_error": _Prior("inertia", 0.15, -0.4, 0.6),
+        "cg_shift": _Prior("cg", 0.05, -0.15, 0.15, log_odds=-2.0),
+        "elevator_effectiveness": _Prior("elevator", 0.3, -0.7, 1.0),
+        "tail_effectiveness": _Prior("tail", 0.3, -1.0, 0.05, shape=0.25),
+        "wing_effectiveness": _Prior("wing", 0.15, -0.6, 0.05, shape=0.3),
+        "dynamic_pressure": _Prior("dynamic_pressure", 0.05, -0.35, 0.5),
+        "aerodynamic_center": _Prior("aerodynamic_center", 0.05, -0.15, 0.15, log_odds=-4.0),
+        "icing": _Prior("icing", 1.0, 0.0, 4.0, shape=0.4, log_odds=-5.0),
+    }
+)
+"""Prior of each cause, in the units of its size: factors less one, shifts over the chord, severity (judgement: usual
+errors of declarations, tail and wing that lose lift rather than gain it, and the accuracy of first-order textbook
+contributions)."""
+EXPLAINING: Final = tuple(_PRIORS)
+"""Keys of the physical causes."""
+
+
+def causes_of(directions: Mapping[str, Array]) -> tuple[Cause, ...]:
+    """Every cause with its direction, see `airtruth.physics.composition.directions`."""
+    return tuple(
+        Cause(key, directions[p.quantity], p.std, p.low, p.high, p.shape, p.log_odds)
+        for key, p in _PRIORS.items()
+    )
+
+
+def explain(
+    likelihood: DerivativeLikelihood, causes: Sequence[Cause], wrong_allowed: bool = True
+) -> tuple[CauseSet, ...]:
+    """Every set of up to `MOST_CAUSES` causes and wrong declarations, the most probable first.
+
+    Parameters
+    ----------
+    likelihood : of the derivatives; causes : physical causes.
+    wrong_allowed : whether declarations may be wrong.
+    """
+    subsets = tuple(_subsets()) if wrong_allowed else ((),)
+    found: list[CauseSet] = []
+    for count in range(min(MOST_CAUSES, len(causes)) + 1):
+        for chosen in combinations(causes, count):
+            by_scale = [_sets_of(likelihood, chosen, subsets, scale) for scale in WRONG_BY]
+            found += [_mixed(scales) for scales in zip(*by_scale, strict=True)]
+    return tuple(sorted((s for s in found if np.isfinite(s.cost)), key=lambda s: s.cost))
+
+
+def _mixed(scales: Sequence[CauseSet]) -> CauseSet:
+    """One set with the evidence of the mixture, and the prior of its best part."""
+    best = min(scales, key=lambda s: s.cost)
+    mean = np.logaddexp.reduce([-s.cost for s in scales]) - np.log(len(scales))
+    return replace(best, cost=float(-mean)) if best.wrong else best
+
+
+def size_of(likelihood: DerivativeLikelihood, cause: Cause) -> tuple[float, float]:
+    """Estimate of a cause's size, alone and without its prior, and its standard deviation.
+
+    The declared derivatives keep their declared uncertainty, so that size over standard deviation is standard normal
+    where they are right.
+    """
+    certain = replace(cause, shape=0.0, low=-np.inf, high=np.inf)
+    (only,) = _sets_of(likelihood, (certain,), ((),), 1.0)
+    return only.sizes[0], only.size_std[0]
+
+
+def predicted_cost(likelihood: DerivativeLikelihood, causes: Sequence[Cause]) -> float:
+    """Negative log-posterior that a fit of these causes reaches, sizes without a prior, to first order in them."""
+    turned = np.eye(6) + likelihood.information @ likelihood.declared
+    seen = np.linalg.solve(turned, likelihood.vector)
+    directions = np.array([c.direction for c in causes])
+    told = directions @ np.linalg.solve(turned, likelihood.information) @ directions.T
+    along = directions @ seen
+    gained = likelihood.vector @ likelihood.declared @ seen + along @ np.linalg.solve(told, along)
+    return likelihood.cost - 0.5 * float(gained)
+
+
+def _subsets() -> Iterator[tuple[int, ...]]:
+    for count in range(len(PARAMETERS) + 1):
+        yield from combinations(range(len(PARAMETERS)), count)
+
+
+def _sets_of(
+    likelihood: DerivativeLikelihood,
+    chosen: Sequence[Cause],
+    subsets: Sequence[tuple[int, ...]],
+    wrong_by: float,
+) -> Iterator[CauseSet]:
+    """One set of physical causes with each set of wrong declarations, see `WRONG_BY`."""
+    information, vector, declared = likelihood.information, likelihood.vector, likelihood.declared
+    own = np.repeat(declared[None], len(subsets), axis=0)
+    for i, subset in enumerate(subsets):
+        at = list(subset)
+        own[i, at, at] += (wrong_by**2 - 1.0) * np.diag(declared)[at]
+    directions = np.array([c.direction for c in chosen]).reshape(len(chosen), len(PARAMETERS))
+    shape = np.array([c.shape for c in chosen])
+    sizes = np.tile([c.std for c in chosen], (len(subsets), 1))
+    for _ in range(2):  # the uncertainty of a direction goes with the size
+        about = own + np.einsum("nk,k,ki->ni", sizes**2, shape**2, directions**2)[:, :, None] * np.eye(6)
+        told = np.linalg.solve(np.eye(6) + information @ about, np.broadcast_to(information, about.shape))
+        seen = np.linalg.solve(
+            np.eye(6) + information @ about, np.broadcast_to(vector, (len(subsets), 6))[..., None]
+        )[..., 0]
+        size_information = np.einsum("ki,nij,lj->nkl", directions, told, directions)
+        size_covariance = np.linalg.pinv(size_information, hermitian=True)
+        sizes = np.einsum("nkl,li,ni->nk", size_covariance, directions, seen)
+    std = np.sqrt(np.maximum(np.diagonal(size_covariance, axis1=1, axis2=2), 0.0))
+    prior = np.einsum("k,ki,kj->ij", np.array([c.std**2 for c in chosen]), directions, directions)
+    covariance = about + prior
+    turned = np.eye(6) + covariance @ information
+    gained = 0.5 * np.einsum(
+        "i,ni->n", vector, np.linalg.solve(turned, (covariance @ vector)[..., None])[..., 0]
+    )
+    least = np.linalg.slogdet(np.eye(6) + declared @ information)[1]
+    occam = 0.5 * (np.linalg.slogdet(turned)[1] - least)
+    in_range = _in_range(chosen, sizes, std)
+    for i, subset in enumerate(subsets):
+        odds = _log_odds(chosen) + (_LOG_WRONG * (1 + len(subset)) if subset else 0.0)
+        several = bool(chosen or subset)
+        yield CauseSet(
+            causes=tuple(c.key for c in chosen),
+            wrong=tuple(PARAMETERS[k] for k in subset),
+            sizes=tuple(sizes[i].tolist()),
+            size_std=tuple(std[i].tolist()),
+            covariance=covariance[i],
+            cost=float(
+                likelihood.cost - gained[i] + occam[i] - in_range[i] - odds - (_REFERENCE if several else 0.0)
+            ),
+        )
+
+
+def _log_odds(chosen: Sequence[Cause]) -> float:
+    """Logarithm of the prior odds of physical causes."""
+    loading = [c.log_odds for c in chosen if c.key in _LOADING]
+    others = sum(c.log_odds for c in chosen if c.key not in _LOADING)
+    return others + (loading[0] + _LOG_SAME_EVENT * (len(loading) - 1) if loading else 0.0)
+
+
+def _in_range(chosen: Sequence[Cause], sizes: Array, std: Array) -> Array:
+    """(sets,) logarithm of the ratio of posterior to prior probability that every size lies in its plausible range.
+
+    It turns the evidence of normal sizes into that of sizes limited to the range, the sizes taken as independent.
+
+    Parameters
+    ----------
+    sizes, std : (sets, causes) estimates without the prior of the sizes.
+    """
+    total = np.zeros(len(sizes))
+    for k, c in enumerate(chosen):
+        weight = np.zeros(len(sizes))
+        np.divide(1.0, std[:, k] ** 2, out=weight, where=std[:, k] > 0.0)
+        spread = 1.0 / np.sqrt(weight + c.std**-2)
+        middle = weight * sizes[:, k] * spread**2
+        after = norm.cdf((c.high - middle) / spread) - norm.cdf((c.low - middle) / spread)
+        before = norm.cdf(c.high / c.std) - norm.cdf(c.low / c.std)
+        total += np.log(np.maximum(after, _LEAST_SHARE) / before)
+    return total
+
+
+__all__ = [
+    "DERIVATIVES",
+    "EXPLAINING",
+    "MOST_CAUSES",
+    "WRONG_BY",
+    "Cause",
+    "CauseSet",
+    "causes_of",
+    "explain",
+]

@@ -1,0 +1,186 @@
+"""Which increments the residual asks for: shapes over the flown ranges, and their evidence at a null without a refit.
+
+With the bends' normal prior of standard deviation s, the evidence of a shape against the null is, to second order,
+
+    log B = g' (H + 1/s^2)^-1 g / 2 - log det(1 + s^2 H) / 2,
+
+g the gradient and H the information of its bends, both with the nuisance parameters eliminated.
+
+Source: D. J. C. MacKay, Neural Computation 4 (1992) 415-447, section 3 (evidence of a linear model).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from airtruth.effects.effect import Effect
+from airtruth.effects.increment import Increment, Memory, Shape, increment
+from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.inference.whitening import Whitener
+from airtruth.tracing.model.records import TraceRecord
+from airtruth.tracing.selection.score_test import Direction, gradients
+
+Array = NDArray[np.float64]
+
+CELLS: Final = 8
+"""Number of cells of a function [-] (judgement: a six-record flight test resolves no finer function)."""
+_QUANTILES: Final = (0.005, 0.995)
+"""Quantiles of a signal between which an increment is learned [-] (judgement: a bend outside has no samples)."""
+_RATE_S: Final = 0.1
+"""Width of the mean over which the rate of the angle of attack is taken [s] (judgement: noise of the vane)."""
+_LAGS_S: Final = (0.03, 0.08, 0.2, 0.5, 1.2)
+"""Time constants of lags that are tried [s] (judgement: a refit moves them by up to a factor of three)."""
+_SLOW_S: Final = (0.08, 0.2, 0.5)
+"""Time constants behind which functions are tried [s] (judgement: separation and hysteresis)."""
+_MODES_HZ: Final = (0.7, 1.4, 2.8, 5.6, 10.0)
+"""Natural frequencies of modes that are tried [Hz] (judgement: as `_LAGS_S`; the sampling ends the range)."""
+_MODE_DAMPING: Final = 0.1
+"""Damping ratio of the modes that are tried [-] (judgement)."""
+_NYQUIST_SHARE: Final = 0.5
+"""Highest frequency of a mode over the Nyquist frequency [-] (judgement)."""
+_SCALES: Final = tuple(np.geomspace(1e-3, 1.0, 7).tolist())
+"""Standard deviations of the bends' prior over the largest plausible bend that are tried [-] (judgement)."""
+
+
+@dataclass(frozen=True)
+class Screened:
+    """A shape with its evidence at a null.
+
+    Attributes
+    ----------
+    effect : the increment, with the prior of largest evidence.
+    log_evidence : log of the Bayes factor against the null, averaged over the priors tried [-].
+    start : (bends,) where a refit begins.
+    """
+
+    effect: Increment
+    log_evidence: float
+    start: Array
+
+
+def shapes(problem: TraceProblem) -> list[Shape]:
+    """Every shape that the records can hold, over the range that they cover."""
+    found = []
+    ranges = {name: _range(problem.records, name) for name in ("alpha", "elevator", "qhat", "alpha_dot_hat")}
+    records = problem.records
+    trims = {
+        "alpha": float(np.mean([r.plant.trim_alpha_rad for r in records])),
+        "elevator": float(np.mean([r.plant.trim_elevator_rad for r in records])),
+    }
+    highest_hz = _NYQUIST_SHARE * 0.5 / max(r.signals.dt_s for r in records)
+    coefficients: tuple[Literal["CL", "Cm"], ...] = ("CL", "Cm")
+    for coefficient in coefficients:
+        for name, (low, high) in ranges.items():
+            trim = min(max(trims.get(name, 0.0), low), high)
+
+            def add(cells: int, memory: Memory | None = None) -> None:
+                found.append(Shape(coefficient, name, low, high, cells, trim, memory))  # noqa: B023
+
+            if high <= low:
+                continue
+            if name == "alpha_dot_hat":
+                if coefficient == "Cm":  # lift over its own alpha' is an implicit equation
+                    add(CELLS)
+                continue
+            add(CELLS)
+            for time_s in _LAGS_S:
+                add(0, Memory("lag", time_s))
+            for hz in _MODES_HZ:
+                if hz < highest_hz:
+                    add(0, Memory("mode", 1.0 / (2.0 * np.pi * hz), _MODE_DAMPING))
+            if name == "alpha":
+                for time_s in _SLOW_S:
+                    add(CELLS, Memory("lag", time_s))
+    return found
+
+
+def flown(record: TraceRecord, signal: str) -> Array:
+    """(samples,) measured values of a signal of a term, see `airtruth.physics.terms.SIGNALS`."""
+    s, chord = record.signals, record.plant.aircraft.constants.chord_m
+    alpha = s.y[:, 0] - record.plant.alpha_shift_rad
+    if signal == "alpha":
+        return alpha
+    if signal == "elevator":
+        return s.elevator_rad
+    half = 0.5 * chord / s.airspeed_m_s[:: s.sub]
+    if signal == "qhat":
+        return np.asarray(s.y[:, 1] * half)
+    width = max(round(_RATE_S / s.dt_s), 1)
+    smooth = np.convolve(np.pad(alpha, width, mode="edge"), np.ones(width) / width, mode="same")[width:-width]
+    return np.asarray(np.gradient(smooth, s.dt_s) * half)
+
+
+def _range(records: Sequence[TraceRecord], signal: str) -> tuple[float, float]:
+    low, high = np.quantile(np.concatenate([flown(r, signal) for r in records]), _QUANTILES)
+    return float(low), float(high)
+
+
+def screen(
+    problem: TraceProblem, null: PosteriorFit, whitener: Whitener, tried: Sequence[Shape]
+) -> list[Screened]:
+    """Shapes by their evidence at a null, best first; those that the records do not excite are left out."""
+    effects = [increment(s) for s in tried]
+    directions = [d for e in effects for d in _directions(e)]
+    gradient, information = gradients(null, problem, directions, whitener)
+    found, first = [], 0
+    for e in effects:
+        span = slice(first, first + e.bends)
+        first = span.stop
+        g, h = gradient[span], information[span, span]
+        if not np.isfinite(h).all() or not np.trace(h) > 0.0:
+            continue
+        stds = np.array(_SCALES) * e.parameters[0].high
+        evidence = log_evidences(g, h, stds)
+        best = float(stds[int(np.argmax(evidence))])
+        start = -np.linalg.solve(h + np.eye(e.bends) / best**2, g)
+        mean = float(logsumexp(evidence) - np.log(len(stds)))
+        found.append(Screened(e.with_prior(best), mean, np.asarray(start, dtype=np.float64)))
+    return sorted(found, key=lambda s: -s.log_evidence)
+
+
+def log_evidences(gradient: Array, information: Array, stds: Array) -> Array:
+    """Log Bayes factor of bends against none, for each standard deviation of their prior; see the module's formula.
+
+    Parameters
+    ----------
+    gradient, information : (bends,) and (bends, bends), nuisance parameters eliminated.
+    stds : (priors,) standard deviations.
+
+    Returns
+    -------
+    (priors,) [-].
+    """
+    values, vectors = np.linalg.eigh(0.5 * (information + information.T))
+    values, g = np.maximum(values, 0.0), vectors.T @ gradient
+    spread = 1.0 + np.outer(stds**2, values)
+    gain = (g**2 * stds[:, None] ** 2 / spread).sum(axis=1)
+    return np.asarray(0.5 * gain - 0.5 * np.log(spread).sum(axis=1))
+
+
+def _directions(e: Increment) -> list[Direction]:
+    """One direction for each bend, the other bends at zero and the times as the shape has them."""
+    memory = e.shape.memory
+    times = {} if memory is None else {"time_s": memory.time_s, "damping": memory.damping}
+    zero = {p.name: times.get(p.name, 0.0) for p in e.parameters}
+    return [Direction(_single(e, p.name, zero), (), p.step) for p in e.parameters[: e.bends]]
+
+
+def _single(e: Increment, name: str, zero: dict[str, float]) -> Effect:
+    own = next(p for p in e.parameters if p.name == name)
+    return Effect(
+        name=f"{e.key} {name}",
+        where=e.where,
+        parameters=(own,),
+        describe=lambda values: e.describe(zero | dict(values)),
+        explanation="",
+        source="",
+    )
+
+
+__all__ = ["CELLS", "Screened", "flown", "log_evidences", "screen", "shapes"]

@@ -1,0 +1,100 @@
+"""Coloured sensor noise: whether part of the noise is slow, tested before anything is traced.
+
+Slow noise (a Gauss-Markov process beside the white one) costs states and parameters, and most records have none, so
+it enters only where the records show it. It is indistinguishable from a model error where the noise levels are not
+declared, where it would be as slow as a motion, and where all noise would be slow: then it does not enter.
+
+Source: C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50-57 (the score test), one-sided for the share of each sensor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from airtruth.tracing.inference.optimise import fit, initial_parameters
+from airtruth.tracing.inference.posterior import (
+    PosteriorFit,
+    TraceProblem,
+    at_bounds,
+    likelihood_terms,
+    marginal_information,
+    sensitivities_of,
+)
+from airtruth.tracing.inference.whitening import NO_WHITENER
+from airtruth.tracing.model.parameters import BOUNDS, Common, Parameters
+from airtruth.tracing.prepare import Case
+from airtruth.tracing.selection.score_test import eliminated
+
+Array = NDArray[np.float64]
+
+LEVEL: Final = 1e-9
+"""Significance level of the three scores together [-] (judgement: half of the variance correlated over 80 ms scores 8 to
+17 standard deviations in four records of some seconds; a model error scores too, and less slow noise than that does no
+harm as white noise)."""
+FIRST_SHARE: Final = 0.2
+"""Share of slow noise at which a search begins [-] (judgement; at zero the correlation time has no effect)."""
+SHARES: Final = np.r_[Common.colour_shares]
+"""Indices of the shares among the common parameters."""
+
+
+def with_coloured_noise(case: Case) -> tuple[Case, Parameters]:
+    """The case, with slow noise where its fitted records show some, and the parameters at which its search begins."""
+    problem, hypothesis = case.fitted, case.hypothesis
+    start = initial_parameters(problem, hypothesis)
+    null = fit(problem, hypothesis, start)
+    if null is None:
+        return case, start
+    if not problem.settings.noise_is_declared:
+        return case, null.point
+    settings = replace(problem.settings, coloured=True)
+    slow = replace(problem, settings=settings)
+    z = scores(slow, null)
+    if not (norm.sf(z) < LEVEL / len(SHARES)).any():
+        return case, null.point
+    common = null.point.common.copy()
+    common[SHARES] = np.where(z > 0.0, FIRST_SHARE, 0.0)
+    again = fit(slow, hypothesis, replace(null.point, common=common))
+    if (
+        again is None
+        or not again.converged
+        or any(again.point.common[i] == BOUNDS[i][1] for i in np.r_[Common.colour])
+    ):
+        return case, null.point
+    held = None if case.held is None else replace(case.held, settings=settings)
+    return replace(case, fitted=slow, held=held), again.point
+
+
+def scores(problem: TraceProblem, null: PosteriorFit) -> Array:
+    """(3,) signed roots of the score of each sensor's share, every parameter but the other shares refitted.
+
+    Parameters
+    ----------
+    problem : problem with slow noise; null : a fit without.
+    """
+    slope, information = share_slopes(problem, null)
+    return np.asarray(-slope / np.sqrt(np.diag(information)))
+
+
+def share_slopes(problem: TraceProblem, null: PosteriorFit) -> tuple[Array, Array]:
+    """Slope (3,) of the cost in the shares and their information (3, 3), every other parameter refitted.
+
+    Parameters
+    ----------
+    problem, null : as of `scores`.
+    """
+    sensitivities = [
+        sensitivities_of(problem, i, null.hypothesis, null.point) for i in range(len(problem.records))
+    ]
+    if any(t is None for t in sensitivities):
+        return np.zeros(len(SHARES)), np.eye(len(SHARES))
+    pieces = [likelihood_terms(t, NO_WHITENER, levels=True) for t in sensitivities if t is not None]
+    held = tuple(i for i in at_bounds(null.point) if i not in SHARES)
+    gradient, information, _ = marginal_information(
+        problem.priors(null.hypothesis), null.point, pieces, levels=True, fixed=held
+    )
+    return eliminated(gradient, information, SHARES)

@@ -1,0 +1,105 @@
+"""Gains of the refitted candidates, compared under one autoregression, and the tests of those that lead."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from airtruth.tracing.inference.optimise import fit
+from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.inference.whitening import Whitener, autoregression
+from airtruth.tracing.model.parameters import Common, PerRecord
+from airtruth.tracing.selection.acceptance import (
+    IMMATERIAL,
+    OUTDONE,
+    SUPERSEDED,
+    UNCONVERGED,
+    Candidate,
+    assess_candidate,
+    reference_of,
+    untested,
+)
+from airtruth.tracing.selection.refit import Refit
+
+TIE: Final = 6.0
+"""Difference in 2 log L up to which two effects explain the records equally well [-] (judgement: a likelihood ratio of
+20; a wider tie names more look-alikes, a narrower one names a wrong effect more often)."""
+_NEAR: Final = 30.0
+"""Difference in log L up to which candidates are compared under one autoregression [-] (judgement: wide enough for
+the change of a gain by the autoregression)."""
+_ITERATIONS: Final = 6
+"""Iterations of a refit under the common autoregression [-] (judgement: it begins next to its optimum)."""
+
+
+def rank(
+    problem: TraceProblem,
+    null: PosteriorFit,
+    fits: Sequence[Refit],
+    least: float,
+    replacement: tuple[str, str] | None = None,
+) -> tuple[Candidate, ...]:
+    """Rank the refitted candidates by their gain, and test those that lead.
+
+    Parameters
+    ----------
+    fits : refits, best first; least : gain in 2 log L that is significant.
+    replacement : keys (old, new); the old effect explains nothing beside the new one.
+    """
+    if not fits:
+        return ()
+    gains = _gains(problem, null, fits)
+    ranked = sorted(((gains[r.score.effect.key], r) for r in fits), key=lambda g: -g[0])
+    reference = reference_of(problem, null)
+    candidates: list[Candidate] = []
+    accepted, leading = -np.inf, ""
+    for gain, r in ranked:
+        if replacement is not None and r.score.effect.key == replacement[0]:
+            candidates.append(untested(r.score, r.fit, gain, SUPERSEDED, f"that is {replacement[1]}"))
+            continue
+        if gain < accepted - TIE and r.score.effect.name != leading:
+            candidates.append(untested(r.score, r.fit, gain, OUTDONE))
+            continue
+        candidate = assess_candidate(problem, r.score, r.fit, gain, reference, least)
+        if gain < accepted - TIE:
+            candidate = replace(candidate, reasons=(*candidate.reasons, OUTDONE))
+        candidates.append(candidate)
+        if not np.isfinite(accepted) and set(candidate.reasons) <= {IMMATERIAL, UNCONVERGED}:
+            accepted = gain  # an effect that explains less than an immaterial one is not the cause either
+            leading = r.score.effect.name
+    return tuple(candidates)
+
+
+def _gains(problem: TraceProblem, null: PosteriorFit, fits: Sequence[Refit]) -> dict[str, float]:
+    """Key -> gain in 2 log L over the null; those near the best under the autoregression of its innovations."""
+    best = fits[0].fit
+    gains = {r.score.effect.key: 2.0 * (null.cost + 1.0 - r.cost) for r in fits}
+    near = [r for r in fits if r.fit.cost - best.cost < _NEAR]
+    whitener = autoregression(best.innovations)
+    if whitener.order and len(near) > 1:
+        costs = {
+            r.score.effect.key: _whitened_cost(problem, r.fit, whitener, best)
+            + r.freedom_correction
+            + r.parameters
+            for r in near
+        }
+        top, lowest = max(gains[key] for key in costs), min(costs.values())
+        gains |= {key: top - 2.0 * (cost - lowest) for key, cost in costs.items()}
+    return gains
+
+
+def _whitened_cost(
+    problem: TraceProblem, own: PosteriorFit, whitener: Whitener, levels: PosteriorFit
+) -> float:
+    """Cost under an autoregression, at the noise and gust levels of another fit, so that only the motion counts."""
+    common, per_record = own.point.common.copy(), own.point.per_record.copy()
+    common[Common.noise] = levels.point.common[Common.noise]
+    per_record[:, PerRecord.log_gust] = levels.point.per_record[:, PerRecord.log_gust]
+    start = replace(own.point, common=common, per_record=per_record)
+    again = fit(problem, own.hypothesis, start, whitener, iterations=_ITERATIONS, free_levels=False)
+    return np.inf if again is None else again.cost
+
+
+__all__ = ["TIE", "rank"]

@@ -1,0 +1,304 @@
+"""Full refits of the leading candidates of a round."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.effects.effect import Effect
+from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.optimise import fit, initial_parameters
+from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.model.parameters import Common, Parameters
+from airtruth.tracing.model.response import respond
+from airtruth.tracing.selection.acceptance import IMPROBABLE, declared_probability, own_probability
+from airtruth.tracing.selection.budget import Advance, may_begin
+from airtruth.tracing.selection.score_test import Score, Table
+
+LEADING: Final = 8
+"""Largest number of candidates that a round refits [-] (judgement: a refit costs seconds to a minute)."""
+_BY_SCORE: Final = 2
+"""Refits reserved for candidates that lead by their score under the autoregression [-] (judgement)."""
+_VISIBLE: Final = 2.0
+"""Score in standard deviations, innovations taken as white, from which a candidate may be refitted [-] (judgement:
+most effects of which less shows would not pass)."""
+_ATTEMPTS: Final = 3
+"""Number of further refits that the leader is given to converge [-] (judgement)."""
+_SHARES: Final = (2.0, 1.0, 0.6, 0.3, 0.1, 0.02)
+"""Multiples of the size that the score suggests at which a refit may begin [-] (judgement: a score extrapolates along a
+straight line, and overstates a size that acts in a curve more often than it understates one)."""
+_SAME: Final = 0.5
+"""Difference in log L below which two refits have reached the same optimum [-] (judgement: one standard error)."""
+_EXPLAINED: Final = 0.2
+"""Share of its score that a refit has to gain in log L to be taken without another start [-] (judgement; a score
+promises one half)."""
+_BETTER: Final = 2.0
+"""Gain in log L that counts as another optimum [-] (judgement)."""
+_BETTER_NULL_ITERATIONS: Final = 20
+"""Iterations of a null that begins where a candidate ended [-] (judgement: an optimum nearby)."""
+_FRESH_ITERATIONS: Final = 6
+"""Iterations with gusts taken as strong for a refit that begins at the declared aircraft [-] (judgement)."""
+_USUAL: Final = 0.15
+"""Share of its plausible range at which the search for an effect without a score begins [-] (judgement)."""
+
+
+@dataclass(frozen=True)
+class Refit:
+    """An effect's refit beside the round's null.
+
+    Attributes
+    ----------
+    score, fit : the score that made it a leading candidate, and the fit with all parameters free.
+    freedom_correction : log L that the null gains by the freedom alone that the effect gives to derivatives and trim
+        coefficients.
+    """
+
+    score: Score
+    fit: PosteriorFit
+    freedom_correction: float
+
+    @property
+    def cost(self) -> float:
+        """Negative log-posterior that compares between effects: one per parameter, the freedom corrected."""
+        return self.fit.cost + self.freedom_correction + self.parameters
+
+    @property
+    def parameters(self) -> int:
+        """Number of parameters of the effect."""
+        return len(self.score.effect.parameters)
+
+
+def refit_leaders(
+    problem: TraceProblem,
+    null: PosteriorFit,
+    table: Table,
+    significant: NDArray[np.bool_],
+    advance: Advance,
+    replacement: tuple[str, str] | None = None,
+    skip: Collection[str] = (),
+    rival: float = np.inf,
+) -> list[Refit]:
+    """Refit the leading candidates, best first; none where no score is significant.
+
+    Parameters
+    ----------
+    table : scores at the null; significant : (scores,) which of them pass the level.
+    replacement : keys of two effects that have to be among the refitted ones; skip : keys of those that are not.
+    rival : cost of another explanation; refits that stay far behind end early.
+    """
+    if not significant.any():
+        return []
+    fits: list[Refit] = []
+    for i in _leading(problem, null, table, significant, replacement):
+        s = table.scores[i]
+        if s.effect.key in skip:
+            continue
+        if not may_begin(advance, f"refit {s.effect.key}"):
+            continue
+        ahead = min((r.fit.cost for r in fits), default=rival)
+        best = _refit(problem, null, s, table.white_sizes[i], min(ahead, rival))
+        if best is not None:
+            fits.append(Refit(s, best, _freedom_correction(problem, null, s.effect, best)))
+    for _ in range(_ATTEMPTS):  # the leader at least has to converge
+        fits.sort(key=lambda r: r.cost)
+        if not fits or fits[0].fit.converged:
+            break
+        first = fits[0].fit
+        fits[0] = replace(fits[0], fit=fit(problem, first.hypothesis, first.point) or first)
+    return sorted(fits, key=lambda r: r.cost)
+
+
+def refit_absorbed(
+    problem: TraceProblem,
+    null: PosteriorFit,
+    table: Table,
+    fits: Sequence[Refit],
+    advance: Advance,
+    skip: Collection[str] = (),
+) -> list[Refit]:
+    """The refits with those of effects that refitted derivatives may have absorbed, best first.
+
+    At a null whose derivatives contradict the declaration such an effect has no score; its refit begins at the
+    declared aircraft.
+
+    Parameters
+    ----------
+    fits : refits of the leading candidates; skip : keys of effects that are not refitted.
+    """
+    known = {r.score.effect.key for r in fits} | set(skip)
+    found = list(fits)
+    for s in table.scores:
+        if s.effect.key in known or len(s.effect.parameters) > 1:
+            continue
+        if not may_begin(advance, f"refit {s.effect.key} from the declared aircraft"):
+            continue
+        rival = min((r.fit.cost for r in found), default=np.inf)
+        tried = _from_declared(problem, null, s, _usual_size(s), rival)
+        if tried is not None:
+            found.append(Refit(s, tried, 0.0))
+    return sorted(found, key=lambda r: r.cost)
+
+
+def refit_known(
+    problem: TraceProblem,
+    null: PosteriorFit,
+    table: Table,
+    fits: Sequence[Refit],
+    known: Mapping[str, float],
+    advance: Advance,
+) -> list[Refit]:
+    """The refits with those of effects whose size is known beforehand, best first; each begins at the declared aircraft.
+
+    Parameters
+    ----------
+    fits : refits of the leading candidates; the better of two refits of an effect remains.
+    known : key of an effect -> value of its first parameter, from the kinematic check.
+    """
+    best = {r.score.effect.key: r for r in fits}
+    for s in table.scores:
+        key = s.effect.key
+        if key not in known or len(s.effect.parameters) > 1:
+            continue
+        if not may_begin(advance, f"refit {key} from the kinematic check"):
+            break
+        tried = _from_declared(problem, null, s, s.effect.parameters[0].size(known[key]), np.inf)
+        if tried is not None and (key not in best or tried.cost < best[key].fit.cost):
+            best[key] = Refit(s, tried, _freedom_correction(problem, null, s.effect, tried))
+    return sorted(best.values(), key=lambda r: r.cost)
+
+
+def _usual_size(s: Score) -> float:
+    """Size at which the search for an effect without a score begins."""
+    first = s.effect.parameters[0]
+    return _USUAL * first.reach[1] if first.one_sided else 0.0
+
+
+def _from_declared(
+    problem: TraceProblem, null: PosteriorFit, s: Score, size: float, rival: float
+) -> PosteriorFit | None:
+    """A refit that begins at the declared aircraft, with the noise levels of the null."""
+    hypothesis = null.hypothesis.plus(s.effect)
+    start = initial_parameters(problem, hypothesis, _at(null, s, size).sizes, _FRESH_ITERATIONS)
+    common = start.common.copy()
+    common[Common.noise] = null.point.common[Common.noise]
+    return fit(problem, hypothesis, replace(start, common=common), rival=rival)
+
+
+def _leading(
+    problem: TraceProblem,
+    null: PosteriorFit,
+    table: Table,
+    significant: NDArray[np.bool_],
+    replacement: tuple[str, str] | None,
+) -> list[int]:
+    """Indices of the scores whose effects are refitted.
+
+    An autoregression of a large misfit inflates the other scores, so most candidates are chosen by their score with
+    innovations taken as white; it includes the noise levels too: a lag in gusts shows in the scatter.
+    """
+    white = np.array(table.white)
+    by_white = np.argsort(-white, kind="stable")[: LEADING - _BY_SCORE]
+    order = [int(i) for i in by_white if white[i] > _VISIBLE]
+    if _is_improbable(problem, null):
+        # a null far from the declared aircraft has absorbed effects that then have no score
+        loose = null.hypothesis.unconstrained
+        absorbed = [
+            i for i, s in enumerate(table.scores) if null.hypothesis.plus(s.effect).unconstrained != loose
+        ]
+        order = [*absorbed, *(i for i in order if i not in absorbed)]
+    by_score = np.argsort([-abs(s.z) for s in table.scores], kind="stable")
+    order += [int(i) for i in by_score if int(i) not in order and significant[i]][: LEADING - len(order)]
+    if replacement is not None:
+        wanted = [i for i, s in enumerate(table.scores) if s.effect.key in replacement]
+        order = [*wanted, *(i for i in order if i not in wanted)]
+    return order
+
+
+def _freedom_correction(
+    problem: TraceProblem, null: PosteriorFit, effect: Effect, best: PosteriorFit
+) -> float:
+    free = null.hypothesis.plus(effect).unconstrained
+    if free == null.hypothesis.unconstrained:
+        return 0.0
+    hypothesis = replace(null.hypothesis, also_unconstrained=free)
+    ends = [fit(problem, hypothesis, start) for start in (null.point, _without_effect(null, best))]
+    return max([null.cost - end.cost for end in ends if end is not None], default=0.0)
+
+
+def _without_effect(null: PosteriorFit, best: PosteriorFit) -> Parameters:
+    """The parameters of a refit without those of its last effect."""
+    return replace(best.point, sizes=best.point.sizes[: len(null.point.sizes)])
+
+
+def better_null(problem: TraceProblem, null: PosteriorFit, fits: Sequence[Refit]) -> PosteriorFit | None:
+    """The null fitted again from the end of the best refit, if that is a better optimum."""
+    if not fits:
+        return None
+    start = _without_effect(null, fits[0].fit)
+    again = fit(problem, null.hypothesis, start, iterations=_BETTER_NULL_ITERATIONS)
+    return again if again is not None and again.cost < null.cost - _BETTER else None
+
+
+def _refit(
+    problem: TraceProblem, null: PosteriorFit, s: Score, white_size: float, rival: float
+) -> PosteriorFit | None:
+    """The null and one effect with all parameters free, from multiples of the size that the score suggests.
+
+    An improbable null has absorbed part of a large effect, and the search from there can end in another optimum. So
+    one more refit begins at the declared aircraft, with the size that the score has without an autoregression,
+    because an autoregression can absorb such an effect as a whole.
+    """
+    hypothesis = null.hypothesis.plus(s.effect)
+    is_limit = s.effect.parameters[0].is_limit
+    best: PosteriorFit | None = None
+    for share in _ordered_shares(problem, null, hypothesis, s):
+        tried = fit(problem, hypothesis, _at(null, s, share * s.size), rival=rival)
+        if tried is None:
+            continue
+        again = best is not None and abs(tried.cost - best.cost) < _SAME
+        if best is None or tried.cost < best.cost:
+            best = tried
+        gain = null.cost - best.cost
+        # several starts may end at a limit too high to act
+        if (best.converged and gain > _EXPLAINED * s.z**2) or (again and not (is_limit and gain < _BETTER)):
+            break
+    if _is_improbable(problem, null):
+        tried = _from_declared(problem, null, s, white_size, rival)
+        if tried is not None and (best is None or tried.cost < best.cost):
+            best = tried
+    return best
+
+
+def _is_improbable(problem: TraceProblem, null: PosteriorFit) -> bool:
+    """Whether derivatives, biases or trim coefficients of a null contradict the declared ones."""
+    return min(declared_probability(problem, null), own_probability(problem, null)) < IMPROBABLE
+
+
+def _at(null: PosteriorFit, s: Score, size: float) -> Parameters:
+    low, high = s.effect.parameters[0].reach
+    sizes = s.direction.sizes(min(max(size, low), high))
+    return replace(null.point, sizes=np.concatenate([null.point.sizes, sizes]))
+
+
+def _ordered_shares(
+    problem: TraceProblem, null: PosteriorFit, hypothesis: Hypothesis, s: Score
+) -> list[float]:
+    """`_SHARES`, the most likely size first, all other parameters as in the null."""
+    costs = []
+    for share in _SHARES:
+        point = _at(null, s, share * s.size)
+        change = hypothesis.change(point.sizes)
+        total = 0.0
+        for record, local in zip(problem.records, point.per_record, strict=True):
+            moved = respond(record, problem.settings, change, point.common, local)
+            white = moved.e @ moved.white.T
+            total += 0.5 * len(white) * moved.logdet + 0.5 * float((white**2).sum())
+        costs.append(total if np.isfinite(total) else np.inf)
+    return [_SHARES[i] for i in np.argsort(costs, kind="stable")]
+
+
+__all__ = ["LEADING", "Refit", "better_null", "refit_absorbed", "refit_leaders"]

@@ -1,0 +1,189 @@
+"""The declared derivatives against the records: a contradiction, a fit without the declaration, and what explains it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from airtruth.effects.effect import Effect
+from airtruth.tracing.inference.derivative_likelihood import (
+    Contradiction,
+    DerivativeLikelihood,
+    derivative_likelihood,
+)
+from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.optimise import fit
+from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.model.parameters import Common, Parameters
+from airtruth.tracing.selection.explanation import WRONG_BY, Cause, CauseSet, explain, predicted_cost
+
+CONTRADICTED: Final = 0.01
+"""Probability below which records contradict the declared derivatives [-] (convention: one true declaration in a
+hundred is contradicted)."""
+_REFITS: Final = 4
+"""Number of sets that are refitted in the filter [-] (judgement: each costs a refit)."""
+_HOPELESS: Final = 30.0
+"""Log-posterior behind the best set from which a set is not refitted [-] (judgement: more than a curve explains)."""
+DIVISORS: Final = ("mass_error", "inertia_error")
+"""Causes whose factor divides the coefficients."""
+_ATTEMPTS: Final = 2
+"""Number of times that a fit without the declaration may begin again where it ended [-] (judgement)."""
+
+
+@dataclass(frozen=True)
+class DeclaredCauses:
+    """Candidates that explain a contradiction of the declared derivatives.
+
+    Attributes
+    ----------
+    causes : physical causes; wrong_allowed : whether declarations themselves may be wrong.
+    effects : effects of those causes that the filter carries, beyond first order.
+    """
+
+    causes: tuple[Cause, ...] = ()
+    wrong_allowed: bool = True
+    effects: tuple[Effect, ...] = ()
+
+    @property
+    def keys(self) -> Collection[str]:
+        """Keys of the physical causes."""
+        return {c.key for c in self.causes}
+
+
+@dataclass(frozen=True)
+class Release:
+    """The derivatives released from a declaration that the records contradict.
+
+    Attributes
+    ----------
+    test : of the declaration; fit : every declaration taken as wrong; sets : what explains the shifts, best first.
+    strain : log-posterior that the best set loses to derivatives without any prior [-].
+    refit : the best set as effects of the filter, where it carries all of them; else None.
+    """
+
+    test: Contradiction
+    fit: PosteriorFit
+    sets: tuple[CauseSet, ...]
+    strain: float
+    refit: PosteriorFit | None = None
+
+    @property
+    def cost(self) -> float:
+        """Cost of the best set, comparable with that of a refitted effect."""
+        return self.sets[0].cost
+
+
+def released(hypothesis: Hypothesis, problem: TraceProblem) -> Hypothesis:
+    """The hypothesis with every declared derivative taken as wrong."""
+    spread = (max(WRONG_BY) ** 2 - 1.0) * np.diag(np.diag(problem.declared_covariance))
+    return replace(hypothesis, spread=spread)
+
+
+def release(
+    problem: TraceProblem, null: PosteriorFit, declared: DeclaredCauses, test: Contradiction
+) -> Release | None:
+    """Where a test contradicts the declaration, fit without it and explain the shifts.
+
+    Parameters
+    ----------
+    test : of the declaration at ``null``.
+
+    Returns
+    -------
+    None where the records do not contradict the declaration, or where nothing may explain a contradiction.
+    """
+    allowed = declared.causes or declared.wrong_allowed
+    if null.hypothesis.spread is not None or not allowed or test.p_value > CONTRADICTED:
+        return None
+    free = _converged(problem, released(null.hypothesis, problem), null.point)
+    if free is None:
+        return None
+    own = derivative_likelihood(problem, free)
+    sets = _explaining(own, declared)
+    if not sets:
+        return None
+    peak = 0.5 * float(own.vector @ np.linalg.pinv(own.information, hermitian=True) @ own.vector)
+    sets, refits = _refitted(problem, null, free, declared, sets)
+    strain = sets[0].cost - (own.cost - peak)
+    return Release(test, free, sets, strain, refits.get(sets[0].effects))
+
+
+def _converged(problem: TraceProblem, hypothesis: Hypothesis, start: Parameters) -> PosteriorFit | None:
+    """A fit that begins again where it ended, until it converges or `_ATTEMPTS` are spent."""
+    own = fit(problem, hypothesis, start)
+    for _ in range(_ATTEMPTS):
+        if own is None or own.converged:
+            break
+        own = fit(problem, hypothesis, own.point)
+    return own
+
+
+def _refitted(
+    problem: TraceProblem,
+    null: PosteriorFit,
+    free: PosteriorFit,
+    declared: DeclaredCauses,
+    sets: tuple[CauseSet, ...],
+) -> tuple[tuple[CauseSet, ...], dict[tuple[str, ...], PosteriorFit]]:
+    """The sets with the leading ones refitted in the filter, where it carries their effects; best first.
+
+    A shift of the CG bends the moment as the lift is bent, and an inertia stretches it; first order in the derivatives
+    does not show this. A set's cost changes by the difference between its refit and what first order predicts.
+    """
+    effects = {e.key: e for e in declared.effects}
+    causes = {c.key: c for c in declared.causes}
+    plain = derivative_likelihood(problem, free, robust=False)
+    carried = [s for s in sets if s.causes and not s.wrong and set(s.causes) <= set(effects)]
+    changed, refits = {}, {}
+    for s in carried[:_REFITS]:
+        if s.cost > sets[0].cost + _HOPELESS:
+            break
+        hypothesis, start = null.hypothesis, free.point
+        common, sizes = start.common.copy(), list(start.sizes)
+        for key, size in zip(s.causes, s.sizes, strict=True):
+            hypothesis = hypothesis.plus(effects[key])
+            common[Common.derivatives] -= size * causes[key].direction
+            low, high = effects[key].parameters[0].reach
+            sizes.append(min(max(size_in_filter(key, size), low), high))
+        own = _converged(problem, hypothesis, replace(start, common=common, sizes=np.array(sizes)))
+        if own is not None and own.converged:
+            predicted = predicted_cost(plain, [causes[key] for key in s.causes])
+            changed[s.effects] = replace(s, cost=s.cost + own.cost - predicted)
+            refits[s.effects] = own
+    ranked = sorted((changed.get(s.effects, s) if not s.wrong else s for s in sets), key=lambda s: s.cost)
+    return tuple(ranked), refits
+
+
+def size_in_filter(key: str, size: float) -> float:
+    """Size of a cause's effect in the filter: a mass or inertia divides the coefficients."""
+    return size / (1.0 - size) if key in DIVISORS else size
+
+
+def size_in_derivatives(key: str, size: float) -> float:
+    """Inverse of `size_in_filter`."""
+    return size / (1.0 + size) if key in DIVISORS else size
+
+
+def explained(problem: TraceProblem, free: PosteriorFit, declared: DeclaredCauses) -> tuple[CauseSet, ...]:
+    """Sets that explain the derivatives of a released fit, best first; the declaration itself is not among them."""
+    return _explaining(derivative_likelihood(problem, free), declared)
+
+
+def _explaining(likelihood: DerivativeLikelihood, declared: DeclaredCauses) -> tuple[CauseSet, ...]:
+    sets = explain(likelihood, declared.causes, declared.wrong_allowed)
+    return tuple(s for s in sets if s.effects)
+
+
+__all__ = [
+    "CONTRADICTED",
+    "DeclaredCauses",
+    "Release",
+    "explained",
+    "release",
+    "released",
+    "size_in_derivatives",
+    "size_in_filter",
+]

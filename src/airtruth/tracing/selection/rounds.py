@@ -1,0 +1,301 @@
+"""One round of the search: the null, the scores at it, the refits, and the effects that explain the records best."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from airtruth.effects.effect import Effect
+from airtruth.tracing.inference.derivative_likelihood import Contradiction, contradiction
+from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.optimise import fit
+from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.inference.profile import Profile, best_location, location_index
+from airtruth.tracing.inference.whitening import Whitener, autoregression
+from airtruth.tracing.model.parameters import Common, Parameters
+from airtruth.tracing.selection import score_test
+from airtruth.tracing.selection.acceptance import SUPERSEDED, Candidate, has_converged
+from airtruth.tracing.selection.budget import Advance
+from airtruth.tracing.selection.explanation import CauseSet
+from airtruth.tracing.selection.omnibus import Anomaly, anomalies
+from airtruth.tracing.selection.ranking import TIE, rank
+from airtruth.tracing.selection.refit import Refit, better_null, refit_absorbed, refit_known, refit_leaders
+from airtruth.tracing.selection.release import DeclaredCauses, Release, explained, release
+from airtruth.tracing.selection.score_test import Table
+
+Array = NDArray[np.float64]
+
+LEVEL: Final = 0.05
+"""Significance level of the scores in the first round, after Holm's correction [-] (convention)."""
+LATER_LEVEL: Final = 0.001
+"""The same in later rounds [-] (judgement: a misspecified model always leaves a small residual, and a stricter level
+adds fewer false effects at the price of small true ones)."""
+MOST_EFFECTS: Final = 3
+"""Largest number of effects that a trace accepts [-] (judgement: each costs a round, and four in a few records have
+not been separable)."""
+FAMILY_LEVEL: Final = 0.05165827451
+"""Significance level of the gain in 2 log L of a refit over all candidates, by Bonferroni's rule [-]: a gain of 10.0
+where all 33 candidates of the library are tested (judgement: a round figure next to 5 %)."""
+LATER_FAMILY_LEVEL: Final = 1.8919003744e-5
+"""The same in later rounds [-]: a gain of 25.0 for 33 candidates (judgement: as `LATER_LEVEL`)."""
+_RESTARTS: Final = 2
+"""Number of times that a round begins again at a better optimum of its null [-] (judgement: one has been enough)."""
+_GLS_ITERATIONS: Final = 6
+"""Iterations of the refit under the autoregression [-] (judgement: it begins next to its optimum)."""
+NOTHING_KNOWN: Final[Mapping[str, float]] = MappingProxyType({})
+"""No effect has a size that is known beforehand."""
+NOTHING_DECLARED: Final = DeclaredCauses(wrong_allowed=False)
+"""No explanation of a contradiction: the declared derivatives are not tested."""
+_STRAINED: Final = 15.0
+"""Log-posterior that an explanation of the derivatives loses to derivatives without a prior, from which effects are
+refitted from the declared aircraft [-] (judgement: one physical cause loses 6, two wrong declarations lose 8)."""
+_RELEASE_LEADS: Final = 10.0
+"""Gain in 2 log L by which released derivatives have to lead for no effect to be followed beside them [-] (judgement: as
+a significant gain)."""
+_FAR: Final = 5.0
+"""Distance in standard errors from which the refit under the autoregression is discarded [-] (judgement)."""
+
+
+def significant_gain(candidates: int, later: bool = False) -> float:
+    """Gain in 2 log L from which a refit is significant among so many candidates (Bonferroni, chi-square(1)).
+
+    Source: S. S. Wilks, Ann. Math. Statist. 9 (1938) 60-62.
+    """
+    level = LATER_FAMILY_LEVEL if later else FAMILY_LEVEL
+    return float(chi2.isf(level / max(candidates, 1), 1))
+
+
+@dataclass(frozen=True)
+class RoundStart:
+    """Where a round begins.
+
+    Attributes
+    ----------
+    hypothesis, start : effects accepted so far, and where the search for its parameters begins.
+    effects : candidates of the round.
+    replacement : keys (old, new) of an effect that became redundant and of the one that replaces it; usually None.
+    settled : whether the round follows a replacement or a choice between tied effects; neither is made twice.
+    scores_only : whether the candidates are scored and none is refitted.
+    """
+
+    hypothesis: Hypothesis
+    start: Parameters
+    effects: tuple[Effect, ...]
+    replacement: tuple[str, str] | None = None
+    settled: bool = False
+    scores_only: bool = False
+
+    @property
+    def tested(self) -> int:
+        """Number of candidates of the whole search."""
+        return len(self.effects) + len(self.hypothesis.effects)
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A branch of the search that lost.
+
+    Attributes
+    ----------
+    effects : names of its effects; excess : its cost at its end less that of the branch that remains.
+    """
+
+    effects: tuple[str, ...]
+    excess: float
+
+
+@dataclass(frozen=True)
+class SearchRound:
+    """One round: its null, the scores at it, and the refitted candidates.
+
+    Attributes
+    ----------
+    null : fit of the effects accepted so far, noise levels free; gls : the same under ``whitener``.
+    omnibus : tests that name no effect.
+    adjusted : Holm's p-values of the scores in the table.
+    candidates : refitted candidates, best first.
+    tied : the best accepted candidate and those that explain the records as well; empty if none was accepted.
+    profile : likelihood of the best accepted candidate over its location; None where it has no location.
+    declared_test : test of the declared derivatives at the null.
+    release : the derivatives released from a declaration that the records contradict; None where they do not.
+    sets : what explains the derivatives at a null that is released, best first; empty at any other.
+    rival : the branch of the search that began at this round and lost; None where there is none.
+    """
+
+    null: PosteriorFit
+    gls: PosteriorFit
+    whitener: Whitener
+    table: Table
+    omnibus: tuple[Anomaly, ...]
+    adjusted: Array
+    candidates: tuple[Candidate, ...]
+    tied: tuple[Candidate, ...]
+    declared_test: Contradiction
+    profile: Profile | None = None
+    release: Release | None = None
+    sets: tuple[CauseSet, ...] = ()
+    rival: Rival | None = None
+
+    @property
+    def release_gain(self) -> float:
+        """Gain in 2 log L of the released derivatives over the null, comparable with `Candidate.gain`."""
+        return -np.inf if self.release is None else 2.0 * (self.null.cost + 1.0 - self.release.cost)
+
+    @property
+    def release_leads(self) -> bool:
+        """Whether released derivatives explain the records so much better that no effect is followed instead.
+
+        Where no cause explains the derivatives well, an effect is followed however much they gain: they may have
+        absorbed it.
+        """
+        if self.release is None or self.release.strain > _STRAINED:
+            return False
+        return not self.tied or self.release_gain > self.tied[0].gain + _RELEASE_LEADS
+
+    @property
+    def anomaly(self) -> Anomaly:
+        """The strongest evidence of a missing effect, a score or an omnibus test; p-value by Bonferroni's rule."""
+        seen = list(self.omnibus)
+        if self.table.scores:
+            best = min(
+                range(len(self.adjusted)), key=lambda i: (self.adjusted[i], -abs(self.table.scores[i].z))
+            )
+            s = self.table.scores[best]
+            seen.append(Anomaly(s.effect.key, s.z**2, 1, float(self.adjusted[best])))
+        # among p-values that underflow to zero, the chi-square farthest out by R. A. Fisher's sqrt(2 x)
+        least = min(seen, key=lambda a: (a.p_value, np.sqrt(2.0 * a.degrees) - np.sqrt(2.0 * a.statistic)))
+        return replace(least, p_value=min(1.0, len(seen) * least.p_value))
+
+
+def search_round(
+    problem: TraceProblem,
+    begin: RoundStart,
+    count: int,
+    seed: int,
+    advance: Advance,
+    declared: DeclaredCauses = NOTHING_DECLARED,
+    known: Mapping[str, float] = NOTHING_KNOWN,
+) -> SearchRound | None:
+    """Run one round.
+
+    Parameters
+    ----------
+    begin : its null and candidates; count : number of rounds before it.
+    seed : seed of the draws behind p-values; advance : receives the step that begins.
+    declared : candidates that explain a contradiction of the declared derivatives.
+    known : effects that are always refitted, with the value at which their refit begins.
+
+    Returns
+    -------
+    The round; None where not even its null can be fitted.
+    """
+    start, restarts = begin.start, _RESTARTS
+    while True:
+        advance(f"round {count + 1}: refit without further effects")
+        null = fit(problem, begin.hypothesis, start)
+        if null is None:
+            return None
+        whitener = autoregression(null.innovations)
+        gls = null if whitener.order == 0 else _refit_whitened(problem, null, whitener)
+        advance(f"round {count + 1}: score {len(begin.effects)} effects")
+        table = score_test.table(gls, problem, begin.effects, whitener, seed)
+        adjusted = score_test.holm([s.p_value for s in table.scores])
+        candidates: tuple[Candidate, ...] = ()
+        test = contradiction(problem, null)
+        free = release(problem, null, declared, test)
+        if len(begin.hypothesis.effects) < MOST_EFFECTS and not begin.scores_only:
+            level = LATER_LEVEL if count else LEVEL
+            # the released derivatives contain these causes, alone and together
+            skip = declared.keys if free is not None or begin.hypothesis.spread is not None else ()
+            rival = free.cost if free is not None and free.strain < _STRAINED else np.inf
+            passing = adjusted <= level
+            fits = refit_leaders(problem, null, table, passing, advance, begin.replacement, skip, rival)
+            if free is not None and _may_hide_effects(free, fits):
+                fits = refit_absorbed(problem, null, table, fits, advance, skip)
+            if known:
+                fits = refit_known(problem, null, table, fits, known, advance)
+            better = better_null(problem, null, fits) if restarts else None
+            if better is not None:
+                start, restarts = better.point, restarts - 1
+                continue
+            least = significant_gain(begin.tested, later=count > 0)
+            candidates = rank(problem, null, fits, least, begin.replacement)
+        omnibus = anomalies(gls, problem, whitener)
+        sets = () if begin.hypothesis.spread is None else explained(problem, null, declared)
+        own = SearchRound(
+            null,
+            gls,
+            whitener,
+            table,
+            omnibus,
+            adjusted,
+            candidates,
+            _tied(candidates),
+            test,
+            release=free,
+            sets=sets,
+        )
+        if own.release_leads:
+            own = replace(own, tied=())
+        return at_best_location(problem, own, advance)
+
+
+def _may_hide_effects(free: Release, fits: Sequence[Refit]) -> bool:
+    """Whether released derivatives may have absorbed an effect: no cause explains them well, nor any refit better."""
+    best = min((r.cost for r in fits), default=np.inf)
+    return free.strain > _STRAINED and best > free.cost - _STRAINED
+
+
+def at_best_location(problem: TraceProblem, own: SearchRound, advance: Advance) -> SearchRound:
+    """The round with its leader at its best location, where the leader has a location."""
+    if not own.tied or location_index(own.tied[0].score.effect) is None:
+        return replace(own, profile=None)
+    first = own.tied[0]
+    advance(f"location of {first.score.effect.key}")
+    best, profile = best_location(problem, first.fit)
+    leader = replace(first, fit=best)
+    candidates = tuple(leader if c is first else c for c in own.candidates)
+    return replace(own, candidates=candidates, tied=(leader, *own.tied[1:]), profile=profile)
+
+
+def _refit_whitened(problem: TraceProblem, null: PosteriorFit, whitener: Whitener) -> PosteriorFit:
+    """The null under an autoregression; at the null's own parameters where the refit leads far away.
+
+    An autoregression of a misfit can absorb the very motion that shows the derivatives.
+    """
+    again = fit(problem, null.hypothesis, null.point, whitener, iterations=_GLS_ITERATIONS, free_levels=False)
+    if again is not None:
+        std = np.sqrt(np.diag(null.covariance)[Common.derivatives])
+        if (
+            np.abs(again.point.common[Common.derivatives] - null.point.common[Common.derivatives])
+            < _FAR * std
+        ).all():
+            return again
+    return fit(problem, null.hypothesis, null.point, whitener, iterations=0, free_levels=False) or null
+
+
+def _tied(candidates: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
+    """The best accepted candidate and those within `TIE` of it."""
+    accepted = [c for c in candidates if not c.reasons]
+    if not accepted:
+        return ()
+    best = accepted[0]
+    others = (c for c in candidates if c is not best and c.reasons[:1] != (SUPERSEDED,))
+    near = (c for c in others if abs(best.gain - c.gain) <= TIE and has_converged(c.fit, c.gain))
+    return (best, *near)
+
+
+__all__ = [
+    "LEVEL",
+    "RoundStart",
+    "SearchRound",
+    "at_best_location",
+    "search_round",
+    "significant_gain",
+]

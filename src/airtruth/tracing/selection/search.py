@@ -1,0 +1,251 @@
+"""The search: rounds of scoring, refitting and acceptance until no further effect is accepted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from airtruth.effects.effect import Effect
+from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.optimise import fit
+from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.model.parameters import Parameters
+from airtruth.tracing.selection.acceptance import OUTDONE, Candidate
+from airtruth.tracing.selection.budget import Advance, may_begin
+from airtruth.tracing.selection.release import DeclaredCauses, Release
+from airtruth.tracing.selection.rounds import (
+    NOTHING_DECLARED,
+    NOTHING_KNOWN,
+    Rival,
+    RoundStart,
+    SearchRound,
+    at_best_location,
+    search_round,
+    significant_gain,
+)
+
+_ALTERNATIVES: Final = 2
+"""Number of tied effects to try instead of the leader [-] (judgement: each costs the rounds that follow)."""
+_CLEAN: Final = 0.05
+"""Probability of the remaining anomaly from which a search explains the records, so that no tied effect is tried
+instead [-] (convention)."""
+_EFFECT_LEADS: Final = 30.0
+"""Gain in 2 log L by which an effect has to lead for the released derivatives not to be followed beside it [-]
+(judgement: what a later effect may still add to them)."""
+
+
+def search(
+    problem: TraceProblem,
+    hypothesis: Hypothesis,
+    start: Parameters,
+    effects: Sequence[Effect],
+    seed: int,
+    advance: Advance = lambda step: None,
+    declared: DeclaredCauses = NOTHING_DECLARED,
+    known: Mapping[str, float] = NOTHING_KNOWN,
+) -> tuple[SearchRound, ...]:
+    """Rounds of scoring, refitting and acceptance, until nothing more is accepted.
+
+    Where the records contradict the declared derivatives, the search follows two branches: effects that the
+    derivatives cannot express, and derivatives released from their declaration. The branch of the larger posterior
+    remains.
+
+    Parameters
+    ----------
+    hypothesis, start : the declared aircraft, and where the search for its parameters begins.
+    effects : candidates.
+    seed : seed of the random draws behind p-values.
+    advance : receives the step that begins.
+    declared : candidates that explain a contradiction of the declared derivatives.
+    known : effects that are always refitted, with the value [SI] at which their refit begins.
+    """
+    first = RoundStart(hypothesis, start, tuple(effects))
+    return _settled(problem, _Search(problem, seed, advance, declared, known).rounds((first,), ()))
+
+
+@dataclass(frozen=True)
+class _Search:
+    """What every round of a search shares."""
+
+    problem: TraceProblem
+    seed: int
+    advance: Advance
+    declared: DeclaredCauses
+    known: Mapping[str, float]
+
+    def rounds(
+        self, starts: tuple[RoundStart, ...], before: tuple[SearchRound, ...]
+    ) -> tuple[SearchRound, ...]:
+        """Finished rounds from the last of ``starts`` on, after those before it."""
+        current = starts[-1]
+        own = search_round(
+            self.problem, current, len(before), self.seed, self.advance, self.declared, self.known
+        )
+        if own is None:
+            return before
+        if own.release is not None:
+            return self._branches(starts, before, own, own.release)
+        return self._accepting(starts, (*before, own))
+
+    def _branches(
+        self,
+        starts: tuple[RoundStart, ...],
+        before: tuple[SearchRound, ...],
+        own: SearchRound,
+        release: Release,
+    ) -> tuple[SearchRound, ...]:
+        """The better of the rounds after an effect and after the release of the derivatives."""
+        ends = []
+        if own.tied:
+            ends.append(self._accepting(starts, (*before, replace(own, release=None))))
+        phrase, leads = "release the derivatives from their declaration", own.tied[:1]
+        if not leads:
+            self.advance(phrase)
+        behind = not leads or leads[0].gain < own.release_gain + _EFFECT_LEADS
+        if behind and (not leads or may_begin(self.advance, phrase)):
+            left = tuple(e for e in starts[-1].effects if e.key not in self.declared.keys)
+            fitted = release.refit or release.fit
+            following = RoundStart(fitted.hypothesis, fitted.point, left, settled=True)
+            ends.append(self.rounds((*starts, following), (*before, replace(own, tied=(), profile=None))))
+        if len(ends) == 1:
+            return ends[0]
+        costs = [total_cost(rounds[-1]) for rounds in ends]
+        best = int(np.argmin(costs))
+        won, lost = ends[best], ends[1 - best]
+        rival = Rival(_effects_of(lost[-1]), costs[1 - best] - costs[best])
+        at = len(before)
+        return (*won[:at], replace(won[at], rival=rival), *won[at + 1 :])
+
+    def _accepting(
+        self, starts: tuple[RoundStart, ...], rounds: tuple[SearchRound, ...]
+    ) -> tuple[SearchRound, ...]:
+        """The rounds with what follows the last one's accepted effect."""
+        current, own = starts[-1], rounds[-1]
+        if not own.tied:
+            return rounds
+        if not current.settled:
+            replaced = self._replacing(starts, rounds)
+            if replaced is not None:
+                return replaced
+        ends = self._onwards(starts, rounds, current.settled)
+        if current.settled or _is_clean(ends, len(rounds)):
+            return ends
+        return self._with_alternative(starts, rounds) or ends
+
+    def _replacing(
+        self, starts: tuple[RoundStart, ...], rounds: tuple[SearchRound, ...]
+    ) -> tuple[SearchRound, ...] | None:
+        """The search with the last effect in place of an earlier one that it makes redundant."""
+        best = rounds[-1].tied[0]
+        effect = redundant_effect(self.problem, best.fit, significant_gain(starts[-1].tested))
+        if effect is None:
+            return None
+        index = [i for i, r in enumerate(rounds) if r.tied][effect]
+        old, new = rounds[index].tied[0].score.effect.key, best.score.effect.key
+        if not may_begin(self.advance, f"{new} instead of {old}"):
+            return None
+        again = replace(starts[index], start=rounds[index].null.point, replacement=(old, new), settled=True)
+        other = self.rounds((*starts[:index], again), rounds[:index])
+        return other if len(other) > index and other[index].tied else None
+
+    def _with_alternative(
+        self, starts: tuple[RoundStart, ...], rounds: tuple[SearchRound, ...]
+    ) -> tuple[SearchRound, ...] | None:
+        """The first search that explains the records with an effect that ties with the leader, or is its variant."""
+        own = rounds[-1]
+        best = own.tied[0]
+        for rival in (*own.tied[1 : 1 + _ALTERNATIVES], *_variants(own)):
+            if not may_begin(self.advance, f"{rival.score.effect.key} instead of {best.score.effect.key}"):
+                return None
+            rest = (c for c in own.tied if c.score.effect.name != rival.score.effect.name)
+            led = at_best_location(self.problem, replace(own, tied=(rival, *rest)), self.advance)
+            tried = self._onwards(starts, (*rounds[:-1], led), True)
+            if _is_clean(tried, len(rounds)):
+                return tried
+        return None
+
+    def _onwards(
+        self, starts: tuple[RoundStart, ...], rounds: tuple[SearchRound, ...], settled: bool
+    ) -> tuple[SearchRound, ...]:
+        """The rounds after one that has accepted an effect."""
+        fitted = rounds[-1].tied[0].fit
+        accepted = {e.key for e in fitted.hypothesis.effects}
+        effects = tuple(e for e in starts[-1].effects if e.key not in accepted)
+        following = RoundStart(fitted.hypothesis, fitted.point, effects, settled=settled)
+        return self.rounds((*starts, following), rounds)
+
+
+def _effects_of(last: SearchRound) -> tuple[str, ...]:
+    """Names of the effects of a branch that ends with this round."""
+    explaining = last.sets[0].effects if last.sets else ()
+    return (*(e.name for e in last.null.hypothesis.effects), *explaining)
+
+
+def total_cost(last: SearchRound) -> float:
+    """Negative log-posterior at the end of a search, with one for each parameter of an effect."""
+    if last.null.hypothesis.spread is None:
+        own = last.null.cost if last.release is None else last.release.cost
+    else:
+        own = last.sets[0].cost if last.sets else np.inf
+    return own + len(last.null.point.sizes)
+
+
+def _settled(problem: TraceProblem, rounds: tuple[SearchRound, ...]) -> tuple[SearchRound, ...]:
+    """The rounds with the last fit under the best explanation of the derivatives, where they were released."""
+    if not rounds or not rounds[-1].sets:
+        return rounds
+    last = rounds[-1]
+    spread = last.sets[0].covariance - problem.declared_covariance
+    hypothesis = replace(last.null.hypothesis, spread=spread)
+    null = fit(problem, hypothesis, last.null.point) or last.null
+    gls = fit(
+        problem, hypothesis, last.gls.point, last.whitener, free_levels=last.whitener.order == 0, iterations=6
+    )
+    first = next(r.release for r in rounds if r.release is not None)
+    end = replace(last, null=null, gls=gls or null, release=replace(first, fit=last.null, sets=last.sets))
+    return (*rounds[:-1], end)
+
+
+def _variants(own: SearchRound) -> tuple[Candidate, ...]:
+    """Other variants of the leader that pass every test but gain less.
+
+    A break can stand in for a curve, and then leaves a larger residual.
+    """
+    best = own.tied[0]
+    return tuple(
+        replace(c, reasons=())
+        for c in own.candidates
+        if c.score.effect.name == best.score.effect.name
+        and c.reasons == (OUTDONE,)
+        and np.isfinite(c.likelihood_gain).all()
+    )
+
+
+def _is_clean(rounds: Sequence[SearchRound], count: int) -> bool:
+    """Whether the first ``count`` rounds explain the records: no later effect, and no anomaly that remains."""
+    return not any(r.tied for r in rounds[count:]) and rounds[-1].anomaly.p_value > _CLEAN
+
+
+def redundant_effect(problem: TraceProblem, fitted: PosteriorFit, least: float) -> int | None:
+    """Index of an earlier effect that the last one makes redundant; None where each is needed.
+
+    An effect is redundant if its size is immaterial, or if the fit without it loses less than ``least`` in 2 log L.
+    """
+    at = 0
+    for i, effect in enumerate(fitted.hypothesis.effects[:-1]):
+        count = len(effect.parameters)
+        if abs(fitted.point.sizes[at]) < effect.parameters[0].material:
+            return i
+        rest = tuple(e for j, e in enumerate(fitted.hypothesis.effects) if j != i)
+        sizes = np.delete(fitted.point.sizes, np.arange(at, at + count))
+        less = fit(problem, replace(fitted.hypothesis, effects=rest), replace(fitted.point, sizes=sizes))
+        if less is not None and 2.0 * (less.cost - fitted.cost - count) < least:
+            return i
+        at += count
+    return None
+
+
+__all__ = ["redundant_effect", "search", "total_cost"]

@@ -1,0 +1,138 @@
+"""Errors of the stages of a trace: root mean squares, tolerances of a training simulator, flights in JSBSim."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, Final, Generic, Protocol, TypeVar
+
+STAGES: Final = ("declared", "before", "after", "control", "floor")
+"""Stages of the report in their order: the declared aircraft; its derivatives and noise levels refitted; the accepted
+effects added; the runner-up added instead; the error that gusts and sensor noise alone explain."""
+SETS: Final = ("held_out", "fit")
+"""Sets of records that a stage is assessed on, in the order of the report."""
+
+PerChannel = dict[str, float]
+"""Channel -> value in the channel's SI unit."""
+
+
+class _Row(Protocol):
+    def to_dict(self) -> dict[str, Any]: ...
+
+
+T = TypeVar("T", bound=_Row)
+
+
+@dataclass(frozen=True)
+class BySet(Generic[T]):
+    """One quantity on the fitted and on the held-out records; None where there are no such records."""
+
+    fit: T | None = None
+    held_out: T | None = None
+
+    def on(self, records: str) -> T | None:
+        """The quantity on one of `SETS`."""
+        return self.held_out if records == "held_out" else self.fit
+
+    def to_dict(self) -> dict[str, Any]:
+        """The sets that there are."""
+        both = {"fit": self.fit, "held_out": self.held_out}
+        return {name: row.to_dict() for name, row in both.items() if row is not None}
+
+
+@dataclass(frozen=True)
+class Rms:
+    """Root mean squares of a stage over some records.
+
+    Attributes
+    ----------
+    free_run : errors of the simulation from the initial state, per channel.
+    innovation : errors of the one-step prediction, per channel.
+    """
+
+    free_run: PerChannel
+    innovation: PerChannel
+
+    def to_dict(self) -> dict[str, Any]:
+        """Both kinds."""
+        return {"free_run": dict(self.free_run), "innovation": dict(self.innovation)}
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors of every stage.
+
+    Attributes
+    ----------
+    channels : standard deviation of each measured channel.
+    stages : stage, one of `STAGES` -> errors.
+    """
+
+    channels: PerChannel
+    stages: dict[str, BySet[Rms]]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Channels and stages side by side."""
+        return {"channels": dict(self.channels)} | {name: e.to_dict() for name, e in self.stages.items()}
+
+
+@dataclass(frozen=True)
+class Excursions:
+    """Free runs of some records against the tolerances of a training simulator.
+
+    Attributes
+    ----------
+    pitch_rad, q_rad_s, az_m_s2 : largest distances over the records [rad, rad/s, m/s2].
+    share_inside : mean share of the samples inside the tolerances [-].
+    records_within, records : number of records inside throughout, and in all.
+    """
+
+    pitch_rad: float
+    q_rad_s: float
+    az_m_s2: float
+    share_inside: float
+    records_within: int
+    records: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """Every field."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Every stage against the tolerances of a training simulator.
+
+    Attributes
+    ----------
+    source : regulation.
+    limits : quantity -> largest allowed distance, in SI.
+    stages : stage -> distances.
+    """
+
+    source: str
+    limits: dict[str, float]
+    stages: dict[str, BySet[Excursions]]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Source, limits and stages side by side."""
+        rows = {name: e.to_dict() for name, e in self.stages.items()}
+        return {"source": self.source, "limits": dict(self.limits), **rows}
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Root mean square errors of records flown again in JSBSim, by the declared and by the updated aircraft.
+
+    Both are None where nothing could be flown.
+    """
+
+    declared: PerChannel | None = None
+    updated: PerChannel | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Those aircraft that flew."""
+        both = {"declared": self.declared, "updated": self.updated}
+        return {name: dict(rms) for name, rms in both.items() if rms is not None}
+
+
+__all__ = ["SETS", "STAGES", "BySet", "Errors", "Excursions", "PerChannel", "Replay", "Rms", "Tolerances"]

@@ -1,0 +1,134 @@
+"""The updated aircraft: a copy of the declared one with the accepted effects and the refitted derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from airtruth.aircraft import FILE, Aircraft
+from airtruth.aircraft.write import MARK, Corrections, write_aircraft
+from airtruth.effects.increment import Increment
+from airtruth.errors import StoreError
+from airtruth.logs import atomic
+from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.terms import AeroTerm, Change
+from airtruth.tracing.increment_table import increment_table
+from airtruth.tracing.inference.posterior import PosteriorFit
+from airtruth.tracing.inference.robust import robust_covariance
+from airtruth.tracing.model.parameters import Common
+from airtruth.tracing.prepare import Case
+from airtruth.tracing.selection.rounds import SearchRound
+
+
+def accepted_change(rounds: Sequence[SearchRound]) -> Change:
+    """The accepted effects at their estimated sizes."""
+    final = rounds[-1].gls
+    return final.hypothesis.added(final.point.sizes)
+
+
+def updated_folder(aircraft: Aircraft, out: Path) -> Path:
+    """OUT/aircraft/NAME, the folder of the updated aircraft.
+
+    Raises
+    ------
+    StoreError
+        If the folder contains the declared aircraft, lies inside it, or holds anything but an earlier update: no
+        file of the user is ever replaced.
+    """
+    folder = out / "aircraft" / aircraft.name
+    if aircraft.name in (".", ".."):
+        raise StoreError(f"{aircraft.folder}: {aircraft.name!r} names no folder; give the aircraft a name")
+    here, declared = folder.resolve(), aircraft.folder.resolve()
+    if here == declared or here in declared.parents:
+        raise StoreError(f"{folder}: holds the declared aircraft itself; choose another --out")
+    if declared in here.parents:
+        raise StoreError(f"{folder}: lies inside the folder of the declared aircraft; choose another --out")
+    if folder.exists() and any(folder.iterdir() if folder.is_dir() else [folder]) and not _is_update(folder):
+        raise StoreError(f"{folder}: exists and is not an earlier update of a trace; choose another --out")
+    return folder
+
+
+def _is_update(folder: Path) -> bool:
+    try:
+        return MARK in (folder / FILE).read_text(encoding="utf-8")
+    except OSError:
+        return False
+
+
+def write_update(
+    case: Case,
+    rounds: Sequence[SearchRound],
+    aircraft: Aircraft,
+    out: Path,
+    contradicted: bool = False,
+) -> str | None:
+    """Write the aircraft with the accepted effects and the refitted derivatives to OUT/aircraft/NAME.
+
+    A complete new folder replaces an earlier update, or nothing changes. An aircraft without a JSBSim model takes
+    effects of its sensors only; for others, write a model first (`airtruth aircraft new`).
+
+    Parameters
+    ----------
+    contradicted : whether the records contradict the declared model; its derivatives are then refitted although no
+        effect was accepted.
+
+    Returns
+    -------
+    The folder; None where nothing is to be changed, or nothing that the aircraft can take.
+
+    Raises
+    ------
+    AircraftError, StoreError
+        If the model cannot take the effect, or the folder cannot be written; as `updated_folder`.
+    """
+    folder = updated_folder(aircraft, out)
+    change = accepted_change(rounds)
+    released = rounds[-1].null.hypothesis.spread is not None
+    refits = (released or contradicted) and aircraft.file.jsbsim is not None
+    if (change == Change() and not refits) or (aircraft.file.jsbsim is None and change.in_aircraft):
+        atomic.remove_folder(folder)
+        return None
+    fit = rounds[-1].gls
+    plants = [record.plant for record in case.fitted.records]
+    shift = float(np.mean([p.alpha_shift_rad for p in plants]))
+    change = replace(change, aero=tuple(_from_zero_alpha(t, shift) for t in change.aero))
+    increments = dict(zip(PARAMETERS, fit.point.common[Common.derivatives].tolist(), strict=True))
+    release = rounds[-1].release
+    causes = release.sets[0].effects if released and release is not None else ()
+    names = dict.fromkeys([*(e.key for e in fit.hypothesis.effects), *causes])
+    found = ", ".join(names) or "no effect of the library explains the residual"
+    note = f"Traced from measured records: {found}."
+    corrections = None
+    if aircraft.file.jsbsim is not None and np.isfinite(list(increments.values())).all():
+        alpha = float(np.mean([p.trim_alpha_rad for p in plants]))
+        elevator = float(np.mean([p.trim_elevator_rad for p in plants]))
+        corrections = Corrections(increments, alpha + shift, elevator)
+        note += " Derivatives refitted: " + ", ".join(f"{k} {v:+.4g}" for k, v in increments.items()) + "."
+    note += "".join(f"\n{line}" for line in _bands(case, fit))
+    with atomic.new_folder(folder) as new:
+        write_aircraft(aircraft, change, new, note, corrections)
+    return str(folder)
+
+
+def _bands(case: Case, fit: PosteriorFit) -> Iterator[str]:
+    """One line for each learned increment: its 95 % band at the points of its table."""
+    learned = [e for e in fit.hypothesis.effects if isinstance(e, Increment) and e.shape.cells]
+    covariance = robust_covariance(case.fitted, fit) if learned else np.zeros((0, 0))
+    for effect in learned:
+        table = increment_table(case.fitted, fit, covariance, effect)
+        rows = zip(table.at, table.low, table.high, table.samples, strict=True)
+        band = "; ".join(
+            f"{x:.4g}: {low:.3g} to {high:.3g} ({samples} samples)" for x, low, high, samples in rows
+        )
+        yield f"95 % band of {effect.key}: {band}."
+
+
+def _from_zero_alpha(term: AeroTerm, shift_rad: float) -> AeroTerm:
+    """A term that counts alpha from zero, as an aircraft does; the linear model counts it from the record's trim."""
+    return replace(term, at=term.at + shift_rad) if term.signal == "alpha" else term
+
+
+__all__ = ["accepted_change", "updated_folder", "write_update"]

@@ -1,0 +1,1 @@
+"""Experiments behind the documents; each prints its tables (`make study`)."""

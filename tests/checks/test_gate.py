@@ -1,0 +1,236 @@
+"""The gate names every physical fault of the table, and lets every faultless flight through."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from clean_logs import RATES_HZ, fly, picked, table
+from faults import FAULTS
+
+from airtruth import aircraft as planes
+from airtruth.checks.corrections import catalogue
+from airtruth.checks.fault import CODES
+from airtruth.checks.gate import inspect, require
+from airtruth.errors import LogError
+from airtruth.logs.store import read_log, write_log
+
+ROOT = Path(__file__).resolve().parents[2]
+UNDECLARED = sorted((ROOT / "data" / "undeclared").glob("*.parquet"))
+NEEDS_AIRCRAFT = {"airspeed in kt", "command in place of elevator"}
+"""Faults that kinematics alone does not show in six gusty records: they need the declared aircraft."""
+
+
+@pytest.fixture(scope="module")
+def log():
+    return read_log(UNDECLARED[0])
+
+
+def certain(faults):
+    return [fault for fault in faults if fault.certain]
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_every_fault_is_named(name, log, gtm):
+    fault = certain(inspect(FAULTS[name](log), gtm))[0]
+    assert fault.channel in FAULTS[name].channels
+    assert fault.code in FAULTS[name].codes
+    assert fault.code in CODES
+    assert fault.channel in fault.sentence
+    assert "\n" not in fault.sentence
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in FAULTS if name not in NEEDS_AIRCRAFT])
+def test_every_fault_is_named_without_an_aircraft(name, log):
+    fault = certain(inspect(FAULTS[name](log)))[0]
+    assert fault.channel in FAULTS[name].channels
+    assert fault.code in FAULTS[name].codes
+
+
+HIDDEN = {"ax in g", "theta frozen", "elevator and command", "command in place of elevator"}
+"""Faults that this flight does not show: ax changes little, theta rests where it is frozen, and the T-38 has no
+actuator, so that elevator and command agree but for noise."""
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory):
+    flight = next(
+        f for f in table() if (f.aircraft, f.level, f.manoeuvre, f.noisy) == ("T38", "none", "3211", True)
+    )
+    return fly(flight, tmp_path_factory.mktemp("T38"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in FAULTS if name not in HIDDEN])
+def test_every_fault_of_a_simulated_record_is_named(name, simulated):
+    fault = certain(inspect(FAULTS[name](simulated), planes.load("T38")))[0]
+    assert fault.channel in FAULTS[name].channels
+    assert fault.code in FAULTS[name].codes
+
+
+@pytest.mark.parametrize("path", UNDECLARED, ids=lambda path: path.stem)
+def test_logs_with_undeclared_effects_pass(path, gtm):
+    """A missing effect is what `trace` looks for, and no fault of the log."""
+    assert certain(inspect(read_log(path), gtm)) == []
+    assert certain(inspect(read_log(path))) == []
+
+
+FEW = {("gtm", "severe", True), ("c172x", "light", False), ("f16", "light", False), ("T38", "moderate", True)}
+"""Aircraft, gust level and noise of the flights that the fast suite flies."""
+
+
+def check_clean(flight, folder):
+    declared = planes.load(flight.aircraft)
+    flown = fly(flight, folder)
+    for rate_hz in RATES_HZ:
+        for aircraft in (declared, None):
+            assert certain(inspect(picked(flown, rate_hz), aircraft)) == [], (flight.name, rate_hz)
+
+
+@pytest.mark.parametrize(
+    "flight",
+    [f for f in table() if f.manoeuvre == "3211" and (f.aircraft, f.level, f.noisy) in FEW],
+    ids=lambda flight: flight.name,
+)
+def test_clean_flights_pass(flight, tmp_path):
+    check_clean(flight, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("flight", [f for f in table() if f.noisy], ids=lambda flight: flight.name)
+def test_all_clean_flights_pass(flight, tmp_path):
+    """48 flights with much noise at five rates: 240 logs."""
+    check_clean(flight, tmp_path)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("flight", [f for f in table() if not f.noisy], ids=lambda flight: flight.name)
+def test_all_clean_flights_with_their_own_sensors_pass(flight, tmp_path):
+    """48 further flights at five rates: 240 logs."""
+    check_clean(flight, tmp_path)
+
+
+def test_a_fault_of_one_run_names_that_run(log):
+    q = log.channels["q_rad_s"].copy()
+    rows = log.rows(2)
+    q[rows] = -q[rows]
+    fault = certain(inspect(replace(log, channels={**log.channels, "q_rad_s": q})))[0]
+    assert (fault.channel, fault.code, fault.run_id) == ("q_rad_s", "sign", log.run_ids[2])
+    assert f"in 1 of 6 runs ({log.run_ids[2]!r})" in fault.sentence
+
+
+def test_two_faults_are_both_named(log, gtm):
+    changed = {n: v / np.deg2rad(1.0) for n, v in log.channels.items() if n in ("alpha_rad", "theta_rad")}
+    faults = certain(inspect(replace(log, channels={**log.channels, **changed}), gtm))
+    assert {(f.channel, f.code) for f in faults} == {("alpha_rad", "unit"), ("theta_rad", "unit")}
+
+
+def test_a_fault_raises_one_sentence_with_the_cure(log):
+    bad = FAULTS["az sign"](log)
+    with pytest.raises(
+        LogError, match=r"^flight-7: contradicts physics; correct it, or .* --force\n"
+    ) as caught:
+        require(bad, source="flight-7")
+    line = str(caught.value).splitlines()[1]
+    assert line.startswith("  - az_m_s2: opposite sign in all 6 runs: ")
+    assert line.endswith("; state sign = -1 under [channels.az_m_s2] in the import mapping")
+
+
+def test_force_returns_the_faults(log):
+    assert [f.channel for f in require(FAULTS["az sign"](log), force=True)] == ["az_m_s2"]
+
+
+def test_a_breach_of_the_contract_cannot_be_forced(log):
+    with pytest.raises(LogError, match="q_rad_s: required channel is missing"):
+        require(replace(log, channels={n: v for n, v in log.channels.items() if n != "q_rad_s"}), force=True)
+
+
+@pytest.mark.parametrize(
+    ("column", "channel"),
+    [
+        ("elevator_comand_rad", "elevator_command_rad"),
+        ("elevator_cmd_rad", "elevator_command_rad"),
+        ("Theta_rad", "theta_rad"),
+        ("theta_deg", "theta_rad"),
+        ("ax", "ax_m_s2"),
+        ("ax_g", "ax_m_s2"),
+        ("throtle", "throttle"),
+        ("altitude_ft", "altitude_m"),
+        ("density_kgm3", "density_kg_m3"),
+    ],
+)
+def test_a_misspelt_column_names_the_nearest_channel(log, column, channel):
+    channels = {n: v for n, v in log.channels.items() if n != channel}
+    faults = certain(inspect(replace(log, channels={**channels, column: log.channels[channel]})))
+    assert [(f.channel, f.code) for f in faults] == [(channel, "name")]
+    assert faults[0].sentence.startswith(f"{column}: no channel has this name")
+    assert f"rename it to {channel}" in faults[0].sentence
+
+
+@pytest.mark.parametrize("column", ["ay_m_s2", "p_rad_s", "beta_rad", "flap_rad", "vcas", "alpha_vane_rad"])
+def test_other_columns_are_left_alone(log, column):
+    channels = {n: v for n, v in log.channels.items() if n not in ("ax_m_s2", "theta_rad")}
+    assert certain(inspect(replace(log, channels={**channels, column: log.channels["ax_m_s2"]}))) == []
+
+
+def restated(path, name, unit):
+    """The file with another unit in the metadata of a column."""
+    import pyarrow.parquet as pq
+
+    schema_table = pq.read_table(path)
+    schema = schema_table.schema
+    at = schema.get_field_index(name)
+    schema = schema.set(at, schema.field(at).with_metadata({"unit": unit}))
+    pq.write_table(schema_table.cast(schema).replace_schema_metadata(schema_table.schema.metadata), path)
+
+
+@pytest.mark.parametrize(
+    ("unit", "refused"), [("deg", True), ("m/s", True), ("radian", False), ("foo", False)]
+)
+def test_unit_metadata_that_contradict_the_name(log, tmp_path, unit, refused):
+    path = tmp_path / "log.parquet"
+    write_log(path, log)
+    restated(path, "alpha_rad", unit)
+    faults = certain(inspect(read_log(path)))
+    assert [(f.channel, f.code) for f in faults] == ([("alpha_rad", "metadata")] if refused else [])
+    if refused:
+        assert f"state the unit {unit}, the column's name states rad" in faults[0].sentence
+
+
+def test_a_copy_is_told_from_an_actuator_that_is_not_declared(log, gtm):
+    """Elevator and command agree exactly in a simulation without an actuator; the GTM declares one of 5 Hz."""
+    same = FAULTS["command in place of elevator"](log)
+    assert certain(inspect(same)) == []
+    assert [(f.channel, f.code) for f in certain(inspect(same, gtm))] == [("elevator_rad", "copy")]
+
+
+def test_every_correction_has_words_of_its_own(log):
+    """Two mistakes with the same words and cure could not be told apart by a reader."""
+    entries = [(c.channels, c.mistake, c.cure) for c in catalogue(tuple(log.channels), 0.02)]
+    assert len(set(entries)) == len(entries)
+    assert {c.code for c in catalogue(tuple(log.channels), 0.02)} <= set(CODES)
+
+
+def test_a_record_at_rest_has_no_fault(log):
+    still = {name: np.full_like(values, values[0]) for name, values in log.channels.items()}
+    assert inspect(replace(log, channels=still)) == ()
+
+
+@pytest.mark.slow
+def test_damaged_aircraft_are_not_refused(tmp_path, gtm):
+    """An aircraft that lost its tail departs and stalls; a quantised accelerometer repeats its values.
+
+    Each of these flights of the blind trials was once refused; `python -m studies.gate_refusals` flies 600.
+    """
+    from validation.blind import draw, trials
+
+    once = [("composite", n) for n in (23, 54, 71, 81, 97)] + [("derivative", 297)]
+    folders = [tmp_path / f"{mode}-{number}" for mode, number in once]
+    trials.flown_apart([draw.draw(51501, number, mode) for mode, number in once], folders)
+    for folder in folders:
+        log = read_log(folder / "log.parquet")
+        assert certain(inspect(log, gtm)) == [], folder.name
+        assert certain(inspect(log)) == [], folder.name

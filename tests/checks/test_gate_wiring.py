@@ -1,0 +1,121 @@
+"""Every verb and function that reads a log passes it through the gate, before anything expensive."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from faults import FAULTS
+
+import airtruth as at
+from airtruth import cli
+from airtruth.errors import LogError
+from airtruth.logs.store import read_log, write_log
+from airtruth.tracing import run as tracing
+
+ROOT = Path(__file__).resolve().parents[2]
+MAPPING = "".join(
+    f'[channels.{name}]\ncolumn = "{name}"\nunit = "{unit}"\n'
+    for name, unit in {
+        "airspeed_m_s": "m_s",
+        "alpha_rad": "rad",
+        "theta_rad": "rad",
+        "q_rad_s": "rad_s",
+        "ax_m_s2": "m_s2",
+        "az_m_s2": "m_s2",
+        "elevator_rad": "rad",
+        "elevator_command_rad": "rad",
+        "altitude_m": "m",
+        "density_kg_m3": "kg_m3",
+    }.items()
+)
+TIMES = '[time]\ncolumn = "t_s"\nrun = "run_id"\n'
+NAMED = ["az sign", "alpha sign", "q sign", "elevator sign", "alpha and q", "alpha in deg", "az partly zero"]
+"""Faults of the three reviews that a verb once answered with numbers."""
+
+
+@pytest.fixture(scope="module")
+def log():
+    return read_log(ROOT / "data" / "undeclared" / "a.parquet")
+
+
+@pytest.fixture
+def stored(log, tmp_path):
+    def write(name):
+        path = tmp_path / "bad.parquet"
+        write_log(path, FAULTS[name](log), dtype="float64")
+        (tmp_path / "map.toml").write_text(TIMES + MAPPING)
+        return path
+
+    return write
+
+
+@pytest.fixture
+def command(monkeypatch, capsys):
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["airtruth", *map(str, arguments)])
+        code = 0
+        try:
+            cli.main()
+        except SystemExit as end:
+            code = end.code
+        out, err = capsys.readouterr()
+        return code or 0, out, err
+
+    return run
+
+
+def arguments(verb, path):
+    folder = path.parent
+    return {
+        "identify": ("identify", path, "--aircraft", "gtm", "--method", "ls", "--quiet"),
+        "check": ("check", path, "--aircraft", "gtm"),
+        "trace": ("trace", path, "--aircraft", "gtm", "--out", folder / "out", "--quiet"),
+        "import": ("import", path, "--mapping", folder / "map.toml", "--out", folder / "out.parquet"),
+    }[verb]
+
+
+@pytest.mark.parametrize("verb", ["identify", "check", "trace", "import"])
+@pytest.mark.parametrize("name", NAMED)
+def test_every_verb_refuses_and_names_the_channel(verb, name, stored, command, monkeypatch):
+    monkeypatch.setattr(tracing, "prepare", lambda *a: pytest.fail("went on behind the gate"))
+    code, out, err = command(*arguments(verb, stored(name)))
+    assert code == 2, (out, err)
+    assert "contradicts physics" in err
+    assert "--force" in err
+    assert any(channel in err for channel in FAULTS[name].channels)
+    assert not (stored(name).parent / "out.parquet").exists()
+
+
+@pytest.mark.parametrize("call", [at.identify, at.check, at.trace])
+def test_every_function_refuses(call, log):
+    with pytest.raises(LogError, match="q_rad_s: opposite sign in all 6 runs"):
+        call(FAULTS["q sign"](log), "gtm")
+
+
+def test_force_continues_and_the_result_records_it(stored, command):
+    path = stored("theta sign")
+    code, out, _ = command(*arguments("check", path), "--force", "--json")
+    assert code == 0
+    assert json.loads(out)["forced"][0].startswith("theta_rad: opposite sign in all 6 runs")
+    code, _, err = command(*arguments("import", path), "--force")
+    assert code == 0
+    assert "theta_rad: opposite sign" in err
+    forced = read_log(path.parent / "out.parquet").metadata["forced"]
+    assert forced[0].startswith("theta_rad: opposite sign in all 6 runs")
+
+
+def test_the_result_of_check(log):
+    from airtruth.result import Result
+
+    result = at.check(log, "gtm")
+    assert isinstance(result, Result)
+    assert result.to_dict()["run_ids"] == log.run_ids
+    assert "gyro_scale" in result.summary()
+    assert len(result.to_frame()) == len(result.findings)
+    assert np.isfinite(result.to_frame()["estimate"].astype(float)).all()
+    assert result._repr_html_().count("<table") == 2
+    assert len(result.plot().axes) == 2

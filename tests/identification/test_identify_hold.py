@@ -1,0 +1,41 @@
+"""The first-order hold against scipy's matrix exponential of the augmented system."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import expm
+
+from airtruth.numerics.hold import first_order_hold
+
+
+def augmented(a, b, dt):
+    """x' = A x + b u, u' = s, s' = 0: exp gives the response to the start and the slope of u."""
+    big = np.zeros((4, 4))
+    big[:2, :2], big[:2, 2], big[2, 3] = a * dt, b * dt, 1.0
+    e = expm(big)
+    return e[:2, :2], e[:2, 2] - e[:2, 3], e[:2, 3]
+
+
+entry = st.floats(-60.0, 60.0)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.tuples(entry, entry, entry, entry), st.tuples(entry, entry), st.sampled_from([0.005, 0.02, 0.1]))
+def test_equals_the_matrix_exponential(a, b, dt):
+    matrix, column = np.array(a).reshape(2, 2), np.array(b)
+    e, g, h = first_order_hold(*a, *b, dt)
+    reference = augmented(matrix, column, dt)
+    size = np.abs(reference[0]).max() * (1.0 + np.abs(matrix).max()) * (1.0 + np.abs(column).max())
+    np.testing.assert_allclose(np.reshape(e, (2, 2)), reference[0], rtol=0, atol=1e-13 * size)
+    np.testing.assert_allclose(g, reference[1], rtol=0, atol=1e-13 * size)
+    np.testing.assert_allclose(h, reference[2], rtol=0, atol=1e-13 * size)
+
+
+def test_double_integrator_by_hand():
+    """A = [[0, 1], [0, 0]], b = [0, 1]: x0 gains dt^2/2 of a constant, dt^2/6 of the late half."""
+    dt = 0.5
+    e, g, h = first_order_hold(0.0, 1.0, 0.0, 0.0, 0.0, 1.0, dt)
+    assert e == pytest.approx((1.0, dt, 0.0, 1.0), abs=1e-15)
+    assert h == pytest.approx((dt**2 / 6.0, dt / 2.0), abs=1e-15)
+    assert g == pytest.approx((dt**2 / 3.0, dt / 2.0), abs=1e-15)

@@ -1,0 +1,63 @@
+"""What is rebuilt between samples, against exact areas of a servo's motion."""
+
+import numpy as np
+import pytest
+
+from airtruth.numerics.intersample import servo_bend
+from validation.linear_flight import DEG, SERVO_RAD_S, doublet, fly
+
+
+def servo(t_s, steps):
+    """Response of a first-order servo to steps (time, size) and its integral, in closed form."""
+    value = np.zeros_like(t_s)
+    area = np.zeros_like(t_s)
+    for at, size in steps:
+        since = np.maximum(t_s - at, 0.0)
+        gone = -np.expm1(-SERVO_RAD_S * since)
+        value += size * gone
+        area += size * (since - gone / SERVO_RAD_S)
+    return value, area
+
+
+def smooth_mean(x):
+    """Mean of each cell by the cubic through four samples; beyond the ends the end sample repeats."""
+    wide = np.concatenate([x[:1], x, x[-1:]])
+    return (13.0 * (wide[1:-2] + wide[2:-1]) - wide[:-3] - wide[3:]) / 24.0
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.004, 0.011, 0.019])
+@pytest.mark.parametrize("dt", [0.01, 0.02])
+def test_rebuilds_the_area_of_every_cell(late_s, dt):
+    """Steps on and between the samples: to 1e-6 of the amplitude from three cells after a corner on."""
+    t = np.arange(round(5.0 / dt)) * dt
+    steps = [(1.0 + late_s, 2 * DEG), (1.5 + late_s, -4 * DEG), (2.0 + late_s, 2 * DEG)]
+    de, area = servo(t, steps)
+    exact = np.diff(area) / dt - smooth_mean(de)
+    bend = servo_bend(de[None])[0]
+    assert bend[0] == 0.0
+    # against what a smooth interpolation misses, 0.6e-3 to 3e-3 rad
+    np.testing.assert_allclose(bend[1:], exact, atol=2e-2 * np.abs(exact).max())
+    assert np.sum(bend) * dt == pytest.approx(np.sum(exact) * dt, abs=1e-3 * np.abs(exact).max() * dt)
+
+
+@pytest.mark.parametrize("frequency", [0.5, 1.5, 3.0])
+def test_leaves_a_smooth_elevator_alone(frequency):
+    t = np.arange(500) * 0.02
+    de = 0.03 * np.sin(2 * np.pi * frequency * t) + 0.01 * np.sin(2 * np.pi * 0.37 * t)
+    assert (servo_bend(de[None]) == 0.0).all()
+
+
+def test_leaves_noise_and_rest_alone():
+    rng = np.random.default_rng(4)
+    assert (servo_bend(rng.normal(size=(5, 250)) * 1e-3) == 0.0).all()
+    assert (servo_bend(np.full((1, 250), 0.1)) == 0.0).all()
+
+
+def test_sensor_noise_changes_it_little():
+    """With the GTM's 0.01 deg on the surface, 2 deg steps: to a quarter of the correction."""
+    clean = servo_bend(fly(shape=doublet).channels["elevator_rad"])
+    noisy = servo_bend(
+        fly(shape=doublet).channels["elevator_rad"]
+        + 0.01 * DEG * np.random.default_rng(5).normal(size=(1, 250))
+    )
+    assert np.abs(noisy - clean).max() < 0.25 * np.abs(clean).max()

@@ -1,0 +1,217 @@
+"""Headers of other people's files: what the guess maps, with which unit and sign, and what it leaves alone."""
+
+import tomllib
+
+import numpy as np
+import pytest
+import scipy.io
+from import_flight import DEG, FOOT, flown, write_csv
+
+from airtruth.errors import ConfigurationError
+from airtruth.importers import guess_mapping, import_log, open_source, read_dictionary
+from airtruth.importers.mapping import MappingFile
+from validation import recorders
+from validation.recorders import Topic
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    return flown(tmp_path_factory.mktemp("flown"), runs=1, duration_s=6.0)
+
+
+def guessed(path, **more):
+    text = guess_mapping(path, **more)
+    return text, MappingFile.model_validate(tomllib.loads(text))
+
+
+def test_headers_of_flight_test_centres(log, tmp_path):
+    c = log.channels
+    columns = {
+        "TIME_SEC": log.t_s,
+        "VTAS_FTS": c["airspeed_m_s"] / FOOT,
+        "AoA1 [deg]": c["alpha_rad"] / DEG,
+        "THETA_D": c["theta_rad"] / DEG,
+        "Q (deg/sec)": c["q_rad_s"] / DEG,
+        "Nx": c["ax_m_s2"] / 9.80665,
+        "Nz": -c["az_m_s2"] / 9.80665,
+        "STAB POS (deg TEU)": -c["elevator_rad"] / DEG,
+        "Hp [ft]": c["altitude_m"] / FOOT,
+        "rho": 0.0 * log.t_s,
+    }
+    write_csv(tmp_path / "f.csv", columns)
+    text, mapping = guessed(tmp_path / "f.csv")
+    assert {n: (x.unit, x.sign) for n, x in mapping.channels.items()} == {
+        "airspeed_m_s": ("ft_s", 1),
+        "alpha_rad": ("deg", 1),
+        "theta_rad": ("deg", 1),
+        "q_rad_s": ("deg_s", 1),
+        "ax_m_s2": ("g", 1),
+        "az_m_s2": ("g", -1),
+        "elevator_rad": ("deg", -1),
+        "altitude_m": ("ft", 1),
+    }
+    assert "# density_kg_m3: column 'rho' is zero throughout and is not mapped" in text
+    assert "do not contradict" in text
+    (tmp_path / "m.toml").write_text(text)
+    back = import_log(tmp_path / "f.csv", tmp_path / "m.toml").log
+    np.testing.assert_allclose(back.channels["elevator_rad"], c["elevator_rad"], atol=1e-12)
+
+
+LABELS = [
+    "* time (sec)",
+    "* V (ft/sec)",
+    "* alpha (deg)",
+    "* q (deg/sec)",
+    "* az (g)",
+    "* de (deg)",
+    "* h (ft)",
+]
+
+
+def matrix(log):
+    c = log.channels
+    return np.column_stack(
+        [
+            log.t_s,
+            c["airspeed_m_s"] / FOOT,
+            c["alpha_rad"] / DEG,
+            c["q_rad_s"] / DEG,
+            c["az_m_s2"] / 9.80665,
+            c["elevator_rad"] / DEG,
+            c["altitude_m"] / FOOT,
+        ]
+    )
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"varlab": LABELS, "copy": LABELS},
+        {"varlab": [*LABELS, "* beta (deg)", "* phi (deg)"]},
+        {"varlab": LABELS, "varunits": ["s", "ft/s", "deg", "deg/s", "g", "deg", "ft"]},
+    ],
+)
+def test_labels_twice_longer_than_the_matrix_and_beside_units(more, log, tmp_path):
+    cells = {name: np.array(texts, dtype=object) for name, texts in more.items()}
+    scipy.io.savemat(tmp_path / "f.mat", {"fdata": matrix(log), **cells})
+    assert open_source(tmp_path / "f.mat").labels["fdata"] == tuple(LABELS)
+    text, mapping = guessed(tmp_path / "f.mat")
+    assert mapping.channels["airspeed_m_s"].unit == "ft_s"
+    assert "do not contradict" in text
+
+
+def test_label_arrays_that_contradict_each_other_are_left_alone(log, tmp_path):
+    other = [*LABELS[:2], LABELS[3], LABELS[2], *LABELS[4:]]
+    cells = {n: np.array(t, dtype=object) for n, t in (("a", LABELS), ("b", other))}
+    scipy.io.savemat(tmp_path / "f.mat", {"fdata": matrix(log), **cells})
+    assert open_source(tmp_path / "f.mat").labels == {}
+
+
+@pytest.mark.parametrize(("rate_hz", "single"), [(10.0, False), (25.0, True)])
+def test_a_time_column_without_a_name(rate_hz, single, tmp_path):
+    n = 200
+    t = 3600.0 + np.arange(n) / rate_hz
+    t = t.astype(np.float32).astype(float) if single else t
+    values = np.column_stack([t, np.arange(n) + 1.0, np.sin(t)])
+    np.savetxt(tmp_path / "f.txt", values)
+    text, mapping = guessed_channels(tmp_path / "f.txt")
+    assert mapping["time"] == {"column": 1, "unit": "s"}
+    assert "a column without a name that increases evenly" in text
+    np.savetxt(tmp_path / "f.txt", values[:, 1:])
+    text, mapping = guessed_channels(tmp_path / "f.txt")
+    assert mapping["time"] == {}  # a counter is no time, and no rate is invented
+    assert "no time was found" in text
+
+
+def guessed_channels(path):
+    text = guess_mapping(path)
+    return text, tomllib.loads(text)
+
+
+def test_recorders_state_their_units_and_their_own_clocks(log, tmp_path):
+    c, half = log.channels, slice(0, None, 2)
+    fast = {"Pitch": c["theta_rad"], "GyrY": c["q_rad_s"], "AccZ": c["az_m_s2"], "AOA": c["alpha_rad"] / DEG}
+    fast |= {"Elev": c["elevator_rad"] / DEG}
+    units = {
+        "Pitch": "rad",
+        "GyrY": "rad/s",
+        "AccZ": "m/s²",
+        "AOA": "°",
+        "Elev": "deg",
+        "TAS": "m/s",
+        "Alt": "m",
+    }
+    topics = [
+        Topic("nav", log.t_s, fast, units),
+        Topic("air", log.t_s[half], {"TAS": c["airspeed_m_s"][half], "Alt": c["altitude_m"][half]}, units),
+    ]
+    recorders.hdf5(tmp_path / "f.h5", topics)
+    recorders.mdf4(tmp_path / "f.mf4", topics)
+    for name in ("f.h5", "f.mf4"):
+        text, mapping = guessed(tmp_path / name)
+        assert {n: x.unit for n, x in mapping.channels.items()} == {
+            "airspeed_m_s": "m_s",
+            "alpha_rad": "deg",
+            "theta_rad": "rad",
+            "q_rad_s": "rad_s",
+            "az_m_s2": "m_s2",
+            "elevator_rad": "deg",
+            "altitude_m": "m",
+        }
+        assert mapping.resample is not None
+        assert mapping.resample.rate_hz == 50.0
+        assert "do not contradict" in text
+        (tmp_path / "m.toml").write_text(text)
+        assert import_log(tmp_path / name, tmp_path / "m.toml").log.metadata["sample_rate_hz"] == 50.0
+
+
+def test_a_dictionary_of_the_users_own(log, tmp_path):
+    c = log.channels
+    columns = {
+        "t": log.t_s,
+        "KTAS X": c["airspeed_m_s"],
+        "VANE 1 [grd]": c["alpha_rad"] * 200.0 / np.pi / (200.0 / 180.0),
+        "alpha": c["theta_rad"],
+        "q": c["q_rad_s"],
+        "az": c["az_m_s2"],
+        "de [up]": -c["elevator_rad"],
+        "h": c["altitude_m"],
+    }
+    write_csv(tmp_path / "f.csv", columns)
+    (tmp_path / "w.toml").write_text(
+        '[names]\nalpha_rad = ["Vane-1"]\nairspeed_m_s = "ktas x"\n'
+        '[units]\ngrd = "deg"\n"up" = { unit = "rad", sign = -1 }\n'
+    )
+    text, mapping = guessed(tmp_path / "f.csv", words=read_dictionary(tmp_path / "w.toml"))
+    assert mapping.channels["alpha_rad"].column == "VANE 1 [grd]"
+    assert mapping.channels["alpha_rad"].unit == "deg"
+    assert mapping.channels["airspeed_m_s"].column == "KTAS X"
+    assert mapping.channels["elevator_rad"].sign == -1
+    assert "do not contradict" in text
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ('[name]\nalpha_rad = "x"', "'name': did you mean 'names'"),
+        ('[names]\nalfa_rad = "x"', "'alfa_rad' is no channel; did you mean 'alpha_rad'"),
+        ("[names]\nalpha_rad = 3", "3 is no header"),
+        ('[units]\nx = "degg"', "'degg' is no unit; did you mean 'deg'"),
+        ('[units]\nx = { unit = "deg", sign = 2 }', "sign = 1 or -1"),
+        ("names = 3", "names must be a table"),
+    ],
+)
+def test_a_dictionary_that_cannot_be_used(content, message, tmp_path):
+    (tmp_path / "w.toml").write_text(content)
+    with pytest.raises(ConfigurationError, match=message.replace("[", r"\[")):
+        read_dictionary(tmp_path / "w.toml")
+
+
+def test_without_a_vane_the_guess_offers_the_reconstruction(log, tmp_path):
+    c = log.channels
+    columns = {"t": log.t_s, "qbar": c["airspeed_m_s"] ** 2 * 0.5, "q": c["q_rad_s"], "az": c["az_m_s2"]}
+    write_csv(tmp_path / "f.csv", {**columns, "de": c["elevator_rad"], "h": c["altitude_m"]})
+    text, mapping = guessed(tmp_path / "f.csv")
+    assert "# [reconstruct]\n# alpha = true" in text
+    assert mapping.channels["dynamic_pressure_pa"].unit == "pa"
+    assert "airspeed_m_s" not in mapping.channels

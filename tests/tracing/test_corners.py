@@ -1,0 +1,152 @@
+"""Corners of the elevator that its samples do not show: their variance, and the filter that allows for them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trace_records as tr
+from scipy.linalg import expm, solve_discrete_are
+
+from airtruth.physics.terms import Change, SurfaceTerm
+from airtruth.tracing.model.parameters import PerRecord
+from airtruth.tracing.model.records import corner_variance, read
+from airtruth.tracing.model.response import filter_inputs, respond
+from airtruth.units import DEG, G0
+
+
+def test_a_step_at_a_sample_and_one_between_two():
+    """The mean over a cell lies anywhere between its ends: the square of their difference over 12."""
+    at_sample = corner_variance(np.array([0.0, 0.0, 0.0, 0.0, 0.5, 1.0, 1.0, 1.0, 1.0]), 0.0)
+    assert at_sample == pytest.approx([0.0, 0.0, 0.0, 0.0, 0.25 / 12, 0.25 / 12, 0.0, 0.0, 0.0])
+    between = corner_variance(np.array([0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]), 0.0)
+    assert between == pytest.approx([0.0, 0.0, 0.0, 0.0, 1.0 / 12, 0.0, 0.0, 0.0])
+
+
+def test_what_the_samples_show_has_no_variance():
+    t = np.arange(200) * 0.02
+    assert corner_variance(np.sin(2.0 * np.pi * 3.0 * t), 0.0).size == 0
+    noise = 0.01 * np.random.default_rng(1).standard_normal(200)
+    assert corner_variance(np.sin(2.0 * np.pi * t) + noise, 0.01).size == 0
+    assert corner_variance(np.zeros(200), 0.0).size == 0
+
+
+def test_a_delay_of_the_surface_carries_the_corner_to_later_cells():
+    made = tr.record(np.zeros((6, 3)), 0.0)
+    made = replace(made, signals=replace(made.signals, corner_rad2=np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])))
+    late = filter_inputs(made, Change(surface=(SurfaceTerm("delay", 1.5 * tr.DT),)))
+    assert late.corner_rad2 == pytest.approx([0.0, 0.0, 0.0, 0.5, 0.5, 0.0], abs=0.05)
+    assert late.corner_rad2.sum() == pytest.approx(1.0, rel=0.02)
+    assert filter_inputs(made, Change()).corner_rad2 is made.signals.corner_rad2
+
+
+def test_a_servo_that_the_samples_show_is_no_corner():
+    from airtruth.logs.flight_log import FlightLog
+
+    t = np.arange(150) * 0.02
+    surface = np.where(t > 0.5, -np.expm1(-np.maximum(t - 0.5, 0.0) / 0.03), 0.0) * DEG
+    for elevator, empty in ((surface, True), (np.where(t > 0.5, DEG, 0.0), False)):
+        channels = {
+            name: np.zeros(150) for name in ("alpha_rad", "q_rad_s", "az_m_s2", "theta_rad", "altitude_m")
+        }
+        channels |= {"airspeed_m_s": np.full(150, tr.V), "elevator_rad": elevator}
+        log = FlightLog({}, ("a",), np.array([0, 150]), t, channels)
+        assert (read(log)[0].corner_rad2.size == 0) == empty
+
+
+def kalman(made, u, corner, sigma_w):
+    """Innovations over their own Cholesky factors, by a Kalman filter with a covariance of its own at each sample."""
+    a, b, c, d = tr.motion(sigma_w=sigma_w)
+    drive = np.zeros(8)
+    drive[2] = 2.0 * tr.V / tr.LENGTH_W
+    variance = np.diag(tr.SETTINGS.noise**2)
+    phi, early, late = tr.discrete(a, b, tr.DT)
+    noise = tr.noise_step(a, tr.DT, drive)
+    points = (np.arange(400) + 0.5) / 400 * tr.DT
+    columns = np.array([expm(a * s) @ b for s in points])
+    spread = tr.DT**2 * np.einsum("pi,pj->ij", columns, columns) / 400
+    p, x, found = solve_discrete_are(phi.T, c.T, noise, variance), np.zeros(8), []
+    for k in range(made.samples):
+        s = c @ p @ c.T + variance
+        e = made.signals.y[k] + [0.0, 0.0, G0] - c @ x - d * u[k]
+        found.append(np.linalg.solve(np.linalg.cholesky(s), e))
+        gain = np.linalg.solve(s, c @ p).T
+        x, p = x + gain @ e, p - gain @ c @ p
+        if k + 1 < made.samples:
+            x = phi @ x + early * u[k] + late * u[k + 1]
+            p = phi @ p @ phi.T + noise + corner[k + 1] * spread
+    return np.array(found)
+
+
+def stepped(rng, sigma_w=0.3, amplitude=DEG, noise=tr.SETTINGS.noise):
+    """A record whose elevator steps at two samples; the grid is linear between the samples, as a log suggests."""
+    samples, parts = 100, 8
+    u = np.zeros(samples)
+    u[20], u[21:60], u[60] = 0.5 * amplitude, amplitude, 0.5 * amplitude
+    fine = np.where(
+        (np.arange(samples * parts) >= 20 * parts) & (np.arange(samples * parts) < 60 * parts), 1.0, 0.0
+    )
+    a, b, c, d = tr.motion(sigma_w=sigma_w)
+    dt = tr.DT / parts
+    phi, early, late = tr.discrete(a, b, dt)
+    root = np.linalg.cholesky(
+        tr.noise_step(a, dt, np.array([0, 0, 2.0 * tr.V / tr.LENGTH_W, *np.zeros(5)])) + 1e-18 * np.eye(8)
+    )
+    x, y = np.zeros(8), []
+    for k, now in enumerate(fine * amplitude):
+        if k % parts == 0:
+            y.append(c @ x + d * u[k // parts] + noise * rng.standard_normal(3) - [0.0, 0.0, G0])
+        x = phi @ x + (early + late) * now + root @ rng.standard_normal(8)
+    t = np.arange(samples) * tr.DT
+    made = tr.record(np.array(y), lambda at: np.interp(at, t, u))
+    return made, u
+
+
+def whitened(made, sigma_w=0.3):
+    common, per_record = tr.still()
+    per_record[PerRecord.log_gust] = np.log(sigma_w)
+    found = respond(made, tr.SETTINGS, Change(), common, per_record)
+    return found.e @ found.white.T, found
+
+
+def test_innovations_are_those_of_the_kalman_filter_with_the_corner_in_its_noise():
+    made, u = stepped(np.random.default_rng(2))
+    corner = corner_variance(u, 0.0)
+    known = replace(made, signals=replace(made.signals, corner_rad2=corner))
+    r, found = whitened(known)
+    expected = kalman(made, u, corner, 0.3)
+    assert np.abs(r - expected).max() < 0.05  # curvature of the sines at a degree
+    assert found.more_logdet > 0.0
+    assert found.logdet == pytest.approx(np.linalg.slogdet(found.covariance)[1] + found.more_logdet / 100)
+
+
+def test_a_step_between_samples_leaves_no_spike():
+    """Quiet sensors see the error of an interpolated step at ten standard deviations; the corner explains it."""
+    quiet = replace(tr.SETTINGS, noise=0.05 * tr.SETTINGS.noise)
+    rng = np.random.default_rng(4)
+    worst = {True: 0.0, False: 0.0}
+    for _ in range(5):
+        made, u = stepped(rng, sigma_w=0.02, noise=quiet.noise)
+        common, per_record = tr.still()
+        per_record[PerRecord.log_gust] = np.log(0.02)
+        for aware in worst:
+            corner = corner_variance(u, 0.0) if aware else np.zeros(0)
+            known = replace(made, signals=replace(made.signals, corner_rad2=corner))
+            found = respond(known, quiet, Change(), common, per_record)
+            r = found.e @ found.white.T
+            worst[aware] = max(worst[aware], float(np.abs(r[15:30]).max()))
+    assert worst[False] > 8.0
+    assert worst[True] < 5.0
+
+
+def test_a_smooth_residual_below_the_resolution_is_no_information():
+    """Innovations of a hundredth of their stated size, however smooth, keep their stated covariance."""
+    from airtruth.tracing.inference.whitening import autoregression
+
+    t = np.arange(300) * 0.05
+    smooth = 0.01 * np.stack([np.sin(t), np.cos(2.0 * t), np.sin(3.0 * t)], axis=1)
+    assert autoregression([smooth, smooth]).order == 0
+    assert (
+        autoregression([100.0 * smooth + 0.1 * np.random.default_rng(1).standard_normal((300, 3))]).order > 0
+    )

@@ -1,0 +1,82 @@
+"""The declared derivatives against records: a linear normal problem whose answer is known in closed form."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+from airtruth.tracing.inference import derivative_likelihood as module
+from airtruth.tracing.inference.derivative_likelihood import contradiction, derivative_likelihood
+from airtruth.tracing.model.parameters import Common
+
+DECLARED = np.diag([0.24, 9.5, 0.05, 0.09, 6.2, 0.09]) ** 2
+"""Covariance of the declared derivatives of aircraft/gtm, independent."""
+TOLD = np.diag(np.array([0.02, 6.0, 0.01, 0.05, 1.0, 0.01]) ** -2.0)
+"""Information of the records: some derivatives well known, CLq and Cmalpha not."""
+
+
+@pytest.fixture
+def white(monkeypatch):
+    """Innovations that are white: plain and robust covariance are equal."""
+    for name in ("inflation", "scatter"):
+        monkeypatch.setattr(module, name, lambda problem, fitted: np.ones(Common.size))
+
+
+def fit_of(estimate):
+    """The posterior of a linear problem: prior of zero mean, likelihood about ``estimate``."""
+    prior = np.eye(Common.size)
+    own = Common.derivatives
+    prior[own, own] = np.linalg.inv(DECLARED)
+    precision = prior.copy()
+    precision[own, own] += TOLD
+    covariance = np.linalg.inv(precision)
+    mode = np.zeros(Common.size)
+    mode[own] = np.linalg.solve(precision[own, own], TOLD @ estimate)
+    problem = SimpleNamespace(
+        declared_covariance=DECLARED, priors=lambda hypothesis: SimpleNamespace(common=prior)
+    )
+    fitted = SimpleNamespace(
+        point=SimpleNamespace(common=mode),
+        covariance=covariance,
+        hypothesis=SimpleNamespace(unconstrained=(), spread=None),
+        cost=0.5 * float((mode[own] - estimate) @ TOLD @ (mode[own] - estimate))
+        + 0.5 * float(mode[own] @ np.linalg.solve(DECLARED, mode[own])),
+    )
+    return problem, fitted
+
+
+def test_the_likelihood_is_that_of_the_records(white):
+    estimate = np.array([0.3, -4.0, 0.02, 0.2, 3.0, -0.1])
+    found = derivative_likelihood(*fit_of(estimate))
+    np.testing.assert_allclose(found.information, TOLD, rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(found.vector, TOLD @ estimate, rtol=1e-8)
+    assert found.cost == pytest.approx(0.5 * estimate @ TOLD @ estimate, rel=1e-8)
+
+
+def test_the_test_is_calibrated_under_a_true_declaration(white):
+    """p-values of declared derivatives drawn from their uncertainty are uniform (Kolmogorov and Smirnov)."""
+    rng = np.random.default_rng(20261122)
+    noise = np.linalg.cholesky(np.linalg.inv(TOLD))
+    root = np.linalg.cholesky(DECLARED)
+    p_values = [
+        contradiction(*fit_of(root @ rng.standard_normal(6) + noise @ rng.standard_normal(6))).p_value
+        for _ in range(400)
+    ]
+    assert kstest(p_values, "uniform").pvalue > 0.01
+
+
+def test_a_wrong_declaration_is_contradicted(white):
+    """Six declared standard deviations in a derivative that the records know."""
+    estimate = np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0])
+    test = contradiction(*fit_of(estimate))
+    assert test.degrees == 6
+    assert test.statistic == pytest.approx(0.3**2 / (0.05**2 + 0.01**2), rel=1e-6)
+    assert test.p_value < 1e-5
+
+
+def test_derivatives_that_the_records_do_not_show_do_not_count(white, monkeypatch):
+    told = TOLD.copy()
+    told[1, 1] = told[3, 3] = 1e-9
+    monkeypatch.setitem(globals(), "TOLD", told)
+    assert contradiction(*fit_of(np.zeros(6))).degrees == 4

@@ -1,0 +1,92 @@
+"""Sets of causes of shifted derivatives: evidence, sizes and ranking, against independent values."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from airtruth.physics.composition import TailGeometry, directions
+from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood
+from airtruth.tracing.selection.explanation import Cause, causes_of, explain, size_of
+
+DECLARED = np.array([4.787, 31.7, 0.480, -1.785, -41.2, -1.787])
+"""Derivatives of aircraft/gtm."""
+STD = np.abs(DECLARED) * np.array([0.05, 0.30, 0.10, 0.05, 0.15, 0.05])
+"""Their declared standard deviations."""
+TOLD = np.abs(DECLARED) * np.array([0.004, 0.05, 0.01, 0.004, 0.01, 0.004])
+"""Standard deviations of the records alone."""
+DIRECTIONS = directions(DECLARED, TailGeometry(7.9))
+
+
+def likelihood(shift, told=TOLD):
+    information = np.diag(told**-2.0)
+    return DerivativeLikelihood(
+        information, information @ shift, 0.5 * float(shift @ information @ shift), np.diag(STD**2)
+    )
+
+
+@pytest.mark.parametrize(
+    ("shift", "effects"),
+    [
+        (-0.5 * DIRECTIONS["tail"], ("tail_effectiveness",)),
+        (-0.4 * DIRECTIONS["elevator"], ("elevator_effectiveness",)),
+        (0.08 * DIRECTIONS["cg"], ("cg_shift",)),
+        (2.5 * DIRECTIONS["icing"], ("icing",)),
+        (DECLARED * [0.4, 0.0, -0.5, 0.4, -0.9, 0.0], ("derivatives",)),
+    ],
+)
+def test_the_cause_of_a_shift_leads(shift, effects):
+    """Far beyond the declared uncertainty, with shapes as in the library."""
+    assert explain(likelihood(shift), causes_of(DIRECTIONS))[0].effects == effects
+
+
+def test_declared_derivatives_lead_where_nothing_is_wrong():
+    """Beside the constant that makes a single cause comparable with the refit of an effect."""
+    none, *others = sorted(
+        explain(likelihood(0.3 * STD), causes_of(DIRECTIONS)), key=lambda s: bool(s.effects)
+    )
+    assert none.effects == ()
+    assert all(s.cost + 4.0 > none.cost for s in others)
+
+
+def test_the_evidence_is_that_of_a_normal_prior():
+    """Two sets compared: the ratio of the densities of the estimate under both, by scipy's normal."""
+    shift = np.array([0.1, 3.0, -0.05, 0.25, 4.0, 0.1])
+    cause = Cause("cg_shift", DIRECTIONS["cg"], std=0.05, low=-np.inf, high=np.inf, shape=0.0)
+    by_effects = {s.effects: s for s in explain(likelihood(shift), [cause], wrong_allowed=False)}
+    about = np.diag(STD**2 + TOLD**2)
+    wide = about + 0.05**2 * np.outer(cause.direction, cause.direction)
+    densities = [multivariate_normal(np.zeros(6), c).logpdf(shift) for c in (about, wide)]
+    odds = cause.log_odds + 4.0  # the prior odds, and the constant that makes it comparable with refits
+    expected = densities[0] - densities[1] - odds
+    assert by_effects[("cg_shift",)].cost - by_effects[()].cost == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_size_is_that_of_weighted_least_squares():
+    shift = 0.03 * DIRECTIONS["cg"] + 0.5 * STD
+    v, weight = DIRECTIONS["cg"], 1.0 / (STD**2 + TOLD**2)
+    size, std = size_of(likelihood(shift), Cause("cg_shift", v, 0.05, -0.15, 0.15))
+    assert size == pytest.approx((v * weight * shift).sum() / (v * weight * v).sum(), rel=1e-9)
+    assert std == pytest.approx((v * weight * v).sum() ** -0.5, rel=1e-9)
+
+
+def test_derivatives_without_information_do_not_matter():
+    """A derivative that the records do not show changes no cost but by its prior odds, 1 in e."""
+    told = TOLD.copy()
+    told[1] = 1e6
+    shift = 0.08 * DIRECTIONS["cg"]
+    sets = {(s.causes, s.wrong): s.cost for s in explain(likelihood(shift, told), causes_of(DIRECTIONS))}
+    alone, with_q = sets[(), ("Cmalpha",)], sets[(), ("CLq", "Cmalpha")]
+    assert with_q - alone == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_size_beyond_its_range_is_improbable():
+    """A tail that becomes more effective, of a sign that is not physical."""
+    shift = 0.5 * DIRECTIONS["tail"]
+    tail = [c for c in causes_of(DIRECTIONS) if c.key == "tail_effectiveness"]
+    costs = [
+        {s.effects: s.cost for s in explain(likelihood(shift), causes)}[("tail_effectiveness",)]
+        for causes in (tail, [replace(tail[0], low=-np.inf, high=np.inf)])
+    ]
+    assert costs[0] > costs[1] + 5.0

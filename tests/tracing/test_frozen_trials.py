@@ -1,0 +1,62 @@
+"""24 frozen blind trials, flown again from their seed and traced: what the tracer answered when they were frozen.
+
+The truth is validation/blind's own (docs/blind.md). Expected names are those of the effects that were flown, where
+`python -m validation.blind --trials 80 --seed 9 --mode mixed` gives them a noncentrality above 30. Trials with
+less in them are only required to answer.
+"""
+
+import pytest
+
+SEED, COUNT = 9, 24
+NULLS = (8, 10, 19)
+"""In a fourth, 13, a rate limit is named: its score has Holm's p = 0.04, and 1 null in 20 may be named."""
+FIRST = {
+    2: "cm_alpha_nonlinear",
+    5: "cm_alpha_nonlinear",
+    7: "vane_scale",
+    9: "gyro_lag",
+    11: "vane_scale",
+    15: "vane_scale",
+    16: "gyro_scale",
+    20: "elevator_delay",
+}
+"""Trial -> the effect, or the dominant one, which has to be in the first reported set."""
+BOTH = {12: {"downwash_lag", "inertia_error"}}
+OFF_LIBRARY = (0, 1, 23)
+"""Effects that the library lacks: unexplained, or provisional. The best effect of the library leaves 57, 659 and 72 of
+their noncentrality; of a fourth, a weak mode of the structure in 14, it leaves 9.9."""
+NOT_WORSE = 1.02
+
+pytestmark = pytest.mark.slow
+
+
+def names(effect):
+    return {effect["name"], *effect["indistinguishable_from"]}
+
+
+def marked(number):
+    """Trials without an expected name belong to the studies."""
+    expected = number in {*NULLS, *FIRST, *BOTH, *OFF_LIBRARY}
+    return number if expected else pytest.param(number, marks=pytest.mark.study)
+
+
+@pytest.mark.parametrize("number", [marked(number) for number in range(COUNT)])
+def test_a_trial_is_answered_as_it_was(number, tmp_path):
+    from airtruth.tracing import TraceOptions, trace
+    from validation.blind.trials import frozen
+
+    (folder,) = frozen(SEED, [number], "mixed", tmp_path)
+    answer = trace(folder, "gtm", TraceOptions()).to_dict()
+    effects = answer["effects"]
+    assert answer["verdict"] in ("none", "traced", "one_of", "learned", "unexplained")
+    if number in NULLS:
+        assert effects == []
+    if number in FIRST:
+        assert FIRST[number] in names(effects[0])
+    if number in BOTH:
+        assert BOTH[number] <= set().union(*(names(e) for e in effects))
+    if number in OFF_LIBRARY:
+        assert answer["verdict"] in ("unexplained", "learned") or answer["provisional"]
+    if effects:
+        before, after = (answer["error"][s]["held_out"]["innovation"] for s in ("before", "after"))
+        assert all(after[c] < NOT_WORSE * before[c] for c in after)

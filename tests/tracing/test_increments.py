@@ -1,0 +1,135 @@
+"""Learning of increments: the evidence, the prior on sizes, and the way from flights to a learned aircraft."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trace_flights as flights
+import trace_records as tr
+from scipy.stats import multivariate_normal
+
+from airtruth import report
+from airtruth.effects.increment import Shape, increment
+from airtruth.physics.terms import Change, shape_of
+from airtruth.tracing import TraceOptions, trace
+from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
+from airtruth.tracing.effect_module import MODULE, effect_module
+from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.posterior import (
+    likelihood_terms,
+    marginal_information,
+    prior_cost,
+    sensitivities_of,
+)
+from airtruth.tracing.inference.whitening import NO_WHITENER
+from airtruth.tracing.model.parameters import size_index
+from airtruth.tracing.selection.increments import log_evidences
+
+
+def test_evidence_is_that_of_a_linear_model():
+    """y = X b + e: the log of the ratio of the marginal densities, computed from the densities themselves."""
+    rng = np.random.default_rng(3)
+    x, y = rng.normal(size=(40, 3)), rng.normal(size=40)
+    stds = np.array([0.1, 0.7, 3.0])
+    expected = [
+        multivariate_normal(np.zeros(40), np.eye(40) + s**2 * x @ x.T).logpdf(y)
+        - multivariate_normal(np.zeros(40), np.eye(40)).logpdf(y)
+        for s in stds
+    ]
+    np.testing.assert_allclose(log_evidences(-x.T @ y, x.T @ x, stds), expected, rtol=1e-9)
+
+
+def test_the_prior_of_a_size_enters_cost_gradient_and_information():
+    shape = Shape("Cm", "alpha", 0.02, 0.12, 4, trim=0.06)
+    free, held = (Hypothesis(Change(), (increment(shape, std),)) for std in (np.inf, 0.02))
+    problem = tr.problem([tr.fly(np.random.default_rng(1), samples=120)])
+    point = replace(tr.point(problem.records, [0.0]), sizes=np.array([0.01, -0.02, 0.03]))
+    assert prior_cost(problem.priors(held), point) - prior_cost(problem.priors(free), point) == pytest.approx(
+        0.5 * (0.01**2 + 0.02**2 + 0.03**2) / 0.02**2
+    )
+    terms = [likelihood_terms(sensitivities_of(problem, 0, held, point), NO_WHITENER, levels=True)]
+    with_prior, without = (
+        marginal_information(problem.priors(h), point, terms, levels=True) for h in (held, free)
+    )
+    sizes = [size_index(k) for k in range(3)]
+    np.testing.assert_allclose(
+        (with_prior.information - without.information)[np.ix_(sizes, sizes)], np.eye(3) / 0.02**2, rtol=1e-6
+    )
+    np.testing.assert_allclose(
+        (with_prior.gradient - without.gradient)[sizes], point.sizes / 0.02**2, rtol=1e-6
+    )
+
+
+def an_effect(value, variant="Cm over alpha_rad"):
+    at = np.linspace(0.0, 0.2, 9).tolist()
+    half = [0.0 if v == 0.0 else 1e-3 for v in value]
+    table = IncrementTable(
+        tuple(at),
+        tuple(value),
+        tuple(v - h for v, h in zip(value, half, strict=True)),
+        tuple(v + h for v, h in zip(value, half, strict=True)),
+        (20,) * 9,
+    )
+    return AcceptedEffect(
+        "increment", {}, 0.0, 1.0, variant=variant, acts_on="Cm", over="alpha_rad", table=table
+    )
+
+
+class Answer:
+    verdict = "learned"
+
+    def __init__(self, *effects):
+        self.effects = effects
+
+
+def executed(text):
+    space: dict[str, object] = {}
+    exec(compile(text, f"{MODULE}.py", "exec"), space)
+    return space["EFFECTS"]
+
+
+def test_the_written_module_holds_the_closed_form():
+    value = [0.0, 0.0, 0.0, 0.0, 0.0, -0.01, -0.02, -0.03, -0.04]
+    (effect,) = executed(effect_module(Answer(an_effect(value))))
+    assert [p.name for p in effect.parameters] == ["slope", "at"]
+    assert effect.change({"slope": -0.4, "at": 0.1}).aero[0].shape == "above"
+
+
+def test_the_written_module_scales_a_table_without_a_closed_form():
+    value = [0.004, -0.003, 0.0, 0.0, 0.005, -0.012, 0.014, -0.015, 0.018]
+    (effect,) = executed(effect_module(Answer(an_effect(value))))
+    change = effect.change({"factor": 2.0})
+    at = np.linspace(0.0, 0.2, 9)
+    flown = sum(t.amplitude * shape_of(t, at) for t in change.aero)
+    np.testing.assert_allclose(flown, 2.0 * np.array(value), atol=1e-12)
+
+
+OTHERS = ("elevator_delay", "vane_lag", "gyro_lag")
+
+
+@pytest.mark.slow
+def test_a_break_that_the_library_lacks_is_learned_added_and_confirmed(tmp_path):
+    """The library is left without breaks and curves (three effects of sensors and surface); Cm has a break at 5 deg."""
+    truth = {"dCmalpha": -1.2, "at_alpha_rad": np.deg2rad(5.0)}
+    place = flights.fly(tmp_path, [("cm_alpha_nonlinear:break", truth)], runs=6, seed=77, amplitude=3.0)
+    options = TraceOptions(effects=OTHERS, increments=True)
+    result = trace(place, "gtm", options, tmp_path / "out")
+    answer = json.loads((tmp_path / "out" / "trace.json").read_text())
+    assert answer["verdict"] == "learned"
+    assert answer["confirmed"]
+    increments = {e["variant"]: e for e in answer["effects"] if e["name"] == "increment"}
+    print(increments)
+    effect = increments["Cm over alpha_rad"]
+    assert (effect["acts_on"], effect["over"], effect["states"]) == ("Cm", "alpha_rad", [])
+    table = effect["table"]
+    assert len(table["at"]) == len(table["value"]) == len(table["samples"]) == 9
+    assert all(
+        low <= v <= high for low, v, high in zip(table["low"], table["value"], table["high"], strict=True)
+    )
+    held = {s: answer["error"][s]["held_out"]["free_run"]["q_rad_s"] for s in ("before", "after", "floor")}
+    assert held["after"] < held["before"]
+    page = report(tmp_path / "out", tmp_path / "report.html")[0].read_text()
+    assert "increment" in page
+    assert executed(effect_module(result.answer))
+    assert "tableData" in next((tmp_path / "out" / "aircraft").rglob("*.xml")).read_text()

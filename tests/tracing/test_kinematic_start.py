@@ -1,0 +1,76 @@
+"""The kinematic check gives a trace its starting points, and contradictions between the two are stated."""
+
+from dataclasses import replace
+
+import pytest
+
+from airtruth.logs.store import iter_logs
+from airtruth.simulation.campaign import run as campaign
+from airtruth.tracing import TraceOptions, trace
+from airtruth.tracing.kinematic_start import disagreement, kinematic_check, starts_of
+
+LAG_S = 0.2
+CAMPAIGN = """
+schema = 1
+name = "slow"
+aircraft = "gtm"
+runs = 3
+seed = 5
+duration_s = 12.0
+[condition]
+eas_kt = 75.0
+altitude_ft = 7000.0
+[[manoeuvre]]
+kind = "3211"
+amplitude_deg = 2.0
+start_s = 1.0
+step_s = 0.4
+[gust]
+figures = "gtm"
+level = "light"
+factor = 0.3
+[sensors.channel.alpha_rad]
+lag = { value = 0.2, unit = "s" }
+"""
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("slow")
+    (folder / "slow.toml").write_text(CAMPAIGN)
+    campaign.fly(folder / "slow.toml", folder / "out")
+    return list(iter_logs(folder / "out"))
+
+
+def test_a_slow_vane_is_a_start(logs, gtm):
+    check = kinematic_check(logs, gtm, held=())
+    assert starts_of(check)["vane_lag"] == pytest.approx(LAG_S, abs=0.02)
+    assert len(check.run_ids) == 3
+
+
+def test_held_out_records_take_no_part(logs, gtm):
+    last = logs[-1].run_ids[-1]
+    assert last not in kinematic_check(logs, gtm, held={last}).run_ids
+
+
+@pytest.mark.slow
+def test_a_trace_refits_the_cause_and_agrees(logs, gtm):
+    steps = []
+    result = trace(
+        logs, gtm, TraceOptions(model="linear", effects=("vane_lag", "elevator_delay")), advance=steps.append
+    )
+    assert "refit vane_lag from the kinematic check" in steps
+    (effect,) = result.answer.effects
+    assert effect.name == "vane_lag"
+    assert effect.parameters["tau_s"].value == pytest.approx(LAG_S, abs=0.02)
+    assert not any("kinematic check" in note for note in result.answer.notes)
+    # without the effect, and with another size, the same answer contradicts the check
+    check = kinematic_check(logs, gtm, held=())
+    (note,) = disagreement(check, replace(result.answer, effects=()))
+    assert "names" in note
+    assert "vane_lag" in note
+    other = replace(effect.parameters["tau_s"], value=0.5, ci95=(0.45, 0.55))
+    (note,) = disagreement(
+        check, replace(result.answer, effects=(replace(effect, parameters={"tau_s": other}),))
+    )
+    assert "vane_lag: the trace estimates 0.5" in note

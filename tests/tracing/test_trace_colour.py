@@ -1,0 +1,111 @@
+"""Slow noise of the sensors enters where the records show it, and not elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trace_records as tr
+
+from airtruth.tracing.inference.optimise import fit, initial_parameters
+from airtruth.tracing.prepare import Case
+from airtruth.tracing.selection.noise_colour import SHARES, scores, share_slopes, with_coloured_noise
+from airtruth.tracing.selection.release import DeclaredCauses
+from airtruth.units import DEG
+
+pytestmark = pytest.mark.slow
+
+
+def flown(seed, share, amplitudes=(2.0, -2.0), time_s=0.08):
+    rng = np.random.default_rng(seed)
+    return [
+        tr.fly(
+            rng,
+            sigma_w=0.1,
+            amplitude=a * DEG,
+            samples=150,
+            name=str(a),
+            slow_share=share,
+            slow_time_s=time_s,
+        )
+        for a in amplitudes
+    ]
+
+
+def case(seed, share, time_s=0.08):
+    records = flown(seed, share, (2.0, -2.0, 3.0), time_s)
+    return Case(
+        tr.problem(records[:2]), tr.problem(records[2:]), tr.NOTHING, (), (), "linear", (), DeclaredCauses()
+    )
+
+
+def test_scores_of_white_noise_are_no_larger_than_normal():
+    """Initial states and biases take up what is slow in a short record, so that the mean of 60 is below none and the
+    standard deviation below one, each within four standard errors.
+    """
+    z = []
+    for seed in range(20):
+        problem = tr.problem(flown(seed, 0.0))
+        slow = replace(problem, settings=replace(problem.settings, coloured=True))
+        z.append(scores(slow, fit(problem, tr.NOTHING, initial_parameters(problem, tr.NOTHING))))
+    z = np.array(z)
+    assert -2.0 < z.mean() < 4.0 / np.sqrt(z.size)
+    assert 0.5 < z.std() < 1.0 + 4.0 / np.sqrt(2.0 * z.size)
+
+
+def test_slope_of_a_share_is_that_of_the_refitted_likelihood():
+    """Differences over a share of 0.01 and its half, refitted, extrapolated to none; a search ends within 0.002."""
+    problem = tr.problem(flown(4, 0.3, (2.0, -2.0, 3.0)))
+    slow = replace(problem, settings=replace(problem.settings, coloured=True))
+    null = fit(problem, tr.NOTHING, initial_parameters(problem, tr.NOTHING))
+    slope, information = share_slopes(slow, null)
+
+    def rise(place, share):
+        common = null.point.common.copy()
+        common[place] = share
+        again = fit(problem, tr.NOTHING, replace(null.point, common=common))
+        return (again.cost - 0.5 * share**2 / 0.5**2 - null.cost) / share
+
+    for i, place in enumerate(SHARES):
+        expected = 2.0 * rise(place, 0.005) - rise(place, 0.01)
+        assert slope[i] == pytest.approx(expected, abs=0.04 * abs(expected) + 1.5)
+        assert abs(slope[i]) > 3.0 * np.sqrt(information[i, i])
+
+
+def test_white_records_stay_as_they_are():
+    white = case(5, 0.0)
+    found, start = with_coloured_noise(white)
+    assert found is white
+    np.testing.assert_array_equal(start.common[list(SHARES)], 0.0)
+
+
+def test_slow_noise_enters_fitted_and_held_out_records():
+    slow = case(5, 0.5)
+    found, start = with_coloured_noise(slow)
+    assert found.fitted.settings.coloured
+    assert found.held is not None
+    assert found.held.settings.coloured
+    assert (start.common[list(SHARES)] > 0.0).any()
+    assert found.fitted.records == slow.fitted.records
+
+
+def test_noise_that_nobody_declares_is_no_slow_noise():
+    """It would explain whatever the model lacks."""
+    slow = case(5, 0.5)
+    settings = replace(tr.SETTINGS, noise_prior=1.0)
+    slow = replace(slow, fitted=replace(slow.fitted, settings=settings))
+    found, start = with_coloured_noise(slow)
+    assert found is slow
+    np.testing.assert_array_equal(start.common[list(SHARES)], 0.0)
+
+
+def test_what_is_as_slow_as_a_motion_is_no_noise():
+    """A correlation time of a second ends the search at the limit of 0.27 s, and the records stay with white noise."""
+    slow = case(5, 0.5, time_s=1.0)
+    problem = replace(slow.fitted, settings=replace(slow.fitted.settings, coloured=True))
+    white = fit(slow.fitted, tr.NOTHING, initial_parameters(slow.fitted, tr.NOTHING))
+    assert scores(problem, white).max() > 5.0
+    found, start = with_coloured_noise(slow)
+    assert found is slow
+    np.testing.assert_array_equal(start.common[list(SHARES)], 0.0)

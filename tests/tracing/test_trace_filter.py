@@ -1,0 +1,240 @@
+"""Free runs and innovations of the filter: integration, states of effects, sensors, the steady Kalman filter."""
+
+import math
+
+import numpy as np
+import pytest
+import trace_records as tr
+from scipy.linalg import block_diag
+
+from airtruth.effects.registry import EFFECTS
+from airtruth.physics.terms import AeroTerm, Change, SensorTerm, StateTerm
+from airtruth.tracing.model.linearise import gain
+from airtruth.tracing.model.parameters import Common, PerRecord
+from airtruth.tracing.model.response import respond
+from airtruth.units import DEG, G0
+
+
+def test_free_run_is_the_exact_discretisation():
+    a, b, c, d = tr.motion()
+    expected, _ = tr.run(a, b, c, d, tr.U, tr.DT)
+    tr.close(tr.free(), expected, 1e-6)
+
+
+def test_free_run_converges_with_the_fourth_order_of_runge_kutta():
+    expected, _ = tr.run(*tr.motion(), tr.U, tr.DT)
+    errors = [np.abs(tr.free(sub=sub) - expected)[:, 0].max() for sub in (2, 4, 8)]
+    assert errors[0] < 1e-4 * np.abs(expected[:, 0]).max()
+    assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.3)
+    assert errors[1] / errors[2] == pytest.approx(16.0, rel=0.3)
+
+
+# -- effects with states, exactly
+
+
+def augmented(name, kind, signal, time_s, damping, coefficient, amplitude):
+    """Linear system with an effect's state: coefficient += amplitude (x - signal)."""
+    a, b, c, d = tr.motion()
+    extra = 1 if kind == "lag" else 2
+    n = 8 + extra
+    big, bb, cc = np.zeros((n, n)), np.zeros(n), np.zeros((3, n))
+    big[:8, :8], bb[:8], cc[:, :8] = a, b, c
+    drive, direct = np.zeros(n), 0.0
+    if signal == "alpha":
+        drive[0] = 1.0
+    elif signal == "elevator":
+        direct = 1.0
+    elif signal == "qhat":
+        drive[1] = tr.HALF
+    if kind == "lag":
+        big[8] = drive / time_s
+        big[8, 8], bb[8] = -1.0 / time_s, direct / time_s
+    else:
+        wn = 1.0 / time_s
+        big[8, 9], big[9] = 1.0, wn * wn * drive
+        big[9, 8], big[9, 9], bb[9] = -wn * wn, -2.0 * damping * wn, wn * wn * direct
+    late, ahead = -drive, -direct
+    late[8] = 1.0
+    if coefficient == "Cm":
+        gain = tr.FORCE * tr.C.chord_m / tr.C.inertia_yy_kg_m2 * amplitude
+        big[1] += gain * late
+        bb[1] += gain * ahead
+    else:
+        gain = -tr.FORCE / tr.C.mass_kg * amplitude
+        big[0] += gain / tr.V * late
+        bb[0] += gain / tr.V * ahead
+        cc[2] += gain * late
+        d = d + np.array([0.0, 0.0, gain * ahead])
+    return big, bb, cc, d
+
+
+@pytest.mark.parametrize("coefficient", ["CL", "Cm"])
+@pytest.mark.parametrize("signal", ["alpha", "elevator", "qhat"])
+@pytest.mark.parametrize(("kind", "time_s", "damping"), [("lag", 0.15, 0.0), ("mode", 0.05, 0.1)])
+def test_states_of_effects(coefficient, signal, kind, time_s, damping):
+    amplitude = 3.0 if signal == "qhat" else 0.4
+    change = Change(
+        states=(StateTerm("own", kind, signal, time_s, damping),),
+        aero=(
+            AeroTerm(coefficient, "own", "linear", amplitude),
+            AeroTerm(coefficient, signal, "linear", -amplitude),
+        ),
+    )
+    expected, _ = tr.run(
+        *augmented("own", kind, signal, time_s, damping, coefficient, amplitude), tr.U, tr.DT
+    )
+    tr.close(tr.free(change), expected, 3e-6)
+    plain, _ = tr.run(*tr.motion(), tr.U, tr.DT)
+    assert np.abs(expected - plain)[:, 1].max() > 3e-4 * np.abs(plain[:, 1]).max()
+
+
+def test_two_states_do_not_take_each_other_s_place():
+    """A mode has two places; a lag that follows it is found behind both."""
+    mode, lag = EFFECTS["elastic_mode"], EFFECTS["lift_lag"]
+    first = mode.change({"dCmalpha": 0.4, "frequency_hz": 3.0, "damping": 0.1})
+    second = lag.change({"dCLalpha": 1.0, "tau_s": 0.2})
+    np.testing.assert_allclose(tr.free(first + second), tr.free(second + first), rtol=0.0, atol=1e-14)
+    assert np.abs(tr.free(first + second) - tr.free(first)).max() > 1e-9
+
+
+# -- sensors of a known motion
+
+FINE_STEPS = 20
+
+
+def known():
+    """The exact motion every DT/FINE_STEPS from half a second before the record."""
+    t = np.arange(-25 * FINE_STEPS, 150 * FINE_STEPS + 1) * tr.DT / FINE_STEPS
+    y, x = tr.run(*tr.motion(), tr.doublet(t, tr.SMALL), tr.DT / FINE_STEPS)
+    return t, y, x
+
+
+def sampled(t, y):
+    return y[25 * FINE_STEPS :: FINE_STEPS]
+
+
+def test_scales_and_arms():
+    """alpha - q x/V, az - x q_dot with q_dot of the equation of motion; then the scale."""
+    change = Change(
+        sensors=(
+            SensorTerm("alpha_rad", "arm", 0.8),
+            SensorTerm("az_m_s2", "arm", -0.3),
+            SensorTerm("alpha_rad", "scale", 1.1),
+            SensorTerm("q_rad_s", "scale", 0.9),
+            SensorTerm("az_m_s2", "scale", 1.05),
+        )
+    )
+    a, b, c, d = tr.motion()
+    y, x = tr.run(a, b, c, d, tr.U, tr.DT)
+    q_dot = x @ a[1] + b[1] * tr.U
+    expected = np.column_stack(
+        [1.1 * (y[:, 0] - 0.8 / tr.V * y[:, 1]), 0.9 * y[:, 1], 1.05 * (y[:, 2] + 0.3 * q_dot)]
+    )
+    tr.close(tr.free(change), expected, 1e-6)
+
+
+def test_bias_adds_after_all():
+    made = tr.record(np.zeros((5, 3)), 0.0)
+    change = Change(sensors=(SensorTerm("alpha_rad", "bias", 0.01), SensorTerm("alpha_rad", "scale", 2.0)))
+    common, per_record = tr.still()
+    y = -respond(made, tr.SETTINGS, change, common, per_record, free_run=True).e
+    np.testing.assert_allclose(y[:, 0], 0.01, atol=1e-12)
+
+
+@pytest.mark.parametrize("delay", [0.004, 0.013, 0.02, 0.051])
+def test_delayed_sensors(delay):
+    """The motion so much earlier, from its own fine grid.
+
+    The filter takes the signal as linear over half a step: at the corners of the doublet, which az has from the
+    elevator, that is 0.1 %.
+    """
+    change = Change(sensors=tuple(SensorTerm(c, "delay", delay) for c in ("alpha_rad", "q_rad_s", "az_m_s2")))
+    t, y, _ = known()
+    shift = round(delay / tr.DT * FINE_STEPS)
+    assert shift * tr.DT / FINE_STEPS == pytest.approx(delay)
+    expected = sampled(t, np.roll(y, shift, axis=0))
+    tr.close(tr.free(change)[:, :2], expected[:, :2], 3e-4)
+    tr.close(tr.free(change), expected, 2e-3)
+
+
+def test_a_delay_comes_after_a_lag():
+    """Both in one sensor: the lagged signal, late."""
+    lag, delay = SensorTerm("q_rad_s", "lag", 0.05), SensorTerm("q_rad_s", "delay", 0.03)
+    a, b, _, _ = tr.motion()
+    big, bb, cc = np.zeros((9, 9)), np.append(b, 0.0), np.zeros((1, 9))
+    big[:8, :8], big[8, 1], big[8, 8], cc[0, 8] = a, 20.0, -20.0, 1.0
+    t = known()[0]
+    lagged, _ = tr.run(big, bb, cc, np.zeros(1), tr.doublet(t, tr.SMALL), tr.DT / FINE_STEPS)
+    expected = sampled(t, np.roll(lagged, round(0.03 / tr.DT * FINE_STEPS), axis=0))
+    for terms in ((lag, delay), (delay, lag)):
+        tr.close(tr.free(Change(sensors=terms))[:, 1:2], expected, 3e-4)
+
+
+@pytest.mark.parametrize("lag", [0.005, 0.03, 0.2])
+def test_lagging_sensors(lag):
+    """tau y' = x - y as further states of the exact discretisation.
+
+    The filter takes the signal as linear over half a step h: w^2 h^2/48 of it at 7 rad/s and 5 ms is 3e-5.
+    """
+    change = Change(sensors=tuple(SensorTerm(c, "lag", lag) for c in ("alpha_rad", "q_rad_s", "az_m_s2")))
+    a, b, c, d = tr.motion()
+    big, bb, cc = np.zeros((11, 11)), np.concatenate([b, d / lag]), np.zeros((3, 11))
+    big[:8, :8], big[8:, :8], big[8:, 8:], cc[:, 8:] = a, c / lag, -np.eye(3) / lag, np.eye(3)
+    expected, _ = tr.run(big, bb, cc, np.zeros(3), tr.U, tr.DT)
+    tr.close(tr.free(change), expected, 1.2e-4)
+
+
+# -- innovations
+
+
+@pytest.mark.parametrize("shares", [(0.0, 0.0, 0.0), (0.5, 0.0, 0.3)])
+def test_innovations_are_those_of_the_steady_kalman_filter(shares):
+    """A noisy record through x+ = phi x + ..., x <- x + K e with the DARE's gain, slow noise among the states."""
+    rng = np.random.default_rng(5)
+    made = tr.fly(rng, sigma_w=0.3, amplitude=0.5 * DEG)
+    common, per_record = tr.still()
+    per_record[PerRecord.log_gust] = np.log(0.3)
+    common[Common.colour] = [*shares, np.log(0.08 / 0.1)]
+    found = respond(made, tr.SETTINGS, Change(), common, per_record)
+    a, b, c, d = tr.motion(sigma_w=0.3)
+    variance = tr.SETTINGS.noise**2
+    colour = np.array([*np.sqrt(variance * shares), 0.08])
+    if any(shares):
+        a, b = block_diag(a, -np.eye(3) / 0.08), np.append(b, np.zeros(3))
+        c = np.hstack([c, np.diag(colour[:3])])
+    drive = np.zeros(len(a))
+    drive[2] = 2.0 * tr.V / tr.LENGTH_W
+    drive[8:] = 2.0 / 0.08
+    k_gain, _, _, _ = gain(a, c, drive, variance * (1.0 - np.array(shares)), tr.DT)
+    phi, early, late = tr.discrete(a, b, tr.DT)
+    t = np.arange(made.samples) * tr.DT
+    u = tr.doublet(t, 0.5 * DEG)
+    x, expected = np.zeros(len(a)), []
+    for k in range(len(t)):
+        e = made.signals.y[k] + [0.0, 0.0, G0] - c @ x - d * u[k]
+        expected.append(e)
+        x = x + k_gain @ e
+        if k + 1 < len(t):
+            x = phi @ x + early * u[k] + late * u[k + 1]
+    # curvature of the sines at half a degree, in units of the innovations' own spread
+    error = np.abs(found.e - expected).max(axis=0) / np.sqrt(np.diag(found.covariance))
+    assert (error < 0.05).all(), error
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5])
+def test_innovations_of_a_true_model_are_white_and_of_the_stated_covariance(share):
+    """20 records of 200 samples: the mean square of 12 000 whitened values is 1 within 4 sqrt(2/12000)."""
+    rng = np.random.default_rng(6)
+    common, per_record = tr.still()
+    per_record[PerRecord.log_gust] = np.log(0.3)
+    common[Common.colour] = [share, share, share, np.log(0.08 / 0.1)]
+    whitened = []
+    for _ in range(20):
+        made = tr.fly(rng, sigma_w=0.3, amplitude=DEG, slow_share=share)
+        found = respond(made, tr.SETTINGS, Change(), common, per_record)
+        whitened.append(found.e[20:] @ found.white.T)  # the filter starts at the trim, the air does not
+    r = np.array(whitened)
+    draws = r.size
+    assert np.mean(r**2) == pytest.approx(1.0, abs=4.0 * math.sqrt(2.0 / draws))
+    lagged = np.einsum("nki,nkj->ij", r[:, 1:], r[:, :-1]) / (draws / 3.0)
+    assert np.abs(lagged).max() < 4.0 / math.sqrt(draws / 3.0)

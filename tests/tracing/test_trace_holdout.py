@@ -1,0 +1,162 @@
+"""Records left out: against actual refits, against simulated gusts; judging changes nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trace_records as tr
+from scipy.linalg import solve_continuous_lyapunov
+
+from airtruth.effects.registry import EFFECTS
+from airtruth.physics.terms import Change
+from airtruth.tracing.inference.assess import assess, noise_floor
+from airtruth.tracing.inference.cross_validate import leave_one_out, one_by_the_other
+from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.optimise import fit, initial_parameters
+from airtruth.tracing.model.compile import compile_change
+from airtruth.tracing.model.parameters import Common, PerRecord
+from airtruth.tracing.model.response import respond
+from airtruth.units import DEG
+
+ARM = EFFECTS["vane_arm"]
+ONE = Hypothesis(Change(), (ARM,))
+MORE = np.array([0.15, -4.0, 0.03, -0.06, 3.0, 0.07])
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    """Five records with a vane arm of 0.3 m, and the fit of all."""
+    rng = np.random.default_rng(30)
+    records = []
+    for a in (2.0, -2.0, 1.0, -1.0, 2.5):
+        made = tr.fly(rng, tr.TRUTH + MORE, 0.2, amplitude=a * DEG, name=str(a))
+        y = made.signals.y.copy()
+        y[:, 0] -= 0.3 / tr.V * y[:, 1]
+        records.append(replace(made, signals=replace(made.signals, y=y)))
+    problem = tr.problem(records)
+    start = initial_parameters(problem, ONE)
+    return problem, fit(problem, ONE, replace(start, sizes=np.array([0.1])))
+
+
+def test_leave_one_out_is_the_refit_without_the_record(fitted):
+    """One step of scoring against the search itself: likelihoods of records left out within 0.3."""
+    problem, found = fitted
+    likelihood, assessed = leave_one_out(problem, found)
+    for i in range(len(problem.records)):
+        rest = [k for k in range(len(problem.records)) if k != i]
+        less = replace(problem, records=tuple(problem.records[k] for k in rest))
+        again = fit(less, ONE, replace(found.point, per_record=found.point.per_record[rest]))
+        expected = assess(problem, i, ONE, again.point.common, again.point.sizes, found.point.per_record[i])
+        assert likelihood[i] == pytest.approx(expected.likelihood, abs=0.3)
+        np.testing.assert_allclose(assessed[i].free_run, expected.free_run, rtol=0.02)
+        assert assessed[i].likelihood == likelihood[i]
+
+
+def test_of_two_records_the_other_is_refitted(fitted):
+    problem, found = fitted
+    two = replace(problem, records=problem.records[:2])
+    both = fit(two, ONE, replace(found.point, per_record=found.point.per_record[:2]))
+    likelihood, _ = one_by_the_other(two, both)
+    for i, other in ((0, 1), (1, 0)):
+        alone = replace(two, records=(two.records[other],))
+        again = fit(alone, ONE, replace(both.point, per_record=both.point.per_record[[other]]))
+        expected = assess(two, i, ONE, again.point.common, again.point.sizes, both.point.per_record[i])
+        assert likelihood[i] == expected.likelihood
+
+
+def test_a_record_far_from_the_start_is_fitted_to_its_end(fitted):
+    """Biases and trim far from the start's: the same optimum as from the fit's own parameters."""
+    problem, found = fitted
+    record = problem.records[0]
+    off = replace(record.signals, y=record.signals.y + np.array([0.01, 0.008, 0.5]))
+    moved = replace(problem, records=(replace(record, signals=off),))
+    point = found.point
+    own = point.per_record[0] + np.array([0.0, 0.0, 0.0, 0.0, 0.01, 0.008, 0.5, 0.0, 0.0, 0.0])
+    near = assess(moved, 0, ONE, point.common, point.sizes, own)
+    far = assess(moved, 0, ONE, point.common, point.sizes)
+    assert far.likelihood == pytest.approx(near.likelihood, abs=0.05)
+
+
+def test_records_left_out_fit_worse_than_records_fitted(fitted):
+    """A record left out loses about half its share of the parameters: positive in sum."""
+    problem, found = fitted
+    likelihood, _ = leave_one_out(problem, found)
+    inside = [
+        assess(problem, i, ONE, found.point.common, found.point.sizes, found.point.per_record[i]).likelihood
+        for i in range(len(problem.records))
+    ]
+    loss = likelihood.sum() - np.sum(inside)
+    assert 0.0 < loss < 3.0 * (Common.size + 1)
+
+
+def test_assess_changes_nothing_that_it_is_given(fitted):
+    problem, found = fitted
+    arguments = [found.point.common, found.point.sizes, found.point.per_record[0]]
+    before = [a.copy() for a in arguments]
+    y = problem.records[0].signals.y.copy()
+    first = assess(problem, 0, ONE, *arguments)
+    second = assess(problem, 0, ONE, *arguments)
+    for a, b in zip(arguments, before, strict=True):
+        np.testing.assert_array_equal(a, b)
+    np.testing.assert_array_equal(problem.records[0].signals.y, y)
+    assert first.likelihood == second.likelihood
+    np.testing.assert_array_equal(first.residual, second.residual)
+
+
+def test_assess_ends_at_the_fit_s_own_optimum(fitted):
+    """From the start as from where the fit ended: the same best own parameters."""
+    problem, found = fitted
+    for i in range(len(problem.records)):
+        near = assess(problem, i, ONE, found.point.common, found.point.sizes, found.point.per_record[i])
+        far = assess(problem, i, ONE, found.point.common, found.point.sizes)
+        assert far.likelihood == pytest.approx(near.likelihood, abs=0.05)
+        np.testing.assert_allclose(far.free_run, near.free_run, rtol=0.01)
+
+
+def test_error_is_in_the_channels_units_and_the_effect_lowers_it(fitted):
+    problem, found = fitted
+    with_it = [assess(problem, i, ONE, found.point.common, found.point.sizes) for i in range(5)]
+    without = [assess(problem, i, tr.NOTHING, found.point.common, np.zeros(0)) for i in range(5)]
+    assert sum(a.likelihood for a in with_it) < sum(a.likelihood for a in without) - 5.0
+    for a in with_it:
+        np.testing.assert_allclose(a.free_run, np.sqrt((a.residual**2).mean(axis=0)), rtol=1e-12)
+        # innovations of the right model are gusts and noise: 200 samples, a mean square within 30 %
+        np.testing.assert_allclose(a.innovation, a.expected, rtol=0.25)
+
+
+def test_free_run_of_a_clean_record_has_no_error():
+    """Initial state, biases and trim coefficients are free, and there is nothing else in the record."""
+    blank = tr.record(np.zeros((200, 3)), lambda t: tr.doublet(t))
+    common, per_record = tr.still()
+    per_record[PerRecord.motion_start], per_record[PerRecord.offsets] = (
+        [0.01, 0.02],
+        [0.002, 0.003, 0.05, 0.01, -0.002],
+    )
+    y = -respond(blank, tr.SETTINGS, Change(), common, per_record, free_run=True).e
+    problem = tr.problem([replace(blank, signals=replace(blank.signals, y=y))])
+    found = assess(problem, 0, tr.NOTHING, np.zeros(Common.size), np.zeros(0))
+    assert (found.free_run < 0.05 * tr.SETTINGS.noise).all()
+
+
+@pytest.mark.parametrize("sigma_w", [0.1, 0.5])
+def test_floor_is_the_standard_deviation_of_the_gust_response(sigma_w):
+    """Stationary covariance by the Lyapunov equation of the equations written by hand; and 100 s of simulated air."""
+    made = tr.fly(np.random.default_rng(31), sigma_w=sigma_w, samples=100)
+    problem = tr.problem([made])
+    common, per_record = tr.still()
+    per_record[PerRecord.log_gust] = np.log(sigma_w)
+    found = noise_floor(made, problem.settings, compile_change(Change()), common, per_record)
+    a, _, c, _ = tr.motion(sigma_w=sigma_w)
+    drive = np.diag([0.0, 0.0, 2.0 * tr.V / tr.LENGTH_W, *np.zeros(5)])
+    spread = solve_continuous_lyapunov(a, -drive)
+    expected = np.sqrt(np.diag(c @ spread @ c.T) + tr.SETTINGS.noise**2)
+    # the filter's linearisation is about the record's mean alpha, not the trim
+    np.testing.assert_allclose(found, expected, rtol=2e-3)
+    rng = np.random.default_rng(32)
+    y = np.concatenate(
+        [tr.fly(rng, sigma_w=sigma_w, samples=200, amplitude=0.0).signals.y[100:] for _ in range(50)]
+    )
+    # 50 independent records, each about one correlation time long: 4/sqrt(100), and some
+    np.testing.assert_allclose(
+        np.sqrt(((y + np.array([0.0, 0.0, 9.80665])) ** 2).mean(axis=0)), found, rtol=0.4
+    )

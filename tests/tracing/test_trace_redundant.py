@@ -1,0 +1,49 @@
+"""Earlier effects that a later one makes redundant, on records whose sensors' scales are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trace_records as tr
+
+from airtruth.effects.registry import EFFECTS
+from airtruth.tracing.inference.optimise import fit, initial_parameters
+from airtruth.tracing.model.parameters import Parameters
+from airtruth.tracing.selection.rounds import significant_gain
+from airtruth.tracing.selection.search import redundant_effect
+from airtruth.units import DEG
+
+EARLIER, LATER = EFFECTS["gyro_scale"], EFFECTS["accelerometer_scale"]
+MATERIAL = EARLIER.parameters[0].material
+LEAST = significant_gain(33)
+
+
+def fitted(gyro, accelerometer):
+    """Both effects, fitted to two records of sensors with these scales."""
+    rng = np.random.default_rng(4)
+    records = []
+    for amplitude in (2.0, -2.0):
+        one = tr.fly(rng, amplitude=amplitude * DEG, sigma_w=0.05, name=str(amplitude))
+        y = one.signals.y * [1.0, gyro, accelerometer]
+        records.append(replace(one, signals=replace(one.signals, y=y)))
+    problem = tr.problem(records)
+    hypothesis = tr.NOTHING.plus(EARLIER).plus(LATER)
+    start = initial_parameters(problem, hypothesis)
+    return problem, fit(problem, hypothesis, Parameters(start.common, start.per_record, np.zeros(2)))
+
+
+@pytest.mark.parametrize(("gyro", "expected"), [(1.2, None), (1.0, 0)])
+def test_an_effect_that_is_there_stays_and_one_that_is_not_goes(gyro, expected):
+    problem, found = fitted(gyro, 1.1)
+    std = np.sqrt(found.covariance[-2, -2])
+    assert found.point.sizes[0] == pytest.approx(gyro - 1.0, abs=3.0 * std)
+    assert redundant_effect(problem, found, LEAST) == expected
+
+
+def test_an_immaterial_effect_goes_however_sure():
+    """A size short of material, known to far less than that: the same fit with its size moved there."""
+    problem, found = fitted(1.2, 1.1)
+    for share, expected in ((0.99, 0), (1.01, None)):
+        sizes = np.array([share * MATERIAL, found.point.sizes[1]])
+        moved = replace(found, point=replace(found.point, sizes=sizes), cost=found.cost - 1e3)
+        assert redundant_effect(problem, moved, LEAST) == expected

@@ -1,0 +1,136 @@
+"""Trials in parallel: fly, trace, measure; each stage's file appears whole, and a killed run goes on.
+
+Flying and measuring, and tracing, use processes of their own, so that no process that flies a truth knows the
+tracer. A trial depends on seed, number and mode alone.
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import sys
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from airtruth.logs.store import read_log, write_text
+from validation.blind import draw, information, refit, tracing
+from validation.blind.figures import CHANNELS
+from validation.blind.flight import LeftRangeError
+
+_ATTEMPTS: Final = 3
+_NEXT: Final = 1_000_000
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to do: trials 0 to ``count`` - 1 of a seed and mode, into ``out``, by the tracer MODULE:NAME."""
+
+    count: int
+    seed: int
+    mode: str
+    out: Path
+    tracer: str = "validation.blind.tracing:answer"
+
+    def file(self, stage: str, number: int) -> Path:
+        """JSON file of one trial and stage, "truth" or "answer"."""
+        return self.out / stage / f"{self.mode}-{self.seed}-{number:05d}.json"
+
+    def log(self, number: int) -> Path:
+        """Folder that a tracer is shown."""
+        return self.out / "logs" / f"{self.mode}-{self.seed}-{number:05d}"
+
+
+def fly(plan: Plan, number: int) -> dict[str, Any]:
+    """Fly one trial, write its log, and say what the truth was.
+
+    A trial whose aircraft leaves its range (an upset) is replaced by another number's.
+    """
+    for attempt in range(_ATTEMPTS):
+        try:
+            return _flown(plan, number, draw.draw(plan.seed, number + attempt * _NEXT, plan.mode))
+        except LeftRangeError:
+            if attempt == _ATTEMPTS - 1:
+                raise
+    raise AssertionError
+
+
+def _flown(plan: Plan, number: int, trial: draw.Trial) -> dict[str, Any]:
+    path = draw.write(trial, plan.log(number))
+    log = read_log(path, CHANNELS)
+    records = [
+        np.column_stack([log.channels[name][log.rows(k)] for name in CHANNELS])
+        for k in range(len(log.run_ids))
+    ]
+    return {
+        "trial": draw.plain(trial),
+        "lambda": refit.lambdas(trial),
+        "increments": draw.derivative_increments(trial),
+        "oracle": information.oracle(draw.open_loop(trial, noisy=True), records),
+    }
+
+
+def trace(plan: Plan, number: int) -> dict[str, Any]:
+    """Have one trial traced."""
+    return tracing.call(plan.tracer, plan.log(number) / "log.parquet")
+
+
+def run(plan: Plan, jobs: int) -> list[dict[str, Any]]:
+    """All trials, in order: {"truth": .., "answer": ..} each."""
+    for folder in ("truth", "answer", "logs"):
+        (plan.out / folder).mkdir(parents=True, exist_ok=True)
+    numbers = range(plan.count)
+    _stage(plan, "truth", fly, [k for k in numbers if not plan.file("truth", k).exists()], jobs)
+    _stage(plan, "answer", trace, [k for k in numbers if not _answered(plan, k)], jobs)
+    return [
+        {stage: json.loads(plan.file(stage, k).read_text()) for stage in ("truth", "answer")} for k in numbers
+    ]
+
+
+def frozen(seed: int, numbers: Sequence[int], mode: str, out: Path) -> list[Path]:
+    """Fly some trials again in a process of its own; the folders that a tracer is shown, in order."""
+    plan = Plan(len(numbers), seed, mode, out)
+    return flown_apart([draw.draw(seed, k, mode) for k in numbers], [plan.log(k) for k in numbers])
+
+
+def flown_apart(trials: Sequence[draw.Trial], folders: Sequence[Path]) -> list[Path]:
+    """Fly trials into folders, in a process that does not know the tracer; the folders."""
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, mp_context=context) as pool:
+        return list(pool.map(_write, trials, folders))
+
+
+def _write(trial: draw.Trial, folder: Path) -> Path:
+    return draw.write(trial, folder).parent
+
+
+def _answered(plan: Plan, number: int) -> bool:
+    path = plan.file("answer", number)
+    return path.exists() and "failed" not in json.loads(path.read_text())
+
+
+def _stage(
+    plan: Plan,
+    stage: str,
+    work: Callable[[Plan, int], dict[str, Any]],
+    numbers: Sequence[int],
+    jobs: int,
+) -> None:
+    if not numbers:
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, mp_context=context) as pool:
+        futures = {pool.submit(work, plan, k): k for k in numbers}
+        for done, future in enumerate(as_completed(futures), 1):
+            text = json.dumps(future.result(), default=_simple)
+            write_text(plan.file(stage, futures[future]), text)
+            print(f"\r{stage}: {done} of {len(numbers)}", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+
+
+def _simple(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)

@@ -1,0 +1,1 @@
+"""Damaged inputs: every reader of airtruth answers each of them with a result or one sentence."""
