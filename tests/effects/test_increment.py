@@ -111,7 +111,7 @@ def test_a_single_break_is_still_written_as_a_formula(tmp_path):
 def test_closed_forms_recover_what_made_the_table(name, truth, expected):
     x = np.linspace(0.0, 0.2, 41)
     near = np.abs(x - 0.06) < 1e-9
-    best = closed_forms(x, truth(x), np.where(near, 0.0, 1e-4))[0]
+    best = closed_forms(x, truth(x), np.where(near, 0.0, 1e-4), float(x[near].mean()))[0]
     assert best.name == name
     assert best.is_as_good
     for key, value in expected.items():
@@ -120,4 +120,4 @@ def test_closed_forms_recover_what_made_the_table(name, truth, expected):
 
 def test_no_closed_form_is_as_good_as_a_table_that_oscillates():
     x = np.linspace(0.0, 0.2, 21)
-    assert not any(f.is_as_good for f in closed_forms(x, 0.01 * np.sin(150.0 * x), np.full(21, 1e-4)))
+    assert not any(f.is_as_good for f in closed_forms(x, 0.01 * np.sin(150.0 * x), np.full(21, 1e-4), 0.1))

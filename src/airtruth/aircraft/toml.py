@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any, Final
@@ -11,6 +10,7 @@ from airtruth.aircraft import AircraftFile, Dynamics
 from airtruth.channels import SIGNALS
 from airtruth.physics.sensor_errors import KINDS
 from airtruth.quantity import Quantity
+from airtruth.toml_values import toml_value
 from airtruth.units import UNITS
 
 _UNITS: Final = {
@@ -43,7 +43,11 @@ def write(file: AircraftFile, heading: str) -> str:
     """
     lines = [f"# {line}".rstrip() for line in heading.splitlines()]
     content = {k: getattr(file, k) for k in type(file).model_fields if k in file.model_fields_set}
-    lines += ["schema = 1", f"name = {_text(file.name)}", f"description = {_text(file.description)}"]
+    lines += [
+        "schema = 1",
+        f"name = {toml_value(file.name)}",
+        f"description = {toml_value(file.description)}",
+    ]
     for name, table in content.items():
         if name in ("schema_", "name", "description") or table is None:
             continue
@@ -56,7 +60,10 @@ def write(file: AircraftFile, heading: str) -> str:
         elif isinstance(table, Dynamics):
             for key, rows in table:
                 for row in rows:
-                    lines += [f"\n[[{name}.{key}]]", *(f"{k} = {_plain(v)}" for k, v in asdict(row).items())]
+                    lines += [
+                        f"\n[[{name}.{key}]]",
+                        *(f"{k} = {toml_value(v)}" for k, v in asdict(row).items()),
+                    ]
         else:
             lines += _table(name, _stated(table), _UNITS, "")
     return "\n".join(lines) + "\n"
@@ -75,32 +82,18 @@ def _table(name: str, entries: Mapping[str, Any], units: Mapping[str, str], unit
             plain.append(f"{key} = {_quantity(value, units.get(key, unit))}")
         elif isinstance(value, Mapping):
             if value:
-                inner = ", ".join(f"{_text(k)} = {_plain(v)}" for k, v in value.items())
+                inner = ", ".join(f"{toml_value(k)} = {toml_value(v)}" for k, v in value.items())
                 plain.append(f"{key} = {{ {inner} }}")
         elif hasattr(value, "model_fields_set"):
             tables += _table(f"{name}.{key}", _stated(value), units, unit)
         else:
-            plain.append(f"{key} = {_plain(value)}")
+            plain.append(f"{key} = {toml_value(value)}")
     return plain + tables
 
 
 def _quantity(quantity: Quantity, unit: str) -> str:
     parts = [f"value = {quantity.value!r}"]
-    parts += [f"unit = {_text(unit)}"] if unit else []
+    parts += [f"unit = {toml_value(unit)}"] if unit else []
     parts += [f"std = {quantity.std!r}"] if quantity.std else []
-    parts += [f"source = {_text(quantity.source)}"] if quantity.source else []
+    parts += [f"source = {toml_value(quantity.source)}"] if quantity.source else []
     return f"{{ {', '.join(parts)} }}"
-
-
-def _plain(value: Any) -> str:
-    if isinstance(value, str):
-        return _text(value)
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(_plain(v) for v in value)}]"
-    return repr(value)
-
-
-def _text(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)

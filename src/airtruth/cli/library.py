@@ -10,6 +10,7 @@ import typer
 from airtruth.cli.application import app
 from airtruth.cli.arguments import Json, Replace
 from airtruth.cli.output import print_result
+from airtruth.errors import ConfigurationError
 
 
 @app.command(epilog="Example: airtruth effects elevator_delay")
@@ -22,7 +23,8 @@ def effects(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of the package, with --from.")
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder of the package, with --from; default: learned_effects."),
     ] = None,
     json_: Json = False,
     force: Replace = False,
@@ -31,6 +33,8 @@ def effects(
     if from_ is not None:
         _write(from_, out or Path("learned_effects"), force)
         return
+    if out is not None:
+        raise ConfigurationError("--out needs --from TRACE.JSON: only learned increments are written")
     from airtruth.effects import listing
     from airtruth.effects import registry as library
 

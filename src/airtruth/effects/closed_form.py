@@ -52,7 +52,9 @@ class ClosedForm:
         return self.p_value > _LEVEL
 
 
-def closed_forms(at: Sequence[float], value: Sequence[float], std: Sequence[float]) -> list[ClosedForm]:
+def closed_forms(
+    at: Sequence[float], value: Sequence[float], std: Sequence[float], trim: float
+) -> list[ClosedForm]:
     """Every closed form fitted to a table, the best first by the statistic with two for each parameter (AIC).
 
     Parameters
@@ -60,10 +62,10 @@ def closed_forms(at: Sequence[float], value: Sequence[float], std: Sequence[floa
     at, value, std : (points,) of the signal, of the increment, and its standard deviation; points whose standard
         deviation is zero are those about the trim, where the increment is zero by definition, and do not count; nor do
         those of infinite standard deviation, which have no samples.
+    trim : value of the signal at the trim, about which a curve is measured [unit of the signal].
     """
     x, y, s = (np.asarray(v, dtype=np.float64) for v in (at, value, std))
     counted = (s > 0.0) & np.isfinite(s)
-    trim = float(x[s == 0.0].mean()) if (s == 0.0).any() else float(x.mean())
     x, y, s = x[counted], y[counted], s[counted]
     found = []
     for name, (names, form) in _forms(trim).items():

@@ -39,8 +39,8 @@ _STEP: Final[Mapping[str, float]] = {"CL": 1e-3, "Cm": 1e-4}
 """Step of the differences in a bend [-] (judgement: small against noise, large against rounding)."""
 _REACH: Final[Mapping[str, float]] = {"CL": 1.0, "Cm": 0.3}
 """Largest bend over one cell [-] (judgement: the lift and the moment of a stall)."""
-_TIME_STEP: Final = 0.02
-"""Step of the differences in the logarithm of a time constant, as a share of it [-] (judgement)."""
+_TIME_REACH: Final = 3.0
+"""Largest ratio by which a refit may lengthen or shorten a time constant [-] (judgement: the grid's steps are smaller)."""
 
 
 @dataclass(frozen=True)
@@ -57,11 +57,6 @@ class Memory:
     kind: Literal["lag", "mode"]
     time_s: float
     damping: float = 0.0
-
-    @property
-    def longest_s(self) -> float:
-        """Largest time constant that a refit may reach [s]; the shortest is its inverse, relative to `time_s`."""
-        return 3.0 * self.time_s
 
 
 @dataclass(frozen=True)
@@ -175,7 +170,7 @@ class Increment(Effect):
     shape : where it acts, and by which functions.
     """
 
-    shape: Shape = field(default=Shape("Cm", "alpha", 0.0, 1.0, 1, 0.0), kw_only=True)
+    shape: Shape = field(kw_only=True)
 
     @property
     def bends(self) -> int:
@@ -221,7 +216,7 @@ def increment(shape: Shape, prior_std: float = math.inf) -> Increment:
 
 
 def _times(memory: Memory) -> list[Parameter]:
-    low, high = memory.time_s**2 / memory.longest_s, memory.longest_s
+    low, high = memory.time_s / _TIME_REACH, memory.time_s * _TIME_REACH
     meaning = "time constant" if memory.kind == "lag" else "inverse of the natural frequency in rad/s"
     times = [Parameter("time_s", "s", meaning, low, high, 0.0, is_location=True, step=memory.time_s)]
     if memory.kind == "mode":

@@ -24,13 +24,18 @@ class IncrementTable:
     samples: tuple[int, ...]
 
     @property
+    def trim(self) -> float:
+        """Middle of the points where the increment is zero by definition [unit of the signal]."""
+        zero = [x for x, low, high in zip(self.at, self.low, self.high, strict=True) if low == high]
+        return sum(zero) / len(zero) if zero else 0.0
+
+    @property
     def onset(self) -> tuple[float | None, float | None]:
         """Points below and above the trim from which the band excludes zero; None where it contains zero to the end."""
         sure = [x for x, low, high in zip(self.at, self.low, self.high, strict=True) if low * high > 0.0]
-        middle = next((x for x, v in zip(self.at, self.value, strict=True) if v == 0.0), 0.0)
         return (
-            max((x for x in sure if x < middle), default=None),
-            min((x for x in sure if x > middle), default=None),
+            max((x for x in sure if x < self.trim), default=None),
+            min((x for x in sure if x > self.trim), default=None),
         )
 
 

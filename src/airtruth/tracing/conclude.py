@@ -43,7 +43,7 @@ from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihoo
 from airtruth.tracing.inference.hypothesis import unconstrained_by
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.profile import Profile, location_index
-from airtruth.tracing.inference.robust import inflation, scatter
+from airtruth.tracing.inference.robust import robust_covariance
 from airtruth.tracing.model.compile import CHANNELS
 from airtruth.tracing.model.parameters import COLOUR_TIME_S, Common
 from airtruth.tracing.prepare import Case
@@ -86,7 +86,7 @@ def conclude(
     case, first, last = stages.case, rounds[0], rounds[-1]
     effects = accepted(rounds)
     anomaly, remaining = first.anomaly, last.anomaly
-    covariance = _widened(case.fitted, reported(last))
+    covariance = robust_covariance(case.fitted, reported(last))
     stated = (
         *(_effect(case.fitted, rounds, number, covariance) for number in range(len(effects))),
         *explaining_effects(rounds, covariance),
@@ -194,12 +194,6 @@ def reported(last: SearchRound) -> PosteriorFit:
     """The fit whose sizes are reported: that under the autoregression, where it moved away from the null."""
     stayed = np.array_equal(last.gls.point.common, last.null.point.common)
     return last.null if stayed else last.gls
-
-
-def _widened(problem: TraceProblem, fit: PosteriorFit) -> Array:
-    """Covariance with the serial correlation of the innovations and the scatter between records in it."""
-    ratio = np.maximum(inflation(problem, fit), scatter(problem, fit))
-    return np.asarray(fit.covariance * np.outer(ratio, ratio))
 
 
 def _effect(

@@ -111,7 +111,7 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
     form = _form(e)
     driver = _SIGNALS[e.over or ""]
     signal = "learned-state" if e.states else driver
-    trim = _trim(e.table)
+    trim = e.table.trim if e.table is not None else 0.0
     values = {name: p.value for name, p in e.parameters.items()} if form is None else form.values
     sizes = {k: v for k, v in values.items() if k not in ("at", "width", "time_s", "damping")}
     if form is not None:
@@ -155,20 +155,12 @@ def _form(e: AcceptedEffect) -> ClosedForm | None:
     t = e.table
     rows = zip(t.low, t.high, t.samples, strict=True)
     std = [(high - low) / (2.0 * Z95) if n else math.inf for low, high, n in rows]
-    return next((f for f in closed_forms(t.at, t.value, std) if f.is_as_good), None)
-
-
-def _trim(table: IncrementTable | None) -> float:
-    """Middle of the part where the increment is zero by definition."""
-    if table is None:
-        return 0.0
-    zero = [x for x, low, high in zip(table.at, table.low, table.high, strict=True) if low == high]
-    return sum(zero) / len(zero) if zero else 0.0
+    return next((f for f in closed_forms(t.at, t.value, std, t.trim) if f.is_as_good), None)
 
 
 def _of_table(coefficient: str, table: IncrementTable, signal: str) -> str:
     """Terms of a table with a common factor: its bends, on either side of the trim, where it is flat."""
-    points, trim = list(table.at), _trim(table)
+    points, trim = list(table.at), table.trim
     pieces = zip(pairwise(points), pairwise(table.value), strict=True)
     slopes = [(b - a) / (y - x) for (x, y), (a, b) in pieces]
     bends = [after - before for before, after in zip([0.0, *slopes], [*slopes, 0.0], strict=True)]

@@ -4,24 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.effects.increment import SIGNAL_NAMES, Increment
 from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable
-from airtruth.tracing.answer import CandidateScore
+from airtruth.tracing.answer import Z95, CandidateScore
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.model.parameters import size_index
 from airtruth.tracing.selection.increments import flown
-from airtruth.tracing.selection.learn import relative_swing
+from airtruth.tracing.selection.learn import fitted_bends, relative_swing
 from airtruth.tracing.selection.rounds import SearchRound
 
 Array = NDArray[np.float64]
-
-_Z95: Final = 1.959964
-"""Quantile 0.975 of the standard normal distribution, the half width of the band [standard deviations]."""
 
 
 def in_physical_terms(
@@ -55,12 +50,11 @@ def increment_table(
 ) -> IncrementTable:
     """The increment at the ends of its cells, with its pointwise 95 % band and the samples about each point."""
     shape = effect.shape
-    first = fitted.hypothesis.span(effect.key).start
-    bends = slice(size_index(first), size_index(first) + effect.bends)
+    bends, spread = fitted_bends(fitted, effect, covariance)
     at = np.linspace(shape.low, shape.high, shape.cells + 1)
     basis = shape.basis(at)
-    value = basis @ fitted.point.sizes[first : first + effect.bends]
-    half = _Z95 * np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", basis, covariance[bends, bends], basis), 0.0))
+    value = basis @ bends
+    half = Z95 * np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", basis, spread, basis), 0.0))
     signal = np.concatenate([flown(r, shape.signal) for r in problem.records])
     edges = np.concatenate([[-np.inf], at[:-1] + 0.5 * shape.width, [np.inf]])
     samples = np.histogram(signal, edges)[0]

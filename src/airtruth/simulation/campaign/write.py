@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 from pydantic import BaseModel
 
 from airtruth.simulation.campaign.file import Campaign, Constant, Distribution, EffectTable, Table
+from airtruth.toml_values import toml_value
 from airtruth.units import UNITS
 
 
@@ -65,18 +65,10 @@ def _lines(model: BaseModel) -> list[str]:
 
 def _value(value: Any) -> str:
     if isinstance(value, Constant):
-        return repr(value.value)
+        return toml_value(value.value)
     if isinstance(value, Distribution):
-        return _value({name: getattr(value, name) for name in type(value).model_fields})
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{json.dumps(str(k))} = {_value(v)}" for k, v in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_value(v) for v in value) + "]"
-    return repr(value)
+        return toml_value({name: getattr(value, name) for name in type(value).model_fields})
+    return toml_value(value)
 
 
 __all__ = ["as_toml"]

@@ -196,9 +196,19 @@ def _onset(table: IncrementTable, over: str) -> str:
 
 def effect_details(effect: AcceptedEffect, share: float | None = None) -> Iterator[str]:
     """Significance of an effect, and the effects that look the same."""
-    line = f"  {probability(effect.p_value)} (Holm over all candidates)"
-    if effect.gain_2_log_likelihood is not None:
-        line += f"; its refit gains {significant(effect.gain_2_log_likelihood)} in 2 log L"
+    is_learned, gain = effect.acts_on is not None, effect.gain_2_log_likelihood
+    rule = (
+        "inverse of the posterior odds over all increments tried"
+        if is_learned
+        else "Holm over all candidates"
+    )
+    line = f"  {probability(effect.p_value)} ({rule})"
+    if gain is not None:
+        line += (
+            f"; twice its log odds: {significant(gain)}"
+            if is_learned
+            else f"; its refit gains {significant(gain)} in 2 log L"
+        )
     yield f"{line}; {significant(effect.separation_sigma)} sigma from the next effect"
     if share is not None:
         part = f"{100.0 * share:.0f} %"

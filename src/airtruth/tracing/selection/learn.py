@@ -39,8 +39,8 @@ Array = NDArray[np.float64]
 MOST_INCREMENTS: Final = 3
 """Largest number of increments that a trace accepts [-] (judgement: lift, moment and one with memory)."""
 LEAST_RECORDS: Final = 3
-"""Least number of fitted records [-] (judgement: what one or two flights show can be the air's; a measured record of
-60 s always leaves an anomaly beside a linear model)."""
+"""Least number of fitted records [-] (judgement: the gusts of one or two flights can resemble an increment, and
+a measured record of 60 s always leaves an anomaly beside a linear model)."""
 REMAINS: Final = 0.01
 """Probability of the remaining anomaly below which increments are learned [-]; that of an unexplained verdict."""
 _REFITTED: Final = 3
@@ -171,6 +171,8 @@ class _Learning:
             if may_begin(self.advance, f"refit {s.effect.key}"):
                 own = _refit(self.problem, null, s, len(tried))
                 learned += [] if own is None else [own]
+        if not learned:
+            return ()
         reference = reference_of(self.problem, null)
         ranked = _settled(self.problem, null, learned, len(tried))
         found: list[Candidate] = []
@@ -231,7 +233,7 @@ def _settled(
 
 def _restated(own: PosteriorFit, effect: Increment) -> Increment | None:
     """The increment with the prior that its bends ask for (MacKay's fixed point); None where that is the present one."""
-    bends, covariance = _bends(own, effect)
+    bends, covariance = fitted_bends(own, effect, own.covariance)
     old = effect.parameters[0].prior_std
     effective = effect.bends - float(np.trace(covariance)) / old**2
     if not effective > 0.0:
@@ -242,16 +244,21 @@ def _restated(own: PosteriorFit, effect: Increment) -> Increment | None:
     return effect.with_prior(new) if abs(np.log(new / old)) > np.log(1.5) else None
 
 
-def _bends(own: PosteriorFit, effect: Increment) -> tuple[Array, Array]:
-    """Bends (bends,) of an increment and their covariance."""
+def fitted_bends(own: PosteriorFit, effect: Increment, covariance: Array) -> tuple[Array, Array]:
+    """Bends of an increment (bends,) [-] and their covariance (bends, bends).
+
+    Parameters
+    ----------
+    own : a fit with the increment; covariance : of its common parameters and sizes.
+    """
     first = own.hypothesis.span(effect.key).start
     at = slice(size_index(first), size_index(first) + effect.bends)
-    return own.point.sizes[first : first + effect.bends], own.covariance[at, at]
+    return own.point.sizes[first : first + effect.bends], covariance[at, at]
 
 
 def _log_evidence(null: PosteriorFit, own: PosteriorFit, effect: Increment, tried: int) -> float:
     """Log of the posterior odds of an increment (Laplace), one for each of its times; every shape equally probable."""
-    _, covariance = _bends(own, effect)
+    _, covariance = fitted_bends(own, effect, own.covariance)
     volume = np.linalg.slogdet(covariance)[1] - 2.0 * effect.bends * np.log(effect.parameters[0].prior_std)
     times = len(effect.parameters) - effect.bends
     return float(null.cost - own.cost + 0.5 * volume - times - np.log(tried))
@@ -286,7 +293,7 @@ def _assessed(problem: TraceProblem, own: _Learned, reference: Reference) -> Can
 def relative_swing(problem: TraceProblem, own: PosteriorFit, effect: Increment) -> float:
     """Swing of an increment over that of the declared derivative in the flown range [-]; for a linear one its share."""
     shape = effect.shape
-    bends, _ = _bends(own, effect)
+    bends, _ = fitted_bends(own, effect, own.covariance)
     index = PARAMETERS.index(f"{shape.coefficient}{_DERIVATIVE[shape.signal]}")
     declared = abs(float(problem.declared_derivatives[index]))
     if not shape.cells:
@@ -317,4 +324,4 @@ def _tied(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     return tuple(c for c in accepted if accepted[0].gain - c.gain <= TIE)
 
 
-__all__ = ["LEAST_RECORDS", "MOST_INCREMENTS", "relative_swing", "with_increments"]
+__all__ = ["LEAST_RECORDS", "MOST_INCREMENTS", "fitted_bends", "relative_swing", "with_increments"]
