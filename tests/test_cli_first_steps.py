@@ -100,6 +100,7 @@ def test_a_new_mapping_imports_the_example(airtruth, tmp_path):
     assert (tmp_path / "flight7.parquet").is_file()
 
 
+@pytest.mark.slow
 def test_a_new_mapping_of_a_file_is_the_guess(airtruth, tmp_path):
     airtruth("example", "csv")
     code, out, _ = airtruth("new", "mapping", "data/foreign/flight7.csv", "--out", "map.toml")
@@ -360,6 +361,7 @@ def test_the_steps_of_a_trace_are_those_of_a_loop_in_its_middle():
     assert remaining.left_s == pytest.approx(9.0 * 13.0 / 33.2)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 def test_a_bar_on_a_terminal_leaves_the_result_as_it_is(tmp_path):
     """rich would wrap what a command prints below a bar at the width of the terminal."""

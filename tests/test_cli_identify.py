@@ -61,6 +61,7 @@ def test_json_on_stdout_is_the_table(flown):
     assert rows[0]["run_id"] == "light-000000"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
 def test_json_on_a_full_stdout_is_one_message(flown):
     log = flown / "logs" / "00000.parquet"
@@ -98,6 +99,7 @@ def test_files_and_folders_and_chunks_give_the_same_estimates(flown):
         np.testing.assert_array_equal(merged[name], merged[f"{name}_again"])
 
 
+@pytest.mark.slow
 def test_joint_over_files_is_the_joint_of_all_runs(flown):
     gtm = aircraft.load("gtm")
     table = identify(flown, gtm, ["iv-lowpass"], joint=True).to_frame()

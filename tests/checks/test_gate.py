@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from clean_logs import RATES_HZ, fly, picked, table
 from faults import FAULTS
+from tiers import sampled
 
 from airtruth import aircraft as planes
 from airtruth.checks.corrections import catalogue
@@ -32,7 +33,7 @@ def certain(faults):
     return [fault for fault in faults if fault.certain]
 
 
-@pytest.mark.parametrize("name", FAULTS)
+@pytest.mark.parametrize("name", sampled(FAULTS, 3))
 def test_every_fault_is_named(name, log, gtm):
     fault = certain(inspect(FAULTS[name](log), gtm))[0]
     assert fault.channel in FAULTS[name].channels
@@ -78,7 +79,7 @@ def test_logs_with_undeclared_effects_pass(path, gtm):
     assert certain(inspect(read_log(path))) == []
 
 
-FEW = {("gtm", "severe", True), ("c172x", "light", False), ("f16", "light", False), ("T38", "moderate", True)}
+FEW = {("gtm", "severe", True)}
 """Aircraft, gust level and noise of the flights that the fast suite flies."""
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import sys
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 from faults import FAULTS
+from tiers import sampled
 
 import airtruth as at
 from airtruth import cli
@@ -78,8 +80,10 @@ def arguments(verb, path):
     }[verb]
 
 
-@pytest.mark.parametrize("verb", ["identify", "check", "trace", "import"])
-@pytest.mark.parametrize("name", NAMED)
+VERBS = ("identify", "check", "trace", "import")
+
+
+@pytest.mark.parametrize(("verb", "name"), sampled(product(VERBS, NAMED), 3))
 def test_every_verb_refuses_and_names_the_channel(verb, name, stored, command, monkeypatch):
     monkeypatch.setattr(tracing, "prepare", lambda *a: pytest.fail("went on behind the gate"))
     code, out, err = command(*arguments(verb, stored(name)))
@@ -96,6 +100,7 @@ def test_every_function_refuses(call, log):
         call(FAULTS["q sign"](log), "gtm")
 
 
+@pytest.mark.slow
 def test_force_continues_and_the_result_records_it(stored, command):
     path = stored("theta sign")
     code, out, _ = command(*arguments("check", path), "--force", "--json")

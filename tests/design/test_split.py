@@ -153,6 +153,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(searching, "_UNITS", 2)
 
 
+@pytest.mark.slow
 def test_command_line_writes_a_campaign_that_flies(quick, tmp_path):
     out = tmp_path / "next.toml"
     line = [
@@ -196,6 +197,7 @@ def test_every_form_of_the_result_agrees(quick, tmp_path):
     assert result.prediction.difference.shape == (len(result.prediction.t_s), 3)
 
 
+@pytest.mark.slow
 def test_a_range_of_airspeeds_is_compared(quick, gtm):
     campaign = base_campaign(None, False, "gtm")
     table = campaign.condition.model_validate({"eas_kt": {"choose": [65.0, 85.0]}, "altitude_ft": 7000.0})

@@ -6,6 +6,7 @@ from typing import get_args, get_type_hints
 import effect_flights as flights
 import numpy as np
 import pytest
+from tiers import sampled
 
 from airtruth.aircraft import Sensor
 from airtruth.aircraft.neutral import effective, fitted
@@ -155,7 +156,7 @@ def distance(flown, plain):
 IN_AIRCRAFT = [k for k in ALL if EFFECTS[k].change(values(EFFECTS[k], 1.0)).in_aircraft]
 
 
-@pytest.mark.parametrize("key", IN_AIRCRAFT)
+@pytest.mark.parametrize("key", sampled(IN_AIRCRAFT, 4))
 def test_written_effect_grows_from_nothing_and_composes(gtm, paper_condition, plain, tmp_path, key):
     effect = EFFECTS[key]
 

@@ -60,6 +60,7 @@ def test_a_change_that_is_not_resolved_is_not_written(gtm, tmp_path):
         writing.write_aircraft(gtm, change, tmp_path / "gtm")
 
 
+@pytest.mark.slow
 def test_an_effect_on_the_derivatives_flies_in_a_campaign(tmp_path):
     quiet = {"gust": {"level": "none"}, "sensors": {"ideal": True}, "runs": 1}
     plain = campaigns.channel(campaigns.fly(tmp_path / "plain", **quiet), "q_rad_s")

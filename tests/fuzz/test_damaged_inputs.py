@@ -35,6 +35,7 @@ def folder_in_which_errors_are_foreseen():
         yield Path(folder)
 
 
+@pytest.mark.slow
 @examples(40)
 @given(strategies.damaged_logs(), strategies.RANDOM)
 def test_bytes_of_logs(content, rng):
@@ -51,6 +52,7 @@ def test_contents_of_logs(content, rng):
         logs.use(folder / "log.parquet", rng)
 
 
+@pytest.mark.slow
 @examples(60)
 @given(strategies.foreign_files())
 def test_foreign_files(file):
@@ -60,6 +62,7 @@ def test_foreign_files(file):
         import_log(folder / name, MappingFile.model_validate(mapping), force=True)
 
 
+@pytest.mark.slow
 @examples(25)
 @given(strategies.campaigns())
 def test_campaigns(content):

@@ -109,6 +109,7 @@ def test_predicted_states_keep_most_of_the_bias_in_lift():
     assert abs(bias["iv-frequency"]) < 0.08
 
 
+@pytest.mark.slow
 def test_joint_of_one_run_is_that_run_and_of_many_is_sharper():
     one = fly(runs=1, gust=2.0, noise=1.0, seed=62)
     for name in ("iv-frequency", "iv-kalman"):

@@ -4,10 +4,12 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pandas as pd
 import pytest
+from tiers import sampled
 
 from airtruth import aircraft
 from airtruth.errors import ConfigurationError, LogError
@@ -105,8 +107,7 @@ def burnt(cg, **flight):
     return replace(as_log(*parts), metadata={"record_constants": facts})
 
 
-@pytest.mark.parametrize("cg", [False, True])
-@pytest.mark.parametrize("method", JOINT)
+@pytest.mark.parametrize(("method", "cg"), sampled(product(JOINT, (False, True)), 3))
 def test_joint_estimates_of_records_that_burn_fuel(method, cg):
     """Without noise the joint estimate has the error of the single records, which discretisation makes."""
     log = burnt(cg, noise=0.02)

@@ -26,6 +26,7 @@ def folder(tmp_path_factory):
     return place
 
 
+@pytest.mark.slow
 def test_guess_import_check_identify(folder):
     guessed = run("import", "--guess", folder / "f.csv")
     assert guessed.returncode == 0, guessed.stderr
@@ -46,6 +47,7 @@ def test_guess_import_check_identify(folder):
     assert json.loads(identified.stdout)[0]["converged"]
 
 
+@pytest.mark.slow
 def test_a_wrong_sign_ends_with_2_and_writes_nothing_unless_forced(folder):
     text = mapping_by_name()
     at = text.index("[channels.q_rad_s]")

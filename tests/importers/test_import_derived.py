@@ -97,6 +97,7 @@ def test_exact_motion_is_reconstructed():
     np.testing.assert_allclose(made.alpha_rad, c["alpha_rad"], atol=2e-5)
 
 
+@pytest.mark.slow
 def test_errors_of_instruments_stay_within_the_directions():
     """A bias of az and of q, and a wrong airspeed: the error of alpha over its stated deviation, 60 draws."""
     ratios, rng = [], np.random.default_rng(3)

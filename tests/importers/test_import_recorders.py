@@ -80,6 +80,7 @@ unit = "m"
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["dataflash", "mdf", "hdf5"])
 def test_a_recorder_gives_the_log_that_was_flown(kind, log, tmp_path):
     nav, air, fast, slow = "NAVX.", "AIR.", "", ""

@@ -66,6 +66,7 @@ def test_a_cell_or_a_column_of_a_table_is_wrong(tmp_path, light, name, data, num
     page_or_error(tmp_path / name if alone else tmp_path, tmp_path)
 
 
+@pytest.mark.slow
 @EXAMPLES
 @given(entries=st.one_of(VALUES, st.fixed_dictionaries({}, optional={
     "name": VALUES, "title": VALUES, "runs": VALUES, "gust": VALUES
@@ -77,6 +78,7 @@ def test_the_description_of_a_campaign_is_wrong(tmp_path, light, entries):
     page_or_error(tmp_path, tmp_path)
 
 
+@pytest.mark.slow
 @EXAMPLES
 @given(values=st.lists(NUMBERS, min_size=8, max_size=8), column=st.integers(0, 7))
 @example(values=[0.0, 0.0, 0.0, math.nan, math.nan, 1.6e308, 1.6e308, 1.6e308], column=0)

@@ -29,6 +29,7 @@ def test_standard_error_of_the_standard_deviation_is_scipys_k_statistic(kind, n)
         assert figure.se[j] == pytest.approx(expected, rel=1e-10, abs=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", SAMPLES)
 def test_standard_errors_predict_the_spread_over_replications(kind):
     """6667 replications of 3 columns of 200: spreads are known to about 1 %, 3 % allowed (order 1/n)."""

@@ -5,6 +5,7 @@ import pytest
 from fly_campaigns import channel, fly
 from scipy.signal import lsim
 from scipy.stats import norm
+from tiers import sampled
 
 from airtruth.channels import SIGNALS
 
@@ -76,15 +77,18 @@ def test_channels_without_a_sensor_are_logged_as_they_are(ideal, shipped):
 
 @pytest.mark.parametrize(
     ("entries", "expected"),
-    [
-        ({"bias": 0.02}, lambda q: q + 0.02),
-        ({"scale": 1.1}, lambda q: 1.1 * q),
-        ({"scale": 0.9, "bias": -0.1}, lambda q: 0.9 * q - 0.1),
-        ({"minimum": -0.05, "maximum": 0.03}, lambda q: np.clip(q, -0.05, 0.03)),
-        ({"quantum": 0.01}, lambda q: 0.01 * np.round(q / 0.01)),
-        ({"delay": 0.02}, lambda q: np.concatenate([np.repeat(q[:, :1], 4, 1), q[:, :-4]], 1)),
-        ({"hold": 0.05}, lambda q: np.repeat(q[:, ::10], 10, 1)[:, : q.shape[1]]),
-    ],
+    sampled(
+        [
+            ({"bias": 0.02}, lambda q: q + 0.02),
+            ({"scale": 1.1}, lambda q: 1.1 * q),
+            ({"scale": 0.9, "bias": -0.1}, lambda q: 0.9 * q - 0.1),
+            ({"minimum": -0.05, "maximum": 0.03}, lambda q: np.clip(q, -0.05, 0.03)),
+            ({"quantum": 0.01}, lambda q: 0.01 * np.round(q / 0.01)),
+            ({"delay": 0.02}, lambda q: np.concatenate([np.repeat(q[:, :1], 4, 1), q[:, :-4]], 1)),
+            ({"hold": 0.05}, lambda q: np.repeat(q[:, ::10], 10, 1)[:, : q.shape[1]]),
+        ],
+        3,
+    ),
 )
 def test_one_error_at_a_time(ideal, tmp_path, entries, expected):
     truth = channel(ideal, "q_rad_s")
@@ -108,6 +112,7 @@ def test_lag_is_first_order(ideal, tmp_path):
     np.testing.assert_allclose(got, expected, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_lag_in_coarse_logs_is_that_of_the_simulation(tmp_path):
     """A lag is computed at 200 Hz whatever the rate of the log."""
     fine = logged(tmp_path / "fine", "alpha_rad", lag=0.013)

@@ -81,6 +81,7 @@ def test_the_page_has_queries() -> None:
     assert sum(language == "python" for language, _ in BLOCKS) >= 3
 
 
+@pytest.mark.slow
 def test_every_query_gives_rows(results: dict[int, Any]) -> None:
     for number, result in results.items():
         assert result is None or len(result), BLOCKS[number][1]
@@ -108,6 +109,7 @@ def test_failed_runs_are_those_of_the_truth(campaigns: Path, results: dict[int, 
     assert failed["reason"].str.startswith("gtm cannot be trimmed").all()
 
 
+@pytest.mark.slow
 def test_the_partition_holds_the_runs_in_moderate_gusts(campaigns: Path, results: dict[int, Any]) -> None:
     truth = pd.concat(pd.read_parquet(p) for p in (campaigns / "out").glob("*/truth.parquet"))
     own = truth[(truth["status"] == "ok") & truth["sigma_w_m_s"].between(1.2, 2.4, inclusive="left")]

@@ -42,6 +42,7 @@ def logs(tmp_path_factory):
     return list(iter_logs(folder / "out"))
 
 
+@pytest.mark.slow
 def test_a_slow_vane_is_a_start(logs, gtm):
     check = kinematic_check(logs, gtm, held=())
     assert starts_of(check)["vane_lag"] == pytest.approx(LAG_S, abs=0.02)

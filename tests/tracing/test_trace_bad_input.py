@@ -108,6 +108,7 @@ def test_one_record_works_and_is_provisional(command, log, tmp_path):
     assert answer == json.loads((tmp_path / "out" / "trace.json").read_text())
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
 def test_json_on_a_full_stdout_is_one_message(log, tmp_path):
     command = [sys.executable, "-m", "airtruth", "trace", stored(tmp_path, one(log)), "--aircraft", "gtm"]
@@ -161,6 +162,7 @@ def test_an_aircraft_of_quite_another_kind(command, log, tmp_path):
         assert found["anomaly"]["p_value"] < 1e-6
 
 
+@pytest.mark.slow
 def test_an_aircraft_that_cannot_fly_there(command, log, tmp_path):
     """A T-38 at 75 kt: no trim."""
     code, _, err = command(stored(tmp_path, log), "--aircraft", "T38", "--out", tmp_path / "out", "--quiet")
@@ -223,6 +225,7 @@ def test_neither_density_nor_altitude(command, log, tmp_path):
     assert "altitude_m" in message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("altitude", [True, False])
 def test_density_in_another_unit(command, log, tmp_path, altitude):
     less = log if altitude else without(log, "altitude_m")

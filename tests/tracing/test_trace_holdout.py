@@ -38,6 +38,7 @@ def fitted():
     return problem, fit(problem, ONE, replace(start, sizes=np.array([0.1])))
 
 
+@pytest.mark.slow
 def test_leave_one_out_is_the_refit_without_the_record(fitted):
     """One step of scoring against the search itself: likelihoods of records left out within 0.3."""
     problem, found = fitted

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -56,16 +57,23 @@ def integral(x: Array, dt_s: float) -> Array:
 def spectrum(x: Array, dt_s: float) -> Array:
     """Real and imaginary parts of the spectrum of (..., samples) below the band's edge, line and mean removed."""
     n = x.shape[-1]
-    t = np.linspace(-1.0, 1.0, n)
-    trend = np.linalg.qr(np.stack([np.ones(n), t], axis=1))[0]
+    trend, lines_in_band = _trend_and_band(n, dt_s)
     x = x - x[..., :1]  # so that a constant is exactly zero
     rest = x - (x @ trend) @ trend.T
     size = np.abs(x).max(axis=-1, keepdims=True)
     rest = np.where(np.abs(rest).max(axis=-1, keepdims=True) > ROUNDING * size, rest, 0.0)
-    lines = np.fft.rfft(rest, axis=-1) / np.sqrt(n)
-    f = np.fft.rfftfreq(n, dt_s)
-    lines = lines[..., (f > 0.0) & (f <= min(BAND_HZ, BAND_RATE / dt_s))]
+    lines = np.fft.rfft(rest, axis=-1)[..., 1 : 1 + lines_in_band] / np.sqrt(n)
     return np.concatenate([lines.real, lines.imag], axis=-1)
+
+
+@lru_cache(maxsize=64)
+def _trend_and_band(n: int, dt_s: float) -> tuple[Array, int]:
+    """Orthonormal basis (samples, 2) of constant and line, and the number of lines above zero in the band."""
+    trend = np.linalg.qr(np.stack([np.ones(n), np.linspace(-1.0, 1.0, n)], axis=1))[0]
+    trend.flags.writeable = False
+    f = np.fft.rfftfreq(n, dt_s)
+    inside = np.count_nonzero((f > 0.0) & (f <= min(BAND_HZ, BAND_RATE / dt_s)))
+    return trend, int(inside)
 
 
 def instruments(elevator: Array, dt_s: float) -> Array:

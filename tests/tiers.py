@@ -1,0 +1,20 @@
+"""Shares of a parameter set between the fast tests and the slow ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import pytest
+
+
+def sampled(cases: Iterable[Any], every: int) -> list[Any]:
+    """Cases of a parametrised test: the fast tests run the first of each ``every``, the slow tests run the others."""
+    return [
+        case if number % every == 0 else pytest.param(*_values(case), marks=pytest.mark.slow)
+        for number, case in enumerate(cases)
+    ]
+
+
+def _values(case: Any) -> tuple[Any, ...]:
+    return case if isinstance(case, tuple) else (case,)
