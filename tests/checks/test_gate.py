@@ -20,7 +20,7 @@ from airtruth.logs.store import read_log, write_log
 
 ROOT = Path(__file__).resolve().parents[2]
 UNDECLARED = sorted((ROOT / "data" / "undeclared").glob("*.parquet"))
-NEEDS_AIRCRAFT = {"airspeed in kt", "command in place of elevator"}
+NEEDS_AIRCRAFT = {"airspeed in kt", "airspeed times 0.2", "command in place of elevator"}
 """Faults that kinematics alone does not show in six gusty records: they need the declared aircraft."""
 
 
@@ -49,6 +49,14 @@ def test_every_fault_is_named_without_an_aircraft(name, log):
     fault = certain(inspect(FAULTS[name](log)))[0]
     assert fault.channel in FAULTS[name].channels
     assert fault.code in FAULTS[name].codes
+
+
+def test_a_late_vane_and_a_wrong_airspeed_that_fit_alike_are_both_named(log):
+    """Kinematics alone cannot tell a vane that is 0.8 s late from a fifth of the airspeed in these gusts."""
+    fault = next(f for f in inspect(FAULTS["airspeed times 0.2"](log)) if f.code == "lag")
+    assert not fault.certain
+    assert "possibly about 0.8 s late, or airspeed_m_s: factor of about 0.2 in all 6 runs" in fault.sentence
+    assert "state the unit and scale of airspeed_m_s in the import mapping" in fault.sentence
 
 
 HIDDEN = {"ax in g", "theta frozen", "elevator and command", "command in place of elevator"}

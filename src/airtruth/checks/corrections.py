@@ -251,7 +251,7 @@ class Explanation:
     failed : the test that failed most.
     gain : decrease of the sum of squared distances.
     certain : whether hardly anything is left, see `GAIN` and `REST`.
-    rival : the inverse of another mistake of the same channel that explains the tests nearly as well, see `RIVAL`.
+    rival : the inverse of another mistake that explains the tests nearly as well, see `RIVAL`.
     """
 
     correction: Correction | None
@@ -263,8 +263,11 @@ class Explanation:
     @property
     def mistake(self) -> str:
         """The mistake in words, and its rival."""
-        words = [one.mistake for one in (self.correction, self.rival) if one is not None]
-        return ", or ".join(words)
+        if self.correction is None or self.rival is None:
+            return "" if self.correction is None else self.correction.mistake
+        same = self.rival.channels == self.correction.channels
+        other = self.rival.mistake if same else f"{self.rival.channels[0]}: {self.rival.mistake}"
+        return f"{self.correction.mistake}, or {other}"
 
     @property
     def cure(self) -> str:
@@ -331,12 +334,16 @@ def explain(batch: Batch, aircraft: Aircraft | None = None, *, partial: bool = F
 
 
 def _rival(best: Correction, value: float, values: list[tuple[float, Correction]]) -> Correction | None:
-    """Another unit or gravity of the same channel that fits about as well."""
+    """Another mistake that fits about as well: another unit or gravity of the channel, or a mistake beside a late sensor."""
     kinds = {"unit", "gravity"}
     near = [
         (v, one)
         for v, one in values
-        if one.channels == best.channels and {one.code, best.code} == kinds and v - value < RIVAL
+        if v - value < RIVAL
+        and (
+            (one.channels == best.channels and {one.code, best.code} == kinds)
+            or (best.sensor and not one.sensor)
+        )
     ]
     return min(near, key=lambda pair: pair[0])[1] if near else None
 
