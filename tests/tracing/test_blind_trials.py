@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from airtruth.cluster import connected
 from airtruth.logs.store import read_log
 from airtruth.logs.validate import validate
 from validation import undeclared
@@ -54,6 +55,12 @@ def cases(plan):
 def test_result_does_not_depend_on_jobs(plan, cases, tmp_path):
     again = trials.Plan(2, 4, "null", tmp_path, plan.tracer)
     assert trials.run(again, 1) == cases
+
+
+def test_a_cluster_gives_the_same_trials(plan, cases, tmp_path):
+    with connected("local:2") as cluster:
+        again = trials.Plan(2, 4, "null", tmp_path, plan.tracer)
+        assert trials.run(again, 1, cluster) == cases
 
 
 def test_a_killed_run_goes_on(plan, cases):

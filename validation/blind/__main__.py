@@ -13,6 +13,7 @@ import os
 import sys
 from pathlib import Path
 
+from airtruth.cluster import workers
 from airtruth.logs.store import write_text
 from validation.blind import results, scoring, set_scoring
 from validation.blind.draw import MODES
@@ -27,6 +28,7 @@ def main() -> int:
     parser.add_argument("--trials", type=int, required=True)
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--cluster", metavar="ADDRESS", help="work on a Dask cluster, see docs/cluster.md")
     parser.add_argument("--out", type=Path, default=Path("out/blind"))
     parser.add_argument("--mode", choices=MODES, default="mixed")
     parser.add_argument(
@@ -40,7 +42,8 @@ def main() -> int:
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(name, "1")  # of the workers
     plan = Plan(arguments.trials, arguments.seed, arguments.mode, arguments.out, arguments.tracer)
-    cases = run(plan, arguments.jobs)
+    with workers(arguments.cluster) as cluster:
+        cases = run(plan, arguments.jobs, cluster)
     scores = scoring.score(cases)
     sets = set_scoring.set_scores(cases)
     text = results.markdown(scores, sets)

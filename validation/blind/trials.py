@@ -9,14 +9,16 @@ from __future__ import annotations
 import json
 import multiprocessing
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from airtruth.cluster import Cluster, LostWorkError
+from airtruth.errors import StoreError
 from airtruth.logs.store import read_log, write_text
 from validation.blind import draw, information, refit, tracing
 from validation.blind.figures import CHANNELS
@@ -79,13 +81,20 @@ def trace(plan: Plan, number: int) -> dict[str, Any]:
     return tracing.call(plan.tracer, plan.log(number) / "log.parquet")
 
 
-def run(plan: Plan, jobs: int) -> list[dict[str, Any]]:
-    """All trials, in order: {"truth": .., "answer": ..} each."""
+def run(plan: Plan, jobs: int, cluster: Cluster | None = None) -> list[dict[str, Any]]:
+    """All trials, in order: {"truth": .., "answer": ..} each.
+
+    Parameters
+    ----------
+    plan : what to do.
+    jobs : number of processes of this machine.
+    cluster : whose workers do the work instead; they see the folder ``plan.out`` and this package under the same names.
+    """
     for folder in ("truth", "answer", "logs"):
         (plan.out / folder).mkdir(parents=True, exist_ok=True)
     numbers = range(plan.count)
-    _stage(plan, "truth", fly, [k for k in numbers if not plan.file("truth", k).exists()], jobs)
-    _stage(plan, "answer", trace, [k for k in numbers if not _answered(plan, k)], jobs)
+    _stage(plan, "truth", fly, [k for k in numbers if not plan.file("truth", k).exists()], jobs, cluster)
+    _stage(plan, "answer", trace, [k for k in numbers if not _answered(plan, k)], jobs, cluster)
     return [
         {stage: json.loads(plan.file(stage, k).read_text()) for stage in ("truth", "answer")} for k in numbers
     ]
@@ -113,23 +122,47 @@ def _answered(plan: Plan, number: int) -> bool:
     return path.exists() and "failed" not in json.loads(path.read_text())
 
 
+Work = Callable[[Plan, int], dict[str, Any]]
+"""Stage of a trial: plan and number in, the content of the stage's file out."""
+
+
 def _stage(
-    plan: Plan,
-    stage: str,
-    work: Callable[[Plan, int], dict[str, Any]],
-    numbers: Sequence[int],
-    jobs: int,
+    plan: Plan, stage: str, work: Work, numbers: Sequence[int], jobs: int, cluster: Cluster | None
 ) -> None:
+    results = _pooled(plan, work, numbers, jobs) if cluster is None else _on(cluster, plan, work, numbers)
+    for done, (number, content) in enumerate(results, 1):
+        write_text(plan.file(stage, number), json.dumps(content, default=_simple))
+        end = "\n" if done == len(numbers) else ""
+        print(f"\r{stage}: {done} of {len(numbers)}", end=end, file=sys.stderr, flush=True)
+
+
+def _pooled(
+    plan: Plan, work: Work, numbers: Sequence[int], jobs: int
+) -> Iterator[tuple[int, dict[str, Any]]]:
     if not numbers:
         return
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(jobs, mp_context=context) as pool:
         futures = {pool.submit(work, plan, k): k for k in numbers}
-        for done, future in enumerate(as_completed(futures), 1):
-            text = json.dumps(future.result(), default=_simple)
-            write_text(plan.file(stage, futures[future]), text)
-            print(f"\r{stage}: {done} of {len(numbers)}", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+
+
+def _on(
+    cluster: Cluster, plan: Plan, work: Work, numbers: Sequence[int]
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    plan = replace(plan, out=plan.out.absolute())
+    for (_, _, number), content in cluster.completed(_apart, [(work, plan, k) for k in numbers]):
+        if isinstance(content, LostWorkError):
+            raise StoreError(f"trial {number}: the workers of the cluster ended each time ({content})")
+        yield number, content
+
+
+def _apart(task: tuple[Work, Plan, int]) -> dict[str, Any]:
+    """One stage of a trial in a process of its own, since a worker has flown truths and traced before."""
+    work, plan, number = task
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        return pool.submit(work, plan, number).result()
 
 
 def _simple(value: Any) -> Any:

@@ -19,15 +19,18 @@ from airtruth.cli.arguments import (
     LogFiles,
     Methods,
     Model,
+    OnCluster,
     Quiet,
     Threads,
     TimeBudget,
     TraceSeed,
 )
-from airtruth.cli.output import print_result
-from airtruth.cli.progress import TRACE_STEPS, status
+from airtruth.cli.output import notice, print_result
+from airtruth.cli.progress import TRACE_STEPS, progress_bar, status
+from airtruth.errors import FAILED_RUNS
 
 if TYPE_CHECKING:
+    from airtruth.api.trace_tasks import TraceTask
     from airtruth.tracing import TraceOptions
 
 
@@ -43,21 +46,27 @@ def trace(
     effect: Candidates = None,
     time_budget: TimeBudget = None,
     increments: Increments = None,
+    each: Annotated[
+        bool,
+        typer.Option(
+            "--each", help="Trace each LOG by itself, into a folder of its name, with a table of all."
+        ),
+    ] = False,
+    cluster: OnCluster = None,
     force: ForceAndReplace = False,
     json_: Annotated[bool, typer.Option("--json", help="Print trace.json.")] = False,
     quiet: Quiet = False,
 ) -> None:
     """Name the effect that a declared aircraft lacks, add it, and report the error before and after."""
-    from airtruth import tracing
-    from airtruth.api.writing import trace_outputs
+    from airtruth.api.campaigns import load_aircraft
+    from airtruth.api.trace_tasks import TraceTask
 
     options = _options(model, hold_out, jobs, seed, effect, time_budget, increments)
-    with (
-        trace_outputs("trace", logs, aircraft, out, force=force) as declared,
-        status("trace", quiet, TRACE_STEPS) as advance,
-    ):
-        result = tracing.trace(logs, declared, options, out, force, advance)
-    print_result(result.answer.to_json().rstrip() if json_ else result.summary())
+    if each:
+        _trace_each(logs, aircraft, options, out, cluster, force=force, as_json=json_, quiet=quiet)
+        return
+    task = TraceTask(tuple(logs), load_aircraft(aircraft), options, out, force)
+    _perform(task, cluster, as_json=json_, quiet=quiet)
 
 
 @app.command(
@@ -75,25 +84,64 @@ def loop(
     effect: Candidates = None,
     time_budget: TimeBudget = None,
     increments: Increments = None,
+    cluster: OnCluster = None,
     force: ForceAndReplace = False,
     json_: Annotated[bool, typer.Option("--json", help="Print loop.json.")] = False,
     quiet: Quiet = False,
 ) -> None:
     """Trace, remove the traced effects from the logs, and identify before and after (default: ls and iv-f1)."""
-    import json
-
-    from airtruth.api.writing import trace_outputs
-    from airtruth.loop import METHODS, close_loop
+    from airtruth.api.campaigns import load_aircraft
+    from airtruth.api.trace_tasks import TraceTask
+    from airtruth.loop import METHODS
 
     options = _options(model, hold_out, jobs, seed, effect, time_budget, increments)
-    with (
-        trace_outputs("loop", logs, aircraft, out, force=force) as declared,
-        status("loop", quiet, TRACE_STEPS) as advance,
-    ):
-        result = close_loop(
-            logs, declared, out, method or METHODS, trace_options=options, force=force, advance=advance
+    task = TraceTask(tuple(logs), load_aircraft(aircraft), options, out, force, tuple(method or METHODS))
+    _perform(task, cluster, as_json=json_, quiet=quiet)
+
+
+def _perform(task: TraceTask, cluster: str | None, *, as_json: bool, quiet: bool) -> None:
+    """Perform a task here or on a cluster, and print its summary or its JSON file."""
+    from airtruth.api.trace_tasks import attempted_on, perform
+    from airtruth.cluster import workers
+
+    with workers(cluster) as on, status(task.command, quiet, TRACE_STEPS) as advance:
+        if on is None:
+            summary = perform(task, advance)
+        else:
+            advance(f"{task.command} on the cluster")
+            ((_, ended),) = attempted_on(on, [task])
+            if ended.error is not None:
+                raise ended.error
+            summary = ended.summary
+    print_result(task.answer.read_text(encoding="utf-8").rstrip() if as_json else summary.rstrip())
+
+
+def _trace_each(
+    sets: list[Path],
+    aircraft: str,
+    options: TraceOptions,
+    out: Path,
+    cluster: str | None,
+    *,
+    force: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    import json
+
+    from airtruth.api.campaigns import load_aircraft
+    from airtruth.api.trace_sets import trace_sets
+    from airtruth.cluster import workers
+
+    with workers(cluster) as on, progress_bar("trace", "sets", quiet) as advance:
+        result = trace_sets(
+            sets, load_aircraft(aircraft), options, out, force=force, cluster=on, advance=advance
         )
-    print_result(json.dumps(result.to_dict(), indent=1) if json_ else result.summary().rstrip())
+    print_result(json.dumps(result.to_dict(), indent=1) if as_json else result.summary().rstrip())
+    for one in result.failed:
+        notice(f"{one.name}: {one.error}")
+    if result.failed:
+        raise typer.Exit(FAILED_RUNS)
 
 
 def _options(

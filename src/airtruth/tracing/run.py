@@ -93,7 +93,7 @@ def _traced(
     case, rounds = _search(case, options, advance, starts_of(kinematics))
     advance("assess every stage on fitted and held-out records")
     stages = assess_stages(case, rounds)
-    origin = _provenance(logs, declared, options)
+    origin = provenance_of(logs, declared, options)
     if out is None:
         return TraceResult(
             _with_notes(conclude(stages, rounds, forced=forced), kinematics), rounds, stages, origin
@@ -107,7 +107,14 @@ def _traced(
     return result
 
 
-def _provenance(logs: Logs, aircraft: Aircraft, options: TraceOptions) -> Provenance:
+def provenance_of(logs: Logs, aircraft: Aircraft, options: TraceOptions) -> Provenance:
+    """Version, options and digests of the inputs of a trace.
+
+    Raises
+    ------
+    StoreError, ConfigurationError
+        If a file cannot be read, or a log does not exist.
+    """
     stated = {
         name: value for name, value in asdict(options).items() if name != "threads"
     }  # which changes nothing
@@ -170,4 +177,4 @@ def _effects(options: TraceOptions) -> list[Effect]:
     return list(found.values())
 
 
-__all__ = ["trace"]
+__all__ = ["provenance_of", "trace"]

@@ -1,0 +1,206 @@
+"""Many sets of records, each traced by itself: one folder for each set, and one table of the answers."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from airtruth.api.trace_tasks import Ended, TraceTask, attempt, attempted_on
+from airtruth.charts import Chart, Mark, Panel
+from airtruth.cluster import Cluster
+from airtruth.errors import ConfigurationError, LogError, StoreError
+from airtruth.logs.histories import FILE, read_histories
+from airtruth.logs.outputs import writing
+from airtruth.table import Table, as_html, as_text, flat, to_frame, write_table
+from airtruth.tracing.answer import ANSWER, TraceAnswer
+from airtruth.tracing.presentation.files import ERRORS
+from airtruth.tracing.presentation.text import effect_line
+from airtruth.tracing.presentation.trace_histories import PROVENANCE
+from airtruth.tracing.run import provenance_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from airtruth.aircraft import Aircraft
+    from airtruth.tracing import TraceOptions
+
+NAME: Final = "traces"
+"""Name of the table's files."""
+FAILED: Final = "failed"
+"""Entry of a set without an answer, in the place of its verdict."""
+Progress = Callable[[int, int, int], None]
+"""Called with the number of sets that are done, of all sets, and of those that failed."""
+
+
+@dataclass(frozen=True)
+class TracedSet:
+    """One set of records.
+
+    Attributes
+    ----------
+    name : of its folder below the output folder.
+    answer : what trace.json states; None if the set has no answer.
+    error : why it has none.
+    """
+
+    name: str
+    answer: TraceAnswer | None
+    error: str = ""
+
+
+@dataclass(frozen=True)
+class TracedSets:
+    """The answers to many sets of records; satisfies `airtruth.result.Result`.
+
+    Attributes
+    ----------
+    sets : in the order of the arguments.
+    """
+
+    sets: tuple[TracedSet, ...]
+
+    @property
+    def failed(self) -> tuple[TracedSet, ...]:
+        """Sets without an answer."""
+        return tuple(s for s in self.sets if s.answer is None)
+
+    @property
+    def verdicts(self) -> Mapping[str, int]:
+        """Number of sets with each verdict."""
+        return Counter(FAILED if s.answer is None else s.answer.verdict for s in self.sets)
+
+    def table(self) -> Table:
+        """One row for each set: verdict, effects with sizes, and the p-value of the declared model."""
+        columns = ("set", "verdict", "provisional", "p declared", "effects")
+        return flat(f"{len(self.sets)} sets of records", columns, [_row(s) for s in self.sets])
+
+    def summary(self) -> str:
+        """The number of sets with each verdict, then the table."""
+        counts = ", ".join(f"{count} {name}" for name, count in sorted(self.verdicts.items()))
+        return f"{len(self.sets)} sets of records traced: {counts}.\n\n{as_text(self.table())}"
+
+    def to_frame(self) -> pd.DataFrame:
+        """The table."""
+        return to_frame(self.table())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Name of a set -> its trace.json, or the reason why it has none under the key "error"."""
+        return {s.name: {"error": s.error} if s.answer is None else s.answer.to_dict() for s in self.sets}
+
+    def plot(self) -> Figure:
+        """Number of sets with each verdict."""
+        from airtruth.charts import as_figure
+
+        names = tuple(sorted(self.verdicts))
+        counts = [float(self.verdicts[name]) for name in names]
+        marks = tuple(Mark(row, n, 0.0, n, None, "", "blue") for row, n in enumerate(counts))
+        panel = Panel(x_label="Sets of records", rows=names, marks=marks)
+        return as_figure(Chart(NAME, "Verdicts", (panel,), columns=1))
+
+    def _repr_html_(self) -> str:
+        return as_html(self.table())
+
+
+def trace_sets(
+    sets: Sequence[Path],
+    aircraft: Aircraft,
+    options: TraceOptions,
+    out: Path,
+    *,
+    force: bool = False,
+    cluster: Cluster | None = None,
+    advance: Progress = lambda done, total, failed: None,
+) -> TracedSets:
+    """Trace each set of records into a folder of its name, and write the table of all (traces.csv, .md, .tex).
+
+    A set whose folder holds an answer by the same version, options and inputs is not traced again, so that the
+    same command continues after an interruption. An error of one set is stated in its row; the others go on.
+
+    Parameters
+    ----------
+    sets : files and folders of logs, one for each set.
+    aircraft : the declared aircraft.
+    options : choices of every trace.
+    out : folder of the folders.
+    force : see `airtruth.api.trace_tasks.TraceTask`; sets with an answer are traced again.
+    cluster : whose workers trace, in place of this process.
+    advance : receives the progress.
+
+    Raises
+    ------
+    ConfigurationError
+        If two sets have the same name.
+    StoreError
+        If the table cannot be written.
+    """
+    tasks = {
+        name: TraceTask((path,), aircraft, options, out / name, force) for name, path in _named(sets).items()
+    }
+    with writing("trace", sets, force=force) as outputs:
+        outputs.require(*(out / f"{NAME}.{suffix}" for suffix in ("csv", "md", "tex")))
+        found = {name: _earlier(task) for name, task in tasks.items()}
+        left = {name: task for name, task in tasks.items() if found[name] is None}
+        done, failed = len(tasks) - len(left), 0
+        advance(done, len(tasks), failed)
+        for task, ended in _attempted(list(left.values()), cluster):
+            found[task.out.name] = _traced(task, ended)
+            done, failed = done + 1, failed + (ended.error is not None)
+            advance(done, len(tasks), failed)
+        result = TracedSets(tuple(one for name in tasks if (one := found[name]) is not None))
+        write_table(result.table(), out, NAME)
+    return result
+
+
+def _attempted(tasks: list[TraceTask], cluster: Cluster | None) -> Iterator[tuple[TraceTask, Ended]]:
+    if cluster is not None:
+        return attempted_on(cluster, tasks)
+    return ((task, attempt(task)) for task in tasks)
+
+
+def _named(sets: Sequence[Path]) -> dict[str, Path]:
+    """Name of each set, that of its file or folder."""
+    found: dict[str, Path] = {}
+    for path in sets:
+        name = path.name if path.is_dir() else path.stem
+        if name in found:
+            raise ConfigurationError(
+                f"--each: {found[name]} and {path} have the same name {name!r}, which names their folder; rename one, or "
+                "trace it into another --out"
+            )
+        found[name] = path
+    return found
+
+
+def _earlier(task: TraceTask) -> TracedSet | None:
+    """The set if its folder holds an answer of the same version, options and inputs."""
+    if task.force or not all((task.out / name).is_file() for name in (ANSWER, FILE, ERRORS)):
+        return None
+    try:
+        stated = read_histories(task.out / FILE, "airtruth trace").facts.get(PROVENANCE)
+        if stated != provenance_of(task.logs, task.aircraft, task.options).to_dict():
+            return None
+        return TracedSet(task.out.name, TraceAnswer.read(task.answer))
+    except (StoreError, LogError):
+        return None
+
+
+def _traced(task: TraceTask, ended: Ended) -> TracedSet:
+    if ended.error is not None:
+        return TracedSet(task.out.name, None, str(ended.error))
+    return TracedSet(task.out.name, TraceAnswer.read(task.answer))
+
+
+def _row(one: TracedSet) -> tuple[str, ...]:
+    if one.answer is None:
+        return (one.name, FAILED, "", "", one.error.replace("\n", " "))
+    effects = "; ".join(effect_line(e) for e in one.answer.effects)
+    declared = one.answer.declared_model
+    p_value = "" if declared is None else f"{declared.p_value:.2g}"
+    return (one.name, one.answer.verdict, "yes" if one.answer.provisional else "no", p_value, effects)
+
+
+__all__ = ["FAILED", "NAME", "TracedSet", "TracedSets", "trace_sets"]
