@@ -16,7 +16,7 @@ BUDGET ?= 1
 AT := $(if $(STORE),--store $(STORE))
 CAMPAIGNS := light light-fit moderate moderate-fit
 
-.PHONY: planned check-study help setup setup-dev lock installed docs docs-links campaign campaign-quick loop study blind test test-slow test-all fuzz robustness mutants lint kernels browser bench clean
+.PHONY: planned check-study help setup setup-dev lock installed docs docs-links campaign campaign-quick loop study blind test test-slow test-long test-all fuzz robustness mutants lint kernels browser bench clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -84,10 +84,13 @@ blind: $(READY) ## 200 flight tests that the tracer has not seen, scored against
 test: lint kernels ## lint, types, unit and property tests, one end-to-end run of each command
 	$(BIN)/python -m pytest -n $(JOBS) --dist loadgroup
 
-test-slow: kernels ## the tests that take long: frozen trials, interrupted campaigns, measured flights, studies
-	$(BIN)/python -m pytest -n $(JOBS) --dist loadgroup -m "slow and not study"
+test-slow: kernels ## interrupted campaigns, stores, clusters, pages in a browser, one of each kind of trace
+	$(BIN)/python -m pytest -n $(JOBS) --dist loadgroup -m "slow and not long and not study"
 
-test-all: test test-slow ## every test
+test-long: kernels ## the rest: frozen trials, data/undeclared, measured flights, every fault, every document (an hour)
+	$(BIN)/python -m pytest -n $(JOBS) --dist loadgroup -m "long and not study"
+
+test-all: test test-slow test-long ## every test
 
 fuzz: kernels ## damage 33,000 logs, imported files, TOML files and results and use each (about half an hour; BUDGET scales it)
 	$(BIN)/python -m validation.fuzz --budget $(BUDGET) --seed 1

@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from tiers import sampled
 
 from airtruth.errors import FAILED_RUNS, INTERRUPTED, USAGE
 from validation.fuzz.logs import CAMPAIGN
@@ -137,7 +138,7 @@ def test_streams_of_quick_commands(name, home):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", SLOW)
+@pytest.mark.parametrize("name", sampled(SLOW, 5))
 def test_streams_of_every_command(name, campaign):
     check_endings(name, campaign)
 
@@ -196,7 +197,7 @@ def test_an_interrupt_during_the_imports(delay, home):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", SLOW)
+@pytest.mark.parametrize("name", sampled(SLOW, 5))
 def test_an_interrupt_of_every_command(name, campaign):
     rng = random.Random(name)
     for _ in range(4):

@@ -47,6 +47,7 @@ def few(tmp_path_factory):
     return undisturbed(verb, folder / "whole")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "seed"), [("fly", 2), ("identify", 3)])
 def test_a_killed_command_ends_with_the_files_of_an_undisturbed_one(verbs, tmp_path, name, seed):
     mode, _, fault = kill_trial(verbs[name], tmp_path / "trial", seed)

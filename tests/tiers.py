@@ -1,4 +1,4 @@
-"""Shares of a parameter set between the fast tests and the slow ones."""
+"""Shares of a parameter set between the fast tests, the slow ones and the long ones."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import pytest
 
 
 def sampled(cases: Iterable[Any], every: int) -> list[Any]:
-    """Cases of a parametrised test: the fast tests run the first of each ``every``, the slow tests run the others."""
+    """Cases of a parametrised test: the first of each ``every`` runs with the test, the others are long tests."""
     return [
-        case if number % every == 0 else pytest.param(*_values(case), marks=pytest.mark.slow)
+        case if number % every == 0 else pytest.param(*_values(case), marks=pytest.mark.long)
         for number, case in enumerate(cases)
     ]
 

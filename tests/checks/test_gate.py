@@ -44,7 +44,7 @@ def test_every_fault_is_named(name, log, gtm):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in FAULTS if name not in NEEDS_AIRCRAFT])
+@pytest.mark.parametrize("name", sampled((name for name in FAULTS if name not in NEEDS_AIRCRAFT), 5))
 def test_every_fault_is_named_without_an_aircraft(name, log):
     fault = certain(inspect(FAULTS[name](log)))[0]
     assert fault.channel in FAULTS[name].channels
@@ -73,7 +73,7 @@ def simulated(tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in FAULTS if name not in HIDDEN])
+@pytest.mark.parametrize("name", sampled((name for name in FAULTS if name not in HIDDEN), 5))
 def test_every_fault_of_a_simulated_record_is_named(name, simulated):
     fault = certain(inspect(FAULTS[name](simulated), planes.load("T38")))[0]
     assert fault.channel in FAULTS[name].channels
@@ -109,7 +109,9 @@ def test_clean_flights_pass(flight, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("flight", [f for f in table() if f.noisy], ids=lambda flight: flight.name)
+@pytest.mark.parametrize(
+    "flight", sampled((f for f in table() if f.noisy), 8), ids=lambda flight: flight.name
+)
 def test_all_clean_flights_pass(flight, tmp_path):
     """48 flights with much noise at five rates: 240 logs."""
     check_clean(flight, tmp_path)

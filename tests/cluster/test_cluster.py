@@ -144,6 +144,7 @@ def test_a_campaign_has_the_bytes_of_this_machine(cluster, campaign, local, tmp_
     assert far.equals(estimates)
 
 
+@pytest.mark.long
 def test_a_campaign_survives_dying_workers(campaign, local, tmp_path):
     """A nanny process starts each worker again; one of them is killed every three seconds, six times."""
     own = Processes(tmp_path, 2)
@@ -162,6 +163,7 @@ def test_a_campaign_survives_dying_workers(campaign, local, tmp_path):
     assert contents(tmp_path / "out") == contents(local[0])
 
 
+@pytest.mark.long
 def test_a_lost_scheduler_is_one_sentence_and_the_command_continues(campaign, local, tmp_path):
     own = Processes(tmp_path, 2)
     done = []

@@ -45,7 +45,7 @@ def test_a_row_is_imported_and_identified(name, logs):
         assert moved["std_s"] < 0.004
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_two_recorders_and_a_slow_vane_end_in_the_right_class(logs):
     folder, place = logs("two")
     assert len(log_paths(folder)) == 2

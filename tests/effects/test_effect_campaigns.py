@@ -23,6 +23,7 @@ def logs(out):
     return {p.name: p.read_bytes() for p in store.log_paths(out)}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "neutral",
     [

@@ -19,7 +19,7 @@ HERE = Path(__file__).resolve().parent
 RECORDS = ("fAttasElv1", "fAttasElv2")
 ARM_M = 13.08
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("attas")]
+pytestmark = [pytest.mark.long, pytest.mark.xdist_group("attas")]
 
 
 @pytest.fixture(scope="module")

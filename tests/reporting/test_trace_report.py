@@ -277,6 +277,7 @@ def test_page_of_a_trace_stands_alone(found, tmp_path):
     assert r"\begin{tabular}" in out.with_suffix(".tex").read_text()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["png", "svg", "pdf"])
 def test_figures_for_papers(found, tmp_path, kind):
     files = report(found[1], tmp_path / f"paper.{kind}")

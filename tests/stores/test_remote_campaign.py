@@ -106,6 +106,7 @@ def wait_for_records(out: Path, process: subprocess.Popen[str], number: int) -> 
         time.sleep(0.02)
 
 
+@pytest.mark.long
 def test_a_killed_and_resumed_campaign_has_the_bytes_of_a_local_one(
     bucket: str, campaign: Path, local: Path
 ) -> None:

@@ -159,7 +159,7 @@ def test_a_bucket_that_does_not_exist(bucket: str) -> None:
         path.upload(b"1" * 20_000_000)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_store_that_does_not_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     server = Server(tmp_path)
     use(server, monkeypatch)

@@ -9,7 +9,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_quick_campaign_ends_in_tables_and_figures_and_resumes(tmp_path):
     command = [
         sys.executable,

@@ -58,7 +58,7 @@ def test_a_wrong_line_is_reported(tmp_path):
     assert "exit code 2" in wrong[1]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_readme_prints_what_it_shows(tmp_path):
     import os
     import sys

@@ -79,6 +79,7 @@ def test_shown_rounds_to_the_error():
     assert study.shown(Entry("ls", "", "iterations", 2.0)) == "2"
 
 
+@pytest.mark.long
 def test_misfit_is_the_rms_of_z_over_the_printed_columns(small):
     tables = study.tables_of(small, cases.SETTINGS[0])
     z = [tables[0].entries["ls", p, "mean"].z for p in study.PARAMETERS]

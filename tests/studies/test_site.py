@@ -155,7 +155,7 @@ def locks(path: Path) -> dict[str, set[str]]:
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_notebook_closes_the_loop(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", RUNNER, str(NOTEBOOK)],

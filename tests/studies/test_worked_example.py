@@ -21,7 +21,7 @@ def made(tmp_path_factory):
     return worked_example.make(tmp_path_factory.mktemp("example"))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_page_shows_every_block_and_its_commands_are_what_was_run(made):
     page = worked_example.PAGE.read_text(encoding="utf-8")
     marked = dict(re.findall(r"<!-- example: ([\w-]+) -->\n```\n(.*?)\n```", page, re.DOTALL))
@@ -34,13 +34,13 @@ def test_the_page_shows_every_block_and_its_commands_are_what_was_run(made):
     assert marked["refused"] == made.blocks["refused"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_guess_is_refused_and_the_settled_mapping_goes_through(made):
     assert made.codes.pop("refused") == 2
     assert set(made.codes.values()) == {0}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_undeclared_arm_is_traced(made):
     answer = json.loads((made.folder / "traced" / "trace.json").read_text(encoding="utf-8"))
     assert answer["verdict"] == "traced"

@@ -168,7 +168,7 @@ def test_a_multisine_stays_below_a_quarter_of_the_rate():
     assert power[frequency > 2.45].sum() < 1e-3 * power.sum()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_fewer_samples_tell_less_of_an_effect(calm):
     """White noise in calm air: the noncentrality of a scale falls with the number of samples."""
     effects = (Added("gyro_scale", {"factor": 1.05}),)
@@ -181,7 +181,7 @@ def test_fewer_samples_tell_less_of_an_effect(calm):
     assert 0.35 < found[1] / found[0] < 0.75
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("mode", CONDITIONS)
 def test_the_truth_fits_its_own_held_out_records(mode, tmp_path):
     """Calm air: the error of the true aircraft, biases and initial state free, is the sensors' noise."""

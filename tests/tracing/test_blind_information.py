@@ -12,7 +12,7 @@ from validation.blind.figures import BODY, CHANNELS, NOISE
 from validation.blind.flight import Truth
 from validation.blind.truths import Added, Parts, combined, model
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 
 def test_noncentrality_of_a_sine_in_white_noise():

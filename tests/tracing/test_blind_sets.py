@@ -134,14 +134,14 @@ def calm():
     return replace(draw.draw(1, 0, "derivative"), air="calm", noise="white", body=Body(), duration_s=5.0)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_shifts_are_as_strong_as_their_declared_uncertainty_lets_them_be(calm):
     """In calm air the records fix a slope far better than its declaration: lambda is (shift/std)^2, a little less."""
     trial = replace(calm, effects=(Added("derivatives", {"dCmalpha": 0.3 * 1.79}),))
     assert refit.lambdas(trial)["derivatives"] == pytest.approx(36.0, rel=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_set_is_as_strong_as_what_imitates_it(calm):
     """A larger inertia divides the moments: at most (0.25/0.03)^2 of the inertia alone, and at least what inertia and
     the three slopes leave together, known to 3 % and to 5, 15 and 5 %; the curves of the tables tell more than slopes.

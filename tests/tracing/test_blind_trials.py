@@ -17,7 +17,7 @@ from validation.blind import draw, results, scoring, trials
 from validation.blind.figures import APART, BEYOND
 from validation.blind.scoring import Share
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).parent

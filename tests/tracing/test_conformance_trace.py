@@ -10,7 +10,7 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.tracing import TraceOptions, trace
 from airtruth.units import DEG
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 LIGHT, CALM = flights.LIGHT, flights.CALM
 

@@ -27,7 +27,7 @@ OFF_LIBRARY = (0, 1, 23)
 their noncentrality; of a fourth, a weak mode of the structure in 14, it leaves 9.9."""
 NOT_WORSE = 1.02
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 
 def names(effect):

@@ -108,7 +108,7 @@ def test_the_written_module_scales_a_table_without_a_closed_form():
 OTHERS = ("elevator_delay", "vane_lag", "gyro_lag")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_break_that_the_library_lacks_is_learned_added_and_confirmed(tmp_path):
     """The library is left without breaks and curves (three effects of sensors and surface); Cm has a break at 5 deg."""
     truth = {"dCmalpha": -1.2, "at_alpha_rad": np.deg2rad(5.0)}

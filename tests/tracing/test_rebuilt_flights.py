@@ -6,7 +6,7 @@ import rebuilt_flights as rebuilt
 from airtruth import aircraft as planes
 from airtruth.tracing import TraceOptions, trace
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 TAIL = pytest.mark.xdist_group("lost tail")
 """Tests of one answer, which one process traces."""

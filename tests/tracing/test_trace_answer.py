@@ -173,6 +173,7 @@ def test_default_holds_out_every_third(traced):
     }
 
 
+@pytest.mark.long
 def test_held_out_runs_serve_the_report_alone(flown):
     """Another record held out: other errors there, and nothing of it in what is fitted, to the last bit."""
     log = log_of(flown["delay"])
@@ -258,6 +259,7 @@ def test_a_name_without_its_variant_means_all_of_them(flown):
 # -- what it must not depend on
 
 
+@pytest.mark.long
 def test_threads_change_no_byte(flown, tmp_path, monkeypatch):
     texts = []
     for threads in (1, 2):
@@ -269,6 +271,7 @@ def test_threads_change_no_byte(flown, tmp_path, monkeypatch):
     assert texts[0] == texts[1]
 
 
+@pytest.mark.long
 def test_nothing_that_tells_the_truth_is_read(flown, tmp_path, monkeypatch):
     """plan.parquet, truth.parquet and what else stands beside the logs replaced by rubbish: the same bytes."""
     texts = []
@@ -285,6 +288,7 @@ def test_nothing_that_tells_the_truth_is_read(flown, tmp_path, monkeypatch):
     assert texts[0] == texts[1]
 
 
+@pytest.mark.long
 def test_order_of_logs_does_not_matter(flown):
     """Forward and backward: the same effects to a thousandth of their error."""
     options = TraceOptions(hold_out=("blind-000001",), effects=FEW)

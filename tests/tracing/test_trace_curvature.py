@@ -20,7 +20,7 @@ KEY = "cm_alpha_nonlinear:quadratic"
 TRUE = -8.0
 GTM = planes.load("gtm")
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("curvature")]
+pytestmark = [pytest.mark.long, pytest.mark.xdist_group("curvature")]
 
 
 @pytest.fixture(scope="module")

@@ -28,7 +28,7 @@ for name in sys.argv[1:]:
 WORSE = 1.02
 """A held-out error counts as worse above this ratio (docs/blind.md)."""
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("undeclared")]
+pytestmark = [pytest.mark.long, pytest.mark.xdist_group("undeclared")]
 
 
 @pytest.fixture(scope="module")
