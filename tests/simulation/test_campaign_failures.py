@@ -114,7 +114,7 @@ def test_full_disk_is_one_message_and_resumes(tmp_path, jobs):
     smallest = min(len(v) for k, v in whole.items() if k.startswith("logs/"))
     assert smallest > len(whole["plan.parquet"]) + 4096
     file, out = write(tmp_path / "campaign.toml", **LARGE), tmp_path / "out"
-    arguments = [smallest - 1024, "fly", file, "--out", out, "--jobs", jobs]
+    arguments = [smallest - 1024, "fly", file, "--out", out, "--jobs", jobs, "--quiet"]
     ended = subprocess.run(
         [sys.executable, "-c", LIMITED, *map(str, arguments)], capture_output=True, text=True, check=False
     )

@@ -87,7 +87,18 @@ def flying(folder, jobs=2):
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # of a shell's background jobs, and inherited
         signal.signal(signal.SIGINT, signal.default_int_handler)
     process = subprocess.Popen(
-        [sys.executable, "-m", "airtruth", "fly", file, "--out", folder / "out", "--jobs", str(jobs)],
+        [
+            sys.executable,
+            "-m",
+            "airtruth",
+            "fly",
+            file,
+            "--out",
+            folder / "out",
+            "--jobs",
+            str(jobs),
+            "--quiet",
+        ],
         start_new_session=True,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

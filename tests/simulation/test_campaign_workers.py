@@ -74,7 +74,7 @@ def test_a_run_whose_process_is_killed_is_interrupted_and_flown_by_the_next_comm
         states = {r["run_id"]: r["status"] for r in runs_recorded(out)}
         assert [s for s in states.values() if s != "ok"] == ["interrupted"] * 2
     dies(signal.SIGKILL, -1)
-    ended = command("fly", file, "--out", out, "--jobs", 1)
+    ended = command("fly", file, "--out", out, "--jobs", 1, "--quiet")
     assert (ended.code, ended.out, ended.err) == (0, f"18 runs in {out} (2 flown now, 0 failed)\n", "")
     assert results(out) == results(whole)
 
@@ -86,7 +86,7 @@ def test_files_of_the_working_folder_are_not_imported(tmp_path):
         (tmp_path / f"{name}.py").write_text(f"open({str(canary)!r}, 'w'); raise SystemExit(9)")
     file = write(tmp_path / "campaign.toml", runs=2)
     done = subprocess.run(
-        [sys.executable, "-P", "-m", "airtruth", "fly", file, "--out", "out", "--jobs", "2"],
+        [sys.executable, "-P", "-m", "airtruth", "fly", file, "--out", "out", "--jobs", "2", "--quiet"],
         cwd=tmp_path,
         capture_output=True,
         text=True,

@@ -138,13 +138,13 @@ def test_damage_in_a_store_is_named_and_repaired(bucket: str, campaign: Path, lo
 
 def test_the_commands_take_urls(bucket: str, campaign: Path, local: Path) -> None:
     url = f"{bucket}/by command"
-    flown = command("fly", campaign, "--out", url, "--runs", 8, "--jobs", 1)
+    flown = command("fly", campaign, "--out", url, "--runs", 8, "--jobs", 1, "--quiet")
     assert (flown.returncode, flown.stderr) == (0, "")
     assert flown.stdout == f"8 runs in {url} (8 flown now, 0 failed)\n"
     for arguments in (
-        ("identify", url, "--aircraft", "gtm", "--method", "ls"),
-        ("tables", url, "--out", f"{url}/tables"),
-        ("report", url, "--out", f"{url}/report.html"),
+        ("identify", url, "--aircraft", "gtm", "--method", "ls", "--quiet"),
+        ("tables", url, "--out", f"{url}/tables", "--quiet"),
+        ("report", url, "--out", f"{url}/report.html", "--quiet"),
         ("verify", url),
         ("verify", f"{url}/tables"),
     ):

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Final
 import typer
 from typer.core import TyperGroup
 
+from airtruth.cli.failure import require_memory
 from airtruth.cli.journal import Application, LogFile, Verbose, journal
 from airtruth.cli.output import print_result
 from airtruth.errors import ConfigurationError, choices
@@ -128,3 +129,4 @@ def _root(
 
         print_result(__version__)
         raise typer.Exit
+    require_memory()

@@ -16,6 +16,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Final
 
+from airtruth.errors import ConfigurationError
+
 RESOURCES: Final = {
     errno.EMFILE: "too many files are open; raise the limit (ulimit -n) and run again",
     errno.ENFILE: "too many files are open on this machine; close some and run again",
@@ -29,6 +31,9 @@ RESOURCES: Final = {
 LEAST_MEMORY: Final = 2e9
 """Limit of the address space below which a failure is attributed to it [byte] (judgement: the libraries reserve about
 1 GB)."""
+LEAST_TO_START: Final = 1_500_000_000
+"""Address space that a command needs [byte]; `fly` takes 0.96 GB, `identify` and `check` 1.2 GB. With 0.8 to 1.1 GB,
+libraries crashed, or waited forever for a thread that could not start."""
 LONGEST_REASON: Final = 200
 """Characters of an exception's message that the sentence quotes (judgement: two lines of a terminal)."""
 
@@ -49,6 +54,22 @@ def lacking_resource(error: Exception) -> str | None:
             f"airtruth may need {LEAST_MEMORY / 1e9:.2g} GB: raise the limit and run again"
         )
     return None
+
+
+def require_memory() -> None:
+    """Refuse to start where the limit of the address space would end a library without a message.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the limit and the next step.
+    """
+    limit = _memory_limit()
+    if limit < LEAST_TO_START:
+        raise ConfigurationError(
+            f"the address space of this process is limited to {limit / 1e9:.2g} GB (ulimit -v), and airtruth needs "
+            f"{LEAST_TO_START / 1e9:.2g} GB; raise the limit with `ulimit -v {LEAST_TO_START // 1024}`, or run without it"
+        )
 
 
 def _reason(error: Exception) -> str:
