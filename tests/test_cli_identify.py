@@ -131,6 +131,7 @@ def test_wrong_names_are_told_with_the_allowed_ones(flown, arguments, message):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_tables_stand_beside_the_published_figures(flown, tmp_path):
     run("identify", flown, "--aircraft", "gtm", "--method", "ls", "--method", "iv-lowpass")
     done = run("tables", flown, "--out", tmp_path / "tables")

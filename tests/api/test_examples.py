@@ -13,9 +13,12 @@ import airtruth as at
 FUNCTIONS = {name: getattr(at, name) for name in at.__all__ if inspect.isfunction(getattr(at, name))}
 METHODS = {f"FlightLog.{name}": getattr(at.FlightLog, name) for name in ("select", "concat", "to_frame")}
 EXAMPLES = FUNCTIONS | METHODS
+SLOW = ("trace", "close_loop")
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in EXAMPLES]
+)
 def test_example_runs_as_written(name: str, workspace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(workspace)
     documented = EXAMPLES[name]

@@ -61,6 +61,7 @@ def test_no_module_has_the_name_of_a_public_function() -> None:
     assert not modules & functions
 
 
+@pytest.mark.slow
 def test_functions_survive_the_import_of_every_room() -> None:
     script = (
         "import airtruth as at, airtruth.cli, airtruth.reporting, airtruth.tracing, airtruth.design\n"

@@ -81,6 +81,7 @@ def test_aircraft_in_every_form(workspace: Path) -> None:
         at.load_aircraft(3)
 
 
+@pytest.mark.slow
 def test_check_joins_logs_and_selects_runs(workspace: Path) -> None:
     log = at.read_log(workspace / "out" / "light")
     some = at.check(log, "gtm", run_ids=log.run_ids[:3])

@@ -44,6 +44,7 @@ def log(request, tmp_path_factory):
     return read_log(log_paths(folder / "flown")[0])
 
 
+@pytest.mark.slow
 def test_a_damped_log_passes(log):
     """Without the feedback in the relation, the surface leads the command and some runs are refused."""
     assert [fault.sentence for fault in gate.inspect(log, aircraft.load("gtm")) if fault.certain] == []

@@ -183,6 +183,7 @@ def test_command_line_writes_a_campaign_that_flies(quick, tmp_path):
     assert json.loads(again.stdout) == facts
 
 
+@pytest.mark.slow
 def test_every_form_of_the_result_agrees(quick, tmp_path):
     campaign = base_campaign(None, False, "gtm")
     result = at.plan(campaign, split=("vane_scale", "gyro_scale"), records=3, limits=LIMITS)

@@ -38,6 +38,7 @@ def point(gtm, paper_condition):
     return linear_point(gtm, paper_condition)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", CASES)
 def test_the_written_aircraft_has_the_derivatives_of_its_effect(gtm, paper_condition, point, tmp_path, key):
     change = EFFECTS[key].change(CASES[key])

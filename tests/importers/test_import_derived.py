@@ -37,6 +37,7 @@ def stored(log, folder, **changes):
     return folder / "f.parquet"
 
 
+@pytest.mark.slow
 def test_dynamic_pressure_gives_the_true_airspeed(log, tmp_path):
     pressure = 0.5 * log.channels["density_kg_m3"] * log.channels["airspeed_m_s"] ** 2
     path = stored(log, tmp_path, qbar=pressure / 47.880259)
@@ -120,6 +121,7 @@ def test_errors_of_instruments_stay_within_the_directions():
     assert (spread < 1.3).all()
 
 
+@pytest.mark.slow
 def test_a_log_without_a_vane_is_imported_and_identified_with_wider_intervals(log, gtm, tmp_path):
     path = stored(log, tmp_path)
     names = [n for n in UNITS if n != "alpha_rad"]

@@ -87,6 +87,7 @@ def test_every_query_gives_rows(results: dict[int, Any]) -> None:
         assert result is None or len(result), BLOCKS[number][1]
 
 
+@pytest.mark.slow
 def test_bias_is_that_of_pandas(campaigns: Path, results: dict[int, Any]) -> None:
     out = campaigns / "out" / "light"
     both = pd.read_parquet(out / "estimates.parquet").merge(

@@ -49,6 +49,7 @@ def test_a_slow_vane_is_a_start(logs, gtm):
     assert len(check.run_ids) == 3
 
 
+@pytest.mark.slow
 def test_held_out_records_take_no_part(logs, gtm):
     last = logs[-1].run_ids[-1]
     assert last not in kinematic_check(logs, gtm, held={last}).run_ids
