@@ -30,12 +30,14 @@ from cosmic_ray.plugins import get_operator, operator_names
 ROOT: Final = Path(__file__).resolve().parents[1]
 LEAST: Final = 0.85
 """Share of mutants that the tests have to kill [-]: the target of the project."""
-TIMEOUT_S: Final = 120.0
+TIMEOUT_S: Final = 240.0
 """A mutant whose tests take longer counts as killed [s]: several times the slowest unmutated run."""
 COPIED: Final = ("src", "tests", "aircraft", "data", "scripts", "studies", "validation", "pyproject.toml")
 """Parts of the project that a test run reads."""
 ARITHMETIC: Final = ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "FloorDiv_Mul", "Mod_Mul")
 """Arithmetic replacements that are made. The others fail on types or repeat these."""
+SLOW_TOO: Final = "-mnot long and not study"
+"""Option that adds the slow tests: a campaign that is killed or damaged is one of them."""
 TESTS: Final[dict[str, tuple[str, ...]]] = {
     "physics/atmosphere": ("tests/physics/test_atmosphere.py",),
     "physics/short_period": ("tests/physics/test_short_period.py",),
@@ -55,10 +57,13 @@ TESTS: Final[dict[str, tuple[str, ...]]] = {
     "simulation/campaign/run": (
         "tests/simulation/test_campaign_failures.py",
         "tests/simulation/test_campaign_killed.py",
+        "-knot all_its_processes and not ctrl_c",
+        SLOW_TOO,
     ),
     "simulation/campaign/chunk": (
         "tests/simulation/test_campaign_failures.py",
         "tests/simulation/test_log_contract.py",
+        SLOW_TOO,
     ),
     "simulation/campaign/plan": (
         "tests/simulation/test_bad_campaigns.py",
@@ -67,12 +72,13 @@ TESTS: Final[dict[str, tuple[str, ...]]] = {
     "logs/manifest": ("tests/logs/test_manifest.py",),
     "logs/ledger": ("tests/logs/test_outputs.py",),
     "logs/outputs": ("tests/logs/test_outputs.py",),
-    "logs/verify": ("tests/simulation/test_campaign_damaged.py",),
+    "logs/verify": ("tests/simulation/test_campaign_damaged.py", SLOW_TOO),
     "simulation/campaign/folder": (
         "tests/simulation/test_campaign_bytes.py",
         "tests/simulation/test_campaign_damaged.py",
+        SLOW_TOO,
     ),
-    "simulation/campaign/workers": ("tests/simulation/test_campaign_workers.py",),
+    "simulation/campaign/workers": ("tests/simulation/test_campaign_workers.py", SLOW_TOO),
 }
 """Module below src/airtruth -> tests that have to notice a change of it."""
 

@@ -197,7 +197,7 @@ def test_an_interrupt_during_the_imports(delay, home):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sampled(SLOW, 5))
+@pytest.mark.parametrize("name", sampled(SLOW, 13))
 def test_an_interrupt_of_every_command(name, campaign):
     rng = random.Random(name)
     for _ in range(4):

@@ -9,6 +9,7 @@ import time
 
 import pytest
 from fly_campaigns import alive, children, fly, leftovers, results, runs_recorded, write
+from tiers import sampled
 
 from airtruth.simulation.campaign import plan
 from airtruth.simulation.campaign import run as campaign
@@ -124,7 +125,7 @@ def done(folder):
     return len(runs_recorded(folder / "out"))
 
 
-@pytest.mark.parametrize("share", [None, 0.0, 0.3, 0.8])
+@pytest.mark.parametrize("share", sampled([None, 0.0, 0.3, 0.8], 4))
 def test_killed_with_all_its_processes(long, tmp_path, share):
     """None: as soon as the folder exists; else once this share of the runs is recorded."""
     with flying(tmp_path) as process:
@@ -161,7 +162,7 @@ def test_a_killed_worker_costs_no_run(long, tmp_path):
     assert results(tmp_path / "out") == long
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", sampled([1, 2], 2))
 def test_ctrl_c_exits_130_says_so_and_resumes(long, tmp_path, jobs):
     with flying(tmp_path, jobs) as process:
         wait_until(lambda: done(tmp_path) > 0, process)

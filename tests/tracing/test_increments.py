@@ -16,6 +16,7 @@ from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
 from airtruth.tracing.effect_module import MODULE, effect_module
 from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import (
     likelihood_terms,
     marginal_information,
@@ -23,8 +24,10 @@ from airtruth.tracing.inference.posterior import (
     sensitivities_of,
 )
 from airtruth.tracing.inference.whitening import NO_WHITENER
-from airtruth.tracing.model.parameters import size_index
+from airtruth.tracing.model.parameters import Parameters, size_index
+from airtruth.tracing.selection.increment_fit import redundant_increment
 from airtruth.tracing.selection.increments import log_evidences
+from airtruth.units import DEG
 
 
 def test_evidence_is_that_of_a_linear_model():
@@ -105,6 +108,34 @@ def test_the_written_module_scales_a_table_without_a_closed_form():
     np.testing.assert_allclose(flown, 2.0 * np.array(value), atol=1e-12)
 
 
+NEEDED = increment(Shape("Cm", "elevator", -3.0 * DEG, 3.0 * DEG, 6, trim=0.0), 0.01)
+"""What a surface lacks that is measured half a degree too far for each degree beyond one."""
+IDLE = increment(Shape("Cm", "alpha", -0.03, 0.03, 4, trim=0.0), 0.01)
+
+
+def beyond_one_degree(one):
+    e = one.signals.elevator_rad
+    measured = e + 0.5 * np.sign(e) * np.maximum(np.abs(e) - DEG, 0.0)
+    return replace(one, signals=replace(one.signals, elevator_rad=measured))
+
+
+@pytest.mark.parametrize(("order", "expected"), [((NEEDED, IDLE), None), ((IDLE, NEEDED), IDLE.key)])
+def test_an_increment_that_a_later_one_makes_redundant_is_named(order, expected):
+    rng = np.random.default_rng(5)
+    problem = tr.problem(
+        [
+            beyond_one_degree(tr.fly(rng, amplitude=a * DEG, sigma_w=0.05, name=str(a)))
+            for a in (2.5, -2.5, 2.0)
+        ]
+    )
+    hypothesis = tr.NOTHING.plus(order[0]).plus(order[1])
+    start = initial_parameters(problem, hypothesis)
+    zero = np.zeros(order[0].bends + order[1].bends)
+    found = fit(problem, hypothesis, Parameters(start.common, start.per_record, zero))
+    named = redundant_increment(problem, found, tried=70)
+    assert (named.key if named else None) == expected
+
+
 OTHERS = ("elevator_delay", "vane_lag", "gyro_lag")
 
 
@@ -119,7 +150,7 @@ def test_a_break_that_the_library_lacks_is_learned_added_and_confirmed(tmp_path)
     assert answer["verdict"] == "learned"
     assert answer["confirmed"]
     increments = {e["variant"]: e for e in answer["effects"] if e["name"] == "increment"}
-    print(increments)
+    assert list(increments) == ["Cm over alpha_rad"]
     effect = increments["Cm over alpha_rad"]
     assert (effect["acts_on"], effect["over"], effect["states"]) == ("Cm", "alpha_rad", [])
     table = effect["table"]

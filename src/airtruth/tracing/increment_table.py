@@ -12,8 +12,8 @@ from airtruth.effects.increment import SIGNAL_NAMES, Increment
 from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable
 from airtruth.tracing.answer import Z95, CandidateScore
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.selection.increment_fit import fitted_bends, relative_swing
 from airtruth.tracing.selection.increments import flown
-from airtruth.tracing.selection.learn import fitted_bends, relative_swing
 from airtruth.tracing.selection.rounds import SearchRound
 
 Array = NDArray[np.float64]

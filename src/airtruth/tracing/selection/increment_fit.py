@@ -1,0 +1,239 @@
+"""A learned increment fitted to records: its prior, its evidence, and the tests that it has to pass."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from airtruth.effects.increment import Increment
+from airtruth.physics.short_period import PARAMETERS
+from airtruth.tracing.inference.optimise import fit
+from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.inference.robust import inflation, robust_covariance
+from airtruth.tracing.model.parameters import size_index
+from airtruth.tracing.selection.acceptance import (
+    IMMATERIAL,
+    UNCONVERGED,
+    Candidate,
+    Reference,
+    has_converged,
+    tested_on_left_out,
+)
+from airtruth.tracing.selection.increments import Screened, flown
+from airtruth.tracing.selection.score_test import Direction, Score
+
+Array = NDArray[np.float64]
+
+_ITERATIONS: Final = 8
+"""Iterations of an increment's refit, and half of it of the refit with another prior [-] (judgement: enough to rank
+the shapes; the leader is refitted until it converges)."""
+_ATTEMPTS: Final = 3
+"""Number of further refits that the leader is given to converge [-] (judgement)."""
+LEAST_ODDS: Final = 5.0
+"""Log of the posterior odds, all shapes equally probable beforehand, from which an increment is accepted [-]
+(judgement: the gain of a named effect has to be 10 in 2 log L)."""
+_TWO_DEVIATIONS: Final = 0.0455
+"""Probability beyond two standard deviations [-] (convention), as for the size of a named effect."""
+WITHIN_ERROR: Final = "its size is within two standard deviations"
+"""Reason of an increment that its scatter between records explains."""
+_MATERIAL: Final = 0.02
+"""Least swing of an increment over that of the declared derivative in the same range [-] (judgement: 2 % is about the
+material size of the named effects)."""
+_FLOWN: Final = (0.02, 0.98)
+"""Quantiles of the flown signal between which the swing counts [-] (judgement)."""
+_DERIVATIVE: Final[Mapping[str, str]] = {
+    "alpha": "alpha",
+    "elevator": "de",
+    "qhat": "q",
+    "alpha_dot_hat": "q",
+}
+"""Derivative with which an increment over a signal is compared; a moment by alpha' with the damping."""
+
+
+@dataclass(frozen=True)
+class FittedIncrement:
+    """A refitted increment.
+
+    Attributes
+    ----------
+    effect : the increment, with its prior.
+    fit : with all parameters free.
+    log_evidence : log of the posterior odds against the null [-].
+    """
+
+    effect: Increment
+    fit: PosteriorFit
+    log_evidence: float
+
+
+def refitted(problem: TraceProblem, null: PosteriorFit, s: Screened, tried: int) -> FittedIncrement | None:
+    """All parameters with the increment; the prior's standard deviation is estimated again, once."""
+    memory, effect = s.effect.shape.memory, s.effect
+    times = [] if memory is None else [memory.time_s, memory.damping][: len(effect.parameters) - effect.bends]
+    sizes = np.concatenate([null.point.sizes, s.start, times])
+    start = replace(null.point, sizes=sizes)
+    own = fit(problem, null.hypothesis.plus(effect), start, iterations=_ITERATIONS)
+    if own is None:
+        return None
+    best = FittedIncrement(effect, own, log_evidence(null, own, effect, tried))
+    again = _restated(own, effect)
+    if again is not None:
+        own = fit(problem, null.hypothesis.plus(again), own.point, iterations=_ITERATIONS // 2)
+        if own is not None:
+            retried = FittedIncrement(again, own, log_evidence(null, own, again, tried))
+            best = max(best, retried, key=lambda learned: learned.log_evidence)
+    return best
+
+
+def converged(
+    problem: TraceProblem, null: PosteriorFit, learned: Sequence[FittedIncrement], tried: int
+) -> list[FittedIncrement]:
+    """The refits, best first, the best one converged if a few more refits achieve it."""
+    ranked = sorted(learned, key=lambda own: -own.log_evidence)
+    for _ in range(_ATTEMPTS):
+        if not ranked or has_converged(ranked[0].fit, 2.0 * ranked[0].log_evidence):
+            break
+        effect, first = ranked[0].effect, ranked[0].fit
+        own = fit(problem, first.hypothesis, first.point)
+        if own is None:
+            break
+        ranked[0] = FittedIncrement(effect, own, log_evidence(null, own, effect, tried))
+        ranked.sort(key=lambda other: -other.log_evidence)
+    return ranked
+
+
+def _restated(own: PosteriorFit, effect: Increment) -> Increment | None:
+    """The increment with the prior that its bends ask for (MacKay's fixed point); None where that is the present one."""
+    bends, covariance = fitted_bends(own, effect, own.covariance)
+    old = effect.parameters[0].prior_std
+    effective = effect.bends - float(np.trace(covariance)) / old**2
+    if not effective > 0.0:
+        return None
+    new = float(np.sqrt(bends @ bends / effective))
+    low, high = 1e-3 * effect.parameters[0].high, effect.parameters[0].high
+    new = min(max(new, low), high)
+    return effect.with_prior(new) if abs(np.log(new / old)) > np.log(1.5) else None
+
+
+def fitted_bends(own: PosteriorFit, effect: Increment, covariance: Array) -> tuple[Array, Array]:
+    """Bends of an increment (bends,) [-] and their covariance (bends, bends).
+
+    Parameters
+    ----------
+    own : a fit with the increment; covariance : of its common parameters and sizes.
+    """
+    first = own.hypothesis.span(effect.key).start
+    at = slice(size_index(first), size_index(first) + effect.bends)
+    return own.point.sizes[first : first + effect.bends], covariance[at, at]
+
+
+def log_evidence(null: PosteriorFit, own: PosteriorFit, effect: Increment, tried: int) -> float:
+    """Log of the posterior odds of an increment (Laplace), one for each of its times; every shape equally probable."""
+    _, covariance = fitted_bends(own, effect, own.covariance)
+    volume = np.linalg.slogdet(covariance)[1] - 2.0 * effect.bends * np.log(effect.parameters[0].prior_std)
+    times = len(effect.parameters) - effect.bends
+    return float(null.cost - own.cost + 0.5 * volume - times - np.log(tried))
+
+
+def assessed(problem: TraceProblem, own: FittedIncrement, reference: Reference) -> Candidate:
+    """A refitted increment with the tests that it fails."""
+    gain = 2.0 * own.log_evidence
+    ratios = inflation(problem, own.fit)
+    first = size_index(own.fit.hypothesis.span(own.effect.key).start)
+    excess = float(np.mean(ratios[first : first + own.effect.bends] ** 2))
+    left_out = tested_on_left_out(problem, own.fit, reference)
+    swing = relative_swing(problem, own.fit, own.effect)
+    reasons = (
+        *([] if has_converged(own.fit, gain) else [UNCONVERGED]),
+        *(["its evidence is not significant"] if own.log_evidence < LEAST_ODDS * excess else []),
+        *([] if _is_apart_from_zero(problem, own) else [WITHIN_ERROR]),
+        *left_out.reasons,
+        *([IMMATERIAL] if swing < _MATERIAL else []),
+    )
+    return Candidate(
+        score=evidence_score(own),
+        fit=own.fit,
+        gain=gain,
+        likelihood_gain=left_out.likelihood_gain,
+        free_run_gain=left_out.free_run_gain,
+        size=swing,
+        std=float("nan"),
+        reasons=reasons,
+    )
+
+
+def _is_apart_from_zero(problem: TraceProblem, own: FittedIncrement) -> bool:
+    """Whether the bends exceed two standard deviations (Wald), the scatter between records in the covariance."""
+    bends, covariance = fitted_bends(own.fit, own.effect, robust_covariance(problem, own.fit))
+    return bool(chi2.sf(bends @ np.linalg.solve(covariance, bends), len(bends)) < _TWO_DEVIATIONS)
+
+
+def relative_swing(problem: TraceProblem, own: PosteriorFit, effect: Increment) -> float:
+    """Swing of an increment over that of the declared derivative in the flown range [-]; for a linear one its share."""
+    shape = effect.shape
+    bends, _ = fitted_bends(own, effect, own.covariance)
+    index = PARAMETERS.index(f"{shape.coefficient}{_DERIVATIVE[shape.signal]}")
+    declared = abs(float(problem.declared_derivatives[index]))
+    if not shape.cells:
+        return abs(float(bends[0])) / declared
+    signal = np.concatenate([flown(r, shape.signal) for r in problem.records])
+    low, high = np.quantile(signal, _FLOWN)
+    values = shape.basis(np.linspace(low, high, 101)) @ bends
+    return float(np.ptp(values) / (declared * (high - low)))
+
+
+def evidence_score(own: FittedIncrement) -> Score:
+    """The evidence as a score; the inverse of a Bayes factor bounds the p-value (J. Ville, 1939)."""
+    effect = own.effect
+    return Score(
+        effect=effect,
+        z=float(np.sqrt(max(2.0 * own.log_evidence, 0.0))),
+        p_value=float(np.exp(-max(own.log_evidence, 0.0))),
+        size=float("nan"),
+        direction=Direction(effect, (), effect.parameters[0].step),
+        information=0.0,
+        index=-1,
+    )
+
+
+def redundant_increment(problem: TraceProblem, fitted: PosteriorFit, tried: int) -> Increment | None:
+    """The first increment that the last effect makes redundant: its posterior odds beside the others are too low.
+
+    Parameters
+    ----------
+    fitted : a fit whose last effect was added last; tried : number of shapes that were tried.
+    """
+    for effect in fitted.hypothesis.effects[:-1]:
+        if isinstance(effect, Increment):
+            less = _without(problem, fitted, effect)
+            if less is not None and log_evidence(less, fitted, effect, tried) < LEAST_ODDS:
+                return effect
+    return None
+
+
+def _without(problem: TraceProblem, fitted: PosteriorFit, effect: Increment) -> PosteriorFit | None:
+    """The fit without one of its effects."""
+    span = fitted.hypothesis.span(effect.key)
+    rest = tuple(e for e in fitted.hypothesis.effects if e.key != effect.key)
+    point = replace(fitted.point, sizes=np.delete(fitted.point.sizes, span))
+    return fit(problem, replace(fitted.hypothesis, effects=rest), point)
+
+
+__all__ = [
+    "LEAST_ODDS",
+    "WITHIN_ERROR",
+    "FittedIncrement",
+    "assessed",
+    "converged",
+    "evidence_score",
+    "fitted_bends",
+    "log_evidence",
+    "redundant_increment",
+    "refitted",
+    "relative_swing",
+]
