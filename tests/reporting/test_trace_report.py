@@ -111,6 +111,26 @@ def test_verdict_in_one_sentence(answer, changes, sentence):
     assert sentence in " ".join(as_trace_text(changed).split())
 
 
+@pytest.mark.parametrize(
+    ("coefficients", "words"),
+    [
+        (("Cm",), "lacks an increment of Cm over alpha_rad, which no effect of the library describes"),
+        (
+            ("CL", "Cm"),
+            "lacks an increment of CL over alpha_rad and an increment of Cm over alpha_rad, which no effect",
+        ),
+    ],
+)
+def test_learned_increments_are_listed(answer, coefficients, words):
+    learned = tuple(
+        replace(
+            answer.effects[0], name="increment", variant=f"{c} over alpha_rad", acts_on=c, over="alpha_rad"
+        )
+        for c in coefficients
+    )
+    assert words in verdict(replace(answer, verdict="learned", effects=learned))
+
+
 def test_provisional_without_held_out_says_so(answer):
     alone = replace(answer, provisional=True, records=replace(answer.records, held_out=()))
     assert verdict(alone).endswith("Provisional: no record was held out.")

@@ -128,7 +128,8 @@ def _in_derivatives(name: str) -> bool:
 
 
 def _listed(names: list[str]) -> str:
-    return " and ".join(", ".join(names).rsplit(", ", 1))
+    *most, last = names
+    return f"{', '.join(most)} and {last}" if most else last
 
 
 def _evidence(evidence: Evidence) -> str:
