@@ -1,6 +1,5 @@
 """Campaigns that are really killed, at several moments, and the same call that finishes them."""
 
-import contextlib
 import os
 import signal
 import subprocess
@@ -8,6 +7,7 @@ import sys
 import time
 
 import pytest
+from commands import running
 from fly_campaigns import alive, children, fly, leftovers, results, runs_recorded, write
 from tiers import sampled
 
@@ -81,36 +81,12 @@ def test_killed_at_a_rename(short, tmp_path, moment):
     assert results(out) == short
 
 
-@contextlib.contextmanager
 def flying(folder, jobs=2):
-    """The command in a session of its own, which is gone afterwards whatever happens."""
+    """The command that flies `LONG`."""
     file = write(folder / "campaign.toml", **LONG)
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # of a shell's background jobs, and inherited
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    process = subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "airtruth",
-            "fly",
-            file,
-            "--out",
-            folder / "out",
-            "--jobs",
-            str(jobs),
-            "--quiet",
-        ],
-        start_new_session=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        yield process
-    finally:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
+    return running("fly", file, "--out", folder / "out", "--jobs", jobs, "--quiet")
 
 
 def wait_until(condition, process=None, patience_s=60.0):

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 import store_users as iam
+from commands import running
 from conftest_stores import Server, use
 
 from airtruth.errors import ConfigurationError, StoreError
@@ -82,24 +83,6 @@ def command(*arguments: object) -> subprocess.CompletedProcess[str]:
     )
 
 
-@contextlib.contextmanager
-def flying(campaign: Path, out: Path) -> contextlib.AbstractContextManager[subprocess.Popen[str]]:
-    """The command in a session of its own, which is gone afterwards whatever happens."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "airtruth", "fly", str(campaign), "--out", str(out), "--jobs", "1"],
-        start_new_session=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        yield process
-    finally:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
-
-
 def wait_for_records(out: Path, process: subprocess.Popen[str], number: int) -> None:
     while len(list((out / "manifest-parts").iterdir())) < number:
         assert process.poll() is None, "it ended before it could be killed"
@@ -112,7 +95,7 @@ def test_a_killed_and_resumed_campaign_has_the_bytes_of_a_local_one(
 ) -> None:
     out = location(f"{bucket}/results")
     for records in (1, 4):
-        with flying(campaign, out / "light") as process:
+        with running("fly", campaign, "--out", out / "light", "--jobs", 1) as process:
             wait_for_records(out / "light", process, records)
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()
@@ -252,7 +235,7 @@ def test_a_bucket_that_vanishes_is_one_sentence_and_resumes(
     bucket: str, campaign: Path, local: Path, s3_server: Server
 ) -> None:
     out = location(f"{bucket}/light")
-    with flying(campaign, out) as process:
+    with running("fly", campaign, "--out", out, "--jobs", 1) as process:
         wait_for_records(out, process, 3)
         for key in location(bucket).files():
             key.unlink(missing_ok=True)
