@@ -49,7 +49,11 @@ TESTS: Final[dict[str, tuple[str, ...]]] = {
         "tests/physics/test_dryden.py",
         "--deselect=tests/physics/test_dryden.py::test_simulated_spectrum",
     ),
-    "identification/regression/solve": ("tests/identification/test_identify_regression.py",),
+    "identification/regression/solve": (
+        "tests/identification/test_identify_regression.py",
+        "tests/identification/test_identify_covariance.py",
+        "-knot filter-error and not output-error",
+    ),
     "identification/regression/covariance": (
         "tests/identification/test_identify_covariance.py",
         "-knot filter-error and not output-error",
