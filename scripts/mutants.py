@@ -61,6 +61,7 @@ TESTS: Final[dict[str, tuple[str, ...]]] = {
     "simulation/campaign/run": (
         "tests/simulation/test_campaign_failures.py",
         "tests/simulation/test_campaign_killed.py",
+        "tests/simulation/test_campaign_workers.py",
         "-knot all_its_processes and not ctrl_c",
         SLOW_TOO,
     ),

@@ -19,7 +19,7 @@ import io
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any, Final, Literal, ParamSpec, TypeVar
+from typing import IO, Any, Final, Literal, ParamSpec, TypeVar
 
 import matplotlib
 import numpy as np
@@ -160,16 +160,21 @@ def save(figure: Figure, path: Path) -> None:
     kind = path.suffix.removeprefix(".")
     if kind not in FORMATS:
         raise StoreError(f"{path}: no figure format {kind!r}; {choices(kind, FORMATS)}")
-    with applied(), atomic_file(path) as file:
-        figure.savefig(file, format=kind, dpi=DPI, metadata=FORMATS[kind])
+    with atomic_file(path) as file:
+        _write(figure, file, kind)
 
 
 def as_png(figure: Figure) -> bytes:
     """Return the figure as the bytes of a PNG file."""
     out = io.BytesIO()
-    with applied():
-        figure.savefig(out, format="png", dpi=DPI, metadata=FORMATS["png"])
+    _write(figure, out, "png")
     return out.getvalue()
+
+
+def _write(figure: Figure, file: IO[bytes], kind: str) -> None:
+    with applied():
+        figure.draw_without_rendering()  # the first layout changes the ticks, which the second one has to fit
+        figure.savefig(file, format=kind, dpi=DPI, metadata=FORMATS[kind])
 
 
 def as_html(png: bytes, caption: str) -> str:

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image
 from report_html import parsed, read_page
 from report_synthetic import TABLE_1, paper_campaign
 from typer.testing import CliRunner
@@ -75,6 +76,8 @@ def test_a_trace_is_a_result(found):
     assert result.to_dict() == json.loads((folder / "trace.json").read_text())
     assert result.to_frame()["name"].to_list() == [c.name for c in result.answer.candidates]
     assert len(result.plot().axes) == 9
+    pixels = np.asarray(Image.open(folder / "trace.png").convert("L"))
+    assert (pixels[:, [0, 1, -2, -1]] == 255).all(), "text is cut at an edge of the picture"
     assert parsed(result._repr_html_()).open == []
 
 
