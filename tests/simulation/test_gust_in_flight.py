@@ -80,6 +80,7 @@ def test_gusts_of_a_campaign_start_stationary_or_from_rest(tmp_path):
     v = np.median(first["rest"][1])
     for values, sigma in ((speed, plan["sigma_u_m_s"][0]), (alpha, plan["sigma_w_m_s"][0] / v)):
         assert abs(values.std(ddof=1) / sigma - 1) < 4 / np.sqrt(2 * 59)
+    assert abs(np.corrcoef(speed, alpha)[0, 1]) < 4 / np.sqrt(60)  # u and w are independent (MIL-F-8785C)
     assert np.ptp(first["rest"][0]) == 0.0
     assert np.ptp(first["rest"][1]) == 0.0
 
