@@ -63,14 +63,14 @@ def test_unwritable_folder(tmp_path: Path) -> None:
         manifest.read(tmp_path)
 
 
-@pytest.mark.parametrize(("count", "more"), [(5, ""), (6, "; and 1 more"), (8, "; and 3 more")])
+@pytest.mark.parametrize(("count", "more"), [(3, ""), (5, ""), (6, "; and 1 more"), (8, "; and 3 more")])
 def test_many_damaged_lines_are_counted(tmp_path: Path, count: int, more: str) -> None:
     path = tmp_path / "m.jsonl"
     path.write_bytes(b"x\n" * count)
     with pytest.raises(StoreError) as error:
         manifest.read(path)
     message = str(error.value)
-    assert message.count("is not JSON (") == 5
+    assert message.count("is not JSON (") == min(count, 5)
     assert f"{more}. An interrupted write damages only the last line" in message
     assert ("more" in message) == bool(more)
 
@@ -96,3 +96,31 @@ def test_a_new_manifest_is_an_entry_on_disk(tmp_path: Path, monkeypatch: pytest.
     manifest.append(tmp_path / "m.jsonl", {})
     manifest.append(tmp_path / "m.jsonl", {})
     assert flushed == [tmp_path]
+
+
+def test_a_closing_record_closes_what_is_above_it_alone(tmp_path: Path) -> None:
+    path = tmp_path / "manifest.jsonl"
+    manifest.rewrite(path, RECORDS)
+    assert manifest.scan(path) == manifest.Scan(tuple(RECORDS), (), closed=False)
+    manifest.rewrite(path, RECORDS, closing={"end": True})
+    assert manifest.scan(path) == manifest.Scan((*RECORDS, {"end": True}), (), closed=True)
+    whole = path.read_bytes().split(b"\n")
+    for changed in (
+        [*whole[1:]],  # a line is gone
+        [whole[1], whole[0], *whole[2:]],  # exchanged
+        [*whole[:-1], b'{"torn'],
+        [*whole[:-1], *whole[:1], b""],  # another record follows
+    ):
+        path.write_bytes(b"\n".join(changed))
+        found = manifest.scan(path)
+        assert not found.closed
+        assert found.damaged == ()
+
+
+def test_a_record_that_changed_is_named_by_its_line(tmp_path: Path) -> None:
+    path = tmp_path / "manifest.jsonl"
+    manifest.rewrite(path, RECORDS)
+    path.write_bytes(path.read_bytes().replace(b"ok", b"no"))
+    found = manifest.scan(path)
+    assert found.damaged == (2,)
+    assert found.records == (RECORDS[0], RECORDS[2])
