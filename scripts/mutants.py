@@ -74,6 +74,7 @@ TESTS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "simulation/campaign/plan": (
         "tests/simulation/test_bad_campaigns.py",
+        "tests/simulation/test_campaign_result.py",
         "tests/simulation/test_gust_in_flight.py",
         "tests/simulation/test_closed_loop.py",
         "tests/simulation/test_log_contract.py",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,8 @@ from airtruth.simulation.campaign import file as campaign_file
 from airtruth.simulation.campaign import plan
 from airtruth.simulation.campaign.result import CampaignResult
 from airtruth.simulation.campaign.run import fly
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -84,3 +87,17 @@ def test_what_cannot_be_asked_of_it(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match="runs: Input should be greater than or equal to 1"):
         fly(campaign_file.read(path), tmp_path / "out", runs=0)
     assert not (tmp_path / "out").exists()
+
+
+def test_the_digest_of_a_plan_is_that_of_what_is_read(tmp_path: Path) -> None:
+    folder = tmp_path / "gtm"
+    shutil.copytree(ROOT / "aircraft" / "gtm", folder)
+    file = write(tmp_path / "campaign.toml", aircraft=folder)
+    digest = plan.make(file).digest
+    (folder / "notes.txt").write_text("unread")
+    (folder / "empty.xml").mkdir()
+    assert plan.make(file).digest == digest
+    assert plan.make(write(tmp_path / "more.toml", aircraft=folder, runs=9)).digest == digest
+    model = folder / "aircraft.toml"
+    model.write_text(model.read_text() + "\n# a comment\n")
+    assert plan.make(file).digest != digest
