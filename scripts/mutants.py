@@ -92,6 +92,9 @@ TESTS: Final[dict[str, tuple[str, ...]]] = {
     "simulation/campaign/folder": (
         "tests/simulation/test_campaign_bytes.py",
         "tests/simulation/test_campaign_damaged.py",
+        "tests/simulation/test_campaign_failures.py",
+        "tests/simulation/test_campaign_killed.py",
+        "-knot all_its_processes and not ctrl_c and not at_a_rename",
         SLOW_TOO,
     ),
     "simulation/campaign/workers": ("tests/simulation/test_campaign_workers.py", SLOW_TOO),
