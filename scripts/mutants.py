@@ -38,6 +38,8 @@ ARITHMETIC: Final = ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "Flo
 """Arithmetic replacements that are made. The others fail on types or repeat these."""
 SLOW_TOO: Final = "-mnot long and not study"
 """Option that adds the slow tests: a campaign that is killed or damaged is one of them."""
+NO_DEVICES: Final = "--deselect=tests/logs/test_outputs.py::test_devices_and_links_are_not_replaced"
+"""Option that leaves a test out: a mutant that fails it replaces /dev/null where the user is root."""
 TESTS: Final[dict[str, tuple[str, ...]]] = {
     "physics/atmosphere": ("tests/physics/test_atmosphere.py",),
     "physics/short_period": ("tests/physics/test_short_period.py",),
@@ -86,8 +88,8 @@ TESTS: Final[dict[str, tuple[str, ...]]] = {
         "tests/simulation/test_campaign_failures.py",
         SLOW_TOO,
     ),
-    "logs/ledger": ("tests/logs/test_outputs.py",),
-    "logs/outputs": ("tests/logs/test_outputs.py",),
+    "logs/ledger": ("tests/logs/test_outputs.py", NO_DEVICES),
+    "logs/outputs": ("tests/logs/test_outputs.py", NO_DEVICES),
     "logs/verify": ("tests/simulation/test_campaign_damaged.py", SLOW_TOO),
     "simulation/campaign/folder": (
         "tests/simulation/test_campaign_bytes.py",
