@@ -105,6 +105,7 @@ def test_import_does_not_replace_its_input_or_another_log(command, log):
         assert out.read_bytes() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verb", ["trace", "loop"])
 def test_trace_refuses_before_its_search_and_keeps_what_a_user_added(command, log, verb, monkeypatch):
     def searches(*arguments, **named):
@@ -129,6 +130,7 @@ def test_trace_refuses_before_its_search_and_keeps_what_a_user_added(command, lo
     assert (code, "the search began" in err) == (70, True)
 
 
+@pytest.mark.slow
 def test_temporary_files_of_others_stay(command, tmp_path):
     out = tmp_path / "out"
     arguments = (

@@ -51,6 +51,7 @@ def test_the_result_of_each_verb_is_frozen_and_shows_itself(
     assert all(table.is_file() for table in tables)
 
 
+@pytest.mark.slow
 def test_identify_takes_logs_in_every_form(workspace: Path) -> None:
     folder = workspace / "out" / "light"
     files = sorted((folder / "logs").glob("*.parquet"))
@@ -71,6 +72,7 @@ def _runs(path: Path) -> tuple[str, ...]:
     return at.read_log(path).run_ids
 
 
+@pytest.mark.slow
 def test_aircraft_in_every_form(workspace: Path) -> None:
     shipped = at.load_aircraft("gtm")
     for form in (shipped.folder, str(shipped.folder), shipped.folder / "aircraft.toml", shipped):
@@ -91,6 +93,7 @@ def test_check_joins_logs_and_selects_runs(workspace: Path) -> None:
     np.testing.assert_equal(again.residual_rms, some.residual_rms)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verb", [at.identify, at.trace, at.close_loop])
 def test_a_missing_log_and_a_wrong_type_are_named(verb: Callable[..., object]) -> None:
     with pytest.raises(at.StoreError, match=r"absent\.parquet: no such file"):

@@ -53,6 +53,7 @@ def test_a_damped_log_passes(log):
         assert (command.distance < 4.0).all()
 
 
+@pytest.mark.slow
 def test_a_command_of_the_other_sign_is_refused(log):
     turned = {"elevator_command_rad": -np.asarray(log.channels["elevator_command_rad"])}
     faults = gate.inspect(replace(log, channels={**log.channels, **turned}), aircraft.load("gtm"))

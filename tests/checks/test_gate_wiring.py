@@ -94,6 +94,7 @@ def test_every_verb_refuses_and_names_the_channel(verb, name, stored, command, m
     assert not (stored(name).parent / "out.parquet").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("call", [at.identify, at.check, at.trace])
 def test_every_function_refuses(call, log):
     with pytest.raises(LogError, match="q_rad_s: opposite sign in all 6 runs"):

@@ -58,6 +58,7 @@ def test_surface_effect_on_a_foreign_aircraft_is_felt_late(foreign, tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_derivatives_of_a_foreign_aircraft_move_by_what_is_written(foreign, tmp_path):
     plane, at, _, _, before = foreign
     start = trim(plane, at)
@@ -74,6 +75,7 @@ def test_derivatives_of_a_foreign_aircraft_move_by_what_is_written(foreign, tmp_
         np.testing.assert_allclose(moved, share * np.array(list(amounts.values())), rtol=1.2e-2, atol=2e-4)
 
 
+@pytest.mark.slow
 def test_declared_values_of_a_foreign_aircraft(foreign, tmp_path):
     plane, at, _, _, _ = foreign
     # CG first alone: the mass stays, and the inertia about the moved CG too

@@ -45,6 +45,7 @@ def covered(estimates):
     return ((q.lower[:, :6] < THETA) & (q.upper[:, :6] > THETA)).mean(axis=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gust", [0.0, 1.0, 4.3])
 def test_levels_unknown_from_calm_to_severe(gust):
     """Nothing declared but the log: all converge, near the bound; 95 % of 150 runs is known to 1.8 points."""

@@ -171,6 +171,7 @@ def test_files_say_so_once_per_constant(log, tmp_path):
     assert note.endswith("30, not the aircraft's 26.195")
 
 
+@pytest.mark.slow
 def test_the_command_uses_and_says_it(log, tmp_path):
     path = tmp_path / "a.parquet"
     facts = {run: {"inertia_yy_kg_m2": 12.628} for run in log.run_ids}

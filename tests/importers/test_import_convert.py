@@ -228,6 +228,7 @@ def test_a_guess_says_what_it_did_not_find(tmp_path):
     tomllib.loads(text)
 
 
+@pytest.mark.slow
 def test_units_are_guessed_by_size_where_names_say_nothing(tmp_path):
     log = flown(tmp_path, runs=1)
     c = log.channels

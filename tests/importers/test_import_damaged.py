@@ -135,6 +135,7 @@ def test_a_delimiter_that_cannot_divide_cells(tmp_path, delimiter, decimal):
         import_log(tmp_path / "f.csv", tmp_path / "m.toml")
 
 
+@pytest.mark.slow
 def test_a_module_of_a_stranger_in_the_working_folder_is_not_imported(tmp_path):
     for name in ("pandas", "subprocess", "scipy", "json", "airtruth"):
         (tmp_path / f"{name}.py").write_text("open('canary', 'w').close()\n")

@@ -83,6 +83,7 @@ def matrix(log):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "more",
     [

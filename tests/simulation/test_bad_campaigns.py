@@ -178,6 +178,7 @@ def test_files_that_are_no_campaign(tmp_path, content, words):
         assert word in ended.err
 
 
+@pytest.mark.slow
 def test_replayed_log_that_is_missing_or_lacks_the_run(tmp_path):
     log = fly(tmp_path / "a", runs=1) / "logs" / "00000.parquet"
     for entry, words in (

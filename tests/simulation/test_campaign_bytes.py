@@ -74,6 +74,7 @@ def test_a_campaign_grows_to_the_files_of_a_longer_one(once, tmp_path):
     }
 
 
+@pytest.mark.slow
 def test_a_campaign_does_not_shrink(once, tmp_path):
     before = results(once)
     file = write(tmp_path / "campaign.toml", **MIXED)
@@ -92,6 +93,7 @@ def test_the_chunk_of_a_run_depends_on_its_number_alone(one, other):
     assert (np.diff(more, prepend=0) <= 1).all()
 
 
+@pytest.mark.slow
 def test_runs_and_seeds_differ(once, tmp_path):
     gusts = read(once).pivot(columns="run_id", index="t_s", values="alpha_rad").to_numpy()
     assert np.unique(gusts, axis=1).shape[1] == 7

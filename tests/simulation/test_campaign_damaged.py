@@ -44,6 +44,7 @@ def test_random_damage_is_named_and_restored(whole, tmp_path, seed):
     assert damage_trial(whole, planned, tmp_path / "out", seed)[2] == ""
 
 
+@pytest.mark.slow
 def test_the_command_line_names_and_restores(whole, tmp_path):
     out = damaged(whole, tmp_path)
     flip(out / "logs" / "00004.parquet", random.Random(1))
@@ -92,6 +93,7 @@ def test_a_resume_restores_what_is_damaged_and_flies_no_other_run(whole, tmp_pat
     assert results(out) == results(whole)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["campaign.json", "manifest.jsonl"])
 def test_one_of_the_two_files_that_identify_a_campaign_is_enough(whole, tmp_path, name):
     out = damaged(whole, tmp_path)
@@ -121,6 +123,7 @@ def test_verify_names_what_an_unfinished_campaign_lacks(whole, tmp_path):
     assert digest.encode() in lines[0]
 
 
+@pytest.mark.slow
 def test_an_unrecorded_chunk_is_flown_again(whole, tmp_path):
     """The line of the last chunk, of two runs, is missing; its files are whole."""
     out = damaged(whole, tmp_path)

@@ -100,6 +100,7 @@ def test_level_and_factor_scale_the_gusts_of_the_same_draw(tmp_path):
     np.testing.assert_allclose(b, 2 * a, atol=0.03 * np.abs(a).max())
 
 
+@pytest.mark.slow
 def test_wind_that_keeps_the_airspeed_leaves_the_logs_as_they_are(tmp_path):
     calm = fly(tmp_path / "calm", runs=2)
     windy = fly(tmp_path / "windy", runs=2, wind={"along_track_m_s": {"choose": [8.0, -8.0]}})
@@ -108,6 +109,7 @@ def test_wind_that_keeps_the_airspeed_leaves_the_logs_as_they_are(tmp_path):
     assert set(pd.read_parquet(windy / "truth.parquet")["wind_m_s"].abs()) == {8.0}
 
 
+@pytest.mark.slow
 def test_wind_that_keeps_the_ground_speed_takes_airspeed(tmp_path):
     calm = fly(tmp_path / "calm", runs=1, gust=None, **CALM)
     windy = fly(

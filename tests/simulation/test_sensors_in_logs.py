@@ -98,6 +98,7 @@ def test_one_error_at_a_time(ideal, tmp_path, entries, expected):
     assert different.mean() < (1e-3 if "quantum" in entries else 1e-12)
 
 
+@pytest.mark.slow
 def test_delay_between_samples_is_linear(ideal, tmp_path):
     q, t = channel(ideal, "q_rad_s"), np.arange(601) * DT
     got = logged(tmp_path, "q_rad_s", delay=0.012)
@@ -105,6 +106,7 @@ def test_delay_between_samples_is_linear(ideal, tmp_path):
     np.testing.assert_allclose(got, expected, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_lag_is_first_order(ideal, tmp_path):
     alpha, t = channel(ideal, "alpha_rad"), np.arange(601) * DT
     got = logged(tmp_path, "alpha_rad", lag=0.04)
@@ -138,6 +140,7 @@ def test_accelerometer_ahead_of_the_cg(ideal, tmp_path):
     np.testing.assert_allclose(integral, -0.5 * (q[:, 1:] - q[:, :1]), atol=0.02 * 0.5 * np.ptp(q))
 
 
+@pytest.mark.slow
 def test_elevator_noise_does_not_move_the_aircraft(ideal, tmp_path):
     loud = fly(tmp_path, sensors={"channel": {"elevator_rad": table("elevator_rad", noise_std=0.1)}}, **FINE)
     np.testing.assert_array_equal(channel(loud, "throttle"), channel(ideal, "throttle"))

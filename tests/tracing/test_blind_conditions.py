@@ -147,6 +147,7 @@ def test_the_log_of_a_loop_holds_the_readings_that_the_damper_saw(tmp_path):
     assert moved == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_coarse_log_holds_samples_of_the_same_flight(calm, tmp_path):
     truth, parts = draw.truth_of(calm, ())
     doublet = calm.manoeuvres[0]
