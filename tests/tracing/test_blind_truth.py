@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from tiers import sampled
 
 from airtruth.physics import dryden
 from airtruth.simulation.flight import Flight, Inputs
@@ -212,7 +213,7 @@ def test_downwash_lag_is_a_moment_by_alpha_dot():
     assert (late["q_dot_rad_s2"] - plain["q_dot_rad_s2"])[3] == pytest.approx(expected, rel=0.03)
 
 
-@pytest.mark.parametrize("key", list(EFFECTS))
+@pytest.mark.parametrize("key", sampled(EFFECTS, 4))
 def test_every_effect_flies_from_its_own_trim_and_vanishes_with_its_size(key):
     trial = draw.draw(3, 0, "null")
     kind = EFFECTS[key]
