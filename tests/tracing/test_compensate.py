@@ -275,6 +275,7 @@ def test_alpha_counts_from_where_a_linear_trace_counts():
             assert value == pytest.approx(shifts[run], abs=1e-12)
 
 
+@pytest.mark.long
 def test_from_trace_to_estimate():
     noise = {"alpha_rad": 0.03 * DEG, "q_rad_s": 0.2 * DEG, "az_m_s2": 0.05}
     break_alone = (AeroTerm("Cm", "alpha", "above", 0.46, 0.44 * DEG),)

@@ -55,7 +55,7 @@ def test_held_out_records_take_no_part(logs, gtm):
     assert last not in kinematic_check(logs, gtm, held={last}).run_ids
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_trace_refits_the_cause_and_agrees(logs, gtm):
     steps = []
     result = trace(

@@ -150,7 +150,7 @@ def refusal_or_answer(log, plane, options):
         return str(error)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_an_aircraft_of_quite_another_kind(command, log, tmp_path):
     """A Cessna declared for records of a 26 kg model: refused, or an answer that says that much is missing."""
     found = refusal_or_answer(log, "c172x", TraceOptions(effects=FEW))

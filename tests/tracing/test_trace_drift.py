@@ -90,7 +90,7 @@ def test_a_late_surface_in_records_of_two_flight_conditions(tmp_path):
     assert answer["declared_model"]["consistent"] is False
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["swing", "shear"])
 def test_a_late_surface_while_the_airspeed_changes_by_a_tenth(kind, tmp_path):
     """Dives, climbs and wind along the path, of the blind trials' own truth."""
