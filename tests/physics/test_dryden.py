@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import quad
@@ -53,6 +53,8 @@ def test_discrete_covariance_is_the_continuous_one(d: Dryden, dt: float, lag: in
 
 
 @settings(max_examples=200, deadline=None)
+@example(Dryden(1.0, 1.0, 10.0, 750.9140625, 106.0, 1.0), 10.0)
+@example(Dryden(1.0, 1.0, 10.0, 1000.0, 90.0, 0.5), 10.0)
 @given(conditions, steps)
 def test_process_noise_keeps_the_covariance(d: Dryden, dt: float) -> None:
     g = dryden.discretise(d, dt)

@@ -29,6 +29,9 @@ Array = NDArray[np.float64]
 
 STARTS: Final = ("stationary", "rest")
 """Initial states of a gust: a draw from its stationary distribution, or zero."""
+_LONG_STEP: Final = 0.1
+"""Step over the longest time constant from which the noise is a difference of covariances [-]; there the difference has
+lost at most four digits, and a cascade of rates 1 to 10,000 has been doubled up to 14 times."""
 _ZERO: Final = 1.0 / math.sqrt(3.0)
 """Zero of H_w in units of V/Lw [-]."""
 
@@ -79,12 +82,16 @@ def discretise(d: Dryden, dt_s: float) -> DiscreteGust:
     The states of w and q are a cascade of first-order lags, x1' = -r1 x1 + noise, xi' = -ri xi + x(i-1),
     with rates (V/Lw, V/Lw), preceded by pi V/(4 b) with the rotary gust. In this order w and
     q are sums without cancellation. The noise of a step comes from Van Loan (IEEE Trans. Automatic
-    Control 23, 1978, eqs (2.1) and following) over a step short enough to be exact, then by doubling.
+    Control 23, 1978, eqs (2.1) and following) over a step short enough to be exact, then by doubling. For a step longer than
+    `_LONG_STEP`, in which doubling adds up rounding, it is the stationary covariance less what is left of it.
     """
     u_rate, rates, output = _shaping(d)
     stationary = _cascade_covariance(rates)
     deviation = np.sqrt(np.diagonal(stationary, axis1=-2, axis2=-1))
+    correlation = stationary / (deviation[..., :, None] * deviation[..., None, :])
     phi_w, noise_w = _cascade_step(rates, deviation, dt_s)
+    long = (dt_s * rates.min(axis=-1) > _LONG_STEP)[..., None, None]
+    noise_w = np.where(long, correlation - phi_w @ correlation @ np.swapaxes(phi_w, -1, -2), noise_w)
     n = rates.shape[-1]
     shape = rates.shape[:-1]
     phi, gamma, start = (np.zeros((*shape, n + 1, n + 1)) for _ in range(3))
@@ -93,7 +100,7 @@ def discretise(d: Dryden, dt_s: float) -> DiscreteGust:
     start[..., 0, 0] = 1.0
     phi[..., 1:, 1:] = phi_w
     gamma[..., 1:, 1:] = np.linalg.cholesky(noise_w)
-    start[..., 1:, 1:] = np.linalg.cholesky(stationary / (deviation[..., :, None] * deviation[..., None, :]))
+    start[..., 1:, 1:] = np.linalg.cholesky(correlation)
     rows = np.zeros((*shape, output.shape[-2] + 1, n + 1))
     rows[..., 0, 0] = d.sigma_u_m_s
     rows[..., 1:, 1:] = output * deviation[..., None, :]
