@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from monte_carlo import coverage, efficiency_percent
 
 from airtruth.errors import ConfigurationError
-from airtruth.identification import Options, Status, identify_batch, identify_joint, quantities
-from airtruth.identification.likelihood.cramer_rao import experiment_bound
-from airtruth.identification.likelihood.options import FilterOptions
+from airtruth.identification import Options, Status, identify_batch, identify_joint
 from airtruth.identification.regression.frequency import HIGHEST, SURE, band_of, spectra, transform
 from airtruth.identification.regression.frequency_kernel import sums_of
 from airtruth.physics.short_period import modal
-from validation.linear_flight import DEG, GTM, LIGHT, NOISE, THETA, doublet, fly, gtm_scale, with_channel
+from validation.linear_flight import DEG, GTM, THETA, doublet, fly, gtm_scale, with_channel
 
 NAME = "frequency"
 PLAIN = Options(covariance="none")
@@ -141,24 +140,13 @@ def test_a_band_may_be_stated():
         Options(band_hz=(2.0, 1.0))
 
 
-def efficiency_percent(estimates, airspeed):
-    levels = (*NOISE[:3], LIGHT[0] * 2.0, LIGHT[1] * 2.0, LIGHT[2], LIGHT[3])
-    more = {"airspeed_std_m_s": 0.0309, "airspeed_m_s": 42.85} if airspeed else {}
-    bound = experiment_bound(fly(), GTM, THETA, FilterOptions(*levels, **more))[0]
-    return 100.0 * np.diag(bound) / ((estimates.theta - THETA) ** 2).mean(axis=0)
-
-
 @pytest.mark.parametrize(("name", "batch"), [("constant", GUSTS), ("measured", AIR)])
 def test_spread_and_coverage(name, batch):
     """3000 runs gave 52 to 92 % and 92.9 to 94.7 %; 600 runs have standard errors of 5 and 1 points."""
     estimates = identify_batch(batch, GTM, NAME, Options(pressure=name))
     assert estimates.converged.all()
     assert (efficiency_percent(estimates, name == "measured") > 40.0).all()
-    q = quantities(estimates)
-    truth = np.append(THETA, modal(THETA, gtm_scale()))
-    cover = ((q.lower < truth) & (truth < q.upper)).mean(axis=0)
-    if name == "measured":  # wn refers to the airspeed of the record, which is not the reference's
-        cover = cover[:6]
+    cover = coverage(estimates, name == "measured")
     assert (cover > 0.90).all(), cover
     assert (cover < 0.985).all(), cover
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from monte_carlo import coverage, efficiency_percent
 from scipy.linalg import cho_factor, cho_solve, solve_discrete_lyapunov, toeplitz
 from scipy.signal import lfilter
 
@@ -16,10 +17,7 @@ from airtruth.identification import (
     identify_batch,
     identify_joint,
     linear_auxiliary,
-    quantities,
 )
-from airtruth.identification.likelihood.cramer_rao import experiment_bound
-from airtruth.identification.likelihood.options import FilterOptions
 from airtruth.identification.regression.refined_kernel import (
     LARGEST_ORDER,
     balance,
@@ -30,8 +28,7 @@ from airtruth.identification.regression.refined_kernel import (
     remove,
     whiten,
 )
-from airtruth.physics.short_period import modal
-from validation.linear_flight import GTM, LIGHT, NOISE, THETA, Constants, fly, gtm_scale
+from validation.linear_flight import GTM, THETA, Constants, fly
 
 NAME = "iv-refined"
 PLAIN = Options(covariance="none", tolerance=1e-9)
@@ -170,24 +167,13 @@ def test_records_that_start_in_motion_and_unstable_aircraft():
     np.testing.assert_allclose(unstable.theta[0], theta, rtol=2e-3)
 
 
-def efficiency_percent(estimates, airspeed):
-    levels = (*NOISE[:3], LIGHT[0] * 2.0, LIGHT[1] * 2.0, LIGHT[2], LIGHT[3])
-    more = {"airspeed_std_m_s": 0.0309, "airspeed_m_s": 42.85} if airspeed else {}
-    bound = experiment_bound(fly(), GTM, THETA, FilterOptions(*levels, **more))[0]
-    return 100.0 * np.diag(bound) / ((estimates.theta - THETA) ** 2).mean(axis=0)
-
-
 @pytest.mark.parametrize(("name", "batch"), [("constant", GUSTS), ("measured", AIR)])
 def test_spread_comes_near_the_bound_and_intervals_cover(name, batch):
     """3000 runs gave 79 to 96 % and 92.5 to 96.4 %; 600 runs have standard errors of 5 and 1 points."""
     estimates = identify_batch(batch, GTM, NAME, Options(pressure=name))
     assert estimates.converged.all()
     assert (efficiency_percent(estimates, name == "measured") > 65.0).all()
-    q = quantities(estimates)
-    truth = np.append(THETA, modal(THETA, gtm_scale()))
-    cover = ((q.lower < truth) & (truth < q.upper)).mean(axis=0)
-    if name == "measured":  # wn refers to the airspeed of the record, which is not the reference's
-        cover = cover[:6]
+    cover = coverage(estimates, name == "measured")
     assert (cover > 0.90).all(), cover
     assert (cover < 0.985).all(), cover
 

@@ -206,7 +206,8 @@ def redundant_increment(problem: TraceProblem, fitted: PosteriorFit, tried: int)
 
     Parameters
     ----------
-    fitted : a fit whose last effect was added last; tried : number of shapes that were tried.
+    fitted : a fit with its effects in the order of their acceptance.
+    tried : number of shapes that were tried.
     """
     for effect in fitted.hypothesis.effects[:-1]:
         if isinstance(effect, Increment):
