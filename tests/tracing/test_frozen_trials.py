@@ -60,3 +60,14 @@ def test_a_trial_is_answered_as_it_was(number, tmp_path):
     if effects:
         before, after = (answer["error"][s]["held_out"]["innovation"] for s in ("before", "after"))
         assert all(after[c] < NOT_WORSE * before[c] for c in after)
+
+
+def test_a_set_one_exchange_away_is_reached(tmp_path):
+    """A late gyro and a late surface, lambda 735: the search alone accepted the gyro's delay, a lag of the surface, and the
+    gyro's lag. The log-posterior of the two that were flown is larger by 20 (measured)."""
+    from airtruth.tracing import TraceOptions, trace
+    from validation.blind.trials import frozen
+
+    (folder,) = frozen(20261123, [6], "slow", tmp_path)
+    answer = trace(folder, "gtm", TraceOptions()).to_dict()
+    assert {e["name"] for e in answer["effects"]} == {"gyro_lag", "elevator_delay"}

@@ -26,6 +26,8 @@ OUTDONE: Final = "another effect explains more"
 """Reason of a candidate that gains less than an accepted one."""
 SUPERSEDED: Final = "it explains nothing beside another effect"
 """Reason of a candidate that became redundant."""
+SURPASSED: Final = "a set of effects without it explains more"
+"""Reason of a candidate that leads alone, and not beside other effects."""
 IMMATERIAL: Final = "its size is immaterial"
 """Reason of a candidate that is too small to matter."""
 IMPROBABLE: Final = 0.001

@@ -16,6 +16,7 @@ from airtruth.tracing.selection.acceptance import (
     IMMATERIAL,
     OUTDONE,
     SUPERSEDED,
+    SURPASSED,
     UNCONVERGED,
     Candidate,
     assess_candidate,
@@ -40,6 +41,7 @@ def rank(
     fits: Sequence[Refit],
     least: float,
     replacement: tuple[str, str] | None = None,
+    leader: str = "",
 ) -> tuple[Candidate, ...]:
     """Rank the refitted candidates by their gain, and test those that lead.
 
@@ -47,6 +49,7 @@ def rank(
     ----------
     fits : refits, best first; least : gain in 2 log L that is significant.
     replacement : keys (old, new); the old effect explains nothing beside the new one.
+    leader : key of the effect that leads whatever others gain, because the set with it explains more; "" for none.
     """
     if not fits:
         return ()
@@ -55,7 +58,11 @@ def rank(
     reference = reference_of(problem, null)
     candidates: list[Candidate] = []
     accepted, leading = -np.inf, ""
+    led = gains.get(leader, np.inf)
     for gain, r in ranked:
+        if leader in gains and gain > led:
+            candidates.append(untested(r.score, r.fit, gain, SURPASSED))
+            continue
         if replacement is not None and r.score.effect.key == replacement[0]:
             candidates.append(untested(r.score, r.fit, gain, SUPERSEDED, f"that is {replacement[1]}"))
             continue

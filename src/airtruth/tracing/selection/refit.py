@@ -78,7 +78,7 @@ def refit_leaders(
     table: Table,
     significant: NDArray[np.bool_],
     advance: Advance,
-    replacement: tuple[str, str] | None = None,
+    wanted: Collection[str] = (),
     skip: Collection[str] = (),
     rival: float = np.inf,
 ) -> list[Refit]:
@@ -87,13 +87,13 @@ def refit_leaders(
     Parameters
     ----------
     table : scores at the null; significant : (scores,) which of them pass the level.
-    replacement : keys of two effects that have to be among the refitted ones; skip : keys of those that are not.
+    wanted : keys of effects that have to be among the refitted ones; skip : keys of those that are not.
     rival : cost of another explanation; refits that stay far behind end early.
     """
     if not significant.any():
         return []
     fits: list[Refit] = []
-    for i in _leading(problem, null, table, significant, replacement):
+    for i in _leading(problem, null, table, significant, wanted):
         s = table.scores[i]
         if s.effect.key in skip:
             continue
@@ -193,7 +193,7 @@ def _leading(
     null: PosteriorFit,
     table: Table,
     significant: NDArray[np.bool_],
-    replacement: tuple[str, str] | None,
+    wanted: Collection[str],
 ) -> list[int]:
     """Indices of the scores whose effects are refitted.
 
@@ -212,9 +212,8 @@ def _leading(
         order = [*absorbed, *(i for i in order if i not in absorbed)]
     by_score = np.argsort([-abs(s.z) for s in table.scores], kind="stable")
     order += [int(i) for i in by_score if int(i) not in order and significant[i]][: LEADING - len(order)]
-    if replacement is not None:
-        wanted = [i for i, s in enumerate(table.scores) if s.effect.key in replacement]
-        order = [*wanted, *(i for i in order if i not in wanted)]
+    first = [i for i, s in enumerate(table.scores) if s.effect.key in wanted]
+    order = [*first, *(i for i in order if i not in first)]
     return order
 
 
@@ -232,6 +231,14 @@ def _freedom_correction(
 def _without_effect(null: PosteriorFit, best: PosteriorFit) -> Parameters:
     """The parameters of a refit without those of its last effect."""
     return replace(best.point, sizes=best.point.sizes[: len(null.point.sizes)])
+
+
+def refit_without(problem: TraceProblem, fitted: PosteriorFit, effect: Effect) -> PosteriorFit | None:
+    """A fit again, without one of its effects."""
+    span = fitted.hypothesis.span(effect.key)
+    rest = tuple(e for e in fitted.hypothesis.effects if e.key != effect.key)
+    point = replace(fitted.point, sizes=np.delete(fitted.point.sizes, span))
+    return fit(problem, replace(fitted.hypothesis, effects=rest), point)
 
 
 def better_null(problem: TraceProblem, null: PosteriorFit, fits: Sequence[Refit]) -> PosteriorFit | None:
@@ -301,4 +308,4 @@ def _ordered_shares(
     return [_SHARES[i] for i in np.argsort(costs, kind="stable")]
 
 
-__all__ = ["LEADING", "Refit", "better_null", "refit_absorbed", "refit_leaders"]
+__all__ = ["LEADING", "Refit", "better_null", "refit_absorbed", "refit_leaders", "refit_without"]

@@ -20,7 +20,7 @@ from airtruth.tracing.inference.profile import Profile, best_location, location_
 from airtruth.tracing.inference.whitening import Whitener, autoregression
 from airtruth.tracing.model.parameters import Common, Parameters
 from airtruth.tracing.selection import score_test
-from airtruth.tracing.selection.acceptance import SUPERSEDED, Candidate, has_converged
+from airtruth.tracing.selection.acceptance import SUPERSEDED, SURPASSED, Candidate, has_converged
 from airtruth.tracing.selection.budget import Advance
 from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.omnibus import Anomaly, anomalies
@@ -82,6 +82,7 @@ class RoundStart:
     replacement : keys (old, new) of an effect that became redundant and of the one that replaces it; usually None.
     settled : whether the round follows a replacement or a choice between tied effects; neither is made twice.
     scores_only : whether the candidates are scored and none is refitted.
+    leader : key of the effect that leads the round, whatever others gain; "" for the one that gains most.
     """
 
     hypothesis: Hypothesis
@@ -90,6 +91,7 @@ class RoundStart:
     replacement: tuple[str, str] | None = None
     settled: bool = False
     scores_only: bool = False
+    leader: str = ""
 
     @property
     def tested(self) -> int:
@@ -215,7 +217,8 @@ def search_round(
             skip = declared.keys if free is not None or begin.hypothesis.spread is not None else ()
             rival = free.cost if free is not None and free.strain < _STRAINED else np.inf
             passing = adjusted <= level
-            fits = refit_leaders(problem, null, table, passing, advance, begin.replacement, skip, rival)
+            wanted = begin.replacement or ((begin.leader,) if begin.leader else ())
+            fits = refit_leaders(problem, null, table, passing, advance, wanted, skip, rival)
             if free is not None and _may_hide_effects(free, fits):
                 fits = refit_absorbed(problem, null, table, fits, advance, skip)
             if known:
@@ -225,7 +228,7 @@ def search_round(
                 start, restarts = better.point, restarts - 1
                 continue
             least = significant_gain(begin.tested, later=count > 0)
-            candidates = rank(problem, null, fits, least, begin.replacement)
+            candidates = rank(problem, null, fits, least, begin.replacement, begin.leader)
         omnibus = anomalies(gls, problem, whitener)
         sets = () if begin.hypothesis.spread is None else explained(problem, null, declared)
         own = SearchRound(
@@ -286,7 +289,7 @@ def _tied(candidates: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
     if not accepted:
         return ()
     best = accepted[0]
-    others = (c for c in candidates if c is not best and c.reasons[:1] != (SUPERSEDED,))
+    others = (c for c in candidates if c is not best and c.reasons[:1] not in ((SUPERSEDED,), (SURPASSED,)))
     near = (c for c in others if abs(best.gain - c.gain) <= TIE and has_converged(c.fit, c.gain))
     return (best, *near)
 

@@ -15,6 +15,8 @@ from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import OUTDONE, Candidate
 from airtruth.tracing.selection.budget import Advance, may_begin
+from airtruth.tracing.selection.exchange import BETTER, better_set
+from airtruth.tracing.selection.refit import refit_without
 from airtruth.tracing.selection.release import DeclaredCauses, Release
 from airtruth.tracing.selection.rounds import (
     NOTHING_DECLARED,
@@ -63,7 +65,8 @@ def search(
     known : effects that are always refitted, with the value [SI] at which their refit begins.
     """
     first = RoundStart(hypothesis, start, tuple(effects))
-    return _settled(problem, _Search(problem, seed, advance, declared, known).rounds((first,), ()))
+    own = _Search(problem, seed, advance, declared, known)
+    return _settled(problem, own.exchanged(first, own.rounds((first,), ())))
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,28 @@ class _Search:
         if own.release is not None:
             return self._branches(starts, before, own, own.release)
         return self._accepting(starts, (*before, own))
+
+    def exchanged(self, first: RoundStart, rounds: tuple[SearchRound, ...]) -> tuple[SearchRound, ...]:
+        """The rounds of a set that explains more than the one reached, if an exchange of one effect leads to it."""
+        last = rounds[-1].null.hypothesis if rounds else first.hypothesis
+        if len(last.effects) < 2 or last.spread is not None:
+            return rounds
+        least = significant_gain(first.tested, later=True)
+        better = better_set(self.problem, rounds, least, self.advance)
+        if better is None:
+            return rounds
+        starts: tuple[RoundStart, ...] = (first,)
+        again: tuple[SearchRound, ...] = ()
+        for effect in better:
+            begin = replace(starts[-1], leader=effect.key, settled=True)
+            own = search_round(self.problem, begin, len(again), self.seed, self.advance, known=self.known)
+            if own is None or not own.tied:
+                return rounds
+            fitted, again = own.tied[0].fit, (*again, replace(own, release=None))
+            left = tuple(e for e in begin.effects if e.key != effect.key)
+            starts = (*starts, RoundStart(fitted.hypothesis, fitted.point, left, settled=True))
+        again = self.rounds(starts, again)
+        return again if total_cost(again[-1]) < total_cost(rounds[-1]) - BETTER else rounds
 
     def _branches(
         self,
@@ -239,9 +264,7 @@ def redundant_effect(problem: TraceProblem, fitted: PosteriorFit, least: float) 
         count = len(effect.parameters)
         if abs(fitted.point.sizes[at]) < effect.parameters[0].material:
             return i
-        rest = tuple(e for j, e in enumerate(fitted.hypothesis.effects) if j != i)
-        sizes = np.delete(fitted.point.sizes, np.arange(at, at + count))
-        less = fit(problem, replace(fitted.hypothesis, effects=rest), replace(fitted.point, sizes=sizes))
+        less = refit_without(problem, fitted, effect)
         if less is not None and 2.0 * (less.cost - fitted.cost - count) < least:
             return i
         at += count

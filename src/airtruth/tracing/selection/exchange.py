@@ -1,0 +1,104 @@
+"""Sets of effects one exchange away from the one that a search has reached.
+
+A search accepts one effect after another. Two causes that are alike at first may lead it to a set of three that together
+imitate them: the delay of a gyro in place of its lag, then a lag of the surface in place of its delay, then the lag of the
+gyro for what remains. An exchange of one member for its rival, and the removal of what becomes redundant, leads back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.effects.effect import Effect
+from airtruth.tracing.inference.optimise import fit
+from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.selection.acceptance import Candidate
+from airtruth.tracing.selection.budget import Advance, may_begin
+from airtruth.tracing.selection.refit import refit_without
+from airtruth.tracing.selection.rounds import SearchRound
+
+_RIVALS: Final = 1
+"""Number of rivals of a member that are tried in its place [-] (judgement: each costs a refit)."""
+BETTER: Final = 5.0
+"""Log-posterior by which another set has to lead [-] (judgement: a gain of 10 in 2 log L, as that of a first effect)."""
+
+
+def better_set(
+    problem: TraceProblem, rounds: Sequence[SearchRound], least: float, advance: Advance
+) -> tuple[Effect, ...] | None:
+    """The effects of a better set, the one that explains most first; None where no exchange leads by `BETTER`.
+
+    Parameters
+    ----------
+    rounds : a finished search with two or more accepted effects.
+    least : gain in 2 log L below which a member of the new set is removed.
+    """
+    last = rounds[-1].null
+    best: PosteriorFit | None = None
+    for index, effect in enumerate(last.hypothesis.effects):
+        for rival in _rivals(rounds, last, effect):
+            key = rival.score.effect.key
+            if not may_begin(advance, f"{key} in place of {effect.key} beside the other effects"):
+                return None
+            tried = _exchanged(problem, last, index, rival)
+            if tried is not None and _cost(tried) < _cost(best or last) - (0.0 if best else BETTER):
+                best = tried
+    return None if best is None else _needed(problem, best, least)
+
+
+def _rivals(rounds: Sequence[SearchRound], last: PosteriorFit, effect: Effect) -> list[Candidate]:
+    """Candidates of other names that were refitted in the round of an effect, best first."""
+    own = next((r for r in rounds if r.tied and r.tied[0].score.effect.key == effect.key), None)
+    if own is None:
+        return []
+    taken = {e.name for e in last.hypothesis.effects if e.key != effect.key}
+    others = (c for c in own.candidates if c.score.effect.name not in taken | {effect.name})
+    return sorted(others, key=lambda c: -c.gain)[:_RIVALS]
+
+
+def _exchanged(
+    problem: TraceProblem, last: PosteriorFit, index: int, rival: Candidate
+) -> PosteriorFit | None:
+    """The fit with a rival in place of a member; it begins where the rival's refit ended.
+
+    A refit that begins at the last set can end early or elsewhere, because the member to be replaced has moved the rest.
+    """
+    effects = last.hypothesis.effects
+    swapped = (*effects[:index], rival.score.effect, *effects[index + 1 :])
+    known = {e.key for e in rival.fit.hypothesis.effects}
+    sizes = [_sizes(rival.fit if e.key in known else last, e.key) for e in swapped]
+    start = replace(rival.fit.point, sizes=np.concatenate(sizes))
+    return fit(problem, replace(last.hypothesis, effects=swapped), start)
+
+
+def _sizes(fitted: PosteriorFit, key: str) -> NDArray[np.float64]:
+    return fitted.point.sizes[fitted.hypothesis.span(key)]
+
+
+def _cost(fitted: PosteriorFit) -> float:
+    """Negative log-posterior with one for each parameter of an effect."""
+    return fitted.cost + len(fitted.point.sizes)
+
+
+def _needed(problem: TraceProblem, fitted: PosteriorFit, least: float) -> tuple[Effect, ...]:
+    """The effects whose removal costs at least ``least`` in 2 log L, the one that costs most first."""
+    while True:
+        effects = fitted.hypothesis.effects
+        losses, fits = [], []
+        for effect in effects:
+            less = refit_without(problem, fitted, effect)
+            fits.append(less)
+            losses.append(np.inf if less is None else 2.0 * (_cost(less) - _cost(fitted)))
+        order = sorted(range(len(effects)), key=lambda i: -losses[i])
+        less = fits[order[-1]]
+        if less is None or losses[order[-1]] >= least or len(effects) == 1:
+            return tuple(effects[i] for i in order)
+        fitted = less
+
+
+__all__ = ["BETTER", "better_set"]

@@ -1,0 +1,73 @@
+"""Sets one exchange away from the one that a search has reached, on records whose sensors' scales are known."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import trace_records as tr
+
+from airtruth.effects.registry import EFFECTS
+from airtruth.tracing.inference.optimise import fit, initial_parameters
+from airtruth.tracing.model.parameters import Parameters
+from airtruth.tracing.selection.exchange import better_set
+from airtruth.tracing.selection.rounds import significant_gain
+from airtruth.units import DEG
+
+VANE, GYRO, ACCELEROMETER = (EFFECTS[f"{name}_scale"] for name in ("vane", "gyro", "accelerometer"))
+LEAST = significant_gain(33, later=True)
+
+
+@pytest.fixture(scope="module")
+def problem():
+    """Two records; the vane reads 1.3 and the gyro 1.1 of the truth."""
+    rng = np.random.default_rng(4)
+    records = []
+    for amplitude in (2.0, -2.0):
+        one = tr.fly(rng, amplitude=amplitude * DEG, sigma_w=0.05, name=str(amplitude))
+        y = one.signals.y * [1.3, 1.1, 1.0]
+        records.append(replace(one, signals=replace(one.signals, y=y)))
+    return tr.problem(records)
+
+
+def fitted(problem, *effects):
+    hypothesis = tr.NOTHING
+    for effect in effects:
+        hypothesis = hypothesis.plus(effect)
+    start = initial_parameters(problem, hypothesis)
+    return fit(problem, hypothesis, Parameters(start.common, start.per_record, np.zeros(len(effects))))
+
+
+def reached(problem, first, second, rivals):
+    """A search that has accepted two effects; ``rivals`` were refitted in its second round."""
+
+    def candidate(gain, *effects):
+        return SimpleNamespace(
+            score=SimpleNamespace(effect=effects[-1]), fit=fitted(problem, *effects), gain=gain
+        )
+
+    leaders = candidate(60.0, first), candidate(50.0, first, second)
+    others = [candidate(40.0, first, rival) for rival in rivals]
+    return (
+        SimpleNamespace(tied=leaders[:1], candidates=leaders[:1]),
+        SimpleNamespace(tied=leaders[1:], candidates=(leaders[1], *others)),
+        SimpleNamespace(tied=(), candidates=(), null=leaders[1].fit),
+    )
+
+
+def test_a_wrong_member_gives_way_to_its_rival(problem):
+    better = better_set(problem, reached(problem, GYRO, ACCELEROMETER, [VANE]), LEAST, lambda step: None)
+    assert better is not None
+    assert {e.key for e in better} == {"vane_scale", "gyro_scale"}
+
+
+def test_what_explains_most_comes_first(problem):
+    better = better_set(problem, reached(problem, GYRO, ACCELEROMETER, [VANE]), LEAST, lambda step: None)
+    without = {e.key: fitted(problem, *(o for o in better if o is not e)).cost for e in better}
+    assert without[better[0].key] > without[better[1].key]
+
+
+def test_a_right_set_stays(problem):
+    assert (
+        better_set(problem, reached(problem, GYRO, VANE, [ACCELEROMETER]), LEAST, lambda step: None) is None
+    )
