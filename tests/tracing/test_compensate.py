@@ -14,6 +14,7 @@ from airtruth.identification import Options, identify
 from airtruth.logs.flight_log import FlightLog
 from airtruth.loop import identify_without_effects
 from airtruth.physics import short_period
+from airtruth.physics.readings import state_of
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.physics.terms import AeroTerm, SensorTerm, StateTerm, SurfaceTerm
 from airtruth.tracing import TraceOptions, trace
@@ -26,7 +27,7 @@ from airtruth.tracing.compensate import (
     trim_alpha,
     updated_constants,
 )
-from airtruth.tracing.increment_response import increments, response, state
+from airtruth.tracing.increment_response import increments, response
 from airtruth.tracing.prepare import prepare
 from airtruth.units import DEG, G0
 
@@ -239,11 +240,11 @@ def test_increments_by_hand():
 def test_states_answer_a_ramp_as_the_books_say():
     t = np.arange(0.0, 2.0, 0.02)
     ramp = 0.3 + 0.5 * t[None, :]
-    lag = state(StateTerm("late", "lag", "alpha", 0.08), ramp, 0.02)[0]
+    lag = state_of(StateTerm("late", "lag", "alpha", 0.08), ramp, 0.02)[0]
     # tau x' = s - x on s = s0 + r t from equilibrium: s0 + r (t - tau (1 - exp(-t/tau)))
     assert np.allclose(lag, 0.3 + 0.5 * (t - 0.08 * (1.0 - np.exp(-t / 0.08))), atol=1e-12)
     wn, zeta = 12.0, 0.2
-    mode = state(StateTerm("bends", "mode", "alpha", 1.0 / wn, zeta), ramp, 0.02)[0]
+    mode = state_of(StateTerm("bends", "mode", "alpha", 1.0 / wn, zeta), ramp, 0.02)[0]
     wd = wn * np.sqrt(1.0 - zeta**2)
     # its ramp response (Ogata, Modern Control Engineering, ch. 5): t - 2 zeta/wn plus a decaying sine
     decay = np.exp(-zeta * wn * t)

@@ -64,7 +64,7 @@ def test_the_prior_of_a_size_enters_cost_gradient_and_information():
     )
 
 
-def an_effect(value, variant="Cm over alpha_rad"):
+def an_effect(value, acts_on="Cm"):
     at = np.linspace(0.0, 0.2, 9).tolist()
     half = [0.0 if v == 0.0 else 1e-3 for v in value]
     table = IncrementTable(
@@ -75,7 +75,14 @@ def an_effect(value, variant="Cm over alpha_rad"):
         (20,) * 9,
     )
     return AcceptedEffect(
-        "increment", {}, 0.0, 1.0, variant=variant, acts_on="Cm", over="alpha_rad", table=table
+        "increment",
+        {},
+        0.0,
+        1.0,
+        variant=f"{acts_on} over alpha_rad",
+        acts_on=acts_on,
+        over="alpha_rad",
+        table=table,
     )
 
 
@@ -106,6 +113,14 @@ def test_the_written_module_scales_a_table_without_a_closed_form():
     at = np.linspace(0.0, 0.2, 9)
     flown = sum(t.amplitude * shape_of(t, at) for t in change.aero)
     np.testing.assert_allclose(flown, 2.0 * np.array(value), atol=1e-12)
+
+
+def test_the_written_module_of_a_reading_changes_the_sensor():
+    value = [0.0, 0.0, 0.0, 0.0, 0.0, -0.01, -0.02, -0.03, -0.04]
+    (effect,) = executed(effect_module(Answer(an_effect(value, "alpha_rad"))))
+    (term,) = effect.change({"slope": -0.4, "at": 0.1}).readings
+    assert effect.where == "sensor"
+    assert (term.channel, term.signal, term.shape, term.amplitude) == ("alpha_rad", "alpha", "above", -0.4)
 
 
 NEEDED = increment(Shape("Cm", "elevator", -3.0 * DEG, 3.0 * DEG, 6, trim=0.0), 0.01)

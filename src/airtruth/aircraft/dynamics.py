@@ -39,6 +39,10 @@ def with_change(declared: Dynamics | None, change: Change) -> Dynamics | None:
         surface=(*own.surface, *change.surface),
         states=(*own.states, *(replace(s, name=names[s.name]) for s in change.states)),
         aero=(*own.aero, *(replace(t, signal=names.get(t.signal, t.signal)) for t in dynamic)),
+        readings=(
+            *own.readings,
+            *(replace(t, signal=names.get(t.signal, t.signal)) for t in change.readings),
+        ),
     )
     return None if result == Dynamics() else result
 
@@ -65,6 +69,10 @@ def declared_dynamics(dynamics: Dynamics | None) -> Change:
         surface=dynamics.surface,
         states=tuple(replace(state, name=_DECLARED + state.name) for state in dynamics.states),
         aero=tuple(aero),
+        readings=tuple(
+            replace(t, signal=_DECLARED + t.signal if t.signal in inputs else t.signal)
+            for t in dynamics.readings
+        ),
     )
 
 

@@ -15,7 +15,7 @@ from airtruth.documents import read_toml
 from airtruth.errors import AircraftError, choices
 from airtruth.physics.sensor_errors import KINDS, SensorErrors
 from airtruth.physics.short_period import PARAMETERS
-from airtruth.physics.terms import AeroTerm, StateTerm, SurfaceTerm
+from airtruth.physics.terms import AeroTerm, ReadingTerm, StateTerm, SurfaceTerm
 from airtruth.quantity import Quantity, Strict
 
 FILE: Final = "aircraft.toml"
@@ -111,12 +111,14 @@ class Dynamics(Strict):
     """Dynamics of the JSBSim model that its forces in a steady state do not show; a trace adds them to its filter.
 
     `airtruth trace` writes them into an updated aircraft. surface: terms between the measured surface and the air, in
-    sequence; states: lags and modes; aero: increments of CL and Cm whose signal is alpha_dot c/(2V) or a state.
+    sequence; states: lags and modes; aero: increments of CL and Cm whose signal is alpha_dot c/(2V) or a state; readings:
+    increments of what the sensors read, which campaigns fly as well.
     """
 
     surface: tuple[SurfaceTerm, ...] = ()
     states: tuple[StateTerm, ...] = ()
     aero: tuple[AeroTerm, ...] = ()
+    readings: tuple[ReadingTerm, ...] = ()
 
     @model_validator(mode="after")
     def _positive(self) -> Dynamics:

@@ -15,7 +15,8 @@ from airtruth.physics.terms import CAUSES, DECLARED, Change, SensorTerm, Surface
 def effective(change: Change) -> Change:
     """Return the change without neutral terms, and without states that no term reads."""
     aero = tuple(term for term in change.aero if term.amplitude != 0.0)
-    signals = {term.signal for term in aero}
+    readings = tuple(term for term in change.readings if term.amplitude != 0.0)
+    signals = {term.signal for term in aero} | {term.signal for term in readings}
     return replace(
         change,
         surface=tuple(term for term in change.surface if not _neutral_surface(term)),
@@ -24,6 +25,7 @@ def effective(change: Change) -> Change:
         declared=tuple(term for term in change.declared if term.value != DECLARED[term.quantity]),
         derivatives=tuple(term for term in change.derivatives if term.value != CAUSES[term.cause]),
         sensors=tuple(term for term in change.sensors if term.value != KINDS[term.kind].neutral),
+        readings=readings,
         air=tuple(term for term in change.air if term.factor != 1.0),
     )
 

@@ -170,8 +170,8 @@ def _write_model(
         mass_kg=constants.mass_kg, inertia_kg_m2=constants.inertia_yy_kg_m2, chord_m=constants.chord_m
     )
     declared_xml.write(root, change.declared, masses, where)
-    _write_functions(root, model, change, where, highest_hz)
-    if change.in_aircraft:
+    _write_functions(root, model, change.in_motion, where, highest_hz)
+    if change.in_aircraft or change.readings:
         _document(root, heading)
     model_files.write(read, out / f"{out.name}.xml")
 

@@ -1,4 +1,5 @@
-"""Increments of a coefficient that have no name: piecewise linear functions of a signal, with memory or without.
+"""Increments of a coefficient or of a reading that have no name: piecewise linear functions of a signal, with memory or
+without.
 
     dC = sum_k b_k/w h_k(s)  [+ a (x - s)],   h_k = max(0, s - s_k) above the trim, min(0, s - s_k) below it
 
@@ -16,13 +17,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from airtruth.effects.effect import Effect, Parameter
-from airtruth.physics.terms import AeroTerm, Change, StateTerm, shape_of
+from airtruth.physics.terms import READINGS, AeroTerm, Change, ReadingTerm, StateTerm, shape_of
 
 Array = NDArray[np.float64]
 
@@ -35,10 +36,22 @@ SIGNAL_NAMES: Final[Mapping[str, str]] = {
     "alpha_dot_hat": "alpha_dot_hat",
 }
 """Signal of a term -> its name in an answer; a rate is multiplied by c/(2V)."""
-_STEP: Final[Mapping[str, float]] = {"CL": 1e-3, "Cm": 1e-4}
-"""Step of the differences in a bend [-] (judgement: small against noise, large against rounding)."""
-_REACH: Final[Mapping[str, float]] = {"CL": 1.0, "Cm": 0.3}
-"""Largest bend over one cell [-] (judgement: the lift and the moment of a stall)."""
+Acted = Literal["CL", "Cm", "alpha_rad", "q_rad_s", "az_m_s2"]
+"""Coefficient, or channel whose reading changes."""
+_STEP: Final[Mapping[str, float]] = {
+    "CL": 1e-3,
+    "Cm": 1e-4,
+    "alpha_rad": 1e-4,
+    "q_rad_s": 1e-3,
+    "az_m_s2": 1e-2,
+}
+"""Step of the differences in a bend [-, unit of the channel] (judgement: small against noise, large against rounding)."""
+_REACH: Final[Mapping[str, float]] = {"CL": 1.0, "Cm": 0.3, "alpha_rad": 0.1, "q_rad_s": 1.0, "az_m_s2": 30.0}
+"""Largest bend over one cell [-, unit of the channel] (judgement: the lift and the moment of a stall; 6 deg of a vane)."""
+_QHAT: Final = 30.0
+"""Pitch rate over q c/(2V) by which the share of a reading over q c/(2V) exceeds one over an angle [-] (judgement)."""
+_ACTS: Final = {"CL": "lift", "Cm": "pitching moment"}
+"""Coefficient in words."""
 _TIME_REACH: Final = 3.0
 """Largest ratio by which a refit may lengthen or shorten a time constant [-] (judgement: the grid's steps are smaller)."""
 
@@ -59,13 +72,22 @@ class Memory:
     damping: float = 0.0
 
 
+class Piece(NamedTuple):
+    """Part of an increment: signal, shape, amplitude and origin, as of `airtruth.physics.terms.AeroTerm`."""
+
+    signal: str
+    shape: Literal["linear", "above", "below"]
+    amplitude: float
+    at: float
+
+
 @dataclass(frozen=True)
 class Shape:
     """Where a learned increment acts, and by which functions.
 
     Attributes
     ----------
-    coefficient : "CL" or "Cm".
+    acts_on : "CL", "Cm", or the channel whose reading changes.
     signal : one of `airtruth.physics.terms.SIGNALS`.
     low, high : range of the signal in which the increment is learned [unit of the signal].
     cells : number of equal cells of the range; 0 for a linear increment, which needs ``memory``.
@@ -73,7 +95,7 @@ class Shape:
     memory : state between the signal and the increment; None for an increment of the signal itself.
     """
 
-    coefficient: Literal["CL", "Cm"]
+    acts_on: Acted
     signal: str
     low: float
     high: float
@@ -95,42 +117,53 @@ class Shape:
     def state(self) -> str:
         """Name of the state; one for each coefficient, signal and kind."""
         kind = self.memory.kind if self.memory is not None else ""
-        return f"{NAME}-{self.coefficient}-{self.signal.replace('_', '-')}-{kind}"
+        return f"{NAME}-{self.acts_on}-{self.signal}-{kind}".replace("_", "-")
+
+    @property
+    def of_reading(self) -> bool:
+        """Whether it changes a reading instead of a coefficient."""
+        return self.acts_on in READINGS
 
     @property
     def variant(self) -> str:
-        """Variant of the effect: coefficient, signal and memory."""
+        """Variant of the effect: coefficient or channel, signal and memory."""
         over = SIGNAL_NAMES[self.signal]
         if self.memory is None:
-            return f"{self.coefficient} over {over}"
-        return f"{self.coefficient} over a {self.memory.kind} of {over}"
+            return f"{self.acts_on} over {over}"
+        return f"{self.acts_on} over a {self.memory.kind} of {over}"
 
     def terms(self, values: Mapping[str, float]) -> Change:
         """Terms of the increment at given parameters."""
         if self.memory is None:
-            return Change(aero=self._bends(values, self.signal))
+            return self._change(self._bends(values, self.signal))
         state = StateTerm(
             self.state, self.memory.kind, self.signal, values["time_s"], values.get("damping", 0.0)
         )
         if self.cells:
-            return Change(states=(state,), aero=self._bends(values, state.name))
+            return self._change(self._bends(values, state.name), state)
         share = values["share"]
-        return Change(
-            states=(state,),
-            aero=(
-                AeroTerm(self.coefficient, state.name, "linear", share, self.trim),
-                AeroTerm(self.coefficient, self.signal, "linear", -share, self.trim),
-            ),
+        pieces = (
+            Piece(state.name, "linear", share, self.trim),
+            Piece(self.signal, "linear", -share, self.trim),
         )
+        return self._change(pieces, state)
 
-    def _bends(self, values: Mapping[str, float], signal: str) -> tuple[AeroTerm, ...]:
+    def _change(self, pieces: tuple[Piece, ...], *states: StateTerm) -> Change:
+        """The pieces as terms of what the increment acts on."""
+        if self.acts_on == "CL" or self.acts_on == "Cm":
+            coefficient = self.acts_on
+            return Change(states=states, aero=tuple(AeroTerm(coefficient, *piece) for piece in pieces))
+        channel = self.acts_on
+        return Change(states=states, readings=tuple(ReadingTerm(channel, *piece) for piece in pieces))
+
+    def _bends(self, values: Mapping[str, float], signal: str) -> tuple[Piece, ...]:
         sides: tuple[Literal["below", "above"], ...] = ("below", "above")
         above = [(at, values[_bend(k)] / self.width) for k, at in enumerate(self.knots) if at > self.trim]
         below = [(at, values[_bend(k)] / self.width) for k, at in enumerate(self.knots) if at <= self.trim]
         above.append((self.high, -sum(slope for _, slope in above)))
         below.append((self.low, -sum(slope for _, slope in below)))
         return tuple(
-            AeroTerm(self.coefficient, signal, shape, slope, at)
+            Piece(signal, shape, slope, at)
             for shape, rows in zip(sides, (below, above), strict=True)
             for at, slope in rows
             if len(rows) > 1
@@ -153,7 +186,9 @@ class Shape:
         for name in names:
             unit = dict.fromkeys(names, 0.0) | {name: 1.0}
             terms = self._bends(unit, self.signal)
-            columns.append(sum((t.amplitude * shape_of(t, at) for t in terms), np.zeros(at.shape)))
+            columns.append(
+                sum((t.amplitude * shape_of(AeroTerm("CL", *t), at) for t in terms), np.zeros(at.shape))
+            )
         return np.stack(columns, axis=-1)
 
 
@@ -193,19 +228,21 @@ def increment(shape: Shape, prior_std: float = math.inf) -> Increment:
     """
     size = "share" if not shape.cells else ""
     names = [size] if size else [_bend(k) for k in range(len(shape.knots))]
-    reach = 10.0 * _REACH[shape.coefficient] if size else _REACH[shape.coefficient]
-    step = (100.0 if size else 1.0) * _STEP[shape.coefficient]
+    reach, step = _REACH[shape.acts_on], _STEP[shape.acts_on]
+    if size:
+        rate = _QHAT if shape.of_reading and shape.signal == "qhat" else 1.0
+        reach, step = 10.0 * rate * reach, 100.0 * rate * step
     meaning = "part that acts through the state [1/unit of the signal]" if size else "bend over one cell"
     parameters = [
         Parameter(name, "-", meaning, -reach, reach, 0.0, step=step, prior_std=prior_std) for name in names
     ]
     if shape.memory is not None:
         parameters += _times(shape.memory)
-    acts = "pitching moment" if shape.coefficient == "Cm" else "lift"
+    acts = _ACTS.get(shape.acts_on, f"reading of {shape.acts_on}")
     return Increment(
         name=NAME,
         variant=shape.variant,
-        where="dynamics",
+        where="sensor" if shape.of_reading else "dynamics",
         parameters=tuple(parameters),
         describe=shape.terms,
         explanation=f"An increment of the {acts} that no effect of the library describes, learned from the records.",

@@ -7,7 +7,7 @@ down, nose-up positive, elevator trailing edge down positive.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -20,8 +20,10 @@ Array = NDArray[np.float64]
 
 SIGNALS: Final = ("alpha", "elevator", "qhat", "alpha_dot_hat")
 """Signals of a `StateTerm` or `AeroTerm`, which may name a state as well; their order numbers them for compiled code."""
+READINGS: Final = ("alpha_rad", "q_rad_s", "az_m_s2")
+"""Channels of a `ReadingTerm`, the outputs of the filter."""
 SHAPES: Final = ("linear", "quadratic", "above", "below")
-"""Functions f of an `AeroTerm`, see `shape_of`; their order numbers them for compiled code."""
+"""Functions f of an `AeroTerm` or a `ReadingTerm`, see `shape_of`; their order numbers them for compiled code."""
 FORMULAS: Final[Mapping[str, str]] = {
     "linear": "(s - at)",
     "quadratic": "(s - at)^2",
@@ -69,7 +71,7 @@ class SurfaceTerm:
 
 @dataclass(frozen=True)
 class StateTerm:
-    """A state x driven by a signal s; an `AeroTerm` may name it as its signal.
+    """A state x driven by a signal s; an `AeroTerm` or a `ReadingTerm` may name it as its signal.
 
     Attributes
     ----------
@@ -109,7 +111,29 @@ class AeroTerm:
     at: float = 0.0
 
 
-def shape_of(term: AeroTerm, signal: ArrayLike) -> Array:
+@dataclass(frozen=True)
+class ReadingTerm:
+    """An increment of a reading: channel += amplitude f(signal), f by `shape_of`.
+
+    It acts where the instrument is, before its lag, delay and scale.
+
+    Attributes
+    ----------
+    channel : one of `READINGS`.
+    signal : "alpha" [rad] of the air at the CG, "elevator" [rad], "qhat" = q c/(2V), or the name of a `StateTerm`.
+    shape : name of f, see `FORMULAS`.
+    amplitude : per unit of f [unit of the channel]; neutral 0.
+    at : origin of f [unit of the signal].
+    """
+
+    channel: Literal["alpha_rad", "q_rad_s", "az_m_s2"]
+    signal: str
+    shape: Literal["linear", "quadratic", "above", "below"]
+    amplitude: float
+    at: float = 0.0
+
+
+def shape_of(term: AeroTerm | ReadingTerm, signal: ArrayLike) -> Array:
     """Evaluate f of a term, without its amplitude.
 
     Parameters
@@ -232,6 +256,7 @@ class Change:
     declared: tuple[DeclaredTerm, ...] = ()
     derivatives: tuple[DerivativeTerm, ...] = ()
     sensors: tuple[SensorTerm, ...] = ()
+    readings: tuple[ReadingTerm, ...] = ()
     air: tuple[AirTerm, ...] = ()
 
     def __add__(self, other: Change) -> Change:
@@ -241,4 +266,11 @@ class Change:
     @property
     def in_aircraft(self) -> bool:
         """Whether it changes the JSBSim model itself, and not its sensors or the air alone."""
-        return bool(self.surface or self.states or self.aero or self.declared or self.derivatives)
+        return bool(self.surface or self.aero or self.declared or self.derivatives)
+
+    @property
+    def in_motion(self) -> Change:
+        """The change without its readings and the states that they alone read."""
+        signals = {term.signal for term in self.aero}
+        states = tuple(s for s in self.states if s.name in signals)
+        return replace(self, states=states, readings=())

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.aircraft import Aircraft
 from airtruth.physics import sensors
+from airtruth.physics.readings import reading_increments
 from airtruth.physics.sensor_errors import SensorErrors
+from airtruth.physics.terms import ReadingTerm, StateTerm
 
 Array = NDArray[np.float64]
 
@@ -29,8 +33,41 @@ LOGGED: Final = (
 """Channels of a log, in the order of its columns."""
 
 
-def needs_every_step(fitted: Mapping[str, SensorErrors], log_period_s: float) -> bool:
-    """Whether a sensor needs the samples between those of the log: for a lag, or for a delay or hold between samples."""
+@dataclass(frozen=True)
+class Readings:
+    """What the sensors read beyond their errors.
+
+    Attributes
+    ----------
+    terms, states : increments of the readings, and the states that drive them.
+    chord_m : reference chord [m].
+    """
+
+    terms: tuple[ReadingTerm, ...] = ()
+    states: tuple[StateTerm, ...] = ()
+    chord_m: float = 1.0
+
+    def increments(self, truth: Mapping[str, Array], dt_s: float) -> dict[str, Array]:
+        """Channel -> increment of its reading, see `airtruth.physics.readings.reading_increments`."""
+        return reading_increments(self.terms, self.states, truth, self.chord_m, dt_s)
+
+
+def readings_of(aircraft: Aircraft) -> Readings:
+    """The increments of readings that an aircraft.toml declares."""
+    dynamics = aircraft.file.dynamics
+    if dynamics is None or not dynamics.readings:
+        return Readings()
+    return Readings(dynamics.readings, dynamics.states, aircraft.chord_m)
+
+
+def needs_every_step(
+    fitted: Mapping[str, SensorErrors], log_period_s: float, readings: Readings | None = None
+) -> bool:
+    """Whether a sensor needs the samples between those of the log: for a lag or a state, or for a delay or hold between
+    samples.
+    """
+    if readings is not None and readings.terms and readings.states:
+        return True
 
     def odd(duration: float) -> bool:
         samples = duration / log_period_s
@@ -45,6 +82,7 @@ def log_channels(
     noise: Mapping[str, Array],
     dt_s: float,
     every: int,
+    readings: Readings | None = None,
 ) -> dict[str, Array]:
     """Readings of the sensors at the samples of the log.
 
@@ -55,6 +93,7 @@ def log_channels(
     noise : channel -> (runs, records) standard normals for the channels with noise.
     dt_s : period of the records [s].
     every : records per log sample.
+    readings : increments of the readings; None for none.
 
     Returns
     -------
@@ -62,10 +101,13 @@ def log_channels(
         Channel of `LOGGED` -> (runs, samples).
     """
     result = {}
+    more = {} if readings is None else readings.increments(truth, dt_s)
     for name in LOGGED:
         values = truth[name]
         if name in fitted:
-            values = sensors.at_instrument(name, truth, fitted[name])
+            values = sensors.at_instrument(name, truth, fitted[name]) + more.get(name, 0.0)
             values = sensors.measure(fitted[name], values, dt_s, noise.get(name, np.zeros_like(values)))
+        elif name in more:
+            values = values + more[name]
         result[name] = values[:, ::every]
     return result

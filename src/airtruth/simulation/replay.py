@@ -152,7 +152,9 @@ def _first(track: Track, channel: str, otherwise: float) -> float:
 def _logged(aircraft: Aircraft, truth: Mapping[str, Array], track: Track) -> dict[str, Array]:
     rows = {name: values[None, :] for name, values in truth.items()}
     sensors = {name: s.errors() for name, s in aircraft.file.sensors.items() if name in track.outputs}
-    logged = measure.log_channels(rows, sensors, {}, track.dt_s / track.substeps, track.substeps)
+    logged = measure.log_channels(
+        rows, sensors, {}, track.dt_s / track.substeps, track.substeps, measure.readings_of(aircraft)
+    )
     return {name: values[0] for name, values in logged.items()}
 
 

@@ -27,9 +27,18 @@ from airtruth.logs.flight_log import Batch, FlightLog, batches
 from airtruth.numerics.prefilter import butterworth
 from airtruth.physics import short_period
 from airtruth.physics.atmosphere import air_density
+from airtruth.physics.readings import reading_increments, state_of
 from airtruth.physics.sensor_errors import SensorErrors
-from airtruth.physics.terms import AeroTerm, Change, SensorTerm, StateTerm, SurfaceTerm, declared_total
-from airtruth.tracing.increment_response import increments, response, state
+from airtruth.physics.terms import (
+    AeroTerm,
+    Change,
+    ReadingTerm,
+    SensorTerm,
+    StateTerm,
+    SurfaceTerm,
+    declared_total,
+)
+from airtruth.tracing.increment_response import increments, response
 from airtruth.tracing.model.surface import through
 from airtruth.tracing.result import TraceResult
 
@@ -91,7 +100,8 @@ class Compensation:
     aero, states : increments of the coefficients, and the lags and modes that they may take as signals.
     conditions : derivatives of the aircraft per flight condition; a record takes those of the nearest airspeed.
     from_trim : whether alpha counts from the record's own trim, as in a trace with the linear model.
-    sensors, surface : errors of sensors, and dynamics between measured surface and air.
+    sensors, readings : errors of sensors, and increments of what they read.
+    surface : dynamics between measured surface and air.
     mass_factor, inertia_factor : factors on the declared constants [-].
     treatments : what happens to each effect.
     """
@@ -101,6 +111,7 @@ class Compensation:
     states: tuple[StateTerm, ...] = ()
     from_trim: bool = False
     sensors: tuple[SensorTerm, ...] = ()
+    readings: tuple[ReadingTerm, ...] = ()
     surface: tuple[SurfaceTerm, ...] = ()
     mass_factor: float = 1.0
     inertia_factor: float = 1.0
@@ -129,6 +140,7 @@ def compensation_of(result: TraceResult) -> Compensation:
         states=states,
         from_trim=result.case.model == "linear",
         sensors=total.sensors,
+        readings=total.readings,
         surface=total.surface,
         mass_factor=declared_total(total.declared, "mass"),
         inertia_factor=declared_total(total.declared, "inertia"),
@@ -145,8 +157,10 @@ def _measurable(change: Change) -> tuple[tuple[AeroTerm, ...], tuple[StateTerm, 
 
 def treatment_of(key: str, change: Change) -> Treatment:
     """The treatment of one effect, by what it changes."""
-    if change.sensors:
-        channels = ", ".join(sorted({t.channel for t in change.sensors}))
+    if change.sensors or change.readings:
+        channels = ", ".join(
+            sorted({t.channel for t in change.sensors} | {t.channel for t in change.readings})
+        )
         return Treatment(key, "undone", f"{key}: its error is undone in {channels}")
     if change.surface:
         return Treatment(key, "replaced", f"{key}: elevator_rad is replaced by the surface that the air sees")
@@ -202,6 +216,7 @@ def compensated_batch(batch: Batch, constants: AircraftConstants, taken: Compens
     """The runs of a batch without the traced effects; increments at the first sample belong to the trim."""
     channels = dict(batch.channels)
     _undo_sensors(channels, taken.sensors, batch.dt_s)
+    _undo_readings(channels, batch.dt_s, constants, taken)
     if taken.surface:
         elevator = channels["elevator_rad"]
         channels["elevator_rad"] = np.array([_air_surface(taken.surface, de, batch.dt_s) for de in elevator])
@@ -224,19 +239,34 @@ def _increment_response(
         airspeed,
         np.asarray(air_density(channels)).mean(axis=1),
     )
-    trim = trim_alpha(alpha, dt_s)[:, None] if taken.from_trim else 0.0
     signals = {
-        "alpha": alpha - trim,
+        "alpha": alpha - _origin(alpha, dt_s, taken),
         "elevator": channels["elevator_rad"],
         "qhat": channels["q_rad_s"] * scale.half_chord_time[:, None],
     }
-    signals |= {s.name: state(s, signals[s.signal], dt_s) for s in taken.states}
+    signals |= {s.name: state_of(s, signals[s.signal], dt_s) for s in taken.states}
     more = increments(taken.aero, signals)
     more -= more[..., : _head(dt_s)].mean(axis=2, keepdims=True)
     conditions = np.array([c.airspeed_m_s for c in taken.conditions])
     nearest = np.abs(airspeed[:, None] - conditions).argmin(axis=1)
     derivatives = np.array([c.derivatives for c in taken.conditions])[nearest]
     return response(derivatives, scale, more[0], more[1], dt_s)
+
+
+def _undo_readings(
+    channels: dict[str, Array], dt_s: float, constants: AircraftConstants, taken: Compensation
+) -> None:
+    """Subtract the increments of the readings, in the measured signals, from ``channels``."""
+    alpha = channels["alpha_rad"]
+    signals = channels | {"alpha_rad": alpha - _origin(alpha, dt_s, taken)}
+    more = reading_increments(taken.readings, taken.states, signals, constants.chord_m, dt_s)
+    for name, increment in more.items():
+        channels[name] = channels[name] - increment
+
+
+def _origin(alpha: Array, dt_s: float, taken: Compensation) -> Array:
+    """(runs, 1) angle of attack from which the terms count [rad]."""
+    return trim_alpha(alpha, dt_s)[:, None] if taken.from_trim else np.zeros((len(alpha), 1))
 
 
 def trim_alpha(alpha: Array, dt_s: float) -> Array:

@@ -12,6 +12,7 @@ from airtruth.effects.closed_form import ClosedForm, closed_forms
 from airtruth.effects.increment import SIGNAL_NAMES
 from airtruth.errors import StoreError
 from airtruth.logs import atomic
+from airtruth.physics.terms import READINGS
 from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
 from airtruth.tracing.answer import Z95, TraceAnswer
 
@@ -24,20 +25,20 @@ _RANGE: Final = 4.0
 _MATERIAL: Final = 0.2
 """Material size over the learned one [-] (judgement: a fifth of what was worth learning)."""
 _TERMS: Final = {
-    "break above": '(AeroTerm("{c}", "{s}", "above", values["slope"], values["at"]),)',
-    "break below": '(AeroTerm("{c}", "{s}", "below", values["slope"], values["at"]),)',
+    "break above": '({term}("{c}", "{s}", "above", values["slope"], values["at"]),)',
+    "break below": '({term}("{c}", "{s}", "below", values["slope"], values["at"]),)',
     "step above": """(
-            AeroTerm("{c}", "{s}", "above", values["step"] / values["width"], values["at"]),
-            AeroTerm("{c}", "{s}", "above", -values["step"] / values["width"], values["at"] + values["width"]),
+            {term}("{c}", "{s}", "above", values["step"] / values["width"], values["at"]),
+            {term}("{c}", "{s}", "above", -values["step"] / values["width"], values["at"] + values["width"]),
         )""",
     "step below": """(
-            AeroTerm("{c}", "{s}", "below", -values["step"] / values["width"], values["at"]),
-            AeroTerm("{c}", "{s}", "below", values["step"] / values["width"], values["at"] - values["width"]),
+            {term}("{c}", "{s}", "below", -values["step"] / values["width"], values["at"]),
+            {term}("{c}", "{s}", "below", values["step"] / values["width"], values["at"] - values["width"]),
         )""",
-    "curve": '(AeroTerm("{c}", "{s}", "quadratic", values["curvature"], {trim!r}),)',
+    "curve": '({term}("{c}", "{s}", "quadratic", values["curvature"], {trim!r}),)',
     "share": """(
-            AeroTerm("{c}", "{s}", "linear", values["share"], {trim!r}),
-            AeroTerm("{c}", "{driver}", "linear", -values["share"], {trim!r}),
+            {term}("{c}", "{s}", "linear", values["share"], {trim!r}),
+            {term}("{c}", "{driver}", "linear", -values["share"], {trim!r}),
         )""",
 }
 """Closed form -> terms, as Python."""
@@ -85,7 +86,7 @@ traces test them.
 """
 
 from airtruth.effects.effect import Effect, Parameter
-from airtruth.physics.terms import AeroTerm, Change, StateTerm
+from airtruth.physics.terms import AeroTerm, Change, ReadingTerm, StateTerm
 '''
 """First lines of a module."""
 _PROJECT: Final = """[build-system]
@@ -112,25 +113,26 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
     driver = _SIGNALS[e.over or ""]
     signal = "learned-state" if e.states else driver
     trim = e.table.trim if e.table is not None else 0.0
+    field, term = ("readings", "ReadingTerm") if e.acts_on in READINGS else ("aero", "AeroTerm")
     values = {name: p.value for name, p in e.parameters.items()} if form is None else form.values
     sizes = {k: v for k, v in values.items() if k not in ("at", "width", "time_s", "damping")}
     if form is not None:
-        terms = _TERMS[form.name].format(c=e.acts_on, s=signal, driver=driver, trim=trim)
+        terms = _TERMS[form.name].format(term=term, c=e.acts_on, s=signal, driver=driver, trim=trim)
         sentence = (
             f"Closed form of the learned table ({form.name}): chi-square {form.statistic:.3g} over "
             f"{form.degrees} degrees of freedom."
         )
     elif e.table is None:
-        terms = _TERMS["share"].format(c=e.acts_on, s=signal, driver=driver, trim=0.0)
+        terms = _TERMS["share"].format(term=term, c=e.acts_on, s=signal, driver=driver, trim=0.0)
         sentence = "Linear part behind a state."
     else:
-        terms = _of_table(e.acts_on or "", e.table, signal)
+        terms = _of_table(f'{term}("{e.acts_on}"', e.table, signal)
         sizes, values = {"factor": 1.0}, {"factor": 1.0}
         sentence = "No closed form is as good as the learned table, so the effect scales the table."
     state = [(s.kind, s.time_s, s.damping) for s in e.states]
     states = "".join(f'StateTerm("learned-state", "{k}", "{driver}", {t!r}, {d!r}),' for k, t, d in state)
     yield (
-        f"def _terms_{number}(values):\n    return Change(\n        states=({states}),\n        aero={terms},\n    )\n"
+        f"def _terms_{number}(values):\n    return Change(\n        states=({states}),\n        {field}={terms},\n    )\n"
     )
     locations = {k: values[k] for k in ("at", "width") if k in values}
     parameters = [_size(name, value) for name, value in sizes.items()]
@@ -141,7 +143,7 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
         f"EFFECT_{number} = Effect(\n"
         f'    name="learned_{(e.acts_on or "").lower()}_{driver}",\n'
         f'    variant="{"-".join(k for k, _, _ in state)}",\n'
-        f'    where="dynamics",\n    parameters=(\n{lines}    ),\n'
+        f'    where="{"sensor" if e.acts_on in READINGS else "dynamics"}",\n    parameters=(\n{lines}    ),\n'
         f"    describe=_terms_{number},\n"
         f'    explanation="Learned from flight logs: {e.variant}.",\n'
         f'    source="{sentence}",\n)\n'
@@ -158,14 +160,17 @@ def _form(e: AcceptedEffect) -> ClosedForm | None:
     return next((f for f in closed_forms(t.at, t.value, std, t.trim) if f.is_as_good), None)
 
 
-def _of_table(coefficient: str, table: IncrementTable, signal: str) -> str:
-    """Terms of a table with a common factor: its bends, on either side of the trim, where it is flat."""
+def _of_table(term: str, table: IncrementTable, signal: str) -> str:
+    """Terms of a table with a common factor: its bends, on either side of the trim, where it is flat.
+
+    ``term`` is how each term begins.
+    """
     points, trim = list(table.at), table.trim
     pieces = zip(pairwise(points), pairwise(table.value), strict=True)
     slopes = [(b - a) / (y - x) for (x, y), (a, b) in pieces]
     bends = [after - before for before, after in zip([0.0, *slopes], [*slopes, 0.0], strict=True)]
     rows = "".join(
-        f'            AeroTerm("{coefficient}", "{signal}", "{"above" if x > trim else "below"}", '
+        f'            {term}, "{signal}", "{"above" if x > trim else "below"}", '
         f'{bend if x > trim else -bend!r} * values["factor"], {x!r}),\n'
         for x, bend in zip(points, bends, strict=True)
     )

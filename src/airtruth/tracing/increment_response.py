@@ -19,10 +19,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
-from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
 from airtruth.physics import short_period
-from airtruth.physics.terms import AeroTerm, StateTerm, shape_of
+from airtruth.physics.terms import AeroTerm, shape_of
 
 Array = NDArray[np.float64]
 
@@ -38,16 +37,6 @@ def increments(aero: Sequence[AeroTerm], signals: Mapping[str, Array]) -> Array:
     for term in aero:
         total[0 if term.coefficient == "CL" else 1] += term.amplitude * shape_of(term, signals[term.signal])
     return total
-
-
-def state(term: StateTerm, signal: Array, dt_s: float) -> Array:
-    """A lag or a mode of a signal (runs, samples), from equilibrium, exact for a signal linear between samples."""
-    time = term.time_s
-    poles = [time, 1.0] if term.kind == "lag" else [time**2, 2.0 * term.damping * time, 1.0]
-    b, a, _ = cont2discrete(([1.0], poles), dt_s, method="foh")
-    b = b.ravel()
-    start = lfilter_zi(b, a)[None, :] * signal[:, :1]
-    return np.asarray(lfilter(b, a, signal, axis=1, zi=start)[0])
 
 
 def response(derivatives: Array, scale: short_period.Scale, lift: Array, moment: Array, dt_s: float) -> Array:
@@ -85,4 +74,4 @@ def response(derivatives: Array, scale: short_period.Scale, lift: Array, moment:
     return np.stack([x[..., 0], x[..., 1], az])
 
 
-__all__ = ["increments", "response", "state"]
+__all__ = ["increments", "response"]

@@ -37,7 +37,7 @@ def in_physical_terms(
     )
     return replace(
         stated,
-        acts_on=shape.coefficient,
+        acts_on=shape.acts_on,
         over=SIGNAL_NAMES[shape.signal],
         relative_size=relative_swing(problem, fitted, effect),
         table=increment_table(problem, fitted, covariance, effect) if shape.cells else None,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,13 +15,15 @@ from airtruth.effects.increment import Increment
 from airtruth.errors import StoreError
 from airtruth.logs import atomic
 from airtruth.physics.short_period import PARAMETERS
-from airtruth.physics.terms import AeroTerm, Change
+from airtruth.physics.terms import AeroTerm, Change, ReadingTerm
 from airtruth.tracing.increment_table import increment_table
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import robust_covariance
 from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.rounds import SearchRound
+
+_Term = TypeVar("_Term", AeroTerm, ReadingTerm)
 
 
 def accepted_change(rounds: Sequence[SearchRound]) -> Change:
@@ -94,7 +97,11 @@ def write_update(
     fit = rounds[-1].gls
     plants = [record.plant for record in case.fitted.records]
     shift = float(np.mean([p.alpha_shift_rad for p in plants]))
-    change = replace(change, aero=tuple(_from_zero_alpha(t, shift) for t in change.aero))
+    change = replace(
+        change,
+        aero=tuple(_from_zero_alpha(t, shift) for t in change.aero),
+        readings=tuple(_from_zero_alpha(t, shift) for t in change.readings),
+    )
     increments = dict(zip(PARAMETERS, fit.point.common[Common.derivatives].tolist(), strict=True))
     release = rounds[-1].release
     causes = release.sets[0].effects if released and release is not None else ()
@@ -126,7 +133,7 @@ def _bands(case: Case, fit: PosteriorFit) -> Iterator[str]:
         yield f"95 % band of {effect.key}: {band}."
 
 
-def _from_zero_alpha(term: AeroTerm, shift_rad: float) -> AeroTerm:
+def _from_zero_alpha(term: _Term, shift_rad: float) -> _Term:
     """A term that counts alpha from zero, as an aircraft does; the linear model counts it from the record's trim."""
     return replace(term, at=term.at + shift_rad) if term.signal == "alpha" else term
 

@@ -106,7 +106,8 @@ class Pilot:
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
         models = {name: sensor.errors() for name, sensor in plan.sensors.items()}
-        dynamic = measure.needs_every_step(models, 1.0 / plan.campaign.log_hz)
+        self._readings = measure.readings_of(plan.aircraft)
+        dynamic = measure.needs_every_step(models, 1.0 / plan.campaign.log_hz, self._readings)
         self._record_every = 1 if dynamic else plan.log_every
         self._noisy = tuple(
             name for name in measure.LOGGED if name in models and models[name].noise_std > 0.0
@@ -242,7 +243,9 @@ class Pilot:
             )
             for name in self._noisy
         }
-        logged = measure.log_channels(truth, self._models, noise, plan.dt_s * every, plan.log_every // every)
+        logged = measure.log_channels(
+            truth, self._models, noise, plan.dt_s * every, plan.log_every // every, self._readings
+        )
         samples = logged["alpha_rad"].shape[1]
         return FlightLog(
             metadata=_log_metadata(plan),

@@ -64,7 +64,7 @@ def aircraft(plane: Aircraft, change: Change, simulation_hz: float, nominal: Con
         If an effect acts on the derivatives and the aircraft cannot be trimmed.
     """
     change = replace(change, sensors=(), air=())
-    if not change.in_aircraft:
+    if not (change.in_aircraft or change.readings):
         return plane
     from airtruth.aircraft.write import changed
 

@@ -13,10 +13,13 @@ from airtruth.errors import ConfigurationError, choices
 from airtruth.physics.sensor_errors import KINDS, Kind, SensorErrors
 from airtruth.physics.terms import (
     DECLARED,
+    READINGS,
     SHAPES,
     SIGNALS,
     STATE_KINDS,
+    AeroTerm,
     Change,
+    ReadingTerm,
     SensorTerm,
     SurfaceTerm,
     declared_total,
@@ -27,7 +30,7 @@ from airtruth.tracing.model.parameters import OUTPUTS, StateLayout, effect_state
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-CHANNELS: Final = ("alpha_rad", "q_rad_s", "az_m_s2")
+CHANNELS: Final = READINGS
 """Outputs of the filter, columns of the log."""
 
 
@@ -105,14 +108,16 @@ def compile_change(change: Change) -> CompiledChange:
 
 
 def _effects(change: Change, first: Ints) -> EffectArrays:
-    """Aerodynamic terms and states by numbers; ``first``: first state of each effect with states."""
+    """Terms of coefficients and readings, and states, by numbers; ``first``: first state of each effect with states."""
     names = [s.name for s in change.states]
-    terms = np.zeros((len(change.aero), 4), dtype=np.int64)
-    for i, term in enumerate(change.aero):
+    every: list[AeroTerm | ReadingTerm] = [*change.aero, *change.readings]
+    terms = np.zeros((len(every), 4), dtype=np.int64)
+    for i, term in enumerate(every):
+        acts_on = term.channel if isinstance(term, ReadingTerm) else term.coefficient
         signal = _index(term.signal, (*SIGNALS, *names), "signal")
         own = signal >= len(SIGNALS)
         terms[i] = (
-            _index(term.coefficient, ("CL", "Cm"), "coefficient"),
+            _index(acts_on, ("CL", "Cm", *READINGS), "coefficient or channel"),
             -1 if own else signal,
             _index(term.shape, SHAPES, "shape"),
             first[signal - len(SIGNALS)] if own else -1,
@@ -122,8 +127,8 @@ def _effects(change: Change, first: Ints) -> EffectArrays:
         states[i] = _index(state.kind, STATE_KINDS, "state"), _index(state.signal, SIGNALS, "signal")
     return EffectArrays(
         term_index=terms,
-        amplitude=np.array([t.amplitude for t in change.aero], dtype=np.float64),
-        origin=np.array([t.at for t in change.aero], dtype=np.float64),
+        amplitude=np.array([t.amplitude for t in every], dtype=np.float64),
+        origin=np.array([t.at for t in every], dtype=np.float64),
         state_index=states,
         time_s=np.array([s.time_s for s in change.states], dtype=np.float64),
         damping=np.array([s.damping for s in change.states], dtype=np.float64),

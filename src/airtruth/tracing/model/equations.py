@@ -36,7 +36,7 @@ from airtruth.tracing.model.kernel_input import (
     GridSignals,
     GustModel,
 )
-from airtruth.tracing.model.parameters import LEAD, LEAD_COUNT
+from airtruth.tracing.model.parameters import LEAD, LEAD_COUNT, OUTPUTS
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
@@ -53,6 +53,8 @@ of 840 m at 43 m/s, within 6 % (rms 2 %) from 0.5 to 600 rad/s, the level left f
 powers of the frequency, so that the corners serve any speed and length; a record of seconds shows little below it."""
 _LEAD_GAIN: Final = (0.58, 0.84, 1.39)
 """Gains at these corners [-]; fitted with them."""
+_READING: Final = 2
+"""First number of a reading among what a term acts on, see `EffectArrays`."""
 _ALPHA_DOT: Final = 3
 """Number of the signal alpha_dot_hat in `airtruth.physics.terms.SIGNALS`."""
 
@@ -149,7 +151,7 @@ def _terms(
     lift = moment = 0.0
     for t in range(effects.amplitude.size):
         number = effects.term_index[t, 1]
-        if (number == _ALPHA_DOT) != in_alpha_dot:
+        if (number == _ALPHA_DOT) != in_alpha_dot or effects.term_index[t, 0] >= _READING:
             continue
         state, amplitude = effects.term_index[t, 3], effects.amplitude[t]
         s = x[state] if state >= 0 else _signal(signals, number)
@@ -261,6 +263,21 @@ def air_at(grid: GridSignals, point: int) -> AirPoint:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def _add_readings(x: Array, alpha: float, at: AirPoint, model: FilterModel, y: Array) -> None:
+    """Add the increments of the readings."""
+    effects = model.effects
+    for t in range(effects.amplitude.size):
+        output = effects.term_index[t, 0] - _READING
+        if output >= 0:
+            surface = effective_elevator(at.elevator_rad, model.aircraft)
+            qhat = x[1] * 0.5 * model.aircraft.chord_m / at.airspeed_m_s
+            state = effects.term_index[t, 3]
+            own = _signal(Signals(alpha, surface, qhat, 0.0), effects.term_index[t, 1])
+            s = x[state] if state >= 0 else own
+            y[output] += effects.amplitude[t] * _shape(effects.term_index[t, 2], s - effects.origin[t])
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def outputs(x: Array, q_dot: float, az: float, at: AirPoint, model: FilterModel, y: Array) -> None:
     """What the sensors read without bias, lag, delay and noise: alpha [rad], q [rad/s], az [m/s2].
 
@@ -270,9 +287,12 @@ def outputs(x: Array, q_dot: float, az: float, at: AirPoint, model: FilterModel,
     """
     scale, arm = model.sensors.scale, model.sensors.arm_m
     alpha = air_alpha(x, gust(x, model.gusts.rolloff), model.gusts.level_m_s, at)
-    y[0] = scale[0] * _vane(alpha, x[1], arm[0], at.airspeed_m_s)
-    y[1] = scale[1] * x[1]
-    y[2] = scale[2] * (az - arm[2] * q_dot)
+    y[0] = _vane(alpha, x[1], arm[0], at.airspeed_m_s)
+    y[1] = x[1]
+    y[2] = az - arm[2] * q_dot
+    _add_readings(x, alpha, at, model, y)
+    for i in range(OUTPUTS):
+        y[i] *= scale[i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)

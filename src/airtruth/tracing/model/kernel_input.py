@@ -71,11 +71,12 @@ class GustModel(NamedTuple):
 
 
 class EffectArrays(NamedTuple):
-    """Aerodynamic terms and states of effects; numbers follow the order of the names in `airtruth.physics.terms`.
+    """Terms of coefficients and readings, and states of effects; numbers follow `airtruth.physics.terms`.
 
     Attributes
     ----------
-    term_index : (terms, 4) coefficient (0 CL, 1 Cm), signal (-1 for a state), shape, state (-1 for a signal).
+    term_index : (terms, 4) what it acts on (0 CL, 1 Cm, 2 + i the reading of output i), signal (-1 for a state), shape,
+        state (-1 for a signal).
     amplitude, origin : (terms,) of each term.
     state_index : (states, 2) kind (0 lag, 1 mode), signal.
     time_s, damping : (states,) of each state [s], [-].

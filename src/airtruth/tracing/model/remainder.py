@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft.dynamics import declared_dynamics
+from airtruth.physics.readings import state_of
 from airtruth.physics.terms import Change
 from airtruth.simulation.replay import Track, flown_through, substeps
-from airtruth.tracing.increment_response import increments, state
+from airtruth.tracing.increment_response import increments
 from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import FINE, Signals
 from airtruth.tracing.model.surface import through
@@ -99,7 +100,7 @@ def _declared(
         "qhat": qhat[None],
         "alpha_dot_hat": (np.gradient(alpha, dt_s) * half)[None],
     }
-    signals |= {s.name: state(s, signals[s.signal], dt_s) for s in change.states}
+    signals |= {s.name: state_of(s, signals[s.signal], dt_s) for s in change.states}
     return increments(change.aero, signals)[:, 0]
 
 

@@ -48,8 +48,10 @@ def effect_panel(answer: TraceAnswer, shown_: ShownRecord) -> Panel:
         return _curve(shown_, change.aero)
     if change.sensors:
         return _sensor(answer, shown_, change)
-    if change.declared or (answer.effects and not change.aero):
+    if change.declared or (answer.effects and not change.aero and not change.readings):
         return _estimates(answer)
+    if change.readings:
+        return _motion(shown_, change.readings[0].channel)
     if change.aero:
         return _motion(shown_)
     return Panel(title="the effect", words="no effect accepted")
@@ -200,19 +202,20 @@ def _estimates(answer: TraceAnswer) -> Panel:
     )
 
 
-def _motion(shown_: ShownRecord) -> Panel:
-    """An effect with memory: the pitch rate of the simulation with it and without."""
+def _motion(shown_: ShownRecord, channel: str = "q_rad_s") -> Panel:
+    """An effect with memory: a channel of the simulation with it and without."""
     model = shown_.stages.models["after"]
-    factor, time_s = shown("q_rad_s")[1], shown_.time_s
+    label, factor = shown(channel)
+    i, time_s = CHANNELS.index(channel), shown_.time_s
     runs = (
-        shown_.free_run(model, change)[:, 1] * factor
+        shown_.free_run(model, change)[:, i] * factor
         for change in (model.hypothesis.declared, model.hypothesis.change(model.sizes))
     )
-    measured, without, complete = (line(time_s, y) for y in (shown_.record.signals.y[:, 1] * factor, *runs))
+    measured, without, complete = (line(time_s, y) for y in (shown_.record.signals.y[:, i] * factor, *runs))
     return Panel(
         title="the effect: motion with and without it",
         x_label="time [s]",
-        y_label="pitch rate [deg/s]",
+        y_label=label,
         lines=(
             replace(measured, label="measured", colour="grey", stroke="points"),
             replace(without, label="without the effect", stroke="dotted"),

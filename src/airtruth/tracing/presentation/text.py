@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from airtruth.effects.registry import EFFECTS
+from airtruth.physics.terms import READINGS
 from airtruth.table import WIDTH, as_text, significant
 from airtruth.tracing.accepted import AcceptedEffect, IncrementTable, ParameterEstimate
 from airtruth.tracing.answer import Evidence, TraceAnswer
@@ -182,7 +183,12 @@ def increment_words(effect: AcceptedEffect) -> str:
         for s in effect.states
     ]
     if effect.relative_size is not None:
-        parts.append(f"{100.0 * effect.relative_size:.0f} % of the declared derivative in the flown range")
+        whole = (
+            f"motion of {effect.acts_on}"
+            if effect.acts_on in READINGS
+            else "declared derivative in the flown range"
+        )
+        parts.append(f"{significant(100.0 * effect.relative_size, 2)} % of the {whole}")
     return "; ".join(parts)
 
 

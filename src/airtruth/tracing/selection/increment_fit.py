@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from airtruth.effects.increment import Increment
+from airtruth.physics.readings import reading_increments
 from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.terms import READINGS
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import inflation, robust_covariance
 from airtruth.tracing.model.parameters import size_index
+from airtruth.tracing.model.records import FINE, TraceRecord
 from airtruth.tracing.selection.acceptance import (
     IMMATERIAL,
     UNCONVERGED,
@@ -25,6 +28,7 @@ from airtruth.tracing.selection.acceptance import (
     tested_on_left_out,
 )
 from airtruth.tracing.selection.increments import Screened, flown
+from airtruth.tracing.selection.refit import refit_without
 from airtruth.tracing.selection.score_test import Direction, Score
 
 Array = NDArray[np.float64]
@@ -44,6 +48,9 @@ WITHIN_ERROR: Final = "its size is within two standard deviations"
 _MATERIAL: Final = 0.02
 """Least swing of an increment over that of the declared derivative in the same range [-] (judgement: 2 % is about the
 material size of the named effects)."""
+_MATERIAL_READING: Final = 0.005
+"""Least standard deviation of an increment of a reading over that of its channel [-] (judgement: half of the material
+error of a gyro's scale)."""
 _FLOWN: Final = (0.02, 0.98)
 """Quantiles of the flown signal between which the swing counts [-] (judgement)."""
 _DERIVATIVE: Final[Mapping[str, str]] = {
@@ -153,7 +160,7 @@ def assessed(problem: TraceProblem, own: FittedIncrement, reference: Reference) 
         *(["its evidence is not significant"] if own.log_evidence < LEAST_ODDS * excess else []),
         *([] if _is_apart_from_zero(problem, own) else [WITHIN_ERROR]),
         *left_out.reasons,
-        *([IMMATERIAL] if swing < _MATERIAL else []),
+        *([IMMATERIAL] if swing < (_MATERIAL_READING if own.effect.shape.of_reading else _MATERIAL) else []),
     )
     return Candidate(
         score=evidence_score(own),
@@ -174,10 +181,16 @@ def _is_apart_from_zero(problem: TraceProblem, own: FittedIncrement) -> bool:
 
 
 def relative_swing(problem: TraceProblem, own: PosteriorFit, effect: Increment) -> float:
-    """Swing of an increment over that of the declared derivative in the flown range [-]; for a linear one its share."""
+    """Size of an increment relative to what is declared [-].
+
+    Its swing over that of the declared derivative in the flown range, of a linear one its share; of a reading, its
+    standard deviation over that of the channel.
+    """
     shape = effect.shape
+    if shape.of_reading:
+        return _share_of_channel(problem.records, own, effect)
     bends, _ = fitted_bends(own, effect, own.covariance)
-    index = PARAMETERS.index(f"{shape.coefficient}{_DERIVATIVE[shape.signal]}")
+    index = PARAMETERS.index(f"{shape.acts_on}{_DERIVATIVE[shape.signal]}")
     declared = abs(float(problem.declared_derivatives[index]))
     if not shape.cells:
         return abs(float(bends[0])) / declared
@@ -185,6 +198,28 @@ def relative_swing(problem: TraceProblem, own: PosteriorFit, effect: Increment) 
     low, high = np.quantile(signal, _FLOWN)
     values = shape.basis(np.linspace(low, high, 101)) @ bends
     return float(np.ptp(values) / (declared * (high - low)))
+
+
+def _share_of_channel(records: Sequence[TraceRecord], own: PosteriorFit, effect: Increment) -> float:
+    """Standard deviation of an increment of a reading over that of its channel [-]."""
+    sizes = own.point.sizes[own.hypothesis.span(effect.key)]
+    names = [p.name for p in effect.parameters]
+    terms = effect.describe(dict(zip(names, sizes.tolist(), strict=True)))
+    channel = READINGS.index(effect.shape.acts_on)
+    parts = []
+    for r in records:
+        s = r.signals
+        signals = {
+            "alpha_rad": s.y[None, :, 0] - r.plant.alpha_shift_rad,
+            "elevator_rad": s.elevator_rad[None, :: s.sub * FINE],
+            "q_rad_s": s.y[None, :, 1],
+            "airspeed_m_s": s.airspeed_m_s[None, :: s.sub],
+        }
+        chord = r.plant.aircraft.constants.chord_m
+        more = reading_increments(terms.readings, terms.states, signals, chord, s.dt_s)
+        parts.append((more[effect.shape.acts_on].var(), s.y[:, channel].var()))
+    added, whole = np.mean(parts, axis=0)
+    return float(np.sqrt(added / whole))
 
 
 def evidence_score(own: FittedIncrement) -> Score:
@@ -211,18 +246,10 @@ def redundant_increment(problem: TraceProblem, fitted: PosteriorFit, tried: int)
     """
     for effect in fitted.hypothesis.effects[:-1]:
         if isinstance(effect, Increment):
-            less = _without(problem, fitted, effect)
+            less = refit_without(problem, fitted, effect)
             if less is not None and log_evidence(less, fitted, effect, tried) < LEAST_ODDS:
                 return effect
     return None
-
-
-def _without(problem: TraceProblem, fitted: PosteriorFit, effect: Increment) -> PosteriorFit | None:
-    """The fit without one of its effects."""
-    span = fitted.hypothesis.span(effect.key)
-    rest = tuple(e for e in fitted.hypothesis.effects if e.key != effect.key)
-    point = replace(fitted.point, sizes=np.delete(fitted.point.sizes, span))
-    return fit(problem, replace(fitted.hypothesis, effects=rest), point)
 
 
 __all__ = [

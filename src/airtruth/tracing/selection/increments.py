@@ -11,8 +11,8 @@ Source: D. J. C. MacKay, Neural Computation 4 (1992) 415-447, section 3 (evidenc
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -42,6 +42,15 @@ _MODES_HZ: Final = (0.7, 1.4, 2.8, 5.6, 10.0)
 """Natural frequencies of modes that are tried [Hz] (judgement: as `_LAGS_S`; the sampling ends the range)."""
 _MODE_DAMPING: Final = 0.1
 """Damping ratio of the modes that are tried [-] (judgement)."""
+_NEARBY: Final = tuple(np.geomspace(1.0 / 1.25, 1.25, 7).tolist())
+"""Frequencies tried about that of a leading mode, over it [-] (judgement: half a step of `_STRUCTURE_HZ` to either side)."""
+_DAMPINGS: Final = (0.02, 0.06, 0.2)
+"""Damping ratios tried about a leading mode [-] (judgement)."""
+_STRUCTURE_HZ: Final = (2.8, 4.0, 5.6, 8.0, 11.0)
+"""Natural frequencies of modes that are tried at a sensor [Hz] (judgement: closer than `_MODES_HZ`, because the refit has
+to find a narrow peak)."""
+_SENSED: Final = ("q_rad_s", "az_m_s2")
+"""Channels at which a mode is tried: gyro and accelerometer feel the structure, a vane does not (judgement)."""
 _NYQUIST_SHARE: Final = 0.5
 """Highest frequency of a mode over the Nyquist frequency [-] (judgement)."""
 _SCALES: Final = tuple(np.geomspace(1e-3, 1.0, 7).tolist())
@@ -65,8 +74,8 @@ class Screened:
 
 
 def shapes(problem: TraceProblem) -> list[Shape]:
-    """Every shape that the records can hold, over the range that they cover."""
-    found = []
+    """Every shape that the records can hold, over the range that they cover: of the coefficients, then of the readings."""
+    found: list[Shape] = []
     ranges = {name: _range(problem.records, name) for name in ("alpha", "elevator", "qhat", "alpha_dot_hat")}
     records = problem.records
     trims = {
@@ -93,11 +102,32 @@ def shapes(problem: TraceProblem) -> list[Shape]:
                 add(0, Memory("lag", time_s))
             for hz in _MODES_HZ:
                 if hz < highest_hz:
-                    add(0, Memory("mode", 1.0 / (2.0 * np.pi * hz), _MODE_DAMPING))
+                    add(0, _mode(hz))
             if name == "alpha":
                 for time_s in _SLOW_S:
                     add(CELLS, Memory("lag", time_s))
-    return found
+    return found + list(_of_readings(ranges, trims, highest_hz))
+
+
+def _of_readings(
+    ranges: Mapping[str, tuple[float, float]], trims: Mapping[str, float], highest_hz: float
+) -> Iterator[Shape]:
+    """A curve of the vane, and modes of the structure at gyro and accelerometer that each signal drives."""
+    for name in ("alpha", "elevator", "qhat"):
+        low, high = ranges[name]
+        if high <= low:
+            continue
+        trim = min(max(trims.get(name, 0.0), low), high)
+        if name == "alpha":
+            yield Shape("alpha_rad", name, low, high, CELLS, trim)
+        for channel in _SENSED:
+            for hz in _STRUCTURE_HZ:
+                if hz < highest_hz:
+                    yield Shape(channel, name, low, high, 0, trim, _mode(hz))
+
+
+def _mode(hz: float) -> Memory:
+    return Memory("mode", 1.0 / (2.0 * np.pi * hz), _MODE_DAMPING)
 
 
 def flown(record: TraceRecord, signal: str) -> Array:
@@ -144,6 +174,26 @@ def screen(
     return sorted(found, key=lambda s: -s.log_evidence)
 
 
+def sharpened(
+    problem: TraceProblem, null: PosteriorFit, whitener: Whitener, leading: Sequence[Screened]
+) -> list[Screened]:
+    """The shapes, those behind a mode with the frequency and damping of largest evidence nearby, best first.
+
+    A lightly damped mode is narrower than the steps of the grid, and a refit that begins beside its peak ends there.
+    """
+    near = [
+        replace(shape, memory=replace(shape.memory, time_s=shape.memory.time_s / ratio, damping=damping))
+        for shape in (s.effect.shape for s in leading)
+        if shape.memory is not None and shape.memory.kind == "mode"
+        for ratio in _NEARBY
+        for damping in _DAMPINGS
+    ]
+    best: dict[str, Screened] = {}
+    for s in sorted((*leading, *screen(problem, null, whitener, near)), key=lambda s: -s.log_evidence):
+        best.setdefault(s.effect.variant, s)
+    return list(best.values())
+
+
 def log_evidences(gradient: Array, information: Array, stds: Array) -> Array:
     """Log Bayes factor of bends against none, for each standard deviation of their prior; see the module's formula.
 
@@ -183,4 +233,4 @@ def _single(e: Increment, name: str, zero: dict[str, float]) -> Effect:
     )
 
 
-__all__ = ["CELLS", "Screened", "flown", "log_evidences", "screen", "shapes"]
+__all__ = ["CELLS", "Screened", "flown", "log_evidences", "screen", "shapes", "sharpened"]

@@ -13,6 +13,7 @@ from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment, Shape
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.selection.acceptance import (
     OUTDONE,
     SUPERSEDED,
@@ -30,7 +31,7 @@ from airtruth.tracing.selection.increment_fit import (
     redundant_increment,
     refitted,
 )
-from airtruth.tracing.selection.increments import Screened, screen, shapes
+from airtruth.tracing.selection.increments import Screened, screen, shapes, sharpened
 from airtruth.tracing.selection.ranking import TIE
 from airtruth.tracing.selection.rounds import Rival, RoundStart, SearchRound, search_round
 from airtruth.tracing.selection.search import total_cost
@@ -156,7 +157,8 @@ class _Learning:
             return ()
         present = {e.variant for e in _increments_of(null)}
         tried = [s for s in every if s.variant not in present]
-        leading = _leading(screen(self.problem, last.gls, last.whitener, tried))
+        leading = _leading(screen(self.problem, last.null, NO_WHITENER, tried))
+        leading = sharpened(self.problem, last.null, NO_WHITENER, leading)
         learned = []
         for s in leading:
             if may_begin(self.advance, f"refit {s.effect.key}"):

@@ -1,0 +1,71 @@
+"""Increments of readings, and the states that drive increments, in sampled signals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.physics.terms import ReadingTerm, StateTerm, shape_of
+
+Array = NDArray[np.float64]
+
+
+def state_of(term: StateTerm, signal: Array, dt_s: float) -> Array:
+    """A lag or a mode of a signal (runs, samples), from equilibrium, exact for a signal linear between samples.
+
+    Source: G. F. Franklin, J. D. Powell and M. Workman, Digital Control of Dynamic Systems, 3rd ed., 1998, 6.3.2
+    (triangle hold).
+    """
+    from scipy.signal import (
+        cont2discrete,
+        lfilter,
+        lfilter_zi,
+    )  # slow to import, and few aircraft have states
+
+    time = term.time_s
+    poles = [time, 1.0] if term.kind == "lag" else [time**2, 2.0 * term.damping * time, 1.0]
+    b, a, _ = cont2discrete(([1.0], poles), dt_s, method="foh")
+    b = b.ravel()
+    start = lfilter_zi(b, a)[None, :] * signal[:, :1]
+    return np.asarray(lfilter(b, a, signal, axis=1, zi=start)[0])
+
+
+def reading_increments(
+    terms: Sequence[ReadingTerm],
+    states: Sequence[StateTerm],
+    truth: Mapping[str, Array],
+    chord_m: float,
+    dt_s: float,
+) -> dict[str, Array]:
+    """Increments of readings by channel; a channel without terms is left out.
+
+    Parameters
+    ----------
+    terms, states : of the sensors; states that no term names do not matter.
+    truth : alpha_rad, elevator_rad, q_rad_s and airspeed_m_s, (runs, samples) each, at the CG [SI].
+    chord_m : reference chord [m]; qhat = q c/(2V).
+    dt_s : sample period [s].
+
+    Returns
+    -------
+    Channel -> (runs, samples) [unit of the channel].
+    """
+    if not terms:
+        return {}
+    signals = {
+        "alpha": truth["alpha_rad"],
+        "elevator": truth["elevator_rad"],
+        "qhat": truth["q_rad_s"] * (0.5 * chord_m) / truth["airspeed_m_s"],
+    }
+    named = {term.signal for term in terms}
+    signals |= {s.name: state_of(s, signals[s.signal], dt_s) for s in states if s.name in named}
+    total: dict[str, Array] = {}
+    for term in terms:
+        more = term.amplitude * shape_of(term, signals[term.signal])
+        total[term.channel] = total.get(term.channel, 0.0) + more
+    return total
+
+
+__all__ = ["reading_increments", "state_of"]

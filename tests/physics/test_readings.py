@@ -1,0 +1,58 @@
+"""Increments of readings in sampled signals: states against an integration of their equations, and terms by hand."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from airtruth.physics.readings import reading_increments, state_of
+from airtruth.physics.terms import ReadingTerm, StateTerm
+
+DT = 0.02
+T = np.arange(200) * DT
+SIGNAL = np.interp(T, [0.5, 0.7, 1.1, 1.5], [0.0, 0.03, 0.03, -0.01])
+
+
+def integrated(term):
+    """The state by the equations in the docstring of `StateTerm`, its input linear between the samples."""
+
+    def rates(t, x):
+        s = np.interp(t, T, SIGNAL)
+        if term.kind == "lag":
+            return [(s - x[0]) / term.time_s]
+        wn = 1.0 / term.time_s
+        return [x[1], wn**2 * (s - x[0]) - 2.0 * term.damping * wn * x[1]]
+
+    start = [SIGNAL[0]] if term.kind == "lag" else [SIGNAL[0], 0.0]
+    return solve_ivp(rates, (0.0, T[-1]), start, t_eval=T, rtol=1e-10, atol=1e-13, max_step=DT / 2).y[0]
+
+
+@pytest.mark.parametrize(
+    "term", [StateTerm("x", "lag", "alpha", 0.3), StateTerm("x", "mode", "alpha", 0.05, 0.04)]
+)
+def test_a_state_obeys_its_equation(term):
+    np.testing.assert_allclose(state_of(term, SIGNAL[None, :], DT)[0], integrated(term), atol=2e-9)
+
+
+def test_terms_add_by_channel_each_over_its_signal():
+    truth = {
+        "alpha_rad": SIGNAL[None, :] + 0.05,
+        "elevator_rad": -SIGNAL[None, :],
+        "q_rad_s": 4.0 * SIGNAL[None, :],
+        "airspeed_m_s": np.full((1, 200), 40.0),
+    }
+    state = StateTerm("bending", "lag", "elevator", 0.3)
+    terms = (
+        ReadingTerm("alpha_rad", "alpha", "above", 0.2, 0.06),
+        ReadingTerm("q_rad_s", "qhat", "linear", 3.0),
+        ReadingTerm("q_rad_s", "bending", "linear", -0.5),
+    )
+    more = reading_increments(terms, (state,), truth, chord_m=0.3, dt_s=DT)
+    assert set(more) == {"alpha_rad", "q_rad_s"}
+    np.testing.assert_allclose(more["alpha_rad"][0], 0.2 * np.maximum(SIGNAL + 0.05 - 0.06, 0.0), atol=1e-15)
+    # q c/(2V) = 4 s 0.3/80
+    expected = 3.0 * 0.015 * SIGNAL + 0.5 * integrated(StateTerm("x", "lag", "alpha", 0.3))
+    np.testing.assert_allclose(more["q_rad_s"][0], expected, atol=2e-9)
+
+
+def test_sensors_without_terms_read_nothing_else():
+    assert reading_increments((), (), {}, 0.3, DT) == {}
