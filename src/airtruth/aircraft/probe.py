@@ -7,19 +7,25 @@ instead of refusing it. A child process therefore loads the model first, looks u
 from __future__ import annotations
 
 import json
-import subprocess
+import tempfile
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
 from airtruth.aircraft.jsbsim.confine import controls_simulation, model_files
 from airtruth.errors import AircraftError
-from airtruth.isolation.interpreter import environment, module_command
+from airtruth.isolation.client import call
+from airtruth.isolation.limits import Limits
+from airtruth.isolation.protocol import IsolatedError, Task
 from airtruth.quantity import Strict
 
-_TIMEOUT_S: Final = 60.0
-"""Time for JSBSim to load a model [s] (judgement: far above the time of any shipped model, and a user still waits
-for the message)."""
+_LIMITS: Final = Limits(seconds=60.0, memory_bytes=3_000_000_000)
+"""Limits of JSBSim while it loads a model (judgement: far above those of any shipped model, and a user still waits for the
+message)."""
+_MODULES: Final = ("airtruth.aircraft.probe_child", "jsbsim")
+"""Modules of the process that loads a model."""
+_OUTPUT_LINES: Final = 6
+"""Lines of JSBSim's output that an error quotes [-] (judgement: its own message and what precedes it)."""
 
 
 class Constants(Strict):
@@ -62,25 +68,30 @@ def probe(folder: Path, jsbsim_json: str) -> Constants:
         raise AircraftError(
             f"{folder}: JSBSim cannot open a folder whose name is not UTF-8; rename it, or use a UTF-8 locale"
         ) from None
-    command = module_command("airtruth.aircraft.probe_child", str(folder), jsbsim_json)
-    try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, timeout=_TIMEOUT_S, check=False, env=environment()
-        )
-    except subprocess.TimeoutExpired:
-        raise AircraftError(
-            f"{folder}: JSBSim did not finish loading the model within {_TIMEOUT_S:.0f} s"
-        ) from None
-    lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
-    answer: dict[str, Any] = json.loads(lines[-1]) if lines else {}
+    with tempfile.TemporaryDirectory(prefix="airtruth-") as scratch:
+        output = Path(scratch) / "output"
+        arguments = {"folder": str(folder.absolute()), "table": table, "output": str(output)}
+        task = Task("airtruth.aircraft.probe_child:load", arguments, _LIMITS, _MODULES)
+        try:
+            answer: dict[str, Any] = dict(call(task).facts)
+        except IsolatedError as error:
+            raise AircraftError(f"{folder}: {_explain(error, output)}") from None
     if "error" in answer:
         raise AircraftError(f"{folder}: {answer['error']}")
-    if done.returncode != 0 or "constants" not in answer:
-        output = "\n  ".join((done.stderr + done.stdout).strip().splitlines()[-6:])
-        raise AircraftError(
-            f"{folder}: JSBSim died while loading the model (exit {done.returncode}); its output:\n  {output}"
-        )
     return Constants.model_validate(answer["constants"])
+
+
+def _explain(error: IsolatedError, output: Path) -> str:
+    """A process that gave no answer, as a sentence, and the output of JSBSim before that."""
+    if error.kind == "time":
+        return f"JSBSim did not finish loading the model within {_LIMITS.seconds:.0f} s"
+    if error.kind == "memory":
+        return f"JSBSim needs more than {_LIMITS.memory_bytes / 1e9:.2g} GB of memory to load the model"
+    if error.kind == "start":
+        return f"no process starts to load the model ({error.detail}); raise the limits of memory and processes (ulimit -v, -u)"
+    printed = output.read_text(encoding="utf-8", errors="replace") if output.is_file() else ""
+    lines = printed.strip().splitlines()[-_OUTPUT_LINES:]
+    return f"JSBSim died while loading the model ({error.detail}); its output:\n  " + "\n  ".join(lines)
 
 
 def _refuse_control(folder: Path, table: dict[str, Any]) -> None:

@@ -1,15 +1,31 @@
-"""Child process of `airtruth.aircraft.probe`: load a JSBSim model and print its constants, or its fault, as JSON."""
+"""Task of `airtruth.aircraft.probe` for a disposable process: load a JSBSim model and return its constants, or its fault."""
 
 from __future__ import annotations
 
-import json
-import sys
+import os
 from pathlib import Path
 from typing import Any
 
 from airtruth.aircraft.probe import load_model, model_file, model_root
 from airtruth.errors import choices
+from airtruth.isolation.protocol import Reply
 from airtruth.units import FT, SLUG
+
+
+def load(folder: str, table: dict[str, Any], output: str) -> Reply:
+    """Load a model and return "constants", or "error", why it cannot be used.
+
+    Parameters
+    ----------
+    folder : folder of aircraft.toml; table : its [jsbsim] table; output : file that receives what JSBSim prints.
+    """
+    import jsbsim
+
+    descriptor = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+    for standard in (1, 2):
+        os.dup2(descriptor, standard)
+    jsbsim.set_logger(jsbsim.DefaultLogger())  # another task may have silenced it
+    return Reply(_load(Path(folder), table))
 
 
 def _load(folder: Path, table: dict[str, Any]) -> dict[str, Any]:
@@ -66,5 +82,4 @@ def _explain_missing(fdm: Any, missing: list[str]) -> str:
     return "; ".join(sentences)
 
 
-if __name__ == "__main__":
-    print(json.dumps(_load(Path(sys.argv[1]), json.loads(sys.argv[2]))), flush=True)
+__all__ = ["load"]

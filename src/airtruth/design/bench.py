@@ -18,8 +18,10 @@ from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.terms import Change
 from airtruth.simulation.campaign import effects as with_effects
 from airtruth.simulation.campaign.file import Campaign
-from airtruth.simulation.flight import Flight, Inputs
+from airtruth.simulation.disposable import isolated, isolated_flight
+from airtruth.simulation.flight import Inputs, fly_all
 from airtruth.simulation.manoeuvres import Manoeuvre, sample
+from airtruth.simulation.resolution import trimmed_and_linear
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import trim
 from airtruth.tracing.model.plant import Plant, probed
@@ -79,11 +81,10 @@ class Bench:
         self.dt_s = 1.0 / campaign.simulation_hz
         self.log_dt_s = 1.0 / campaign.log_hz
         every = round(campaign.simulation_hz / campaign.log_hz)
-        self.trim = trim(aircraft, condition, self.dt_s)
+        self.trim, self.linear = trimmed_and_linear(aircraft, condition, self.dt_s)
         self._every = every
-        self._kept: list[Aircraft] = []  # their folders exist as long as they do
         self._simulation_hz = campaign.simulation_hz
-        self._flights = [Flight(aircraft, self.trim, self.dt_s, every)]
+        self._planes = [(aircraft, self.trim)]  # folders of changed aircraft exist as long as they do
         whole = round((START_S + limits.length_s + TAIL_S) * campaign.log_hz) * every
         self.duration_s = whole * self.dt_s
         self._t_s = np.arange(whole + 1, dtype=np.float64) * self.dt_s
@@ -104,9 +105,8 @@ class Bench:
         for change in changes:
             flown = with_effects.aircraft(self.aircraft, change, self._simulation_hz, self.condition)
             if flown is not self.aircraft:
-                at = trim(flown, self.condition, self.dt_s)
-                self._flights.append(Flight(flown, at, self.dt_s, self._every))
-                self._kept.append(flown)
+                at = isolated(f"the trim of {flown.name}", trim, flown, self.condition, self.dt_s)
+                self._planes.append((flown, at))
 
     def _probe(self) -> Plant:
         """Tables over the angles that the limits allow, and the pitch rates of two flights."""
@@ -160,7 +160,16 @@ class Bench:
         try:
             command = sample(manoeuvre, self._t_s)
             still = np.zeros_like(command)
-            flown = [flight.fly(Inputs(command, still, still)) for flight in self._flights]
+            inputs = Inputs(command, still, still)
+            flown = isolated_flight(
+                command.size * len(self._planes),
+                f"the flight of {self.aircraft.name}",
+                fly_all,
+                self._planes,
+                inputs,
+                self.dt_s,
+                self._every,
+            )
         except (ConfigurationError, FlightError):
             return None
         reached = [extremes(channels, self.log_dt_s) for channels in flown]

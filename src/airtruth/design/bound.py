@@ -20,12 +20,12 @@ from airtruth.identification.likelihood.cramer_rao import experiment_bound
 from airtruth.identification.likelihood.options import CHANNELS, PRESSURES, FilterOptions
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.short_period import PARAMETERS
-from airtruth.simulation.campaign.chunk import Pilot
+from airtruth.simulation.campaign.chunk import flown_runs
 from airtruth.simulation.campaign.file import Campaign
 from airtruth.simulation.campaign.plan import Plan, PlannedRun, make, planned_runs
 from airtruth.simulation.campaign.run import Progress
-from airtruth.simulation.linearise import linearise
-from airtruth.simulation.trim import trim
+from airtruth.simulation.disposable import isolated_flight
+from airtruth.simulation.trim import Trim
 from airtruth.table import Table, as_html, as_text, flat
 
 if TYPE_CHECKING:
@@ -199,12 +199,19 @@ def forecast(
     groups = plan.table.groupby(list(_KIND), sort=False)
     kinds = groups.head(1).head(MOST_KINDS)
     counts = groups.size().to_numpy()[: len(kinds)].astype(np.float64)
-    pilot = Pilot(replace(plan, sensors={}))
+    runs = planned_runs(kinds)
+    still = [replace(run, sigma_u_m_s=0.0, sigma_w_m_s=0.0) for run in runs]
+    flown = isolated_flight(
+        len(runs) * plan.samples,
+        f"the flights of {plan.aircraft.name}",
+        flown_runs,
+        replace(plan, sensors={}, table=plan.table.iloc[:0]),
+        still,
+    )
     theta, covariance = [], []
-    for run in planned_runs(kinds):
-        value, least = _run(plan, pilot, run, noise)
-        theta.append(value)
-        covariance.append(least)
+    for run, (at, linear, channels) in zip(runs, flown, strict=True):
+        theta.append(linear.plus)
+        covariance.append(_bound(plan, run, at, linear.plus, channels, noise))
         advance(len(theta), len(kinds), 0)
     share = counts / counts.sum()
     each = np.stack(covariance)
@@ -239,11 +246,15 @@ def _noise(plan: Plan, pressure: str) -> dict[str, float]:
     return noise
 
 
-def _run(plan: Plan, pilot: Pilot, run: PlannedRun, noise: Mapping[str, float]) -> tuple[Array, Array]:
-    """Declared derivatives (6,) and the bound (6, 6) of one run of the table."""
-    at = trim(plan.aircraft, run.condition, plan.dt_s)
-    theta = linearise(plan.aircraft, at, plan.dt_s).plus
-    flown = pilot.channels(replace(run, sigma_u_m_s=0.0, sigma_w_m_s=0.0))
+def _bound(
+    plan: Plan,
+    run: PlannedRun,
+    at: Trim,
+    theta: Array,
+    flown: Mapping[str, Array],
+    noise: Mapping[str, float],
+) -> Array:
+    """The bound (6, 6) of one run of the table, from its trim, derivatives (6,) and flight in still air."""
     channels = {name: np.ascontiguousarray(values[None]) for name, values in flown.items()}
     samples = channels["alpha_rad"].shape[1]
     dt_s = plan.dt_s * plan.log_every
@@ -260,5 +271,5 @@ def _run(plan: Plan, pilot: Pilot, run: PlannedRun, noise: Mapping[str, float]) 
         airspeed_m_s=at.airspeed_m_s,
     )
     batch = Batch((run.run_id,), dt_s, t_s, channels)
-    least = experiment_bound(batch, plan.aircraft, theta, options, plan.campaign.gust.start)[0]
-    return theta, least
+    least: Array = experiment_bound(batch, plan.aircraft, theta, options, plan.campaign.gust.start)[0]
+    return least

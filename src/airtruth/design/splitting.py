@@ -35,7 +35,7 @@ from airtruth.simulation.campaign.file import (
     Uniform,
 )
 from airtruth.simulation.manoeuvres import Manoeuvre
-from airtruth.simulation.resolution import linear_point
+from airtruth.simulation.resolution import point_of
 from airtruth.simulation.simulator import Condition, jsbsim_model
 from airtruth.tracing.model.settings import declared_change, settings_of
 
@@ -264,7 +264,9 @@ def _at(
         records=fitted_of(options.records or LEAST_RECORDS),
     )
     point = (
-        linear_point(aircraft, at, bench.dt_s) if any(h.effect.in_derivatives for h in hypotheses) else None
+        point_of(aircraft, bench.trim, bench.linear)
+        if any(h.effect.in_derivatives for h in hypotheses)
+        else None
     )
     resolved = [h if point is None else at_point(h, point) for h in hypotheses]
     search = Search(bench, _nothing(model), rise_s)

@@ -47,18 +47,36 @@ def impose(limits: Limits) -> None:
     if hasattr(signal, "setitimer"):
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
         signal.setitimer(signal.ITIMER_REAL, limits.seconds)
+    impose_memory(limits.memory_bytes)
+
+
+def impose_memory(memory_bytes: int) -> bool:
+    """Limit the address space of this process [byte]; False if the system has no such limit or already a lower one.
+
+    The process leaves no core file either.
+    """
     try:
         resource = importlib.import_module("resource")
     except ImportError:
-        return
-    _lower(resource, resource.RLIMIT_AS, limits.memory_bytes)
+        return False
     _lower(resource, resource.RLIMIT_CORE, 0)
+    return _lower(resource, resource.RLIMIT_AS, memory_bytes)
 
 
-def _lower(resource: Any, kind: int, value: int) -> None:
+def impose_cpu_time(seconds: float) -> None:
+    """Let the system end this process by SIGPROF once it has computed for a time from now on [s]; 0 for no limit.
+
+    The time of a process that is stopped or waits does not count. Windows has no such limit.
+    """
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_PROF, seconds)
+
+
+def _lower(resource: Any, kind: int, value: int) -> bool:
     soft, hard = resource.getrlimit(kind)
     stated = [limit for limit in (soft, hard) if limit != resource.RLIM_INFINITY]
     resource.setrlimit(kind, (min([value, *stated]), hard))
+    return all(value < limit for limit in stated)
 
 
-__all__ = ["Limits", "impose", "limits_of"]
+__all__ = ["Limits", "impose", "impose_cpu_time", "impose_memory", "limits_of"]

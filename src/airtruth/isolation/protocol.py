@@ -107,6 +107,8 @@ def understood(answer: bytes) -> Reply:
     UnforeseenError
         If the function raised anything else.
     """
+    if not answer:
+        raise IsolatedError("crash", "exit code 0, incomplete answer")
     try:
         (length,) = LENGTH.unpack_from(answer)
         start = LENGTH.size + length

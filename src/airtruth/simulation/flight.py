@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.errors import ConfigurationError
+from airtruth.errors import ConfigurationError, FlightError
 from airtruth.simulation.readings import READ, channels, require_sound
 from airtruth.simulation.simulator import Executive
 from airtruth.simulation.trim import Trim
@@ -58,6 +58,7 @@ class Flight:
         self.trim = trim
         self._record_every = record_every
         self._executive = Executive(aircraft, dt_s)
+        self._flown = False
         self._start()
 
     def _start(self) -> None:
@@ -81,7 +82,7 @@ class Flight:
         Raises
         ------
         FlightError
-            If the state leaves the range in which the simulation has a meaning.
+            If the state leaves the range in which the simulation has a meaning, or the model ends the simulation.
         ConfigurationError
             If the inputs need an augmentation or a rotary gust that the aircraft lacks.
         """
@@ -94,10 +95,11 @@ class Flight:
         }
 
     def _simulate(self, inputs: Inputs) -> Array:
-        renewed = self._executive.renewed()
+        renewed = self._executive.renewed() if self._flown else self._executive
         if renewed is not self._executive:
             self._executive = renewed
             self._start()
+        self._flown = True
         executive, trim = self._executive, self.trim
         fdm = executive.fdm
         controls = trim.controls
@@ -123,7 +125,8 @@ class Flight:
             for values in steps[first : first + every]:
                 for setter, value in zip(setters, values):  # noqa: B905 (hot loop)
                     setter(value)
-                run()
+                if not run():
+                    raise FlightError(f"the model ended the flight at {fdm.get_sim_time():.3f} s")
             extend([get() for get in gets])
         return np.array(records).reshape(-1, len(gets)).T
 
@@ -162,3 +165,16 @@ class Flight:
         fdm[names.damper_gain] = inputs.damper_gain_s
         fdm[names.attitude_gain] = inputs.attitude_gain
         fdm[names.theta_reference] = self.trim.alpha_rad + self.trim.condition.gamma_rad
+
+
+def fly_all(
+    planes: Sequence[tuple[Aircraft, Trim]], inputs: Inputs, dt_s: float, record_every: int
+) -> list[dict[str, Array]]:
+    """Fly the same inputs with several aircraft, each from its trim; see `Flight.fly`.
+
+    Raises
+    ------
+    FlightError, ConfigurationError
+        As `Flight.fly`.
+    """
+    return [Flight(plane, at, dt_s, record_every).fly(inputs) for plane, at in planes]

@@ -16,9 +16,10 @@ from airtruth.logs.validate import validate
 from airtruth.physics import atmosphere
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.quantity import Quantity
-from airtruth.simulation.linearise import Linearisation, linearise
+from airtruth.simulation.linearise import Linearisation
+from airtruth.simulation.resolution import trimmed_and_linear
 from airtruth.simulation.simulator import Condition
-from airtruth.simulation.trim import Trim, trim
+from airtruth.simulation.trim import Trim
 from airtruth.units import DEG
 
 
@@ -83,8 +84,8 @@ def new_aircraft(
     written = write_new(source, values, at, out, note)
     altitude = float(atmosphere.altitude_of_density_m(at.density_kg_m3))
     eas = float(atmosphere.equivalent_airspeed_m_s(at.airspeed_m_s, at.density_kg_m3))
-    level = trim(written, Condition(eas, altitude, 0.0))
-    return NewAircraft(written, values, level, linearise(written, level))
+    level, linear = trimmed_and_linear(written, Condition(eas, altitude, 0.0))
+    return NewAircraft(written, values, level, linear)
 
 
 def estimated_derivatives(table: Path, method: str | None = None) -> dict[str, Quantity]:

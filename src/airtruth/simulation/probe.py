@@ -115,6 +115,34 @@ def probe(
     )
 
 
+def forces_at_speeds(aircraft: Aircraft, trim: Trim, ratios: Array, dt_s: float = 1.0 / 200.0) -> Array:
+    """Forces and moment of the aircraft at the attitude and controls of a trim, at other airspeeds.
+
+    Parameters
+    ----------
+    aircraft, trim : the aircraft and its equilibrium.
+    ratios : airspeed over that of the trim (points,) [-].
+    dt_s : simulation step of the executive [s].
+
+    Returns
+    -------
+    (points, 4) X, Z [N] and M [N m] of the aircraft, and X without that of the air [N].
+    """
+    executive = Executive(aircraft, dt_s)
+    inertia = aircraft.constants.inertia_yy_kg_m2
+    rows = []
+    for ratio in ratios:
+        condition = replace(trim.condition, eas_m_s=trim.condition.eas_m_s * float(ratio))
+        executive = executive.again()
+        total = executive.nodes(["forces/fbx-total-lbs", "forces/fbz-total-lbs"])
+        air = executive.node("forces/fbx-aero-lbs")
+        executive.initialise(condition, trim.alpha_rad, trim.controls)
+        moment = executive.respond().q_dot_rad_s2 * inertia
+        x, z = (node.get_double_value() * LBF for node in total)
+        rows.append([x, z, moment, x - air.get_double_value() * LBF])
+    return np.array(rows)
+
+
 class _States:
     """States of the grid, one after the other in one executive.
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
+from airtruth.errors import FlightError
 from airtruth.simulation import instruments as measure
 from airtruth.simulation.readings import READ, channels, require_sound
 from airtruth.simulation.simulator import Executive
@@ -84,7 +85,7 @@ def replay(aircraft: Aircraft, at: Trim, track: Track) -> dict[str, Array]:
     Raises
     ------
     FlightError
-        If the motion leaves the range in which the simulation has a meaning.
+        If the motion leaves the range in which the simulation has a meaning, or the model ends the simulation.
     AircraftError
         If the aircraft has no JSBSim model.
     """
@@ -131,7 +132,7 @@ def flown_through(aircraft: Aircraft, at: Trim, track: Track) -> dict[str, Array
     Raises
     ------
     FlightError
-        If the motion leaves the range in which the simulation has a meaning.
+        If the motion leaves the range in which the simulation has a meaning, or the model ends the simulation.
     AircraftError
         If the aircraft has no JSBSim model.
     """
@@ -252,7 +253,8 @@ def _stepped(
         set_command(command + error)
         sink = down()
         set_gust(north() - math.sqrt(max(airspeed * airspeed - sink * sink, 0.0)))
-        fdm.run()
+        if not fdm.run():
+            raise FlightError(f"the model ended the replay at {fdm.get_sim_time():.3f} s")
         records.extend([get() for get in gets])
     return np.array(records).reshape(-1, len(gets)).T
 

@@ -6,13 +6,38 @@ from airtruth.aircraft import Aircraft
 from airtruth.aircraft.tail import tail_geometry
 from airtruth.physics.resolution import LinearPoint, resolved
 from airtruth.physics.terms import Change
-from airtruth.simulation.linearise import linearise
+from airtruth.simulation.disposable import isolated
+from airtruth.simulation.linearise import Linearisation, linearise
 from airtruth.simulation.simulator import Condition
-from airtruth.simulation.trim import trim
+from airtruth.simulation.trim import Trim, trim
+
+
+def trimmed_and_linear(
+    aircraft: Aircraft, condition: Condition, dt_s: float = 1.0 / 200.0
+) -> tuple[Trim, Linearisation]:
+    """Trim an aircraft and return its derivatives there, in a disposable process.
+
+    Parameters
+    ----------
+    aircraft, condition, dt_s : as in `airtruth.simulation.trim.trim`.
+
+    Raises
+    ------
+    TrimError
+        If the aircraft cannot be trimmed.
+    AircraftError
+        If the model ends or blocks its process.
+    """
+    return isolated(f"the trim of {aircraft.name}", _trimmed_and_linear, aircraft, condition, dt_s)
+
+
+def _trimmed_and_linear(aircraft: Aircraft, condition: Condition, dt_s: float) -> tuple[Trim, Linearisation]:
+    at = trim(aircraft, condition, dt_s)
+    return at, linearise(aircraft, at, dt_s)
 
 
 def linear_point(aircraft: Aircraft, condition: Condition, dt_s: float = 1.0 / 200.0) -> LinearPoint:
-    """Derivatives (central differences), trim and tail of an aircraft.
+    """Derivatives (central differences), trim and tail of an aircraft; JSBSim runs in a disposable process.
 
     Parameters
     ----------
@@ -25,10 +50,12 @@ def linear_point(aircraft: Aircraft, condition: Condition, dt_s: float = 1.0 / 2
     TrimError
         If the aircraft cannot be trimmed.
     """
-    at = trim(aircraft, condition, dt_s)
-    return LinearPoint(
-        linearise(aircraft, at, dt_s).central, at.alpha_rad, at.elevator_rad, tail_geometry(aircraft)
-    )
+    return point_of(aircraft, *trimmed_and_linear(aircraft, condition, dt_s))
+
+
+def point_of(aircraft: Aircraft, at: Trim, linear: Linearisation) -> LinearPoint:
+    """Derivatives, trim and tail of an aircraft that was trimmed and linearised."""
+    return LinearPoint(linear.central, at.alpha_rad, at.elevator_rad, tail_geometry(aircraft))
 
 
 def at_condition(
@@ -51,4 +78,4 @@ def at_condition(
     return resolved(change, linear_point(aircraft, condition, dt_s))
 
 
-__all__ = ["at_condition", "linear_point"]
+__all__ = ["at_condition", "linear_point", "point_of", "trimmed_and_linear"]

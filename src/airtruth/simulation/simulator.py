@@ -37,6 +37,8 @@ _STEADY: Final = 1e-9
 engine that settles with a time constant of 10 s is then 4e-8 from its steady state, less than the residual of a trim)."""
 _ENGINE_ROUNDS: Final = 4
 """Steady states of the engines before a run: the thrust of a piston engine is constant after two (measured)."""
+STOPS: Final = (jsbsim.BaseError, RuntimeError, KeyError)
+"""Exceptions that JSBSim raises on a model or a property."""
 _PLANET: Final = Path(__file__).with_name("flat_planet.xml")
 """A planet that is flat and does not rotate, see docs/design.md."""
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from airtruth import aircraft as planes
 from airtruth.aircraft import Aircraft, Sensor
 from airtruth.errors import FlightError, TrimError
+from airtruth.simulation.disposable import isolated, isolated_flight
 from airtruth.simulation.replay import Track, replay, substeps
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim, trim
@@ -108,8 +109,12 @@ def _errors(records: Sequence[TraceRecord], aircraft: Aircraft, weights: list[Ar
         ratio = float(_corrected("airspeed_m_s", np.array(before), record.plant.aircraft, aircraft)) / before
         at = replace(declared.condition, eas_m_s=declared.condition.eas_m_s * ratio)
         if at not in trims:
-            trims[at] = trim(aircraft, at)
-        flown = replay(aircraft, trims[at], track(record, aircraft, weight))
+            trims[at] = isolated(f"the trim of {aircraft.name}", trim, aircraft, at)
+        measured = track(record, aircraft, weight)
+        steps = measured.elevator_rad.size
+        flown = isolated_flight(
+            steps, f"the replay of {aircraft.name}", replay, aircraft, trims[at], measured
+        )
         residual = record.signals.y - np.stack([flown[c] for c in CHANNELS], axis=1)
         squares.append((residual**2).mean(axis=0))
     return dict(zip(CHANNELS, np.sqrt(np.mean(squares, axis=0)).tolist(), strict=True))

@@ -113,8 +113,12 @@ def _refuse_channels(root: ET.Element, path: Path) -> None:
 
 
 def controls_simulation(name: str) -> bool:
-    """Whether writing a property stops, trims, rewinds or re-times the simulation."""
-    return name.strip().removeprefix("/").lstrip("-").startswith("simulation/")
+    """Whether writing a property stops, trims, rewinds or re-times the simulation.
+
+    JSBSim resolves "..", ".", indices and absolute paths in names, so every component before the last counts.
+    """
+    components = [part.partition("[")[0].strip(" -") for part in name.strip().split("/")]
+    return "simulation" in components[:-1]
 
 
 def _refuse_control(root: ET.Element, path: Path) -> None:

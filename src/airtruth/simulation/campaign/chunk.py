@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from airtruth.errors import AirtruthError
+from airtruth.errors import AirtruthError, reason
 from airtruth.logs import store
 from airtruth.logs.digest import sha256_of
 from airtruth.logs.flight_log import FlightLog
@@ -27,7 +27,7 @@ from airtruth.simulation.campaign.effects import EFFECTS
 from airtruth.simulation.campaign.plan import Plan, PlannedRun
 from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.linearise import Linearisation, linearise
-from airtruth.simulation.simulator import Condition
+from airtruth.simulation.simulator import STOPS, Condition
 from airtruth.simulation.trim import Trim, trim
 
 Array = NDArray[np.float64]
@@ -114,6 +114,7 @@ class Pilot:
         )
         self._models = models
         self._prepared: OrderedDict[Condition, Prepared] = OrderedDict()
+        self._kept: list[BaseException] = []  # the destructor of an executive that failed aborts the process
         time = np.arange(plan.samples, dtype=np.float64) * plan.dt_s
         self._shapes = [manoeuvres.sample(m, time) for m in plan.manoeuvres]
 
@@ -141,17 +142,20 @@ class Pilot:
         """
         unflown, truth_rows, flown = [], [], []
         for run in order.runs:
-            reason = (crashed or {}).get(run.run_id)
+            why = (crashed or {}).get(run.run_id)
             prepared = None
-            if reason is None:
+            if why is None:
                 starts(run.run_id)
                 try:
-                    prepared = self._prepare(run.condition)
+                    prepared = self.prepared(run.condition)
                     flown.append((run, self.channels(run)))
                 except AirtruthError as error:
-                    reason, prepared = str(error), None
-            if reason is not None:
-                unflown.append(Outcome(run.run_id, FAILED, reason))
+                    why, prepared = str(error), None
+                except STOPS as error:
+                    self._kept.append(error)
+                    why, prepared = f"JSBSim stops with: {reason(error)}", None
+            if why is not None:
+                unflown.append(Outcome(run.run_id, FAILED, why))
             truth_rows.append(truth_row(run, prepared))
         log, truth = (folder / chunk_file(order.chunk) for folder in (logs, truths))
         if flown:
@@ -165,11 +169,19 @@ class Pilot:
             sha256_of(truth),
         )
 
-    def _prepare(self, at: Condition) -> Prepared:
+    def prepared(self, at: Condition) -> Prepared:
+        """Return a flight condition, trimmed, linearised and loaded.
+
+        Raises
+        ------
+        TrimError
+            If the condition cannot be trimmed.
+        """
         prepared = self._prepared.pop(at, None)
         if prepared is None:
             plan = self.plan
-            at_trim = trim(plan.aircraft, at, plan.dt_s)
+            known, nominal = plan.nominal or (None, None)
+            at_trim = nominal if nominal and at == known else trim(plan.aircraft, at, plan.dt_s)
             prepared = Prepared(
                 trim=at_trim,
                 linear=linearise(plan.aircraft, at_trim, plan.dt_s),
@@ -189,7 +201,7 @@ class Pilot:
             If the run's condition cannot be trimmed, or the flight leaves the simulation's range.
         """
         plan = self.plan
-        prepared = self._prepare(run.condition)
+        prepared = self.prepared(run.condition)
         gust = self._gust(prepared.trim, run)
         manoeuvre = plan.manoeuvres[run.manoeuvre]
         amplitude = 1.0 if manoeuvre.kind == "replay" else run.amplitude_rad
@@ -254,6 +266,19 @@ class Pilot:
             t_s=np.tile(np.arange(samples) / plan.campaign.log_hz, len(flown)),
             channels={name: values.ravel() for name, values in logged.items()},
         )
+
+
+def flown_runs(plan: Plan, runs: Sequence[PlannedRun]) -> list[tuple[Trim, Linearisation, dict[str, Array]]]:
+    """Fly single runs of a plan; trim, derivatives and noise-free channels of each.
+
+    Raises
+    ------
+    TrimError, FlightError
+        As `Pilot.channels`.
+    """
+    pilot = Pilot(plan)
+    prepared = ((run, pilot.prepared(run.condition)) for run in runs)
+    return [(at.trim, at.linear, pilot.channels(run)) for run, at in prepared]
 
 
 @lru_cache(maxsize=64)

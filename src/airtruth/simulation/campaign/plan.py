@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from airtruth import __version__
 from airtruth.aircraft import Aircraft, Sensor, load
 from airtruth.aircraft.neutral import fitted
-from airtruth.errors import AirtruthError, ConfigurationError
+from airtruth.errors import AirtruthError, ConfigurationError, TrimError
 from airtruth.logs.names import ordered_number
 from airtruth.logs.store import read_log
 from airtruth.physics import actuators, atmosphere
@@ -26,6 +26,7 @@ from airtruth.simulation.campaign import file as campaign_file
 from airtruth.simulation.campaign import streams
 from airtruth.simulation.campaign.file import NO_GUST, Campaign, ManoeuvreTable
 from airtruth.simulation.campaign.numbering import chunk_numbers, chunk_offsets
+from airtruth.simulation.disposable import isolated
 from airtruth.simulation.manoeuvres import Manoeuvre, end_s, sample
 from airtruth.simulation.simulator import Condition, jsbsim_model
 from airtruth.simulation.trim import Trim, trim
@@ -84,6 +85,7 @@ class Plan:
     table : one row per run: run, run_id, chunk, eas_m_s, altitude_m, gamma_rad, wind_m_s, manoeuvre,
         amplitude_rad, sigma_u_m_s, sigma_w_m_s, length_u_m, length_w_m, and effects where there are any.
     digest : fingerprint of all this except the number of runs, by which a folder recognises its campaign.
+    nominal : condition of the run of median airspeed and its trim, which no worker computes again.
     """
 
     campaign: Campaign
@@ -93,6 +95,7 @@ class Plan:
     manoeuvres: tuple[Manoeuvre, ...]
     table: pd.DataFrame
     digest: str
+    nominal: tuple[Condition, Trim] | None = None
 
     @property
     def dt_s(self) -> float:
@@ -165,8 +168,7 @@ def make(campaign: Path | str | Campaign, seed: int | None = None, runs: int | N
         table=table,
         digest=_digest(campaign, flown, manoeuvres),
     )
-    _check(plan, path)
-    return plan
+    return _checked(plan, path)
 
 
 def planned_runs(table: pd.DataFrame) -> list[PlannedRun]:
@@ -267,8 +269,8 @@ def _digest(campaign: Campaign, aircraft: Aircraft, manoeuvres: tuple[Manoeuvre,
     return content.hexdigest()
 
 
-def _check(plan: Plan, path: Path) -> None:
-    """Refuse a campaign with every problem that can be known before the flight."""
+def _checked(plan: Plan, path: Path) -> Plan:
+    """The plan with its nominal trim, or every problem of the campaign that can be known before the flight."""
     problems: list[str] = []
     t = np.arange(plan.samples, dtype=np.float64) * plan.dt_s
     nominal = _nominal_trims(plan, problems)
@@ -289,13 +291,15 @@ def _check(plan: Plan, path: Path) -> None:
             problems += [f"{where}: {p}" for p in _saturation(plan, manoeuvre, shape, rows, nominal)]
     if problems:
         raise ConfigurationError(f"{path}: {len(problems)} problem(s)\n  " + "\n  ".join(problems))
+    return replace(plan, nominal=(_nominal(plan.table), nominal[0]))
 
 
 def _nominal_trims(plan: Plan, problems: list[str]) -> list[Trim]:
     """Trim the run of median airspeed; a run in a tail of a distribution may still fail in flight."""
+    plane, at = plan.aircraft, _nominal(plan.table)
     try:
-        return [trim(plan.aircraft, _nominal(plan.table), plan.dt_s)]
-    except AirtruthError as error:
+        return [isolated(f"the trim of {plane.name}", trim, plane, at, plan.dt_s)]
+    except TrimError as error:
         problems.append(f"condition: {error}")
         return []
 

@@ -18,10 +18,16 @@ import traceback
 import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
-from typing import TYPE_CHECKING, BinaryIO, Final
+from typing import TYPE_CHECKING, Final
+
+from airtruth.isolation.limits import impose_cpu_time, impose_memory
+from airtruth.simulation.disposable import limits_of
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from airtruth.simulation.campaign.chunk import ChunkOrder
+    from airtruth.simulation.campaign.plan import Plan
 
 _PARENT_CHECK_S: Final = 0.5
 """Period at which a worker checks that its parent lives [s] (judgement: an orphan ends within a second at no cost)."""
@@ -49,30 +55,38 @@ def main() -> None:
 
     from airtruth.errors import AirtruthError
 
+    limited = False
     try:
-        _fly(sys.stdin.buffer, answer)
+        plan, logs, truths = pickle.load(sys.stdin.buffer)
+        limited = impose_memory(limits_of(plan.samples).memory_bytes)
+        _fly(plan, (logs, truths), answer)
     except AirtruthError as error:
         answer(event="error", kind=type(error).__name__, message=str(error))
     except MemoryError:
-        answer(event="memory")
+        answer(event="memory", own=limited)
     except BaseException:
         answer(event="unforeseen", message=traceback.format_exc())
 
 
-def _fly(orders: BinaryIO, answer: Callable[..., None]) -> None:
+def _fly(plan: Plan, folders: tuple[Path, Path], answer: Callable[..., None]) -> None:
     from airtruth.simulation.campaign.chunk import Pilot
 
-    plan, logs, truths = pickle.load(orders)
     pilot = Pilot(plan)
-    for line in orders:
+    allowed_s = limits_of(plan.samples).seconds
+
+    def starts(run_id: str) -> None:
+        answer(event="starts", run_id=run_id)
+        impose_cpu_time(allowed_s)
+
+    for line in sys.stdin.buffer:
         order, crashed = pickle.loads(zlib.decompress(base64.b64decode(line)))
         chunk = pilot.fly_chunk(
             order,
-            logs,
-            truths,
+            *folders,
             crashed,
-            lambda run_id: answer(event="starts", run_id=run_id),
+            starts,
         )
+        impose_cpu_time(0.0)
         answer(event="ended", **asdict(chunk))
 
 

@@ -1,7 +1,8 @@
 """Fly chunks in child processes, and tell a run that kills its process from a process that was killed.
 
-A run during which the process dies twice by a fault (a segmentation fault, an abort, an exit) has failed. A process
-that was killed from outside, or that lacks memory, says nothing about its runs: its chunk is flown again, and after
+A run during which the process dies twice by a fault (a segmentation fault, an abort, an exit, whatever its code) or reaches
+the limit of memory that it imposed on itself has failed, and so has a run that exceeds the computing time of any run. A
+process that was killed from outside, or that lacks memory, says nothing about its runs: its chunk is flown again, and after
 `ATTEMPTS` deaths it is left to the next command.
 """
 
@@ -17,7 +18,7 @@ from collections import deque
 from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from airtruth import errors
 from airtruth.errors import StoreError
@@ -26,6 +27,7 @@ from airtruth.logs.atomic import write_error
 from airtruth.simulation.campaign.chunk import INTERRUPTED, ChunkOrder, FlownChunk, Outcome
 from airtruth.simulation.campaign.plan import Plan, chunk_runs
 from airtruth.simulation.campaign.worker import encoded
+from airtruth.simulation.disposable import limits_of
 
 ATTEMPTS: Final = 3
 """Times that a chunk is flown whose process is killed from outside (judgement: one for a kill, more for a lack of
@@ -42,6 +44,8 @@ FAULTS: Final = frozenset(
     if (number := getattr(signal, name, None)) is not None
 )
 """Signals that a process causes itself; the others come from outside."""
+_ENDLESS: Final = getattr(signal, "SIGPROF", None)
+"""Signal of a process whose run exceeds its computing time; a second flight would do the same."""
 ONE_THREAD: Final = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 """Environment of a worker: the runs are what is parallel, and each thread of a library reserves memory."""
 
@@ -64,7 +68,7 @@ class _Worker:
     tasks: deque[_Task] = field(default_factory=deque)
     run_id: str | None = None
     rest: bytes = b""
-    memory: bool = False
+    memory: Literal["", "system", "own"] = ""
 
     @property
     def output(self) -> int:
@@ -169,6 +173,7 @@ class _Crew:
         resident: bool = False,
     ) -> None:
         self.start_message = pickle.dumps((without_table(plan), *folders))
+        self.allowed_s = limits_of(plan.samples).seconds
         self.orders = orders
         self.again: deque[_Task] = deque()
         self.resident = resident
@@ -262,7 +267,7 @@ class _Crew:
             yield FlownChunk(unflown=unflown, **event)
             self._feed(worker)
         elif kind == "memory":
-            worker.memory = True
+            worker.memory = "own" if event["own"] else "system"
         elif kind == "error":
             raise getattr(errors, event["kind"], StoreError)(event["message"])
         else:
@@ -273,7 +278,12 @@ class _Crew:
         code = self._dismiss(worker)
         task = worker.tasks[0]
         how = _how(code) if not worker.memory else "ran out of memory"
-        if worker.run_id is not None and not worker.memory and (code >= 0 or -code in FAULTS):
+        by_run = worker.memory == "own" if worker.memory else code >= 0 or -code in FAULTS
+        if worker.run_id is not None and -code == _ENDLESS:
+            task.crashed[worker.run_id] = (
+                f"the flight does not end within {self.allowed_s:.0f} s of computing time"
+            )
+        elif worker.run_id is not None and by_run:
             count = task.crashes[worker.run_id] = task.crashes.get(worker.run_id, 0) + 1
             if count >= CRASHES:
                 task.crashed[worker.run_id] = f"the flight ends its process each time ({how})"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from airtruth.aircraft import Aircraft
 from airtruth.errors import AircraftError
 from airtruth.physics.short_period import PARAMETERS
-from airtruth.simulation.linearise import linearise
-from airtruth.simulation.probe import Grid, probe
-from airtruth.simulation.simulator import Condition, Executive
+from airtruth.simulation.disposable import isolated
+from airtruth.simulation.linearise import Linearisation, linearise
+from airtruth.simulation.probe import Grid, forces_at_speeds, probe
+from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim, trim
-from airtruth.units import DEG, G0, LBF
+from airtruth.units import DEG, G0
 
 Array = NDArray[np.float64]
 
@@ -82,7 +83,8 @@ def trim_of(
         If it cannot fly there.
     """
     eas = airspeed_m_s * float(np.sqrt(density_kg_m3 / 1.225))
-    return trim(aircraft, Condition(eas, altitude_m, gamma_rad))
+    at = Condition(eas, altitude_m, gamma_rad)
+    return isolated(f"the trim of {aircraft.name}", trim, aircraft, at)
 
 
 def probed(
@@ -104,11 +106,12 @@ def probed(
     offset = at.controls.elevator_command_rad - at.elevator_rad
     rates = np.linspace(-1.0, 1.0, _RATES) * max(q * _RATE_MARGIN, _LEAST_RATE_RAD_S)
     commands = whole(elevator[0] + offset, elevator[1] + offset, DEG)
-    tables = probe(aircraft, at, Grid(whole(alpha[0], alpha[1], DEG), commands, rates, np.ones(1))).tables
+    grid = Grid(whole(alpha[0], alpha[1], DEG), commands, rates, np.ones(1))
+    tables = isolated(f"the table of forces of {aircraft.name}", probe, aircraft, at, grid).tables
     power = engines(aircraft, at)
     constant = power.constant
     pressure = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2
-    declared = linearise(aircraft, at)
+    declared = _linearised(aircraft, at)
     constants = aircraft.constants
     return Plant(
         aircraft=aircraft,
@@ -144,22 +147,15 @@ class Engines:
 
 def engines(aircraft: Aircraft, at: Trim) -> Engines:
     """The engines of the JSBSim aircraft, from three airspeeds about a trim."""
-    executive = Executive(aircraft, 1.0 / 200.0)
-    inertia = aircraft.constants.inertia_yy_kg_m2
-    rows = []
-    for ratio in _SPEEDS:
-        condition = replace(at.condition, eas_m_s=at.condition.eas_m_s * float(ratio))
-        executive = executive.again()
-        total = executive.nodes(["forces/fbx-total-lbs", "forces/fbz-total-lbs"])
-        air = executive.node("forces/fbx-aero-lbs")
-        executive.initialise(condition, at.alpha_rad, at.controls)
-        moment = executive.respond().q_dot_rad_s2 * inertia
-        x, z = (node.get_double_value() * LBF for node in total)
-        rows.append([x, z, moment, x - air.get_double_value() * LBF])
+    rows = isolated(f"the forces of the engines of {aircraft.name}", forces_at_speeds, aircraft, at, _SPEEDS)
     pressures = 0.5 * at.density_kg_m3 * (at.airspeed_m_s * _SPEEDS) ** 2
     basis = np.column_stack([np.ones_like(pressures), pressures])
-    fitted = np.linalg.lstsq(basis, np.array(rows), rcond=None)[0]
+    fitted = np.linalg.lstsq(basis, rows, rcond=None)[0]
     return Engines(np.ascontiguousarray(fitted[0, :3]), np.ascontiguousarray(fitted[:, 3]))
+
+
+def _linearised(aircraft: Aircraft, at: Trim) -> Linearisation:
+    return isolated(f"the derivatives of {aircraft.name}", linearise, aircraft, at)
 
 
 def linear(
@@ -219,7 +215,7 @@ def declared_derivatives(aircraft: Aircraft, at: Trim | None) -> Array:
         If neither is there.
     """
     if at is not None:
-        return linearise(aircraft, at).central
+        return _linearised(aircraft, at).central
     stated = aircraft.file.derivatives
     missing = [name for name in PARAMETERS if name not in stated]
     if missing:

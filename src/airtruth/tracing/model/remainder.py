@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from airtruth.aircraft.dynamics import declared_dynamics
 from airtruth.physics.readings import state_of
 from airtruth.physics.terms import Change
+from airtruth.simulation.disposable import isolated_flight
 from airtruth.simulation.replay import Track, flown_through, substeps
 from airtruth.tracing.increment_response import increments
 from airtruth.tracing.model.plant import Plant
@@ -45,7 +46,15 @@ def remainder(signals: Signals, plant: Plant) -> Array:
     """
     at = plant.trim
     assert at is not None
-    flown = flown_through(plant.aircraft, at, track_of(signals))
+    track = track_of(signals)
+    flown = isolated_flight(
+        track.elevator_rad.size,
+        f"the flight of {plant.aircraft.name}",
+        flown_through,
+        plant.aircraft,
+        at,
+        track,
+    )
     dt_s = signals.dt_s / substeps(signals.dt_s)
     c = plant.aircraft.constants
     speed = flown["airspeed_m_s"]
