@@ -158,6 +158,19 @@ def test_a_model_must_not_control_the_simulation(plane, element):
     refuses(plane, "must not stop, trim, rewind or re-time the simulation")
 
 
+@pytest.mark.parametrize(
+    "name",
+    ["fcs/../simulation/terminate", "./simulation/terminate", "simulation[0]/terminate", "-simulation/reset"],
+)
+def test_nor_by_another_name_of_the_same_property(plane, name):
+    """JSBSim 1.3.3 ends the simulation through each of the first three."""
+    add(
+        plane,
+        f'<system name="s"><channel name="c"><pure_gain name="g"><output>{name}</output></pure_gain></channel></system>',
+    )
+    refuses(plane, "must not stop, trim, rewind or re-time the simulation")
+
+
 @pytest.mark.parametrize("name", ["simulation/do_simple_trim", "simulation/dt", "/simulation/reset"])
 def test_nor_may_aircraft_toml(plane, name):
     toml = plane / "aircraft.toml"
@@ -169,6 +182,7 @@ def test_nor_may_aircraft_toml(plane, name):
 
 def test_reading_the_time_is_no_control():
     assert controls_simulation("simulation/dt")
+    assert not controls_simulation("simulation")
     assert not controls_simulation("fcs/elevator-cmd-norm")
 
 

@@ -113,6 +113,12 @@ def test_verify_of_other_folders(tmp_path):
         assert (ended.code, words in ended.err) == (2, True)
 
 
+def test_verify_names_a_manifest_that_is_missing(whole, tmp_path):
+    out = damaged(whole, tmp_path)
+    (out / "manifest.jsonl").unlink()
+    assert [(f.file, f.state) for f in verify(out).findings] == [("manifest.jsonl", MISSING)]
+
+
 def test_verify_names_what_an_unfinished_campaign_lacks(whole, tmp_path):
     out = damaged(whole, tmp_path)
     lines = (out / "manifest.jsonl").read_bytes().splitlines(keepends=True)

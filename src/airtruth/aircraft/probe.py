@@ -70,7 +70,7 @@ def probe(folder: Path, jsbsim_json: str) -> Constants:
         ) from None
     with tempfile.TemporaryDirectory(prefix="airtruth-") as scratch:
         output = Path(scratch) / "output"
-        arguments = {"folder": str(folder.absolute()), "table": table, "output": str(output)}
+        arguments = {"folder": str(folder.absolute()), "jsbsim_json": jsbsim_json, "output": str(output)}
         task = Task("airtruth.aircraft.probe_child:load", arguments, _LIMITS, _MODULES)
         try:
             answer: dict[str, Any] = dict(call(task).facts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
 from typing import Any
@@ -12,12 +13,12 @@ from airtruth.isolation.protocol import Reply
 from airtruth.units import FT, SLUG
 
 
-def load(folder: str, table: dict[str, Any], output: str) -> Reply:
+def load(folder: str, jsbsim_json: str, output: str) -> Reply:
     """Load a model and return "constants", or "error", why it cannot be used.
 
     Parameters
     ----------
-    folder : folder of aircraft.toml; table : its [jsbsim] table; output : file that receives what JSBSim prints.
+    folder : folder of aircraft.toml; jsbsim_json : its [jsbsim] table as JSON; output : file that receives what JSBSim prints.
     """
     import jsbsim
 
@@ -25,7 +26,7 @@ def load(folder: str, table: dict[str, Any], output: str) -> Reply:
     for standard in (1, 2):
         os.dup2(descriptor, standard)
     jsbsim.set_logger(jsbsim.DefaultLogger())  # another task may have silenced it
-    return Reply(_load(Path(folder), table))
+    return Reply(_load(Path(folder), json.loads(jsbsim_json)))
 
 
 def _load(folder: Path, table: dict[str, Any]) -> dict[str, Any]:

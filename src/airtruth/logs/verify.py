@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 LOCK: Final = ".lock"
 """File whose lock a flying process holds; it has no content."""
+_SETTINGS: Final = "campaign.json"
+"""File of a campaign that shows that its manifest is missing."""
 _CAMPAIGN_FILE: Final = re.compile(
     r"(?:logs|truth-parts)/[a-z]?\d{5,}\.parquet|plan\.parquet|truth\.parquet|campaign\.json"
 )
@@ -105,13 +107,14 @@ def verify(folder: Path | str) -> Verification:
         raise StoreError(f"{folder}: is no folder; give the folder of a campaign or another --out")
     files = {p.relative_to(folder).as_posix(): p for p in files_below(folder)}
     listing = {name for name in files if name == MANIFEST or Path(name).name == LEDGER}
-    if not listing:
+    campaign = MANIFEST in files or _SETTINGS in files
+    if not listing and not campaign:
         raise StoreError(
             f"{folder}: holds neither {MANIFEST} nor {LEDGER}, so there is nothing to compare its files with"
         )
     findings: list[Finding] = []
     recorded: dict[str, str] = {}
-    if MANIFEST in files or (folder / "campaign.json").exists():
+    if campaign:
         digests, faults = _of_manifest(folder)
         recorded |= digests
         findings += faults
