@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from airtruth import aircraft as planes
 from airtruth.aircraft import Aircraft
 from airtruth.api.plans import base_campaign
-from airtruth.design import Limits, SplitOptions, split
+from airtruth.design import Limits, PlanOptions, split
 from airtruth.design.limits import extremes
 from airtruth.design.question import from_names
 from airtruth.design.separation import Experiment, Member, Model
@@ -125,7 +125,7 @@ def planned(gtm: Aircraft, number: int, out: Path, seed: int) -> None:
     base = base_campaign(None, False, "gtm")
     assert isinstance(base, Campaign)
     began = time.perf_counter()
-    options = SplitOptions(Limits(), seed=seed)
+    options = PlanOptions(Limits(), seed=seed)
     keys = PAIRS[number][:2]
     sizes = tied(base, number, options, gtm)
     result = split(base, from_names(keys, sizes), options, gtm)
@@ -139,7 +139,7 @@ def planned(gtm: Aircraft, number: int, out: Path, seed: int) -> None:
     print(path.name, result.best.family, result.best.least, result.ratio, facts["jsbsim"], flush=True)
 
 
-def tied(base: Campaign, number: int, options: SplitOptions, gtm: Aircraft) -> dict[str, float]:
+def tied(base: Campaign, number: int, options: PlanOptions, gtm: Aircraft) -> dict[str, float]:
     """The size of the first effect at which the reference separates as far as `TIED`, by the secant in logarithms."""
     first, second, parameter = PAIRS[number]
     start = from_names([first, second], {})[0].effect.parameters[0]

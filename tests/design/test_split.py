@@ -15,10 +15,12 @@ from airtruth.api.plans import base_campaign
 from airtruth.design import search as searching
 from airtruth.design import splitting
 from airtruth.design.bench import Bench
+from airtruth.design.flight import PlanOptions
 from airtruth.design.limits import Limits
-from airtruth.design.question import from_answer, from_names
+from airtruth.design.question import from_names
 from airtruth.design.separation import Experiment, Member, Model
 from airtruth.design.split_result import split_probability
+from airtruth.design.verdict import asked_by
 from airtruth.design.waveforms import multistep
 from airtruth.effects.registry import EFFECTS
 from airtruth.errors import ConfigurationError
@@ -111,15 +113,15 @@ def test_probability_of_one_name_is_that_of_draws():
 
 def test_tied_effects_of_a_trace_are_the_hypotheses():
     answer = TraceAnswer.read(SAMPLE)
-    first, *others = from_answer(answer, "trace.json")
+    first, *others = asked_by(answer, "trace.json")
     assert first.effect.key == "gyro_lag"
     (tau,) = first.sizes
     assert tau == pytest.approx(answer.effects[1].parameters["tau_s"].value)
     assert {h.effect.name for h in others} == {"sensor_delay"}
     assert all(h.sizes is None for h in others)
-    alone = replace(answer, effects=answer.effects[:1], alternatives=())
+    alone = replace(answer, effects=answer.effects[:1], alternatives=(), verdict="traced", provisional=False)
     with pytest.raises(ConfigurationError, match="no two effects are tied"):
-        from_answer(alone, "trace.json")
+        asked_by(alone, "trace.json")
 
 
 def test_sizes_are_read_in_any_unit():
@@ -206,7 +208,7 @@ def test_a_range_of_airspeeds_is_compared(quick, gtm):
     result = splitting.split(
         campaign.model_copy(update={"condition": table}),
         from_names(["elevator_delay", "actuator_lag"], {}),
-        splitting.SplitOptions(LIMITS, 3),
+        PlanOptions(LIMITS, 3),
         gtm,
         tried.append,
     )

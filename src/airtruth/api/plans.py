@@ -1,4 +1,4 @@
-"""Public function that plans flights: the accuracy of a campaign, or the input that separates two effects."""
+"""Public function that plans flights: the accuracy of a campaign, or the input that answers a question best."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from airtruth.api.campaigns import campaign_of
 
 if TYPE_CHECKING:
     from airtruth.api.arguments import FilePath
-    from airtruth.design import ForecastResult, Limits, SplitResult
+    from airtruth.design import ForecastResult, Limits, NarrowResult, SplitResult
     from airtruth.simulation.campaign.file import Campaign
 
 
@@ -41,13 +41,28 @@ def plan(
     campaign: FilePath | Campaign | None = None,
     *,
     records: int | None = None,
+    derivatives: Sequence[str],
+    trace: FilePath | None = None,
+    aircraft: str | None = None,
+    limits: Limits | None = None,
+    seed: int = 0,
+    out: FilePath | None = None,
+    force: bool = False,
+) -> NarrowResult: ...
+
+
+@overload
+def plan(
+    campaign: FilePath | Campaign | None = None,
+    *,
+    records: int | None = None,
     trace: FilePath,
     aircraft: str | None = None,
     limits: Limits | None = None,
     seed: int = 0,
     out: FilePath | None = None,
     force: bool = False,
-) -> SplitResult: ...
+) -> SplitResult | NarrowResult: ...
 
 
 def plan(
@@ -56,6 +71,7 @@ def plan(
     records: int | None = None,
     pressure: str = "constant",
     split: Sequence[str] = (),
+    derivatives: Sequence[str] = (),
     trace: FilePath | None = None,
     sizes: Mapping[str, float] | None = None,
     aircraft: str | None = None,
@@ -63,17 +79,21 @@ def plan(
     seed: int = 0,
     out: FilePath | None = None,
     force: bool = False,
-) -> ForecastResult | SplitResult:
-    """Predict the standard errors of a campaign (the Cramer-Rao bound), or compute the flight that separates effects.
+) -> ForecastResult | SplitResult | NarrowResult:
+    """Predict the standard errors of a campaign (the Cramer-Rao bound), or compute the flight that separates effects or
+    determines derivatives.
 
     Parameters
     ----------
-    campaign : campaign file or a `Campaign`. To separate effects it states aircraft, condition, gusts and sensors, and
+    campaign : campaign file or a `Campaign`. To compute a flight it states aircraft, condition, gusts and sensors, and
         may be None: the condition is then that of the trace, or the default one of a shipped aircraft.
-    records : number of records; None for the campaign's runs, or as many as separate the effects with 95 % probability.
+    records : number of records; None for the campaign's runs, as many as separate the effects with 95 % probability, or 6
+        for derivatives and increments.
     pressure : "constant", the airspeed is not an output of the filter, or "measured", it is one.
     split : keys of two or more effects to separate.
-    trace : folder of a trace, or its trace.json, whose tied effects are to be separated.
+    derivatives : names of derivatives to determine with the smallest standard errors.
+    trace : folder of a trace, or its trace.json. Without ``split`` and ``derivatives`` its answer asks: tied effects are
+        separated, the band of a learned increment is narrowed.
     sizes : EFFECT.PARAMETER -> value [its unit]; an effect without sizes imitates the first.
     aircraft : shipped name or folder, instead of that of the campaign or of the trace.
     limits : of the elevator and of the motion.
@@ -83,13 +103,13 @@ def plan(
 
     Returns
     -------
-    ForecastResult or SplitResult
-        The latter where ``split`` or ``trace`` is given; its ``campaign`` can be flown.
+    ForecastResult, SplitResult or NarrowResult
+        The second where effects are separated, the third for derivatives and increments; their ``campaign`` can be flown.
 
     Raises
     ------
     ConfigurationError
-        If an input cannot be used as written, or the trace has no tied effects.
+        If an input cannot be used as written, or the trace leaves no question that an input answers.
     AircraftError, TrimError, FlightError, StoreError
         If the aircraft cannot be loaded, trimmed or flown, or a file cannot be read or written.
 
@@ -102,20 +122,23 @@ def plan(
     from airtruth.design import forecast
     from airtruth.errors import ConfigurationError
 
-    if not split and trace is None:
+    if not split and not derivatives and trace is None:
         if campaign is None:
-            raise ConfigurationError("plan: nothing to plan; give a campaign, effects to split, or a trace")
+            raise ConfigurationError(
+                "plan: nothing to plan; give a campaign, effects to split, derivatives, or a trace"
+            )
         return forecast(campaign_of(campaign), records, pressure)
-    from airtruth.design import SplitOptions
-    from airtruth.design.from_files import split_from
+    from airtruth.design import PlanOptions
+    from airtruth.design.from_files import Stated, planned_from
 
     options = (
-        SplitOptions(records=records, seed=seed) if limits is None else SplitOptions(limits, records, seed)
+        PlanOptions(records=records, seed=seed) if limits is None else PlanOptions(limits, records, seed)
     )
     source = base_campaign(None if campaign is None else campaign_of(campaign), trace is not None, aircraft)
     target = None if out is None else Path(out)
     answer = None if trace is None else Path(os.fspath(trace))
-    return split_from(source, split, answer, sizes or {}, aircraft, options, target, force=force)
+    stated = Stated(split, sizes or {}, derivatives, answer)
+    return planned_from(source, stated, aircraft, options, target, force=force)
 
 
 def base_campaign(

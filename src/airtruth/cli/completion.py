@@ -44,6 +44,15 @@ def complete_effect(incomplete: str) -> Iterator[str]:
     return _beginning(incomplete, {*EFFECTS, *(effect.name for effect in EFFECTS.values())})
 
 
+def complete_derivative(incomplete: str) -> Iterator[str]:
+    """Names of the derivatives; after a comma the next one."""
+    from airtruth.physics.short_period import PARAMETERS
+
+    before, comma, last = incomplete.rpartition(",")
+    stated = before.split(",")
+    return (before + comma + name for name in _beginning(last, PARAMETERS) if name not in stated)
+
+
 def complete_example(incomplete: str) -> Iterator[str]:
     """Names of the examples."""
     from airtruth.starting import EXAMPLES

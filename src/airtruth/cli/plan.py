@@ -1,4 +1,4 @@
-"""`airtruth plan`: standard errors of a campaign beforehand, and the flight that separates effects."""
+"""`airtruth plan`: standard errors of a campaign beforehand, and the flight that answers a question best."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 
 from airtruth.cli.application import app
 from airtruth.cli.arguments import Json, PlanPressure, Quiet, Replace
-from airtruth.cli.completion import complete_aircraft, complete_effect
+from airtruth.cli.completion import complete_aircraft, complete_derivative, complete_effect
 from airtruth.cli.output import print_result
 from airtruth.cli.progress import progress_bar, status
 from airtruth.errors import ConfigurationError
@@ -28,13 +28,13 @@ def plan(
         Path | None,
         typer.Argument(
             metavar="[CAMPAIGN.toml]",
-            help="Campaign whose accuracy is predicted; with --split or --from, the source of condition, gusts and sensors.",
+            help="Campaign whose accuracy is predicted; otherwise the source of condition, gusts and sensors.",
         ),
     ] = None,
     records: Annotated[
         int | None,
         typer.Option(
-            min=1, help="Number of records; default: the file's runs, or as many as separate the effects."
+            min=1, help="Number of records; default: the file's runs, as many as separate the effects, or 6."
         ),
     ] = None,
     pressure: Annotated[
@@ -45,10 +45,20 @@ def plan(
         str | None,
         typer.Option(metavar="A,B", help="Effects to separate, by key.", autocompletion=complete_effect),
     ] = None,
+    derivative: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME[,NAME]",
+            help="Derivatives to determine with the smallest standard errors.",
+            autocompletion=complete_derivative,
+        ),
+    ] = None,
     trace: Annotated[
         Path | None,
         typer.Option(
-            "--from", metavar="DIR|trace.json", help="Trace whose tied effects are to be separated."
+            "--from",
+            metavar="DIR|trace.json",
+            help="Trace whose question is answered: tied effects, a learned increment, a derivative.",
         ),
     ] = None,
     size: Annotated[
@@ -85,29 +95,33 @@ def plan(
     json_: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Predict the standard errors of a campaign, or compute the flight that separates effects."""
+    """Predict the standard errors of a campaign, or compute the flight that separates effects or determines derivatives."""
     import json
 
     from airtruth.api.plans import base_campaign
-    from airtruth.design import ForecastResult, SplitOptions, SplitResult, forecast
-    from airtruth.design.from_files import split_from
+    from airtruth.design import ForecastResult, NarrowResult, PlanOptions, SplitResult, forecast
+    from airtruth.design.from_files import Stated, planned_from
 
-    result: ForecastResult | SplitResult
-    if split is None and trace is None:
+    result: ForecastResult | SplitResult | NarrowResult
+    if split is None and derivative is None and trace is None:
         if campaign is None:
-            raise ConfigurationError("plan: state a CAMPAIGN.toml, --split A,B or --from DIR")
+            raise ConfigurationError(
+                "plan: state a CAMPAIGN.toml, --split A,B, --derivative NAME or --from DIR"
+            )
         with progress_bar("plan", "kinds of runs", quiet) as advance:
             result = forecast(campaign, records, pressure, advance)
     else:
-        keys = [] if split is None else [key.strip() for key in split.split(",") if key.strip()]
+        stated = Stated(_listed(split), _sizes(size or []), _listed(derivative), trace)
         limits = _limits(amplitude_deg, rate_deg_s, alpha_deg, load_factor, length_s, airspeed_percent)
-        options = SplitOptions(limits, records, seed)
+        options = PlanOptions(limits, records, seed)
         with status("plan", quiet) as step:
             base = base_campaign(campaign, trace is not None, aircraft)
-            result = split_from(
-                base, keys, trace, _sizes(size or []), aircraft, options, out, force=force, step=step
-            )
+            result = planned_from(base, stated, aircraft, options, out, force=force, step=step)
     print_result(json.dumps(result.to_dict(), indent=1) if json_ else result.summary())
+
+
+def _listed(text: str | None) -> list[str]:
+    return [] if text is None else [name.strip() for name in text.split(",") if name.strip()]
 
 
 def _limits(

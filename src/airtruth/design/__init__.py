@@ -1,8 +1,24 @@
-"""Design of experiments: the accuracy of a campaign before it is flown, and the input that separates two effects."""
+"""Design of experiments: accuracy of a campaign before it is flown; the input that separates effects or narrows estimates."""
 
+from airtruth.design.band import BandQuestion
 from airtruth.design.bound import ForecastResult, forecast
+from airtruth.design.flight import PlanOptions
 from airtruth.design.limits import Limits
+from airtruth.design.narrow_result import NarrowResult
+from airtruth.design.narrowing import narrow
+from airtruth.design.precision import DerivativeQuestion
 from airtruth.design.split_result import SplitResult
-from airtruth.design.splitting import SplitOptions, split
+from airtruth.design.splitting import split
 
-__all__ = ["ForecastResult", "Limits", "SplitOptions", "SplitResult", "forecast", "split"]
+__all__ = [
+    "BandQuestion",
+    "DerivativeQuestion",
+    "ForecastResult",
+    "Limits",
+    "NarrowResult",
+    "PlanOptions",
+    "SplitResult",
+    "forecast",
+    "narrow",
+    "split",
+]

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.design.information import LinearExperiment, sensor_noise
 from airtruth.errors import ConfigurationError, choices
-from airtruth.identification.likelihood.cramer_rao import experiment_bound
-from airtruth.identification.likelihood.options import CHANNELS, PRESSURES, FilterOptions
-from airtruth.logs.flight_log import Batch
+from airtruth.identification.likelihood.options import PRESSURES
+from airtruth.physics.gust_figures import GustScales
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.simulation.campaign.chunk import flown_runs
 from airtruth.simulation.campaign.file import Campaign
@@ -195,7 +195,7 @@ def forecast(
     if pressure not in PRESSURES:
         raise ConfigurationError(f"plan: pressure = {pressure!r}: {choices(pressure, PRESSURES)}")
     plan = campaign if isinstance(campaign, Plan) else make(campaign)
-    noise = _noise(plan, pressure)
+    noise = sensor_noise(plan.sensors, plan.aircraft, pressure)
     groups = plan.table.groupby(list(_KIND), sort=False)
     kinds = groups.head(1).head(MOST_KINDS)
     counts = groups.size().to_numpy()[: len(kinds)].astype(np.float64)
@@ -232,20 +232,6 @@ def forecast(
     )
 
 
-def _noise(plan: Plan, pressure: str) -> dict[str, float]:
-    """Standard deviation of the noise of each sensor that the bound needs [SI]."""
-    needed = [c for n, c in CHANNELS.items() if n != "airspeed" or pressure == "measured"]
-    noise = {c: plan.sensors[c].noise_std.value if c in plan.sensors else 0.0 for c in needed}
-    lacking = [c for c, std in noise.items() if std <= 0.0]
-    if lacking:
-        raise ConfigurationError(
-            f"plan: {plan.aircraft.name} states no noise of {', '.join(lacking)}, without which the bound is 0; "
-            f"state noise_std in [sensors.{lacking[0]}] of {plan.aircraft.folder / 'aircraft.toml'}, "
-            f"or in [sensors.channel.{lacking[0]}] of the campaign"
-        )
-    return noise
-
-
 def _bound(
     plan: Plan,
     run: PlannedRun,
@@ -255,21 +241,8 @@ def _bound(
     noise: Mapping[str, float],
 ) -> Array:
     """The bound (6, 6) of one run of the table, from its trim, derivatives (6,) and flight in still air."""
-    channels = {name: np.ascontiguousarray(values[None]) for name, values in flown.items()}
-    samples = channels["alpha_rad"].shape[1]
-    dt_s = plan.dt_s * plan.log_every
-    t_s = dt_s * np.arange(samples, dtype=np.float64)[None]
-    options = FilterOptions(
-        noise["alpha_rad"],
-        noise["q_rad_s"],
-        noise["az_m_s2"],
-        sigma_u_m_s=run.sigma_u_m_s,
-        sigma_w_m_s=run.sigma_w_m_s,
-        length_u_m=run.length_u_m,
-        length_w_m=run.length_w_m,
-        airspeed_std_m_s=noise.get("airspeed_m_s"),
-        airspeed_m_s=at.airspeed_m_s,
+    gusts = GustScales(run.sigma_u_m_s, run.sigma_w_m_s, run.length_u_m, run.length_w_m)
+    experiment = LinearExperiment(
+        plan.aircraft, noise, gusts, at.airspeed_m_s, plan.dt_s * plan.log_every, plan.campaign.gust.start
     )
-    batch = Batch((run.run_id,), dt_s, t_s, channels)
-    least: Array = experiment_bound(batch, plan.aircraft, theta, options, plan.campaign.gust.start)[0]
-    return least
+    return experiment.least_covariance(flown, theta)

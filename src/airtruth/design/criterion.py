@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.design.bench import Flown
 from airtruth.design.question import Hypothesised
 from airtruth.design.separation import Distance, Experiment, Member, Model
 from airtruth.tracing.model.parameters import Common
@@ -61,15 +62,15 @@ class Criterion:
         """The same for another number of equal records."""
         return replace(self, model=replace(self.model, records=records))
 
-    def rate(self, record: TraceRecord, *, final: bool = False) -> Array | None:
+    def rate(self, flown: Flown, *, final: bool = False) -> Array | None:
         """(members,) separation of each truth from the nearest rival, averaged over draws; None if a motion is lost.
 
         Parameters
         ----------
-        record : of the input.
+        flown : the input.
         final : use all draws, not the first two.
         """
-        experiment = Experiment(self.model, record)
+        experiment = Experiment(self.model, flown.record)
         if not experiment.sound:
             return None
         unknowns = self.unknowns if final else self.unknowns[:_FIRST]

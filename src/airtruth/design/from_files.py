@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -11,9 +12,14 @@ import numpy as np
 from airtruth import aircraft as planes
 from airtruth import style
 from airtruth.aircraft import Aircraft
-from airtruth.design.question import Hypothesised, from_answer, from_names
+from airtruth.design.flight import PlanOptions
+from airtruth.design.narrow_result import NarrowResult
+from airtruth.design.narrowing import narrow
+from airtruth.design.precision import DerivativeQuestion
+from airtruth.design.question import from_names
 from airtruth.design.split_result import SplitResult
-from airtruth.design.splitting import SplitOptions, split
+from airtruth.design.splitting import split
+from airtruth.design.verdict import Asked, asked_by
 from airtruth.errors import ConfigurationError
 from airtruth.logs.histories import FILE, Histories, read_histories
 from airtruth.logs.outputs import writing
@@ -30,26 +36,40 @@ _LOG_HZ: Final = 50.0
 """Rate of the log where neither a campaign nor a trace states one [Hz]: that of the shipped campaigns."""
 
 
-def split_from(
+@dataclass(frozen=True)
+class Stated:
+    """What a user states of the question; where it is nothing, a trace asks.
+
+    Attributes
+    ----------
+    split : keys of effects to separate.
+    sizes : EFFECT.PARAMETER -> value [its unit].
+    derivatives : names of derivatives to determine.
+    trace : folder of a trace, or its trace.json; None for none.
+    """
+
+    split: Sequence[str] = ()
+    sizes: Mapping[str, float] = field(default_factory=dict)
+    derivatives: Sequence[str] = ()
+    trace: Path | None = None
+
+
+def planned_from(
     campaign: Path | Campaign | None,
-    keys: Sequence[str],
-    trace: Path | None,
-    sizes: Mapping[str, float],
+    stated: Stated,
     aircraft: str | None,
-    options: SplitOptions,
+    options: PlanOptions,
     out: Path | None = None,
     *,
     force: bool = False,
     step: Step = lambda text: None,
-) -> SplitResult:
-    """Plan the flight that separates the effects of ``keys``, or the tied effects of a trace.
+) -> SplitResult | NarrowResult:
+    """Plan the flight that answers a question, or the question that a trace leaves open.
 
     Parameters
     ----------
     campaign : where condition, gusts and sensors come from; None for those of the trace or the default ones.
-    keys : effects; none for those of the trace.
-    trace : folder of a trace, or its trace.json; None for none.
-    sizes : EFFECT.PARAMETER -> value [its unit].
+    stated : the question.
     aircraft : shipped name or folder; None for that of the campaign or of the trace.
     options : limits, records and seed.
     out : campaign file to write, and a figure beside it; None to write nothing.
@@ -61,29 +81,36 @@ def split_from(
     ConfigurationError, AircraftError, TrimError, StoreError
         Naming what is wrong, where, and what to do.
     """
+    trace = stated.trace
     answer_file = None if trace is None else (trace / ANSWER if trace.is_dir() else trace)
-    hypotheses = _hypotheses(keys, answer_file, sizes)
+    question = _question(stated, answer_file)
     records = _records(answer_file)
     declared, base = _base(campaign, aircraft, records, "" if out is None else out.stem)
     inputs = [p for p in (campaign, answer_file) if isinstance(p, Path)]
     with writing("plan", inputs, force=force) as outputs:
         if out is not None:
             outputs.require(out, out.with_suffix(".png"))
-        result = split(base, hypotheses, options, declared, step)
+        result = (
+            split(base, question, options, declared, step)
+            if isinstance(question, tuple)
+            else narrow(base, question, options, declared, step)
+        )
         if out is not None:
             result.write(out)
             style.save(result.plot(), out.with_suffix(".png"))
     return result
 
 
-def _hypotheses(
-    keys: Sequence[str], answer_file: Path | None, sizes: Mapping[str, float]
-) -> tuple[Hypothesised, ...]:
-    if keys or answer_file is None:
-        return from_names(keys, sizes)
-    if sizes:
-        raise ConfigurationError("plan: sizes are those of the trace; leave --size out, or state --split")
-    return from_answer(TraceAnswer.read(answer_file), str(answer_file))
+def _question(stated: Stated, answer_file: Path | None) -> Asked:
+    if stated.split and stated.derivatives:
+        raise ConfigurationError("plan: one flight has one aim; state --split or --derivative")
+    if stated.sizes and not stated.split:
+        raise ConfigurationError("plan: sizes belong to effects; leave --size out, or state --split")
+    if stated.derivatives:
+        return DerivativeQuestion(tuple(stated.derivatives))
+    if stated.split or answer_file is None:
+        return from_names(stated.split, stated.sizes)
+    return asked_by(TraceAnswer.read(answer_file), str(answer_file))
 
 
 def _records(answer_file: Path | None) -> Histories | None:
@@ -144,4 +171,4 @@ def _stated(name: str, declared: Aircraft) -> str:
     return name if shipped else str(declared.folder.resolve())
 
 
-__all__ = ["split_from"]
+__all__ = ["Stated", "planned_from"]

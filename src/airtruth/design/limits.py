@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import asdict, dataclass
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,15 @@ class Limits:
                 f"plan: an input of {self.length_s:g} s; allowed are {LEAST_LENGTH_S:g} to {MOST_LENGTH_S:g} s"
             )
 
+    @property
+    def rise_s(self) -> float:
+        """Time in which the elevator moves from one end of its range to the other [s]."""
+        return 2.0 * self.amplitude_rad / self.rate_rad_s
+
+    def to_dict(self) -> dict[str, Any]:
+        """The limits; a rate without limit is None."""
+        return asdict(self) | {"rate_rad_s": self.rate_rad_s if math.isfinite(self.rate_rad_s) else None}
+
 
 @dataclass(frozen=True)
 class Extremes:
@@ -97,6 +106,17 @@ class Extremes:
             (1.0 - low) / (1.0 - least),
             (high - 1.0) / (most - 1.0),
             self.airspeed / limits.airspeed,
+        )
+
+    def beside(self, limits: Limits) -> str:
+        """What is reached beside what is allowed, in words."""
+        low, high = self.load_factor
+        least, most = limits.load_factor
+        return (
+            f"elevator {self.elevator_rad / DEG:.3g} of {limits.amplitude_rad / DEG:.3g} deg, rate "
+            f"{self.rate_rad_s / DEG:.3g} of {limits.rate_rad_s / DEG:.3g} deg/s, alpha {self.alpha_rad / DEG:.3g} of "
+            f"{limits.alpha_rad / DEG:.3g} deg about the trim, load factor {low:.3g} to {high:.3g} of {least:.3g} to "
+            f"{most:.3g}, airspeed {100.0 * self.airspeed:.3g} of {100.0 * limits.airspeed:.3g} % from the trim"
         )
 
     def and_of(self, other: Extremes) -> Extremes:

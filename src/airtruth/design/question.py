@@ -15,7 +15,7 @@ from airtruth.effects.effect import Effect, Parameter
 from airtruth.effects.registry import EFFECTS, named
 from airtruth.errors import ConfigurationError
 from airtruth.physics.resolution import LinearPoint, resolved
-from airtruth.tracing.answer import ParameterEstimate, TraceAnswer
+from airtruth.tracing.answer import AcceptedEffect, TraceAnswer
 
 Array = NDArray[np.float64]
 
@@ -91,34 +91,38 @@ def from_names(keys: Sequence[str], stated: Mapping[str, float]) -> tuple[Hypoth
     return tuple(found)
 
 
-def from_answer(answer: TraceAnswer, source: str) -> tuple[Hypothesised, ...]:
-    """The first effect of an answer with those that explain its records as well.
-
-    Raises
-    ------
-    ConfigurationError
-        If the answer has no tied effects.
-    """
+def tied_in(answer: TraceAnswer) -> tuple[Hypothesised, ...]:
+    """The first effect of an answer with those that explain its records as well; or the two by which its leading sets
+    differ. Empty where there are none that an input separates."""
     for accepted in answer.effects:
         names = {accepted.name, *accepted.indistinguishable_from}
-        if len(names) == 1 and not accepted.other_variants:
+        if accepted.key not in EFFECTS or (len(names) == 1 and not accepted.other_variants):
             continue
         tied = [c.key for c in answer.candidates if c.testable and not c.why_not and c.name in names]
         others = [key for key in tied if key != accepted.key and key in EFFECTS]
         missing = names - {accepted.name} - {EFFECTS[key].name for key in others}
         others += [e.key for name in sorted(missing) for e in named(name)[:1]]
-        first = _estimated(EFFECTS[accepted.key], accepted.parameters)
-        every = (first, *(Hypothesised(EFFECTS[key]) for key in others[: MOST - 1]))
+        every = (estimated(accepted), *(Hypothesised(EFFECTS[key]) for key in others[: MOST - 1]))
         _require([h.effect for h in every])
         return every
     sets = [a.effects for a in answer.alternatives[:2]]
     if len(sets) == 2 and len(set(sets[0]) ^ set(sets[1])) == 2:
-        keys = [next(iter(set(sets[i]) - set(sets[1 - i]))) for i in range(2)]
-        if all(key in EFFECTS for key in keys):
+        names = {name for i in range(2) for name in set(sets[i]) - set(sets[1 - i])}
+        keys = [key for name in sets[0] + sets[1] if name in names for key in _one_of(answer, name)]
+        if len(keys) == 2 and all(is_separable(EFFECTS[key]) for key in keys):
             return from_names(keys, {})
-    raise ConfigurationError(
-        f"{source}: the verdict is {answer.verdict} and no two effects are tied; state the effects to separate with --split"
-    )
+    return ()
+
+
+def _one_of(answer: TraceAnswer, name: str) -> list[str]:
+    """The key of a name or key: that of the answer's effects, or the first that exists."""
+    accepted = [e.key for e in answer.effects if name in (e.name, e.key) and e.key in EFFECTS]
+    return (accepted or [key for key, e in EFFECTS.items() if name in (key, e.name)])[:1]
+
+
+def is_separable(effect: Effect) -> bool:
+    """Whether an input can separate an effect from others: no effect of the air, and not `derivatives`."""
+    return effect.where != "air" and effect.key != "derivatives"
 
 
 def _require(effects: Sequence[Effect]) -> None:
@@ -142,7 +146,9 @@ def _require(effects: Sequence[Effect]) -> None:
         )
 
 
-def _estimated(effect: Effect, parameters: Mapping[str, ParameterEstimate]) -> Hypothesised:
+def estimated(accepted: AcceptedEffect) -> Hypothesised:
+    """An accepted effect of the library with its estimates."""
+    effect, parameters = EFFECTS[accepted.key], accepted.parameters
     sizes, std = np.zeros(len(effect.parameters)), np.zeros(len(effect.parameters))
     for i, p in enumerate(effect.parameters):
         estimate = parameters[p.name]
@@ -181,4 +187,4 @@ def at_point(hypothesised: Hypothesised, point: LinearPoint) -> Hypothesised:
     )
 
 
-__all__ = ["MOST", "Hypothesised", "at_point", "from_answer", "from_names"]
+__all__ = ["MOST", "Hypothesised", "at_point", "estimated", "from_names", "is_separable", "tied_in"]

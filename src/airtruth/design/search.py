@@ -1,4 +1,4 @@
-"""The input of each family that separates the hypotheses best.
+"""The input of each family that answers a question best: the separation of hypotheses, or the accuracy of an estimate.
 
 Doublets, 1-2-1 and 3-2-1-1 are tried over their unit, once and repeated. The best of them, in either sign and at smaller
 amplitudes, begin the search of a free multistep; spectra of one band and the flat one begin that of a multisine. Both are
@@ -9,16 +9,16 @@ Source: H.-G. Beyer and H.-P. Schwefel, Natural Computing 1 (2002) 3-52, section
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.design import waveforms
 from airtruth.design.bench import Bench, Flown
-from airtruth.design.criterion import Criterion
+from airtruth.errors import ConfigurationError
 from airtruth.simulation.manoeuvres import Manoeuvre
 
 Array = NDArray[np.float64]
@@ -47,39 +47,54 @@ _LOWEST_PERIODS: Final = 1.0
 """Periods of the lowest frequency of a multisine in its length [-]."""
 
 
+class Merit(Protocol):
+    """What inputs are rated by."""
+
+    def rate(self, flown: Flown, *, final: bool = False) -> Array | None:
+        """(parts,) merits of an input, all to be large; None if its motion is lost.
+
+        Parameters
+        ----------
+        final : use all draws of what is not known, not the first two.
+        """
+
+
+C = TypeVar("C", bound=Merit)
+
+
 @dataclass(frozen=True)
 class Rated:
-    """An input with its separations.
+    """An input with its merits.
 
     Attributes
     ----------
     family : name of its family.
     flown : the input as flown.
     share : amplitude over the largest that the limits allow [-].
-    sigma : (members,) separation of each truth from its nearest rival [standard deviations].
+    merit : (parts,) as its `Merit` has them.
     """
 
     family: str
     flown: Flown
     share: float
-    sigma: Array
+    merit: Array
 
     @property
     def value(self) -> float:
-        """The smaller separation, whichever hypothesis is true."""
-        return float(self.sigma.min())
+        """The smallest merit."""
+        return float(self.merit.min())
 
 
-class Search:
+class Search(Generic[C]):
     """Rates inputs at one flight condition.
 
     Parameters
     ----------
-    bench, criterion : where inputs are flown, and what separates them.
+    bench, criterion : where inputs are flown, and what they are rated by.
     rise_s : time in which a multistep moves from one level to the next [s].
     """
 
-    def __init__(self, bench: Bench, criterion: Criterion, rise_s: float) -> None:
+    def __init__(self, bench: Bench, criterion: C, rise_s: float) -> None:
         self.bench, self.criterion, self.rise_s = bench, criterion, rise_s
         self.best: dict[str, Rated] = {}
         self.tried = 0
@@ -90,10 +105,10 @@ class Search:
         """Rate an input and keep it if it is the best of its family; None if it cannot be flown."""
         self.tried += 1
         flown = self.bench.fly(manoeuvre, share)
-        sigma = None if flown is None else self.criterion.rate(flown.record, final=final)
-        if flown is None or sigma is None:
+        merit = None if flown is None else self.criterion.rate(flown, final=final)
+        if flown is None or merit is None:
             return None
-        rated = Rated(family, flown, share, sigma)
+        rated = Rated(family, flown, share, merit)
         if not final and (family not in self.best or rated.value > self.best[family].value):
             self.best[family] = rated
         return rated
@@ -114,7 +129,29 @@ class Search:
         return max(_SAMPLES_PER_UNIT * self.bench.log_dt_s, self.rise_s)
 
 
-def run(search: Search, seed: int, step: Step = lambda text: None) -> dict[str, Rated]:
+@dataclass(frozen=True)
+class Setup(Generic[C]):
+    """A search at a flight condition with the input that others are compared with."""
+
+    search: Search[C]
+    reference: Rated
+
+    def finals(self, rated: Iterable[Rated]) -> tuple[list[Rated], Rated]:
+        """Some inputs with all draws, best first, and the reference.
+
+        Raises
+        ------
+        ConfigurationError
+            If none can be flown.
+        """
+        finals = [r for one in rated if (r := self.search.final(one)) is not None]
+        reference = self.search.final(self.reference) or self.reference
+        if not finals:
+            raise ConfigurationError("plan: no input can be flown within the limits; widen them")
+        return sorted(finals, key=lambda r: -r.value), reference
+
+
+def run(search: Search[C], seed: int, step: Step = lambda text: None) -> dict[str, Rated]:
     """Search every family; the best input of each.
 
     Parameters
@@ -139,7 +176,7 @@ def run(search: Search, seed: int, step: Step = lambda text: None) -> dict[str, 
     return search.best
 
 
-def _multisteps(search: Search, seed: int) -> None:
+def _multisteps(search: Search[C], seed: int) -> None:
     rng = np.random.default_rng([seed, 1])
     length, dt, shortest = search.bench.limits.length_s, search.bench.dt_s, search.shortest_s
     start = max(search.best.values(), key=lambda r: r.value, default=None)
@@ -157,7 +194,7 @@ def _multisteps(search: Search, seed: int) -> None:
         parent = child if better else parent
 
 
-def _multisines(search: Search, seed: int) -> None:
+def _multisines(search: Search[C], seed: int) -> None:
     rng = np.random.default_rng([seed, 2])
     length = search.bench.limits.length_s
     band = (_LOWEST_PERIODS / length, 0.5 / search.shortest_s)
@@ -180,4 +217,4 @@ def _multisines(search: Search, seed: int) -> None:
             parent, weights = child, tried
 
 
-__all__ = ["MULTISINE", "MULTISTEP", "REFERENCE", "Rated", "Search", "run"]
+__all__ = ["MULTISINE", "MULTISTEP", "REFERENCE", "Merit", "Rated", "Search", "Setup", "run"]

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from airtruth.effects.effect import Effect, Parameter
 from airtruth.physics.terms import Change
 from airtruth.tracing.inference.hypothesis import Hypothesis
-from airtruth.tracing.inference.posterior import TraceProblem, sensitivities_of
+from airtruth.tracing.inference.posterior import Sensitivities, TraceProblem, sensitivities_of
 from airtruth.tracing.model.parameters import Common, Layout, Parameters, PerRecord
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.response import respond
@@ -119,7 +119,9 @@ class Experiment:
 
     def __init__(self, model: Model, record: TraceRecord) -> None:
         self.model = model
-        self.record = self._flown_by(record, model.hypothesis((), record), np.zeros(0), np.zeros(Common.size))
+        self.record = flown_by(
+            model, record, model.hypothesis((), record), np.zeros(0), np.zeros(Common.size)
+        )
         problem = TraceProblem((self.record,), model.settings)
         self._problem = problem
         own = model.own(self.record)
@@ -128,23 +130,13 @@ class Experiment:
         self.sound = found is not None
         if found is None:
             return
-        layout = Layout(0)
-        nuisance = np.concatenate([_FREE, layout.per_record.start + _OWN])
-        self._white = found.white
-        self._t = found.t[nuisance].reshape(len(nuisance), -1).T
+        self._white, self._sensitivities = found.white, found
         self._bases: dict[tuple[int, ...], Array] = {}
 
     def outputs(self, truth: Member, common: Array) -> Array:
         """(samples, 3) outputs of the record that the tracer's model has with an effect, in still air."""
         hypothesis = self.model.hypothesis((truth.effect,), self.record)
-        return self._flown_by(self.record, hypothesis, truth.sizes, common).signals.y
-
-    def _flown_by(
-        self, record: TraceRecord, hypothesis: Hypothesis, sizes: Array, common: Array
-    ) -> TraceRecord:
-        own, change = self.model.own(record), hypothesis.change(sizes)
-        flown = respond(record, self.model.settings, change, common, own, free_run=True)
-        return replace(record, signals=replace(record.signals, y=record.signals.y - flown.e))
+        return flown_by(self.model, self.record, hypothesis, truth.sizes, common).signals.y
 
     def distance(self, y: Array, rival: Effect, start: Array, common: Array) -> Distance:
         """Separation of outputs from the best-fitting member of a hypothesis.
@@ -167,20 +159,20 @@ class Experiment:
 
         sizes = clipped(rival, start)
         r = innovations(sizes)
-        rest = _beyond(basis, r)
+        rest = beyond(basis, r)
         best = float(rest @ rest)
         for _ in range(_STEPS):
             directions = np.stack(
                 [(innovations(_moved(sizes, k, h)) - r) / h for k, h in enumerate(_steps(rival, sizes))]
             )
-            across = np.stack([_beyond(basis, d) for d in directions])
+            across = np.stack([beyond(basis, d) for d in directions])
             scale = np.sqrt(np.maximum(np.sum(across**2, axis=1), 1e-300))
             move = -np.linalg.lstsq((across / scale[:, None]).T, rest, rcond=1e-9)[0] / scale
             before = best
             for halving in range(1 + _HALVINGS):
                 tried = clipped(rival, sizes + move * 0.5**halving)
                 moved = innovations(tried)
-                left = _beyond(basis, moved)
+                left = beyond(basis, moved)
                 if np.isfinite(left).all() and left @ left < best:
                     sizes, r, rest, best = tried, moved, left, float(left @ left)
                     break
@@ -189,22 +181,52 @@ class Experiment:
         return Distance(float(np.sqrt(self.model.records * best)), sizes)
 
     def _basis(self, hypothesis: Hypothesis) -> Array:
-        """Orthonormal basis (samples 3 + nuisance, nuisance) of what is refitted, priors as further rows."""
         known = self._bases.get(hypothesis.unconstrained)
         if known is not None:
             return known
-        priors = self._problem.priors(hypothesis)
-        common = priors.common[np.ix_(_FREE, _FREE)] / self.model.records
-        own = priors.per_record[0][1][np.ix_(_OWN, _OWN)]
-        rows = np.zeros((len(_FREE) + len(_OWN),) * 2)
-        rows[: len(_FREE), : len(_FREE)] = np.linalg.cholesky(common).T
-        rows[len(_FREE) :, len(_FREE) :] = np.linalg.cholesky(own).T
-        basis = np.asarray(np.linalg.qr(np.vstack([self._t, rows]))[0])
+        basis = refitted(self._problem, hypothesis, self._sensitivities, self.model.records)
         self._bases[hypothesis.unconstrained] = basis
         return basis
 
 
-def _beyond(basis: Array, r: Array) -> Array:
+def flown_by(
+    model: Model, record: TraceRecord, hypothesis: Hypothesis, sizes: Array, common: Array
+) -> TraceRecord:
+    """The record with the outputs that the tracer's model has under a hypothesis, in still air.
+
+    Parameters
+    ----------
+    sizes : of the hypothesis.
+    common : (common,) parameters of the aircraft.
+    """
+    own, change = model.own(record), hypothesis.change(sizes)
+    flown = respond(record, model.settings, change, common, own, free_run=True)
+    return replace(record, signals=replace(record.signals, y=record.signals.y - flown.e))
+
+
+def refitted(problem: TraceProblem, hypothesis: Hypothesis, found: Sensitivities, records: int) -> Array:
+    """Orthonormal basis (samples 3 + nuisance, nuisance) of what is refitted on equal records, priors as further rows.
+
+    Parameters
+    ----------
+    problem : with one record.
+    hypothesis : whose priors count.
+    found : sensitivities of the record; those by sizes do not count.
+    records : number of equal records that are fitted together.
+    """
+    layout = Layout(len(found.t) - Common.size - PerRecord.size)
+    nuisance = np.concatenate([_FREE, layout.per_record.start + _OWN])
+    t = found.t[nuisance].reshape(len(nuisance), -1).T
+    priors = problem.priors(hypothesis)
+    common = priors.common[np.ix_(_FREE, _FREE)] / records
+    own = priors.per_record[0][1][np.ix_(_OWN, _OWN)]
+    rows = np.zeros((len(nuisance),) * 2)
+    rows[: len(_FREE), : len(_FREE)] = np.linalg.cholesky(common).T
+    rows[len(_FREE) :, len(_FREE) :] = np.linalg.cholesky(own).T
+    return np.asarray(np.linalg.qr(np.vstack([t, rows]))[0])
+
+
+def beyond(basis: Array, r: Array) -> Array:
     """The part of innovations, with the zeros of the priors' rows, that no nuisance parameter explains."""
     whole = np.concatenate([r, np.zeros(basis.shape[0] - r.size)])
     return np.asarray(whole - basis @ (basis.T @ whole))
@@ -229,4 +251,4 @@ def clipped(effect: Effect, sizes: Array) -> Array:
     return np.asarray(np.clip(sizes, low, high))
 
 
-__all__ = ["Distance", "Experiment", "Member", "Model", "clipped"]
+__all__ = ["Distance", "Experiment", "Member", "Model", "beyond", "clipped", "flown_by", "refitted"]

@@ -155,7 +155,7 @@ class SplitResult:
         )
 
     def _notes(self) -> tuple[str, ...]:
-        reached, limits, at = self.reached, self.limits, self.condition
+        at = self.condition
         sizes = "; ".join(
             f"{m.effect.key} " + ", ".join(f"{k} = {significant(v)}" for k, v in m.values.items())
             for m in self.hypotheses
@@ -168,12 +168,7 @@ class SplitResult:
             f"Separation of {self.fitted} fitted of {self.campaign.runs} records at {at.eas_m_s:.4g} m/s EAS, "
             f"{at.altitude_m:.4g} m, in vertical gusts of {significant(self.gust_m_s)} m/s; mean over draws of sizes and "
             "derivatives.",
-            f"Reached in still air, as declared and with each effect: elevator {reached.elevator_rad / DEG:.3g} of "
-            f"{limits.amplitude_rad / DEG:.3g} deg, rate {reached.rate_rad_s / DEG:.3g} of "
-            f"{limits.rate_rad_s / DEG:.3g} deg/s, alpha {reached.alpha_rad / DEG:.3g} of {limits.alpha_rad / DEG:.3g} "
-            f"deg about the trim, load factor {reached.load_factor[0]:.3g} to {reached.load_factor[1]:.3g} of "
-            f"{limits.load_factor[0]:.3g} to {limits.load_factor[1]:.3g}, airspeed {100.0 * reached.airspeed:.3g} of "
-            f"{100.0 * limits.airspeed:.3g} % from the trim.",
+            f"Reached in still air, as declared and with each effect: {self.reached.beside(self.limits)}.",
         )
 
     def summary(self) -> str:
@@ -200,7 +195,6 @@ class SplitResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Hypotheses with their sizes, limits, what is reached, and the rows of `to_frame`."""
-        rate = self.limits.rate_rad_s
         return {
             "aircraft": self.aircraft,
             "campaign": self.campaign.name,
@@ -212,7 +206,7 @@ class SplitResult:
             "fitted": self.fitted,
             "condition": asdict(self.condition),
             "gust_m_s": self.gust_m_s,
-            "limits": asdict(self.limits) | {"rate_rad_s": rate if np.isfinite(rate) else None},
+            "limits": self.limits.to_dict(),
             "reached": asdict(self.reached),
             "inputs": [self._row(row) for row in self.rows],
         }

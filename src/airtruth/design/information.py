@@ -1,0 +1,92 @@
+"""The least covariance of the six derivatives from one record, by the Cramer-Rao bound of filter error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.aircraft import Aircraft, Sensor
+from airtruth.errors import ConfigurationError
+from airtruth.identification.likelihood.cramer_rao import experiment_bound
+from airtruth.identification.likelihood.options import CHANNELS, FilterOptions
+from airtruth.logs.flight_log import Batch
+from airtruth.physics.gust_figures import GustScales
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LinearExperiment:
+    """What a record of the linear short period has besides its elevator.
+
+    Attributes
+    ----------
+    aircraft : constants of the aircraft.
+    noise : channel -> standard deviation of the noise of its sensor [SI], see `sensor_noise`.
+    gusts : of the air.
+    airspeed_m_s : at the trim [m/s].
+    dt_s : time between two samples [s].
+    start : how the gusts start, see `airtruth.identification.likelihood.cramer_rao.experiment_bound`.
+    """
+
+    aircraft: Aircraft
+    noise: Mapping[str, float]
+    gusts: GustScales
+    airspeed_m_s: float
+    dt_s: float
+    start: str
+
+    def least_covariance(self, flown: Mapping[str, Array], theta: Array) -> Array:
+        """Least covariance (6, 6) of unbiased derivatives, with levels, biases and initial states unknown.
+
+        Parameters
+        ----------
+        flown : channel -> (samples,) of a flight in still air; the elevator counts, and the flight condition.
+        theta : (6,) true derivatives [-].
+        """
+        channels = {name: np.ascontiguousarray(values[None]) for name, values in flown.items()}
+        samples = channels["alpha_rad"].shape[1]
+        t_s = self.dt_s * np.arange(samples, dtype=np.float64)[None]
+        options = FilterOptions(
+            self.noise["alpha_rad"],
+            self.noise["q_rad_s"],
+            self.noise["az_m_s2"],
+            **self.gusts._asdict(),
+            airspeed_std_m_s=self.noise.get("airspeed_m_s"),
+            airspeed_m_s=self.airspeed_m_s,
+        )
+        batch = Batch(("plan",), self.dt_s, t_s, channels)
+        least: Array = experiment_bound(batch, self.aircraft, theta, options, self.start)[0]
+        return least
+
+
+def sensor_noise(sensors: Mapping[str, Sensor], aircraft: Aircraft, pressure: str) -> dict[str, float]:
+    """Standard deviation of the noise of each sensor that the bound needs [SI].
+
+    Parameters
+    ----------
+    sensors : channel -> sensor.
+    aircraft : named in the message.
+    pressure : "measured" counts the airspeed.
+
+    Raises
+    ------
+    ConfigurationError
+        If a sensor has no noise.
+    """
+    needed = [c for n, c in CHANNELS.items() if n != "airspeed" or pressure == "measured"]
+    noise = {c: sensors[c].noise_std.value if c in sensors else 0.0 for c in needed}
+    lacking = [c for c, std in noise.items() if std <= 0.0]
+    if lacking:
+        raise ConfigurationError(
+            f"plan: {aircraft.name} states no noise of {', '.join(lacking)}, without which the bound is 0; "
+            f"state noise_std in [sensors.{lacking[0]}] of {aircraft.folder / 'aircraft.toml'}, "
+            f"or in [sensors.channel.{lacking[0]}] of the campaign"
+        )
+    return noise
+
+
+__all__ = ["LinearExperiment", "sensor_noise"]

@@ -1,0 +1,295 @@
+"""The planned flight that determines derivatives or narrows bands: the input, the standard errors to expect, the campaign."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.design.limits import Extremes, Limits
+from airtruth.logs.atomic import write_text
+from airtruth.simulation.campaign.file import Campaign
+from airtruth.simulation.campaign.write import as_toml
+from airtruth.simulation.simulator import Condition
+from airtruth.table import Table, as_html, as_text, flat
+from airtruth.table.model import Number, Row, significant
+from airtruth.tracing.answer import Z95
+from airtruth.units import DEG
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A derivative, or a point of a learned increment.
+
+    Attributes
+    ----------
+    target : name of the derivative, or variant of the increment.
+    at : where [unit of its signal]; None for a derivative or a share.
+    value : declared derivative, or what the trace learned [-].
+    known : its standard deviation before the flight [-].
+    expected, reference : with the planned flight, and with the 3-2-1-1 of equal length and limits [-].
+    """
+
+    target: str
+    at: float | None
+    value: float
+    known: float
+    expected: float
+    reference: float
+
+
+@dataclass(frozen=True)
+class NarrowRow:
+    """An input with its standard errors.
+
+    Attributes
+    ----------
+    family, shape : name of its family, and its segments or its spectrum in words.
+    amplitude_rad : peak of the elevator command about the trim [rad].
+    std : (targets,) expected standard error; of an increment the root mean square over its points [-].
+    merit : smallest ratio of a known to an expected standard error [-].
+    """
+
+    family: str
+    shape: str
+    amplitude_rad: float
+    std: tuple[float, ...]
+    merit: float
+
+
+@dataclass(frozen=True)
+class Histories:
+    """The planned flight in still air.
+
+    Attributes
+    ----------
+    t_s : (samples,) [s].
+    elevator_rad, reference_rad : (samples,) surface about its trim, of the input and of the 3-2-1-1 [rad].
+    alpha_rad : (samples,) angle of attack with the input [rad].
+    """
+
+    t_s: Array
+    elevator_rad: Array
+    reference_rad: Array
+    alpha_rad: Array
+
+
+@dataclass(frozen=True)
+class NarrowResult:
+    """A planned flight; satisfies `airtruth.result.Result`.
+
+    Attributes
+    ----------
+    aircraft : name.
+    campaign : the campaign that flies it; reference_campaign : the same with the 3-2-1-1.
+    targets : derivatives, or variants of learned increments.
+    known : (targets,) standard deviation before the flight, of an increment the root mean square over its points [-].
+    quantities : the derivatives, or the points of the increments.
+    limits, reached : limits, and what the aircraft reaches in still air, with the changes that are allowed for.
+    condition : flight condition.
+    gust_m_s : vertical gust that is expected [m/s].
+    rows : the best input of each family, best first, then the 3-2-1-1 of equal length and limits, ``reference``.
+    tried : inputs that were flown.
+    histories : the flight.
+    """
+
+    aircraft: str
+    campaign: Campaign
+    reference_campaign: Campaign
+    targets: tuple[str, ...]
+    known: tuple[float, ...]
+    quantities: tuple[Quantity, ...]
+    limits: Limits
+    reached: Extremes
+    condition: Condition
+    gust_m_s: float
+    rows: tuple[NarrowRow, ...]
+    reference: NarrowRow
+    tried: int
+    histories: Histories
+
+    @property
+    def best(self) -> NarrowRow:
+        """The input that is flown."""
+        return max(self.rows, key=lambda row: row.merit)
+
+    @property
+    def ratio(self) -> float:
+        """Standard error by the 3-2-1-1 of equal length and limits over the expected one, of the target that gains least
+        [-]."""
+        return min(r / s for r, s in zip(self.reference.std, self.best.std, strict=True))
+
+    def table(self) -> Table:
+        """One row per family, best first."""
+        rows: list[Row] = [
+            (
+                row.family,
+                row.shape,
+                Number(row.amplitude_rad / DEG, digits=3),
+                *(Number(std, digits=3) for std in row.std),
+                *(Number(std / known, digits=3) for std, known in zip(row.std, self.known, strict=True)),
+            )
+            for row in self.rows
+        ]
+        return flat(
+            title=f"Inputs that determine {', '.join(self.targets)} ({self.aircraft})",
+            columns=(
+                "input",
+                "shape",
+                "peak [deg]",
+                *(f"std, {t}" for t in self.targets),
+                *(f"over known, {t}" for t in self.targets),
+            ),
+            rows=rows,
+            notes=self._notes(),
+        )
+
+    def quantity_table(self) -> Table:
+        """One row per derivative, or per point of an increment."""
+        rows: list[Row] = [
+            (
+                q.target if q.at is None else f"{q.target} = {significant(q.at)}",
+                q.value,
+                *(Number(x, digits=3) for x in (q.known, q.expected, q.reference)),
+            )
+            for q in self.quantities
+        ]
+        return flat(
+            title="Standard errors before and with the planned flight",
+            columns=("quantity", "value", "std before", "planned", "3-2-1-1"),
+            rows=rows,
+        )
+
+    def _notes(self) -> tuple[str, ...]:
+        at, alpha = self.condition, self.histories.alpha_rad / DEG
+        gain = (
+            ""
+            if self.ratio == 1.0
+            else f"; the 3-2-1-1 has {significant(self.ratio)} times this standard error"
+        )
+        expected = ", ".join(
+            f"{significant(std)} for {target} (now {significant(known)})"
+            for target, std, known in zip(self.targets, self.best.std, self.known, strict=True)
+        )
+        return (
+            f"Expected standard error of {self.campaign.runs} records: {expected}{gain}.",
+            f"At {at.eas_m_s:.4g} m/s EAS, {at.altitude_m:.4g} m, in vertical gusts of {significant(self.gust_m_s)} m/s; "
+            "mean over draws of the derivatives. Other derivatives, biases and initial state are free.",
+            f"Reached in still air, as declared and with the changes allowed for: {self.reached.beside(self.limits)}. "
+            f"The declared aircraft flies angles of attack of {alpha.min():.3g} to {alpha.max():.3g} deg.",
+        )
+
+    def summary(self) -> str:
+        """The tables as text."""
+        return as_text(self.table()) + "\n" + as_text(self.quantity_table())
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per input: family, shape, amplitude_rad, std_TARGET for each target, merit."""
+        import pandas as pd
+
+        return pd.DataFrame([self._row(row) for row in self.rows])
+
+    def _row(self, row: NarrowRow) -> dict[str, Any]:
+        std = {f"std_{t}": s for t, s in zip(self.targets, row.std, strict=True)}
+        return {
+            "family": row.family,
+            "shape": row.shape,
+            "amplitude_rad": row.amplitude_rad,
+            **std,
+            "merit": row.merit,
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Quantities with their standard errors, limits, what is reached, and the rows of `to_frame`."""
+        return {
+            "aircraft": self.aircraft,
+            "campaign": self.campaign.name,
+            "targets": list(self.targets),
+            "expected_std": dict(zip(self.targets, self.best.std, strict=True)),
+            "reference_std": dict(zip(self.targets, self.reference.std, strict=True)),
+            "known_std": dict(zip(self.targets, self.known, strict=True)),
+            "quantities": [asdict(q) for q in self.quantities],
+            "records": self.campaign.runs,
+            "condition": asdict(self.condition),
+            "gust_m_s": self.gust_m_s,
+            "limits": self.limits.to_dict(),
+            "reached": asdict(self.reached),
+            "inputs": [self._row(row) for row in self.rows],
+        }
+
+    def to_toml(self) -> str:
+        """Text of the campaign file."""
+        title = self.campaign.title
+        return as_toml(
+            self.campaign,
+            "\n".join([f"{title[:1].upper()}{title[1:]}, computed by airtruth plan.", *self._notes()]),
+        )
+
+    def write(self, out: Path) -> None:
+        """Write the campaign file.
+
+        Raises
+        ------
+        StoreError
+            If the file cannot be written.
+        """
+        write_text(out, self.to_toml())
+
+    def plot(self) -> Figure:
+        """The elevator beside that of the 3-2-1-1, the angle of attack, and the standard errors before and with the flight."""
+        from airtruth import style
+
+        p = self.histories
+        with style.applied():
+            figure, axes = style.panels(
+                2 + len(self.targets), 1, width_in=6.5, height_in=4.0 + 2.0 * len(self.targets)
+            )
+            top, middle = axes[0, 0], axes[1, 0]
+            top.plot(p.t_s, p.reference_rad / DEG, color=style.GREY, label="3-2-1-1 of equal length")
+            top.plot(p.t_s, p.elevator_rad / DEG, color=style.BLUE, label=self.best.family)
+            top.set_ylabel("elevator [deg]")
+            top.legend(loc="lower left")
+            middle.plot(p.t_s, p.alpha_rad / DEG, color=style.BLUE)
+            middle.set_ylabel("alpha [deg]")
+            middle.set_xlabel("time [s]")
+            for k, target in enumerate(self.targets):
+                self._draw(axes[2 + k, 0], target)
+        return figure
+
+    def _draw(self, ax: Axes, target: str) -> None:
+        """Estimate and 95 % intervals of a target: known, with the 3-2-1-1, with the planned flight."""
+        from airtruth import style
+
+        own = [q for q in self.quantities if q.target == target]
+        value = np.array([q.value for q in own])
+        kinds = (
+            ("known", style.GREY, np.array([q.known for q in own])),
+            ("with the 3-2-1-1", style.ORANGE, np.array([q.reference for q in own])),
+            ("expected", style.BLUE, np.array([q.expected for q in own])),
+        )
+        at = [q.at for q in own if q.at is not None]
+        step = 0.08 * float(np.ptp(at)) / max(len(at) - 1, 1) if len(at) == len(own) and at else 1.0
+        for k, (label, colour, std) in enumerate(kinds):
+            x = np.array(at) + (k - 1) * step if len(at) == len(own) and at else np.full(len(own), float(k))
+            ax.errorbar(x, value, Z95 * std, fmt="o", markersize=3, color=colour, capsize=2, label=label)
+        if not at:
+            ax.set_xticks([])
+        ax.set_ylabel(f"{target}, 95 %" if not at else "increment, 95 %")
+        ax.set_xlabel("" if not at else target)
+        ax.legend(loc="upper left", ncols=3)
+
+    def _repr_html_(self) -> str:
+        return as_html(self.table()) + as_html(self.quantity_table())
+
+
+__all__ = ["Histories", "NarrowResult", "NarrowRow", "Quantity"]

@@ -1,0 +1,177 @@
+"""Derivatives that a flight has to determine: their standard errors from an input, averaged over what is not yet known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.design.bench import Bench, Flown
+from airtruth.design.flight import gusts
+from airtruth.design.information import LinearExperiment, sensor_noise
+from airtruth.design.narrow_result import Quantity
+from airtruth.errors import ConfigurationError, choices
+from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.terms import Change, DerivativeTerm
+from airtruth.simulation.campaign.file import Campaign
+from airtruth.simulation.linearise import linearise
+
+Array = NDArray[np.float64]
+
+DRAWS: Final = 6
+"""Draws of the derivatives behind a stated standard error [-] (judgement, as for a separation)."""
+_FIRST: Final = 2
+"""Draws during the search [-] (judgement: a draw and its opposite)."""
+_FLOWN_SIGMA: Final = 1.5
+"""Change of the derivatives with which the limits are kept besides, in declared standard deviations [-] (judgement: the
+largest draw of a size in a separation)."""
+
+
+@dataclass(frozen=True)
+class DerivativeQuestion:
+    """Derivatives that a flight has to determine.
+
+    Attributes
+    ----------
+    names : of `airtruth.physics.short_period.PARAMETERS`.
+    """
+
+    names: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse names that are none.
+
+        Raises
+        ------
+        ConfigurationError
+            Naming the first one and the allowed names.
+        """
+        for name in self.names:
+            if name not in PARAMETERS:
+                raise ConfigurationError(f"plan: derivative {name!r}: {choices(name, PARAMETERS)}")
+        if not self.names or len(set(self.names)) < len(self.names):
+            raise ConfigurationError(
+                f"plan: derivatives {', '.join(self.names) or 'none'}: state each once, such as --derivative Cmq,Cmde"
+            )
+
+    @property
+    def title(self) -> str:
+        """What the input does."""
+        return f"the input that determines {', '.join(self.names)}"
+
+    def at(self, bench: Bench, campaign: Campaign, records: int, seed: int) -> Precision:
+        """Their standard errors at a flight condition.
+
+        Parameters
+        ----------
+        bench : of the condition.
+        campaign : gusts and sensors.
+        records : equal records.
+        seed : seed of the draws.
+
+        Raises
+        ------
+        ConfigurationError
+            If a sensor has no noise.
+        """
+        aircraft, covariance = bench.aircraft, bench.plant.derivative_cov
+        noise = sensor_noise(campaign.sensors.apply(aircraft.file.sensors), aircraft, "constant")
+        experiment = LinearExperiment(
+            aircraft,
+            noise,
+            gusts(campaign, bench.condition),
+            bench.trim.airspeed_m_s,
+            bench.log_dt_s,
+            campaign.gust.start,
+        )
+        root, rng = np.linalg.cholesky(covariance), np.random.default_rng(seed)
+        drawn = [root @ rng.standard_normal(6) for _ in range(DRAWS // 2)]
+        return Precision(
+            names=self.names,
+            experiment=experiment,
+            theta=linearise(aircraft, bench.trim, bench.dt_s).plus,
+            declared_std=np.sqrt(np.diag(covariance)),
+            draws=tuple(sign * d for d in drawn for sign in (1.0, -1.0)),
+            records=records,
+        )
+
+
+@dataclass(frozen=True)
+class Precision:
+    """Standard errors of derivatives at a flight condition; a `airtruth.design.search.Merit`.
+
+    Attributes
+    ----------
+    names : derivatives that count.
+    experiment : what a record has besides its elevator.
+    theta, declared_std : (6,) declared derivatives and their standard deviations [-].
+    draws : (6,) increments each, in pairs of opposite sign [-].
+    records : equal records.
+    """
+
+    names: tuple[str, ...]
+    experiment: LinearExperiment
+    theta: Array
+    declared_std: Array
+    draws: tuple[Array, ...]
+    records: int
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """Names of what is determined."""
+        return self.names
+
+    @property
+    def known(self) -> Array:
+        """(targets,) standard deviations that are declared [-]."""
+        return self.declared_std[self._index]
+
+    @property
+    def gust_m_s(self) -> float:
+        """Standard deviation of the vertical gust [m/s]."""
+        return self.experiment.gusts.sigma_w_m_s
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """Aircraft with which the limits are kept besides."""
+        return tuple(
+            Change(
+                derivatives=tuple(
+                    DerivativeTerm(name, sign * _FLOWN_SIGMA * float(std))
+                    for name, std in zip(self.names, self.known, strict=True)
+                )
+            )
+            for sign in (1.0, -1.0)
+        )
+
+    @property
+    def _index(self) -> list[int]:
+        return [PARAMETERS.index(name) for name in self.names]
+
+    def rate(self, flown: Flown, *, final: bool = False) -> Array | None:
+        """(targets,) declared over expected standard deviation [-]; None if a draw has no bound."""
+        variance = self._variance(flown, final=final)
+        return self.known / np.sqrt(variance) if (variance > 0.0).all() else None
+
+    def _variance(self, flown: Flown, *, final: bool) -> Array:
+        """(targets,) mean over the draws; nan where a draw has no bound."""
+        draws = self.draws if final else self.draws[:_FIRST]
+        each = [np.diag(self.experiment.least_covariance(flown.channels, self.theta + d)) for d in draws]
+        return np.asarray(np.mean(each, axis=0)[self._index] / self.records)
+
+    def quantities(self, flown: Flown, reference: Flown) -> tuple[Quantity, ...]:
+        """The derivatives with their standard errors by an input and by the reference."""
+        rows = zip(
+            self.names,
+            self.theta[self._index].tolist(),
+            self.known.tolist(),
+            np.sqrt(self._variance(flown, final=True)).tolist(),
+            np.sqrt(self._variance(reference, final=True)).tolist(),
+            strict=True,
+        )
+        return tuple(Quantity(name, None, value, *stds) for name, value, *stds in rows)
+
+
+__all__ = ["DRAWS", "DerivativeQuestion", "Precision"]
