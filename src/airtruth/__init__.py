@@ -34,7 +34,7 @@ if TYPE_CHECKING:
         verify,
     )
     from airtruth.checks.result import CheckResult
-    from airtruth.design import ForecastResult, Limits, SplitResult
+    from airtruth.design import ForecastResult, Limits, NarrowResult, SplitResult
     from airtruth.effects.effect import Effect
     from airtruth.identification import IdentificationResult
     from airtruth.identification.options import Options as IdentificationOptions
@@ -64,6 +64,7 @@ _LAZY = {
     "Logs": "airtruth.logs.sources",
     "Limits": "airtruth.design",
     "LoopResult": "airtruth.loop",
+    "NarrowResult": "airtruth.design",
     "Result": "airtruth.result",
     "SplitResult": "airtruth.design",
     "TraceOptions": "airtruth.tracing.options",
@@ -119,6 +120,7 @@ __all__ = [
     "LogError",
     "Logs",
     "LoopResult",
+    "NarrowResult",
     "Result",
     "SplitResult",
     "StoreError",

@@ -37,6 +37,8 @@ DRAWS: Final = 6
 """Draws of the derivatives and of the size behind a stated band [-] (judgement, as for a separation)."""
 _FIRST: Final = 2
 """Draws during the search [-] (judgement: a draw and its opposite)."""
+COEFFICIENTS: Final = ("CL", "Cm")
+"""Coefficients whose increments are planned for."""
 _SPREAD: Final = 0.3
 """Relative standard deviation of the size of an increment in the draws [-] (judgement, as of an effect)."""
 _MOST: Final = 1.5
@@ -251,4 +253,4 @@ def _rms(x: Array) -> float:
     return float(np.sqrt(np.mean(x**2)))
 
 
-__all__ = ["DRAWS", "Band", "BandQuestion", "Learned", "learned"]
+__all__ = ["COEFFICIENTS", "DRAWS", "Band", "BandQuestion", "Learned", "learned"]

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft, Sensor
 from airtruth.errors import ConfigurationError
+from airtruth.identification.condition import AircraftConstants
 from airtruth.identification.likelihood.cramer_rao import experiment_bound
+from airtruth.identification.likelihood.fit import fit
 from airtruth.identification.likelihood.options import CHANNELS, FilterOptions
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.gust_figures import GustScales
@@ -32,7 +34,7 @@ class LinearExperiment:
     start : how the gusts start, see `airtruth.identification.likelihood.cramer_rao.experiment_bound`.
     """
 
-    aircraft: Aircraft
+    aircraft: AircraftConstants
     noise: Mapping[str, float]
     gusts: GustScales
     airspeed_m_s: float
@@ -47,6 +49,22 @@ class LinearExperiment:
         flown : channel -> (samples,) of a flight in still air; the elevator counts, and the flight condition.
         theta : (6,) true derivatives [-].
         """
+        batch, options = self._read(flown)
+        least: Array = experiment_bound(batch, self.aircraft, theta, options, self.start)[0]
+        return least
+
+    def linear_error(self, flown: Mapping[str, Array], theta: Array) -> Array:
+        """Error (6,) of the derivatives that filter error estimates from a flight without noise: that of the linear model.
+
+        Parameters
+        ----------
+        flown : channel -> (samples,) of a flight in still air.
+        theta : (6,) true derivatives [-]; the fit starts there.
+        """
+        batch, options = self._read(flown)
+        return np.asarray(fit(batch, self.aircraft, theta[None], options).theta[0] - theta)
+
+    def _read(self, flown: Mapping[str, Array]) -> tuple[Batch, FilterOptions]:
         channels = {name: np.ascontiguousarray(values[None]) for name, values in flown.items()}
         samples = channels["alpha_rad"].shape[1]
         t_s = self.dt_s * np.arange(samples, dtype=np.float64)[None]
@@ -58,9 +76,7 @@ class LinearExperiment:
             airspeed_std_m_s=self.noise.get("airspeed_m_s"),
             airspeed_m_s=self.airspeed_m_s,
         )
-        batch = Batch(("plan",), self.dt_s, t_s, channels)
-        least: Array = experiment_bound(batch, self.aircraft, theta, options, self.start)[0]
-        return least
+        return Batch(("plan",), self.dt_s, t_s, channels), options
 
 
 def sensor_noise(sensors: Mapping[str, Sensor], aircraft: Aircraft, pressure: str) -> dict[str, float]:

@@ -38,6 +38,8 @@ class Quantity:
     value : declared derivative, or what the trace learned [-].
     known : its standard deviation before the flight [-].
     expected, reference : with the planned flight, and with the 3-2-1-1 of equal length and limits [-].
+    bias, reference_bias : of a derivative the error that the linear model of filter error has in either flight, which more
+        records do not reduce; nan where there is none [-].
     """
 
     target: str
@@ -46,6 +48,8 @@ class Quantity:
     known: float
     expected: float
     reference: float
+    bias: float = float("nan")
+    reference_bias: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -156,18 +160,25 @@ class NarrowResult:
 
     def quantity_table(self) -> Table:
         """One row per derivative, or per point of an increment."""
-        rows: list[Row] = [
-            (
-                q.target if q.at is None else f"{q.target} = {significant(q.at)}",
-                q.value,
-                *(Number(x, digits=3) for x in (q.known, q.expected, q.reference)),
-            )
-            for q in self.quantities
-        ]
+        has_bias = any(np.isfinite(q.bias) for q in self.quantities)
+        rows: list[Row] = []
+        for q in self.quantities:
+            figures = [q.known, q.expected, q.reference, *([q.bias, q.reference_bias] if has_bias else [])]
+            name = q.target if q.at is None else f"{q.target} = {significant(q.at)}"
+            rows.append((name, q.value, *(Number(x, digits=3) for x in figures)))
         return flat(
             title="Standard errors before and with the planned flight",
-            columns=("quantity", "value", "std before", "planned", "3-2-1-1"),
+            columns=(
+                *("quantity", "value", "std before", "planned", "3-2-1-1"),
+                *(("bias, planned", "bias, 3-2-1-1") if has_bias else ()),
+            ),
             rows=rows,
+            notes=(
+                "The bias is the error that filter error's linear model has in the flight without noise and gusts. More "
+                "records do not reduce it.",
+            )
+            if has_bias
+            else (),
         )
 
     def _notes(self) -> tuple[str, ...]:
@@ -218,7 +229,7 @@ class NarrowResult:
             "expected_std": dict(zip(self.targets, self.best.std, strict=True)),
             "reference_std": dict(zip(self.targets, self.reference.std, strict=True)),
             "known_std": dict(zip(self.targets, self.known, strict=True)),
-            "quantities": [asdict(q) for q in self.quantities],
+            "quantities": [_without_nan(asdict(q)) for q in self.quantities],
             "records": self.campaign.runs,
             "condition": asdict(self.condition),
             "gust_m_s": self.gust_m_s,
@@ -290,6 +301,11 @@ class NarrowResult:
 
     def _repr_html_(self) -> str:
         return as_html(self.table()) + as_html(self.quantity_table())
+
+
+def _without_nan(row: dict[str, Any]) -> dict[str, Any]:
+    """A row with None for every nan."""
+    return {key: None if isinstance(x, float) and not np.isfinite(x) else x for key, x in row.items()}
 
 
 __all__ = ["Histories", "NarrowResult", "NarrowRow", "Quantity"]

@@ -163,15 +163,12 @@ class Precision:
 
     def quantities(self, flown: Flown, reference: Flown) -> tuple[Quantity, ...]:
         """The derivatives with their standard errors by an input and by the reference."""
-        rows = zip(
-            self.names,
-            self.theta[self._index].tolist(),
-            self.known.tolist(),
-            np.sqrt(self._variance(flown, final=True)).tolist(),
-            np.sqrt(self._variance(reference, final=True)).tolist(),
-            strict=True,
-        )
-        return tuple(Quantity(name, None, value, *stds) for name, value, *stds in rows)
+        index = self._index
+        columns = [self.theta[index], self.known]
+        columns += [np.sqrt(self._variance(f, final=True)) for f in (flown, reference)]
+        columns += [self.experiment.linear_error(f.channels, self.theta)[index] for f in (flown, reference)]
+        rows = np.stack(columns, axis=1).tolist()
+        return tuple(Quantity(name, None, *row) for name, row in zip(self.names, rows, strict=True))
 
 
 __all__ = ["DRAWS", "DerivativeQuestion", "Precision"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from airtruth.design.band import BandQuestion
+from airtruth.design.band import COEFFICIENTS, BandQuestion
 from airtruth.design.precision import DerivativeQuestion
 from airtruth.design.question import Hypothesised, estimated, is_separable, tied_in
 from airtruth.effects.registry import EFFECTS
@@ -32,7 +32,7 @@ def asked_by(answer: TraceAnswer, source: str) -> Asked:
     ConfigurationError
         If the trace leaves no question that an input answers; the message names the options that state one.
     """
-    increments = tuple(e for e in answer.effects if e.acts_on is not None)
+    increments = tuple(e for e in answer.effects if e.acts_on in COEFFICIENTS)
     if increments:
         return BandQuestion(increments)
     tied = tied_in(answer)
@@ -91,7 +91,7 @@ def _nothing_open(answer: TraceAnswer, first: AcceptedEffect | None) -> str:
     if first is None:
         names = ", ".join(e.key for e in answer.effects) or "nothing"
         return (
-            f"the verdict is {answer.verdict} ({names}), which no input of the elevator separates further; state "
+            f"the verdict is {answer.verdict} ({names}), for which no flight is planned; state "
             f"--split A,B for other effects, or {derivative}"
         )
     rival = rivals[0] if rivals else "B"

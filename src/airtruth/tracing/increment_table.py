@@ -77,7 +77,7 @@ def least_certain(effects: Sequence[AcceptedEffect]) -> Iterator[str]:
         i = int(np.argmax(widths))
         yield (
             f"The increment of {effect.variant} is least certain at {table.at[i]:.3g} ({table.samples[i]} samples): "
-            "records that hold the signal there narrow its band."
+            "records that hold the signal there narrow its band. `airtruth plan --from` computes the input."
         )
 
 
