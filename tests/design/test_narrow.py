@@ -322,7 +322,9 @@ def test_estimates_of_a_repeated_input_spread_as_expected():
     experiment = LinearExperiment(GTM, noise, GustScales(*LIGHT), AIRSPEED_M_S, 0.02, "rest")
     still = {name: values[0] for name, values in fly(**record).channels.items()}
     expected = np.sqrt(np.diag(experiment.least_covariance(still, THETA)))
-    error = experiment.linear_error(still, THETA)  # a linear aircraft has none but that of the surface between samples
+    error = experiment.linear_error(
+        still, THETA
+    )  # a linear aircraft has none but that of the surface between samples
     assert (np.abs(error) < 0.15 * expected).all(), error / expected
     batch = fly(runs=200, gust=1.0, noise=1.0, seed=5, **record)
     options = FilterOptions(*NOISE[:3], *LIGHT, airspeed_m_s=AIRSPEED_M_S)
