@@ -16,7 +16,6 @@ from airtruth.errors import ConfigurationError, choices
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.physics.terms import Change, DerivativeTerm
 from airtruth.simulation.campaign.file import Campaign
-from airtruth.simulation.linearise import linearise
 
 Array = NDArray[np.float64]
 
@@ -91,7 +90,7 @@ class DerivativeQuestion:
         return Precision(
             names=self.names,
             experiment=experiment,
-            theta=linearise(aircraft, bench.trim, bench.dt_s).plus,
+            theta=bench.linear.plus,
             declared_std=np.sqrt(np.diag(covariance)),
             draws=tuple(sign * d for d in drawn for sign in (1.0, -1.0)),
             records=records,
