@@ -5,7 +5,7 @@ import pytest
 import report_synthetic as synthetic
 
 from airtruth.errors import LogError, StoreError
-from airtruth.reporting import read_campaign
+from airtruth.reporting import Campaign, read_campaign, stored_campaign
 
 
 @pytest.fixture
@@ -180,3 +180,37 @@ def test_many_wrong_runs_are_summed_up(tmp_path):
     few = without(synthetic.estimate_columns(values), lambda i: i < 10)
     with pytest.raises(LogError, match="runs 'r00010', 'r00011', 'r00012' and 27 more flew"):
         read_campaign(synthetic.write_campaign(tmp_path / "c", truth, few))
+
+
+def test_a_campaign_in_parts_is_that_of_the_whole(tmp_path, monkeypatch):
+    """Parts of seven runs in files whose row groups have ten rows; some runs failed, others did not converge."""
+    monkeypatch.setattr(stored_campaign, "RUNS_PER_PART", 7)
+    failed = (2, 13, 14, 39)
+    values = synthetic.draw_paper("table1", ("ls", "iv-lowpass"), 40, seed=1)
+    truth = synthetic.truth_columns(40, failed=failed)
+    estimates = synthetic.estimate_columns(values, failed=failed, status={("ls", 4): "maximum iterations"})
+    order = np.lexsort(
+        (np.arange(len(estimates["run_id"])), estimates["run_id"])
+    )  # run by run, as identify writes
+    folder = synthetic.write_campaign(
+        tmp_path / "c", truth, {name: [column[i] for i in order] for name, column in estimates.items()}
+    )
+    opened, whole = stored_campaign.open_campaign(folder), read_campaign(folder)
+    assert isinstance(opened, stored_campaign.StoredCampaign)
+    parts = list(opened.parts())
+    assert [part.runs for part in parts] == [7, 7, 7, 7, 7, 5]
+    assert (opened.runs, opened.methods) == (40, whole.methods)
+    assert sum((part.run_ids for part in parts), ()) == whole.run_ids
+    for method in whole.methods:
+        for name in ("truth", "flown", "values", "lower", "upper", "converged", "iterations"):
+            joined = np.concatenate([getattr(part.sample(method), name) for part in parts])
+            np.testing.assert_array_equal(joined, getattr(whole.sample(method), name))
+        assert sum((part.sample(method).status for part in parts), ()) == whole.sample(method).status
+
+
+def test_estimates_in_another_order_are_read_as_a_whole(tmp_path, pieces):
+    truth, estimates, _ = pieces  # method by method
+    folder = synthetic.write_campaign(tmp_path / "c", truth, estimates)
+    opened = stored_campaign.open_campaign(folder)
+    assert isinstance(opened, Campaign)
+    assert opened.run_ids == tuple(synthetic.run_names(6))

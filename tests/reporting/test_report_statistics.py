@@ -8,6 +8,7 @@ from report_synthetic import TRUTH
 from scipy import stats
 
 from airtruth.reporting import statistics
+from airtruth.reporting.partial import Sample, method_statistics
 
 SAMPLES = {
     "normal": lambda rng, n: rng.standard_normal((n, 3)),
@@ -105,9 +106,10 @@ def test_ratio_of_paired_methods_over_replications():
     ratios, ses, unpaired = [], [], []
     for _ in range(3000):
         common = correlated(rng, 300)
-        a = statistics.relative_error(common + 8.0, truth)
-        b = statistics.relative_error(common + 0.3 * rng.standard_normal((300, 6)) + 4.0, truth)
-        ratio, se = statistics.ratio(a.value, a.influence, b.value, b.influence)
+        pair = common + 8.0, common + 0.3 * rng.standard_normal((300, 6)) + 4.0
+        a, b = (statistics.relative_error(errors, truth) for errors in pair)
+        one, two = (statistics.influence(errors, errors.mean(axis=0), truth, 300) for errors in pair)
+        ratio, se = statistics.ratio(a.value, b.value, (one @ one, two @ two, one @ two))
         ratios.append(ratio)
         ses.append(se**2)
         unpaired.append((ratio * np.hypot(a.se / a.value, b.se / b.value)) ** 2)
@@ -116,12 +118,12 @@ def test_ratio_of_paired_methods_over_replications():
 
 
 def test_ratio_to_a_perfect_method_is_unknown():
-    assert np.isnan(statistics.ratio(1.0, np.zeros(3), 0.0, np.zeros(3))).all()
+    assert np.isnan(statistics.ratio(1.0, 0.0, (0.0, 0.0, 0.0))).all()
 
 
 def campaign_statistics(values, converged=None, flown=None, truth=None, half_width=1.0, status=None):
     n = len(values)
-    return statistics.method_statistics(
+    sample = Sample(
         np.tile(TRUTH, (n, 1)) if truth is None else truth,
         np.ones(n, dtype=bool) if flown is None else flown,
         values,
@@ -131,6 +133,7 @@ def campaign_statistics(values, converged=None, flown=None, truth=None, half_wid
         np.arange(n, dtype=float),
         status or ("",) * n,
     )
+    return method_statistics(lambda: [{"": sample}])[""]
 
 
 def test_runs_that_did_not_converge_are_counted_and_kept_out_of_the_mean():
@@ -151,8 +154,7 @@ def test_runs_that_did_not_converge_are_counted_and_kept_out_of_the_mean():
     assert s.iterations.value == np.mean(np.arange(3, 10))
     # the median sees the run that did not converge
     assert s.median[0] == np.median(values[[1, *range(3, 10)], 0])
-    assert (s.influence[:3] == 0.0).all()
-    assert np.sqrt(np.sum(s.influence**2) * 7 / 6) == pytest.approx(s.relerr.se, rel=1e-12)
+    assert np.sqrt(s.products[""] * 7 / 6) == pytest.approx(s.relerr.se, rel=1e-12)
 
 
 def test_each_run_is_compared_with_its_own_truth():
@@ -203,7 +205,7 @@ def test_statistics_do_not_depend_on_the_order_of_runs_or_on_the_scale(seed, n, 
     converged, flown = rng.random(n) > 0.2, rng.random(n) > 0.1
     order = rng.permutation(n)
     one = campaign_statistics(values, converged, flown)
-    other = statistics.method_statistics(
+    sample = Sample(
         np.tile(scale * TRUTH, (n, 1)),
         flown[order],
         scale * values[order],
@@ -213,6 +215,7 @@ def test_statistics_do_not_depend_on_the_order_of_runs_or_on_the_scale(seed, n, 
         np.arange(n, dtype=float)[order],
         ("",) * n,
     )
+    other = method_statistics(lambda: [{"": sample}])[""]
     c = one.counts
     assert c == other.counts
     assert c.total == c.failed_to_fly + c.used + c.not_converged + c.diverged
@@ -221,4 +224,54 @@ def test_statistics_do_not_depend_on_the_order_of_runs_or_on_the_scale(seed, n, 
         np.testing.assert_allclose(getattr(other, name).se, scale * getattr(one, name).se, rtol=1e-6)
     np.testing.assert_allclose(other.relerr.value, one.relerr.value, rtol=1e-9)
     np.testing.assert_allclose(other.relerr.se, one.relerr.se, rtol=1e-9)
-    np.testing.assert_allclose(other.influence, one.influence[order], rtol=1e-6, atol=1e-15)
+    assert other.products[""] == pytest.approx(one.products[""], rel=1e-6, abs=1e-30)
+
+
+def parts_of(sample, rows):
+    return [
+        Sample(*(getattr(sample, name)[first : first + rows] for name in Sample.__dataclass_fields__))
+        for first in range(0, len(sample.truth), rows)
+    ]
+
+
+def test_runs_in_parts_give_the_statistics_of_all_runs():
+    """Expected values are numpy's over the whole arrays; with outliers, runs that failed, and modes that do not oscillate."""
+    rng = np.random.default_rng(12)
+    n = 1000
+    truth = TRUTH * (1.0 + 0.01 * rng.standard_normal((n, 8)))
+    one, two = (
+        Sample(
+            truth,
+            flown,
+            values := truth * (1.0 + 0.05 * rng.standard_t(3.0, (n, 8))),
+            values - 0.1 * np.abs(truth),
+            values + 0.1 * np.abs(truth),
+            rng.random(n) > 0.1,
+            rng.integers(1, 9, n).astype(float),
+            tuple(rng.choice(["a", "b"], n).tolist()),
+        )
+        for flown in [rng.random(n) > 0.05] * 2
+    )
+    one.values[::17, 6:] = np.nan
+    two.values[::13] = np.nan
+    whole = method_statistics(lambda: [{"one": one, "two": two}])
+    parts = [{"one": a, "two": b} for a, b in zip(parts_of(one, 37), parts_of(two, 37), strict=True)]
+    reduced = method_statistics(lambda: parts)
+    used = one.flown & one.converged & np.isfinite(one.values[:, :6]).all(axis=1)
+    six, errors = one.values[used, :6], (one.values - truth)[used, :6]
+    s = reduced["one"]
+    np.testing.assert_allclose(s.mean.value[:6], six.mean(axis=0), rtol=1e-13)
+    np.testing.assert_allclose(s.std.value[:6], six.std(axis=0, ddof=1), rtol=1e-12)
+    np.testing.assert_allclose(s.rmse.value[:6], np.sqrt((errors**2).mean(axis=0)), rtol=1e-13)
+    np.testing.assert_allclose(s.correlation, np.corrcoef(six, rowvar=False), rtol=1e-10, atol=1e-13)
+    centre = np.nanmedian(one.values[one.finite], axis=0)
+    np.testing.assert_array_equal(s.median, centre)
+    spread = np.nanmedian(np.abs(one.values[one.finite] - centre), axis=0)
+    np.testing.assert_allclose(s.mad, statistics.MAD_TO_STD * spread, rtol=1e-15)
+    for method, other in whole.items():
+        assert reduced[method].counts == other.counts
+        assert reduced[method].products == pytest.approx(other.products, rel=1e-10)
+        for name in ("mean", "std", "rmse", "coverage", "relerr", "relerr_modal", "iterations"):
+            a, b = getattr(reduced[method], name), getattr(other, name)
+            np.testing.assert_allclose(a.value, b.value, rtol=1e-12)
+            np.testing.assert_allclose(a.se, b.se, rtol=1e-10)

@@ -15,6 +15,7 @@ from airtruth.reporting import TABLES, TableSpec, evaluate, read_campaign
 from airtruth.reporting import statistics as mc
 from airtruth.reporting.paper import comparison, layout, published
 from airtruth.reporting.paper.tables import LONG_COLUMNS, Entry, all_methods, long_form, methods_of
+from airtruth.reporting.partial import Sample, method_statistics
 from airtruth.reporting.write import write_tables
 from airtruth.table import MISSING, WIDTH, as_csv, as_latex, as_markdown, as_text
 
@@ -94,7 +95,7 @@ def test_differences_have_unit_variance_under_the_null():
         column = published.PublishedColumn(
             "x", ("x",), exact["mean"], exact["std"], published.Printed(relerr, 1e-9), {}, None
         )
-        s = mc.method_statistics(
+        sample = Sample(
             np.tile(synthetic.TRUTH, (200, 1)),
             np.ones(200, dtype=bool),
             ours,
@@ -104,6 +105,7 @@ def test_differences_have_unit_variance_under_the_null():
             np.zeros(200),
             ("",) * 200,
         )
+        s = method_statistics(lambda one=sample: [{"": one}])[""]
         beside = comparison.published_figures(column, 300, s)
         for j, name in enumerate(published.ESTIMATED):
             zs["mean"].append(
@@ -132,8 +134,10 @@ def test_standard_errors_of_the_printed_figures_by_hand(table1):
     ratio = table1.entries["ls", "six", "relerr_ratio"]
     assert ratio.published.value == pytest.approx(111 / 11.7, rel=1e-12)
     a, b = (table1.entries[m, "six", "relerr_pct"] for m in ("ls", "iv-lowpass"))
-    one, two = (table1.statistics[m].influence for m in ("ls", "iv-lowpass"))
-    common = np.corrcoef(one, two)[0, 1]  # the influences have mean zero
+    products = table1.statistics["ls"].products  # the influences have mean zero
+    common = products["iv-lowpass"] / math.sqrt(
+        products["ls"] * table1.statistics["iv-lowpass"].products["iv-lowpass"]
+    )
     terms = np.array([a.published_se / 111, -b.published_se / 11.7])
     relative = math.sqrt(terms @ np.array([[1.0, common], [common, 1.0]]) @ terms)
     assert ratio.published_se == pytest.approx(111 / 11.7 * relative, rel=1e-9)

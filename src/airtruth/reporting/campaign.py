@@ -6,10 +6,10 @@ The truth serves tables and scoring alone; identification and tracing never read
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 import pyarrow as pa
@@ -19,6 +19,7 @@ from airtruth.documents import read_json
 from airtruth.errors import LogError, StoreError, choices
 from airtruth.reporting.columns import Kind, flags, numbers, read_columns, texts
 from airtruth.reporting.paper.published import ESTIMATED
+from airtruth.reporting.partial import Sample
 
 Array = NDArray[np.float64]
 
@@ -40,7 +41,7 @@ FAILED: Final = "failed"
 _BOUNDS: Final = tuple(name + end for name in ESTIMATED for end in ("_lower", "_upper"))
 """Columns of the ends of the 95 % intervals (contract 2)."""
 
-_TRUTH_KINDS: Final[Mapping[str, Kind]] = {
+TRUTH_KINDS: Final[Mapping[str, Kind]] = {
     "run_id": "text",
     "status": "text",
     **dict.fromkeys(ESTIMATED, "number"),
@@ -102,9 +103,68 @@ class Campaign:
     truth: Array
     estimates: Mapping[str, MethodEstimates]
 
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Methods with estimates."""
+        return tuple(self.estimates)
+
+    @property
+    def runs(self) -> int:
+        """Number of planned runs."""
+        return len(self.run_ids)
+
+    def parts(self) -> Iterator[Campaign]:
+        """Yield the campaign as its only part."""
+        yield self
+
+    def sample(self, method: str) -> Sample:
+        """Truth and estimates of one method."""
+        e = self.estimates[method]
+        return Sample(self.truth, self.flown, e.values, e.lower, e.upper, e.converged, e.iterations, e.status)
+
+
+class Parted(Protocol):
+    """A campaign whose runs come in parts: a `Campaign` in memory, or one that is read part by part.
+
+    Attributes
+    ----------
+    folder, name, title, gust : as in `Campaign`.
+    methods : methods with estimates.
+    runs : number of planned runs.
+    """
+
+    @property
+    def folder(self) -> Path: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def title(self) -> str: ...
+    @property
+    def gust(self) -> str: ...
+    @property
+    def methods(self) -> tuple[str, ...]: ...
+    @property
+    def runs(self) -> int: ...
+    def parts(self) -> Iterable[Campaign]:
+        """Return the same parts at each call, each run in one of them, in the order of the truth."""
+        ...
+
+
+def average_truth(campaign: Parted) -> Array:
+    """Return the mean truth of the runs that flew, (8,); exact if all of them share one truth."""
+    first, total, count = None, np.zeros(len(ESTIMATED)), 0
+    with np.errstate(over="ignore", invalid="ignore"):
+        for part in campaign.parts():
+            truth = part.truth[part.flown]
+            if len(truth):
+                first = truth[0] if first is None else first
+                total += (truth - first).sum(axis=0)
+                count += len(truth)
+        return np.full(len(ESTIMATED), np.nan) if first is None else np.asarray(first + total / count)
+
 
 @dataclass(frozen=True)
-class _Description:
+class Description:
     """The entries of campaign.json that tables show; ``runs`` is None where the file does not state it."""
 
     name: str
@@ -123,15 +183,14 @@ def read_campaign(folder: Path) -> Campaign:
     LogError
         A column is missing or has the wrong type, or truth and estimates do not hold the same runs.
     """
-    fly = f"`airtruth fly CAMPAIGN.toml --out {folder}`"
-    identify = f"`airtruth identify {folder} --aircraft AIRCRAFT`"
+    fly, identify = writers(folder)
     if not folder.is_dir():
         raise StoreError(f"{folder}: no such campaign folder; {fly} creates it")
     truth_path, estimates_path = folder / TRUTH, folder / ESTIMATES
-    run_ids, flown, truth = _truth(read_columns(truth_path, _TRUTH_KINDS, fly), truth_path)
+    run_ids, flown, truth = _truth(read_columns(truth_path, TRUTH_KINDS, fly), truth_path)
     estimates = read_estimates(estimates_path, identify)
     rows_of = _match(run_ids, flown, estimates, estimates_path, identify)
-    described = _describe(folder)
+    described = describe(folder)
     if described.runs is not None and described.runs != len(run_ids):
         raise LogError(
             f"{truth_path}: holds {len(run_ids)} of the {described.runs} runs that {DESCRIPTION} plans; "
@@ -145,8 +204,15 @@ def read_campaign(folder: Path) -> Campaign:
         run_ids=run_ids,
         flown=flown,
         truth=truth,
-        estimates={m: _method(estimates, rows, runs, len(run_ids)) for m, (rows, runs) in rows_of.items()},
+        estimates={
+            m: estimates_of(estimates, rows, runs, len(run_ids)) for m, (rows, runs) in rows_of.items()
+        },
     )
+
+
+def writers(folder: Path) -> tuple[str, str]:
+    """The commands that write the truth and the estimates of a folder, for messages."""
+    return f"`airtruth fly CAMPAIGN.toml --out {folder}`", f"`airtruth identify {folder} --aircraft AIRCRAFT`"
 
 
 def read_estimates(path: Path, writer: str) -> pa.Table:
@@ -221,7 +287,18 @@ def _match(
     return matched
 
 
-def _method(table: pa.Table, rows: NDArray[np.int64], runs: NDArray[np.int64], total: int) -> MethodEstimates:
+def estimates_of(
+    table: pa.Table, rows: NDArray[np.int64], runs: NDArray[np.int64], total: int
+) -> MethodEstimates:
+    """Estimates of one method.
+
+    Parameters
+    ----------
+    table : columns `ESTIMATE_KINDS`.
+    rows : its rows of the method.
+    runs : index of the run of each of these rows.
+    total : number of runs.
+    """
     own = table.take(rows)
 
     def per_run(values: Array) -> Array:
@@ -243,11 +320,18 @@ def _method(table: pa.Table, rows: NDArray[np.int64], runs: NDArray[np.int64], t
     )
 
 
-def _describe(folder: Path) -> _Description:
+def describe(folder: Path) -> Description:
+    """Read campaign.json of a folder; without it the folder's name serves.
+
+    Raises
+    ------
+    StoreError
+        If the file is malformed.
+    """
     path = folder / DESCRIPTION
     fallback = folder.resolve().name
     if not path.is_file():
-        return _Description(fallback, fallback, None, "")
+        return Description(fallback, fallback, None, "")
     cure = "correct it, or remove it to use the folder's name"
     entries = read_json(path, StoreError, cure)
     if not isinstance(entries, dict):
@@ -264,7 +348,7 @@ def _describe(folder: Path) -> _Description:
         raise StoreError(f"{path}: name {name!r} cannot be part of a file's name; leave out '/'")
     if not (runs is None or isinstance(runs, int)):
         raise StoreError(f"{path}: runs {runs!r} must be a whole number; {cure}")
-    return _Description(name, title, runs, words)
+    return Description(name, title, runs, words)
 
 
 def _words(setting: object) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final, Literal
 
@@ -28,6 +29,9 @@ _WANTED: Final[Mapping[Kind, pa.DataType]] = {
 }
 """Type to which a column of a kind is cast."""
 
+BUFFER_BYTES: Final = 65_536
+"""Bytes of a column that are read at a time [byte] (judgement): a row group of all columns need not be in memory."""
+
 
 def read_columns(
     path: Path, kinds: Mapping[str, Kind], writer: str, optional: Sequence[str] = ()
@@ -48,28 +52,56 @@ def read_columns(
     LogError
         If a column is missing, appears twice or holds another kind.
     """
+    with _opened(path, writer) as file:
+        wanted = _wanted(path, file.schema_arrow.names, kinds, writer, optional)
+        table = file.read(wanted)
+    return _cast_table(table, kinds, path, writer)
+
+
+def column_parts(
+    path: Path, kinds: Mapping[str, Kind], writer: str, optional: Sequence[str] = (), *, rows: int
+) -> Iterator[pa.Table]:
+    """Read columns as `read_columns` does, up to ``rows`` rows at a time."""
+    with _opened(path, writer) as file:
+        wanted = _wanted(path, file.schema_arrow.names, kinds, writer, optional)
+        for batch in file.iter_batches(batch_size=rows, columns=wanted, use_threads=False):
+            yield _cast_table(pa.Table.from_batches([batch]), kinds, path, writer)
+            pa.default_memory_pool().release_unused()
+
+
+@contextmanager
+def _opened(path: Path, writer: str) -> Iterator[pq.ParquetFile]:
     if not path.is_file():
         raise StoreError(f"{path}: missing; {writer} writes it")
     try:
         with (
             source_of(path) as source,
-            pq.ParquetFile(source, page_checksum_verification=True) as file,
+            pq.ParquetFile(source, page_checksum_verification=True, buffer_size=BUFFER_BYTES) as file,
         ):
-            names = file.schema_arrow.names
-            wanted = [name for name in kinds if name in names]
-            missing = [name for name in kinds if name not in names and name not in optional]
-            twice = [name for name in wanted if names.count(name) > 1]
-            table = None if missing or twice else file.read(wanted)
+            yield file
     except (pa.ArrowException, OSError, UnicodeError) as error:
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise StoreError(
             f"{path}: not a readable Parquet file ({reason}); {writer} writes it again"
         ) from error
-    if table is None:
+
+
+def _wanted(
+    path: Path, names: Sequence[str], kinds: Mapping[str, Kind], writer: str, optional: Sequence[str]
+) -> list[str]:
+    """Columns of ``kinds`` that a file has."""
+    wanted = [name for name in kinds if name in names]
+    missing = [name for name in kinds if name not in names and name not in optional]
+    twice = [name for name in wanted if names.count(name) > 1]
+    if missing or twice:
         faults = [f"column {name!r} appears twice" for name in twice] + [_missing(n, names) for n in missing]
         raise LogError(f"{path}: {'; '.join(faults)}; {writer} writes all columns that reports need")
-    cast = [_cast(table.column(name), name, kinds[name], path, writer) for name in wanted]
-    return pa.table(dict(zip(wanted, cast, strict=True)))
+    return wanted
+
+
+def _cast_table(table: pa.Table, kinds: Mapping[str, Kind], path: Path, writer: str) -> pa.Table:
+    names = table.column_names
+    return pa.table({name: _cast(table.column(name), name, kinds[name], path, writer) for name in names})
 
 
 def texts(table: pa.Table, name: str) -> list[str]:
@@ -111,5 +143,7 @@ def _cast(column: pa.ChunkedArray, name: str, kind: Kind, path: Path, writer: st
     if kind == "flag":
         if converted.null_count:
             raise LogError(f"{path}: column {name!r} has empty cells; {writer} writes it again")
+        return converted
+    if not converted.null_count:
         return converted
     return pc.fill_null(converted, "" if kind == "text" else float("nan"))

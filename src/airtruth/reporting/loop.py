@@ -20,7 +20,7 @@ from airtruth.physics.short_period import PARAMETERS
 from airtruth.reporting.campaign import Campaign
 from airtruth.reporting.paper.layout import STANDARD_ERROR
 from airtruth.reporting.paper.published import DECIMALS, SYMBOLS
-from airtruth.reporting.paper.tables import method_statistics
+from airtruth.reporting.paper.tables import statistics_of
 from airtruth.reporting.statistics import MethodStatistics
 from airtruth.table import MISSING, Cell, Group, Number, Pair, Row, Table, as_text, flat, write_table
 
@@ -113,15 +113,13 @@ def evaluate(campaign: Campaign, name: str, title: str, notes: Sequence[str] = (
     methods = [m for m in campaign.estimates if m + WITH_EFFECTS in campaign.estimates]
     if not methods:
         raise LogError(f"{campaign.folder}: holds no method both as METHOD and as METHOD{WITH_EFFECTS}")
+    statistics = statistics_of(campaign)
     return LoopTable(
         name=name,
         title=title,
         campaign=campaign,
         truth=campaign.truth[campaign.flown][:, : len(PARAMETERS)].mean(axis=0),
-        statistics={
-            m: (method_statistics(campaign, m), method_statistics(campaign, m + WITH_EFFECTS))
-            for m in methods
-        },
+        statistics={m: (statistics[m], statistics[m + WITH_EFFECTS]) for m in methods},
         notes=tuple(notes),
     )
 

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from airtruth.errors import ConfigurationError
-from airtruth.reporting.campaign import Campaign, read_campaign
+from airtruth.reporting.campaign import Parted
 from airtruth.reporting.paper import layout, tables
 from airtruth.reporting.paper.published import SYMBOLS
 from airtruth.reporting.paper.tables import PaperTable, TableSpec
+from airtruth.reporting.stored_campaign import open_campaign
 from airtruth.table import as_text, write_table
 
 
@@ -48,11 +49,14 @@ def write_tables(
     ConfigurationError
         No folder is given, or two campaigns have the same name.
     StoreError, LogError
-        See `read_campaign`; or a table cannot be written.
+        See `airtruth.reporting.campaign.read_campaign`; or a table cannot be written.
     """
     wanted = tuple(tables.TABLES.values() if specs is None else specs)
     campaigns = _campaigns(folders)
-    evaluated = [tables.evaluate(spec, campaign) for spec, campaign in _pairs(wanted, campaigns)]
+    known = {campaign.name: tables.statistics_of(campaign) for campaign in campaigns}
+    evaluated = [
+        tables.evaluate(spec, campaign, known[campaign.name]) for spec, campaign in _pairs(wanted, campaigns)
+    ]
     paths: list[Path] = []
     texts = []
     for table in evaluated:
@@ -63,12 +67,12 @@ def write_tables(
     return WrittenTables(tuple(paths), "\n".join([*texts, *skipped]))
 
 
-def _campaigns(folders: Sequence[Path]) -> list[Campaign]:
+def _campaigns(folders: Sequence[Path]) -> list[Parted]:
     if not folders:
         raise ConfigurationError("no campaign folder is given; name folders that `airtruth fly` wrote")
-    by_name: dict[str, Campaign] = {}
+    by_name: dict[str, Parted] = {}
     for folder in folders:
-        campaign = read_campaign(folder)
+        campaign = open_campaign(folder)
         if campaign.name in by_name:
             other = by_name[campaign.name].folder
             raise ConfigurationError(
@@ -79,22 +83,22 @@ def _campaigns(folders: Sequence[Path]) -> list[Campaign]:
     return list(by_name.values())
 
 
-def _pairs(specs: Sequence[TableSpec], campaigns: Sequence[Campaign]) -> Iterator[tuple[TableSpec, Campaign]]:
+def _pairs(specs: Sequence[TableSpec], campaigns: Sequence[Parted]) -> Iterator[tuple[TableSpec, Parted]]:
     pairs = [
         (spec, campaign)
         for spec in specs
         for campaign in campaigns
-        if tables.shows(spec, campaign) and not campaign.estimates.keys().isdisjoint(spec.columns)
+        if tables.shows(spec, campaign) and not set(campaign.methods).isdisjoint(spec.columns)
     ]
     yield from pairs
     for campaign in campaigns:
         shown = {method for spec, shown_by in pairs if shown_by is campaign for method in spec.methods}
-        if not campaign.estimates.keys() <= shown:
+        if not shown.issuperset(campaign.methods):
             yield tables.all_methods(campaign), campaign
 
 
 def _skipped(
-    specs: Sequence[TableSpec], campaigns: Sequence[Campaign], written: Sequence[PaperTable]
+    specs: Sequence[TableSpec], campaigns: Sequence[Parted], written: Sequence[PaperTable]
 ) -> Iterator[str]:
     for spec in specs:
         if any(table.spec is spec for table in written):

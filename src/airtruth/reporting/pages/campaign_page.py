@@ -124,13 +124,14 @@ def _identified(
 
 def _tables(campaign: Campaign) -> list[PaperTable]:
     """The tables that show a method which no earlier table shows; one of all methods if they leave some out."""
+    known = tables.statistics_of(campaign)
     shown: list[PaperTable] = []
     methods: set[str] = set()
     for spec in tables.TABLES.values():
         own = [m for m in spec.columns if m in campaign.estimates]
         if tables.shows(spec, campaign) and not methods.issuperset(own):
-            shown.append(tables.evaluate(spec, campaign))
+            shown.append(tables.evaluate(spec, campaign, known))
             methods.update(shown[-1].methods)
     if not methods.issuperset(campaign.estimates):
-        shown.append(tables.evaluate(tables.all_methods(campaign), campaign))
+        shown.append(tables.evaluate(tables.all_methods(campaign), campaign, known))
     return shown

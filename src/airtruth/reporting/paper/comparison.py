@@ -71,6 +71,7 @@ def published_ratio(
     runs: int,
     ours: MethodStatistics,
     our_reference: MethodStatistics,
+    correlation: float,
 ) -> tuple[Printed, float]:
     """Return the ratio of two published RelErr and its standard error.
 
@@ -82,15 +83,14 @@ def published_ratio(
     column, reference : numerator and denominator.
     runs : number of runs of the paper.
     ours, our_reference : statistics of the methods to compare with.
+    correlation : between the errors of our two RelErr [-].
     """
     parts = [
         (c.relerr_pct.value, c.relerr_pct.unit, _relerr_se_pct(c, runs, s.correlation))
         for c, s in ((column, ours), (reference, our_reference))
     ]
     (a, unit_a, se_a), (b, unit_b, se_b) = parts
-    lengths = float(np.linalg.norm(ours.influence) * np.linalg.norm(our_reference.influence))
-    common = float(ours.influence @ our_reference.influence) / lengths if lengths > 0.0 else 0.0
-    variance = (se_a / a) ** 2 + (se_b / b) ** 2 - 2.0 * common * se_a * se_b / (a * b)
+    variance = (se_a / a) ** 2 + (se_b / b) ** 2 - 2.0 * correlation * se_a * se_b / (a * b)
     ratio = a / b
     return Printed(ratio, ratio * math.hypot(unit_a / a, unit_b / b)), ratio * math.sqrt(max(variance, 0.0))
 

@@ -51,7 +51,7 @@ def lay_out(table: PaperTable) -> Table:
         heading = "Median (scaled median absolute deviation)"
         groups.append(Group(heading, tuple(_medians(table)), supplement=True))
     return Table(
-        title=f"{table.spec.title} - campaign {table.campaign.name!r}, {len(table.campaign.run_ids)} runs",
+        title=f"{table.spec.title} - campaign {table.campaign.name!r}, {table.campaign.runs} runs",
         columns=("", "true", *table.methods),
         groups=tuple(group for group in groups if group.rows),
         notes=tuple(_notes(table)),

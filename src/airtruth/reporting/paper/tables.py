@@ -12,8 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from airtruth.reporting import statistics
-from airtruth.reporting.campaign import Campaign
+from airtruth.reporting import partial, statistics
+from airtruth.reporting.campaign import Parted, average_truth
 from airtruth.reporting.paper import comparison, published
 from airtruth.reporting.paper.comparison import RUNS, SIX
 from airtruth.reporting.paper.published import ESTIMATED, Printed
@@ -126,7 +126,7 @@ class PaperTable:
 
     spec: TableSpec
     name: str
-    campaign: Campaign
+    campaign: Parted
     methods: tuple[str, ...]
     absent: tuple[str, ...]
     statistics: Mapping[str, MethodStatistics]
@@ -174,9 +174,9 @@ TABLES: Final[Mapping[str, TableSpec]] = {
 """The paper's tables by name."""
 
 
-def all_methods(campaign: Campaign) -> TableSpec:
+def all_methods(campaign: Parted) -> TableSpec:
     """Return the description of a table of every method of a campaign, without published numbers."""
-    methods = tuple(campaign.estimates)
+    methods = campaign.methods
     return TableSpec(
         name=f"methods-{campaign.name}",
         title="All methods",
@@ -187,7 +187,7 @@ def all_methods(campaign: Campaign) -> TableSpec:
     )
 
 
-def shows(spec: TableSpec, campaign: Campaign) -> bool:
+def shows(spec: TableSpec, campaign: Parted) -> bool:
     """Return whether a table shows a campaign: the one that it names, or a variant "NAME-..." of it."""
     return campaign.name == spec.campaign or campaign.name.startswith(spec.campaign + "-")
 
@@ -198,24 +198,33 @@ def methods_of(campaign: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(m for spec in TABLES.values() if spec.campaign == base for m in spec.columns))
 
 
-def method_statistics(campaign: Campaign, method: str) -> MethodStatistics:
-    """Return the statistics of one method of a campaign."""
-    e = campaign.estimates[method]
-    return statistics.method_statistics(
-        campaign.truth, campaign.flown, e.values, e.lower, e.upper, e.converged, e.iterations, e.status
+def statistics_of(campaign: Parted) -> dict[str, MethodStatistics]:
+    """Return the statistics of each method of a campaign."""
+    return partial.method_statistics(
+        lambda: ({m: part.sample(m) for m in part.methods} for part in campaign.parts())
     )
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def evaluate(spec: TableSpec, campaign: Campaign) -> PaperTable:
-    """Return every number of a table, with its standard error and its published counterpart."""
-    methods = tuple(m for m in spec.methods if m in campaign.estimates)
-    stats = {m: method_statistics(campaign, m) for m in methods}
+def evaluate(
+    spec: TableSpec, campaign: Parted, known: Mapping[str, MethodStatistics] | None = None
+) -> PaperTable:
+    """Return every number of a table, with its standard error and its published counterpart.
+
+    Parameters
+    ----------
+    spec : description of the table.
+    campaign : the campaign that it shows.
+    known : its statistics, see `statistics_of`; None to compute them.
+    """
+    methods = tuple(m for m in spec.methods if m in campaign.methods)
+    known = statistics_of(campaign) if known is None else known
+    stats = {m: known[m] for m in methods}
     entries = list(_truth(campaign, spec.published is not None))
     for method in methods:
         numbers = dict(_numbers(stats[method]))
         if spec.reference in stats and method != spec.reference:
-            numbers[SIX, "relerr_ratio"] = _ratio(stats[method], stats[spec.reference])
+            numbers[SIX, "relerr_ratio"] = _ratio(stats, method, spec.reference)
         beside = _beside(spec, method, stats)
         entries += [
             Entry(method, parameter, statistic, value, se, *beside.get((parameter, statistic), ()))
@@ -227,7 +236,7 @@ def evaluate(spec: TableSpec, campaign: Campaign) -> PaperTable:
         name=spec.name + variant,
         campaign=campaign,
         methods=methods,
-        absent=tuple(m for m in spec.columns if m not in campaign.estimates),
+        absent=tuple(m for m in spec.columns if m not in campaign.methods),
         statistics=stats,
         entries={(e.method, e.parameter, e.statistic): e for e in entries},
     )
@@ -253,11 +262,9 @@ def long_form(table: PaperTable) -> Table:
     return flat(table.spec.title, LONG_COLUMNS, rows)
 
 
-def _truth(campaign: Campaign, with_published: bool) -> Iterator[Entry]:
+def _truth(campaign: Parted, with_published: bool) -> Iterator[Entry]:
     printed = published.load().truth
-    truth = campaign.truth[campaign.flown]
-    average = truth[0] + (truth - truth[0]).mean(axis=0)  # exact if all runs share one truth
-    for name, value in zip(ESTIMATED, average, strict=True):
+    for name, value in zip(ESTIMATED, average_truth(campaign), strict=True):
         # a true value has no Monte Carlo error and is therefore not compared
         yield Entry(TRUTH, name, "true", float(value), published=printed[name] if with_published else None)
 
@@ -291,8 +298,15 @@ def _numbers(s: MethodStatistics) -> Iterator[tuple[comparison.Key, tuple[float,
         yield (RUNS, statistic), (float(count), math.nan)
 
 
-def _ratio(own: MethodStatistics, reference: MethodStatistics) -> tuple[float, float]:
-    return statistics.ratio(own.relerr.value, own.influence, reference.relerr.value, reference.influence)
+def _ratio(stats: Mapping[str, MethodStatistics], own: str, reference: str) -> tuple[float, float]:
+    return statistics.ratio(
+        stats[own].relerr.value, stats[reference].relerr.value, _products(stats, own, reference)
+    )
+
+
+def _products(stats: Mapping[str, MethodStatistics], one: str, other: str) -> tuple[float, float, float]:
+    """Sums of the squared influences on two RelErr, and of their product."""
+    return stats[one].products[one], stats[other].products[other], stats[one].products[other]
 
 
 def _beside(spec: TableSpec, method: str, stats: Mapping[str, MethodStatistics]) -> comparison.Beside:
@@ -303,6 +317,13 @@ def _beside(spec: TableSpec, method: str, stats: Mapping[str, MethodStatistics])
     beside = comparison.published_figures(column, table.runs, stats[method])
     reference = table.column(spec.reference)
     if reference and spec.reference in stats:
-        pair = stats[method], stats[spec.reference]
-        beside[SIX, "relerr_ratio"] = comparison.published_ratio(column, reference, table.runs, *pair)
+        own, other, common = _products(stats, method, spec.reference)
+        beside[SIX, "relerr_ratio"] = comparison.published_ratio(
+            column,
+            reference,
+            table.runs,
+            stats[method],
+            stats[spec.reference],
+            common / math.sqrt(own * other) if own * other > 0.0 else 0.0,
+        )
     return beside
