@@ -147,11 +147,12 @@ def _verify(out: Path, runs: int, methods: tuple[str, ...]) -> None:
 
 def _identify(out: Path, runs: int, methods: tuple[str, ...]) -> None:
     from airtruth import identification
-    from airtruth.identification import run as identifying
+    from airtruth.identification import from_log
 
-    identifying._from_log = _drawn  # type: ignore[assignment]
-    result = identifying.identify(out, "gtm", methods)
-    identification.write_estimates(out / "estimates.parquet", result)
+    from_log.from_log = _drawn
+    with identification.identified(out, "gtm", methods, folder=out) as result:
+        identification.write_estimates(out / "estimates.parquet", result, merge=False)
+        assert result.summary()
 
 
 def _tables(out: Path, runs: int, methods: tuple[str, ...]) -> None:
@@ -191,15 +192,15 @@ def _copied(made: Any, chunks: list[int], logs: Path, truths: Path, jobs: int) -
 def _drawn(task: Any, estimated: Callable[[Any], None] = lambda made: None) -> Any:
     """What identify makes of a log, with estimates drawn at random."""
     from airtruth.identification.estimates import Estimates
+    from airtruth.identification.from_log import FromLog
     from airtruth.identification.result import Source
-    from airtruth.identification.run import _FromLog
     from airtruth.logs.digest import sha256_of
     from airtruth.logs.store import read_log
     from airtruth.physics.short_period import Scale
 
     ids = read_log(task.folder / task.entry, columns=[]).run_ids
     rng = np.random.default_rng(len(ids))
-    found = _FromLog(ids, Source(task.entry.name, str(sha256_of(task.entry)), len(ids)))
+    found = FromLog(ids, Source(task.entry.name, str(sha256_of(task.entry)), len(ids)))
     scale = Scale(*(np.full(len(ids), 1.0) for _ in Scale.__dataclass_fields__))
     first = Estimates(
         method="",

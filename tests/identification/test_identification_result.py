@@ -178,4 +178,4 @@ def test_the_rows_in_parts_are_those_of_the_frame(result, monkeypatch):
 
 
 def test_the_summary_is_that_of_the_rows(result):
-    assert as_text(overview_of(result.estimates)) == as_text(overview(result.to_frame()))
+    assert as_text(overview_of(lambda: [result.estimates])) == as_text(overview(result.to_frame()))

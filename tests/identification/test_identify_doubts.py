@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtruth.identification.doubts import doubts
+from airtruth.identification import doubts as module
 from airtruth.identification.estimates import Estimates, Status
 from airtruth.physics.short_period import PARAMETERS, Scale
 
@@ -29,6 +29,10 @@ def estimates(theta=THETA, std=STD, runs=1, method="iv-f1", status=Status.CONVER
         scale=scale,
         confidence=0.95,
     )
+
+
+def doubts(methods):
+    return module.doubts(lambda: [methods])
 
 
 def test_sound_estimates_raise_no_doubt():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -77,7 +78,7 @@ def identify(
     from airtruth.api.writing import aircraft_files
     from airtruth.cluster import workers
     from airtruth.logs.outputs import writing
-    from airtruth.logs.remote import location
+    from airtruth.logs.remote import RemotePath, location
     from airtruth.logs.sources import log_files
 
     options = identification.Options(
@@ -95,23 +96,34 @@ def identify(
         out = logs[0] / "estimates.parquet"
     declared = load(aircraft)
     methods = method or ["iv-f1"]
-    with writing("identify", [*log_files(logs), *aircraft_files(declared)], force=force) as outputs:
+    with (
+        writing("identify", [*log_files(logs), *aircraft_files(declared)], force=force) as outputs,
+        ExitStack() as kept,
+    ):
         if out is not None:
             outputs.require(out)
             settings = identification.settings_of(declared, options, joint)
             identification.require_mergeable(out, methods, settings, force=force)
         with workers(cluster) as on, progress_bar("identify", "estimates", quiet) as advance:
-            result = identification.identify(
-                logs, declared, methods, options, joint=joint, force=force, advance=advance, cluster=on
+            result = kept.enter_context(
+                identification.identified(
+                    logs,
+                    declared,
+                    methods,
+                    options,
+                    joint=joint,
+                    force=force,
+                    advance=advance,
+                    cluster=on,
+                    folder=None if out is None or isinstance(out, RemotePath) else out.parent,
+                )
             )
         if out is not None:
             identification.write_estimates(out, result, force=force)
-    if json_:
-        for sentence in () if quiet else (*result.forced, *result.notes):
-            notice(sentence)
-        print_result(result.to_frame().to_json(orient="records", indent=1))
-    else:
-        print_result(result.summary())
+        shown = result.to_frame().to_json(orient="records", indent=1) if json_ else result.summary()
+    for sentence in (*result.forced, *result.notes) if json_ and not quiet else ():
+        notice(sentence)
+    print_result(shown)
 
 
 @app.command(epilog="Example: airtruth tables out/light out/moderate --out out/tables")

@@ -15,8 +15,14 @@ from airtruth.identification.options import AuxiliaryModel, Options
 from airtruth.identification.regression.auxiliary import linear_auxiliary
 from airtruth.identification.regression.covariance import COVARIANCES
 from airtruth.identification.regression.lowpass import identify_actuator
-from airtruth.identification.result import IdentificationResult, Settings, Source, settings_of
-from airtruth.identification.run import identify, identify_batch, identify_joint
+from airtruth.identification.result import (
+    IdentificationResult,
+    Settings,
+    Source,
+    SpooledResult,
+    settings_of,
+)
+from airtruth.identification.run import identified, identify, identify_batch, identify_joint
 from airtruth.identification.store import require_mergeable, write_estimates
 from airtruth.identification.tables import overview
 
@@ -34,9 +40,11 @@ __all__ = [
     "Quantities",
     "Settings",
     "Source",
+    "SpooledResult",
     "Status",
     "diagnose",
     "estimates_table",
+    "identified",
     "identify",
     "identify_actuator",
     "identify_batch",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -11,11 +12,13 @@ from numpy.typing import NDArray
 from airtruth.identification.estimates import (
     SENTENCES,
     Estimates,
+    Parts,
     Status,
     deviations,
     half_width,
     point_values,
 )
+from airtruth.numerics.order_statistics import Blocks, medians
 from airtruth.physics.short_period import PARAMETERS
 
 Array = NDArray[np.float64]
@@ -43,126 +46,179 @@ LIKELY: Final = (
 """Causes of a damping or stiffness of the wrong sign."""
 
 
-def doubts(estimates: Sequence[Estimates]) -> list[str]:
+def doubts(parts: Parts) -> list[str]:
     """Sentences about the estimates of one or more methods, none where nothing is in doubt.
 
     Parameters
     ----------
-    estimates : one per method, of the same runs.
+    parts : estimates of the runs, each run in one part; a part has one entry for each method.
     """
+    own: list[_Method] = []
+    contradictions: list[_Contradiction] = [_Contradiction(name) for name in PARAMETERS]
+    for part in parts():
+        own = own or [_Method(estimates) for estimates in part]
+        for method, estimates in zip(own, part, strict=True):
+            method.add(estimates)
+        for contradiction in contradictions:
+            contradiction.add(part)
     result: list[str] = []
-    for one in estimates:
-        result += _missing(one)
-        result += _undetermined(one)
-        result += _wrong_signs(one)
-    return result + _contradictions(estimates)
+    for i, method in enumerate(own):
+        result += method.missing()
+        result += method.undetermined(_variances(parts, i))
+        result += method.wrong_signs()
+    return result + [sentence for one in contradictions for sentence in one.sentences()]
+
+
+def _variances(parts: Parts, method: int) -> Blocks:
+    """Blocks of the variances of a method, of the runs that have a covariance."""
+    return lambda: (_variance(part[method])[_known(part[method])] for part in parts())
+
+
+def _variance(one: Estimates) -> Array:
+    return np.diagonal(one.covariance, axis1=1, axis2=2)
+
+
+def _known(one: Estimates) -> NDArray[np.bool_]:
+    """(runs,) whether a run has an estimate and a covariance."""
+    return np.asarray(np.isfinite(one.covariance).all(axis=(1, 2)) & np.isfinite(one.theta).all(axis=1))
 
 
 def _some(count: int, runs: int) -> str:
     return "" if runs == 1 else f" in {count} of {runs} runs"
 
 
-def _missing(one: Estimates) -> list[str]:
-    """Reasons of numbers that are absent."""
-    runs = len(one.run_ids)
-    result = []
-    absent = ~np.isfinite(one.theta).all(axis=1)
-    for status in sorted({int(s) for s in one.status[absent]}):
-        count = int((one.status[absent] == status).sum())
-        reason = SENTENCES[Status(status)] if status != Status.CONVERGED else "no estimate was computed"
-        result.append(f"{one.method}: no estimate{_some(count, runs)}: {reason}.")
-    none = ~absent & ~np.isfinite(point_values(one)[:, len(PARAMETERS)])
-    if none.any():
-        result.append(
-            f"{one.method}: no frequency and damping ratio{_some(int(none.sum()), runs)}: with these derivatives the short "
-            "period is no oscillation about a stable trim (its stiffness is negative)."
-        )
-    bare = ~absent & ~np.isfinite(deviations(one)).all(axis=1)
-    if bare.any():
-        reason = (
-            "covariance = none was asked for"
-            if one.covariance_name == "none"
-            else "the information of the record is singular, or the method did not converge"
-        )
-        result.append(f"{one.method}: no intervals{_some(int(bare.sum()), runs)}: {reason}.")
-    return result
+_SIZE: Final = np.array([SIZES[name] for name in PARAMETERS])
+"""`SIZES` in the order of the derivatives [-]."""
+_SIGNS: Final = (("Cmalpha", "pitch stiffness"), ("Cmq", "pitch damping"))
+"""Derivatives that are negative on a stable aircraft, with their meaning."""
 
 
-def _undetermined(one: Estimates) -> list[str]:
-    """Parameters that most of the runs leave open, and the direction in which they may change together."""
-    size = np.array([SIZES[n] for n in PARAMETERS])
-    known = np.isfinite(one.covariance).all(axis=(1, 2)) & np.isfinite(one.theta).all(axis=1)
-    if not known.any():
-        return []
-    variance = np.diagonal(one.covariance, axis1=1, axis2=2)[known]
-    open_ones = variance / (size * size) > 1.0
-    named = np.flatnonzero(open_ones.mean(axis=0) >= 0.5)
-    if not named.size:
-        return []
-    relative = one.covariance[np.flatnonzero(known)[open_ones.any(axis=1)]] / np.outer(size, size)
-    values, vectors = np.linalg.eigh(relative.mean(axis=0))
-    direction = vectors[:, -1] / np.abs(vectors[:, -1]).max()
-    std = np.sqrt(np.median(variance, axis=0))
-    which = ", ".join(f"{PARAMETERS[i]} (standard deviation {std[i]:.2g})" for i in named)
-    parts = [i for i in np.argsort(-np.abs(direction)) if abs(direction[i]) >= SHARE]
-    together = " with ".join(
-        f"{TERMS[PARAMETERS[i]]} ({direction[i] * np.sqrt(values[-1]) * size[i]:+.2g} in {PARAMETERS[i]})"
-        for i in parts
-    )
-    count = int(open_ones.any(axis=1).sum())
-    return [
-        f"{one.method}: the records do not determine {which}{_some(count, int(known.sum()))}. Within one standard deviation "
-        f"these change without a visible effect: {together}. Fly inputs of higher frequency and several "
-        "amplitudes, or more records with --joint."
-    ]
+class _Method:
+    """What the runs of one method have in common: counts, sums, and the first run of each kind."""
 
+    def __init__(self, first: Estimates) -> None:
+        self.name, self.covariance_name = first.method, first.covariance_name
+        self.runs = self.bare = self.aperiodic = self.known = self.open = 0
+        self.absent: Counter[int] = Counter()
+        self.open_ones = np.zeros(len(PARAMETERS))
+        self.relative = np.zeros((len(PARAMETERS),) * 2)
+        self.wrong = dict.fromkeys((name for name, _ in _SIGNS), 0)
+        self.example: dict[str, tuple[float, float, float]] = {}
 
-def _wrong_signs(one: Estimates) -> list[str]:
-    """Stiffness or damping of the wrong sign whose interval excludes the right one."""
-    half = half_width(one.confidence) * deviations(one)
-    result = []
-    for name, word in (("Cmalpha", "pitch stiffness"), ("Cmq", "pitch damping")):
-        i = PARAMETERS.index(name)
-        value, lower, upper = one.theta[:, i], one.theta[:, i] - half[:, i], one.theta[:, i] + half[:, i]
-        with np.errstate(invalid="ignore"):
-            wrong = lower > 0.0
-        if wrong.any():
-            first = int(np.argmax(wrong))
-            result.append(
-                f"Warning: {one.method}: {name} = {value[first]:.3g} ({lower[first]:.3g} to {upper[first]:.3g})"
-                f"{_some(int(wrong.sum()), len(one.run_ids))}: a {word} of the wrong sign, whose interval excludes zero; "
-                f"{LIKELY}."
+    def add(self, one: Estimates) -> None:
+        """Add a part."""
+        self.runs += len(one.run_ids)
+        absent = ~np.isfinite(one.theta).all(axis=1)
+        self.absent.update(int(s) for s in one.status[absent])
+        self.aperiodic += int((~absent & ~np.isfinite(point_values(one)[:, len(PARAMETERS)])).sum())
+        self.bare += int((~absent & ~np.isfinite(deviations(one)).all(axis=1)).sum())
+        known = _known(one)
+        self.known += int(known.sum())
+        open_ones = _variance(one)[known] / (_SIZE * _SIZE) > 1.0
+        self.open_ones += open_ones.sum(axis=0)
+        self.open += int(open_ones.any(axis=1).sum())
+        chosen = np.flatnonzero(known)[open_ones.any(axis=1)]
+        self.relative += (one.covariance[chosen] / np.outer(_SIZE, _SIZE)).sum(axis=0)
+        half = half_width(one.confidence) * deviations(one)
+        for name, _ in _SIGNS:
+            i = PARAMETERS.index(name)
+            value, width = one.theta[:, i], half[:, i]
+            with np.errstate(invalid="ignore"):
+                wrong = value - width > 0.0
+            self.wrong[name] += int(wrong.sum())
+            if wrong.any():
+                k = int(np.argmax(wrong))
+                self.example.setdefault(
+                    name, (float(value[k]), float(value[k] - width[k]), float(value[k] + width[k]))
+                )
+
+    def missing(self) -> Iterator[str]:
+        """Reasons of numbers that are absent."""
+        for status, count in sorted(self.absent.items()):
+            why = SENTENCES[Status(status)] if status != Status.CONVERGED else "no estimate was computed"
+            yield f"{self.name}: no estimate{_some(count, self.runs)}: {why}."
+        if self.aperiodic:
+            yield (
+                f"{self.name}: no frequency and damping ratio{_some(self.aperiodic, self.runs)}: with these derivatives the "
+                "short period is no oscillation about a stable trim (its stiffness is negative)."
             )
-    return result
+        if self.bare:
+            why = (
+                "covariance = none was asked for"
+                if self.covariance_name == "none"
+                else "the information of the record is singular, or the method did not converge"
+            )
+            yield f"{self.name}: no intervals{_some(self.bare, self.runs)}: {why}."
+
+    def undetermined(self, variances: Blocks) -> Iterator[str]:
+        """Parameters that most of the runs leave open, and the direction in which they may change together."""
+        named = np.flatnonzero(2.0 * self.open_ones >= max(self.known, 1))
+        if not named.size:
+            return
+        values, vectors = np.linalg.eigh(self.relative / self.open)
+        direction = vectors[:, -1] / np.abs(vectors[:, -1]).max()
+        std = np.sqrt(medians(variances))
+        which = ", ".join(f"{PARAMETERS[i]} (standard deviation {std[i]:.2g})" for i in named)
+        parts = [i for i in np.argsort(-np.abs(direction)) if abs(direction[i]) >= SHARE]
+        together = " with ".join(
+            f"{TERMS[PARAMETERS[i]]} ({direction[i] * np.sqrt(values[-1]) * _SIZE[i]:+.2g} in {PARAMETERS[i]})"
+            for i in parts
+        )
+        yield (
+            f"{self.name}: the records do not determine {which}{_some(self.open, self.known)}. Within one standard deviation "
+            f"these change without a visible effect: {together}. Fly inputs of higher frequency and several "
+            "amplitudes, or more records with --joint."
+        )
+
+    def wrong_signs(self) -> Iterator[str]:
+        """Stiffness or damping of the wrong sign whose interval excludes the right one."""
+        for name, word in _SIGNS:
+            if name in self.example:
+                value, lower, upper = self.example[name]
+                yield (
+                    f"Warning: {self.name}: {name} = {value:.3g} ({lower:.3g} to {upper:.3g})"
+                    f"{_some(self.wrong[name], self.runs)}: a {word} of the wrong sign, whose interval excludes zero; "
+                    f"{LIKELY}."
+                )
 
 
-def _contradictions(estimates: Sequence[Estimates]) -> list[str]:
-    """Derivatives on which methods contradict each other by more than the magnitude of the derivative."""
-    result: list[str] = []
-    if len(estimates) < 2 or any(e.run_ids != estimates[0].run_ids for e in estimates):
-        return result
-    deviation = [deviations(e) for e in estimates]
-    runs = np.arange(len(estimates[0].run_ids))
-    for i, name in enumerate(PARAMETERS):
+class _Contradiction:
+    """Runs whose methods contradict each other on a derivative by more than the magnitude of the derivative."""
+
+    def __init__(self, name: str) -> None:
+        self.name, self.runs, self.count = name, 0, 0
+        self.example = ""
+
+    def add(self, estimates: Sequence[Estimates]) -> None:
+        """Add a part."""
+        if len(estimates) < 2 or any(e.run_ids != estimates[0].run_ids for e in estimates):
+            return
+        i = PARAMETERS.index(self.name)
+        runs = np.arange(len(estimates[0].run_ids))
         value = np.array([e.theta[:, i] for e in estimates])
-        std = np.array([d[:, i] for d in deviation])
+        std = np.array([deviations(e)[:, i] for e in estimates])
         known = np.isfinite(value) & np.isfinite(std)
         lowest = np.argmin(np.where(known, value, np.inf), axis=0)
         highest = np.argmax(np.where(known, value, -np.inf), axis=0)
         with np.errstate(invalid="ignore"):
             gap = value[highest, runs] - value[lowest, runs]
-            apart = (gap > SIZES[name]) & (gap > APART * np.hypot(std[highest, runs], std[lowest, runs]))
+            apart = (gap > SIZES[self.name]) & (gap > APART * np.hypot(std[highest, runs], std[lowest, runs]))
         apart &= known.sum(axis=0) > 1
-        count = int(apart.sum())
-        if count and 2 * count >= runs.size:
+        self.runs += runs.size
+        self.count += int(apart.sum())
+        if apart.any() and not self.example:
             run = int(np.argmax(apart))
             low, high = lowest[run], highest[run]
-            result.append(
-                f"{name}: the methods contradict each other{_some(count, value.shape[1])}: {value[low, run]:.3g} by "
-                f"{estimates[low].method}, {value[high, run]:.3g} by {estimates[high].method}. At least one of their "
-                "assumptions fails: noise of the regressors, gusts, or an effect that the model lacks (`airtruth trace`)."
+            self.example = f"{value[low, run]:.3g} by {estimates[low].method}, {value[high, run]:.3g} by {estimates[high].method}"
+
+    def sentences(self) -> Iterator[str]:
+        """The sentence, if at least half of the runs contradict."""
+        if self.count and 2 * self.count >= self.runs:
+            yield (
+                f"{self.name}: the methods contradict each other{_some(self.count, self.runs)}: {self.example}. At least one "
+                "of their assumptions fails: noise of the regressors, gusts, or an effect that the model lacks "
+                "(`airtruth trace`)."
             )
-    return result
 
 
 __all__ = ["SIZES", "doubts"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final
@@ -86,6 +86,10 @@ class Estimates:
             iterations=self.iterations[part],
             scale=Scale(*(np.asarray(getattr(self.scale, f))[part] for f in Scale.__dataclass_fields__)),
         )
+
+
+Parts = Callable[[], Iterable[Sequence[Estimates]]]
+"""Returns the same parts at each call, each run in one of them; a part has one entry for each method, of the same runs."""
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
@@ -14,7 +14,7 @@ from airtruth.aircraft import Aircraft
 from airtruth.errors import ConfigurationError, choices
 from airtruth.identification import tables
 from airtruth.identification.condition import AircraftConstants
-from airtruth.identification.estimates import Estimates, estimates_table
+from airtruth.identification.estimates import Estimates, Parts, estimates_table
 from airtruth.identification.options import Options
 from airtruth.identification.record_constants import Constants, values_of
 from airtruth.logs.histories import Histories
@@ -73,8 +73,8 @@ def settings_of(aircraft: AircraftConstants, options: Options, joint: bool) -> S
     return Settings(options, joint, name, values_of(aircraft))
 
 
-RUNS_PER_FRAME: Final = 10_000
-"""Runs in a part of `IdentificationResult.frames` [-] (judgement: 3 MB for each method)."""
+RUNS_PER_FRAME: Final = 2000
+"""Runs in a part of `IdentificationResult.frames` [-] (judgement: 0.6 MB for each method)."""
 
 
 @dataclass(frozen=True)
@@ -134,8 +134,7 @@ class IdentificationResult:
 
     def frames(self) -> Iterator[pd.DataFrame]:
         """The rows of `to_frame` in parts of up to `RUNS_PER_FRAME` runs, so that the memory need not hold them all."""
-        for first in range(0, len(self.run_ids), RUNS_PER_FRAME):
-            yield _frame([e.rows(first, first + RUNS_PER_FRAME) for e in self.estimates])
+        return frames_of(self._parts)
 
     def summary(self) -> str:
         """Estimates of each method with their intervals, or mean and spread over runs; then the notes."""
@@ -143,8 +142,7 @@ class IdentificationResult:
 
     def table(self) -> Table:
         """The table of `summary`."""
-        forced = tuple(f"Overridden by --force: {sentence}" for sentence in self.forced)
-        return dataclasses.replace(tables.overview_of(self.estimates), notes=(*forced, *self.notes))
+        return table_of(self._parts, self.forced, self.notes)
 
     def details(self, method: str, run_id: str | None = None) -> Table:
         """Estimates of one method: of one run, or their distribution over the converged runs.
@@ -206,8 +204,58 @@ class IdentificationResult:
             return None
         return simulated_records(self.logs, self.to_frame(), self.settings.constants)
 
+    def _parts(self) -> Iterable[Sequence[Estimates]]:
+        return (self.estimates,)
+
     def _repr_html_(self) -> str:
         return as_html(self.table())
+
+
+@dataclass(frozen=True)
+class SpooledResult:
+    """The result of an identification whose estimates are in a temporary file, while that is open.
+
+    Attributes
+    ----------
+    parts : the estimates, a few logs at a time.
+    methods : names of the methods.
+    settings, notes, forced, version, sources : as in `IdentificationResult`.
+    """
+
+    parts: Parts
+    methods: tuple[str, ...]
+    settings: Settings
+    notes: tuple[str, ...]
+    forced: tuple[str, ...]
+    version: str
+    sources: tuple[Source, ...]
+
+    def to_frame(self) -> pd.DataFrame:
+        """`IdentificationResult.to_frame`; the memory holds all rows."""
+        import pandas as pd
+
+        return pd.concat(list(self.frames()), ignore_index=True)
+
+    def frames(self) -> Iterator[pd.DataFrame]:
+        """The rows of `to_frame` in parts."""
+        return frames_of(self.parts)
+
+    def summary(self) -> str:
+        """`IdentificationResult.summary`."""
+        return as_text(table_of(self.parts, self.forced, self.notes))
+
+
+def frames_of(parts: Parts) -> Iterator[pd.DataFrame]:
+    """Rows of contract 2 in frames of up to `RUNS_PER_FRAME` runs."""
+    for estimates in parts():
+        for first in range(0, len(estimates[0].run_ids), RUNS_PER_FRAME):
+            yield _frame([e.rows(first, first + RUNS_PER_FRAME) for e in estimates])
+
+
+def table_of(parts: Parts, forced: Iterable[str], notes: Iterable[str]) -> Table:
+    """The estimates of each method with their intervals, or mean and spread over runs; then faults and notes."""
+    overridden = (f"Overridden by --force: {sentence}" for sentence in forced)
+    return dataclasses.replace(tables.overview_of(parts), notes=(*overridden, *notes))
 
 
 def _frame(estimates: Sequence[Estimates]) -> pd.DataFrame:

@@ -5,96 +5,38 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
 
 from airtruth import __version__
 from airtruth import aircraft as planes
-from airtruth.aircraft import Aircraft
-from airtruth.checks import gate
-from airtruth.cluster import Cluster, LostWorkError
-from airtruth.errors import ConfigurationError, LogError, StoreError
-from airtruth.identification.checks import airspeed_fault, check_batch, check_channels
-from airtruth.identification.condition import AircraftConstants, OneOrEach
+from airtruth.cluster import Cluster
+from airtruth.errors import ConfigurationError
+from airtruth.identification.batch import identify_batch, identify_joint
+from airtruth.identification.condition import AircraftConstants
 from airtruth.identification.doubts import doubts
 from airtruth.identification.estimates import Estimates, concatenated
+from airtruth.identification.from_log import FromLog, LogTask, results_of
 from airtruth.identification.loading import at_one_cg, mean_cg
-from airtruth.identification.methods import Method, method, regression
+from airtruth.identification.methods import Method, method
 from airtruth.identification.options import Options
-from airtruth.identification.reconstructed import with_reconstruction
-from airtruth.identification.record_constants import Part, by_loading, differing, with_constants
-from airtruth.identification.regression.solve import regress_batch, regress_joint
-from airtruth.identification.result import IdentificationResult, Source, settings_of
-from airtruth.logs.flight_log import Batch, FlightLog
-from airtruth.logs.sources import IN_MEMORY, Logs, sources
-from airtruth.logs.store import read_log
+from airtruth.identification.record_constants import Part, by_loading
+from airtruth.identification.result import (
+    IdentificationResult,
+    Settings,
+    Source,
+    SpooledResult,
+    settings_of,
+)
+from airtruth.identification.spool import Spool
+from airtruth.logs.owners import Owners
+from airtruth.logs.sources import Logs, sources
 
 Progress = Callable[[int, int, int], None]
 """Called with the number of logs done, of all logs, and of runs without a converged estimate."""
-
-
-def identify_batch(
-    batch: Batch, constants: AircraftConstants, name: str, options: Options | None = None
-) -> Estimates:
-    """Estimate the six derivatives of each run; nothing is checked.
-
-    A result does not depend on the other runs of the batch.
-
-    Parameters
-    ----------
-    batch : runs of one length and sample period, as `airtruth.logs.flight_log.batches` makes them.
-    constants : aircraft, any object with wing_area_m2, chord_m, mass_kg, inertia_yy_kg_m2.
-    name : method, a key of `airtruth.identification.METHODS`.
-    options : choices; None for the defaults.
-
-    Raises
-    ------
-    ConfigurationError
-        If the method does not exist.
-    """
-    chosen = method(name)
-
-    def estimate(parts: Sequence[Batch], options: Options) -> Estimates:
-        if chosen.estimate is not None:
-            return chosen.estimate(parts[0], constants, options)
-        pose = regression(chosen) if chosen.iterates else None
-        return regress_batch(parts[0], constants, name, pose, options)
-
-    return with_reconstruction(estimate, [batch], options or Options())
-
-
-def identify_joint(
-    parts: Sequence[Batch], constants: OneOrEach, name: str, options: Options | None = None
-) -> Estimates:
-    """One estimate for all runs together; nothing is checked.
-
-    The normal equations of all runs are summed. Trim, flight condition and filters remain each run's own.
-    All runs are held in memory.
-
-    Parameters
-    ----------
-    parts : batches; lengths and rates may differ.
-    constants : of all batches, or one entry for each: mass and inertia may differ.
-    name, options : as in `identify_batch`.
-
-    Raises
-    ------
-    ConfigurationError
-        If the method does not exist.
-    """
-    chosen = method(name)
-
-    def estimate(parts: Sequence[Batch], options: Options) -> Estimates:
-        if chosen.estimate_joint is not None:
-            return chosen.estimate_joint(parts, constants, options)
-        pose = regression(chosen) if chosen.iterates else None
-        return regress_joint(parts, constants, name, pose, options)
-
-    return with_reconstruction(estimate, parts, options or Options())
 
 
 def identify(
@@ -145,22 +87,23 @@ def identify(
     >>> result.to_frame().loc[0, ["run_id", "method", "converged"]].tolist()
     ['r1', 'ls', True]
     """
-    options = options or Options()
     chosen = [method(name) for name in dict.fromkeys(methods)]
-    if not chosen:
-        raise ConfigurationError("identify needs at least one method")
-    plane = planes.load(aircraft) if isinstance(aircraft, str | Path) else aircraft
-    entries = sources(logs)
-    steps, total = count(1), len(chosen) * (1 if joint else len(entries))
-    work = _Work(chosen, options, lambda failed: advance(next(steps), total, failed))
-    tasks = (_Task(Path.cwd(), entry, chosen, options, plane, force, joint) for entry in entries)
-    for log, found in _found(tasks, work, cluster):
-        work.add(log, found)
-    estimates = tuple(work.finished(joint))
+    made: list[Sequence[Estimates]] = []
+    work = _worked(
+        made.append, _Request(logs, aircraft, chosen, options or Options(), joint, force), advance, cluster
+    )
+    if joint:
+        estimates = tuple(work.joint())
+    else:
+        run_ids = [run_id for one in made for run_id in one[0].run_ids]
+        by_method = [list(parts) for parts in zip(*made, strict=True)]
+        made.clear()
+        # the parts of a method go before those of the next are joined
+        estimates = tuple(concatenated(by_method.pop(0), run_ids) for _ in chosen)
     return IdentificationResult(
         estimates=estimates,
-        settings=settings_of(plane, options, joint),
-        notes=(*work.notes, *_stated(work.stated), *doubts(estimates)),
+        settings=work.settings,
+        notes=(*work.noted, *doubts(lambda: [estimates])),
         forced=tuple(work.forced),
         version=__version__,
         sources=tuple(work.sources),
@@ -168,111 +111,91 @@ def identify(
     )
 
 
-@dataclass(frozen=True)
-class _Task:
-    """One log to identify, and how; a file is relative to ``folder``, since a worker has another working folder."""
+@contextmanager
+def identified(
+    logs: Logs,
+    aircraft: str | Path | AircraftConstants,
+    methods: Sequence[str] = ("iv-f1",),
+    options: Options | None = None,
+    *,
+    joint: bool = False,
+    force: bool = False,
+    advance: Progress = lambda done, total, failed: None,
+    cluster: Cluster | None = None,
+    folder: Path | None = None,
+) -> Iterator[IdentificationResult | SpooledResult]:
+    """Identify logs as `identify` does, with the estimates of single runs in a temporary file and not in memory.
 
-    folder: Path
-    entry: Path | FlightLog
+    Parameters
+    ----------
+    logs, aircraft, methods, options, joint, force, advance, cluster : as in `identify`.
+    folder : local folder of the temporary file; None for the system's.
+
+    Yields
+    ------
+    IdentificationResult or SpooledResult
+        The latter, of estimates run by run, is usable until the block ends.
+
+    Raises
+    ------
+    StoreError, LogError, ConfigurationError
+        As `identify`; or the temporary file cannot be written.
+    """
+    if joint:
+        yield identify(
+            logs, aircraft, methods, options, joint=True, force=force, advance=advance, cluster=cluster
+        )
+        return
+    chosen = [method(name) for name in dict.fromkeys(methods)]
+    with Spool(folder) as spool:
+        request = _Request(logs, aircraft, chosen, options or Options(), False, force)
+        work = _worked(spool.add, request, advance, cluster)
+        yield SpooledResult(
+            parts=spool.parts,
+            methods=tuple(one.name for one in chosen),
+            settings=work.settings,
+            notes=(*work.noted, *doubts(spool.parts)),
+            forced=tuple(work.forced),
+            version=__version__,
+            sources=tuple(work.sources),
+        )
+
+
+@dataclass(frozen=True)
+class _Request:
+    """What to identify, and how."""
+
+    logs: Logs
+    aircraft: str | Path | AircraftConstants
     methods: Sequence[Method]
     options: Options
-    plane: AircraftConstants
-    force: bool
     joint: bool
-
-    @property
-    def source(self) -> str:
-        """Where the log is from, for messages."""
-        return str(self.entry) if isinstance(self.entry, Path) else IN_MEMORY
+    force: bool
 
 
-@dataclass
-class _FromLog:
-    """What one log gives: its runs and notes, the estimates of each method, or the parts of a joint estimate."""
-
-    run_ids: tuple[str, ...]
-    origin: Source | None = None
-    parts: list[Part] = field(default_factory=list)
-    estimates: dict[str, Estimates] = field(default_factory=dict)
-    stated: dict[str, list[tuple[str, float, float]]] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
-    forced: list[str] = field(default_factory=list)
-
-
-def _found(tasks: Iterable[_Task], work: _Work, cluster: Cluster | None) -> Iterator[tuple[_Task, _FromLog]]:
-    """Each task with what its log gives, in the order of the tasks."""
-    if cluster is None:
-        for task in tasks:
-            yield task, _from_log(task, work.estimated)
-        return
-    early: dict[str, _FromLog] = {}
-    order: deque[_Task] = deque()
-
-    def noted() -> Iterator[_Task]:
-        for task in tasks:
-            order.append(task)
-            yield task
-
-    for task, found in cluster.completed(_from_log, noted()):
-        if isinstance(found, LostWorkError):
-            raise StoreError(
-                f"{task.source}: the workers of the cluster that identified this log ended each time; give them more memory, "
-                "or identify it without --cluster"
-            )
-        for made in found.estimates.values():
-            work.estimated(made)
-        early[task.source] = found
-        while order and order[0].source in early:
-            following = order.popleft()
-            yield following, early.pop(following.source)
-
-
-def _from_log(task: _Task, estimated: Callable[[Estimates], None] = lambda made: None) -> _FromLog:
-    """Read and check one log, and estimate from it unless the estimate is joint.
-
-    ``estimated`` receives the estimates of each method.
-    """
-    entry = task.entry
-    log = read_log(task.folder / entry) if isinstance(entry, Path) else entry
-    found = _FromLog(tuple(log.run_ids))
-    _check(log, task, found)
-    try:
-        for run_id, name, own, declared in differing(log.metadata, log.run_ids, task.plane):
-            found.stated.setdefault(name, []).append((run_id, own, declared))
-        parts = list(with_constants(log, task.plane))
-        for part in parts:
-            check_batch(part.batch, task.options)
-    except LogError as error:
-        raise LogError(f"{task.source}: {error}" if isinstance(entry, Path) else str(error)) from None
-    if isinstance(entry, Path):
-        with (task.folder / entry).open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
-        found.origin = Source(entry.name, digest, len(log.run_ids))
-    if task.joint:
-        found.parts = parts
-        return found
-    for chosen in task.methods:
-        made = [identify_batch(p.batch, p.constants, chosen.name, task.options) for p in parts]
-        found.estimates[chosen.name] = concatenated(made, log.run_ids)
-        estimated(found.estimates[chosen.name])
-    return found
-
-
-def _check(log: FlightLog, task: _Task, found: _FromLog) -> None:
-    source = task.source if isinstance(task.entry, Path) else ""
-    known = task.plane if isinstance(task.plane, Aircraft) else None
-    for fault in gate.require(log, known, source=source, force=task.force):
-        (found.forced if fault.certain else found.notes).append(fault.sentence)
-    prefix = f"{source}: " if source else ""
-    try:
-        check_channels(log, task.methods)
-    except LogError as error:
-        raise LogError(f"{prefix}{error}") from None
-    sentence = airspeed_fault(log, task.options)
-    if sentence is not None:
-        if not task.force:
-            raise ConfigurationError(f"{prefix}{sentence}")
-        found.forced.append(f"{prefix}{sentence}")
+def _worked(
+    keep: Callable[[Sequence[Estimates]], None], asked: _Request, advance: Progress, cluster: Cluster | None
+) -> _Work:
+    """Identify each log, and pass its estimates to ``keep``."""
+    if not asked.methods:
+        raise ConfigurationError("identify needs at least one method")
+    plane = planes.load(asked.aircraft) if isinstance(asked.aircraft, str | Path) else asked.aircraft
+    entries = sources(asked.logs)
+    steps, total = count(1), len(asked.methods) * (1 if asked.joint else len(entries))
+    work = _Work(
+        asked.methods,
+        asked.options,
+        settings_of(plane, asked.options, asked.joint),
+        lambda failed: advance(next(steps), total, failed),
+        keep,
+    )
+    tasks = (
+        LogTask(Path.cwd(), entry, asked.methods, asked.options, plane, asked.force, asked.joint)
+        for entry in entries
+    )
+    for log, found in results_of(tasks, work.estimated, cluster):
+        work.add(log, found)
+    return work
 
 
 @dataclass
@@ -281,10 +204,11 @@ class _Work:
 
     methods: Sequence[Method]
     options: Options
+    settings: Settings
     step: Callable[[int], None]
-    runs: dict[str, str] = field(default_factory=dict)
+    keep: Callable[[Sequence[Estimates]], None]
+    owners: Owners = field(default_factory=Owners)
     parts: list[Part] = field(default_factory=list)
-    estimates: dict[str, list[Estimates]] = field(default_factory=dict)
     stated: dict[str, list[tuple[str, float, float]]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     forced: list[str] = field(default_factory=list)
@@ -296,7 +220,7 @@ class _Work:
         self.failed += int((~made.converged).sum())
         self.step(self.failed)
 
-    def add(self, task: _Task, found: _FromLog) -> None:
+    def add(self, task: LogTask, found: FromLog) -> None:
         """Take over what one log gives.
 
         Raises
@@ -304,44 +228,39 @@ class _Work:
         LogError
             If a run was given before.
         """
-        for run_id in found.run_ids:
-            if run_id in self.runs:
-                raise LogError(
-                    f"run {run_id!r} is in {self.runs[run_id]} and in {task.source}; give each run once, or rename one"
-                )
-        self.runs |= dict.fromkeys(found.run_ids, task.source)
+        self.owners.add(task.entry, found.run_ids)
         for name, records in found.stated.items():
             self.stated.setdefault(name, []).extend(records)
-        for name, made in found.estimates.items():
-            self.estimates.setdefault(name, []).append(made)
+        if found.estimates:
+            self.keep([found.estimates[chosen.name] for chosen in self.methods])
         self.parts += found.parts
         self.notes += found.notes
         self.forced += found.forced
         if found.origin is not None:
             self.sources.append(found.origin)
 
-    def finished(self, joint: bool) -> Iterator[Estimates]:
-        """Estimates of each method over all logs."""
-        if joint:
-            groups = by_loading(self.parts)
-            reference = mean_cg(groups)
-            if reference is not None and len(groups) > 1:
-                self.notes.append(
-                    f"the records have {len(groups)} centres of gravity: derivatives refer to cg_mac {reference:.4f}"
+    @property
+    def noted(self) -> tuple[str, ...]:
+        """Notes of the logs, and constants that records state differently from the aircraft."""
+        return (*self.notes, *_stated(self.stated))
+
+    def joint(self) -> Iterator[Estimates]:
+        """One estimate of each method from all logs."""
+        groups = by_loading(self.parts)
+        reference = mean_cg(groups)
+        if reference is not None and len(groups) > 1:
+            self.notes.append(
+                f"the records have {len(groups)} centres of gravity: derivatives refer to cg_mac {reference:.4f}"
+            )
+        for chosen in self.methods:
+            each = {
+                cg: identify_joint(
+                    [p.batch for p in parts], [p.constants for p in parts], chosen.name, self.options
                 )
-            for chosen in self.methods:
-                each = {
-                    cg: identify_joint(
-                        [p.batch for p in parts], [p.constants for p in parts], chosen.name, self.options
-                    )
-                    for cg, parts in groups.items()
-                }
-                yield at_one_cg(each, reference)
-                self.step(self.failed)
-            return
-        run_ids = tuple(self.runs)
-        while self.estimates:  # the parts of a method go before those of the next are joined
-            yield concatenated(self.estimates.pop(next(iter(self.estimates))), run_ids)
+                for cg, parts in groups.items()
+            }
+            yield at_one_cg(each, reference)
+            self.step(self.failed)
 
 
 def _stated(stated: dict[str, list[tuple[str, float, float]]]) -> Iterator[str]:
@@ -352,4 +271,4 @@ def _stated(stated: dict[str, list[tuple[str, float, float]]]) -> Iterator[str]:
         yield f"{name} of run {run_id!r}{more} as the log states it: {own:.6g}, not the aircraft's {declared:.6g}"
 
 
-__all__ = ["Progress", "identify", "identify_batch", "identify_joint"]
+__all__ = ["Progress", "identified", "identify", "identify_batch", "identify_joint"]

@@ -15,7 +15,7 @@ import pandas as pd
 import pyarrow as pa
 
 from airtruth.errors import LogError, StoreError
-from airtruth.identification.result import IdentificationResult, Settings
+from airtruth.identification.result import IdentificationResult, Settings, SpooledResult
 from airtruth.identification.stored import KEY, KEYS, read_stored
 from airtruth.logs.remote import location
 from airtruth.logs.store import write_table
@@ -45,7 +45,11 @@ def require_mergeable(
 
 
 def write_estimates(
-    path: Path | str, result: IdentificationResult, *, force: bool = False, merge: bool = True
+    path: Path | str,
+    result: IdentificationResult | SpooledResult,
+    *,
+    force: bool = False,
+    merge: bool = True,
 ) -> None:
     """Write estimates, or merge them into a file of estimates.
 

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError
 from airtruth.identification.estimates import (
     SENTENCES,
     Estimates,
+    Parts,
     Status,
     estimates_table,
     point_values,
@@ -24,6 +26,8 @@ from airtruth.table import Cell, Group, Interval, Number, Pair, Table, flat
 
 if TYPE_CHECKING:
     import pandas as pd
+
+Array = NDArray[np.float64]
 
 UNITS: Final = {"wn_rad_s": "rad/s"}
 """Units of the parameters that have one."""
@@ -152,21 +156,76 @@ def overview(estimates: pd.DataFrame) -> Table:
     ----------
     estimates : rows of estimates.parquet, see `airtruth.identification.result.IdentificationResult.to_frame`.
     """
-    return _overview({str(name): rows for name, rows in estimates.groupby("method", sort=False)})
+    names = [*PARAMETERS, *MODAL]
+    by_method = {str(name): rows for name, rows in estimates.groupby("method", sort=False)}
+    if all(len(rows) == 1 for rows in by_method.values()):
+        return _single({name: rows.iloc[0] for name, rows in by_method.items()})
+    return _spread(
+        lambda: (
+            {
+                m: (rows[names].to_numpy(np.float64), rows["converged"].to_numpy())
+                for m, rows in by_method.items()
+            },
+        )
+    )
 
 
-def _overview(by_method: Mapping[str, pd.DataFrame]) -> Table:
-    single = all(len(rows) == 1 for rows in by_method.values())
-    cells = {
-        name: _intervals(rows.iloc[0]) if single else _spreads(rows[rows["converged"]])
-        for name, rows in by_method.items()
+def overview_of(parts: Parts) -> Table:
+    """`overview` of estimates that come in parts, without a row for each run in memory."""
+    runs, first = 0, None
+    for part in parts():
+        runs, first = runs + len(part[0].run_ids), part if first is None else first
+    if first is not None and runs == 1:
+        return _single({e.method: estimates_table(e).iloc[0] for e in first})
+    return _spread(lambda: ({e.method: (point_values(e), e.converged) for e in part} for part in parts()))
+
+
+def _single(by_method: Mapping[str, pd.Series]) -> Table:
+    cells = {name: _intervals(run) for name, run in by_method.items()}
+    converged = {name: int(run["converged"]) for name, run in by_method.items()}
+    return _overview("Estimates with 95 % intervals", cells, converged, dict.fromkeys(by_method, 1))
+
+
+def _spread(parts: Callable[[], Iterable[Mapping[str, tuple[Array, NDArray[np.bool_]]]]]) -> Table:
+    """Mean and standard deviation over the converged runs, from two passes over values (runs, 8) and convergence."""
+    runs: Counter[str] = Counter()
+    converged: Counter[str] = Counter()
+    count, total, squares = _Sums(), _Sums(), _Sums()
+    for part in parts():
+        for method, (values, good) in part.items():
+            runs[method] += len(good)
+            converged[method] += int(good.sum())
+            count[method] += (~np.isnan(values[good])).sum(axis=0)
+            total[method] += np.nansum(values[good], axis=0)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        mean = {method: total[method] / count[method] for method in runs}
+        for part in parts():
+            for method, (values, good) in part.items():
+                squares[method] += np.nansum((values[good] - mean[method]) ** 2, axis=0)
+        std = {m: np.sqrt(np.where(count[m] > 1, squares[m] / (count[m] - 1), np.nan)) for m in runs}
+    cells: dict[str, dict[str, Cell]] = {
+        method: {
+            name: Pair(Number(mean[method][i]), Number(std[method][i], digits=2))
+            for i, name in enumerate((*PARAMETERS, *MODAL))
+        }
+        for method in runs
     }
-    converged = {name: int(rows["converged"].sum()) for name, rows in by_method.items()}
+    return _overview("Mean (standard deviation) over the converged runs", cells, converged, runs)
+
+
+class _Sums(dict[str, Array]):
+    """Sums of each method over its runs, (8,)."""
+
+    def __missing__(self, method: str) -> Array:
+        return np.zeros(len(PARAMETERS) + len(MODAL))
+
+
+def _overview(
+    title: str, cells: Mapping[str, Mapping[str, Cell]], converged: Mapping[str, int], runs: Mapping[str, int]
+) -> Table:
     return Table(
-        title="Estimates with 95 % intervals"
-        if single
-        else "Mean (standard deviation) over the converged runs",
-        columns=("parameter", "unit", *by_method),
+        title=title,
+        columns=("parameter", "unit", *cells),
         groups=(
             Group(
                 "",
@@ -175,8 +234,8 @@ def _overview(by_method: Mapping[str, pd.DataFrame]) -> Table:
             Group(
                 "Runs",
                 (
-                    ("converged", "", *converged.values()),
-                    ("not converged", "", *(len(rows) - converged[n] for n, rows in by_method.items())),
+                    ("converged", "", *(converged[m] for m in cells)),
+                    ("not converged", "", *(runs[m] - converged[m] for m in cells)),
                 ),
             ),
         ),
@@ -184,28 +243,8 @@ def _overview(by_method: Mapping[str, pd.DataFrame]) -> Table:
     )
 
 
-def overview_of(estimates: Sequence[Estimates]) -> Table:
-    """`overview` of estimates by several methods, without a row for each run in memory."""
-    import pandas as pd
-
-    frames = {
-        e.method: estimates_table(e)
-        if len(e.run_ids) == 1
-        else pd.DataFrame(point_values(e), columns=[*PARAMETERS, *MODAL]).assign(converged=e.converged)
-        for e in estimates
-    }
-    return _overview(frames)
-
-
 def _intervals(run: pd.Series) -> dict[str, Cell]:
     return {
         name: Interval(Number(run[name]), Number(run[f"{name}_lower"]), Number(run[f"{name}_upper"]))
-        for name in (*PARAMETERS, *MODAL)
-    }
-
-
-def _spreads(runs: pd.DataFrame) -> dict[str, Cell]:
-    return {
-        name: Pair(Number(runs[name].mean()), Number(runs[name].std(), digits=2))
         for name in (*PARAMETERS, *MODAL)
     }

@@ -1,0 +1,76 @@
+"""Estimates from arrays: of each run of a batch, and of several batches together. Nothing is checked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from airtruth.identification.condition import AircraftConstants, OneOrEach
+from airtruth.identification.estimates import Estimates
+from airtruth.identification.methods import method, regression
+from airtruth.identification.options import Options
+from airtruth.identification.reconstructed import with_reconstruction
+from airtruth.identification.regression.solve import regress_batch, regress_joint
+from airtruth.logs.flight_log import Batch
+
+
+def identify_batch(
+    batch: Batch, constants: AircraftConstants, name: str, options: Options | None = None
+) -> Estimates:
+    """Estimate the six derivatives of each run; nothing is checked.
+
+    A result does not depend on the other runs of the batch.
+
+    Parameters
+    ----------
+    batch : runs of one length and sample period, as `airtruth.logs.flight_log.batches` makes them.
+    constants : aircraft, any object with wing_area_m2, chord_m, mass_kg, inertia_yy_kg_m2.
+    name : method, a key of `airtruth.identification.METHODS`.
+    options : choices; None for the defaults.
+
+    Raises
+    ------
+    ConfigurationError
+        If the method does not exist.
+    """
+    chosen = method(name)
+
+    def estimate(parts: Sequence[Batch], options: Options) -> Estimates:
+        if chosen.estimate is not None:
+            return chosen.estimate(parts[0], constants, options)
+        pose = regression(chosen) if chosen.iterates else None
+        return regress_batch(parts[0], constants, name, pose, options)
+
+    return with_reconstruction(estimate, [batch], options or Options())
+
+
+def identify_joint(
+    parts: Sequence[Batch], constants: OneOrEach, name: str, options: Options | None = None
+) -> Estimates:
+    """One estimate for all runs together; nothing is checked.
+
+    The normal equations of all runs are summed. Trim, flight condition and filters remain each run's own.
+    All runs are held in memory.
+
+    Parameters
+    ----------
+    parts : batches; lengths and rates may differ.
+    constants : of all batches, or one entry for each: mass and inertia may differ.
+    name, options : as in `identify_batch`.
+
+    Raises
+    ------
+    ConfigurationError
+        If the method does not exist.
+    """
+    chosen = method(name)
+
+    def estimate(parts: Sequence[Batch], options: Options) -> Estimates:
+        if chosen.estimate_joint is not None:
+            return chosen.estimate_joint(parts, constants, options)
+        pose = regression(chosen) if chosen.iterates else None
+        return regress_joint(parts, constants, name, pose, options)
+
+    return with_reconstruction(estimate, parts, options or Options())
+
+
+__all__ = ["identify_batch", "identify_joint"]

@@ -1,0 +1,151 @@
+"""What one log gives to an identification: the unit of work, in this process or on a cluster."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from airtruth.aircraft import Aircraft
+from airtruth.checks import gate
+from airtruth.cluster import Cluster, LostWorkError
+from airtruth.errors import ConfigurationError, LogError, StoreError
+from airtruth.identification.batch import identify_batch
+from airtruth.identification.checks import airspeed_fault, check_batch, check_channels
+from airtruth.identification.condition import AircraftConstants
+from airtruth.identification.estimates import Estimates, concatenated
+from airtruth.identification.methods import Method
+from airtruth.identification.options import Options
+from airtruth.identification.record_constants import Part, differing, with_constants
+from airtruth.identification.result import Source
+from airtruth.logs.flight_log import FlightLog
+from airtruth.logs.sources import IN_MEMORY
+from airtruth.logs.store import read_log
+
+
+@dataclass(frozen=True)
+class LogTask:
+    """One log to identify, and how; a file is relative to ``folder``, since a worker has another working folder."""
+
+    folder: Path
+    entry: Path | FlightLog
+    methods: Sequence[Method]
+    options: Options
+    plane: AircraftConstants
+    force: bool
+    joint: bool
+
+    @property
+    def source(self) -> str:
+        """Where the log is from, for messages."""
+        return str(self.entry) if isinstance(self.entry, Path) else IN_MEMORY
+
+
+@dataclass
+class FromLog:
+    """What one log gives: its runs and notes, the estimates of each method, or the parts of a joint estimate."""
+
+    run_ids: tuple[str, ...]
+    origin: Source | None = None
+    parts: list[Part] = field(default_factory=list)
+    estimates: dict[str, Estimates] = field(default_factory=dict)
+    stated: dict[str, list[tuple[str, float, float]]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    forced: list[str] = field(default_factory=list)
+
+
+def results_of(
+    tasks: Iterable[LogTask], estimated: Callable[[Estimates], None], cluster: Cluster | None
+) -> Iterator[tuple[LogTask, FromLog]]:
+    """Return each task with what its log gives, in the order of the tasks.
+
+    Parameters
+    ----------
+    tasks : the logs.
+    estimated : called with the estimates of each method from each log.
+    cluster : whose workers identify the logs; None for this process.
+
+    Raises
+    ------
+    StoreError
+        If the workers of a log end each time, or a file cannot be read.
+    LogError, ConfigurationError
+        If a log cannot be identified.
+    """
+    if cluster is None:
+        for task in tasks:
+            yield task, from_log(task, estimated)
+        return
+    early: dict[str, FromLog] = {}
+    order: deque[LogTask] = deque()
+
+    def noted() -> Iterator[LogTask]:
+        for task in tasks:
+            order.append(task)
+            yield task
+
+    for task, found in cluster.completed(from_log, noted()):
+        if isinstance(found, LostWorkError):
+            raise StoreError(
+                f"{task.source}: the workers of the cluster that identified this log ended each time; give them more memory, "
+                "or identify it without --cluster"
+            )
+        for made in found.estimates.values():
+            estimated(made)
+        early[task.source] = found
+        while order and order[0].source in early:
+            following = order.popleft()
+            yield following, early.pop(following.source)
+
+
+def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made: None) -> FromLog:
+    """Read and check one log, and estimate from it unless the estimate is joint.
+
+    ``estimated`` receives the estimates of each method.
+    """
+    entry = task.entry
+    log = read_log(task.folder / entry) if isinstance(entry, Path) else entry
+    found = FromLog(tuple(log.run_ids))
+    _check(log, task, found)
+    try:
+        for run_id, name, own, declared in differing(log.metadata, log.run_ids, task.plane):
+            found.stated.setdefault(name, []).append((run_id, own, declared))
+        parts = list(with_constants(log, task.plane))
+        for part in parts:
+            check_batch(part.batch, task.options)
+    except LogError as error:
+        raise LogError(f"{task.source}: {error}" if isinstance(entry, Path) else str(error)) from None
+    if isinstance(entry, Path):
+        with (task.folder / entry).open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        found.origin = Source(entry.name, digest, len(log.run_ids))
+    if task.joint:
+        found.parts = parts
+        return found
+    for chosen in task.methods:
+        made = [identify_batch(p.batch, p.constants, chosen.name, task.options) for p in parts]
+        found.estimates[chosen.name] = concatenated(made, log.run_ids)
+        estimated(found.estimates[chosen.name])
+    return found
+
+
+def _check(log: FlightLog, task: LogTask, found: FromLog) -> None:
+    source = task.source if isinstance(task.entry, Path) else ""
+    known = task.plane if isinstance(task.plane, Aircraft) else None
+    for fault in gate.require(log, known, source=source, force=task.force):
+        (found.forced if fault.certain else found.notes).append(fault.sentence)
+    prefix = f"{source}: " if source else ""
+    try:
+        check_channels(log, task.methods)
+    except LogError as error:
+        raise LogError(f"{prefix}{error}") from None
+    sentence = airspeed_fault(log, task.options)
+    if sentence is not None:
+        if not task.force:
+            raise ConfigurationError(f"{prefix}{sentence}")
+        found.forced.append(f"{prefix}{sentence}")
+
+
+__all__ = ["FromLog", "LogTask", "from_log", "results_of"]
