@@ -1,5 +1,6 @@
-"""A server of the S3 protocol for each test process, and a bucket for each test."""
+"""Servers of the S3 protocol and of Google Cloud Storage, a bucket for each test, and a campaign beside them."""
 
-from conftest_stores import bucket, s3_server
+from campaigns import campaign, local
+from conftest_stores import bucket, google_bucket, s3_server
 
-__all__ = ["bucket", "s3_server"]
+__all__ = ["bucket", "campaign", "google_bucket", "local", "s3_server"]

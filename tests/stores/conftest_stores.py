@@ -1,4 +1,4 @@
-"""A server of the S3 protocol on the loopback address (moto), and the environment in which airtruth uses it."""
+"""Stores on the loopback address (moto, gcp-storage-emulator), and the environment in which airtruth uses them."""
 
 from __future__ import annotations
 
@@ -17,6 +17,25 @@ import pytest
 PATIENCE_S = 60.0  # start of the server on a busy machine
 
 
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def wait_for(port: int, process: subprocess.Popen[bytes]) -> None:
+    """Wait until a server accepts connections."""
+    end = time.monotonic() + PATIENCE_S
+    while True:
+        try:
+            with socket.create_connection(("127.0.0.1", port), 1.0):
+                return
+        except OSError:
+            assert time.monotonic() < end, "the server does not answer"
+            assert process.poll() is None, "the server has ended"
+            time.sleep(0.05)
+
+
 class Server:
     """A process that serves S3; its keys are lost when it ends."""
 
@@ -24,9 +43,7 @@ class Server:
         """``free_requests``: requests that need no permission; None for all."""
         if find_spec("moto") is None:
             pytest.skip("the S3 server of the tests is not installed: pip install 'moto[server]'")
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            port = probe.getsockname()[1]
+        port = free_port()
         self.address = f"http://127.0.0.1:{port}"
         extra = {} if free_requests is None else {"INITIAL_NO_AUTH_ACTION_COUNT": str(free_requests)}
         self._process = subprocess.Popen(
@@ -36,18 +53,7 @@ class Server:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        end = time.monotonic() + PATIENCE_S
-        while not self._answers():
-            assert time.monotonic() < end, "moto does not answer"
-            assert self._process.poll() is None, "moto has ended"
-            time.sleep(0.05)
-
-    def _answers(self) -> bool:
-        try:
-            with socket.create_connection(("127.0.0.1", int(self.address.rpartition(":")[2])), 1.0):
-                return True
-        except OSError:
-            return False
+        wait_for(port, self._process)
 
     def request(self, method: str, path: str) -> None:
         """Send a request without credentials."""
@@ -90,3 +96,38 @@ def bucket(
     from airtruth.logs import remote
 
     remote._file_system.cache_clear()
+
+
+@pytest.fixture
+def google_bucket(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """URL of a bucket in an emulator of Google Cloud Storage, which serves this test alone."""
+    if find_spec("gcp_storage_emulator") is None:
+        pytest.skip("the emulator of Google Cloud Storage is not installed: pip install gcp-storage-emulator")
+    from airtruth.logs import remote
+
+    port = free_port()
+    start = [
+        "start",
+        "--host",
+        "127.0.0.1",
+        "--port",
+        str(port),
+        "--in-memory",
+        "--default-bucket",
+        "flights",
+    ]
+    process = subprocess.Popen(
+        [sys.executable, "-c", "from gcp_storage_emulator.__main__ import main; main()", *start],
+        cwd=tmp_path,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        wait_for(port, process)
+        monkeypatch.setenv("CLOUD_STORAGE_EMULATOR_ENDPOINT", f"http://127.0.0.1:{port}")
+        remote._file_system.cache_clear()
+        yield "gs://flights"
+    finally:
+        remote._file_system.cache_clear()
+        process.kill()
+        process.wait()

@@ -13,80 +13,25 @@ from pathlib import Path
 
 import pytest
 import store_users as iam
+from campaigns import contents, everything, wait_for_records
 from commands import running
 from conftest_stores import Server, use
 
 from airtruth.errors import ConfigurationError, StoreError
-from airtruth.identification import identify, write_estimates
 from airtruth.logs import lease
 from airtruth.logs.lease import leased
-from airtruth.logs.remote import RemotePath, location
+from airtruth.logs.remote import location
 from airtruth.logs.verify import verify
-from airtruth.reporting import write_tables
 from airtruth.simulation.campaign import plan
 from airtruth.simulation.campaign.run import fly
 
-CAMPAIGN = """
-schema = 1
-name = "light"
-aircraft = "gtm"
-runs = 36
-seed = 7
-duration_s = 5.0
-[condition]
-eas_kt = 75.0
-altitude_ft = 7000.0
-[[manoeuvre]]
-kind = "doublet"
-amplitude_deg = 1.0
-[gust]
-figures = "gtm"
-level = "light"
-"""
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("stores")]
-METHODS = ("ls", "iv-lowpass", "iv-f1")
-
-
-@pytest.fixture(scope="module")
-def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    file = tmp_path_factory.mktemp("campaign") / "light.toml"
-    file.write_text(CAMPAIGN)
-    return file
-
-
-@pytest.fixture(scope="module")
-def local(campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The campaign flown, identified and tabulated in a folder."""
-    out = tmp_path_factory.mktemp("local")
-    everything(campaign, out)
-    return out
-
-
-def everything(campaign: Path, out: Path) -> None:
-    fly(plan.make(campaign), out / "light")
-    write_estimates(out / "light" / "estimates.parquet", identify(out / "light", "gtm", METHODS))
-    write_tables([out / "light"], out / "tables")
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    files = folder.files() if isinstance(folder, RemotePath) else folder.rglob("*")
-    return {
-        p.relative_to(folder).as_posix(): p.read_bytes()
-        for p in files
-        if p.name != ".lock" and (isinstance(folder, RemotePath) or p.is_file())
-    }
 
 
 def command(*arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "airtruth", *map(str, arguments)], capture_output=True, text=True, check=False
     )
-
-
-def wait_for_records(out: Path, process: subprocess.Popen[str], number: int) -> None:
-    while len(list((out / "manifest-parts").iterdir())) < number:
-        assert process.poll() is None, "it ended before it could be killed"
-        time.sleep(0.02)
 
 
 @pytest.mark.long

@@ -25,6 +25,8 @@ Result = TypeVar("Result")
 
 SCHEMES: Final = {"s3": "?allow_delayed_open=true", "gs": "?retry_limit_seconds=30"}
 """Scheme of a URL -> options of pyarrow: a small key is one upload (s3); a store that is silent for 30 s has failed (gs)."""
+GOOGLE_EMULATOR: Final = "CLOUD_STORAGE_EMULATOR_ENDPOINT"
+"""Variable with the address of an emulator of Google Cloud Storage, as Google's C++ client reads it."""
 REQUESTS: Final = 16
 """Requests to a store at a time [-] (judgement: each waits for some 10 ms, and few processors are needed)."""
 _DENIED: Final = (
@@ -322,7 +324,9 @@ def _file_system(scheme: str, bucket: str) -> Any:
     """The file system of a bucket, one for each process."""
     from pyarrow.fs import FileSystem
 
-    return FileSystem.from_uri(f"{scheme}://{bucket}{SCHEMES[scheme]}")[0]
+    # pyarrow's Google client takes the address of an emulator from the environment and asks for credentials all the same
+    user = "anonymous@" if scheme == "gs" and GOOGLE_EMULATOR in os.environ else ""
+    return FileSystem.from_uri(f"{scheme}://{user}{bucket}{SCHEMES[scheme]}")[0]
 
 
 __all__ = ["REQUESTS", "RemotePath", "answered", "each", "files_below", "location", "uploaded"]

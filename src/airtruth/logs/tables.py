@@ -117,12 +117,25 @@ def write_parts(
             waiting.append(part.cast(schema))
             rows += part.num_rows
             while rows - written >= ROWS_PER_GROUP:
-                table = pa.concat_tables(waiting)
-                writer.write_table(table.slice(0, ROWS_PER_GROUP).combine_chunks())
-                waiting, written = [table.slice(ROWS_PER_GROUP)], written + ROWS_PER_GROUP
+                writer.write_table(_taken(waiting, ROWS_PER_GROUP))
+                written += ROWS_PER_GROUP
         if writer is not None and (rows > written or not rows):
-            writer.write_table(pa.concat_tables(waiting).combine_chunks())
+            writer.write_table(_taken(waiting, rows - written))
     return rows
+
+
+def _taken(waiting: list[pa.Table], rows: int) -> pa.Table:
+    """Take the first rows of tables as one table; a column at a time, so that the memory does not hold them twice."""
+    whole = pa.concat_tables(waiting)
+    schema, columns = whole.schema, [column.chunks for column in whole.slice(0, rows).columns]
+    waiting[:] = [whole.slice(rows)] if whole.num_rows > rows else []
+    del whole
+    joined: list[pa.Array] = []
+    while columns:
+        chunks = columns.pop(0)
+        joined.append(pa.concat_arrays(chunks) if chunks else pa.array([], schema.field(len(joined)).type))
+        del chunks
+    return pa.Table.from_arrays(joined, schema=schema)
 
 
 Kind = Literal["text", "number", "flag"]
