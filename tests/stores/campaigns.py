@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -50,9 +51,19 @@ def local(campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def everything(campaign: Path, out: Path, cluster: Cluster | None = None) -> None:
-    fly(plan.make(campaign), out / "light", cluster=cluster)
-    result = identify(out / "light", "gtm", METHODS, cluster=cluster)
+def silent(done: int, total: int, failed: int) -> None:
+    """Report no progress."""
+
+
+def everything(
+    campaign: Path,
+    out: Path,
+    cluster: Cluster | None = None,
+    flying: Callable[[int, int, int], None] = silent,
+    identifying: Callable[[int, int, int], None] = silent,
+) -> None:
+    fly(plan.make(campaign), out / "light", cluster=cluster, advance=flying)
+    result = identify(out / "light", "gtm", METHODS, cluster=cluster, advance=identifying)
     write_estimates(out / "light" / "estimates.parquet", result)
     write_tables([out / "light"], out / "tables")
 

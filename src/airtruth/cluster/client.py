@@ -88,7 +88,10 @@ class Cluster:
                     self._require_connection()
                     continue
                 for future in [f for f in running if f in done]:
-                    yield running.pop(future), self._result(future)
+                    item, result = running.pop(future), self._result(future)
+                    # while anything refers to a result, Dask performs its task again when the worker that keeps it dies
+                    future.release()
+                    yield item, result
                 self._submit(function, waiting, running)
         finally:
             for future in running:
