@@ -1,4 +1,4 @@
-"""Time and memory of the bookkeeping of a large campaign: fly, resume, verify, identify's reduction and tables.
+"""Time and memory of the bookkeeping of a large campaign: fly, resume, verify, identify's reduction, tables, report.
 
     python -m benchmarks.bench_scale [--runs 1000000] [--methods 2] [--keep DIR]
 
@@ -30,7 +30,7 @@ SAMPLES: Final = 6
 """Samples of a log's run [-]: 0.1 s at 50 Hz."""
 METHODS: Final = ("ls", "iv-f1", "iv-lowpass", "iv-reference", "iv-actuator", "iv-f2")
 """Methods of the estimates, the first ``--methods`` of them."""
-STEPS: Final = ("plan", "fly", "resume", "verify", "identify", "tables", "grow")
+STEPS: Final = ("plan", "fly", "resume", "verify", "identify", "tables", "report", "grow")
 """Steps in the order in which they are measured."""
 LIMIT_S: Final = 600.0
 """Aim for the time of a step at a million runs [s]."""
@@ -161,6 +161,13 @@ def _tables(out: Path, runs: int, methods: tuple[str, ...]) -> None:
     write_tables([out], out / "tables")
 
 
+def _report(out: Path, runs: int, methods: tuple[str, ...]) -> None:
+    """The page of the estimates, with a dozen of the records."""
+    from airtruth.reporting import report
+
+    report(out, out / "tables" / "report.html")
+
+
 def _copied(made: Any, chunks: list[int], logs: Path, truths: Path, jobs: int) -> Iterator[Any]:
     """Chunks in the real formats, each run with the same samples and the same truth."""
     from airtruth.channels import SIGNALS
@@ -229,6 +236,7 @@ _STEPS: Final[dict[str, Callable[[Path, int, tuple[str, ...]], None]]] = {
     "verify": _verify,
     "identify": _identify,
     "tables": _tables,
+    "report": _report,
 }
 """Step -> what it does."""
 

@@ -113,15 +113,16 @@ def simulated_records(
         If a log cannot be read, or the logs lack a run of the estimates.
     """
     methods = tuple(dict.fromkeys(estimates["method"]))
-    rows = {
-        (str(run), str(method)): part.iloc[0]
-        for (run, method), part in estimates.groupby(["run_id", "method"], sort=False)
-    }
     runs = list(dict.fromkeys(estimates["run_id"]))
     joint = runs == [JOINT]
     if joint:
         runs = [run for _, log in named_logs(logs) for run in log.run_ids]
     chosen = [runs[round(k)] for k in np.linspace(0, len(runs) - 1, min(most, len(runs)))]
+    own_rows = estimates[estimates["run_id"].isin([JOINT] if joint else chosen)]
+    rows = {
+        (str(run), str(method)): part.iloc[0]
+        for (run, method), part in own_rows.groupby(["run_id", "method"], sort=False)
+    }
     found = {}
     for _, log in named_logs(logs, run_ids=chosen):
         for run in log.run_ids:

@@ -81,14 +81,17 @@ def named_logs(
     remaining = None if run_ids is None else set(run_ids)
     for source in sources(logs):
         name = IN_MEMORY if isinstance(source, FlightLog) else str(source)
-        log = source if isinstance(source, FlightLog) else read_log(source, columns)
-        if isinstance(source, FlightLog) and columns is not None:
-            log = log.select(channels=columns)
+        wanted = None
         if run_ids is not None:
-            wanted = set(run_ids) & set(log.run_ids)
+            present = source if isinstance(source, FlightLog) else read_log(source, columns=[])
+            wanted = set(run_ids) & set(present.run_ids)
             if not wanted:
                 continue
-            log = log.select(run_ids=wanted)
+        if not isinstance(source, FlightLog):
+            log = read_log(source, columns, wanted)
+        else:
+            log = source if columns is None else source.select(channels=columns)
+            log = log if wanted is None else log.select(run_ids=wanted)
         for run_id in log.run_ids:
             if run_id in owner:
                 raise LogError(

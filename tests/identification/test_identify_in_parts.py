@@ -1,0 +1,102 @@
+"""An identification whose estimates are in a temporary file: the bytes, notes and tables of one in memory."""
+
+import errno
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airtruth.errors import LogError, StoreError
+from airtruth.identification import identified, identify, spool, write_estimates
+from airtruth.identification.doubts import doubts
+from airtruth.identification.spool import Spool
+from airtruth.identification.tables import overview_of
+from airtruth.logs import tables
+from airtruth.logs.owners import Owners
+from airtruth.logs.store import read_log, write_log
+from airtruth.table import as_text
+from validation.linear_flight import GTM, as_log, fly
+
+LOG = as_log(fly(runs=7, gust=1.0, noise=1.0, seed=72))
+METHODS = ("ls", "iv-f1")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Four logs of up to two runs."""
+    out = tmp_path_factory.mktemp("logs")
+    for k in range(0, 7, 2):
+        write_log(out / f"{k}.parquet", LOG.select(run_ids=LOG.run_ids[k : k + 2]), dtype="float64")
+    return out
+
+
+@pytest.fixture(scope="module")
+def whole(folder):
+    return identify(folder, GTM, METHODS)
+
+
+@pytest.mark.parametrize("runs", [1, 3, 100])
+def test_the_file_has_the_bytes_of_an_identification_in_memory(folder, whole, runs, tmp_path, monkeypatch):
+    monkeypatch.setattr(spool, "RUNS_PER_PART", runs)
+    monkeypatch.setattr(tables, "ROWS_PER_GROUP", 5)
+    write_estimates(tmp_path / "memory.parquet", whole)
+    with identified(folder, GTM, METHODS, folder=tmp_path) as result:
+        assert list(tmp_path.iterdir()) == [tmp_path / "memory.parquet"]  # the temporary file has no name
+        write_estimates(tmp_path / "parts.parquet", result)
+        assert result.summary() == whole.summary()
+        assert (result.notes, result.sources, result.methods) == (whole.notes, whole.sources, whole.methods)
+        assert result.to_frame().equals(whole.to_frame())
+    assert (tmp_path / "parts.parquet").read_bytes() == (tmp_path / "memory.parquet").read_bytes()
+
+
+def test_doubts_and_means_of_parts_are_those_of_all_runs(whole):
+    """Of runs without estimates, with wrong signs, with open parameters, and of methods that contradict each other."""
+    ls, iv = whole.estimates
+    theta, covariance = ls.theta.copy(), ls.covariance.copy()
+    theta[1] = np.nan
+    theta[3:, 3] = np.abs(theta[3:, 3])
+    theta[:, 1] += 200.0
+    covariance[2:, 1, 1] = 40.0**2
+    covariance[5, 0, 0] = -1.0
+    estimates = (replace(ls, theta=theta, covariance=covariance), iv)
+
+    def parts():
+        return [[e.rows(first, first + 2) for e in estimates] for first in range(0, 7, 2)]
+
+    expected = doubts(lambda: [estimates])
+    words = ("no estimate", "no frequency", "no intervals", "do not determine", "wrong sign", "contradict")
+    assert all(any(word in sentence for sentence in expected) for word in words)
+    assert doubts(parts) == expected
+    assert as_text(overview_of(parts)) == as_text(overview_of(lambda: [estimates]))
+
+
+def test_a_run_that_two_logs_hold_is_refused_in_any_order_of_names(folder):
+    files = sorted(folder.iterdir())
+    owners = Owners()
+    for file in (files[2], files[0], files[3], files[1]):
+        owners.add(file, read_log(file, columns=[]).run_ids)
+    with pytest.raises(
+        LogError, match=r"run 'b0-run-0002' is in .*2\.parquet and in log in memory; give each run once"
+    ):
+        owners.add(LOG, ("q", LOG.run_ids[2], "z"))
+    owners.add(LOG, ("q", "z"))  # a range of names that holds the others, and none of them
+
+
+def test_a_full_disk_is_one_sentence(whole, tmp_path):
+    class Full:
+        def write(self, content):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        def close(self):
+            return
+
+    with Spool(tmp_path) as estimates:
+        estimates._file.close()
+        estimates._file = Full()
+        estimates.add(whole.estimates)
+        with pytest.raises(
+            StoreError, match=r"temporary file of the estimates cannot be written .*free space"
+        ):
+            list(estimates.parts())
+    with pytest.raises(StoreError, match="temporary file of the estimates"):
+        Spool(tmp_path / "absent")
