@@ -16,7 +16,7 @@ from airtruth.checks.fault import Fault
 from airtruth.checks.spectra import integral
 from airtruth.logs.flight_log import Batch, FlightLog
 from airtruth.logs.store import STATED_UNITS
-from airtruth.physics.reconstruction import COLUMNS
+from airtruth.physics.reconstruction import is_reconstructed
 from airtruth.units import G0, UNITS
 
 Array = NDArray[np.float64]
@@ -108,13 +108,13 @@ def units(log: FlightLog) -> Iterator[Fault]:
 
 def reconstructed(log: FlightLog) -> Iterator[Fault]:
     """An angle of attack that no vane measured, which the import marks by the columns of its errors."""
-    if not set(COLUMNS) & log.channels.keys():
+    if not is_reconstructed(log.channels):
         return
     yield Fault(
         "alpha_rad", log.run_ids[0], "reconstructed",
         "alpha_rad: reconstructed from inertial measurements and airspeed, no vane was recorded: gusts are not in it, it "
         "agrees with q_rad_s and az_m_s2 by construction, and no error of a vane can be estimated; identify adds its "
-        "uncertainty to the intervals, trace does not", False, 1.0,
+        "uncertainty to the intervals, trace takes q_rad_s and az_m_s2 as outputs and alpha as a state", False, 1.0,
     )  # fmt: skip
 
 

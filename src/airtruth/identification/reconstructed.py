@@ -16,7 +16,7 @@ import numpy as np
 from airtruth.identification.estimates import Estimates
 from airtruth.identification.options import Options
 from airtruth.logs.flight_log import Batch
-from airtruth.physics.reconstruction import COLUMNS
+from airtruth.physics.reconstruction import COLUMNS, is_reconstructed
 
 
 def with_reconstruction(
@@ -33,7 +33,7 @@ def with_reconstruction(
     options : choices.
     """
     made = estimate(parts, options)
-    if options.covariance == "none" or not any(name in p.channels for p in parts for name in COLUMNS):
+    if options.covariance == "none" or not any(is_reconstructed(p.channels) for p in parts):
         return made
     covariance = made.covariance.copy()
     for name in COLUMNS:

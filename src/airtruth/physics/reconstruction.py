@@ -12,7 +12,7 @@ by w/V and is not seen.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -42,6 +42,11 @@ LEAST_ALTITUDE_STD_M: Final = 0.02
 """Least standard deviation of an altitude [m] (judgement: resolution of a barometer)."""
 LEAST_ATTITUDE_STD_RAD: Final = 1e-4
 """Least standard deviation of an attitude [rad] (judgement)."""
+
+
+def is_reconstructed(channels: Collection[str]) -> bool:
+    """Whether the columns of a log hold the errors of a reconstructed alpha, so that no vane measured it."""
+    return any(name in channels for name in COLUMNS)
 
 
 @dataclass(frozen=True)
@@ -160,4 +165,4 @@ def _integral(x: Array, dt_s: float) -> Array:
     return np.asarray(rule(x, dx=dt_s, initial=0.0))
 
 
-__all__ = ["COLUMNS", "ERRORS", "NEEDED", "Priors", "Reconstruction", "reconstruct"]
+__all__ = ["COLUMNS", "ERRORS", "NEEDED", "Priors", "Reconstruction", "is_reconstructed", "reconstruct"]

@@ -29,9 +29,8 @@ def confirmation(stages: Stages) -> bool | None:
         return None
     before, after = stages.held["before"], stages.held["after"]
     lags = [round(MEMORY_S / r.signals.dt_s) for r in stages.case.held.records]
-    return not (
-        _worse(_likelihood_gains(before, after), lags) or _worse(_free_run_gains(before, after), lags)
-    )
+    free = _free_run_gains(before, after, stages.case.held.settings.measured)
+    return not (_worse(_likelihood_gains(before, after), lags) or _worse(free, lags))
 
 
 def _likelihood_gains(before: Sequence[Assessment], after: Sequence[Assessment]) -> Iterator[Array]:
@@ -46,11 +45,14 @@ def _densities(assessed: Assessment) -> Array:
     return np.asarray(-squares - (assessed.likelihood - squares.sum()) / len(squares))
 
 
-def _free_run_gains(before: Sequence[Assessment], after: Sequence[Assessment]) -> Iterator[Array]:
-    """(samples,) gains in the squared residual of each record, channels weighted by the smaller of their errors."""
+def _free_run_gains(
+    before: Sequence[Assessment], after: Sequence[Assessment], measured: NDArray[np.bool_]
+) -> Iterator[Array]:
+    """(samples,) gains in the squared residual of each record, measured channels weighted by the smaller of their errors."""
     for old, new in zip(before, after, strict=True):
         weight = np.minimum(old.free_run, new.free_run)
-        yield (((old.residual / weight) ** 2) - ((new.residual / weight) ** 2)).sum(axis=1)
+        gains = ((old.residual / weight) ** 2) - ((new.residual / weight) ** 2)
+        yield gains[:, measured].sum(axis=1)
 
 
 def _worse(gains: Iterator[Array], lags: Sequence[int]) -> bool:

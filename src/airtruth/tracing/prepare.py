@@ -17,13 +17,14 @@ from airtruth.errors import ConfigurationError, FlightError, LogError, TrimError
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.composition import directions
 from airtruth.physics.gust_figures import gust_scales
+from airtruth.physics.reconstruction import is_reconstructed
 from airtruth.simulation.trim import Trim
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.model.plant import Plant, declared_derivatives, engines, linear, probed, trim_of
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, read
 from airtruth.tracing.model.remainder import remainder
-from airtruth.tracing.model.settings import declared_change, resolved, settings_of
+from airtruth.tracing.model.settings import VANE, declared_change, resolved, settings_of
 from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.selection.explanation import DERIVATIVES, causes_of
 from airtruth.tracing.selection.release import DeclaredCauses
@@ -56,6 +57,11 @@ _GUST_ALTITUDE_M: Final = (30.0, 20000.0)
 """Altitudes between which the gust scales are evaluated [m] (judgement: within the range of MIL-F-8785C)."""
 _AIR: Final = "each record has its own gust level, and the measured airspeed contains the horizontal gusts"
 """Why an effect of the air is not tested."""
+_NO_VANE: Final = (
+    "alpha was reconstructed, because no vane measured it: the filter takes q and az as outputs and alpha as a state, and "
+    "no effect of a vane can be tested"
+)
+"""Note of a trace of records without a vane."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +89,11 @@ class Case:
     notes: tuple[str, ...]
     declared: DeclaredCauses
     left_out: tuple[str, ...] = ()
+
+    @property
+    def has_vane(self) -> bool:
+        """Whether alpha was measured in every record."""
+        return bool(self.fitted.settings.measured.all())
 
 
 def prepare(
@@ -116,7 +127,9 @@ def prepare(
     records = _records(signals, aircraft, model, chosen)
     fitted = tuple(r for r in records if r.signals.run_id not in chosen)
     has_throttle = all(r.signals.throttle is not None for r in fitted)
-    settings = settings_of(aircraft, _THRUST_STD if has_throttle else _THRUST_UNKNOWN_STD)
+    has_vane = not any(is_reconstructed(log.channels) for log in logs)
+    thrust_std = _THRUST_STD if has_throttle else _THRUST_UNKNOWN_STD
+    settings = settings_of(aircraft, thrust_std, has_vane=has_vane)
     settings = resolved(settings, fitted)
     held = tuple(r for r in records if r.signals.run_id in chosen)
     if len(fitted) == 1:
@@ -124,14 +137,16 @@ def prepare(
         fitted = _halves(fitted[0])
     if not held:
         notes.append("nothing is held out: the verdict is provisional")
+    if not has_vane:
+        notes.append(_NO_VANE)
     columns = set.intersection(*(set(log.channels) for log in logs))
-    reasons = {effect.key: _why_not(effect, columns) for effect in effects}
+    reasons = {effect.key: _why_not(effect, columns, has_vane) for effect in effects}
     first = fitted[0].plant.trim_alpha_rad
     trim_alpha_rad = first + fmean(r.plant.trim_alpha_rad - first for r in fitted)
     return Case(
         fitted=TraceProblem(fitted, settings, options.threads),
         held=TraceProblem(held, settings, options.threads) if held else None,
-        hypothesis=Hypothesis(declared_change(aircraft), trim_alpha_rad=trim_alpha_rad),
+        hypothesis=Hypothesis(declared_change(aircraft, has_vane=has_vane), trim_alpha_rad=trim_alpha_rad),
         effects=tuple(e for e in effects if not reasons[e.key]),
         untestable=tuple((e, reasons[e.key]) for e in effects if reasons[e.key]),
         model=model,
@@ -154,11 +169,13 @@ def _declared_causes(
     )
 
 
-def _why_not(effect: Effect, columns: Collection[str]) -> str:
+def _why_not(effect: Effect, columns: Collection[str], has_vane: bool) -> str:
     """Why an effect cannot be tested; empty if it can."""
     missing = [channel for channel in effect.channels if channel not in columns]
     if missing:
         return f"the log lacks {', '.join(missing)}"
+    if not has_vane and VANE in effect.channels:
+        return "alpha was reconstructed: no vane measured it"
     return _AIR if effect.where == "air" else ""
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -18,6 +18,7 @@ from airtruth.simulation.replay import Track, replay, substeps
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim, trim
 from airtruth.tracing.inference.assess import noise_floor
+from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.model.compile import CHANNELS, compile_change
 from airtruth.tracing.model.records import FINE, TraceRecord
 from airtruth.tracing.stage_errors import Errors, PerChannel, Replay
@@ -54,11 +55,11 @@ def flown_again(stages: Stages, aircraft: Aircraft, updated: str | Path | None) 
         return Replay()
     new = None if updated is None else planes.load(updated)
     weights = _weights(stages)
-    records = stages.reported[0].records
+    problem = stages.reported[0]
     try:
         return Replay(
-            declared=_errors(records, aircraft, weights),
-            updated=None if new is None else _errors(records, new, weights),
+            declared=_errors(problem, aircraft, weights),
+            updated=None if new is None else _errors(problem, new, weights),
         )
     except (FlightError, TrimError):
         return Replay()
@@ -99,10 +100,11 @@ def _weights(stages: Stages) -> list[Array]:
     ]
 
 
-def _errors(records: Sequence[TraceRecord], aircraft: Aircraft, weights: list[Array]) -> PerChannel:
+def _errors(problem: TraceProblem, aircraft: Aircraft, weights: list[Array]) -> PerChannel:
+    """Root mean squares of the measured channels."""
     trims: dict[Condition, Trim] = {}
     squares = []
-    for record, weight in zip(records, weights, strict=False):
+    for record, weight in zip(problem.records, weights, strict=False):
         declared = record.plant.trim
         assert declared is not None
         before = declared.airspeed_m_s
@@ -117,7 +119,10 @@ def _errors(records: Sequence[TraceRecord], aircraft: Aircraft, weights: list[Ar
         )
         residual = record.signals.y - np.stack([flown[c] for c in CHANNELS], axis=1)
         squares.append((residual**2).mean(axis=0))
-    return dict(zip(CHANNELS, np.sqrt(np.mean(squares, axis=0)).tolist(), strict=True))
+    roots = np.sqrt(np.mean(squares, axis=0)).tolist()
+    return {
+        c: root for c, root, known in zip(CHANNELS, roots, problem.settings.measured, strict=True) if known
+    }
 
 
 def _corrected(channel: str, x: Array, declared: Aircraft, aircraft: Aircraft) -> Array:

@@ -117,26 +117,27 @@ def stage_errors(stages: Stages) -> Errors:
     """Root mean squares of every stage on the fitted and on the held-out records."""
     found: dict[str, BySet[Rms]] = {}
     case = stages.case
+    measured = case.fitted.settings.measured
     for name in STAGES:
         if name == "floor":
             held = None if case.held is None else _floor(case.held, stages, stages.held)
             found[name] = BySet(_floor(case.fitted, stages, stages.fitted), held)
         elif name in stages.fitted:
-            held = _pooled(stages.held[name]) if name in stages.held else None
-            found[name] = BySet(_pooled(stages.fitted[name]), held)
+            held = _pooled(stages.held[name], measured) if name in stages.held else None
+            found[name] = BySet(_pooled(stages.fitted[name], measured), held)
     return Errors(_signals(case), found)
 
 
 def _signals(case: Case) -> PerChannel:
     """Standard deviation of each measured channel, the scale of the errors."""
     y = [r.signals.y - r.signals.y.mean(axis=0) for r in case.fitted.records]
-    return _per_channel(np.concatenate(y) ** 2)
+    return _per_channel(np.concatenate(y) ** 2, case.fitted.settings.measured)
 
 
-def _pooled(assessed: Sequence[Assessment]) -> Rms:
+def _pooled(assessed: Sequence[Assessment], measured: NDArray[np.bool_]) -> Rms:
     return Rms(
-        free_run=_per_channel(np.array([a.free_run**2 for a in assessed])),
-        innovation=_per_channel(np.array([a.innovation**2 for a in assessed])),
+        free_run=_per_channel(np.array([a.free_run**2 for a in assessed]), measured),
+        innovation=_per_channel(np.array([a.innovation**2 for a in assessed]), measured),
     )
 
 
@@ -146,10 +147,10 @@ def _floor(problem: TraceProblem, stages: Stages, assessed: dict[str, list[Asses
     A model that does not fit a record takes its misfit for gusts, and its floor is too high.
     """
     stage = min(("before", stages.best), key=lambda name: sum(a.likelihood for a in assessed[name]))
-    own = assessed[stage]
+    own, measured = assessed[stage], problem.settings.measured
     return Rms(
-        free_run=_per_channel(free_run_floor(problem, stages.models[stage], own) ** 2),
-        innovation=_per_channel(np.array([a.expected**2 for a in own])),
+        free_run=_per_channel(free_run_floor(problem, stages.models[stage], own) ** 2, measured),
+        innovation=_per_channel(np.array([a.expected**2 for a in own]), measured),
     )
 
 
@@ -172,9 +173,10 @@ def free_run_floor(problem: TraceProblem, model: StageModel, assessed: Sequence[
     )
 
 
-def _per_channel(squares: Array) -> PerChannel:
-    """Root of the mean over the first axis, by channel."""
-    return dict(zip(CHANNELS, np.sqrt(np.mean(squares, axis=0)).tolist(), strict=True))
+def _per_channel(squares: Array, measured: NDArray[np.bool_]) -> PerChannel:
+    """Root of the mean over the first axis, by measured channel."""
+    roots = np.sqrt(np.mean(squares, axis=0)).tolist()
+    return {channel: root for channel, root, known in zip(CHANNELS, roots, measured, strict=True) if known}
 
 
 __all__ = [

@@ -264,14 +264,17 @@ def fitted_noise_floor(
 ) -> Array:
     """What gusts and sensors leave of a free run once initial state, biases and trim are fitted to it: (3,) rms.
 
-    The mean over `_DRAWS` records of the linear model in its gusts, treated as `free_run` treats the measured one.
+    The mean over `_DRAWS` records of the linear model in its gusts, treated as `free_run` treats the measured one. An
+    angle of attack that no vane measured has the noise that the settings state of a vane.
 
     Parameters
     ----------
     seed : of the draws.
     unconstrained : see `free_run`.
     """
-    y = _gust_records(record, _linear_model(record, settings, compiled, common, per_record), seed)
+    linear = _linear_model(record, settings, compiled, common, per_record)
+    seen = linear._replace(variance=np.where(settings.measured, linear.variance, settings.noise**2))
+    y = _gust_records(record, seen, seed)
     samples = record.samples
     weight = 1.0 / noise_floor(record, settings, compiled, common, per_record)
     t = _free_run_slopes(record, settings, compiled, common, per_record, weight)[1]

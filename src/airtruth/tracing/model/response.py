@@ -271,7 +271,7 @@ def pack_sensors(
     compiled: CompiledChange, settings: Settings, common: Array, per_record: Array
 ) -> SensorArrays:
     """Errors and noise of the outputs' sensors."""
-    variance = (settings.noise * np.exp(common[Common.log_noise])) ** 2 + settings.resolution**2
+    noise = (settings.noise * np.exp(common[Common.log_noise])) ** 2
     share = np.clip(common[Common.colour_shares], 0.0, _MOST_SLOW)
     return SensorArrays(
         bias=per_record[PerRecord.bias] + compiled.bias,
@@ -279,8 +279,8 @@ def pack_sensors(
         arm_m=compiled.arm_m,
         lag_s=compiled.lag_s,
         delay_s=compiled.delay_s,
-        variance=variance * (1.0 - share),
-        slow_std=np.sqrt(variance * share),
+        variance=noise * (1.0 - share) + settings.resolution**2,
+        slow_std=np.sqrt(noise * share),
         slow_time_s=COLOUR_TIME_S * float(np.exp(common[Common.log_colour_time])),
     )
 

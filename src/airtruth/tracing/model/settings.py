@@ -21,6 +21,8 @@ from airtruth.units import DEG
 
 Array = NDArray[np.float64]
 
+VANE: Final = CHANNELS[0]
+"""Output that a log without a vane does not have."""
 _CARRIED: Final[tuple[Kind, ...]] = ("arm", "lag", "delay", "scale")
 """Declared errors of a sensor that the filter carries; its bias is a per-record parameter."""
 _UNCONSTRAINED_STD: Final = 10.0
@@ -42,6 +44,9 @@ _NOISE: Final = (0.1 * DEG, 0.3 * DEG, 0.1)
 _RESOLUTION: Final = 0.01
 """Least error of a model, as a share of a channel's standard deviation [-] (judgement): tables, steps of integration and
 frames of a simulator. Sensors of flight tests have several times that noise, the GTM's 4 to 8 %."""
+_UNMEASURED_RAD: Final = 1e3
+"""Standard deviation that an angle of attack without a vane has as an output [rad]: large enough that it adds nothing to
+the likelihood in double precision, small enough for the inverse of the covariance (judgement)."""
 _BIAS_STD: Final = (0.5 * DEG, 0.5 * DEG, 0.3)
 """Prior standard deviations of their biases [same units] (judgement)."""
 _TRIM_STD: Final = (0.1, 0.03)
@@ -87,17 +92,30 @@ class Settings:
     resolution: Array = field(default_factory=lambda: np.zeros(3))
 
     @property
+    def measured(self) -> NDArray[np.bool_]:
+        """(3,) whether an instrument measured the output; the angle of attack may be reconstructed."""
+        return np.asarray(self.resolution < _UNMEASURED_RAD)
+
+    @property
     def noise_is_declared(self) -> bool:
         """Whether the sensors' noise levels are declared, not assumed."""
         return self.noise_prior < _NOISE_UNKNOWN_STD
 
 
-def settings_of(aircraft: Aircraft, thrust_std: float) -> Settings:
-    """Read what aircraft.toml declares of the sensors; where it is silent, assume judgements with wide priors."""
+def settings_of(aircraft: Aircraft, thrust_std: float, *, has_vane: bool = True) -> Settings:
+    """Read what aircraft.toml declares of the sensors; where it is silent, assume judgements with wide priors.
+
+    Parameters
+    ----------
+    thrust_std : relative standard deviation of the engines' thrust [-].
+    has_vane : whether alpha was measured; without a vane it is a state of the filter and no output.
+    """
     noise, bias = np.array(_NOISE), np.array(_BIAS_STD)
     prior = _NOISE_STD
     for i, channel in enumerate(CHANNELS):
         sensor = aircraft.file.sensors.get(channel)
+        if channel == VANE and not has_vane:
+            continue
         if sensor is None or sensor.noise_std.value <= 0.0:
             prior = _NOISE_UNKNOWN_STD
             continue
@@ -112,6 +130,9 @@ def settings_of(aircraft: Aircraft, thrust_std: float) -> Settings:
         log_gust_std=_LOG_GUST_STD,
         thrust_std=thrust_std,
         trim_std=np.array(_TRIM_STD),
+        resolution=np.array(
+            [0.0 if has_vane or channel != VANE else _UNMEASURED_RAD for channel in CHANNELS]
+        ),
     )
 
 
@@ -123,16 +144,23 @@ def resolved(settings: Settings, records: Sequence[TraceRecord]) -> Settings:
     if settings.noise_is_declared:
         return settings
     spread = np.sqrt(np.mean([r.signals.y.var(axis=0) for r in records], axis=0))
-    return replace(settings, resolution=_RESOLUTION * spread)
+    return replace(
+        settings, resolution=np.where(settings.measured, _RESOLUTION * spread, settings.resolution)
+    )
 
 
-def declared_change(aircraft: Aircraft) -> Change:
-    """What aircraft.toml declares beyond forces at rest: the sensors' position, lag, delay and scale, the dynamics."""
+def declared_change(aircraft: Aircraft, *, has_vane: bool = True) -> Change:
+    """What aircraft.toml declares beyond forces at rest: the sensors' position, lag, delay and scale, the dynamics.
+
+    Parameters
+    ----------
+    has_vane : whether alpha was measured; without a vane its declared errors are left out.
+    """
     sensors = aircraft.file.sensors
     terms = [
         SensorTerm(channel, kind, sensors[channel].errors().value(kind))
         for channel in CHANNELS
-        if channel in sensors
+        if channel in sensors and (has_vane or channel != VANE)
         for kind in _CARRIED
     ]
     effective = tuple(t for t in terms if t.value != KINDS[t.kind].neutral)
@@ -229,6 +257,7 @@ def common_prior(
 
 __all__ = [
     "GUST_COVARIANCE",
+    "VANE",
     "Settings",
     "common_prior",
     "declared_change",

@@ -200,6 +200,7 @@ def _free_run_gain(
             free[i] = 0.0 if (np.abs(new.residual) < _DIVERGED * weight).all() else -np.inf
             continue
         gains = ((old.residual / weight) ** 2) - ((new.residual / weight) ** 2)
+        gains[:, ~problem.settings.measured] = 0.0
         free[i] = gains.sum(axis=0)
         lags = round(MEMORY_S / problem.records[i].signals.dt_s)
         variance += np.maximum(np.diag(long_run(gains - gains.mean(axis=0), lags)), 0.0)

@@ -110,7 +110,14 @@ def anomalies(null: PosteriorFit, problem: TraceProblem, whitener: Whitener) -> 
     null : a fit; whitener : autoregression of its innovations.
     """
     views = _views(null, problem)
-    built = [{name: family.series(view) for name, family in FAMILIES.items()} for view in views]
+    measured = problem.settings.measured
+    built = [
+        {
+            name: [s for s in family.series(view) if s[0] < ALPHA or measured[s[0] - ALPHA]]
+            for name, family in FAMILIES.items()
+        }
+        for view in views
+    ]
 
     def one(index: int) -> Array:
         return _tangents(null, problem, index, [s for series in built[index].values() for s in series])
@@ -127,7 +134,8 @@ def anomalies(null: PosteriorFit, problem: TraceProblem, whitener: Whitener) -> 
         span = slice(at, at + len(series))
         at += len(series)
         found.append(Anomaly(name, *chi_square(gradient[span], information[span, span])))
-    return (*found, lines([t.r for t in null.sensitivities], [r.signals.dt_s for r in problem.records]))
+    residuals = [np.where(measured, t.r, 0.0) for t in null.sensitivities]
+    return (*found, lines(residuals, [r.signals.dt_s for r in problem.records]))
 
 
 def chi_square(gradient: Array, information: Array) -> tuple[float, int, float]:
