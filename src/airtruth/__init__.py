@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from airtruth.api import (
         check,
         close_loop,
+        find_manoeuvres,
         fly,
         identify,
         import_log,
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from airtruth.effects.effect import Effect
     from airtruth.identification import IdentificationResult
     from airtruth.identification.options import Options as IdentificationOptions
+    from airtruth.importers import ManoeuvreResult
     from airtruth.logs.flight_log import FlightLog
     from airtruth.logs.sources import Logs
     from airtruth.logs.store import write_log
@@ -64,6 +66,7 @@ _LAZY = {
     "Logs": "airtruth.logs.sources",
     "Limits": "airtruth.design",
     "LoopResult": "airtruth.loop",
+    "ManoeuvreResult": "airtruth.importers",
     "NarrowResult": "airtruth.design",
     "Result": "airtruth.result",
     "SplitResult": "airtruth.design",
@@ -72,6 +75,7 @@ _LAZY = {
     "Verification": "airtruth.logs.verify",
     "check": "airtruth.api",
     "close_loop": "airtruth.api",
+    "find_manoeuvres": "airtruth.api",
     "fly": "airtruth.api",
     "identify": "airtruth.api",
     "import_log": "airtruth.api",
@@ -120,6 +124,7 @@ __all__ = [
     "LogError",
     "Logs",
     "LoopResult",
+    "ManoeuvreResult",
     "NarrowResult",
     "Result",
     "SplitResult",
@@ -131,6 +136,7 @@ __all__ = [
     "__version__",
     "check",
     "close_loop",
+    "find_manoeuvres",
     "fly",
     "identify",
     "import_log",

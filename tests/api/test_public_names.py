@@ -14,7 +14,18 @@ import pytest
 import airtruth as at
 
 HEAVY = ("numpy", "scipy", "pandas", "pyarrow", "numba", "jsbsim", "matplotlib", "pydantic", "typer")
-VERBS = ("load_aircraft", "fly", "plan", "read_log", "import_log", "check", "identify", "trace", "report")
+VERBS = (
+    "load_aircraft",
+    "fly",
+    "plan",
+    "read_log",
+    "import_log",
+    "find_manoeuvres",
+    "check",
+    "identify",
+    "trace",
+    "report",
+)
 
 
 def python(script: str) -> str:

@@ -1,16 +1,17 @@
 """Manoeuvres in a long flight: which parts become runs, the table that a person edits, and the picture."""
 
+import json
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from import_flight import DEG, write_csv
 
+import airtruth as at
 from airtruth import style
 from airtruth.errors import ConfigurationError, LogError
 from airtruth.importers import find_manoeuvres, import_log, read_table
-from airtruth.importers.figure import draw
-from airtruth.importers.manoeuvres import RATE_HZ, SETTLE_S, TRIM_S, find, summary
+from airtruth.importers.manoeuvres import RATE_HZ, SETTLE_S, TRIM_S, find
 from airtruth.importers.series import Series
 from studies.real_rows import run
 from validation.linear_flight import DENSITY_KG_M3, fly
@@ -62,7 +63,7 @@ def test_inputs_are_cut_with_trim_before_and_response_after(flight):
         assert one.excitation > 3.0
         assert one.airspeed_m_s == pytest.approx(42.85, rel=0.01)
         assert one.load_factor == pytest.approx(1.0, abs=0.05)
-    assert summary(found) == "4 of 4 manoeuvres accepted"
+    assert found.summary() == "4 of 4 manoeuvres accepted"
 
 
 def test_gusts_alone_are_no_manoeuvre():
@@ -84,7 +85,7 @@ def test_the_reason_of_a_part_that_is_not_accepted(flight):
     assert "q moves" in reasons["m01"]
     assert "airspeed changes" in reasons["m02"]
     assert "load factor of 1.4" in reasons["m04"]
-    assert "m04 not: mean load factor" in summary(found)
+    assert "m04 not: mean load factor" in found.summary()
 
 
 def test_two_inputs_close_together_share_no_sample(flight):
@@ -198,8 +199,30 @@ def test_a_table_that_cannot_be_used(content, message, tmp_path):
 
 def test_the_picture_shows_every_candidate(flight, tmp_path):
     found = find("f", series(flight))
-    figure = draw(found)
+    figure = found.plot()
     names = [text.get_text() for axis in figure.axes for text in axis.texts]
     assert names == ["m01", "m02", "m03", "m04"]
     style.save(figure, tmp_path / "p.png")
     assert (tmp_path / "p.png").stat().st_size > 10_000
+
+
+def test_the_public_function_shows_and_writes_its_result(files, tmp_path):
+    inputs = (files / "f.csv", files / "m.toml")
+    out = tmp_path / "manoeuvres.csv"
+    found = at.find_manoeuvres(*inputs, out=out)
+    assert isinstance(found, at.ManoeuvreResult)
+    assert isinstance(found, at.Result)
+    assert found.to_frame()["run_id"].tolist() == ["m01", "m02", "m03", "m04"]
+    stated = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert [row["accept"] for row in stated["candidates"]] == ["yes"] * 4
+    assert "4 of 4 manoeuvres accepted" in found._repr_html_()
+    assert out.with_suffix(".png").stat().st_size > 0
+    assert out.read_text() == found.table()
+    assert len(at.import_log(*inputs, manoeuvres=out).log.run_ids) == 4
+    with pytest.raises(at.ConfigurationError, match=r"name it with the suffix \.csv"):
+        at.find_manoeuvres(*inputs, out=tmp_path / "m.txt")
+
+
+def test_what_was_not_measured_is_none_in_the_dictionary(flight):
+    found = find("f", {name: one for name, one in series(flight).items() if name != "az_m_s2"})
+    assert {row["load_factor"] for row in found.to_dict()["candidates"]} == {None}

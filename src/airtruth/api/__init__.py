@@ -7,13 +7,14 @@ SI and radians.
 """
 
 from airtruth.api.campaigns import fly, list_effects, load_aircraft, verify
-from airtruth.api.logs import check, import_log, read_log
+from airtruth.api.logs import check, find_manoeuvres, import_log, read_log
 from airtruth.api.models import close_loop, identify, report, trace
 from airtruth.api.plans import plan
 
 __all__ = [
     "check",
     "close_loop",
+    "find_manoeuvres",
     "fly",
     "identify",
     "import_log",

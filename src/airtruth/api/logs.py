@@ -12,7 +12,7 @@ from airtruth.api.campaigns import load_aircraft
 if TYPE_CHECKING:
     from airtruth.api.arguments import AircraftSource, FilePath
     from airtruth.checks.result import CheckResult
-    from airtruth.importers import Imported
+    from airtruth.importers import Imported, ManoeuvreResult
     from airtruth.logs.flight_log import FlightLog
     from airtruth.logs.sources import Logs
 
@@ -94,6 +94,59 @@ def import_log(
 
     table = None if manoeuvres is None else Path(manoeuvres)
     return importers.import_log(_paths(file), _paths(mapping), manoeuvres=table, force=force)
+
+
+def find_manoeuvres(
+    file: FilePath | Sequence[FilePath],
+    mapping: FilePath | Sequence[FilePath],
+    *,
+    out: FilePath | None = None,
+    force: bool = False,
+) -> ManoeuvreResult:
+    """Find the manoeuvres in the measured log of a whole flight, for a person to accept or edit.
+
+    Parameters
+    ----------
+    file : measured log, or the recorders of one flight.
+    mapping : mapping file of each, see docs/measured.md; elevator and pitch rate have to be mapped.
+    out : table to write, with the suffix .csv; its picture has the suffix .png. None to write nothing. `import_log`
+        takes the table as ``manoeuvres``.
+    force : replace files that this function did not write.
+
+    Returns
+    -------
+    ManoeuvreResult
+        The candidates with times [s], size of the input [deg] and the reasons of those that are not accepted.
+
+    Raises
+    ------
+    StoreError
+        If a file cannot be read or may not be written.
+    ConfigurationError
+        If the mapping cannot be used as written, or ``out`` has another suffix.
+    LogError
+        If elevator or pitch rate is missing, or the record is shorter than a manoeuvre.
+
+    Examples
+    --------
+    >>> found = at.find_manoeuvres("flight.csv", "flight.toml", out="manoeuvres.csv")
+    >>> imported = at.import_log("flight.csv", "flight.toml", manoeuvres="manoeuvres.csv")
+    """
+    from airtruth import importers
+    from airtruth.errors import ConfigurationError
+    from airtruth.logs.outputs import writing
+
+    files, mappings = _paths(file), _paths(mapping)
+    if out is None:
+        return importers.find_manoeuvres(files, mappings)
+    table = Path(out)
+    if table.suffix.lower() != ".csv":
+        raise ConfigurationError(f"{table}: --find-manoeuvres writes a table; name it with the suffix .csv")
+    with writing("import", [*files, *mappings], force=force) as outputs:
+        outputs.require(table, table.with_suffix(".png"))
+        found = importers.find_manoeuvres(files, mappings)
+        found.write(table)
+    return found
 
 
 def _paths(files: FilePath | Sequence[FilePath]) -> list[Path]:

@@ -98,23 +98,12 @@ def import_(
 
 def _find(files: list[Path], mapping: list[Path], out: Path, *, force: bool, quiet: bool) -> None:
     """Write the table of manoeuvres and its picture, and print a summary."""
-    from airtruth import importers, style
-    from airtruth.errors import ConfigurationError
-    from airtruth.importers.figure import draw
-    from airtruth.importers.manoeuvres import summary
-    from airtruth.logs.atomic import write_text
-    from airtruth.logs.outputs import writing
+    from airtruth.api import find_manoeuvres
 
-    if out.suffix.lower() != ".csv":
-        raise ConfigurationError(f"{out}: --find-manoeuvres writes a table; name it with the suffix .csv")
-    picture = out.with_suffix(".png")
-    with working("import", quiet), writing("import", [*files, *mapping], force=force) as outputs:
-        outputs.require(out, picture)
-        found = importers.find_manoeuvres(files, mapping)
-        write_text(out, found.table())
-        style.save(draw(found), picture)
+    with working("import", quiet):
+        found = find_manoeuvres(files, mapping, out=out, force=force)
     print_result(
-        f"{summary(found)}\n{out} and {picture}: edit the table, then import with --manoeuvres {out}"
+        f"{found.summary()}\n{out} and {out.with_suffix('.png')}: edit the table, then import with --manoeuvres {out}"
     )
 
 

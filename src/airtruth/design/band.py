@@ -85,7 +85,7 @@ def learned(accepted: AcceptedEffect, plant: Plant) -> Learned:
     trims = {"alpha": plant.trim_alpha_rad, "elevator": plant.trim_elevator_rad}
     low, high = (0.0, 0.0) if table is None else (table.at[0], table.at[-1])
     shape = Shape(
-        coefficient="Cm" if accepted.acts_on == "Cm" else "CL",
+        acts_on="Cm" if accepted.acts_on == "Cm" else "CL",
         signal=signal,
         low=low,
         high=high,

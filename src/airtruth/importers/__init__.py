@@ -3,14 +3,15 @@
 from airtruth.importers.convert import Imported, convert, find_manoeuvres, import_log, record_constants
 from airtruth.importers.dictionary import Words, read_dictionary
 from airtruth.importers.guess import guess_mapping
-from airtruth.importers.manoeuvres import Found, read_table
+from airtruth.importers.manoeuvre_result import ManoeuvreResult
+from airtruth.importers.manoeuvres import read_table
 from airtruth.importers.mapping import MappingFile, read_mapping
 from airtruth.importers.sources import FORMATS, Source, open_source
 
 __all__ = [
     "FORMATS",
-    "Found",
     "Imported",
+    "ManoeuvreResult",
     "MappingFile",
     "Source",
     "Words",

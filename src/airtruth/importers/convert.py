@@ -14,7 +14,8 @@ from airtruth.checks.gate import require
 from airtruth.errors import ConfigurationError, LogError
 from airtruth.importers.align import Alignment, aligned
 from airtruth.importers.derived import airspeed_from_pressure, with_alpha
-from airtruth.importers.manoeuvres import Found, find, read_table
+from airtruth.importers.manoeuvre_result import ManoeuvreResult
+from airtruth.importers.manoeuvres import find, read_table
 from airtruth.importers.mapping import CONSTANTS, MappingFile, Place, Resample, read_mapping, unit_factor
 from airtruth.importers.series import Series, base_clock, read_series
 from airtruth.importers.sources import Source, column, numbers, open_source
@@ -119,7 +120,7 @@ def import_log(
 def find_manoeuvres(
     path: Path | str | Sequence[Path | str],
     mapping: MappingFile | Path | str | Sequence[MappingFile | Path | str],
-) -> Found:
+) -> ManoeuvreResult:
     """Manoeuvres of one flight, for a person to accept or edit.
 
     Parameters

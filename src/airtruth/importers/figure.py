@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from airtruth import style
-from airtruth.importers.manoeuvres import Found
+from airtruth.importers.manoeuvre_result import ManoeuvreResult
 from airtruth.units import DEG
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ MOST_ROWS: Final = 24
 
 
 @style.themed
-def draw(found: Found) -> Figure:
+def draw(found: ManoeuvreResult) -> Figure:
     """Elevator and pitch rate over the flight, accepted manoeuvres green and others grey, with their names."""
     span = float(found.t_s[-1] - found.t_s[0])
     rows = min(MOST_ROWS, max(1, int(np.ceil(span / ROW_S))))

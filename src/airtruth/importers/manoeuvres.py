@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from airtruth.documents import read_plain
 from airtruth.errors import ConfigurationError, LogError, StoreError
+from airtruth.importers.manoeuvre_result import Candidate, ManoeuvreResult
 from airtruth.importers.mapping import Manoeuvre, Resample
 from airtruth.importers.series import Series
 from airtruth.importers.uniform import gaps, resampled
@@ -57,74 +58,7 @@ TURNING: Final = 1.15
 """Mean load factor above which the aircraft turns [-]: a bank of 30 deg."""
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """A part of a flight that may become a run; the columns of the table.
-
-    Attributes
-    ----------
-    run_id : name of the run.
-    accept : "yes" or "no"; the import takes the rows with yes.
-    start_s, end_s : on the clock of the first file [s].
-    input_deg : range of the elevator [deg].
-    energy_deg2_s : integral of its squared deviation from trim [deg2 s].
-    excitation : rms of q over that of the background [-].
-    trim_range : range of the elevator before the input over that of the input [-].
-    airspeed_m_s, airspeed_change : mean [m/s] and relative range [-]; nan without airspeed.
-    load_factor : mean of -az/g [-]; nan without az.
-    reason : why it is not accepted.
-    """
-
-    run_id: str
-    accept: str
-    start_s: float
-    end_s: float
-    input_deg: float
-    energy_deg2_s: float
-    excitation: float
-    trim_range: float
-    airspeed_m_s: float
-    airspeed_change: float
-    load_factor: float
-    reason: str = ""
-
-
-@dataclass(frozen=True)
-class Found:
-    """Manoeuvres of a flight, with what their picture shows.
-
-    Attributes
-    ----------
-    candidates : in the order of time.
-    t_s : (samples,) times on the clock of the first file [s].
-    elevator_rad, q_rad_s : (samples,) what was searched.
-    threshold_rad : deviation of the elevator that counts as an input [rad].
-    """
-
-    candidates: tuple[Candidate, ...]
-    t_s: Array
-    elevator_rad: Array
-    q_rad_s: Array
-    threshold_rad: float
-
-    @property
-    def accepted(self) -> tuple[Candidate, ...]:
-        """Candidates that the import would take."""
-        return tuple(c for c in self.candidates if c.accept == "yes")
-
-    def table(self) -> str:
-        """The candidates as CSV, which `read_table` accepts after any edit."""
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        names = [f.name for f in fields(Candidate)]
-        writer.writerow(names)
-        for one in self.candidates:
-            cells = [getattr(one, name) for name in names]
-            writer.writerow([f"{c:.10g}" if isinstance(c, float) else c for c in cells])
-        return text.getvalue()
-
-
-def find(where: str, series: Mapping[str, Series]) -> Found:
+def find(where: str, series: Mapping[str, Series]) -> ManoeuvreResult:
     """Search a flight for manoeuvres.
 
     Parameters
@@ -161,7 +95,7 @@ def find(where: str, series: Mapping[str, Series]) -> Found:
         high = _settled(c["q_rad_s"], last, min(after, count - 1), background)
         one = _candidate(f"m{number + 1:02d}", c, deviation, (low, first, last, high), background, t)
         candidates.append(_without_gaps(one, used))
-    return Found(tuple(candidates), t, c["elevator_rad"], c["q_rad_s"], threshold)
+    return ManoeuvreResult(tuple(candidates), t, c["elevator_rad"], c["q_rad_s"], threshold)
 
 
 def _without_gaps(candidate: Candidate, used: Mapping[str, Series]) -> Candidate:
@@ -274,7 +208,7 @@ def _candidate(
 
 
 def read_table(path: Path | str) -> tuple[Manoeuvre, ...]:
-    """Accepted manoeuvres of a table, as written by `Found.table` or by hand.
+    """Accepted manoeuvres of a table, as written by `ManoeuvreResult.table` or by hand.
 
     Columns start_s and end_s are needed; run_id is numbered where it is missing, and rows with accept = no are left out.
 
@@ -319,11 +253,4 @@ def read_table(path: Path | str) -> tuple[Manoeuvre, ...]:
     return tuple(result)
 
 
-def summary(found: Found) -> str:
-    """One sentence on the number of candidates and the reasons of those that are not accepted."""
-    rejected: Sequence[Candidate] = [c for c in found.candidates if c.accept != "yes"]
-    text = f"{len(found.accepted)} of {len(found.candidates)} manoeuvres accepted"
-    return text + "".join(f"\n  {c.run_id} not: {c.reason}" for c in rejected)
-
-
-__all__ = ["Candidate", "Found", "find", "read_table", "summary"]
+__all__ = ["find", "read_table"]
