@@ -25,7 +25,8 @@ def assessed(scale: float, seed: int, offset: float = 0.0) -> Assessment:
 
 def stages(before, after, held=True):
     records = [SimpleNamespace(signals=SimpleNamespace(dt_s=0.02))] * len(before)
-    case = SimpleNamespace(held=SimpleNamespace(records=records) if held else None)
+    settings = SimpleNamespace(measured=np.ones(3, dtype=np.bool_))
+    case = SimpleNamespace(held=SimpleNamespace(records=records, settings=settings) if held else None)
     models = {"before": None} | ({"after": None} if after else {})
     return SimpleNamespace(case=case, models=models, held={"before": before, "after": after})
 
