@@ -21,6 +21,7 @@ from scipy.special import logsumexp
 
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment, Memory, Shape, increment
+from airtruth.physics.terms import READINGS
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import Whitener
 from airtruth.tracing.model.records import TraceRecord
@@ -106,7 +107,9 @@ def shapes(problem: TraceProblem) -> list[Shape]:
             if name == "alpha":
                 for time_s in _SLOW_S:
                     add(CELLS, Memory("lag", time_s))
-    return found + list(_of_readings(ranges, trims, highest_hz))
+    of_readings = _of_readings(ranges, trims, highest_hz)
+    measured = dict(zip(READINGS, problem.settings.measured, strict=True))
+    return found + [shape for shape in of_readings if measured[shape.acts_on]]
 
 
 def _of_readings(
