@@ -140,7 +140,7 @@ def stopped(*arguments, **named):
         (["fly", CAMPAIGN, "--out", "x", "--runs", "1"], "airtruth.simulation.campaign.run.fly", "resumes"),
         (
             ["identify", LOG, "--aircraft", "gtm"],
-            "airtruth.identification.identify",
+            "airtruth.identification.identified",
             "starts again from the beginning",
         ),
         (
