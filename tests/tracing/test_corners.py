@@ -9,7 +9,7 @@ import pytest
 import trace_records as tr
 from scipy.linalg import expm, solve_discrete_are
 
-from airtruth.physics.terms import Change, SurfaceTerm
+from airtruth.physics.terms import Change, SensorTerm, SurfaceTerm
 from airtruth.tracing.model.parameters import PerRecord
 from airtruth.tracing.model.records import corner_variance, read
 from airtruth.tracing.model.response import filter_inputs, respond
@@ -63,9 +63,12 @@ def kalman(made, u, corner, sigma_w):
     variance = np.diag(tr.SETTINGS.noise**2)
     phi, early, late = tr.discrete(a, b, tr.DT)
     noise = tr.noise_step(a, tr.DT, drive)
-    points = (np.arange(400) + 0.5) / 400 * tr.DT
-    columns = np.array([expm(a * s) @ b for s in points])
-    spread = tr.DT**2 * np.einsum("pi,pj->ij", columns, columns) / 400
+    share = (np.arange(400) + 0.5) / 400
+    columns = np.array([expm(a * (1.0 - s) * tr.DT) @ b for s in share])
+    after = (
+        tr.DT * (6.0 * share * (1.0 - share)) @ columns / 400
+    )  # a parabola of unit mean, zero at both samples
+    spread = np.outer(after, after)
     p, x, found = solve_discrete_are(phi.T, c.T, noise, variance), np.zeros(8), []
     for k in range(made.samples):
         s = c @ p @ c.T + variance
@@ -150,3 +153,16 @@ def test_a_smooth_residual_below_the_resolution_is_no_information():
     assert (
         autoregression([100.0 * smooth + 0.1 * np.random.default_rng(1).standard_normal((300, 3))]).order > 0
     )
+
+
+def test_a_sensor_late_by_little_does_not_read_the_corner():
+    """The surface is known at the samples: as a lag goes to zero, its covariance goes to that of no lag."""
+    made, u = stepped(np.random.default_rng(2))
+    known = replace(made, signals=replace(made.signals, corner_rad2=corner_variance(u, 0.0)))
+    common, own = tr.still()
+    own[PerRecord.log_gust] = np.log(0.3)
+    more = [
+        respond(known, tr.SETTINGS, change, common, own).more_logdet
+        for change in (Change(), Change(sensors=(SensorTerm("az_m_s2", "lag", 1e-4),)))
+    ]
+    assert more[1] == pytest.approx(more[0], rel=0.02)

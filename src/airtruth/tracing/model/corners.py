@@ -1,8 +1,8 @@
 """The filter where the surface between two samples is uncertain: a corner that the samples do not show.
 
-Within such a cell the error of the surface is white noise, whose mean over the cell has the stated variance. The
-covariance of the prediction grows by it, and returns to the steady one through the updates that follow. The innovations
-are scaled to the steady covariance, so that one whitener serves all samples.
+Within such a cell the error of the surface is a parabola that vanishes at the samples, and its mean over the cell has the
+stated variance. The covariance of the prediction grows by it, and returns to the steady one through the updates that
+follow. The innovations are scaled to the steady covariance, so that one whitener serves all samples.
 
 Source: B. D. O. Anderson and J. B. Moore, *Optimal Filtering* (1979), section 3.1, for the recursion.
 """
@@ -93,17 +93,21 @@ def input_column(x: Array, at: AirPoint, model: FilterModel) -> Array:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
-def spread_of(a: Array, column: Array, phi: Array, dt_s: float) -> Array:
-    """Covariance after a cell of white surface noise whose mean has a unit variance: Simpson's rule over the cell."""
+def spread_of(a: Array, column: Array, dt_s: float) -> Array:
+    """Covariance after a cell of a surface error whose mean has a unit variance and which is zero at both ends.
+
+    The error is a parabola, 6 s (1 - s) over the cell, as in the interpolation of the surface: the samples are known. Its
+    two derivatives are states of a system in discrete time, so that the response is exact for lags of any length.
+    """
     n = a.shape[0]
-    half, _ = discrete(a, np.zeros(n), 0.5 * dt_s)
-    middle, early = np.dot(half, column), np.dot(phi, column)
-    spread = np.empty((n, n))
-    for i in range(n):
-        for j in range(n):
-            total = column[i] * column[j] + 4.0 * middle[i] * middle[j] + early[i] * early[j]
-            spread[i, j] = total * dt_s * dt_s / 6.0
-    return spread
+    system = np.zeros((n + 3, n + 3))
+    system[:n, :n] = a
+    system[:n, n] = column
+    system[n, n + 1] = 1.0
+    system[n + 1, n + 2] = 1.0
+    phi, _ = discrete(system, np.zeros(n + 3), dt_s)
+    after = phi[:n, n + 1] * (6.0 / dt_s) - phi[:n, n + 2] * (12.0 / (dt_s * dt_s))
+    return np.outer(after, after)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)

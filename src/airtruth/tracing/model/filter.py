@@ -340,7 +340,7 @@ def evaluate(given: KernelInput, free_run: bool, e: Array, white: Array, s: Arra
     white[:] = w
     s[:] = cov
     if given.corner_rad2.size > 0:
-        spread = spread_of(a, input_column(_reference_state(given), given.reference, model), phi, given.dt_s)
+        spread = spread_of(a, input_column(_reference_state(given), given.reference, model), given.dt_s)
         variance = model.sensors.variance
         corners = Corners(
             phi, noise, spread, p, c, variance, cov, np.ascontiguousarray(np.linalg.inv(w)), logdet
