@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.design.limits import Extremes, Limits
-from airtruth.logs.atomic import write_text
+from airtruth.design.planned_campaign import PlannedCampaign, draw_elevator
 from airtruth.simulation.campaign.file import Campaign
-from airtruth.simulation.campaign.write import as_toml
 from airtruth.simulation.simulator import Condition
 from airtruth.table import Table, as_html, as_text, flat
 from airtruth.table.model import Number, Row, significant
@@ -89,7 +87,7 @@ class Histories:
 
 
 @dataclass(frozen=True)
-class NarrowResult:
+class NarrowResult(PlannedCampaign):
     """A planned flight; satisfies `airtruth.result.Result`.
 
     Attributes
@@ -238,24 +236,6 @@ class NarrowResult:
             "inputs": [self._row(row) for row in self.rows],
         }
 
-    def to_toml(self) -> str:
-        """Text of the campaign file."""
-        title = self.campaign.title
-        return as_toml(
-            self.campaign,
-            "\n".join([f"{title[:1].upper()}{title[1:]}, computed by airtruth plan.", *self._notes()]),
-        )
-
-    def write(self, out: Path) -> None:
-        """Write the campaign file.
-
-        Raises
-        ------
-        StoreError
-            If the file cannot be written.
-        """
-        write_text(out, self.to_toml())
-
     def plot(self) -> Figure:
         """The elevator beside that of the 3-2-1-1, the angle of attack, and the standard errors before and with the flight."""
         from airtruth import style
@@ -265,11 +245,8 @@ class NarrowResult:
             figure, axes = style.panels(
                 2 + len(self.targets), 1, width_in=6.5, height_in=4.0 + 2.0 * len(self.targets)
             )
-            top, middle = axes[0, 0], axes[1, 0]
-            top.plot(p.t_s, p.reference_rad / DEG, color=style.GREY, label="3-2-1-1 of equal length")
-            top.plot(p.t_s, p.elevator_rad / DEG, color=style.BLUE, label=self.best.family)
-            top.set_ylabel("elevator [deg]")
-            top.legend(loc="lower left")
+            middle = axes[1, 0]
+            draw_elevator(axes[0, 0], p.t_s, p.reference_rad, p.elevator_rad, self.best.family)
             middle.plot(p.t_s, p.alpha_rad / DEG, color=style.BLUE)
             middle.set_ylabel("alpha [deg]")
             middle.set_xlabel("time [s]")

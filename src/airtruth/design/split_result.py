@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -11,10 +10,9 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from airtruth.design.limits import Extremes, Limits
+from airtruth.design.planned_campaign import PlannedCampaign, draw_elevator
 from airtruth.design.separation import Member
-from airtruth.logs.atomic import write_text
 from airtruth.simulation.campaign.file import Campaign
-from airtruth.simulation.campaign.write import as_toml
 from airtruth.simulation.simulator import Condition
 from airtruth.table import Table, as_html, as_text, flat
 from airtruth.table.model import Number, Row, significant
@@ -93,7 +91,7 @@ def split_probability(sigma: float) -> float:
 
 
 @dataclass(frozen=True)
-class SplitResult:
+class SplitResult(PlannedCampaign):
     """A planned flight; satisfies `airtruth.result.Result`.
 
     Attributes
@@ -211,24 +209,6 @@ class SplitResult:
             "inputs": [self._row(row) for row in self.rows],
         }
 
-    def to_toml(self) -> str:
-        """Text of the campaign file."""
-        lines = [
-            self.campaign.title[:1].upper() + self.campaign.title[1:] + ", computed by airtruth plan.",
-            *self._notes(),
-        ]
-        return as_toml(self.campaign, "\n".join(lines))
-
-    def write(self, out: Path) -> None:
-        """Write the campaign file.
-
-        Raises
-        ------
-        StoreError
-            If the file cannot be written.
-        """
-        write_text(out, self.to_toml())
-
     def plot(self) -> Figure:
         """The elevator beside that of the 3-2-1-1, and the predicted differences over the noise of a sample."""
         from airtruth import style
@@ -236,11 +216,7 @@ class SplitResult:
         p = self.prediction
         with style.applied():
             figure, axes = style.panels(4, 1, width_in=6.5, height_in=6.5, sharex=True)
-            top = axes[0, 0]
-            top.plot(p.t_s, p.reference_rad / DEG, color=style.GREY, label="3-2-1-1 of equal length")
-            top.plot(p.t_s, p.elevator_rad / DEG, color=style.BLUE, label=self.best.family)
-            top.set_ylabel("elevator [deg]")
-            top.legend(loc="lower left")
+            draw_elevator(axes[0, 0], p.t_s, p.reference_rad, p.elevator_rad, self.best.family)
             for k, label in enumerate(_LABELS):
                 ax, scale = axes[k + 1, 0], _SCALES[k]
                 ax.axhspan(-scale * p.noise[k], scale * p.noise[k], color="#EEEEEE")

@@ -1,0 +1,70 @@
+"""The campaign file that a planned input is written as, and the panel of the input."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.logs.atomic import write_text
+from airtruth.simulation.campaign.file import Campaign
+from airtruth.simulation.campaign.write import as_toml
+from airtruth.units import DEG
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+
+class PlannedCampaign(ABC):
+    """What every result of `airtruth plan` that computes an input has.
+
+    Attributes
+    ----------
+    campaign : flies the computed input.
+    """
+
+    campaign: Campaign
+
+    @abstractmethod
+    def _notes(self) -> tuple[str, ...]:
+        """Sentences on the input, for the head of the file."""
+
+    def to_toml(self) -> str:
+        """Text of the campaign file."""
+        title = self.campaign.title
+        lines = [f"{title[:1].upper()}{title[1:]}, computed by airtruth plan.", *self._notes()]
+        return as_toml(self.campaign, "\n".join(lines))
+
+    def write(self, out: Path) -> None:
+        """Write the campaign file.
+
+        Raises
+        ------
+        StoreError
+            If the file cannot be written.
+        """
+        write_text(out, self.to_toml())
+
+
+def draw_elevator(ax: Axes, t_s: Array, reference_rad: Array, elevator_rad: Array, family: str) -> None:
+    """Draw the computed input beside the 3-2-1-1 of equal length.
+
+    Parameters
+    ----------
+    t_s, reference_rad, elevator_rad : (samples,) time [s] and both inputs [rad].
+    family : of the computed input.
+    """
+    from airtruth import style
+
+    ax.plot(t_s, reference_rad / DEG, color=style.GREY, label="3-2-1-1 of equal length")
+    ax.plot(t_s, elevator_rad / DEG, color=style.BLUE, label=family)
+    ax.set_ylabel("elevator [deg]")
+    ax.legend(loc="lower left")
+
+
+__all__ = ["PlannedCampaign", "draw_elevator"]
