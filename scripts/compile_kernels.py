@@ -2,7 +2,9 @@
 
     python -m scripts.compile_kernels
 
-With a full cache this takes a few seconds. Without it, every process that meets a kernel first compiles it.
+With a full cache this takes a few seconds. Without it, every process that meets a kernel first compiles it. numba compares
+a cached kernel with its own file alone, and not with the files of the functions that it calls, so that a kernel that is older
+than any file with kernels is removed first.
 """
 
 from __future__ import annotations
@@ -13,7 +15,9 @@ import tempfile
 from pathlib import Path
 from typing import Final
 
-LOG: Final = Path(__file__).resolve().parents[1] / "data" / "undeclared" / "a.parquet"
+ROOT: Final = Path(__file__).resolve().parents[1]
+"""Root of the repository."""
+LOG: Final = ROOT / "data" / "undeclared" / "a.parquet"
 """A short log that every kernel accepts."""
 METHODS: Final = (
     "ls",
@@ -29,8 +33,19 @@ METHODS: Final = (
 """Methods that together run every kernel of the identification."""
 
 
+def remove_stale(package: Path) -> int:
+    """Remove cached kernels older than the newest file with kernels; the number of removed files."""
+    sources = (path for path in package.rglob("*.py") if "njit" in path.read_text(encoding="utf-8"))
+    newest = max((path.stat().st_mtime for path in sources), default=0.0)
+    stale = [p for p in package.rglob("*.nb[ic]") if p.stat().st_mtime < newest]
+    for path in stale:
+        path.unlink()
+    return len(stale)
+
+
 def main() -> None:
     """Run both commands; exit with the first failure."""
+    remove_stale(ROOT / "src" / "airtruth")
     with tempfile.TemporaryDirectory() as folder:
         shared = [sys.executable, "-m", "airtruth"]
         identify = [
