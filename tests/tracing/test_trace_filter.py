@@ -9,9 +9,10 @@ from scipy.linalg import block_diag
 
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import AeroTerm, Change, SensorTerm, StateTerm
+from airtruth.tracing.inference.optimise import initial_parameters
 from airtruth.tracing.model.linearise import gain
 from airtruth.tracing.model.parameters import Common, PerRecord
-from airtruth.tracing.model.response import respond
+from airtruth.tracing.model.response import LOST, respond
 from airtruth.units import DEG, G0
 
 
@@ -238,3 +239,17 @@ def test_innovations_of_a_true_model_are_white_and_of_the_stated_covariance(shar
     assert np.mean(r**2) == pytest.approx(1.0, abs=4.0 * math.sqrt(2.0 / draws))
     lagged = np.einsum("nki,nkj->ij", r[:, 1:], r[:, :-1]) / (draws / 3.0)
     assert np.abs(lagged).max() < 4.0 / math.sqrt(draws / 3.0)
+
+
+def test_a_lost_motion_leaves_no_sample_undefined():
+    """An aircraft that diverges: the residuals after the loss are a constant, and the same at each call."""
+    one = tr.fly(np.random.default_rng(2), amplitude=2.0 * DEG, sigma_w=0.0, name="a")
+    problem = tr.problem([one])
+    start = initial_parameters(problem, tr.NOTHING)
+    start.common[Common.derivatives] += [0.0, 0.0, 0.0, 0.0, 1e4, 0.0]
+    runs = [
+        respond(one, problem.settings, Change(), start.common, start.per_record[0], free_run=True).e
+        for _ in range(2)
+    ]
+    assert (runs[0][-1] == LOST).all()
+    np.testing.assert_array_equal(*runs)

@@ -28,6 +28,8 @@ from airtruth.tracing.model.surface import through
 
 Array = NDArray[np.float64]
 
+LOST: Final = 1e9
+"""Residual of a sample that a lost motion does not reach [unit of the output] (judgement: beyond any that counts)."""
 _MOST_SLOW: Final = 0.99
 """Largest share of slow noise [-]: beyond the search's bound, where the differences need a slope."""
 
@@ -47,7 +49,7 @@ class Response:
 
     Attributes
     ----------
-    e : (samples, 3) innovations, or residuals of a free run [units of the outputs].
+    e : (samples, 3) innovations, or residuals of a free run [units of the outputs]; `LOST` from where the motion is lost.
     white, covariance : (3, 3) whitener W with W S W' = I, and S.
     logdet : mean of log|S| over the samples; nan where the motion is lost.
     more_logdet : sum over the samples of log|S| beyond that of ``covariance``, by an uncertain surface.
@@ -174,7 +176,7 @@ def respond_to(
     free_run: bool = False,
 ) -> Response:
     """`respond` where the same inputs serve many parameters."""
-    e = np.empty_like(given.y)
+    e = np.full_like(given.y, LOST)
     white, covariance = np.eye(OUTPUTS), np.eye(OUTPUTS)
     kernel = kernel_input(given, settings, common, per_record, external)
     if free_run:
@@ -286,6 +288,7 @@ def pack_sensors(
 
 
 __all__ = [
+    "LOST",
     "External",
     "FilterInputs",
     "Response",

@@ -34,6 +34,9 @@ _ALTERNATIVES: Final = 2
 _CLEAN: Final = 0.05
 """Probability of the remaining anomaly from which a search explains the records, so that no tied effect is tried
 instead [-] (convention)."""
+_FAILED: Final = 1e-6
+"""Probability of the remaining anomaly below which a search has failed, and what the kinematic check names leads another
+[-] (judgement: an anomaly beyond doubt)."""
 _EFFECT_LEADS: Final = 30.0
 """Gain in 2 log L by which an effect has to lead for the released derivatives not to be followed beside it [-]
 (judgement: what a later effect may still add to them)."""
@@ -66,7 +69,7 @@ def search(
     """
     first = RoundStart(hypothesis, start, tuple(effects))
     own = _Search(problem, seed, advance, declared, known)
-    return _settled(problem, own.exchanged(first, own.rounds((first,), ())))
+    return _settled(problem, own.improved(first, own.rounds((first,), ())))
 
 
 @dataclass(frozen=True)
@@ -93,18 +96,30 @@ class _Search:
             return self._branches(starts, before, own, own.release)
         return self._accepting(starts, (*before, own))
 
-    def exchanged(self, first: RoundStart, rounds: tuple[SearchRound, ...]) -> tuple[SearchRound, ...]:
-        """The rounds of a set that explains more than the one reached, if an exchange of one effect leads to it."""
-        last = rounds[-1].null.hypothesis if rounds else first.hypothesis
+    def improved(self, first: RoundStart, rounds: tuple[SearchRound, ...]) -> tuple[SearchRound, ...]:
+        """The rounds, or those of a set that explains more: led by what the kinematic check names, or by an exchange."""
+        if not rounds:
+            return rounds
+        taken = {e.key for e in rounds[-1].null.hypothesis.effects}
+        missing = tuple(e for e in first.effects if e.key in self.known and e.key not in taken)
+        if missing and rounds[-1].anomaly.p_value < _FAILED:
+            rounds = self._led(first, missing, rounds)
+        last = rounds[-1].null.hypothesis
         if len(last.effects) < 2 or last.spread is not None:
             return rounds
         least = significant_gain(first.tested, later=True)
         better = better_set(self.problem, rounds, least, self.advance)
-        if better is None:
-            return rounds
+        return rounds if better is None else self._led(first, better, rounds)
+
+    def _led(
+        self, first: RoundStart, effects: Sequence[Effect], rounds: tuple[SearchRound, ...]
+    ) -> tuple[SearchRound, ...]:
+        """The rounds of a search that accepts these effects first, if they explain more than others."""
         starts: tuple[RoundStart, ...] = (first,)
         again: tuple[SearchRound, ...] = ()
-        for effect in better:
+        for effect in effects:
+            if not may_begin(self.advance, f"search led by {effect.key}"):
+                return rounds
             begin = replace(starts[-1], leader=effect.key, settled=True)
             own = search_round(self.problem, begin, len(again), self.seed, self.advance, known=self.known)
             if own is None or not own.tied:
