@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from airtruth.aircraft import Aircraft
+from airtruth.aircraft import load as load_aircraft
 from airtruth.design.bench import Bench
 from airtruth.design.limits import Limits
 from airtruth.design.separation import Model
@@ -27,7 +30,7 @@ from airtruth.simulation.campaign.file import (
     Uniform,
 )
 from airtruth.simulation.manoeuvres import Manoeuvre
-from airtruth.simulation.simulator import Condition
+from airtruth.simulation.simulator import Condition, jsbsim_model
 from airtruth.tracing.model.settings import declared_change, settings_of
 from airtruth.tracing.prepare import gust_length_m
 
@@ -84,14 +87,29 @@ def fitted_of(records: int) -> int:
     return records - (records // 3 if records >= 3 else 0)
 
 
-def open_loop(campaign: Campaign) -> None:
-    """Refuse a campaign in closed loop.
+@contextmanager
+def planning(campaign: Campaign, aircraft: Aircraft | None) -> Iterator[Aircraft]:
+    """Return the declared aircraft of a campaign that an input is planned for, within one thread of linear algebra.
+
+    Parameters
+    ----------
+    campaign : flies in open loop; aircraft : None to load that of the campaign.
 
     Raises
     ------
     ConfigurationError
-        If the campaign has a gain of the augmentation.
+        If the campaign has a gain of the augmentation, or the aircraft has no JSBSim model.
+    AircraftError
+        If the aircraft cannot be loaded.
     """
+    _require_open_loop(campaign)
+    with threadpool_limits(limits=1, user_api="blas"):  # threads for small matrices wait for each other
+        declared = load_aircraft(campaign.aircraft) if aircraft is None else aircraft
+        jsbsim_model(declared)
+        yield declared
+
+
+def _require_open_loop(campaign: Campaign) -> None:
     gains = campaign.augmentation
     if gains.damper_gain_s or gains.attitude_gain:
         raise ConfigurationError(
@@ -249,5 +267,5 @@ __all__ = [
     "gusts",
     "in_words",
     "model_of",
-    "open_loop",
+    "planning",
 ]

@@ -8,19 +8,17 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from airtruth.aircraft import Aircraft
-from airtruth.aircraft import load as load_aircraft
 from airtruth.aircraft.neutral import effective
 from airtruth.design.bench import Bench, Flown
-from airtruth.design.flight import LEAST_RECORDS, PlanOptions, best_condition, flying, in_words, open_loop
+from airtruth.design.flight import LEAST_RECORDS, PlanOptions, best_condition, flying, in_words, planning
 from airtruth.design.narrow_result import Histories, NarrowResult, NarrowRow, Quantity
 from airtruth.design.search import REFERENCE, Rated, Search, Setup, run
 from airtruth.errors import ConfigurationError
 from airtruth.physics.terms import Change
 from airtruth.simulation.campaign.file import Campaign
-from airtruth.simulation.simulator import Condition, jsbsim_model
+from airtruth.simulation.simulator import Condition
 
 Array = NDArray[np.float64]
 Step = Callable[[str], None]
@@ -119,10 +117,7 @@ def narrow(
     AircraftError, TrimError
         If the aircraft cannot be loaded, or cannot fly at any condition.
     """
-    open_loop(campaign)
-    with threadpool_limits(limits=1, user_api="blas"):  # threads for small matrices wait for each other
-        declared = load_aircraft(campaign.aircraft) if aircraft is None else aircraft
-        jsbsim_model(declared)
+    with planning(campaign, aircraft) as declared:
         return _narrow(_Asked(campaign, question, options or PlanOptions(), declared), step)
 
 

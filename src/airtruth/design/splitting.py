@@ -8,10 +8,8 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from airtruth.aircraft import Aircraft
-from airtruth.aircraft import load as load_aircraft
 from airtruth.aircraft.neutral import effective
 from airtruth.design.bench import Bench, Flown
 from airtruth.design.criterion import Criterion, criterion
@@ -24,7 +22,7 @@ from airtruth.design.flight import (
     flying,
     in_words,
     model_of,
-    open_loop,
+    planning,
 )
 from airtruth.design.question import Hypothesised, at_point
 from airtruth.design.search import REFERENCE, Rated, Search, Setup, run
@@ -33,7 +31,7 @@ from airtruth.design.split_result import InputRow, Prediction, SplitResult, spli
 from airtruth.errors import ConfigurationError
 from airtruth.simulation.campaign.file import Campaign
 from airtruth.simulation.resolution import point_of
-from airtruth.simulation.simulator import Condition, jsbsim_model
+from airtruth.simulation.simulator import Condition
 
 Array = NDArray[np.float64]
 Step = Callable[[str], None]
@@ -70,10 +68,7 @@ def split(
         If the aircraft cannot be loaded, or cannot fly at any condition.
     """
     options = options or PlanOptions()
-    open_loop(campaign)
-    with threadpool_limits(limits=1, user_api="blas"):  # threads for small matrices wait for each other
-        declared = load_aircraft(campaign.aircraft) if aircraft is None else aircraft
-        jsbsim_model(declared)
+    with planning(campaign, aircraft) as declared:
         return _split(campaign, hypotheses, options, declared, step)
 
 
