@@ -22,8 +22,6 @@ from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.refit import refit_without
 from airtruth.tracing.selection.rounds import SearchRound
 
-_RIVALS: Final = 1
-"""Number of rivals of a member that are tried in its place [-] (judgement: each costs a refit)."""
 BETTER: Final = 5.0
 """Log-posterior by which another set has to lead [-] (judgement: a gain of 10 in 2 log L, as that of a first effect)."""
 
@@ -41,24 +39,27 @@ def better_set(
     last = rounds[-1].null
     best: PosteriorFit | None = None
     for index, effect in enumerate(last.hypothesis.effects):
-        for rival in _rivals(rounds, last, effect):
-            key = rival.score.effect.key
-            if not may_begin(advance, f"{key} in place of {effect.key} beside the other effects"):
-                return None
-            tried = _exchanged(problem, last, index, rival)
-            if tried is not None and _cost(tried) < _cost(best or last) - (0.0 if best else BETTER):
-                best = tried
+        rival = _rival(rounds, last, effect)
+        if rival is None:
+            continue
+        if not may_begin(
+            advance, f"{rival.score.effect.key} in place of {effect.key} beside the other effects"
+        ):
+            return None
+        tried = _exchanged(problem, last, index, rival)
+        if tried is not None and _cost(tried) < _cost(best or last) - (0.0 if best else BETTER):
+            best = tried
     return None if best is None else _needed(problem, best, least)
 
 
-def _rivals(rounds: Sequence[SearchRound], last: PosteriorFit, effect: Effect) -> list[Candidate]:
-    """Candidates of other names that were refitted in the round of an effect, best first."""
+def _rival(rounds: Sequence[SearchRound], last: PosteriorFit, effect: Effect) -> Candidate | None:
+    """The best candidate of another name that was refitted in the round of an effect; one, because each costs a refit."""
     own = next((r for r in rounds if r.tied and r.tied[0].score.effect.key == effect.key), None)
     if own is None:
-        return []
+        return None
     taken = {e.name for e in last.hypothesis.effects if e.key != effect.key}
     others = (c for c in own.candidates if c.score.effect.name not in taken | {effect.name})
-    return sorted(others, key=lambda c: -c.gain)[:_RIVALS]
+    return max(others, key=lambda c: c.gain, default=None)
 
 
 def _exchanged(
