@@ -71,3 +71,19 @@ def test_a_set_one_exchange_away_is_reached(tmp_path):
     (folder,) = frozen(20261123, [6], "slow", tmp_path)
     answer = trace(folder, "gtm", TraceOptions()).to_dict()
     assert {e["name"] for e in answer["effects"]} == {"gyro_lag", "elevator_delay"}
+
+
+def test_a_late_gyro_that_makes_the_free_run_diverge_is_traced(tmp_path):
+    """A gyro lag of 0.303 s and a surface delay of 38.8 ms in calm air, lambda 50,000. Without both, the refitted derivatives
+    are those of an unstable aircraft, and the free run leaves all bounds."""
+    from airtruth.tracing import TraceOptions, trace
+    from validation.blind.trials import frozen
+
+    (folder,) = frozen(20261124, [0], "slow", tmp_path)
+    answer = trace(folder, "gtm", TraceOptions()).to_dict()
+    assert [e["name"] for e in answer["effects"]] == ["gyro_lag", "elevator_delay"]
+    assert not answer["provisional"]
+    (lag,) = answer["effects"][0]["parameters"].values()
+    (delay,) = answer["effects"][1]["parameters"].values()
+    assert abs(lag["value"] - 0.3034) < 3.0 * lag["std"]
+    assert abs(delay["value"] - 0.03881) < 3.0 * delay["std"]

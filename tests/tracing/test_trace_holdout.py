@@ -16,6 +16,7 @@ from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.model.compile import compile_change
 from airtruth.tracing.model.parameters import Common, PerRecord
 from airtruth.tracing.model.response import respond
+from airtruth.tracing.selection import acceptance
 from airtruth.units import DEG
 
 ARM = EFFECTS["vane_arm"]
@@ -161,3 +162,19 @@ def test_floor_is_the_standard_deviation_of_the_gust_response(sigma_w):
     np.testing.assert_allclose(
         np.sqrt(((y + np.array([0.0, 0.0, 9.80665])) ** 2).mean(axis=0)), found, rtol=0.4
     )
+
+
+def test_an_effect_that_alone_keeps_the_free_run_from_diverging_is_no_loss(fitted):
+    """Derivatives refitted without a large effect can be those of an unstable aircraft: the free run of every record leaves
+    all bounds, and nothing is left to compare."""
+    problem, found = fitted
+    reference = acceptance.reference_of(
+        problem, fit(problem, tr.NOTHING, replace(found.point, sizes=np.zeros(0)))
+    )
+    way = reference.left_out[0]
+    lost = [replace(a, residual=np.full_like(a.residual, 1e9)) for a in way.assessments]
+    tested = acceptance.tested_on_left_out(
+        problem, found, replace(reference, left_out=(way._replace(assessments=lost),))
+    )
+    assert tested.reasons == ()
+    assert (tested.free_run_gain == 0.0).all()

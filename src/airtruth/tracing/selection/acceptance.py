@@ -156,7 +156,7 @@ def tested_on_left_out(problem: TraceProblem, own: PosteriorFit, reference: Refe
         if not _is_loss(likelihood_gain):
             break
     free, variance = _free_run_gain(problem, unaided, after, reference.weight)
-    loses = free.sum() <= -_FREE_ERRORS * np.sqrt(variance.sum())
+    loses = free.sum() < -_FREE_ERRORS * np.sqrt(variance.sum())
     in_channels = (free.sum(axis=0) < -_ERRORS * np.sqrt(variance)).sum()
     reasons = (
         *(["it worsens the likelihood of records left out"] if _is_loss(likelihood_gain) else []),
