@@ -12,7 +12,14 @@ from airtruth.errors import StoreError
 from airtruth.logs import ledger
 from airtruth.logs.atomic import new_folder, remove_folder, write_text
 from airtruth.logs.outputs import writing
-from airtruth.logs.temporary import clear, is_abandoned, is_temporary, temporary_folder, temporary_name
+from airtruth.logs.temporary import (
+    clear,
+    is_abandoned,
+    is_temporary,
+    private_folder,
+    temporary_folder,
+    temporary_name,
+)
 from airtruth.logs.verify import verify
 
 
@@ -199,6 +206,23 @@ def test_temporary_files_of_living_processes_are_kept(tmp_path: Path) -> None:
     with temporary_folder(tmp_path, "x") as folder:
         assert folder.is_dir()
     assert not folder.exists()
+
+
+def test_a_private_folder_of_a_killed_process_is_removed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr("tempfile.tempdir", None)
+    code = (
+        "import os, signal; from airtruth.logs.temporary import private_folder; "
+        "(private_folder() / 'output').write_text('half'); os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True)
+    assert done.returncode == -9
+    assert len(list(tmp_path.iterdir())) == 1
+    folder = private_folder()
+    assert list(tmp_path.iterdir()) == [folder]
+    assert folder.stat().st_mode & 0o777 == 0o700
 
 
 def test_two_processes_do_not_lose_each_others_entries(tmp_path: Path) -> None:

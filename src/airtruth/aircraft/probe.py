@@ -7,7 +7,6 @@ instead of refusing it. A child process therefore loads the model first, looks u
 from __future__ import annotations
 
 import json
-import tempfile
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
@@ -17,6 +16,7 @@ from airtruth.errors import AircraftError
 from airtruth.isolation.client import call
 from airtruth.isolation.limits import Limits
 from airtruth.isolation.protocol import IsolatedError, Task
+from airtruth.logs.temporary import private_folder, remove
 from airtruth.quantity import Strict
 
 _LIMITS: Final = Limits(seconds=60.0, memory_bytes=3_000_000_000)
@@ -68,14 +68,17 @@ def probe(folder: Path, jsbsim_json: str) -> Constants:
         raise AircraftError(
             f"{folder}: JSBSim cannot open a folder whose name is not UTF-8; rename it, or use a UTF-8 locale"
         ) from None
-    with tempfile.TemporaryDirectory(prefix="airtruth-") as scratch:
-        output = Path(scratch) / "output"
+    scratch = private_folder()
+    try:
+        output = scratch / "output"
         arguments = {"folder": str(folder.absolute()), "jsbsim_json": jsbsim_json, "output": str(output)}
         task = Task("airtruth.aircraft.probe_child:load", arguments, _LIMITS, _MODULES)
         try:
             answer: dict[str, Any] = dict(call(task).facts)
         except IsolatedError as error:
             raise AircraftError(f"{folder}: {_explain(error, output)}") from None
+    finally:
+        remove(scratch)
     if "error" in answer:
         raise AircraftError(f"{folder}: {answer['error']}")
     return Constants.model_validate(answer["constants"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import logging
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import partial
@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import BinaryIO, Final, Protocol
 
 from airtruth.errors import StoreError
-from airtruth.logs.remote import RemotePath, location, uploaded
-from airtruth.logs.temporary import remove, temporary_folder, temporary_name
+from airtruth.logs.remote import RemotePath, location
+from airtruth.logs.temporary import private_folder, remove, temporary_folder, temporary_name
 
 _NEXT_STEP: Final = {
     errno.ENOSPC: "the disk is full: free some space and run again",
@@ -67,7 +67,7 @@ def atomic_file(path: Path | str) -> Iterator[BinaryIO]:
         active.before(path)
     if isinstance(path, RemotePath):
         try:
-            with uploaded(path, partial(_record, active, path)) as file:
+            with _uploaded(path, partial(_record, active, path)) as file:
                 yield file
         except OSError as error:  # of the local file
             raise write_error(path, error) from error
@@ -89,6 +89,26 @@ def atomic_file(path: Path | str) -> Iterator[BinaryIO]:
         sync_folder(path.parent)
     except OSError as error:
         raise write_error(path, error) from error
+
+
+@contextmanager
+def _uploaded(path: RemotePath, recorded: Callable[[Path], None]) -> Iterator[BinaryIO]:
+    """A local temporary file that becomes the key when the block ends; if the block fails, nothing is written.
+
+    Parameters
+    ----------
+    path : the key.
+    recorded : receives the file before it is uploaded.
+    """
+    folder = private_folder()
+    try:
+        local = folder / "object"
+        with local.open("wb") as file:
+            yield file
+        recorded(local)
+        path.upload(local)
+    finally:
+        remove(folder)
 
 
 def _record(active: Guard | None, path: Path, written: Path) -> None:

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from pathlib import Path, PosixPath
-from typing import Any, BinaryIO, Final, NoReturn, TypeVar
+from typing import Any, Final, NoReturn, TypeVar
 from urllib.parse import unquote, urlsplit
 
 from airtruth.errors import StoreError, choices, reason
@@ -289,24 +289,6 @@ def answered(path: RemotePath) -> Iterator[None]:
         raise StoreError(f"{path}: the store refuses ({reason(error)}); run the same command again") from None
 
 
-@contextmanager
-def uploaded(path: RemotePath, recorded: Callable[[Path], None]) -> Iterator[BinaryIO]:
-    """A local temporary file that becomes the key when the block ends; if the block fails, nothing is written.
-
-    Parameters
-    ----------
-    path : the key.
-    recorded : receives the file before it is uploaded.
-    """
-    import tempfile
-
-    with tempfile.NamedTemporaryFile(prefix="airtruth-") as file:
-        yield file.file  # type: ignore[misc]
-        file.flush()
-        recorded(Path(file.name))
-        path.upload(Path(file.name))
-
-
 def each(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
     """A function of each item, in their order; `REQUESTS` of them wait for the store at a time."""
     with ThreadPoolExecutor(REQUESTS) as pool:
@@ -329,4 +311,4 @@ def _file_system(scheme: str, bucket: str) -> Any:
     return FileSystem.from_uri(f"{scheme}://{user}{bucket}{SCHEMES[scheme]}")[0]
 
 
-__all__ = ["REQUESTS", "RemotePath", "answered", "each", "files_below", "location", "uploaded"]
+__all__ = ["REQUESTS", "RemotePath", "answered", "each", "files_below", "location"]

@@ -9,6 +9,7 @@ import os
 import re
 import secrets
 import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -86,6 +87,23 @@ def temporary_folder(parent: Path, name: str) -> Iterator[Path]:
         remove(folder)
 
 
+def private_folder() -> Path:
+    """Create a folder of this process in the system's folder for temporary files, and remove those of ended processes.
+
+    The caller removes it; where the caller is killed, the next call of any process does.
+
+    Raises
+    ------
+    OSError
+        If it cannot be created.
+    """
+    parent = Path(tempfile.gettempdir())
+    clear(parent)
+    folder = parent / temporary_name("airtruth")
+    folder.mkdir(mode=0o700)
+    return folder
+
+
 def is_alive(pid: int, start: int) -> bool:
     """Whether the process of this id is alive and, where both starts are known, is the same process."""
     try:
@@ -112,6 +130,7 @@ __all__ = [
     "is_abandoned",
     "is_alive",
     "is_temporary",
+    "private_folder",
     "remove",
     "started",
     "temporary_folder",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import tempfile
 import weakref
 from dataclasses import replace
@@ -17,7 +16,7 @@ from airtruth.aircraft import Aircraft
 from airtruth.aircraft.neutral import effective
 from airtruth.errors import ConfigurationError
 from airtruth.logs.atomic import write_error
-from airtruth.logs.temporary import clear, temporary_name
+from airtruth.logs.temporary import private_folder, remove
 from airtruth.physics.terms import Change
 from airtruth.simulation.campaign.file import NO_GUST, Campaign, EffectTable
 from airtruth.simulation.resolution import at_condition
@@ -70,19 +69,16 @@ def aircraft(plane: Aircraft, change: Change, simulation_hz: float, nominal: Con
 
     change = at_condition(change, plane, nominal, 1.0 / simulation_hz)
 
-    parent = Path(tempfile.gettempdir())
-    clear(parent)
-    folder = parent / temporary_name("airtruth")
     try:
-        folder.mkdir(mode=0o700)
+        folder = private_folder()
     except OSError as error:
-        raise write_error(folder, error) from None
+        raise write_error(Path(tempfile.gettempdir()), error) from None
     try:
         flown = changed(plane, change, folder / plane.name, highest_hz=simulation_hz)
     except BaseException:
-        shutil.rmtree(folder, ignore_errors=True)
+        remove(folder)
         raise
-    weakref.finalize(flown, shutil.rmtree, folder, ignore_errors=True)
+    weakref.finalize(flown, remove, folder)
     return flown
 
 
