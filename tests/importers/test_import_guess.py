@@ -216,3 +216,16 @@ def test_without_a_vane_the_guess_offers_the_reconstruction(log, tmp_path):
     assert "# [reconstruct]\n# alpha = true" in text
     assert mapping.channels["dynamic_pressure_pa"].unit == "pa"
     assert "airspeed_m_s" not in mapping.channels
+
+
+@pytest.mark.parametrize("step", [5e-324, 1e-310])
+def test_a_clock_whose_rate_is_no_number(step, log, tmp_path):
+    """The reciprocal of a subnormal step is infinite; the mapping keeps 50 Hz."""
+    times = step * np.arange(len(log.t_s))
+    topics = [
+        Topic("nav", times, {"GyrY": log.channels["q_rad_s"]}, {"GyrY": "rad/s"}),
+        Topic("air", times[::2], {"TAS": log.channels["airspeed_m_s"][::2]}, {"TAS": "m/s"}),
+    ]
+    recorders.hdf5(tmp_path / "f.h5", topics)
+    _, mapping = guessed(tmp_path / "f.h5")
+    assert mapping.resample.rate_hz == 50.0

@@ -314,8 +314,11 @@ def _rate_hz(source: Source, chosen: dict[str, _Column], clocks: dict[str, _Colu
                 continue
             own = column.values * TIME_UNITS[_unit(TIME, column, chosen)[0]]
         steps = np.diff(own)
-        if len(steps) and float(np.median(steps)) > 0.0:
-            return float(f"{1.0 / float(np.median(steps)):.3g}")
+        step = float(np.median(steps)) if len(steps) else 0.0
+        if 0.0 < step < np.inf and np.isfinite(
+            1.0 / step
+        ):  # the reciprocal of a subnormal number is infinite
+            return float(f"{1.0 / step:.3g}")
     return 50.0
 
 
