@@ -288,7 +288,7 @@ def _explanations(rounds: Sequence[SearchRound]) -> Iterator[tuple[tuple[str, ..
         yield (), 0.0
         return
     for s in release.sets[:_MOST_SETS]:
-        yield s.effects, release.sets[0].cost - s.cost
+        yield s.effects, release.cost - s.cost
 
 
 def inclusion(sets: Sequence[Alternative]) -> dict[str, float]:

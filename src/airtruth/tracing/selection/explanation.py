@@ -47,6 +47,9 @@ _REFERENCE: Final = 4.0
 factor of 2.0; it makes sets comparable with the refit of an effect, whose size has no prior."""
 _CERTAIN_SHAPE: Final = 0.02
 """Relative uncertainty of a direction that follows from definitions [-] (judgement: second order in the size)."""
+_AS_PROBABLE: Final = 0.5
+"""Posterior weight over that of the most probable effects from which fewer effects are preferred [-] (judgement: odds of two
+to one tell nothing apart)."""
 _LEAST_SHARE: Final = 1e-15
 """Least probability of the plausible range of a size [-] (judgement: below it a set is out of the question)."""
 
@@ -154,6 +157,28 @@ def explain(
             by_scale = [_sets_of(likelihood, chosen, subsets, scale) for scale in WRONG_BY]
             found += [_mixed(scales) for scales in zip(*by_scale, strict=True)]
     return tuple(sorted((s for s in found if np.isfinite(s.cost)), key=lambda s: s.cost))
+
+
+def simplest_first(sets: Sequence[CauseSet]) -> tuple[CauseSet, ...]:
+    """The sets, that of the fewest effects among those about as probable as the most probable ones first.
+
+    Wrong declarations of any derivatives are one effect, whose weight is the sum over its sets.
+    """
+    if not sets:
+        return ()
+    least = least_cost(sets)
+    weights: dict[tuple[str, ...], float] = {}
+    for s in sets:
+        weights[s.effects] = weights.get(s.effects, 0.0) + float(np.exp(least - s.cost))
+    enough = _AS_PROBABLE * max(weights.values())
+    names = min((n for n, w in weights.items() if w >= enough), key=lambda n: (len(n), -weights[n]))
+    first = min((s for s in sets if s.effects == names), key=lambda s: s.cost)
+    return (first, *(s for s in sets if s is not first))
+
+
+def least_cost(sets: Sequence[CauseSet]) -> float:
+    """Cost of the most probable set."""
+    return min(s.cost for s in sets)
 
 
 def _mixed(scales: Sequence[CauseSet]) -> CauseSet:
@@ -276,4 +301,6 @@ __all__ = [
     "CauseSet",
     "causes_of",
     "explain",
+    "least_cost",
+    "simplest_first",
 ]

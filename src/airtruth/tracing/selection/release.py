@@ -18,7 +18,15 @@ from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.parameters import Common, Parameters
-from airtruth.tracing.selection.explanation import WRONG_BY, Cause, CauseSet, explain, predicted_cost
+from airtruth.tracing.selection.explanation import (
+    WRONG_BY,
+    Cause,
+    CauseSet,
+    explain,
+    least_cost,
+    predicted_cost,
+    simplest_first,
+)
 
 CONTRADICTED: Final = 0.01
 """Probability below which records contradict the declared derivatives [-] (convention: one true declaration in a
@@ -59,9 +67,10 @@ class Release:
 
     Attributes
     ----------
-    test : of the declaration; fit : every declaration taken as wrong; sets : what explains the shifts, best first.
-    strain : log-posterior that the best set loses to derivatives without any prior [-].
-    refit : the best set as effects of the filter, where it carries all of them; else None.
+    test : of the declaration; fit : every declaration taken as wrong.
+    sets : what explains the shifts, that of the answer first (`airtruth.tracing.selection.explanation.simplest_first`).
+    strain : log-posterior that the most probable set loses to derivatives without any prior [-].
+    refit : the first set as effects of the filter, where it carries all of them; else None.
     """
 
     test: Contradiction
@@ -72,8 +81,8 @@ class Release:
 
     @property
     def cost(self) -> float:
-        """Cost of the best set, comparable with that of a refitted effect."""
-        return self.sets[0].cost
+        """Cost of the most probable set, comparable with that of a refitted effect."""
+        return least_cost(self.sets)
 
 
 def released(hypothesis: Hypothesis, problem: TraceProblem) -> Hypothesis:
@@ -107,7 +116,8 @@ def release(
         return None
     peak = 0.5 * float(own.vector @ np.linalg.pinv(own.information, hermitian=True) @ own.vector)
     sets, refits = _refitted(problem, null, free, declared, sets)
-    strain = sets[0].cost - (own.cost - peak)
+    strain = least_cost(sets) - (own.cost - peak)
+    sets = simplest_first(sets)
     return Release(test, free, sets, strain, refits.get(sets[0].effects))
 
 
@@ -168,8 +178,9 @@ def size_in_derivatives(key: str, size: float) -> float:
 
 
 def explained(problem: TraceProblem, free: PosteriorFit, declared: DeclaredCauses) -> tuple[CauseSet, ...]:
-    """Sets that explain the derivatives of a released fit, best first; the declaration itself is not among them."""
-    return _explaining(derivative_likelihood(problem, free), declared)
+    """Sets that explain the derivatives of a released fit, that of the answer first; the declaration itself is not among
+    them."""
+    return simplest_first(_explaining(derivative_likelihood(problem, free), declared))
 
 
 def _explaining(likelihood: DerivativeLikelihood, declared: DeclaredCauses) -> tuple[CauseSet, ...]:

@@ -126,7 +126,7 @@ class SearchRound:
     profile : likelihood of the best accepted candidate over its location; None where it has no location.
     declared_test : test of the declared derivatives at the null.
     release : the derivatives released from a declaration that the records contradict; None where they do not.
-    sets : what explains the derivatives at a null that is released, best first; empty at any other.
+    sets : what explains the derivatives at a null that is released, that of the answer first; empty at any other.
     rival : the branch of the search that began at this round and lost; None where there is none.
     """
 

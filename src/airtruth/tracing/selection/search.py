@@ -16,6 +16,7 @@ from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import OUTDONE, Candidate
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import BETTER, better_set
+from airtruth.tracing.selection.explanation import least_cost
 from airtruth.tracing.selection.refit import refit_without
 from airtruth.tracing.selection.release import DeclaredCauses, Release
 from airtruth.tracing.selection.rounds import (
@@ -229,7 +230,7 @@ def total_cost(last: SearchRound) -> float:
     if last.null.hypothesis.spread is None:
         own = last.null.cost if last.release is None else last.release.cost
     else:
-        own = last.sets[0].cost if last.sets else np.inf
+        own = least_cost(last.sets) if last.sets else np.inf
     return own + len(last.null.point.sizes)
 
 
