@@ -151,7 +151,7 @@ def _started(task: Task) -> bytes:
 
 
 def _check(code: int, task: Task) -> None:
-    """Raise unless a process ended well; its own clock ends it by SIGALRM."""
+    """Raise unless a process ended well; its own clocks end it by SIGALRM and SIGPROF."""
     if code == 0:
         return
     try:
@@ -160,6 +160,8 @@ def _check(code: int, task: Task) -> None:
         name = f"exit code {code}"
     if name == "SIGALRM":
         raise IsolatedError("time", f"no answer within {task.limits.seconds:.0f} s")
+    if name == "SIGPROF":
+        raise IsolatedError("time", f"no answer within {task.limits.computing_s:.0f} s of computing time")
     raise IsolatedError("crash", name)
 
 

@@ -21,13 +21,20 @@ two copies exist for a moment)."""
 
 @dataclass(frozen=True)
 class Limits:
-    """Time [s] and address space [byte] of one call."""
+    """Limits of one call.
+
+    Attributes
+    ----------
+    seconds : time until the answer [s]; memory_bytes : address space [byte].
+    computing_s : computing time [s], which does not grow where other processes are busy; 0 for no limit.
+    """
 
     seconds: float
     memory_bytes: int
+    computing_s: float = 0.0
 
     def to_dict(self) -> dict[str, Any]:
-        """Both limits by name."""
+        """The limits by name."""
         return asdict(self)
 
 
@@ -47,6 +54,7 @@ def impose(limits: Limits) -> None:
     if hasattr(signal, "setitimer"):
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
         signal.setitimer(signal.ITIMER_REAL, limits.seconds)
+    impose_cpu_time(limits.computing_s)
     impose_memory(limits.memory_bytes)
 
 

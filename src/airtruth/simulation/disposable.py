@@ -26,6 +26,8 @@ T = TypeVar("T")
 
 SECONDS: Final = 300.0
 """Time for a trim or for tables of the forces [s] (judgement: 100 times that of the slowest shipped aircraft)."""
+COMPUTING_S: Final = 60.0
+"""Computing time of the same [s] (judgement: 20 times that of the slowest)."""
 MEMORY_BYTES: Final = 4_000_000_000
 """Address space of the process [byte] (judgement: four times what the libraries reserve)."""
 _STEP_S: Final = 0.01
@@ -40,7 +42,8 @@ _kept: Final[list[BaseException]] = []
 
 def limits_of(steps: int) -> Limits:
     """Limits of a trim and of flights of a number of simulation steps in all."""
-    return Limits(SECONDS + _STEP_S * steps, MEMORY_BYTES + _STEP_BYTES * steps)
+    more = _STEP_S * steps
+    return Limits(SECONDS + more, MEMORY_BYTES + _STEP_BYTES * steps, COMPUTING_S + more)
 
 
 def isolated(work: str, function: Callable[P, T], *arguments: P.args, **named: P.kwargs) -> T:
@@ -88,10 +91,13 @@ def isolated_flight(
                 f"{work}: a process for JSBSim does not start ({error.detail}); raise the limits of memory and processes "
                 "(ulimit -v, -u)"
             ) from None
+        memory = f"needs more than {limits.memory_bytes / 1e9:.2g} GB of memory"
         how = {
-            "time": f"does not end within {limits.seconds:.0f} s",
-            "memory": f"needs more than {limits.memory_bytes / 1e9:.2g} GB of memory",
+            "time": f"gives {error.detail}",
+            "memory": memory,
         }.get(error.kind, f"ends the process of JSBSim ({error.detail})")
+        if error.detail == "SIGABRT":
+            how += f", or {memory}"
         raise AircraftError(f"{work} {how}; correct the JSBSim model, or choose another aircraft") from None
     result: T = pickle.loads(answer.tobytes())
     return result
