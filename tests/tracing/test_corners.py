@@ -55,6 +55,22 @@ def test_a_servo_that_the_samples_show_is_no_corner():
         assert (read(log)[0].corner_rad2.size == 0) == empty
 
 
+def test_a_surface_at_rest_beside_a_step_stays_at_rest():
+    """A step between two samples: the cubic through four samples would bend the cells beside it by a twenty-fourth of it."""
+    from airtruth.logs.flight_log import FlightLog
+
+    t = np.arange(150) * 0.05
+    channels = {
+        name: np.zeros(150) for name in ("alpha_rad", "q_rad_s", "az_m_s2", "theta_rad", "altitude_m")
+    }
+    channels |= {"airspeed_m_s": np.full(150, tr.V), "elevator_rad": np.where(t > 1.02, DEG, 0.0)}
+    (signals,) = read(FlightLog({}, ("a",), np.array([0, 150]), t, channels))
+    cells = (signals.elevator_rad.size - 1) // 149
+    before, after = signals.elevator_rad[: 20 * cells + 1], signals.elevator_rad[21 * cells :]
+    assert (before == 0.0).all()
+    assert (after == DEG).all()
+
+
 def kalman(made, u, corner, sigma_w):
     """Innovations over their own Cholesky factors, by a Kalman filter with a covariance of its own at each sample."""
     a, b, c, d = tr.motion(sigma_w=sigma_w)
@@ -166,3 +182,55 @@ def test_a_sensor_late_by_little_does_not_read_the_corner():
         for change in (Change(), Change(sensors=(SensorTerm("az_m_s2", "lag", 1e-4),)))
     ]
     assert more[1] == pytest.approx(more[0], rel=0.02)
+
+
+T38 = """
+schema = 1
+name = "t38"
+aircraft = "T38"
+runs = 6
+seed = 77
+duration_s = 8.0
+log_hz = {rate}
+[condition]
+eas_kt = 300
+altitude_ft = 10000
+[gust]
+level = "light"
+figures = "mil-f-8785c"
+[sensors]
+ideal = true
+[[effect]]
+name = "vane_lag"
+tau_s = 0.08
+[[manoeuvre]]
+kind = "3211"
+amplitude_deg = 1.0
+start_s = 1.03
+step_s = 0.43
+[[manoeuvre]]
+kind = "doublet"
+amplitude_deg = -1.0
+start_s = 1.01
+step_s = 0.51
+"""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("rate", [50, 25, 20])
+def test_steps_between_the_samples_of_ideal_sensors(rate, tmp_path):
+    """The JSBSim T-38 has no servo, so that its surface steps. Its derivatives are those of its own linearisation."""
+    from airtruth.simulation.campaign.plan import make
+    from airtruth.simulation.campaign.run import fly
+    from airtruth.tracing import TraceOptions, trace
+
+    (tmp_path / "t38.toml").write_text(T38.format(rate=rate))
+    fly(make(tmp_path / "t38.toml"), tmp_path / "out")
+    answer = trace(tmp_path / "out", "T38", TraceOptions()).to_dict()
+    (lag,) = answer["effects"]
+    assert lag["name"] == "vane_lag"
+    assert abs(lag["parameters"]["tau_s"]["value"] - 0.08) < 2.0 * lag["parameters"]["tau_s"]["std"]
+    assert not answer["provisional"]
+    found = answer["derivatives"]
+    for name, std in found["after_std"].items():
+        assert abs(found["after"][name] - found["declared"][name]) < 2.0 * std, name

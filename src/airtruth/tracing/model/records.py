@@ -191,14 +191,19 @@ def _between(elevator: Array, dt_s: float, cells: int, std_rad: float, servo_s: 
         return smooth(elevator, cells) if path is None else path, np.zeros(0)
     bend = servo_bend((elevator - elevator[0])[None, :])[0]
     corners = np.zeros(0) if bend.any() else corner_variance(elevator, std_rad)
-    return _elevator(elevator, bend, cells), corners
+    return _elevator(elevator, bend, cells, corners), corners
 
 
-def _elevator(elevator: Array, bend: Array, sub: int) -> Array:
+def _elevator(elevator: Array, bend: Array, sub: int, corners: Array) -> Array:
+    """Parabolas of the cubic's area; straight beside a corner, because the samples across it say nothing of the cell."""
     relative = elevator - elevator[0]
     edge = np.concatenate([relative[:1], relative, relative[-1:]])
+    cubic = (edge[1:-2] + edge[2:-1] - edge[:-3] - edge[3:]) / 24.0
+    if corners.size:
+        at = np.pad(corners[1:] > 0.0, 1)
+        cubic[at[:-2] | at[1:-1] | at[2:]] = 0.0
     bend = bend.copy()
-    bend[1:] += (edge[1:-2] + edge[2:-1] - edge[:-3] - edge[3:]) / 24.0
+    bend[1:] += cubic
     share = np.arange(sub) / sub
     cells = elevator[:-1, None] + (elevator[1:] - elevator[:-1])[:, None] * share
     cells += 6.0 * bend[1:, None] * share * (1.0 - share)
