@@ -61,3 +61,14 @@ def test_sensor_noise_changes_it_little():
         + 0.01 * DEG * np.random.default_rng(5).normal(size=(1, 250))
     )
     assert np.abs(noisy - clean).max() < 0.25 * np.abs(clean).max()
+
+
+def test_leaves_steps_between_two_samples_alone():
+    """Half of each step on either side of a sample, with noise: the increment after it is noise, and no decay of a servo."""
+    rng = np.random.default_rng(7)
+    t = np.arange(500) * 0.02
+    de = np.zeros((40, 500))
+    for start, level in ((1.0, 1.5), (1.6, -3.0), (2.2, 1.5), (5.0, 1.2), (5.8, -2.4), (6.4, 1.2)):
+        de += np.where(t > start + 0.01, level, np.where(t > start - 0.01, 0.5 * level, 0.0)) * DEG
+    bend = servo_bend(de + 0.02 * DEG * rng.standard_normal(de.shape))
+    assert (bend == 0.0).all()

@@ -23,6 +23,8 @@ _DENSE: Final = 8
 """Cells per step below which the command is not held [-]; judgement."""
 _MOVING: Final = 0.1
 """Least increment over the largest one that determines rho [-]; judgement."""
+_AGREEING: Final = 0.5
+"""Least lower quartile of the ratios over their median that shows a servo [-]; judgement."""
 _SLOWEST: Final = 0.98
 """Largest rho of a servo [-]; judgement: above it the motion over a cell is within sensor noise."""
 _FASTEST: Final = 0.02
@@ -31,7 +33,11 @@ _FASTEST: Final = 0.02
 
 @njit(cache=True)
 def _decay(increments: Array) -> float:
-    """Weighted median of the ratio of neighbouring increments, NaN if nothing moves."""
+    """Weighted median of the ratio of neighbouring increments, NaN if nothing moves or the ratios do not show a servo.
+
+    A step within a cell gives ratios above that of the servo, so that the least ones agree. A surface that stops within a
+    cell gives ratios about zero.
+    """
     count = increments.size - 1
     largest = np.abs(increments).max()
     ratios = np.empty(count)
@@ -44,12 +50,15 @@ def _decay(increments: Array) -> float:
             weights[used] = weight
             used += 1
     order = np.argsort(ratios[:used])
-    half = 0.5 * weights[:used].sum()
+    whole = weights[:used].sum()
+    quarter = np.nan
     total = 0.0
     for i in order:
         total += weights[i]
-        if total >= half:
-            return float(ratios[i])
+        if np.isnan(quarter) and total >= 0.25 * whole:
+            quarter = ratios[i]
+        if total >= 0.5 * whole:
+            return float(ratios[i]) if quarter > _AGREEING * ratios[i] else np.nan
     return np.nan
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 from typing import Final
@@ -35,6 +36,8 @@ _QUIET_S: Final = 0.2
 """Width of the median that replaces an elevator at rest [s] (judgement)."""
 _QUIET_STD: Final = 3.0
 """Distance from that median up to which the elevator is at rest, in standard deviations of its noise [-] (convention)."""
+_CONSTANT_STD: Final = 3.0
+"""Standard deviations of von Neumann's ratio below 1 up to which an elevator at rest is constant [-] (convention)."""
 _CORNER_SHARE: Final = 0.05
 """Least corner, as a share of the elevator's range [-] (judgement): a smaller one moves the aircraft by less."""
 _CORNER_NOISE: Final = 20.0
@@ -102,8 +105,8 @@ class TraceRecord:
 def read(log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0) -> list[Signals]:
     """The runs of a validated log.
 
-    Where the elevator is at rest but for the noise of its sensor it is smoothed, because backlash and rate limits
-    would take each new extreme of the noise for motion.
+    Where the elevator is at rest but for the noise of its sensor it is smoothed, because the noise moves the model's aircraft,
+    and backlash and rate limits would take each new extreme for motion.
     The elevator between samples has the area of the cubic through the four nearest samples and the
     corners of a first-order servo where the record shows one (`airtruth.numerics.intersample`); in a coarse log it is
     that of the declared servo, or a spline (`airtruth.tracing.model.elevator`). Airspeed
@@ -174,14 +177,38 @@ def _ground(channels: dict[str, Array], theta: Array, dt_s: float) -> Array:
 
 
 def _quiet(elevator: Array, dt_s: float, std: float) -> Array:
-    """The median over 0.2 s where that changes less than three standard deviations, as measured elsewhere."""
+    """The elevator without the noise of its sensor where it is at rest.
+
+    It is at rest where it stays within three standard deviations of its median over 0.2 s. Of a stretch that shows nothing
+    but white noise the mean is taken, else the median: slow noise of a median moves an aircraft as well as that of the samples.
+    """
     from scipy.ndimage import median_filter
 
     raw = np.asarray(elevator, dtype=np.float64)
     if std <= 0.0:
         return raw
-    middle = median_filter(raw, size=2 * round(0.5 * _QUIET_S / dt_s) + 1, mode="nearest")
-    return np.where(np.abs(raw - middle) <= _QUIET_STD * std, middle, raw)
+    width = 2 * round(0.5 * _QUIET_S / dt_s) + 1
+    middle = median_filter(raw, size=width, mode="nearest")
+    at_rest = np.abs(raw - middle) <= _QUIET_STD * std
+    between = np.abs(middle[2:] - middle[:-2]) <= std
+    at_rest[1:-1] |= at_rest[:-2] & at_rest[2:] & between  # a single outlier of the noise
+    quiet = np.where(at_rest, middle, raw)
+    jumps = np.abs(np.diff(middle)) > _QUIET_STD * std
+    ends = np.flatnonzero(np.diff(at_rest) | jumps) + 1
+    for start, end in itertools.pairwise([0, *ends.tolist(), len(raw)]):
+        if at_rest[start] and end - start >= width and is_constant(raw[start:end]):
+            quiet[start:end] = raw[start:end].mean()
+    return quiet
+
+
+def is_constant(x: Array) -> bool:
+    """Whether samples show nothing but a constant and white noise, by the mean square of their differences.
+
+    Source: J. von Neumann, Ann. Math. Statist. 12 (1941) 367-395: of white noise its ratio to twice the variance has a mean of
+    about 1 and a standard deviation of about 1/sqrt(samples).
+    """
+    differences = 0.5 * float((np.diff(x) ** 2).mean())
+    return differences >= (1.0 - _CONSTANT_STD / math.sqrt(x.size)) * float(x.var(ddof=1))
 
 
 def _between(elevator: Array, dt_s: float, cells: int, std_rad: float, servo_s: float) -> tuple[Array, Array]:

@@ -1,0 +1,64 @@
+"""The elevator at rest: its noise is no motion."""
+
+import numpy as np
+import pytest
+import trace_records as tr
+
+from airtruth.logs.flight_log import FlightLog
+from airtruth.tracing.model.records import is_constant, read
+from airtruth.units import DEG
+
+STD = 0.02 * DEG
+T = np.arange(500) * 0.02
+
+
+def restored(elevator, std=STD):
+    """The elevator at the samples, as the tracer reads it."""
+    channels = {
+        name: np.zeros(500) for name in ("alpha_rad", "q_rad_s", "az_m_s2", "theta_rad", "altitude_m")
+    }
+    channels |= {"airspeed_m_s": np.full(500, tr.V), "elevator_rad": elevator}
+    (signals,) = read(FlightLog({}, ("a",), np.array([0, 500]), T, channels), std)
+    return signals.elevator_rad[:: (signals.elevator_rad.size - 1) // 499]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_each_rest_has_the_mean_of_its_samples(seed):
+    """Rests of 1 to 5 s between steps: nothing remains but the error of a mean, STD/sqrt(50) to STD/sqrt(250)."""
+    exact = np.select([T < 1.0, T < 2.5, T < 5.0], [0.0, 1.5 * DEG, -1.5 * DEG], 0.0)
+    found = restored(exact + STD * np.random.default_rng(seed).standard_normal(500))
+    for start, end in ((0, 50), (50, 125), (125, 250), (250, 500)):
+        rest = found[start + 6 : end - 6]
+        assert np.ptp(rest) == 0.0
+        assert abs(rest[0] - exact[start + 6]) < 4.0 * STD / np.sqrt(end - start)
+
+
+def test_a_slow_motion_within_the_noise_is_kept():
+    """A drift of three standard deviations over 10 s, with noise and without: the mean would be off by 1.5 at its ends."""
+    exact = 3.0 * STD * T / T[-1]
+    noisy = restored(exact + STD * np.random.default_rng(1).standard_normal(500))
+    for found in (noisy, restored(exact)):
+        assert np.abs(found - exact)[10:-10].max() < 1.6 * STD
+        assert found[-60:].mean() - found[:60].mean() == pytest.approx(2.64 * STD, rel=0.25)
+
+
+def test_a_single_outlier_is_no_motion():
+    elevator = STD * np.random.default_rng(2).standard_normal(500)
+    elevator[250] = 4.0 * STD
+    assert np.ptp(restored(elevator)[10:-10]) == 0.0
+
+
+def test_without_a_declared_noise_every_sample_is_kept():
+    elevator = STD * np.random.default_rng(3).standard_normal(500)
+    assert restored(elevator, 0.0) == pytest.approx(elevator, abs=1e-15)
+
+
+def test_the_ratio_of_von_neumann():
+    """White noise has a ratio of 1, coloured one 1 less its first correlation, a line 6/n^2."""
+    rng = np.random.default_rng(4)
+    white = rng.standard_normal((400, 100))
+    assert np.mean([is_constant(row) for row in white]) > 0.99
+    coloured = np.array([np.convolve(row, np.exp(-np.arange(30) / 8.0), "valid") for row in white])
+    assert np.mean([is_constant(row) for row in coloured]) < 0.01
+    assert not is_constant(np.arange(12.0))
+    assert is_constant(np.ones(12))
