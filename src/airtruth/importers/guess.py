@@ -27,6 +27,12 @@ from airtruth.units import UNITS
 
 Array = NDArray[np.float64]
 
+_LOWEST_HZ: Final = 0.1
+"""Least rate that a guess takes from a clock [Hz] (judgement: slower logs do not show a short period)."""
+_HIGHEST_HZ: Final = 1e5
+"""Highest rate that a guess takes from a clock [Hz] (judgement: above that of any recorder)."""
+_USUAL_HZ: Final = 50.0
+"""Rate of a guess without a plausible clock [Hz] (judgement)."""
 _SHOWN: Final = 200
 """Columns that the comment at the end lists [-] (judgement)."""
 _STEADY: Final = frozenset({"density_kg_m3", "altitude_m", "airspeed_m_s", "throttle"})
@@ -302,7 +308,7 @@ def _missing(chosen: dict[str, _Column]) -> Iterator[str]:
 
 
 def _rate_hz(source: Source, chosen: dict[str, _Column], clocks: dict[str, _Column | None]) -> float:
-    """Rate of q, or of the first channel whose rate is known; 50 if none is [Hz]."""
+    """Rate of q, or of the first channel whose rate is plausible; the usual one if none is [Hz]."""
     for name in ("q_rad_s", *clocks):
         if name not in chosen:
             continue
@@ -315,11 +321,9 @@ def _rate_hz(source: Source, chosen: dict[str, _Column], clocks: dict[str, _Colu
             own = column.values * TIME_UNITS[_unit(TIME, column, chosen)[0]]
         steps = np.diff(own)
         step = float(np.median(steps)) if len(steps) else 0.0
-        if 0.0 < step < np.inf and np.isfinite(
-            1.0 / step
-        ):  # the reciprocal of a subnormal number is infinite
+        if 1.0 / _HIGHEST_HZ <= step <= 1.0 / _LOWEST_HZ:
             return float(f"{1.0 / step:.3g}")
-    return 50.0
+    return _USUAL_HZ
 
 
 def _entry(column: _Column) -> str:
