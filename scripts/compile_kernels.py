@@ -35,7 +35,8 @@ METHODS: Final = (
 
 def remove_stale(package: Path) -> int:
     """Remove cached kernels older than the newest file with kernels; the number of removed files."""
-    sources = (path for path in package.rglob("*.py") if "njit" in path.read_text(encoding="utf-8"))
+    texts = ((path, path.read_text(encoding="utf-8")) for path in package.rglob("*.py"))
+    sources = (path for path, text in texts if "njit" in text or "numerics.compiled" in text)
     newest = max((path.stat().st_mtime for path in sources), default=0.0)
     stale = [p for p in package.rglob("*.nb[ic]") if p.stat().st_mtime < newest]
     for path in stale:

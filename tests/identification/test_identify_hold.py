@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numba import njit
 from scipy.linalg import expm
 
 from airtruth.numerics.hold import first_order_hold
@@ -17,6 +18,12 @@ def augmented(a, b, dt):
     return e[:2, :2], e[:2, 2] - e[:2, 3], e[:2, 3]
 
 
+@njit
+def hold(a00, a01, a10, a11, b0, b1, dt):
+    """`first_order_hold`, which only kernels call."""
+    return first_order_hold(a00, a01, a10, a11, b0, b1, dt)
+
+
 entry = st.floats(-60.0, 60.0)
 
 
@@ -24,7 +31,7 @@ entry = st.floats(-60.0, 60.0)
 @given(st.tuples(entry, entry, entry, entry), st.tuples(entry, entry), st.sampled_from([0.005, 0.02, 0.1]))
 def test_equals_the_matrix_exponential(a, b, dt):
     matrix, column = np.array(a).reshape(2, 2), np.array(b)
-    e, g, h = first_order_hold(*a, *b, dt)
+    e, g, h = hold(*a, *b, dt)
     reference = augmented(matrix, column, dt)
     size = np.abs(reference[0]).max() * (1.0 + np.abs(matrix).max()) * (1.0 + np.abs(column).max())
     np.testing.assert_allclose(np.reshape(e, (2, 2)), reference[0], rtol=0, atol=1e-13 * size)
@@ -35,7 +42,7 @@ def test_equals_the_matrix_exponential(a, b, dt):
 def test_double_integrator_by_hand():
     """A = [[0, 1], [0, 0]], b = [0, 1]: x0 gains dt^2/2 of a constant, dt^2/6 of the late half."""
     dt = 0.5
-    e, g, h = first_order_hold(0.0, 1.0, 0.0, 0.0, 0.0, 1.0, dt)
+    e, g, h = hold(0.0, 1.0, 0.0, 0.0, 0.0, 1.0, dt)
     assert e == pytest.approx((1.0, dt, 0.0, 1.0), abs=1e-15)
     assert h == pytest.approx((dt**2 / 6.0, dt / 2.0), abs=1e-15)
     assert g == pytest.approx((dt**2 / 3.0, dt / 2.0), abs=1e-15)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import trace_records as tr
+from numba import njit
 from scipy.integrate import solve_ivp
 
 from airtruth.physics.terms import AeroTerm, Change, DeclaredTerm
@@ -110,13 +111,19 @@ def test_nonlinear_free_run_against_dop853():
 # -- terms of effects, by the rates at one state
 
 
+@njit
+def of_kernel(x, at, model, out):
+    """`rates`, which only kernels call."""
+    return rates(x, at, model, out)
+
+
 def rates_at(change, x=(0.04, 0.3), de=0.05, common=None):
     model = tr.model(change, common)
     state = np.zeros(model.states.size)
     state[:2] = x
     out = np.zeros(state.size)
     at = AirPoint(de, tr.V, tr.V, 0.5 * tr.DENSITY * tr.V**2, 0.04, 0.0, 0.0)
-    return out, rates(state, at, model, out)
+    return out, of_kernel(state, at, model, out)
 
 
 VALUES = {"alpha": 0.04, "elevator": 0.05, "qhat": 0.3 * tr.HALF}
@@ -192,7 +199,7 @@ def test_spectrum_of_the_gust(rolloff, tolerance):
         state[:] = 0.0
         state[i] = 1.0
         row[i] = gust(state, model.gusts.rolloff)
-        rates(state, at, model, out)
+        of_kernel(state, at, model, out)
         a[5:, i] = out[5:]
     omega = np.geomspace(0.5, 600.0, 200)
     drive = np.zeros(8)

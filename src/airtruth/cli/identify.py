@@ -21,7 +21,7 @@ from airtruth.cli.arguments import (
     Trim,
 )
 from airtruth.cli.output import notice, print_result
-from airtruth.cli.progress import progress_bar, working
+from airtruth.cli.progress import announced_compilation, progress_bar, working
 
 
 @app.command(epilog="Example: airtruth identify out/light --aircraft gtm --method iv-f1 --method ls")
@@ -104,7 +104,11 @@ def identify(
             outputs.require(out)
             settings = identification.settings_of(declared, options, joint)
             identification.require_mergeable(out, methods, settings, force=force)
-        with workers(cluster) as on, progress_bar("identify", "estimates", quiet) as advance:
+        with (
+            workers(cluster) as on,
+            announced_compilation("identify", quiet),
+            progress_bar("identify", "estimates", quiet) as advance,
+        ):
             result = kept.enter_context(
                 identification.identified(
                     logs,

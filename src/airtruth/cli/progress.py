@@ -200,6 +200,36 @@ def progress_bar(verb: str, things: str, quiet: bool) -> Iterator[Callable[[int,
         yield advance
 
 
+@contextmanager
+def announced_compilation(verb: str, quiet: bool) -> Iterator[None]:
+    """State once on stderr that numba compiles a kernel, which it does where the cache of kernels is empty.
+
+    Parameters
+    ----------
+    verb : name of the command.
+    quiet : state nothing.
+    """
+    if quiet or sys.stderr is None:
+        yield
+        return
+    from numba.core import event
+
+    class Announcement(event.Listener):
+        stated = False
+
+        def on_start(self, event: object) -> None:
+            if not self.stated:
+                self.stated = True
+                text = "compiles its kernels; later runs read them from the cache"
+                print(f"airtruth {verb}: {text}", file=sys.stderr, flush=True)
+
+        def on_end(self, event: object) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Announcement()):
+        yield
+
+
 class _Lines:
     """Progress as lines of a log, at most one in `EVERY_S`."""
 
@@ -249,4 +279,4 @@ def _bar(things: str) -> Progress:
     return Progress(*columns, console=Console(stderr=True), redirect_stdout=False)
 
 
-__all__ = ["TRACE_STEPS", "Remaining", "progress_bar", "status", "working"]
+__all__ = ["TRACE_STEPS", "Remaining", "announced_compilation", "progress_bar", "status", "working"]

@@ -26,7 +26,7 @@ from airtruth.cli.arguments import (
     TraceSeed,
 )
 from airtruth.cli.output import notice, print_result
-from airtruth.cli.progress import TRACE_STEPS, progress_bar, status
+from airtruth.cli.progress import TRACE_STEPS, announced_compilation, progress_bar, status
 from airtruth.errors import FAILED_RUNS
 
 if TYPE_CHECKING:
@@ -104,7 +104,11 @@ def _perform(task: TraceTask, cluster: str | None, *, as_json: bool, quiet: bool
     from airtruth.api.trace_tasks import attempted_on, perform
     from airtruth.cluster import workers
 
-    with workers(cluster) as on, status(task.command, quiet, TRACE_STEPS) as advance:
+    with (
+        workers(cluster) as on,
+        announced_compilation(task.command, quiet),
+        status(task.command, quiet, TRACE_STEPS) as advance,
+    ):
         if on is None:
             summary = perform(task, advance)
         else:
@@ -133,7 +137,11 @@ def _trace_each(
     from airtruth.api.trace_sets import trace_sets
     from airtruth.cluster import workers
 
-    with workers(cluster) as on, progress_bar("trace", "sets", quiet) as advance:
+    with (
+        workers(cluster) as on,
+        announced_compilation("trace", quiet),
+        progress_bar("trace", "sets", quiet) as advance,
+    ):
         result = trace_sets(
             sets, load_aircraft(aircraft), options, out, force=force, cluster=on, advance=advance
         )

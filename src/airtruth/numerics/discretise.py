@@ -7,13 +7,17 @@ Sources: E. K.-W. Chu et al., Int. J. Control 77(8), 2004 (structured doubling o
 
 from __future__ import annotations
 
-from typing import Final
+import math
+from typing import Any, Final
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from airtruth.numerics.compiled import inner
+
 Array = NDArray[np.float64]
+Numbers = NDArray[Any]
 
 DOUBLINGS: Final = 40
 """Most doublings of a step or of a power of a matrix."""
@@ -21,7 +25,7 @@ TINY: Final = 1e-40
 """Imaginary part of a complex step; nothing is subtracted, so it may be as small as that."""
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def assemble(values, place, coefficient, system, process, noise):  # type: ignore[no-untyped-def]
     """Fill [[A, B], [C, D]], diag Q and diag R (of the type of ``values``, real or complex)."""
     system[:] = 0.0
@@ -40,8 +44,8 @@ def assemble(values, place, coefficient, system, process, noise):  # type: ignor
             noise[place[t, 1]] += entry
 
 
-@njit(cache=True)
-def multiply(a, b, out):  # type: ignore[no-untyped-def]
+@inner
+def multiply(a: Numbers, b: Numbers, out: Numbers) -> None:
     """out = a b, real or complex."""
     for i in range(a.shape[0]):
         for j in range(b.shape[1]):
@@ -51,8 +55,8 @@ def multiply(a, b, out):  # type: ignore[no-untyped-def]
             out[i, j] = total
 
 
-@njit(cache=True)
-def congruence(a, x, work, out):  # type: ignore[no-untyped-def]
+@inner
+def congruence(a: Numbers, x: Numbers, work: Numbers, out: Numbers) -> None:
     """out = a x a' (plain transpose), x symmetric."""
     multiply(a, x, work)
     for i in range(a.shape[0]):
@@ -64,7 +68,7 @@ def congruence(a, x, work, out):  # type: ignore[no-untyped-def]
             out[j, i] = total
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def step(system, process, states, dt_s, phi, early, late, noise):  # type: ignore[no-untyped-def]
     """Exact step x+ = phi x + early u + late u+ + n for inputs linear in between, n of covariance noise.
 
@@ -99,9 +103,10 @@ def step(system, process, states, dt_s, phi, early, late, noise):  # type: ignor
     spread = np.zeros_like(phi)
     work, other = np.empty_like(phi), np.empty_like(phi)
     once, twice = np.zeros_like(phi), np.zeros_like(phi)
-    phi[:] = 0.0
-    noise[:] = 0.0
     for i in range(n):
+        for j in range(n):
+            phi[i, j] = 0.0
+            noise[i, j] = 0.0
         power[i, i] = 1.0
         spread[i, i] = process[i] * h
     for k in range(16):  # power = (A h)^k/k!; spread = k-th derivative of the noise covariance h^(k+1)/(k+1)!
@@ -141,7 +146,38 @@ def step(system, process, states, dt_s, phi, early, late, noise):  # type: ignor
             early[i, j] = total - ramp / dt_s
 
 
-@njit(cache=True)
+@inner
+def eliminate(matrix: Array, right: Array) -> None:
+    """Solve matrix x = right by Gaussian elimination with row pivots; x replaces ``right``, and ``matrix`` is used up.
+
+    A singular matrix gives values that are not finite.
+    """
+    n, columns = right.shape
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > abs(matrix[best, k]):
+                best = i
+        if best != k:
+            for j in range(k, n):
+                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
+            for j in range(columns):
+                right[k, j], right[best, j] = right[best, j], right[k, j]
+        for i in range(k + 1, n):
+            share = matrix[i, k] / matrix[k, k]
+            for j in range(k + 1, n):
+                matrix[i, j] -= share * matrix[k, j]
+            for j in range(columns):
+                right[i, j] -= share * right[k, j]
+    for k in range(n - 1, -1, -1):
+        for j in range(columns):
+            right[k, j] /= matrix[k, k]
+        for i in range(k):
+            for j in range(columns):
+                right[i, j] -= matrix[i, k] * right[k, j]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def riccati(phi: Array, c: Array, noise: Array, variance: Array) -> Array:
     """P = phi (P - P C' (C P C' + R)^-1 C P) phi' + Q, its stabilising solution, by structured doubling.
 
@@ -149,22 +185,55 @@ def riccati(phi: Array, c: Array, noise: Array, variance: Array) -> Array:
     ----------
     phi, c : (n, n), (m, n).
     noise : (n, n) Q; variance : (m,) diagonal of R.
+
+    Returns
+    -------
+    (n, n) P; not finite where a matrix of the doubling is singular.
     """
-    n = phi.shape[0]
-    a = phi.T.copy()
-    g = np.dot(np.ascontiguousarray(c.T) / variance, c)
-    p = noise.copy()
-    eye = np.eye(n)
+    n, m = phi.shape[0], c.shape[0]
+    a, g, p = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    matrix, right = np.empty((n, n)), np.empty((n, 2 * n))
+    solved, work, change = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    for i in range(n):
+        for j in range(n):
+            a[i, j], p[i, j] = phi[j, i], noise[i, j]
+            total = 0.0
+            for k in range(m):
+                total += c[k, i] / variance[k] * c[k, j]
+            g[i, j] = total
     for _ in range(DOUBLINGS):
-        solved = np.linalg.solve(eye + np.dot(g, p), np.hstack((a, g)))
-        wa = np.ascontiguousarray(solved[:, :n])
-        wg = np.ascontiguousarray(solved[:, n:])
-        change = np.dot(a.T, np.dot(p, wa))
-        g = g + np.dot(a, np.dot(wg, a.T))
-        a = np.dot(a, wa)
-        p = p + 0.5 * (change + change.T)
+        multiply(g, p, matrix)
+        for i in range(n):
+            matrix[i, i] += 1.0
+            for j in range(n):
+                right[i, j], right[i, n + j] = a[i, j], g[i, j]
+        eliminate(matrix, right)
+        for side in range(2):  # change = a' p (I + g p)^-1 a, then g += a (I + g p)^-1 g a'
+            for i in range(n):
+                for j in range(n):
+                    solved[i, j] = right[i, side * n + j]
+            if side == 0:
+                multiply(p, solved, work)
+            else:
+                multiply(a, solved, work)
+            for i in range(n):
+                for j in range(n):
+                    total = 0.0
+                    for k in range(n):
+                        total += a[k, i] * work[k, j] if side == 0 else work[i, k] * a[j, k]
+                    if side == 0:
+                        change[i, j] = total
+                    else:
+                        g[i, j] += total
+        for i in range(n):
+            for j in range(n):
+                solved[i, j] = right[i, j]
+        multiply(a, solved, work)
         settled = True
         for i in range(n):
+            for j in range(n):
+                a[i, j] = work[i, j]
+                p[i, j] += 0.5 * (change[i, j] + change[j, i])
             if abs(change[i, i]) > 1e-15 * abs(p[i, i]):
                 settled = False
         if settled:
@@ -172,7 +241,7 @@ def riccati(phi: Array, c: Array, noise: Array, variance: Array) -> Array:
     return p
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def whitener(s: Array, white: Array) -> float:
     """W with W S W' = I into ``white`` (m, m), lower triangular; log|S|, nan where S is no covariance.
 
@@ -189,9 +258,14 @@ def whitener(s: Array, white: Array) -> float:
             if i == j:
                 if not total > 0.0:
                     return np.nan
-                lower[i, i] = np.sqrt(total)
-                logdet += np.log(total)
+                lower[i, i] = math.sqrt(total)
+                logdet += math.log(total)
             else:
                 lower[i, j] = total / lower[j, j]
-    white[:] = np.linalg.inv(lower)
-    return float(logdet)
+    for j in range(m):
+        for i in range(m):
+            total = 1.0 if i == j else 0.0
+            for k in range(j, i):
+                total -= lower[i, k] * white[k, j]
+            white[i, j] = total / lower[i, i] if i >= j else 0.0
+    return logdet

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from airtruth.numerics.compiled import inner
 
 Array = NDArray[np.float64]
 Four = tuple[float, float, float, float]
 
 
-@njit(cache=True)
+@inner
 def _times(p: float, r: float, x: float, y: float, trace: float, det: float) -> tuple[float, float]:
     """(p I + r A)(x I + y A), by A^2 = trace A - det I."""
     return p * x - det * r * y, p * y + r * x + trace * r * y
 
 
-@njit(cache=True)
+@inner
 def first_order_hold(
     a00: float, a01: float, a10: float, a11: float, b0: float, b1: float, dt_s: float
 ) -> tuple[Four, tuple[float, float], tuple[float, float]]:

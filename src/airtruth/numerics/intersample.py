@@ -9,6 +9,7 @@ except for a few steps.
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -31,77 +32,66 @@ _FASTEST: Final = 0.02
 """Least rho of a servo [-]; judgement: below it the servo settles within a cell."""
 
 
-@njit(cache=True)
-def _decay(increments: Array) -> float:
-    """Weighted median of the ratio of neighbouring increments, NaN if nothing moves or the ratios do not show a servo.
+def _decay(increments: Array) -> Array:
+    """(runs,) weighted median of the ratio of neighbouring increments, NaN if nothing moves or the ratios show no servo.
 
     A step within a cell gives ratios above that of the servo, so that the least ones agree. A surface that stops within a
     cell gives ratios about zero.
     """
-    count = increments.size - 1
-    largest = np.abs(increments).max()
-    ratios = np.empty(count)
-    weights = np.empty(count)
-    used = 0
-    for k in range(count):
-        weight = abs(increments[k])
-        if weight > _MOVING * largest:
-            ratios[used] = increments[k + 1] / increments[k]
-            weights[used] = weight
-            used += 1
-    order = np.argsort(ratios[:used])
-    whole = weights[:used].sum()
-    quarter = np.nan
-    total = 0.0
-    for i in order:
-        total += weights[i]
-        if np.isnan(quarter) and total >= 0.25 * whole:
-            quarter = ratios[i]
-        if total >= 0.5 * whole:
-            return float(ratios[i]) if quarter > _AGREEING * ratios[i] else np.nan
-    return np.nan
+    if increments.shape[1] < 2:
+        return np.full(increments.shape[0], np.nan)
+    weights = np.abs(increments[:, :-1])
+    used = weights > _MOVING * np.abs(increments).max(axis=1, keepdims=True)
+    weights = np.where(used, weights, 0.0)
+    ratios = np.divide(increments[:, 1:], increments[:, :-1], out=np.full_like(weights, np.nan), where=used)
+    order = np.argsort(ratios, axis=1, kind="stable")
+    ranked = np.take_along_axis(ratios, order, axis=1)
+    total = np.cumsum(np.take_along_axis(weights, order, axis=1), axis=1)
+    whole = np.cumsum(weights, axis=1)[:, -1:]
+    quarter, median = (
+        np.take_along_axis(ranked, np.argmax(total >= share * whole, axis=1)[:, None], axis=1)[:, 0]
+        for share in (0.25, 0.5)
+    )
+    return np.where(quarter > _AGREEING * median, median, np.nan)
 
 
-@njit(cache=True)
-def _bend(elevator: Array, bend: Array) -> None:
-    samples = elevator.size
-    bend[:] = 0.0
-    increments = elevator[1:] - elevator[:-1]
-    rho = _decay(increments)
-    if not _FASTEST < rho < _SLOWEST:
-        return
-    command = elevator[:-1] + increments / (1.0 - rho)
-    threshold = _STEP * (command.max() - command.min())
-    steps = 0
-    for k in range(1, command.size):
-        if abs(command[k] - command[k - 1]) > threshold:
-            steps += 1
-    if threshold == 0.0 or steps * _DENSE > command.size:
-        return
-    tau = -1.0 / np.log(rho)  # in samples
-    # mean of one exponential over the cell, less the mean of its ends, per unit of increment
-    curve = 1.0 / (1.0 - rho) - tau - 0.5
-    for k in range(command.size):
-        start, end = elevator[k], elevator[k + 1]
-        mean = 0.5 * (start + end) + curve * (end - start)
-        first = command[max(k - 1, 0)]
-        second = command[min(k + 1, command.size - 1)]
-        if abs(second - first) > threshold:
-            # the command steps inside the cell, at the time where both exponentials meet: x = exp(-s/tau)
-            x = rho * (first - second) / ((end - second) - rho * (start - first))
-            x = min(max(x, rho), 1.0)
-            time = -tau * np.log(x)
-            corner = first + (start - first) * x
-            mean = first * time + (start - first) * tau * (1.0 - x)
-            mean += second * (1.0 - time) + (corner - second) * tau * (1.0 - rho / x)
-        before, after = elevator[max(k - 1, 0)], elevator[min(k + 2, samples - 1)]
-        bend[k + 1] = mean - (13.0 * (start + end) - before - after) / 24.0
-
-
-@njit(cache=True)
-def _bends(elevator: Array, bend: Array) -> None:
+@njit(cache=True, error_model="numpy")
+def _bends(elevator: Array, decay: Array, bend: Array) -> None:
+    cells = elevator.shape[1] - 1
+    command = np.empty(cells)
     for run in range(elevator.shape[0]):
-        _bend(elevator[run], bend[run])
+        de, out, rho = elevator[run], bend[run], decay[run]
+        if not _FASTEST < rho < _SLOWEST:
+            continue
+        low, high = math.inf, -math.inf
+        for k in range(cells):
+            command[k] = de[k] + (de[k + 1] - de[k]) / (1.0 - rho)
+            low, high = min(low, command[k]), max(high, command[k])
+        threshold = _STEP * (high - low)
+        steps = 0
+        for k in range(1, cells):
+            if abs(command[k] - command[k - 1]) > threshold:
+                steps += 1
+        if threshold == 0.0 or steps * _DENSE > cells:
+            continue
+        tau = -1.0 / math.log(rho)  # in samples
+        # mean of one exponential over the cell, less the mean of its ends, per unit of increment
+        curve = 1.0 / (1.0 - rho) - tau - 0.5
+        for k in range(cells):
+            start, end = de[k], de[k + 1]
+            mean = 0.5 * (start + end) + curve * (end - start)
+            first = command[max(k - 1, 0)]
+            second = command[min(k + 1, cells - 1)]
+            if abs(second - first) > threshold:
+                # the command steps inside the cell, at the time where both exponentials meet: x = exp(-s/tau)
+                x = rho * (first - second) / ((end - second) - rho * (start - first))
+                x = min(max(x, rho), 1.0)
+                time = -tau * math.log(x)
+                corner = first + (start - first) * x
+                mean = first * time + (start - first) * tau * (1.0 - x)
+                mean += second * (1.0 - time) + (corner - second) * tau * (1.0 - rho / x)
+            before, after = de[max(k - 1, 0)], de[min(k + 2, cells)]
+            out[k + 1] = mean - (13.0 * (start + end) - before - after) / 24.0
 
 
 def servo_bend(elevator: Array) -> Array:
@@ -119,6 +109,6 @@ def servo_bend(elevator: Array) -> Array:
     (runs, samples) [rad]; zero throughout where the record shows no servo with a held command.
     """
     elevator = np.ascontiguousarray(elevator)  # one layout, so that the kernel compiles once
-    bend = np.empty_like(elevator)
-    _bends(elevator, bend)
+    bend = np.zeros_like(elevator)
+    _bends(elevator, _decay(np.diff(elevator, axis=1)), bend)
     return bend

@@ -13,6 +13,8 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.signal import butter
 
+from airtruth.numerics.compiled import inner
+
 Array = NDArray[np.float64]
 
 
@@ -40,7 +42,7 @@ def edge_samples(sos: Array) -> int:
     return 3 * taps
 
 
-@njit(cache=True)
+@inner
 def _section(rows: Array, sos: Array, first: int, step: int) -> None:
     """Run one section along four rows in place, from sample ``first`` in direction ``step``.
 
@@ -68,7 +70,7 @@ def _section(rows: Array, sos: Array, first: int, step: int) -> None:
         k += step
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _zero_phase(x: Array, sos: Array, edge: int, out: Array) -> None:
     rows, samples = x.shape
     padded = samples + 2 * edge
@@ -79,13 +81,17 @@ def _zero_phase(x: Array, sos: Array, edge: int, out: Array) -> None:
             for i in range(edge):
                 work[lane, i] = 2.0 * row[0] - row[edge - i]
                 work[lane, edge + samples + i] = 2.0 * row[samples - 1] - row[samples - 2 - i]
-            work[lane, edge : edge + samples] = row
-        for s in range(sos.shape[0]):
-            _section(work, sos[s], 0, 1)
-        for s in range(sos.shape[0]):
-            _section(work, sos[s], padded - 1, -1)
+            for i in range(samples):
+                work[lane, edge + i] = row[i]
+        for way in range(
+            2
+        ):  # variables: numba compiles a function again for each constant that it is called with
+            first, step = (padded - 1) * way, 1 - 2 * way
+            for s in range(sos.shape[0]):
+                _section(work, sos[s], first, step)
         for lane in range(min(4, rows - start)):
-            out[start + lane] = work[lane, edge : edge + samples]
+            for i in range(samples):
+                out[start + lane, i] = work[lane, edge + i]
 
 
 def zero_phase(x: Array, sos: Array) -> Array:

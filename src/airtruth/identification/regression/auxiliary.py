@@ -5,6 +5,7 @@ Source: M. Brunot, "An Instrumental Variable Approach for Aircraft Identificatio
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -12,6 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from airtruth.identification.regression.rows import HALF_CHORD, LIFT, MOMENT, row_factors
+from airtruth.numerics.compiled import inner
 from airtruth.numerics.hold import first_order_hold
 from airtruth.physics.short_period import CL_ALPHA, CL_DE, CL_Q, CM_ALPHA, CM_DE, CM_Q, Scale
 
@@ -24,7 +26,7 @@ GROWTH: Final = 1e3
 larger one accepts more of the unstable models that an iteration passes through, with worse instruments."""
 
 
-@njit(cache=True)
+@inner
 def state_matrices(theta: Array, factors: Array) -> Six:
     """a00, a01, a10, a11, b0, b1 of eq. (2), of one run.
 
@@ -44,7 +46,7 @@ def state_matrices(theta: Array, factors: Array) -> Six:
     )
 
 
-@njit(cache=True, fastmath={"contract"})
+@partial(inner, fastmath={"contract"})
 def respond(system: Six, u: Array, origin: float, dt_s: float, alpha: Array, q: Array) -> None:
     """Response of one run to u - origin from rest, u (samples,) linear between samples."""
     e, g, h = first_order_hold(system[0], system[1], system[2], system[3], system[4], system[5], dt_s)
@@ -63,7 +65,7 @@ def respond(system: Six, u: Array, origin: float, dt_s: float, alpha: Array, q: 
         q[k] = x1
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _respond_runs(theta: Array, factors: Array, u: Array, dt_s: float, alpha: Array, q: Array) -> None:
     for r in range(u.shape[0]):
         respond(state_matrices(theta[r], factors[r]), u[r], 0.0, dt_s, alpha[r], q[r])
@@ -83,8 +85,13 @@ def linear_auxiliary(theta: Array, u: Array, dt_s: float, scale: Scale) -> tuple
     -------
     alpha, q : (runs, samples) deviations from the trim [rad], [rad/s].
     """
+    return short_period(theta, row_factors(scale), u, dt_s)
+
+
+def short_period(theta: Array, factors: Array, u: Array, dt_s: float) -> tuple[Array, Array]:
+    """`linear_auxiliary` for factors (runs, 4) from `airtruth.identification.regression.rows.row_factors`."""
     alpha, q = np.empty_like(u), np.empty_like(u)
-    _respond_runs(theta, row_factors(scale), u, dt_s, alpha, q)
+    _respond_runs(theta, factors, u, dt_s, alpha, q)
     return alpha, q
 
 

@@ -91,13 +91,15 @@ def white(p: Projected, factors: Array, samples: int) -> Parts:
     return information, information
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _spectral_sum(z: Complex, lift: Array, cross: Complex, moment: Array, transform: int, out: Array) -> None:
     """out[r] = [lift, cross, moment] (3, 3, 3) of sum_ts z(t) R(t - s) z(s), R by its spectrum."""
     count = z.shape[2]
     for r in range(z.shape[0]):
         sums = out[r]
-        sums[:] = 0.0
+        for i in range(3):
+            for j in range(3):
+                sums[0, i, j] = sums[1, i, j] = sums[2, i, j] = 0.0
         for f in range(count):
             # a real sequence: each frequency except 0 and Nyquist counts twice
             single = f == 0 or (transform % 2 == 0 and f == count - 1)
@@ -203,14 +205,20 @@ def corrected(p: Projected, factors: Array, samples: int) -> Parts:
     )
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _ratio(
-    expected: Complex, carried: Complex, u: Complex, inner: Array, spectrum: Array, samples: int, limit: float
+    expected: Complex,
+    carried: Complex,
+    u: Complex,
+    inner: Array,
+    spectrum: Array,
+    floor: Array,
+    samples: int,
+    limit: float,
 ) -> None:
     """Replace ``spectrum`` by its ratio to expected - 2 Re sum_i conj(u_i) (carried_i - u' inner/2)/N."""
     runs, count, size = u.shape
     for r in range(runs):
-        floor = 1e-9 * spectrum[r].max() + 1e-300
         for f in range(size):
             taken = 0.0
             for i in range(count):
@@ -219,7 +227,7 @@ def _ratio(
                     re -= 0.5 * inner[r, j, i] * u[r, j, f].real
                     im -= 0.5 * inner[r, j, i] * u[r, j, f].imag
                 taken += u[r, i, f].real * re + u[r, i, f].imag * im
-            ratio = spectrum[r, f] / max(expected[r, f].real - 2.0 * taken / samples, floor)
+            ratio = spectrum[r, f] / max(expected[r, f].real - 2.0 * taken / samples, floor[r])
             spectrum[r, f] = min(max(ratio, 1.0 / limit), limit)
 
 
@@ -241,7 +249,8 @@ def correction(weights: Array, w: Complex, u: Complex, spectrum: Array, transfor
     carried = irfft(w * spectrum[:, None], transform)[:, :, :samples]
     inner = np.matmul(weights, np.swapaxes(carried, 1, 2))
     ratio = spectrum.copy()
-    _ratio(expected, rfft(carried, transform), u, inner, ratio, samples, LARGEST_CORRECTION)
+    floor = 1e-9 * ratio.max(axis=1) + 1e-300
+    _ratio(expected, rfft(carried, transform), u, inner, ratio, floor, samples, LARGEST_CORRECTION)
     return ratio
 
 

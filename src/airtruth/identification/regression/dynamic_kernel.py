@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 from airtruth.identification.condition import ALPHA, AZ, ELEVATOR, Q
 from airtruth.identification.regression import rows as layout
 from airtruth.identification.regression.auxiliary import respond, state_matrices
+from airtruth.numerics.compiled import inner
 from airtruth.numerics.hold import first_order_hold
 
 Array = NDArray[np.float64]
@@ -18,6 +21,7 @@ Ints = NDArray[np.int64]
 Four = tuple[float, float, float, float]
 Two = tuple[float, float]
 
+_contracted = partial(inner, fastmath={"contract"})
 _OF_ALPHA: Final = 0
 """Row of scratch: filter states of alpha, two rows."""
 _OF_Q: Final = 2
@@ -78,7 +82,7 @@ class Model(NamedTuple):
     active: Ints
 
 
-@njit(cache=True)
+@inner
 def denominator(a00: float, a01: float, a10: float, a11: float) -> tuple[float, float]:
     """Trace and determinant of Delta(p) = p^2 - trace p + det, unstable roots mirrored to the left.
 
@@ -87,11 +91,11 @@ def denominator(a00: float, a01: float, a10: float, a11: float) -> tuple[float, 
     """
     half = 0.5 * (a00 + a11)
     det = a00 * a11 - a01 * a10
-    spread = np.sqrt(max(half * half - det, 0.0))
+    spread = math.sqrt(max(half * half - det, 0.0))
     return -(abs(half + spread) + abs(half - spread)), abs(det)
 
 
-@njit(cache=True, fastmath={"contract"})
+@_contracted
 def smooth_pair(x: Array, y: Array, ox: float, oy: float, e: Four, g: Two, h: Two, out: Array) -> None:
     """States (v, dv/dt) of 1/Delta(p) for x - ox and y - oy, into out (4, samples), from zero.
 
@@ -104,7 +108,7 @@ def smooth_pair(x: Array, y: Array, ox: float, oy: float, e: Four, g: Two, h: Tw
     p0, p1, q0, q1 = g[0] + c0, g[1] + c1, h[0] + c0, h[1] + c1
     last = x.size - 1
     x0 = x1 = y0 = y1 = 0.0
-    out[:, 0] = 0.0
+    out[0, 0] = out[1, 0] = out[2, 0] = out[3, 0] = 0.0
     xp, yp = x[0] - ox, y[0] - oy
     xpp, ypp = xp, yp
     xk, yk = x[1] - ox, y[1] - oy
@@ -123,14 +127,14 @@ def smooth_pair(x: Array, y: Array, ox: float, oy: float, e: Four, g: Two, h: Tw
         ypp, yp, yk = yp, yk, yn
 
 
-@njit(cache=True, fastmath={"contract"})
+@_contracted
 def linear_pair(x: Array, y: Array, e: Four, g: Two, h: Two, out: Array) -> None:
     """As `smooth_pair`, for inputs that are linear between samples."""
     e0, e1, e2, e3 = e
     g0, g1 = g
     h0, h1 = h
     x0 = x1 = y0 = y1 = 0.0
-    out[:, 0] = 0.0
+    out[0, 0] = out[1, 0] = out[2, 0] = out[3, 0] = 0.0
     xp, yp = x[0], y[0]
     for k in range(1, x.size):
         xk, yk = x[k], y[k]
@@ -144,12 +148,12 @@ def linear_pair(x: Array, y: Array, e: Four, g: Two, h: Two, out: Array) -> None
         xp, yp = xk, yk
 
 
-@njit(cache=True, fastmath={"contract"})
+@_contracted
 def step_and_bend(bend: Array, e: Four, k0: float, k1: float, out: Array) -> None:
     """As `linear_pair`, for the constant 1 and for an input that is constant over each cell."""
     e0, e1, e2, e3 = e
     s0 = s1 = b0 = b1 = 0.0
-    out[:, 0] = 0.0
+    out[0, 0] = out[1, 0] = out[2, 0] = out[3, 0] = 0.0
     for k in range(1, bend.size):
         t = e0 * s0 + (e1 * s1 + k0)
         s1 = e2 * s0 + (e3 * s1 + k1)
@@ -160,14 +164,14 @@ def step_and_bend(bend: Array, e: Four, k0: float, k1: float, out: Array) -> Non
         out[0, k], out[1, k], out[2, k], out[3, k] = s0, s1, b0, b1
 
 
-@njit(cache=True, fastmath={"contract"})
+@_contracted
 def combine(n0: float, x0: Array, n1: float, x1: Array, out: Array) -> None:
     """(n0 + n1 p) x from the states x and dx/dt."""
     for k in range(out.size):
         out[k] = n0 * x0[k] + n1 * x1[k]
 
 
-@njit(cache=True, fastmath={"contract"})
+@_contracted
 def rate(
     x: Array, jump: float, v: Array, s: Array, n0: float, n1: float, trace: float, det: float, out: Array
 ) -> None:
@@ -186,14 +190,14 @@ def rate(
             out[k] += n1 * (x[k] - x[0])
 
 
-@njit(cache=True, fastmath={"contract"})
+@_contracted
 def subtract(out: Array, factor: float, x: Array) -> None:
     """Subtract a multiple of x from out, in place."""
     for k in range(out.size):
         out[k] -= factor * x[k]
 
 
-@njit(cache=True)
+@inner
 def _filter_run(records: Records, model: Model, index: int, work: Array, w: Array) -> None:
     """Fill the rows w (10, samples) of the active run ``index``; work (18, samples) is scratch."""
     run = model.active[index]
@@ -206,8 +210,8 @@ def _filter_run(records: Records, model: Model, index: int, work: Array, w: Arra
     made_alpha, made_q = work[_MODEL], work[_MODEL + 1]
     external = model.made.shape[0] > 0
     if external:
-        made_alpha[:] = model.made[index, 0]
-        made_q[:] = model.made[index, 1]
+        for k in range(made_q.size):
+            made_alpha[k], made_q[k] = model.made[index, 0, k], model.made[index, 1, k]
     else:
         respond((a00, a01, a10, a11, b0, b1), elevator, origin[ELEVATOR], dt_s, made_alpha, made_q)
     smooth_pair(alpha, q, origin[ALPHA], origin[Q], e, g, h, work[_OF_ALPHA:_OF_AZ])
@@ -254,19 +258,22 @@ def _filter_run(records: Records, model: Model, index: int, work: Array, w: Arra
     subtract(moment, b1, corners)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def _filtered(records: Records, model: Model, rows: Array, moments: Array) -> None:
+    """Filtered rows, or where ``rows`` holds one run alone, the sums of products of each run."""
+    work = np.empty((_SCRATCH, records.signals.shape[2]))
+    for i in range(model.active.size):
+        w = rows[i if moments.shape[0] == 0 else 0]
+        _filter_run(records, model, i, work, w)
+        if moments.shape[0] > 0:
+            layout.products(w[:4], w[4:], moments[i])
+
+
 def filtered_moments(records: Records, model: Model, moments: Array) -> None:
     """Sums of products (active, 4, 7) of the filtered rows, [Z | TRIM] against [X | Y | TRIM]."""
-    w = np.empty((layout.COUNT, records.signals.shape[2]))
-    work = np.empty((_SCRATCH, records.signals.shape[2]))
-    for i in range(model.active.size):
-        _filter_run(records, model, i, work, w)
-        layout.products(w[:4], w[4:], moments[i])
+    _filtered(records, model, np.empty((1, layout.COUNT, records.signals.shape[2])), moments)
 
 
-@njit(cache=True)
 def filtered_rows(records: Records, model: Model, rows: Array) -> None:
     """Filtered rows (active, 10, samples), see `airtruth.identification.regression.rows`."""
-    work = np.empty((_SCRATCH, records.signals.shape[2]))
-    for i in range(model.active.size):
-        _filter_run(records, model, i, work, rows[i])
+    _filtered(records, model, rows, np.empty((0, 4, 7)))

@@ -10,14 +10,13 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from airtruth.identification.condition import ALPHA, AZ, ELEVATOR, Observation, Q, origin_of, relative
 from airtruth.identification.options import Options
 from airtruth.identification.regression import rows as layout
-from airtruth.identification.regression.auxiliary import bounded, respond, state_matrices
-from airtruth.identification.regression.rows import NO_INSTRUMENTS, Problem, made_by
+from airtruth.identification.regression.auxiliary import bounded, short_period
+from airtruth.identification.regression.rows import Problem, made_by
 from airtruth.numerics.prefilter import butterworth, zero_phase
 from airtruth.numerics.srivc import TransferFunctions, simulate, srivc
 
@@ -29,35 +28,6 @@ START_RAD_S: Final = 2.0 * np.pi * 5.0
 """Pole of the first filter in the identification of the actuator [rad/s]: 5 Hz, judgement; the estimate does
 not depend on it."""
 
-_ALPHA: Final = 4
-"""Row of scratch for alpha of the auxiliary model."""
-_Q: Final = 5
-"""Row of scratch for q of the auxiliary model."""
-
-
-@njit(cache=True)
-def _fill(smooth: Array, origin: Array, left: Array, dt_s: float, rows: Array) -> None:
-    """Rows of LS of all runs; ``left`` without runs where the signals give the left sides."""
-    last = smooth.shape[2] - 1
-    half = 0.5 / dt_s
-    for r in range(smooth.shape[0]):
-        alpha, q, az, elevator = smooth[r, ALPHA], smooth[r, Q], smooth[r, AZ], smooth[r, ELEVATOR]
-        o = origin[r]
-        w = rows[r]
-        for k in range(1, last):
-            w[layout.Z_ALPHA, k - 1] = w[layout.X_ALPHA, k - 1] = alpha[k] - o[ALPHA]
-            w[layout.Z_Q, k - 1] = w[layout.X_Q, k - 1] = q[k] - o[Q]
-            w[layout.Z_DE, k - 1] = w[layout.X_DE, k - 1] = elevator[k] - o[ELEVATOR]
-            w[layout.TRIM, k - 1] = 1.0
-            w[layout.Y_LIFT, k - 1] = half * (alpha[k + 1] - alpha[k - 1]) - (q[k] - o[Q])
-            w[layout.Y_MOMENT, k - 1] = half * (q[k + 1] - q[k - 1])
-            w[layout.Y_NORMAL, k - 1] = az[k] - o[AZ]
-        if left.shape[0] > 0:
-            x, y, to_lift, to_moment = left[r, 0], left[r, 1], left[r, 2], left[r, 3]
-            for k in range(1, last):
-                w[layout.Y_LIFT, k - 1] = half * (x[k + 1] - x[k - 1]) + to_lift[k]
-                w[layout.Y_MOMENT, k - 1] = half * (y[k + 1] - y[k - 1]) + to_moment[k]
-
 
 def least_squares_rows(observation: Observation) -> Array:
     """Rows (runs, 10, samples - 2) of LS: Z = X.
@@ -67,8 +37,24 @@ def least_squares_rows(observation: Observation) -> Array:
     """
     smooth = observation.smooth
     rows = np.empty((smooth.shape[0], layout.COUNT, smooth.shape[2] - 2))
+    half = 0.5 / observation.dt_s
+    inside = smooth[:, :, 1:-1] - origin_of(smooth, observation.window)[:, :, None]
+    for name, to in (
+        (ALPHA, (layout.Z_ALPHA, layout.X_ALPHA)),
+        (Q, (layout.Z_Q, layout.X_Q)),
+        (ELEVATOR, (layout.Z_DE, layout.X_DE)),
+    ):
+        rows[:, to] = inside[:, None, name]
+    rows[:, layout.TRIM] = 1.0
+    rows[:, layout.Y_NORMAL] = inside[:, AZ]
     left = relative(observation.left_smooth, observation.window)
-    _fill(smooth, origin_of(smooth, observation.window), left, observation.dt_s, rows)
+    if left.shape[0] > 0:
+        derivative = half * (left[:, :2, 2:] - left[:, :2, :-2])
+        rows[:, layout.Y_LIFT] = derivative[:, 0] + left[:, 2, 1:-1]
+        rows[:, layout.Y_MOMENT] = derivative[:, 1] + left[:, 3, 1:-1]
+    else:
+        rows[:, layout.Y_LIFT] = half * (smooth[:, ALPHA, 2:] - smooth[:, ALPHA, :-2]) - inside[:, Q]
+        rows[:, layout.Y_MOMENT] = half * (smooth[:, Q, 2:] - smooth[:, Q, :-2])
     return rows
 
 
@@ -81,42 +67,6 @@ def ls_problem(observation: Observation, options: Options) -> Problem:
         usable=lambda theta, active: np.ones(active.size, dtype=np.bool_),
         failed=np.zeros(rows.shape[0], dtype=np.bool_),
     )
-
-
-@njit(cache=True)
-def _instrument(
-    theta: Array, factors: Array, u: Array, origin: float, made: Array, dt_s: float, z: Array
-) -> None:
-    """Fill z (6, samples): instruments at the samples that have a derivative, and two rows of scratch."""
-    samples = u.size
-    alpha, q = z[_ALPHA], z[_Q]
-    if made.size == 0:
-        respond(state_matrices(theta, factors), u, origin, dt_s, alpha, q)
-        for k in range(1, samples - 1):
-            z[layout.Z_DE, k - 1] = u[k] - origin
-    else:
-        alpha[:] = made[0]
-        q[:] = made[1]
-        z[layout.Z_DE, : samples - 2] = made[2, 1 : samples - 1]
-    for k in range(1, samples - 1):
-        z[layout.Z_ALPHA, k - 1] = alpha[k]
-        z[layout.Z_Q, k - 1] = q[k]
-        z[layout.TRIM, k - 1] = 1.0
-
-
-@njit(cache=True)
-def _instruments(
-    theta: Array, factors: Array, u: Array, origin: Array, made: Array, active: Ints, dt_s: float, rows: Array
-) -> None:
-    """Instruments of the active runs, into the first rows of rows (active, 10, samples - 2)."""
-    samples = u.shape[1]
-    z = np.empty((_Q + 1, samples))
-    nothing = np.empty((3, 0))
-    for i in range(active.size):
-        r = active[i]
-        external = made[i] if made.shape[0] > 0 else nothing
-        _instrument(theta[i], factors[r], u[r], origin[r], external, dt_s, z)
-        rows[i, : layout.TRIM + 1] = z[: layout.TRIM + 1, : samples - 2]
 
 
 def iv_problem(
@@ -151,14 +101,17 @@ def iv_problem(
     duration_s = dt_s * u.shape[1]
 
     def rows_at(theta: Array, active: Ints) -> Array:
-        made = NO_INSTRUMENTS
+        result = rows[active]
         if instruments is not None:
             made = instruments(theta, active)
-        elif options.auxiliary is not None:
+        else:
             inputs = u[active] - origin[active, None]
-            made = made_by(options.auxiliary, theta, inputs, dt_s, observation.scale, active)
-        result = rows[active]
-        _instruments(theta, factors, u, origin, made, active, dt_s, result)
+            if options.auxiliary is not None:
+                made = made_by(options.auxiliary, theta, inputs, dt_s, observation.scale, active)
+            else:
+                made = np.stack((*short_period(theta, factors[active], inputs, dt_s), inputs), axis=1)
+        result[:, layout.Z_ALPHA : layout.Z_DE + 1] = made[:, :, 1:-1]
+        result[:, layout.TRIM] = 1.0
         return result
 
     def usable(theta: Array, active: Ints) -> Bools:

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -26,6 +27,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from airtruth.identification.options import AuxiliaryModel
+from airtruth.numerics.compiled import inner
 from airtruth.physics.short_period import Scale
 from airtruth.units import G0
 
@@ -143,7 +145,7 @@ def made_by(
     return np.stack(made if len(made) == 3 else (*made, u), axis=1)
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+@partial(inner, fastmath={"reassoc", "contract", "nsz"})
 def products(z: Array, x: Array, moments: Array) -> None:
     """Sums over samples of z (4, samples) against x (6, samples) and the last row of z, into (4, 7).
 
@@ -166,7 +168,7 @@ def products(z: Array, x: Array, moments: Array) -> None:
         moments[i, 6] = m6
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _moments(rows: Array, moments: Array) -> None:
     for r in range(rows.shape[0]):
         products(rows[r, :4], rows[r, 4:], moments[r])
@@ -211,47 +213,31 @@ def normal_equations(moments: Array, factors: Array, intercept: bool) -> tuple[A
     return matrix, right
 
 
-@njit(cache=True)
-def _solve(matrix: Array, right: Array, solution: Array) -> None:
-    """Cramer's rule for 3 by 3 systems (count, 3, 3) and (count, 3); NaN where singular."""
-    for r in range(matrix.shape[0]):
-        a = matrix[r]
-        size = 1.0
-        for i in range(3):
-            size *= np.sqrt(a[i, 0] ** 2 + a[i, 1] ** 2 + a[i, 2] ** 2)
-        det = 0.0
-        for j in range(3):
-            solution[r, j] = 0.0
-        for i in range(3):
-            second, third = (i + 1) % 3, (i + 2) % 3
-            for j in range(3):
-                k, h = (j + 1) % 3, (j + 2) % 3
-                cofactor = a[second, k] * a[third, h] - a[second, h] * a[third, k]
-                solution[r, j] += cofactor * right[r, i]
-                if i == 0:
-                    det += a[i, j] * cofactor
-        regular = abs(det) > SINGULAR * size
-        for j in range(3):
-            solution[r, j] = solution[r, j] / det if regular else np.nan
-
-
 def solve(matrix: Array, right: Array) -> Array:
-    """theta (runs, 6) = (Z'X)^-1 Z'y; NaN in a block whose matrix is singular (`SINGULAR`).
+    """theta (runs, 6) = (Z'X)^-1 Z'y by Cramer's rule; NaN in a block whose matrix is singular (`SINGULAR`).
 
     Parameters
     ----------
     matrix, right : (runs, 2, 3, 3) and (runs, 2, 3) of the lift and of the moment parameters.
     """
-    theta = np.empty((matrix.shape[0], 6))
-    _solve(
-        np.ascontiguousarray(matrix).reshape(-1, 3, 3),
-        np.ascontiguousarray(right).reshape(-1, 3),
-        theta.reshape(-1, 3),
-    )
-    return theta
+    a, y = (np.ascontiguousarray(np.moveaxis(part, (0, 1), (-2, -1))) for part in (matrix, right))
+    solution, det, size = np.zeros_like(y), np.zeros_like(y[0]), np.ones_like(y[0])
+    with np.errstate(invalid="ignore", over="ignore"):  # a run without a usable model
+        for i in range(3):
+            second, third = a[(i + 1) % 3], a[(i + 2) % 3]
+            size *= np.sqrt(a[i, 0] ** 2 + a[i, 1] ** 2 + a[i, 2] ** 2)
+            for j in range(3):
+                k, h = (j + 1) % 3, (j + 2) % 3
+                cofactor = second[k] * third[h] - second[h] * third[k]
+                solution[j] += cofactor * y[i]
+                if i == 0:
+                    det += a[i, j] * cofactor
+        regular = np.abs(det) > SINGULAR * size
+    solution = np.divide(solution, det, out=np.full_like(solution, np.nan), where=regular)
+    return np.ascontiguousarray(np.moveaxis(solution, (1, 2), (0, 1))).reshape(-1, 6)
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 def _remove_trim(rows: Array, trim: Array) -> None:
     """Subtract from each row of each run its part along the run's unit vector trim, in place."""
     for r in range(rows.shape[0]):

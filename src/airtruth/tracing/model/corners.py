@@ -15,10 +15,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airtruth.numerics.discretise import whitener
-from airtruth.tracing.model.equations import FASTMATH, outputs, rates
+from airtruth.numerics.compiled import inner
+from airtruth.numerics.discretise import congruence, multiply, whitener
+from airtruth.tracing.model.equations import outputs, rates
 from airtruth.tracing.model.kernel_input import AirPoint, FilterModel
-from airtruth.tracing.model.linearise import delay_system, discrete
+from airtruth.tracing.model.linearise import covariance_of, delay_system, discrete, update_gain
 from airtruth.tracing.model.parameters import DELAY_ORDER, OUTPUTS
 
 Array = NDArray[np.float64]
@@ -55,7 +56,7 @@ class Corners(NamedTuple):
     logdet: float
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def _moved(at: AirPoint, by_rad: float) -> AirPoint:
     """Inputs with another surface."""
     return AirPoint(
@@ -69,30 +70,34 @@ def _moved(at: AirPoint, by_rad: float) -> AirPoint:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def input_column(x: Array, at: AirPoint, model: FilterModel) -> Array:
     """(states,) slope of x' in the surface [1/rad], late sensors included."""
-    n = x.size
-    up, down, column = np.zeros(n), np.zeros(n), np.zeros(n)
-    y_up, y_down = np.empty(OUTPUTS), np.empty(OUTPUTS)
-    above, below = _moved(at, _STEP_RAD), _moved(at, -_STEP_RAD)
-    outputs(x, up[1], rates(x, above, model, up), above, model, y_up)
-    outputs(x, down[1], rates(x, below, model, down), below, model, y_down)
-    for i in range(model.states.motion):
-        column[i] = (up[i] - down[i]) / (2.0 * _STEP_RAD)
+    column, direct = np.zeros(x.size), np.empty(OUTPUTS)
+    _input_differences(x, at, model, column, direct)
     for i in range(OUTPUTS):
-        direct = (y_up[i] - y_down[i]) / (2.0 * _STEP_RAD)
         lag, delay = model.states.lag[i], model.states.delay[i]
         if lag >= 0:
-            column[lag] = direct / model.sensors.lag_s[i]
+            column[lag] = direct[i] / model.sensors.lag_s[i]
         elif delay >= 0:
             system = delay_system(model.sensors.delay_s[i])
-            for row in range(DELAY_ORDER):
-                column[delay + row] = system[row, DELAY_ORDER] * direct
+            column[delay : delay + DELAY_ORDER] = system[:, DELAY_ORDER] * direct[i]
     return column
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _input_differences(x: Array, at: AirPoint, model: FilterModel, column: Array, direct: Array) -> None:
+    """Slopes in the surface of the rates of the motion and of the outputs."""
+    rate, y = np.zeros((2, x.size)), np.empty((2, OUTPUTS))
+    for side in range(2):
+        moved = _moved(at, _STEP_RAD if side == 0 else -_STEP_RAD)
+        az = rates(x, moved, model, rate[side])
+        outputs(x, rate[side, 1], az, moved, model, y[side])
+    for i in range(model.states.motion):
+        column[i] = (rate[0, i] - rate[1, i]) / (2.0 * _STEP_RAD)
+    for i in range(OUTPUTS):
+        direct[i] = (y[0, i] - y[1, i]) / (2.0 * _STEP_RAD)
+
+
 def spread_of(a: Array, column: Array, dt_s: float) -> Array:
     """Covariance after a cell of a surface error whose mean has a unit variance and which is zero at both ends.
 
@@ -110,22 +115,33 @@ def spread_of(a: Array, column: Array, dt_s: float) -> Array:
     return np.outer(after, after)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def corrected(p: Array, k_gain: Array, c: Array) -> Array:
     """Covariance after an update, (I - K C) P, symmetric."""
-    p = p - np.dot(k_gain, np.dot(c, p))
-    return 0.5 * (p + p.T)
+    n = p.shape[0]
+    read, out = np.empty((OUTPUTS, n)), np.empty((n, n))
+    multiply(c, p, read)
+    multiply(k_gain, read, out)
+    for i in range(n):
+        for j in range(i + 1):
+            out[i, j] = 0.5 * (p[i, j] - out[i, j] + p[j, i] - out[j, i])
+            out[j, i] = out[i, j]
+    return out
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def predicted(p: Array, corners: Corners, corner_rad2: float) -> Array:
     """Covariance of the next prediction, with the corner of the cell in between."""
-    moved: Array = np.dot(corners.phi, np.dot(p, np.ascontiguousarray(corners.phi.T)))
-    moved += corners.noise + corner_rad2 * corners.spread
-    return moved
+    n = p.shape[0]
+    work, out = np.empty((n, n)), np.empty((n, n))
+    congruence(corners.phi, p, work, out)
+    for i in range(n):
+        for j in range(n):
+            out[i, j] += corners.noise[i, j] + corner_rad2 * corners.spread[i, j]
+    return out
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def gain_at(p: Array, corners: Corners, k_gain: Array, scale: Array) -> tuple[float, float]:
     """Gain of a prediction's covariance, and the matrix that scales its innovation to the steady covariance.
 
@@ -133,20 +149,19 @@ def gain_at(p: Array, corners: Corners, k_gain: Array, scale: Array) -> tuple[fl
     -------
     log|S| less the steady one (nan where S is no covariance), and the largest relative distance of S from it.
     """
-    pc = np.dot(p, np.ascontiguousarray(corners.c.T))
-    s = np.dot(corners.c, pc)
+    pc, s = np.empty((p.shape[0], OUTPUTS)), np.empty((OUTPUTS, OUTPUTS))
+    covariance_of(p, corners.c, corners.variance, pc, s)
     away = 0.0
     for i in range(OUTPUTS):
-        s[i, i] += corners.variance[i]
         away = max(away, abs(s[i, i] / corners.covariance[i, i] - 1.0))
     white = np.zeros((OUTPUTS, OUTPUTS))
     logdet = whitener(s, white)
-    k_gain[:] = np.dot(pc, np.dot(np.ascontiguousarray(white.T), white))
-    scale[:] = np.dot(corners.root, white)
+    update_gain(pc, white, k_gain)
+    multiply(corners.root, white, scale)
     return logdet - corners.logdet, away
 
 
-@njit(cache=True, nogil=True)
+@inner
 def settled(away: float) -> bool:
     """Whether the gain is the steady one again."""
     return away < _SETTLED

@@ -22,9 +22,9 @@ from collections.abc import Callable
 from typing import Final, NamedTuple, cast
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from airtruth.numerics.compiled import inner, shared
 from airtruth.physics.longitudinal import lower_point
 from airtruth.physics.sensors import vane_equation
 from airtruth.physics.terms import numbered_shape
@@ -41,8 +41,6 @@ from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
-FASTMATH: Final = {"contract", "reassoc", "arcp", "nsz"}
-"""LLVM fastmath flags of the tracer's kernels; nnan and ninf are left out, so that divergence is detected."""
 _W1: Final = math.sqrt(1.5)
 """Gain of the first state of MIL-F-8785C's vertical Dryden filter, states of unit drive [-]."""
 _W2: Final = math.sqrt(1.5) * (1.0 / math.sqrt(3.0) - 1.0)
@@ -58,9 +56,8 @@ _READING: Final = 2
 _ALPHA_DOT: Final = 3
 """Number of the signal alpha_dot_hat in `airtruth.physics.terms.SIGNALS`."""
 
-_compiled = njit(nogil=True, error_model="numpy", fastmath=FASTMATH)
-_shape = cast("Callable[[int, float], float]", _compiled(numbered_shape))
-_vane = cast("Callable[[float, float, float, float], float]", _compiled(vane_equation))
+_shape = cast("Callable[[int, float], float]", inner(numbered_shape))
+_vane = cast("Callable[[float, float, float, float], float]", inner(vane_equation))
 
 
 class Signals(NamedTuple):
@@ -77,7 +74,7 @@ class Signals(NamedTuple):
     alpha_dot_hat: float
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@shared
 def gust(x: Array, rolloff: float) -> float:
     """Upward gust over the level of Dryden's part [-]."""
     lead = 0.0
@@ -86,28 +83,28 @@ def gust(x: Array, rolloff: float) -> float:
     return float(_W1 * x[2] + _W2 * x[3] + rolloff * lead)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def air_alpha(x: Array, upward: float, level_m_s: float, at: AirPoint) -> float:
     """Angle of attack of the air at the CG [rad] in an upward gust [-] of a level [m/s]."""
     sine = (math.sin(at.theta_rad - x[0]) * at.ground_m_s - level_m_s * upward) / at.airspeed_m_s
     return at.theta_rad - math.asin(min(max(sine, -1.0), 1.0))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@shared
 def effective_elevator(elevator_rad: float, aircraft: AircraftArrays) -> float:
     """Deflection whose forces the tables hold [rad]."""
     neutral = aircraft.neutral_elevator_rad
     return neutral + aircraft.effectiveness * (elevator_rad - neutral)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def _cell(axis: Array, x: float) -> tuple[int, float]:
     """Lower point of the cell that holds x and the share of the cell below x; the end cells go on outside."""
     low = lower_point(axis, x)
     return low, (x - axis[low]) / (axis[low + 1] - axis[low])
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def _look_up(
     aircraft: AircraftArrays, alpha: float, surface: float, qhat: float
 ) -> tuple[float, float, float]:
@@ -128,7 +125,7 @@ def _look_up(
     return fx, fz, fm
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def _signal(signals: Signals, number: int) -> float:
     if number == 0:
         return signals.alpha
@@ -137,7 +134,7 @@ def _signal(signals: Signals, number: int) -> float:
     return signals.qhat if number == 2 else signals.alpha_dot_hat
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def _terms(
     x: Array, signals: Signals, effects: EffectArrays, in_alpha_dot: bool, feedback: float
 ) -> tuple[float, float]:
@@ -165,7 +162,7 @@ def _terms(
     return lift, moment
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
     """x' of the motion, the gusts and the effects' states into ``out``; returns az at the CG [m/s2]."""
     aircraft, gusts = model.aircraft, model.gusts
@@ -192,14 +189,11 @@ def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
     moment = at.moment + more[3] * d_alpha + more[4] * qhat + more[5] * d_de
     mass = aircraft.mass_kg
     if model.effects.amplitude.size > 0:
-        signals = Signals(alpha, surface, qhat, 0.0)
-        added = _terms(x, signals, model.effects, False, 0.0)
-        lift, moment = lift + added[0], moment + added[1]
-        # terms in alpha' last: they take alpha' with everything else in it
-        first = q + ((fz - force * lift) * cosine - fx * sine) / (mass * ground) + weight
-        signals = Signals(alpha, surface, qhat, first * half)
-        added = _terms(x, signals, model.effects, True, half * force * cosine / (mass * v))
-        lift, moment = lift + added[0], moment + added[1]
+        for turn in range(2):  # terms in alpha' last: they take alpha' with everything else in it
+            first = q + ((fz - force * lift) * cosine - fx * sine) / (mass * ground) + weight
+            signals = Signals(alpha, surface, qhat, first * half)
+            added = _terms(x, signals, model.effects, turn == 1, half * force * cosine / (mass * v))
+            lift, moment = lift + added[0], moment + added[1]
     fz -= force * lift
     fm += (
         force * aircraft.chord_m * (moment - aircraft.cg_shift * fz / force)
@@ -212,7 +206,7 @@ def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
     return float(fz / mass)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def _gust_rates(x: Array, v: float, late: float, gusts: GustModel, out: Array) -> None:
     a = v / gusts.length_m
     out[2] = -a * x[2]
@@ -222,7 +216,7 @@ def _gust_rates(x: Array, v: float, late: float, gusts: GustModel, out: Array) -
         out[LEAD + i] = _LEAD_RAD_S[i] * (x[2] - x[LEAD + i])
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def _effect_rates(x: Array, signals: Signals, model: FilterModel, out: Array) -> None:
     effects = model.effects
     for k in range(effects.time_s.size):
@@ -236,7 +230,6 @@ def _effect_rates(x: Array, signals: Signals, model: FilterModel, out: Array) ->
             out[at + 1] = wn * wn * (s - x[at]) - 2.0 * effects.damping[k] * wn * x[at + 1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def settle_effects(x: Array, alpha_rad: float, elevator_rad: float, model: FilterModel) -> None:
     """Put the effects' states into equilibrium with a steady angle of attack and surface deflection [rad]."""
     for k in range(model.effects.time_s.size):
@@ -248,7 +241,7 @@ def settle_effects(x: Array, alpha_rad: float, elevator_rad: float, model: Filte
         x[model.states.effect[k]] = s
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def air_at(grid: GridSignals, point: int) -> AirPoint:
     """Inputs at a point of the filter's grid."""
     return AirPoint(
@@ -262,7 +255,7 @@ def air_at(grid: GridSignals, point: int) -> AirPoint:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def _add_readings(x: Array, alpha: float, at: AirPoint, model: FilterModel, y: Array) -> None:
     """Add the increments of the readings."""
     effects = model.effects
@@ -277,7 +270,7 @@ def _add_readings(x: Array, alpha: float, at: AirPoint, model: FilterModel, y: A
             y[output] += effects.amplitude[t] * _shape(effects.term_index[t, 2], s - effects.origin[t])
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def outputs(x: Array, q_dot: float, az: float, at: AirPoint, model: FilterModel, y: Array) -> None:
     """What the sensors read without bias, lag, delay and noise: alpha [rad], q [rad/s], az [m/s2].
 
@@ -295,7 +288,6 @@ def outputs(x: Array, q_dot: float, az: float, at: AirPoint, model: FilterModel,
         y[i] *= scale[i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def lead_decay(dt_s: float, i: int) -> tuple[float, float]:
     """Decay of a low-passed copy over a time [s], and its mean over that time [-]."""
     r = _LEAD_RAD_S[i] * dt_s
@@ -304,7 +296,6 @@ def lead_decay(dt_s: float, i: int) -> tuple[float, float]:
 
 
 __all__ = [
-    "FASTMATH",
     "air_alpha",
     "air_at",
     "effective_elevator",

@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from airtruth.numerics.compiled import inner
 from airtruth.numerics.discretise import step
 from airtruth.tracing.model.corners import (
     Corners,
@@ -27,7 +28,6 @@ from airtruth.tracing.model.corners import (
     spread_of,
 )
 from airtruth.tracing.model.equations import (
-    FASTMATH,
     air_at,
     effective_elevator,
     gust,
@@ -93,7 +93,6 @@ class Work(NamedTuple):
     held: Array
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def _steps(model: FilterModel, dt_s: float, sub: int) -> Steps:
     h = 2.0 * dt_s / sub
     decay, mean = np.empty((2, LEAD_COUNT)), np.empty((2, LEAD_COUNT))
@@ -101,23 +100,18 @@ def _steps(model: FilterModel, dt_s: float, sub: int) -> Steps:
         for i in range(LEAD_COUNT):
             decay[j, i], mean[j, i] = lead_decay(0.5 * (j + 1) * h, i)
     phi = np.zeros((OUTPUTS, DELAY_ORDER, DELAY_ORDER))
-    early, late = np.zeros((OUTPUTS, DELAY_ORDER)), np.zeros((OUTPUTS, DELAY_ORDER))
+    early, late = np.zeros((OUTPUTS, DELAY_ORDER, 1)), np.zeros((OUTPUTS, DELAY_ORDER, 1))
+    unused = np.empty((DELAY_ORDER, DELAY_ORDER))
     for i in range(OUTPUTS):
         if model.states.delay[i] >= 0:
-            transition, noise = np.empty((DELAY_ORDER, DELAY_ORDER)), np.empty((DELAY_ORDER, DELAY_ORDER))
-            input0, input1 = np.empty((DELAY_ORDER, 1)), np.empty((DELAY_ORDER, 1))
             system = delay_system(model.sensors.delay_s[i])
-            step(system, np.zeros(DELAY_ORDER), DELAY_ORDER, 0.5 * h, transition, input0, input1, noise)
-            phi[i] = transition
-            early[i] = input0[:, 0]
-            late[i] = input1[:, 0]
+            step(system, np.zeros(DELAY_ORDER), DELAY_ORDER, 0.5 * h, phi[i], early[i], late[i], unused)
     states = model.states
     forget = math.exp(-dt_s / model.sensors.slow_time_s) if states.noise >= 0 else 0.0
     has_late_sensors = states.size > states.motion + (OUTPUTS if states.noise >= 0 else 0)
-    return Steps(h, decay, mean, phi, early, late, forget, has_late_sensors)
+    return Steps(h, decay, mean, phi, early[:, :, 0].copy(), late[:, :, 0].copy(), forget, has_late_sensors)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def _initial_state(given: KernelInput) -> Array:
     """The stated start; the gust at the tail and its copies, and the effects' states, in equilibrium with it."""
     model = given.model
@@ -129,7 +123,7 @@ def _initial_state(given: KernelInput) -> Array:
     return x
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def _settle_sensors(x: Array, out: Array, model: FilterModel) -> None:
     """Put the sensors' lags and delays into equilibrium with their inputs."""
     for i in range(OUTPUTS):
@@ -139,7 +133,7 @@ def _settle_sensors(x: Array, out: Array, model: FilterModel) -> None:
             x[model.states.delay[i]] = out[i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def _reading(x: Array, value: float, i: int, model: FilterModel) -> float:
     """What a sensor with lag, delay and slow noise reads of an output."""
     at = model.states.lag[i]
@@ -154,7 +148,7 @@ def _reading(x: Array, value: float, i: int, model: FilterModel) -> float:
     return value
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def _advance_motion(
     x: Array, point: int, grid: GridSignals, model: FilterModel, steps: Steps, work: Work
 ) -> None:
@@ -177,10 +171,11 @@ def _advance_motion(
     for m in range(motion):
         slope = rate[0, m] + 2.0 * rate[1, m] + 2.0 * rate[2, m] + rate[3, m]
         x[m] += h / 6.0 * slope
-    x[LEAD:CORE] = tried[LEAD:CORE]
+    for i in range(LEAD_COUNT):
+        x[LEAD + i] = tried[LEAD + i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def _advance_sensors(
     x: Array, point: int, grid: GridSignals, model: FilterModel, steps: Steps, work: Work
 ) -> None:
@@ -203,7 +198,7 @@ def _advance_sensors(
             _advance_delay(x, model.states.delay[i], i, steps, work)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def _advance_lag(x: Array, at: int, r: float, ends: Array) -> None:
     """A lag over two half steps of r time constants each; its output replaces its input in ``ends``."""
     decay = math.exp(-r)
@@ -215,7 +210,7 @@ def _advance_lag(x: Array, at: int, r: float, ends: Array) -> None:
         before, ends[half] = ends[half], x[at]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def _advance_delay(x: Array, at: int, i: int, steps: Steps, work: Work) -> None:
     ends, held = work.ends, work.held
     for half in range(2):
@@ -228,7 +223,7 @@ def _advance_delay(x: Array, at: int, i: int, steps: Steps, work: Work) -> None:
             x[at + row] = total
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def _update(x: Array, k_gain: Array, e: Array) -> bool:
     """x += K e; False if the motion leaves all bounds."""
     for i in range(x.size):
@@ -241,34 +236,15 @@ def _update(x: Array, k_gain: Array, e: Array) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
-def innovations(given: KernelInput, k_gain: Array, corners: Corners, e: Array) -> tuple[bool, float]:
-    """Innovations of one record into ``e`` (samples, outputs).
-
-    Parameters
-    ----------
-    k_gain : (states, outputs) of the update; zeros for a free run.
-    corners : recursion where the surface is uncertain; unused if ``given.corner_rad2`` is empty.
-
-    Returns
-    -------
-    Whether the motion keeps its bounds, and the sum of log|S| beyond the steady one.
-    """
+@njit(cache=True, nogil=True, error_model="numpy")
+def _innovations(
+    given: KernelInput, steps: Steps, work: Work, x: Array, k_gain: Array, corners: Corners, e: Array
+) -> tuple[bool, float]:
+    """`innovations` from a state ``x``, which moves along the record."""
     model, grid, states = given.model, given.grid, given.model.states
     n, samples = states.size, given.y.shape[0]
-    steps = _steps(model, given.dt_s, given.sub)
-    work = Work(
-        np.zeros((4, n)),
-        np.zeros(n),
-        np.zeros(OUTPUTS),
-        np.zeros(OUTPUTS),
-        np.zeros(2),
-        np.zeros(3),
-        np.zeros(DELAY_ORDER),
-    )
-    x = _initial_state(given)
     uncertain, more_logdet, p = False, 0.0, corners.steady
-    own_gain, scale, raw = k_gain.copy(), np.eye(OUTPUTS), np.empty(OUTPUTS)
+    own_gain, scale, raw = k_gain.copy(), np.empty((OUTPUTS, OUTPUTS)), np.empty(OUTPUTS)
     for k in range(samples):
         at = air_at(grid, k * given.sub)
         az = rates(x, at, model, work.rate[0])
@@ -277,25 +253,27 @@ def innovations(given: KernelInput, k_gain: Array, corners: Corners, e: Array) -
             _settle_sensors(x, work.out, model)
         for i in range(OUTPUTS):
             value = _reading(x, work.out[i], i, model)
-            e[k, i] = given.y[k, i] - value - model.sensors.bias[i] - given.more[k, i]
-        raw[:] = e[k]
-        if given.corner_rad2.size > 0:
-            if uncertain:
-                more, away = gain_at(p, corners, own_gain, scale)
-                if not math.isfinite(more):
-                    return False, 0.0
-                more_logdet += more
-                e[k] = np.dot(scale, raw)
-                uncertain = not settled(away)
-            else:
-                own_gain[:] = k_gain
-                p = corners.steady
+            raw[i] = given.y[k, i] - value - model.sensors.bias[i] - given.more[k, i]
+            e[k, i] = raw[i]
+        if uncertain:
+            more, away = gain_at(p, corners, own_gain, scale)
+            if not math.isfinite(more):
+                return False, 0.0
+            more_logdet += more
+            for i in range(OUTPUTS):
+                e[k, i] = 0.0
+                for m in range(OUTPUTS):
+                    e[k, i] += scale[i, m] * raw[m]
+            uncertain = not settled(away)
+            now = own_gain
+        else:
+            now, p = k_gain, corners.steady
         if k + 1 == samples:
             break
-        if not _update(x, own_gain, raw):
+        if not _update(x, now, raw):
             return False, 0.0
         if given.corner_rad2.size > 0 and (uncertain or given.corner_rad2[k + 1] > 0.0):
-            p = predicted(corrected(p, own_gain, corners.c), corners, given.corner_rad2[k + 1])
+            p = predicted(corrected(p, now, corners.c), corners, given.corner_rad2[k + 1])
             uncertain = True
         if states.noise >= 0:
             for i in range(states.noise, n):
@@ -308,11 +286,38 @@ def innovations(given: KernelInput, k_gain: Array, corners: Corners, e: Array) -
     return True, more_logdet
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+def innovations(given: KernelInput, k_gain: Array, corners: Corners, e: Array) -> tuple[bool, float]:
+    """Innovations of one record into ``e`` (samples, outputs).
+
+    Parameters
+    ----------
+    k_gain : (states, outputs) of the update; zeros for a free run.
+    corners : recursion where the surface is uncertain; unused if ``given.corner_rad2`` is empty.
+
+    Returns
+    -------
+    Whether the motion keeps its bounds, and the sum of log|S| beyond the steady one.
+    """
+    n = given.model.states.size
+    steps = _steps(given.model, given.dt_s, given.sub)
+    work = Work(
+        np.zeros((4, n)),
+        np.zeros(n),
+        np.zeros(OUTPUTS),
+        np.zeros(OUTPUTS),
+        np.zeros(2),
+        np.zeros(3),
+        np.zeros(DELAY_ORDER),
+    )
+    sound, more = _innovations(given, steps, work, _initial_state(given), k_gain, corners, e)
+    return bool(sound), float(more)
+
+
 def evaluate(given: KernelInput, free_run: bool, e: Array, white: Array, s: Array) -> tuple[float, float]:
     """Innovations of one record into ``e``, whitener and covariance of the steady filter into ``white`` and ``s``.
 
-    Where the surface is uncertain, the innovations are scaled to the steady covariance.
+    Where the surface is uncertain, the innovations are scaled to the steady covariance. The kernels are few and flat,
+    because numba optimises what a kernel calls again with it.
 
     Parameters
     ----------
@@ -324,32 +329,28 @@ def evaluate(given: KernelInput, free_run: bool, e: Array, white: Array, s: Arra
     """
     model = given.model
     n = model.states.size
-    k_gain = np.zeros((n, OUTPUTS))
     none = np.zeros((0, 0))
     corners = Corners(none, none, none, none, none, model.sensors.variance, none, none, 0.0)
     if free_run:
-        sound, _ = innovations(given, k_gain, corners, e)
-        return (0.0 if sound else np.nan), 0.0
+        sound, _ = innovations(given, np.zeros((n, OUTPUTS)), corners, e)
+        return (0.0 if sound else math.nan), 0.0
     a, c = np.empty((n, n)), np.empty((OUTPUTS, n))
     linearise_at_reference(given, a, c)
     process = process_intensity(given.reference.airspeed_m_s, model)
     phi, noise = discrete(a, process, given.dt_s)
     k_gain, w, cov, logdet, p = gain_of(phi, c, noise, model.sensors.variance)
     if not math.isfinite(logdet):
-        return np.nan, 0.0
+        return math.nan, 0.0
     white[:] = w
     s[:] = cov
     if given.corner_rad2.size > 0:
         spread = spread_of(a, input_column(_reference_state(given), given.reference, model), given.dt_s)
         variance = model.sensors.variance
-        corners = Corners(
-            phi, noise, spread, p, c, variance, cov, np.ascontiguousarray(np.linalg.inv(w)), logdet
-        )
+        corners = Corners(phi, noise, spread, p, c, variance, cov, np.asarray(np.linalg.inv(w)), logdet)
     sound, more = innovations(given, k_gain, corners, e)
-    return (logdet if sound else np.nan), more
+    return (logdet if sound else math.nan), more
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def _reference_state(given: KernelInput) -> Array:
     """The record's mean, effects' states in equilibrium with it."""
     x = np.zeros(given.model.states.size)
@@ -358,7 +359,6 @@ def _reference_state(given: KernelInput) -> Array:
     return x
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def linearise_at_reference(given: KernelInput, a: Array, c: Array) -> None:
     """`linearise` at the record's mean, effects' states in equilibrium with it."""
     linearise(_reference_state(given), given.reference, given.model, a, c)

@@ -13,8 +13,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airtruth.numerics.discretise import riccati, step, whitener
-from airtruth.tracing.model.equations import FASTMATH, gust, outputs, rates
+from airtruth.numerics.compiled import inner
+from airtruth.numerics.discretise import multiply, riccati, step, whitener
+from airtruth.tracing.model.equations import gust, outputs, rates
 from airtruth.tracing.model.kernel_input import AirPoint, FilterModel
 from airtruth.tracing.model.parameters import CORE, DELAY_ORDER, OUTPUTS
 
@@ -29,7 +30,6 @@ _GUST: Final = 0.1
 """The same in a gust state that does not move alpha [-]."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def delay_system(delay_s: float) -> Array:
     """A and B (order, order + 1) of a delay; its output is the input less twice the sum of every second state.
 
@@ -40,15 +40,18 @@ def delay_system(delay_s: float) -> Array:
     for row in range(DELAY_ORDER):
         rate = 2.0 * (2.0 * row + 1.0) / delay_s
         if row % 2 == 0:
-            system[row, row + 1 : DELAY_ORDER : 2] = rate
+            for i in range(row + 1, DELAY_ORDER, 2):
+                system[row, i] = rate
         else:
             system[row, DELAY_ORDER] = rate
-            system[row, 1:DELAY_ORDER:2] = -rate
-            system[row, 0:row:2] = -rate
+            for i in range(1, DELAY_ORDER, 2):
+                system[row, i] = -rate
+            for i in range(0, row, 2):
+                system[row, i] = -rate
     return system
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
 def _half_width(state: int, at: AirPoint, model: FilterModel) -> float:
     """Half width of the central difference in a state of the motion."""
     if state == 1:
@@ -62,7 +65,6 @@ def _half_width(state: int, at: AirPoint, model: FilterModel) -> float:
     return _ANGLE_RAD / moves if moves > 1e-9 else _GUST
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def linearise(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array) -> None:
     """A and C of the motion, effects' states, late sensors and slow noise about a state, by central differences.
 
@@ -73,47 +75,43 @@ def linearise(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array) ->
     """
     a[:] = 0.0
     c[:] = 0.0
-    up, down = np.empty(x.size), np.empty(x.size)
-    y_up, y_down = np.empty(OUTPUTS), np.empty(OUTPUTS)
-    moved = x.copy()
-    for j in range(model.states.motion):
-        h = _half_width(j, at, model)
-        moved[j] = x[j] + h
-        az = rates(moved, at, model, up)
-        outputs(moved, up[1], az, at, model, y_up)
-        moved[j] = x[j] - h
-        az = rates(moved, at, model, down)
-        outputs(moved, down[1], az, at, model, y_down)
-        moved[j] = x[j]
-        for i in range(model.states.motion):
-            a[i, j] = (up[i] - down[i]) / (2.0 * h)
-        for i in range(OUTPUTS):
-            c[i, j] = (y_up[i] - y_down[i]) / (2.0 * h)
+    _differences(x.copy(), at, model, a, c)
     _add_sensors(model, a, c)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _differences(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array) -> None:
+    """Columns of A and C of the motion and the effects' states; ``x`` is moved and returns."""
+    rate, y = np.empty((2, x.size)), np.empty((2, OUTPUTS))
+    for j in range(model.states.motion):
+        h, middle = _half_width(j, at, model), x[j]
+        for side in range(2):
+            x[j] = middle + h if side == 0 else middle - h
+            az = rates(x, at, model, rate[side])
+            outputs(x, rate[side, 1], az, at, model, y[side])
+        x[j] = middle
+        for i in range(model.states.motion):
+            a[i, j] = (rate[0, i] - rate[1, i]) / (2.0 * h)
+        for i in range(OUTPUTS):
+            c[i, j] = (y[0, i] - y[1, i]) / (2.0 * h)
+
+
 def _add_sensors(model: FilterModel, a: Array, c: Array) -> None:
     """Put lags, delays and slow noise behind the outputs of the motion."""
     sensors, states = model.sensors, model.states
-    n = a.shape[0]
     for i in range(OUTPUTS):
         at = states.lag[i]
         if at >= 0:
-            for j in range(n):
-                a[at, j] = c[i, j] / sensors.lag_s[i]
-                c[i, j] = 0.0
+            a[at] = c[i] / sensors.lag_s[i]
+            c[i] = 0.0
             a[at, at] = -1.0 / sensors.lag_s[i]
             c[i, at] = 1.0
         at = states.delay[i]
         if at >= 0:
-            system = delay_system(sensors.delay_s[i])
-            for row in range(DELAY_ORDER):
-                for j in range(n):
-                    a[at + row, j] = system[row, DELAY_ORDER] * c[i, j]
-            a[at : at + DELAY_ORDER, at : at + DELAY_ORDER] = system[:, :DELAY_ORDER]
-            for row in range(1, DELAY_ORDER, 2):
-                c[i, at + row] -= 2.0
+            system, held = delay_system(sensors.delay_s[i]), slice(at, at + DELAY_ORDER)
+            a[held] = system[:, DELAY_ORDER, None] * c[i]
+            a[held, held] = system[:, :DELAY_ORDER]
+            c[i, at + 1 : at + DELAY_ORDER : 2] -= 2.0
     if states.noise >= 0:
         for i in range(OUTPUTS):
             at = states.noise + i
@@ -121,7 +119,6 @@ def _add_sensors(model: FilterModel, a: Array, c: Array) -> None:
             c[i, at] = sensors.slow_std[i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def process_intensity(airspeed_m_s: float, model: FilterModel) -> Array:
     """(states,) intensities [1/s] of the white noise that drives gusts and slow noise."""
     process = np.zeros(model.states.size)
@@ -131,7 +128,6 @@ def process_intensity(airspeed_m_s: float, model: FilterModel) -> Array:
     return process
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def gain(
     a: Array, c: Array, process: Array, variance: Array, dt_s: float
 ) -> tuple[Array, Array, Array, float]:
@@ -147,7 +143,6 @@ def gain(
     return k_gain, white, s, logdet
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def discrete(a: Array, process: Array, dt_s: float) -> tuple[Array, Array]:
     """Transition over a time, and the covariance that the process noise adds in it."""
     n = a.shape[0]
@@ -159,27 +154,53 @@ def discrete(a: Array, process: Array, dt_s: float) -> tuple[Array, Array]:
     return phi, noise
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
+@inner
+def covariance_of(p: Array, c: Array, variance: Array, pc: Array, s: Array) -> None:
+    """P C' and the covariance S = C P C' + R of the innovations."""
+    for i in range(p.shape[0]):
+        for j in range(OUTPUTS):
+            total = 0.0
+            for k in range(p.shape[0]):
+                total += p[i, k] * c[j, k]
+            pc[i, j] = total
+    multiply(c, pc, s)
+    for i in range(OUTPUTS):
+        s[i, i] += variance[i]
+
+
+@inner
+def update_gain(pc: Array, white: Array, k_gain: Array) -> None:
+    """K = P C' W' W."""
+    weight = np.empty((OUTPUTS, OUTPUTS))
+    for i in range(OUTPUTS):
+        for j in range(OUTPUTS):
+            weight[i, j] = 0.0
+            for k in range(OUTPUTS):
+                weight[i, j] += white[k, i] * white[k, j]
+    multiply(pc, weight, k_gain)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def gain_of(phi: Array, c: Array, noise: Array, variance: Array) -> tuple[Array, Array, Array, float, Array]:
     """`gain` of a system in discrete time, and the steady covariance of its prediction."""
     n = phi.shape[0]
-    white = np.zeros((OUTPUTS, OUTPUTS))
-    k_gain = np.zeros((n, OUTPUTS))
-    s = np.zeros((OUTPUTS, OUTPUTS))
-    if not (np.isfinite(phi).all() and np.isfinite(noise).all()):
-        return k_gain, white, s, np.nan, noise
+    white, s = np.zeros((OUTPUTS, OUTPUTS)), np.zeros((OUTPUTS, OUTPUTS))
+    k_gain, pc = np.zeros((n, OUTPUTS)), np.empty((n, OUTPUTS))
     p = riccati(phi, c, noise, variance)
-    pc = np.dot(p, np.ascontiguousarray(c.T))
-    s = np.dot(c, pc)
-    for i in range(OUTPUTS):
-        s[i, i] += variance[i]
-    if not np.isfinite(s).all():
-        return k_gain, white, s, np.nan, p
+    covariance_of(p, c, variance, pc, s)
     logdet = whitener(s, white)
-    if not math.isfinite(logdet):
-        return k_gain, white, s, np.nan, p
-    k_gain[:] = np.dot(pc, np.dot(np.ascontiguousarray(white.T), white))
+    if math.isfinite(logdet):
+        update_gain(pc, white, k_gain)
     return k_gain, white, s, logdet, p
 
 
-__all__ = ["delay_system", "discrete", "gain", "gain_of", "linearise", "process_intensity"]
+__all__ = [
+    "covariance_of",
+    "delay_system",
+    "discrete",
+    "gain",
+    "gain_of",
+    "linearise",
+    "process_intensity",
+    "update_gain",
+]

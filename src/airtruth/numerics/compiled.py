@@ -1,0 +1,36 @@
+"""How kernels are compiled.
+
+A kernel that Python calls is an `njit` with a cache. What only kernels call is `inner`, and what both call is `shared`. The
+entry from Python costs numba more than a small function itself, and numba optimises what a kernel calls again with it, so
+kernels are few and flat. Assignments of arrays to slices, `np.dot` and expressions of arrays compile a library each;
+loops of scalars do not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from typing import Any, Final, TypeVar
+
+from numba import njit
+from numba.extending import register_jitable
+
+F = TypeVar("F", bound=Callable[..., object])
+
+_WITHOUT_ENTRY: Final[dict[str, Any]] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""numba's options for a function without its entries from Python and C."""
+shared: Final = register_jitable(error_model="numpy")
+"""Decorator of a small function that kernels and Python call: from Python it is the plain function."""
+
+
+def inner(function: F, fastmath: Collection[str] = ()) -> F:
+    """Compile a function that only kernels call, without its entry from Python: a call from Python ends the process.
+
+    Parameters
+    ----------
+    fastmath : LLVM's flags.
+    """
+    compiled: F = njit(error_model="numpy", fastmath=set(fastmath), **_WITHOUT_ENTRY)(function)
+    return compiled
+
+
+__all__ = ["inner", "shared"]
