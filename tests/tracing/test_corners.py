@@ -10,9 +10,12 @@ import trace_records as tr
 from scipy.linalg import expm, solve_discrete_are
 
 from airtruth.physics.terms import Change, SensorTerm, SurfaceTerm
+from airtruth.tracing.inference.optimise import fit, initial_parameters
+from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.model.parameters import PerRecord
 from airtruth.tracing.model.records import corner_variance, read
 from airtruth.tracing.model.response import filter_inputs, respond
+from airtruth.tracing.selection.corner_share import corner_share
 from airtruth.units import DEG, G0
 
 
@@ -71,6 +74,39 @@ def test_a_surface_at_rest_beside_a_step_stays_at_rest():
     assert (after == DEG).all()
 
 
+def test_a_step_that_two_cells_share_is_in_the_middle_of_a_ramp_and_a_step():
+    """Through a sample at half of the step: a ramp has means of 1/4 and 3/4 over the two cells, a step 0 and 1."""
+    from airtruth.logs.flight_log import FlightLog
+
+    t = np.arange(150) * 0.02
+    elevator = DEG * np.select([t < 0.999, t < 1.001], [0.0, 0.5], 1.0)
+    channels = {
+        name: np.zeros(150) for name in ("alpha_rad", "q_rad_s", "az_m_s2", "theta_rad", "altitude_m")
+    }
+    channels |= {"airspeed_m_s": np.full(150, tr.V), "elevator_rad": elevator}
+    (signals,) = read(FlightLog({}, ("a",), np.array([0, 150]), t, channels))
+    cells = (signals.elevator_rad.size - 1) // 149
+    means = [
+        np.trapezoid(signals.elevator_rad[k * cells : (k + 1) * cells + 1]) / cells / DEG
+        for k in range(47, 53)
+    ]
+    assert means == pytest.approx([0.0, 0.0, 0.125, 0.875, 1.0, 1.0], abs=0.01)
+
+
+@pytest.mark.parametrize(("late", "low", "high"), [("at the samples", 0.0, 0.01), ("anywhere", 0.3, 1.0)])
+def test_the_records_show_their_share_of_a_corner(late, low, high):
+    """Surfaces that move in straight lines between samples, and surfaces that step once anywhere between them."""
+    quiet = replace(tr.SETTINGS, noise=0.05 * tr.SETTINGS.noise)
+    rng = np.random.default_rng(5)
+    records = []
+    for number in range(4):
+        made = sharply_stepped(rng, late == "anywhere", quiet.noise, str(number))
+        records.append(made)
+    problem = TraceProblem(tuple(records), quiet)
+    found = fit(problem, tr.NOTHING, initial_parameters(problem, tr.NOTHING))
+    assert low <= corner_share(problem, tr.NOTHING, found.point) <= high
+
+
 def kalman(made, u, corner, sigma_w):
     """Innovations over their own Cholesky factors, by a Kalman filter with a covariance of its own at each sample."""
     a, b, c, d = tr.motion(sigma_w=sigma_w)
@@ -120,6 +156,31 @@ def stepped(rng, sigma_w=0.3, amplitude=DEG, noise=tr.SETTINGS.noise):
     t = np.arange(samples) * tr.DT
     made = tr.record(np.array(y), lambda at: np.interp(at, t, u))
     return made, u
+
+
+def sharply_stepped(rng, anywhere, noise, name):
+    """A record with a step every half second, in one cell each, which is a ramp or a step anywhere in it."""
+    samples, parts = 200, 8
+    u = np.zeros(samples)
+    for k, level in zip(range(20, samples, 25), (1.0, -1.0, 0.5, -0.5, 1.5, 0.0, -1.0, 0.0), strict=True):
+        u[k:] = level * DEG
+    a, b, c, d = tr.motion(sigma_w=0.0)
+    phi, early, late = tr.discrete(a, b, tr.DT / parts)
+    x, y = np.zeros(8), []
+    for k in range(samples):
+        y.append(c @ x + d * u[k] + noise * rng.standard_normal(3) - [0.0, 0.0, G0])
+        after = u[min(k + 1, samples - 1)]
+        share = np.linspace(0.0, 1.0, parts + 1)
+        path = np.where(share > rng.uniform(), 1.0, 0.0) if anywhere else share
+        for j in range(parts):
+            x = (
+                phi @ x
+                + early * (u[k] + path[j] * (after - u[k]))
+                + late * (u[k] + path[j + 1] * (after - u[k]))
+            )
+    t = np.arange(samples) * tr.DT
+    made = tr.record(np.array(y), lambda at: np.interp(at, t, u), name=name)
+    return replace(made, signals=replace(made.signals, corner_rad2=corner_variance(u, 0.0)))
 
 
 def whitened(made, sigma_w=0.3):

@@ -29,6 +29,7 @@ from airtruth.tracing.prepare import Case, prepare
 from airtruth.tracing.replay import flown_again
 from airtruth.tracing.result import TraceResult
 from airtruth.tracing.selection.budget import Advance, Budget
+from airtruth.tracing.selection.corner_share import with_corner_share
 from airtruth.tracing.selection.learn import with_increments
 from airtruth.tracing.selection.noise_colour import with_coloured_noise
 from airtruth.tracing.selection.rounds import SearchRound
@@ -145,11 +146,12 @@ def _with_notes(answer: TraceAnswer, kinematics: CheckResult | None) -> TraceAns
 def _search(
     case: Case, options: TraceOptions, advance: Advance, known: Mapping[str, float]
 ) -> tuple[Case, tuple[SearchRound, ...]]:
-    """The case with coloured noise where its records show some, and the rounds of the search."""
+    """The case with the coloured noise and the corners that its records show, and the rounds of the search."""
     advance("refit the declared aircraft")
     limited = None if options.time_budget_s is None else Budget(options.time_budget_s, advance)
     steps = advance if limited is None else limited
     case, start = with_coloured_noise(case)
+    case = with_corner_share(case, start)
     rounds = search(
         case.fitted, case.hypothesis, start, case.effects, options.seed, steps, case.declared, known
     )

@@ -229,12 +229,27 @@ def _elevator(elevator: Array, bend: Array, sub: int, corners: Array) -> Array:
     if corners.size:
         at = np.pad(corners[1:] > 0.0, 1)
         cubic[at[:-2] | at[1:-1] | at[2:]] = 0.0
+        cubic += _shared_steps(np.diff(relative), corners[1:] > 0.0)
     bend = bend.copy()
     bend[1:] += cubic
     share = np.arange(sub) / sub
     cells = elevator[:-1, None] + (elevator[1:] - elevator[:-1])[:, None] * share
     cells += 6.0 * bend[1:, None] * share * (1.0 - share)
     return np.append(cells.ravel(), elevator[-1])
+
+
+def _shared_steps(change: Array, corner: NDArray[np.bool_]) -> Array:
+    """(cells,) mean of a surface less that of a straight line, where a sample lies within a step that two cells share.
+
+    Beside both cells the surface rests. It moves straight through both, or steps at the sample: then the means are off by half
+    of each change. The middle of the two is taken.
+    """
+    alone = np.pad(~corner, 1, constant_values=True)
+    shared = corner[:-1] & corner[1:] & (change[:-1] * change[1:] > 0.0) & alone[:-3] & alone[3:]
+    shift = np.zeros(change.size)
+    shift[:-1] -= np.where(shared, 0.25 * change[:-1], 0.0)
+    shift[1:] += np.where(shared, 0.25 * change[1:], 0.0)
+    return shift
 
 
 def corner_variance(elevator: Array, std_rad: float) -> Array:
