@@ -8,7 +8,15 @@ from scipy.stats import multivariate_normal
 
 from airtruth.physics.composition import TailGeometry, directions
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood
-from airtruth.tracing.selection.explanation import Cause, causes_of, explain, size_of
+from airtruth.tracing.selection.explanation import (
+    Cause,
+    CauseSet,
+    causes_of,
+    explain,
+    least_cost,
+    simplest_first,
+    size_of,
+)
 
 DECLARED = np.array([4.787, 31.7, 0.480, -1.785, -41.2, -1.787])
 """Derivatives of aircraft/gtm."""
@@ -90,3 +98,32 @@ def test_a_size_beyond_its_range_is_improbable():
         for causes in (tail, [replace(tail[0], low=-np.inf, high=np.inf)])
     ]
     assert costs[0] > costs[1] + 5.0
+
+
+def cause_set(cost, *causes, wrong=()):
+    return CauseSet(causes, wrong, (), (), np.zeros((6, 6)), cost)
+
+
+def test_the_weight_of_wrong_declarations_is_the_sum_over_their_sets():
+    """Four sets that are each e^-1 as probable as the best one: 4/e = 1.47 of its weight, so that they lead."""
+    best = cause_set(0.0, "mass_error", "inertia_error")
+    wrong = [
+        cause_set(1.0 + 0.01 * k, wrong=(name,)) for k, name in enumerate(("CLalpha", "CLq", "Cmq", "Cmde"))
+    ]
+    first, *rest = simplest_first((best, *wrong))
+    assert first is wrong[0]
+    assert rest == [best, *wrong[1:]]
+    assert least_cost((first, *rest)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("cost", "names"), [(0.69, ("cg_shift",)), (0.70, ("cg_shift", "tail_effectiveness"))]
+)
+def test_fewer_effects_lead_with_half_of_the_weight(cost, names):
+    """exp(-cost) is a half at 0.693."""
+    sets = (cause_set(0.0, "cg_shift", "tail_effectiveness"), cause_set(cost, "cg_shift"))
+    assert simplest_first(sets)[0].causes == names
+
+
+def test_no_set_has_no_order():
+    assert simplest_first(()) == ()
