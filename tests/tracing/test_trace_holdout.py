@@ -178,3 +178,24 @@ def test_an_effect_that_alone_keeps_the_free_run_from_diverging_is_no_loss(fitte
     )
     assert tested.reasons == ()
     assert (tested.free_run_gain == 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("gains", "correlation", "loses"),
+    [
+        ((-2.1, -2.1, 9.0), 0.0, True),
+        ((-2.1, -2.1, 9.0), 0.98, False),
+        ((-3.0, -3.0, 9.0), 0.98, True),
+        ((-9.0, 0.1, 0.1), 0.0, False),
+    ],
+)
+def test_losses_of_two_channels_that_are_one_count_once(gains, correlation, loses):
+    """The sum of two standard normals has a standard deviation of sqrt(2 + 2 r): the limit is -4 without correlation."""
+    covariance = np.diag([4.0, 9.0, 1.0])
+    covariance[0, 1] = covariance[1, 0] = correlation * 6.0
+    scaled = np.array(gains) * [2.0, 3.0, 1.0]
+    assert acceptance.loses_in_two_channels(scaled, covariance) == loses
+
+
+def test_a_channel_without_a_sensor_loses_nothing():
+    assert not acceptance.loses_in_two_channels(np.array([0.0, -3.0, 0.0]), np.diag([0.0, 1.0, 0.0]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final
@@ -37,8 +38,6 @@ _ERRORS: Final = 2.0
 _FREE_ERRORS: Final = 3.0
 """Standard errors by which a free run may seem worse [-] (judgement: in rough air it consists mostly of gusts, and a
 smaller number rejects true effects)."""
-_MOST_CHANNELS: Final = 2
-"""Number of channels, of three, whose free run may not get worse by `_ERRORS` each [-]: most of them."""
 _SMALL_SHORTFALL: Final = 0.02
 """Share of its gain that a refit may still lack and count as converged [-] (judgement: rate limits and backlash give no
 smooth cost)."""
@@ -155,14 +154,32 @@ def tested_on_left_out(problem: TraceProblem, own: PosteriorFit, reference: Refe
         likelihood_gain, unaided = before[0] - likelihood, before[1]
         if not _is_loss(likelihood_gain):
             break
-    free, variance = _free_run_gain(problem, unaided, after, reference.weight)
-    loses = free.sum() < -_FREE_ERRORS * np.sqrt(variance.sum())
-    in_channels = (free.sum(axis=0) < -_ERRORS * np.sqrt(variance)).sum()
+    free, covariance = _free_run_gain(problem, unaided, after, reference.weight)
+    loses = free.sum() < -_FREE_ERRORS * np.sqrt(max(float(covariance.sum()), 0.0))
+    in_channels = loses_in_two_channels(free.sum(axis=0), covariance)
     reasons = (
         *(["it worsens the likelihood of records left out"] if _is_loss(likelihood_gain) else []),
-        *(["it worsens the free run of records left out"] if loses or in_channels >= _MOST_CHANNELS else []),
+        *(["it worsens the free run of records left out"] if loses or in_channels else []),
     )
     return LeftOutTest(likelihood_gain, free.sum(axis=1), reasons)
+
+
+def loses_in_two_channels(gains: Array, covariance: Array) -> bool:
+    """Whether two channels lose as much together as two independent ones that lose `_ERRORS` standard errors each.
+
+    The free runs of the angle of attack and of the acceleration are nearly one; their losses must not count twice.
+
+    Parameters
+    ----------
+    gains : (channels,) [-]; covariance : (channels, channels) of their errors; zero for channels that are not measured.
+    """
+    error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    for a, b in itertools.combinations(np.flatnonzero(error > 0.0), 2):
+        first, second = gains[a] / error[a], gains[b] / error[b]
+        correlation = max(float(covariance[a, b] / (error[a] * error[b])), 0.0)
+        if max(first, second) < 0.0 and first + second < -2.0 * _ERRORS * np.sqrt(1.0 + correlation):
+            return True
+    return False
 
 
 def _fit_reasons(s: Score, own: PosteriorFit, gain: float, least: float, excess: float) -> Iterator[str]:
@@ -193,8 +210,8 @@ def size_reasons(s: Score, size: float, span_m: float) -> Iterator[str]:
 def _free_run_gain(
     problem: TraceProblem, unaided: list[Assessment], after: list[Assessment], weights: tuple[Array, ...]
 ) -> tuple[Array, Array]:
-    """(records, 3) gains in squared residual over the weight by channel, and (3,) variances of their sums."""
-    free, variance = np.zeros((len(after), OUTPUTS)), np.zeros(OUTPUTS)
+    """(records, 3) gains in squared residual over the weight by channel, and (3, 3) covariance of their sums."""
+    free, covariance = np.zeros((len(after), OUTPUTS)), np.zeros((OUTPUTS, OUTPUTS))
     for i, (old, new, weight) in enumerate(zip(unaided, after, weights, strict=True)):
         if not (np.abs(old.residual) < _DIVERGED * weight).all():
             free[i] = 0.0 if (np.abs(new.residual) < _DIVERGED * weight).all() else -np.inf
@@ -203,8 +220,8 @@ def _free_run_gain(
         gains[:, ~problem.settings.measured] = 0.0
         free[i] = gains.sum(axis=0)
         lags = round(MEMORY_S / problem.records[i].signals.dt_s)
-        variance += np.maximum(np.diag(long_run(gains - gains.mean(axis=0), lags)), 0.0)
-    return free, variance
+        covariance += long_run(gains - gains.mean(axis=0), lags)
+    return free, covariance
 
 
 def has_converged(own: PosteriorFit, gain: float) -> bool:
