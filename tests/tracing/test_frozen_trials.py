@@ -7,6 +7,8 @@ less in them are only required to answer.
 
 import pytest
 
+from airtruth.logs.store import read_log
+
 SEED, COUNT = 9, 24
 NULLS = (8, 10, 19)
 """In a fourth, 13, a rate limit is named: its score has Holm's p = 0.04, and 1 null in 20 may be named."""
@@ -87,3 +89,20 @@ def test_a_late_gyro_that_makes_the_free_run_diverge_is_traced(tmp_path):
     (delay,) = answer["effects"][1]["parameters"].values()
     assert abs(lag["value"] - 0.3034) < 3.0 * lag["std"]
     assert abs(delay["value"] - 0.03881) < 3.0 * delay["std"]
+
+
+@pytest.mark.parametrize("number", [0, 2, 3, 4])
+def test_the_second_half_of_a_single_record_begins_in_motion(number, tmp_path):
+    """A slow sensor and a late surface, one fitted record: it is cut within the doublet. Surface and sensor in equilibrium at
+    the cut made the delay late by up to four standard errors, and needed a CG that had not moved."""
+    from airtruth.tracing import TraceOptions, trace
+    from validation.blind.draw import draw
+    from validation.blind.trials import frozen
+
+    (folder,) = frozen(20261126, [number], "slow", tmp_path)
+    answer = trace(folder, "gtm", TraceOptions(hold_out=read_log(folder, ()).run_ids[1:])).to_dict()
+    flown = {e.key: e.values for e in draw(20261126, number, "slow").effects}
+    assert {e["name"] for e in answer["effects"]} == set(flown)
+    for effect in answer["effects"]:
+        for name, p in effect["parameters"].items():
+            assert abs(p["value"] - flown[effect["name"]][name]) < 3.0 * p["std"]

@@ -1,6 +1,7 @@
 """Free runs and innovations of the filter: integration, states of effects, sensors, the steady Kalman filter."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,11 +9,11 @@ import trace_records as tr
 from scipy.linalg import block_diag
 
 from airtruth.effects.registry import EFFECTS
-from airtruth.physics.terms import AeroTerm, Change, SensorTerm, StateTerm
+from airtruth.physics.terms import AeroTerm, Change, SensorTerm, StateTerm, SurfaceTerm
 from airtruth.tracing.inference.optimise import initial_parameters
 from airtruth.tracing.model.linearise import gain
 from airtruth.tracing.model.parameters import Common, PerRecord
-from airtruth.tracing.model.response import LOST, respond
+from airtruth.tracing.model.response import LOST, External, respond
 from airtruth.units import DEG, G0
 
 
@@ -220,6 +221,41 @@ def test_innovations_are_those_of_the_steady_kalman_filter(shares):
     # curvature of the sines at half a degree, in units of the innovations' own spread
     error = np.abs(found.e - expected).max(axis=0) / np.sqrt(np.diag(found.covariance))
     assert (error < 0.05).all(), error
+
+
+@pytest.mark.parametrize("free_run", [True, False])
+def test_a_part_of_a_record_remembers_what_came_before(free_run):
+    """Cut in the middle of a doublet, behind a late surface and slow sensors: the residuals are those of the whole record."""
+    whole = tr.fly(np.random.default_rng(7), sigma_w=0.3, amplitude=DEG)
+    part = replace(whole, signals=whole.signals.part("part", 0, 45, whole.samples))
+    sensors = (SensorTerm("q_rad_s", "lag", 0.3), SensorTerm("az_m_s2", "delay", 0.05))
+    change = Change(sensors=sensors, surface=(SurfaceTerm("delay", 0.065), SurfaceTerm("lag", 0.05)))
+    common, per_record = tr.still()
+    found, expected = (
+        respond(r, tr.SETTINGS, change, common, per_record, free_run=free_run).e for r in (part, whole)
+    )
+    assert part.samples == len(found) == whole.samples - 45
+    np.testing.assert_array_equal(found, expected[45:])
+
+
+def test_signals_of_a_part_act_in_the_part():
+    """Increments of lift and moment and of a reading over the part alone: those of the whole record with zeros before it."""
+    whole = tr.fly(np.random.default_rng(8), sigma_w=0.0, amplitude=DEG)
+    part = replace(whole, signals=whole.signals.part("part", 0, 45, whole.samples))
+    rng = np.random.default_rng(9)
+    points, sub = (part.samples - 1) * whole.signals.sub + 1, whole.signals.sub
+    more = External(*(1e-3 * rng.standard_normal((2, points))), 1e-3 * rng.standard_normal((part.samples, 3)))
+    padded = External(
+        np.pad(more.lift, (45 * sub, 0)),
+        np.pad(more.moment, (45 * sub, 0)),
+        np.pad(more.output, ((45, 0), (0, 0))),
+    )
+    common, per_record = tr.still()
+    found, expected = (
+        respond(r, tr.SETTINGS, Change(), common, per_record, external=e, free_run=True).e
+        for r, e in ((part, more), (whole, padded))
+    )
+    np.testing.assert_array_equal(found, expected[45:])
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5])

@@ -33,6 +33,21 @@ def test_each_rest_has_the_mean_of_its_samples(seed):
         assert abs(rest[0] - exact[start + 6]) < 4.0 * STD / np.sqrt(end - start)
 
 
+def test_the_end_of_a_servo_s_motion_is_not_taken_for_rest():
+    """Steps through a lag of 32 ms, 0.3 to 1 s apart: beyond three standard deviations of the noise e, e^2/A of a step A may
+    be left where the rest begins, and the mean of a rest moves by less.
+
+    A mean over the whole end would be off by two standard deviations at its start.
+    """
+    steps = np.diff(np.select([T < 1.0, T < 2.0, T < 2.6, T < 2.9], [0.0, 1.0, -1.0, 1.0], 0.0) * DEG)
+    exact = np.zeros(500)
+    for at in np.flatnonzero(steps):
+        exact[at + 1 :] += steps[at] * -np.expm1(-(T[at + 1 :] - T[at]) / 0.032)
+    assert np.abs(restored(exact) - exact).max() < (3.0 * STD) ** 2 / DEG
+    noise = STD * np.random.default_rng(5).standard_normal(500)
+    assert np.abs(restored(exact + noise) - exact - noise)[50:56].max() < 1e-12
+
+
 def test_a_slow_motion_within_the_noise_is_kept():
     """A drift of three standard deviations over 10 s, with noise and without: the mean would be off by 1.5 at its ends."""
     exact = 3.0 * STD * T / T[-1]

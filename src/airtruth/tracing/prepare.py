@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from statistics import fmean
@@ -53,6 +54,9 @@ _HEAD_S: Final = 0.1
 """Start of a record whose mean is its trim with the linear model [s] (judgement: before the manoeuvre moves it)."""
 _HEAD_SAMPLES: Final = 3
 """Least number of samples of that start [-] (judgement)."""
+_LEAD_S: Final = 3.0
+"""Time before the second half of a record from which the filter runs [s] (judgement: several short periods, and time
+constants of slow sensors)."""
 _GUST_ALTITUDE_M: Final = (30.0, 20000.0)
 """Altitudes between which the gust scales are evaluated [m] (judgement: within the range of MIL-F-8785C)."""
 _AIR: Final = "each record has its own gust level, and the measured airspeed contains the horizontal gusts"
@@ -342,28 +346,23 @@ def gust_length_m(altitude_m: float) -> float:
 
 
 def _halves(record: TraceRecord) -> tuple[TraceRecord, TraceRecord]:
-    """The record cut where the elevator has made half of its travel, so that both parts are excited."""
+    """The record cut where the elevator has made half of its travel, so that both parts are excited.
+
+    The second part begins in motion: surfaces, sensors and effects that act late still show what came before.
+    """
     s = record.signals
     travel = np.cumsum(np.abs(np.diff(s.elevator_rad[:: s.sub * FINE])))
     half = int(np.searchsorted(travel, 0.5 * travel[-1]))
     middle = min(max(half, _LEAST_SAMPLES // 2), s.y.shape[0] - _LEAST_SAMPLES // 2)
+    start = max(middle - math.ceil(_LEAD_S / s.dt_s), 0)
     halves = []
-    for name, first, last in (("first half", 0, middle), ("second half", middle, s.y.shape[0])):
-        points = slice(first * s.sub, (last - 1) * s.sub + 1)
-        fine = slice(first * s.sub * FINE, (last - 1) * s.sub * FINE + 1)
-        cut = replace(
-            s,
-            run_id=f"{s.run_id}, {name}",
-            y=np.ascontiguousarray(s.y[first:last]),
-            elevator_rad=s.elevator_rad[fine],
-            airspeed_m_s=s.airspeed_m_s[points],
-            ground_m_s=s.ground_m_s[points],
-            density_kg_m3=s.density_kg_m3[points],
-            theta_rad=s.theta_rad[points],
-            corner_rad2=s.corner_rad2[first:last],
-        )
+    for name, lead, first, last in (
+        ("first half", 0, 0, middle),
+        ("second half", start, middle, s.y.shape[0]),
+    ):
+        points = slice(lead * s.sub, (last - 1) * s.sub + 1)
         beyond = None if record.remainder is None else np.ascontiguousarray(record.remainder[:, points])
-        halves.append(replace(record, signals=cut, remainder=beyond))
+        halves.append(replace(record, signals=s.part(name, lead, first, last), remainder=beyond))
     return halves[0], halves[1]
 
 

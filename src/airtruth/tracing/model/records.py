@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, field
-from typing import Final
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,25 @@ _CORNER_NOISE: Final = 20.0
 
 
 @dataclass(frozen=True)
+class Lead:
+    """What comes before a part of a run: the motion at the start of the part depends on it.
+
+    Attributes
+    ----------
+    y, corner_rad2 : samples before the part, as in `Signals`.
+    elevator_rad, airspeed_m_s, ground_m_s, density_kg_m3, theta_rad : points before the part, as in `Signals`.
+    """
+
+    y: Array
+    elevator_rad: Array
+    airspeed_m_s: Array
+    ground_m_s: Array
+    density_kg_m3: Array
+    theta_rad: Array
+    corner_rad2: Array
+
+
+@dataclass(frozen=True)
 class Signals:
     """One run of a log, before any model.
 
@@ -61,6 +80,7 @@ class Signals:
     throttle : its mean where it is logged, None elsewhere [0..1].
     corner_rad2 : (samples,) variance of the elevator's mean over the cell that ends at each sample, about that of
         ``elevator_rad``; empty where the samples show its motion.
+    lead : what comes before a part of a run; None for a whole run. The filter starts there.
     """
 
     run_id: str
@@ -76,6 +96,42 @@ class Signals:
     throttle: float | None
     elevator_std_rad: float = 0.0
     corner_rad2: Array = field(default_factory=lambda: np.zeros(0))
+    lead: Lead | None = None
+
+    @property
+    def with_lead(self) -> Signals:
+        """The part of a run and what comes before it, as one."""
+        if self.lead is None:
+            return self
+        names = [f.name for f in fields(Lead)]
+        both: dict[str, Any] = {
+            name: np.concatenate([getattr(self.lead, name), getattr(self, name)]) for name in names
+        }
+        return replace(self, lead=None, **both)
+
+    def part(self, name: str, start: int, first: int, last: int) -> Signals:
+        """Samples ``first`` to before ``last``, with those from ``start`` on before them."""
+        fine, end = self.sub * FINE, last - 1
+        before = self._cut(
+            start, first, slice(start * self.sub, first * self.sub), slice(start * fine, first * fine)
+        )
+        own = self._cut(
+            first, last, slice(first * self.sub, end * self.sub + 1), slice(first * fine, end * fine + 1)
+        )
+        series: dict[str, Any] = {f.name: getattr(own, f.name) for f in fields(Lead)}
+        lead = before if start < first else None
+        return replace(self, run_id=f"{self.run_id}, {name}", lead=lead, **series)
+
+    def _cut(self, first: int, last: int, points: slice, fine: slice) -> Lead:
+        return Lead(
+            y=np.ascontiguousarray(self.y[first:last]),
+            elevator_rad=self.elevator_rad[fine],
+            airspeed_m_s=self.airspeed_m_s[points],
+            ground_m_s=self.ground_m_s[points],
+            density_kg_m3=self.density_kg_m3[points],
+            theta_rad=self.theta_rad[points],
+            corner_rad2=self.corner_rad2[first:last],
+        )
 
 
 @dataclass(frozen=True)
@@ -88,7 +144,7 @@ class TraceRecord:
     plant : the declared aircraft there.
     gust_length_m : scale length of the vertical gust there [m].
     remainder : (2, points) of CL and Cm on the filter's grid, which the declared JSBSim model has along this record
-        beyond the plant's tables (`airtruth.tracing.model.remainder`); None for none.
+        beyond the plant's tables (`airtruth.tracing.model.remainder`), from the lead on; None for none.
     """
 
     signals: Signals
@@ -179,7 +235,8 @@ def _ground(channels: dict[str, Array], theta: Array, dt_s: float) -> Array:
 def _quiet(elevator: Array, dt_s: float, std: float) -> Array:
     """The elevator without the noise of its sensor where it is at rest.
 
-    It is at rest where it stays within three standard deviations of its median over 0.2 s. Of a stretch that shows nothing
+    It is at rest where it stays within three standard deviations of its median over 0.2 s and has settled (`_settled`). Of a
+    stretch that shows nothing
     but white noise the mean is taken, else the median: slow noise of a median moves an aircraft as well as that of the samples.
     """
     from scipy.ndimage import median_filter
@@ -192,13 +249,31 @@ def _quiet(elevator: Array, dt_s: float, std: float) -> Array:
     at_rest = np.abs(raw - middle) <= _QUIET_STD * std
     between = np.abs(middle[2:] - middle[:-2]) <= std
     at_rest[1:-1] |= at_rest[:-2] & at_rest[2:] & between  # a single outlier of the noise
-    quiet = np.where(at_rest, middle, raw)
     jumps = np.abs(np.diff(middle)) > _QUIET_STD * std
+    at_rest &= _settled(jumps)
+    quiet = np.where(at_rest, middle, raw)
     ends = np.flatnonzero(np.diff(at_rest) | jumps) + 1
     for start, end in itertools.pairwise([0, *ends.tolist(), len(raw)]):
         if at_rest[start] and end - start >= width and is_constant(raw[start:end]):
             quiet[start:end] = raw[start:end].mean()
     return quiet
+
+
+def _settled(jumps: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Samples before a motion, and from as long after it as it lasted.
+
+    The end of a servo's motion hides in the noise. If a first-order servo took T from a step A to the edge e of the noise,
+    e^2/A of the step is left T later. A mean over the hidden end would distort the surface by several e.
+
+    Parameters
+    ----------
+    jumps : (samples - 1,) whether the surface moves from a sample to the next by more than noise.
+    """
+    settled = np.ones(jumps.size + 1, dtype=np.bool_)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], jumps, [False]])))
+    for start, end in edges.reshape(-1, 2).tolist():
+        settled[start : 2 * end - start + 1] = False
+    return settled
 
 
 def is_constant(x: Array) -> bool:

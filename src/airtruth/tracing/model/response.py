@@ -69,15 +69,17 @@ class FilterInputs:
     Attributes
     ----------
     record, compiled : the record and the change.
-    y : (samples, 3) outputs.
+    y : (lead + samples, 3) outputs, those before a part of a run first.
+    lead : number of samples before the part.
     grid : inputs on the filter's grid, the errors of their sensors undone.
-    corner_rad2 : see `KernelInput`.
+    corner_rad2 : see `KernelInput`; 0 in the lead, whose innovations do not count.
     reference_alpha_rad, reference : means at which the gain is made.
     """
 
     record: TraceRecord
     compiled: CompiledChange
     y: Array
+    lead: int
     grid: GridSignals
     corner_rad2: Array
     reference_alpha_rad: float
@@ -87,7 +89,7 @@ class FilterInputs:
 def filter_inputs(record: TraceRecord, change: Change | CompiledChange) -> FilterInputs:
     """Undo what a change says of the inputs' sensors, and put what it says of the surface behind the elevator."""
     compiled = change if isinstance(change, CompiledChange) else compile_change(change)
-    s, plant = record.signals, record.plant
+    s, plant = record.signals.with_lead, record.plant
     y, theta = s.y, s.theta_rad
     if plant.alpha_shift_rad != 0.0:
         y = y - np.array([plant.alpha_shift_rad, 0.0, 0.0])
@@ -117,14 +119,17 @@ def filter_inputs(record: TraceRecord, change: Change | CompiledChange) -> Filte
         moment=0.0,
     )
     corner = _corners(s, compiled)
-    return FilterInputs(record, compiled, y, grid, corner, float(y[:, 0].mean()), reference)
+    lead = len(y) - record.samples
+    if corner.size:
+        corner[:lead] = 0.0
+    return FilterInputs(record, compiled, y, lead, grid, corner, float(y[:, 0].mean()), reference)
 
 
 def _corners(s: Signals, compiled: CompiledChange) -> Array:
     """Variance of the surface that the air sees, per sample; a delay or lag of the surface carries it to later cells."""
     late = tuple(term for term in compiled.surface if term.kind in ("delay", "lag"))
     if s.corner_rad2.size == 0 or not late:
-        return s.corner_rad2
+        return s.corner_rad2.copy()
     cells = s.sub * FINE
     fine = np.append(np.repeat(s.corner_rad2[1:], cells), 0.0)
     moved = through(late, fine, s.dt_s / cells)
@@ -185,6 +190,7 @@ def respond_to(
         logdet, more = evaluate(kernel, free_run, e, white, covariance)
     except np.linalg.LinAlgError:  # the innovations have no covariance
         logdet, more = float("nan"), 0.0
+    e = e[given.lead :]
     return Response(e, white, covariance, float(logdet + more / len(e)), float(more))
 
 
@@ -197,14 +203,13 @@ def kernel_input(
 ) -> KernelInput:
     """What the compiled filter reads."""
     lift, moment = per_record[PerRecord.trim]
-    if external is None:
-        more = np.zeros_like(given.y)
-        grid = given.grid._replace(lift=given.grid.lift + lift, moment=given.grid.moment + moment)
-    else:
-        more = external.output
-        grid = given.grid._replace(
-            lift=given.grid.lift + external.lift + lift, moment=given.grid.moment + external.moment + moment
-        )
+    more = np.zeros_like(given.y)
+    grid = given.grid._replace(lift=given.grid.lift + lift, moment=given.grid.moment + moment)
+    if external is not None:
+        own = external.lift.size
+        more[given.lead :] = external.output
+        grid.lift[-own:] += external.lift
+        grid.moment[-own:] += external.moment
     signals = given.record.signals
     return KernelInput(
         y=given.y,

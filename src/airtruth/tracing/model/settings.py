@@ -175,7 +175,7 @@ def free_common(settings: Settings) -> tuple[int, ...]:
 def initial_per_record(record: TraceRecord, settings: Settings) -> Array:
     """(per-record,) where the search for a record's own parameters starts."""
     values = np.zeros(PerRecord.size)
-    y = record.signals.y
+    y = record.signals.with_lead.y
     first = y[: min(_FIRST_SAMPLES, len(y))]
     values[PerRecord.alpha] = first[:, 0].mean() - record.plant.alpha_shift_rad
     values[PerRecord.q] = first[:, 1].mean()

@@ -211,7 +211,8 @@ def _views(null: PosteriorFit, problem: TraceProblem) -> list[View]:
     largest = max(float(np.abs(e).max()) for e in elevators)
     predicted, rates = [], []
     for record, tangent in zip(problem.records, null.sensitivities, strict=True):
-        y = filter_inputs(record, change).y
+        given = filter_inputs(record, change)
+        y = given.y[given.lead :]
         predicted.append(y[:, 0] - np.linalg.solve(tangent.white, tangent.r.T)[0])
         rates.append(_rate(predicted[-1], record.signals.dt_s))
     low, high = np.quantile(np.concatenate(predicted), _QUANTILES)
@@ -335,7 +336,8 @@ def _tangents(null: PosteriorFit, problem: TraceProblem, index: int, series: Ser
     record: TraceRecord = problem.records[index]
     base = null.sensitivities[index]
     given = filter_inputs(record, null.hypothesis.change(null.point.sizes))
-    nothing, still = np.zeros(given.grid.lift.size), np.zeros_like(given.y)
+    still = np.zeros_like(base.r)
+    nothing = np.zeros((len(still) - 1) * record.signals.sub + 1)
 
     def response(more: External | None = None) -> Response:
         common, own = null.point.common, null.point.per_record[index]
