@@ -106,3 +106,18 @@ def test_the_second_half_of_a_single_record_begins_in_motion(number, tmp_path):
     for effect in answer["effects"]:
         for name, p in effect["parameters"].items():
             assert abs(p["value"] - flown[effect["name"]][name]) < 3.0 * p["std"]
+
+
+@pytest.mark.parametrize("number", [2, 4])
+def test_released_derivatives_do_not_take_the_part_of_an_effect(number, tmp_path):
+    """Three effects, lambda 131 and 141. In the first trial wrong derivatives of lift had taken the part of an accelerometer
+    that is not at the CG, in the second a thrust line with a wrong Cmq that of the downwash lag."""
+    from airtruth.tracing import TraceOptions, trace
+    from validation.blind.draw import draw
+    from validation.blind.trials import frozen
+
+    (folder,) = frozen(20261126, [number], "triple", tmp_path)
+    answer = trace(folder, "gtm", TraceOptions()).to_dict()
+    assert {e["name"] for e in answer["effects"]} == {
+        e.key.split(":")[0] for e in draw(20261126, number, "triple").effects
+    }

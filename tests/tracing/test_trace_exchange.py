@@ -55,19 +55,22 @@ def reached(problem, first, second, rivals):
     )
 
 
+def better_of(problem, *search):
+    rounds = reached(problem, *search)
+    return better_set(problem, rounds, rounds[-1].null, LEAST, lambda step: None)
+
+
 def test_a_wrong_member_gives_way_to_its_rival(problem):
-    better = better_set(problem, reached(problem, GYRO, ACCELEROMETER, [VANE]), LEAST, lambda step: None)
+    better = better_of(problem, GYRO, ACCELEROMETER, [VANE])
     assert better is not None
     assert {e.key for e in better} == {"vane_scale", "gyro_scale"}
 
 
 def test_what_explains_most_comes_first(problem):
-    better = better_set(problem, reached(problem, GYRO, ACCELEROMETER, [VANE]), LEAST, lambda step: None)
+    better = better_of(problem, GYRO, ACCELEROMETER, [VANE])
     without = {e.key: fitted(problem, *(o for o in better if o is not e)).cost for e in better}
     assert without[better[0].key] > without[better[1].key]
 
 
 def test_a_right_set_stays(problem):
-    assert (
-        better_set(problem, reached(problem, GYRO, VANE, [ACCELEROMETER]), LEAST, lambda step: None) is None
-    )
+    assert better_of(problem, GYRO, VANE, [ACCELEROMETER]) is None

@@ -27,16 +27,19 @@ BETTER: Final = 5.0
 
 
 def better_set(
-    problem: TraceProblem, rounds: Sequence[SearchRound], least: float, advance: Advance
+    problem: TraceProblem,
+    rounds: Sequence[SearchRound],
+    last: PosteriorFit,
+    least: float,
+    advance: Advance,
 ) -> tuple[Effect, ...] | None:
     """The effects of a better set, the one that explains most first; None where no exchange leads by `BETTER`.
 
     Parameters
     ----------
-    rounds : a finished search with two or more accepted effects.
+    rounds : a finished search that accepted effects; last : fit of these under the declaration of the derivatives.
     least : gain in 2 log L below which a member of the new set is removed.
     """
-    last = rounds[-1].null
     best: PosteriorFit | None = None
     for index, effect in enumerate(last.hypothesis.effects):
         rival = _rival(rounds, last, effect)

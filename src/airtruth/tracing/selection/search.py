@@ -105,17 +105,23 @@ class _Search:
         missing = tuple(e for e in first.effects if e.key in self.known and e.key not in taken)
         if missing and rounds[-1].anomaly.p_value < _FAILED:
             rounds = self._led(first, missing, rounds)
-        last = rounds[-1].null.hypothesis
-        if len(last.effects) < 2 or last.spread is not None:
+        last = self._declared(rounds[-1].null)
+        if last is None or len(last.hypothesis.effects) + len(rounds[-1].sets[:1]) < 2:
             return rounds
         least = significant_gain(first.tested, later=True)
-        better = better_set(self.problem, rounds, least, self.advance)
+        better = better_set(self.problem, rounds, last, least, self.advance)
         return rounds if better is None else self._led(first, better, rounds)
+
+    def _declared(self, last: PosteriorFit) -> PosteriorFit | None:
+        """The fit under the declaration of the derivatives: released ones absorb what a wrong effect leaves."""
+        if last.hypothesis.spread is None:
+            return last
+        return fit(self.problem, replace(last.hypothesis, spread=None), last.point)
 
     def _led(
         self, first: RoundStart, effects: Sequence[Effect], rounds: tuple[SearchRound, ...]
     ) -> tuple[SearchRound, ...]:
-        """The rounds of a search that accepts these effects first, if they explain more than others."""
+        """The rounds of a search that accepts these effects first, if they explain more than others, or as much with fewer."""
         starts: tuple[RoundStart, ...] = (first,)
         again: tuple[SearchRound, ...] = ()
         for effect in effects:
@@ -129,7 +135,9 @@ class _Search:
             left = tuple(e for e in begin.effects if e.key != effect.key)
             starts = (*starts, RoundStart(fitted.hypothesis, fitted.point, left, settled=True))
         again = self.rounds(starts, again)
-        return again if total_cost(again[-1]) < total_cost(rounds[-1]) - BETTER else rounds
+        simpler = len(_effects_of(again[-1])) < len(_effects_of(rounds[-1]))
+        lead = 0.0 if simpler else BETTER
+        return again if total_cost(again[-1]) < total_cost(rounds[-1]) - lead else rounds
 
     def _branches(
         self,
