@@ -56,8 +56,8 @@ _STRAINED: Final = 15.0
 """Log-posterior that an explanation of the derivatives loses to derivatives without a prior, from which effects are
 refitted from the declared aircraft [-] (judgement: one physical cause loses 6, two wrong declarations lose 8)."""
 _RELEASE_LEADS: Final = 30.0
-"""Gain in 2 log L by which released derivatives have to lead for no effect to be followed beside them [-] (judgement: as
-a significant gain)."""
+"""Gain in 2 log L by which released derivatives have to lead for no effect to be followed beside them [-] (judgement: what a
+later effect may still add to it)."""
 _FAR: Final = 5.0
 """Distance in standard errors from which the refit under the autoregression is discarded [-] (judgement)."""
 

@@ -162,6 +162,10 @@ class _Search:
         if len(ends) == 1:
             return ends[0]
         costs = [total_cost(rounds[-1]) for rounds in ends]
+        if all(rounds[-1].sets for rounds in ends):  # an effect beside the others has to be significant
+            costs = [
+                c + BETTER * len(r[-1].null.hypothesis.effects) for c, r in zip(costs, ends, strict=True)
+            ]
         best = int(np.argmin(costs))
         won, lost = ends[best], ends[1 - best]
         rival = Rival(_effects_of(lost[-1]), costs[1 - best] - costs[best])
