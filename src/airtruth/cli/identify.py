@@ -20,12 +20,14 @@ from airtruth.cli.arguments import (
     Replace,
     Trim,
 )
+from airtruth.cli.compilation import compile_identification
 from airtruth.cli.output import notice, print_result
 from airtruth.cli.progress import announced_compilation, progress_bar, working
 
 
 @app.command(epilog="Example: airtruth identify out/light --aircraft gtm --method iv-f1 --method ls")
 def identify(
+    context: typer.Context,
     logs: Annotated[
         list[Path],
         typer.Argument(metavar="DIR|LOG...", help="Campaign folders or flight logs, or URLs of these."),
@@ -73,6 +75,8 @@ def identify(
     quiet: Quiet = False,
 ) -> None:
     """Estimate the six short-period derivatives of every run."""
+    methods = method or ["iv-f1"]
+    compile_identification(context, methods, cluster)
     from airtruth import identification
     from airtruth.aircraft import load
     from airtruth.api.writing import aircraft_files
@@ -95,7 +99,6 @@ def identify(
     if out is None and len(logs) == 1 and (logs[0] / "logs").is_dir():
         out = logs[0] / "estimates.parquet"
     declared = load(aircraft)
-    methods = method or ["iv-f1"]
     with (
         writing("identify", [*log_files(logs), *aircraft_files(declared)], force=force) as outputs,
         ExitStack() as kept,

@@ -25,6 +25,7 @@ from airtruth.cli.arguments import (
     TimeBudget,
     TraceSeed,
 )
+from airtruth.cli.compilation import compile_filter
 from airtruth.cli.output import notice, print_result
 from airtruth.cli.progress import TRACE_STEPS, announced_compilation, progress_bar, status
 from airtruth.errors import FAILED_RUNS
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 
 @app.command(epilog="Example: airtruth trace data/undeclared/a.parquet --aircraft gtm --out out/trace")
 def trace(
+    context: typer.Context,
     logs: LogFiles,
     aircraft: Declared,
     out: Annotated[Path, typer.Option(help="Folder of trace.json, figures and the updated aircraft.")],
@@ -58,6 +60,7 @@ def trace(
     quiet: Quiet = False,
 ) -> None:
     """Name the effect that a declared aircraft lacks, add it, and report the error before and after."""
+    compile_filter(context, cluster)
     from airtruth.api.campaigns import load_aircraft
     from airtruth.api.trace_tasks import TraceTask
 
@@ -73,6 +76,7 @@ def trace(
     epilog="Example: airtruth loop out/twelve --aircraft gtm --out out/loop --method ls --method iv-f1"
 )
 def loop(
+    context: typer.Context,
     logs: LogFiles,
     aircraft: Declared,
     out: Annotated[Path, typer.Option(help="Folder of the trace, the estimates, loop.json and the table.")],
@@ -90,6 +94,7 @@ def loop(
     quiet: Quiet = False,
 ) -> None:
     """Trace, remove the traced effects from the logs, and identify before and after (default: ls and iv-f1)."""
+    compile_filter(context, cluster)
     from airtruth.api.campaigns import load_aircraft
     from airtruth.api.trace_tasks import TraceTask
     from airtruth.loop import METHODS

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from airtruth.identification.options import Options
 from airtruth.identification.regression.rows import row_factors
+from airtruth.identification.signals import ALPHA, AZ, COMMAND, Q
 from airtruth.logs.flight_log import Batch
 from airtruth.numerics.prefilter import butterworth, zero_phase
 from airtruth.physics.atmosphere import air_density
@@ -31,16 +32,6 @@ from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
-COMMAND: Final = "elevator_command_rad"
-"""Channel of the elevator command [rad]."""
-ALPHA: Final = 0
-"""Index of alpha [rad] among the signals."""
-Q: Final = 1
-"""Index of q [rad/s] among the signals."""
-AZ: Final = 2
-"""Index of az [g] among the signals."""
-ELEVATOR: Final = 3
-"""Index of the elevator [rad] among the signals."""
 NO_LEFT: Final = np.empty((0, 4, 0))
 """Left sides at constant pressure: the estimators form them from the signals."""
 

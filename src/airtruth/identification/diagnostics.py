@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.stats import chi2
 
-from airtruth.identification.condition import ELEVATOR, AircraftConstants, observe
+from airtruth.identification.condition import AircraftConstants, observe
 from airtruth.identification.estimates import Estimates
 from airtruth.identification.methods import method, regression
 from airtruth.identification.options import Options
 from airtruth.identification.regression.covariance import correction
 from airtruth.identification.regression.rows import LIFT, MOMENT, NORMAL, Projected, project
 from airtruth.identification.regression.solve import chunks
+from airtruth.identification.signals import ELEVATOR
 from airtruth.logs.flight_log import Batch
 
 Array = NDArray[np.float64]

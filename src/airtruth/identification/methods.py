@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError, choices
-from airtruth.identification.condition import COMMAND, ELEVATOR, AircraftConstants, Observation, OneOrEach
+from airtruth.identification.condition import AircraftConstants, Observation, OneOrEach
 from airtruth.identification.estimates import Estimates
 from airtruth.identification.likelihood.method import (
     estimate_filter_error,
@@ -27,6 +27,7 @@ from airtruth.identification.regression.dynamic import dynamic_problem, f1_numer
 from airtruth.identification.regression.kalman_instruments import deviation, predictions
 from airtruth.identification.regression.lowpass import estimated_elevator, iv_problem, ls_problem
 from airtruth.identification.regression.rows import Problem
+from airtruth.identification.signals import COMMAND, ELEVATOR
 from airtruth.logs.flight_log import Batch
 
 Array = NDArray[np.float64]

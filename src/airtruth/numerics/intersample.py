@@ -56,9 +56,8 @@ def _decay(increments: Array) -> Array:
 
 
 @njit(cache=True, error_model="numpy")
-def _bends(elevator: Array, decay: Array, bend: Array) -> None:
-    cells = elevator.shape[1] - 1
-    command = np.empty(cells)
+def _bends(elevator: Array, decay: Array, command: Array, bend: Array) -> None:
+    cells = command.size
     for run in range(elevator.shape[0]):
         de, out, rho = elevator[run], bend[run], decay[run]
         if not _FASTEST < rho < _SLOWEST:
@@ -66,7 +65,8 @@ def _bends(elevator: Array, decay: Array, bend: Array) -> None:
         low, high = math.inf, -math.inf
         for k in range(cells):
             command[k] = de[k] + (de[k + 1] - de[k]) / (1.0 - rho)
-            low, high = min(low, command[k]), max(high, command[k])
+            low = command[k] if command[k] < low else low
+            high = command[k] if command[k] > high else high
         threshold = _STEP * (high - low)
         steps = 0
         for k in range(1, cells):
@@ -80,17 +80,17 @@ def _bends(elevator: Array, decay: Array, bend: Array) -> None:
         for k in range(cells):
             start, end = de[k], de[k + 1]
             mean = 0.5 * (start + end) + curve * (end - start)
-            first = command[max(k - 1, 0)]
-            second = command[min(k + 1, cells - 1)]
+            first = command[k - 1 if k > 0 else 0]
+            second = command[k + 1 if k + 1 < cells else k]
             if abs(second - first) > threshold:
                 # the command steps inside the cell, at the time where both exponentials meet: x = exp(-s/tau)
                 x = rho * (first - second) / ((end - second) - rho * (start - first))
-                x = min(max(x, rho), 1.0)
+                x = rho if x < rho else (1.0 if x > 1.0 else x)
                 time = -tau * math.log(x)
                 corner = first + (start - first) * x
                 mean = first * time + (start - first) * tau * (1.0 - x)
                 mean += second * (1.0 - time) + (corner - second) * tau * (1.0 - rho / x)
-            before, after = de[max(k - 1, 0)], de[min(k + 2, cells)]
+            before, after = de[k - 1 if k > 0 else 0], de[k + 2 if k + 2 < cells else cells]
             out[k + 1] = mean - (13.0 * (start + end) - before - after) / 24.0
 
 
@@ -110,5 +110,5 @@ def servo_bend(elevator: Array) -> Array:
     """
     elevator = np.ascontiguousarray(elevator)  # one layout, so that the kernel compiles once
     bend = np.zeros_like(elevator)
-    _bends(elevator, _decay(np.diff(elevator, axis=1)), bend)
+    _bends(elevator, _decay(np.diff(elevator, axis=1)), np.empty(elevator.shape[1] - 1), bend)
     return bend

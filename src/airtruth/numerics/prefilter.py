@@ -71,10 +71,9 @@ def _section(rows: Array, sos: Array, first: int, step: int) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _zero_phase(x: Array, sos: Array, edge: int, out: Array) -> None:
+def _zero_phase(x: Array, sos: Array, edge: int, work: Array, out: Array) -> None:
     rows, samples = x.shape
     padded = samples + 2 * edge
-    work = np.zeros((4, padded))
     for start in range(0, rows, 4):
         for lane in range(min(4, rows - start)):
             row = x[start + lane]
@@ -109,5 +108,6 @@ def zero_phase(x: Array, sos: Array) -> Array:
     """
     rows = np.ascontiguousarray(x, dtype=np.float64).reshape(-1, x.shape[-1])
     out = np.empty_like(rows)
-    _zero_phase(rows, sos, edge_samples(sos), out)
+    edge = edge_samples(sos)
+    _zero_phase(rows, sos, edge, np.zeros((4, rows.shape[1] + 2 * edge)), out)
     return out.reshape(x.shape)

@@ -13,6 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from airtruth.identification.regression.rows import HALF_CHORD, LIFT, MOMENT, row_factors
+from airtruth.numerics.ahead import awaited
 from airtruth.numerics.compiled import inner
 from airtruth.numerics.hold import first_order_hold
 from airtruth.physics.short_period import CL_ALPHA, CL_DE, CL_Q, CM_ALPHA, CM_DE, CM_Q, Scale
@@ -65,6 +66,7 @@ def respond(system: Six, u: Array, origin: float, dt_s: float, alpha: Array, q: 
         q[k] = x1
 
 
+@awaited
 @njit(cache=True, error_model="numpy")
 def _respond_runs(theta: Array, factors: Array, u: Array, dt_s: float, alpha: Array, q: Array) -> None:
     for r in range(u.shape[0]):

@@ -11,12 +11,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.identification.condition import ELEVATOR, Observation, origin_of, relative
+from airtruth.identification.condition import Observation, origin_of, relative
 from airtruth.identification.options import Options
 from airtruth.identification.regression import rows as layout
 from airtruth.identification.regression.auxiliary import bounded
 from airtruth.identification.regression.dynamic_kernel import Model, Records, filtered_moments, filtered_rows
 from airtruth.identification.regression.rows import NO_INSTRUMENTS, Problem, made_by
+from airtruth.identification.signals import ELEVATOR
 from airtruth.numerics.intersample import servo_bend
 from airtruth.physics.short_period import CL_ALPHA, CL_DE, CM_ALPHA, CM_DE
 

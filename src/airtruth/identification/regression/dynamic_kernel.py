@@ -10,9 +10,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airtruth.identification.condition import ALPHA, AZ, ELEVATOR, Q
 from airtruth.identification.regression import rows as layout
 from airtruth.identification.regression.auxiliary import respond, state_matrices
+from airtruth.identification.signals import ALPHA, AZ, ELEVATOR, Q
+from airtruth.numerics.ahead import awaited
 from airtruth.numerics.compiled import inner
 from airtruth.numerics.hold import first_order_hold
 
@@ -258,6 +259,7 @@ def _filter_run(records: Records, model: Model, index: int, work: Array, w: Arra
     subtract(moment, b1, corners)
 
 
+@awaited
 @njit(cache=True, error_model="numpy")
 def _filtered(records: Records, model: Model, rows: Array, moments: Array) -> None:
     """Filtered rows, or where ``rows`` holds one run alone, the sums of products of each run."""

@@ -27,12 +27,8 @@ from scipy.fft import rfft
 
 from airtruth.errors import ConfigurationError
 from airtruth.identification.condition import (
-    ALPHA,
-    AZ,
-    ELEVATOR,
     AircraftConstants,
     OneOrEach,
-    Q,
     each_batch,
     measured_unless_given,
     observe,
@@ -44,6 +40,7 @@ from airtruth.identification.regression.covariance import sandwich
 from airtruth.identification.regression.frequency_kernel import FREE, sums_of
 from airtruth.identification.regression.rows import HALF_CHORD, LIFT, MOMENT, solve
 from airtruth.identification.regression.solve import chunks, regress_batch, regress_joint
+from airtruth.identification.signals import ALPHA, AZ, ELEVATOR, Q
 from airtruth.logs.flight_log import Batch
 from airtruth.numerics.intersample import servo_bend
 from airtruth.physics.short_period import CL_ALPHA, CL_Q, CM_ALPHA, CM_Q, Scale

@@ -20,8 +20,9 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
-from airtruth.identification.condition import ALPHA, ELEVATOR, Observation, Q, origin_of
+from airtruth.identification.condition import Observation, origin_of
 from airtruth.identification.regression.auxiliary import state_matrices
+from airtruth.identification.signals import ALPHA, ELEVATOR, Q
 from airtruth.numerics.hold import first_order_hold
 
 Array = NDArray[np.float64]

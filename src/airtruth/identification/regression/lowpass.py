@@ -12,11 +12,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.identification.condition import ALPHA, AZ, ELEVATOR, Observation, Q, origin_of, relative
+from airtruth.identification.condition import Observation, origin_of, relative
 from airtruth.identification.options import Options
 from airtruth.identification.regression import rows as layout
 from airtruth.identification.regression.auxiliary import bounded, short_period
 from airtruth.identification.regression.rows import Problem, made_by
+from airtruth.identification.signals import ALPHA, AZ, ELEVATOR, Q
 from airtruth.numerics.prefilter import butterworth, zero_phase
 from airtruth.numerics.srivc import TransferFunctions, simulate, srivc
 

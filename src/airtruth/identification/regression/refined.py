@@ -33,12 +33,8 @@ from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError
 from airtruth.identification.condition import (
-    ALPHA,
-    AZ,
-    ELEVATOR,
     AircraftConstants,
     OneOrEach,
-    Q,
     each_batch,
     measured_unless_given,
     observe,
@@ -52,6 +48,7 @@ from airtruth.identification.regression.iterate import Outcome, repeat
 from airtruth.identification.regression.refined_kernel import WHITENING, Record, record_sums
 from airtruth.identification.regression.rows import solve
 from airtruth.identification.regression.solve import assembled, chunks, regress_batch, regress_joint
+from airtruth.identification.signals import ALPHA, AZ, ELEVATOR, Q
 from airtruth.logs.flight_log import Batch
 from airtruth.numerics.intersample import servo_bend
 from airtruth.physics.short_period import Scale

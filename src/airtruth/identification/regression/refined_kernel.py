@@ -14,8 +14,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airtruth.identification.condition import ALPHA, AZ, ELEVATOR, Q
 from airtruth.identification.regression.rows import HALF_CHORD, LIFT, MOMENT, NORMAL
+from airtruth.identification.signals import ALPHA, AZ, ELEVATOR, Q
 from airtruth.physics.short_period import CL_ALPHA, CM_ALPHA, CM_DE, CM_Q
 
 Array = NDArray[np.float64]

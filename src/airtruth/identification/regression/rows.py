@@ -27,6 +27,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from airtruth.identification.options import AuxiliaryModel
+from airtruth.numerics.ahead import awaited
 from airtruth.numerics.compiled import inner
 from airtruth.physics.short_period import Scale
 from airtruth.units import G0
@@ -168,6 +169,7 @@ def products(z: Array, x: Array, moments: Array) -> None:
         moments[i, 6] = m6
 
 
+@awaited
 @njit(cache=True, error_model="numpy")
 def _moments(rows: Array, moments: Array) -> None:
     for r in range(rows.shape[0]):

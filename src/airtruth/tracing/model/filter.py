@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from airtruth.numerics.ahead import awaited
 from airtruth.numerics.compiled import inner
 from airtruth.numerics.discretise import step
 from airtruth.tracing.model.corners import (
@@ -236,6 +237,7 @@ def _update(x: Array, k_gain: Array, e: Array) -> bool:
     return True
 
 
+@awaited
 @njit(cache=True, nogil=True, error_model="numpy")
 def _innovations(
     given: KernelInput, steps: Steps, work: Work, x: Array, k_gain: Array, corners: Corners, e: Array

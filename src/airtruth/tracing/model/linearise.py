@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from airtruth.numerics.ahead import awaited
 from airtruth.numerics.compiled import inner
 from airtruth.numerics.discretise import multiply, riccati, step, whitener
 from airtruth.tracing.model.equations import gust, outputs, rates
@@ -79,6 +80,7 @@ def linearise(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array) ->
     _add_sensors(model, a, c)
 
 
+@awaited
 @njit(cache=True, nogil=True, error_model="numpy")
 def _differences(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array) -> None:
     """Columns of A and C of the motion and the effects' states; ``x`` is moved and returns."""

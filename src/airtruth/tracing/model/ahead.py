@@ -1,0 +1,61 @@
+"""Calls that compile two of the filter's kernels: an aircraft without forces, and a record of one sample."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from airtruth.tracing.model.corners import Corners
+from airtruth.tracing.model.filter import innovations
+from airtruth.tracing.model.kernel_input import (
+    AircraftArrays,
+    AirPoint,
+    EffectArrays,
+    FilterModel,
+    GridSignals,
+    GustModel,
+    KernelInput,
+    SensorArrays,
+)
+from airtruth.tracing.model.linearise import linearise
+from airtruth.tracing.model.parameters import CORE, OUTPUTS, state_layout
+
+_AT: Final = AirPoint(*[1.0] * len(AirPoint._fields))
+"""Inputs at a point."""
+
+
+def _model() -> FilterModel:
+    axis, ones, none = np.array([0.0, 1.0]), np.ones(OUTPUTS), np.empty(0)
+    whole = np.empty(0, dtype=np.int64)
+    return FilterModel(
+        AircraftArrays._make(
+            [*[1.0] * 12, np.zeros(3), np.zeros(6), axis, axis, axis, np.zeros((2, 2, 2, 3))]
+        ),
+        GustModel(*[1.0] * len(GustModel._fields)),
+        EffectArrays(whole.reshape(0, 4), none, none, whole.reshape(0, 2), none, none),
+        SensorArrays._make([*[ones] * 7, 1.0]),
+        state_layout(whole, CORE, 0.0 * ones, 0.0 * ones, slow=False),
+    )
+
+
+def _linearise() -> None:
+    linearise(np.zeros(CORE), _AT, _model(), np.empty((CORE, CORE)), np.empty((OUTPUTS, CORE)))
+
+
+def _filter() -> None:
+    zeros, square = np.zeros((1, OUTPUTS)), np.empty((0, 0))
+    grid = GridSignals(*[np.ones(1)] * len(GridSignals._fields))
+    given = KernelInput(zeros, zeros, grid, np.empty(0), 1.0, 2, np.zeros(4), 0.0, _AT, _model())
+    corners = Corners(square, square, square, square, square, np.ones(OUTPUTS), square, square, 0.0)
+    innovations(given, np.zeros((CORE, OUTPUTS)), corners, np.empty((1, OUTPUTS)))
+
+
+KERNELS: Final[tuple[tuple[str, Callable[[], None]], ...]] = (
+    ("airtruth.tracing.model.linearise._differences", _linearise),
+    ("airtruth.tracing.model.filter._innovations", _filter),
+)
+"""Full name of each kernel, and the call that compiles it."""
+
+__all__ = ["KERNELS"]
