@@ -100,7 +100,9 @@ def test_the_second_half_of_a_single_record_begins_in_motion(number, tmp_path):
     from validation.blind.trials import frozen
 
     (folder,) = frozen(20261126, [number], "slow", tmp_path)
-    answer = trace(folder, "gtm", TraceOptions(hold_out=read_log(folder / "log.parquet", ()).run_ids[1:])).to_dict()
+    answer = trace(
+        folder, "gtm", TraceOptions(hold_out=read_log(folder / "log.parquet", ()).run_ids[1:])
+    ).to_dict()
     flown = {e.key: e.values for e in draw(20261126, number, "slow").effects}
     assert {e["name"] for e in answer["effects"]} == set(flown)
     for effect in answer["effects"]:

@@ -10,11 +10,12 @@ import trace_records as tr
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.model.parameters import Parameters
-from airtruth.tracing.selection.exchange import better_set
+from airtruth.tracing.selection.exchange import better_set, other_kinds
 from airtruth.tracing.selection.rounds import significant_gain
 from airtruth.units import DEG
 
 VANE, GYRO, ACCELEROMETER = (EFFECTS[f"{name}_scale"] for name in ("vane", "gyro", "accelerometer"))
+LIBRARY = tuple(EFFECTS.values())
 LEAST = significant_gain(33, later=True)
 
 
@@ -57,7 +58,7 @@ def reached(problem, first, second, rivals):
 
 def better_of(problem, *search):
     rounds = reached(problem, *search)
-    return better_set(problem, rounds, rounds[-1].null, LEAST, lambda step: None)
+    return better_set(problem, rounds, rounds[-1].null, LIBRARY, LEAST, lambda step: None)
 
 
 def test_a_wrong_member_gives_way_to_its_rival(problem):
@@ -74,3 +75,26 @@ def test_what_explains_most_comes_first(problem):
 
 def test_a_right_set_stays(problem):
     assert better_of(problem, GYRO, VANE, [ACCELEROMETER]) is None
+
+
+def test_late_members_are_late_in_another_way():
+    """A gyro that is late twice, a slow surface, and a scale: four other sets, as late in each place as the first."""
+    names = ("sensor_delay:q_rad_s", "vane_scale", "gyro_lag", "actuator_lag")
+    hypothesis = tr.NOTHING
+    for name in names:
+        hypothesis = hypothesis.plus(EFFECTS[name])
+    last = SimpleNamespace(
+        hypothesis=hypothesis, point=SimpleNamespace(sizes=np.array([0.02, 0.1, 0.05, 0.04]))
+    )
+    found = {tuple(e.key for e in effects): sizes.tolist() for effects, sizes in other_kinds(LIBRARY, last)}
+    sensors, surfaces = ("gyro_lag", "sensor_delay:q_rad_s"), ("elevator_delay", "actuator_lag")
+    expected = {(q, surface, "vane_scale") for q in sensors for surface in surfaces}
+    assert set(found) == expected
+    for sizes in found.values():
+        assert sizes == pytest.approx([0.07, 0.04, 0.1], abs=1e-15)
+
+
+def test_one_late_member_has_its_rival_alone():
+    hypothesis = tr.NOTHING.plus(EFFECTS["gyro_lag"]).plus(EFFECTS["vane_scale"])
+    last = SimpleNamespace(hypothesis=hypothesis, point=SimpleNamespace(sizes=np.array([0.02, 0.1])))
+    assert list(other_kinds(LIBRARY, last)) == []

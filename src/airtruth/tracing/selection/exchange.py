@@ -7,7 +7,8 @@ gyro for what remains. An exchange of one member for its rival, and the removal 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -24,12 +25,15 @@ from airtruth.tracing.selection.rounds import SearchRound
 
 BETTER: Final = 5.0
 """Log-posterior by which another set has to lead [-] (judgement: a gain of 10 in 2 log L, as that of a first effect)."""
+_LATE: Final = ("delay", "lag")
+"""Kinds of terms that delay a signal."""
 
 
 def better_set(
     problem: TraceProblem,
     rounds: Sequence[SearchRound],
     last: PosteriorFit,
+    effects: Sequence[Effect],
     least: float,
     advance: Advance,
 ) -> tuple[Effect, ...] | None:
@@ -38,6 +42,7 @@ def better_set(
     Parameters
     ----------
     rounds : a finished search that accepted effects; last : fit of these under the declaration of the derivatives.
+    effects : candidates of the search.
     least : gain in 2 log L below which a member of the new set is removed.
     """
     best: PosteriorFit | None = None
@@ -52,7 +57,53 @@ def better_set(
         tried = _exchanged(problem, last, index, rival)
         if tried is not None and _cost(tried) < _cost(best or last) - (0.0 if best else BETTER):
             best = tried
+    for swapped, sizes in other_kinds(effects, last):
+        if not may_begin(advance, f"{' and '.join(e.key for e in swapped)} beside the other effects"):
+            return None
+        hypothesis = replace(last.hypothesis, effects=swapped)
+        tried = fit(problem, hypothesis, replace(last.point, sizes=sizes))
+        if tried is not None and _cost(tried) < _cost(best or last) - (0.0 if best else BETTER):
+            best = tried
     return None if best is None else _needed(problem, best, least)
+
+
+def other_kinds(
+    effects: Sequence[Effect], last: PosteriorFit
+) -> Iterator[tuple[tuple[Effect, ...], NDArray[np.float64]]]:
+    """Sets that are late where the fitted one is, by a delay or by a lag in each place, and their sizes to begin with.
+
+    A delay of the gyro and a lag of the surface are alike a lag of the gyro and a delay of the surface; each of the two
+    exchanges alone explains less.
+    """
+    twins: dict[str, list[Effect]] = {}
+    for effect in effects:
+        place = _late_place(effect)
+        if place:
+            twins.setdefault(place, []).append(effect)
+    own = last.hypothesis.effects
+    late_s: dict[str, float] = {}
+    for effect in own:
+        place = _late_place(effect)
+        if place:
+            late_s[place] = late_s.get(place, 0.0) + float(_sizes(last, effect.key).sum())
+    if len(late_s) < 2:
+        return
+    rest = tuple(e for e in own if not _late_place(e))
+    begin = [_sizes(last, e.key) for e in rest]
+    for late in itertools.product(*(twins[place] for place in late_s)):
+        if {e.key for e in (*late, *rest)} != {e.key for e in own}:
+            yield (*late, *rest), np.concatenate([np.array(list(late_s.values())), *begin])
+
+
+def _late_place(effect: Effect) -> str:
+    """Channel whose reading an effect delays, or "surface"; empty for any other effect.
+
+    The size of such an effect is a time [s].
+    """
+    change = effect.describe({p.name: p.value(p.step) for p in effect.parameters})
+    if any(term.kind in _LATE for term in change.surface):
+        return "surface"
+    return next((term.channel for term in change.sensors if term.kind in _LATE), "")
 
 
 def _rival(rounds: Sequence[SearchRound], last: PosteriorFit, effect: Effect) -> Candidate | None:
@@ -105,4 +156,4 @@ def _needed(problem: TraceProblem, fitted: PosteriorFit, least: float) -> tuple[
         fitted = less
 
 
-__all__ = ["BETTER", "better_set"]
+__all__ = ["BETTER", "better_set", "other_kinds"]

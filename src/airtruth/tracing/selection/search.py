@@ -109,7 +109,7 @@ class _Search:
         if last is None or len(last.hypothesis.effects) + len(rounds[-1].sets[:1]) < 2:
             return rounds
         least = significant_gain(first.tested, later=True)
-        better = better_set(self.problem, rounds, last, least, self.advance)
+        better = better_set(self.problem, rounds, last, first.effects, least, self.advance)
         return rounds if better is None else self._led(first, better, rounds)
 
     def _declared(self, last: PosteriorFit) -> PosteriorFit | None:
