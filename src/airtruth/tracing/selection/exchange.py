@@ -70,7 +70,7 @@ def better_set(
 def other_kinds(
     effects: Sequence[Effect], last: PosteriorFit
 ) -> Iterator[tuple[tuple[Effect, ...], NDArray[np.float64]]]:
-    """Sets that are late where the fitted one is, by a delay or by a lag in each place, and their sizes to begin with.
+    """Sets that are late where the fitted one is, by a delay or by a lag each, and their sizes to begin with.
 
     A delay of the gyro and a lag of the surface are alike a lag of the gyro and a delay of the surface; each of the two
     exchanges alone explains less.
