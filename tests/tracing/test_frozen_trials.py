@@ -64,13 +64,14 @@ def test_a_trial_is_answered_as_it_was(number, tmp_path):
         assert all(after[c] < NOT_WORSE * before[c] for c in after)
 
 
-def test_a_set_one_exchange_away_is_reached(tmp_path):
-    """A late gyro and a late surface, lambda 735: the search alone accepted the gyro's delay, a lag of the surface, and the
-    gyro's lag. The log-posterior of the two that were flown is larger by 20 (measured)."""
+@pytest.mark.parametrize(("seed", "number"), [(20261123, 6), (20261127, 16)])
+def test_a_set_one_exchange_away_is_reached(seed, number, tmp_path):
+    """A late gyro and a late surface, lambda 735 and 1051: the search alone accepted the gyro's delay and a lag of the surface,
+    with the gyro's lag or wrong derivatives. The log-posterior of the two that were flown is larger by 20 in the first."""
     from airtruth.tracing import TraceOptions, trace
     from validation.blind.trials import frozen
 
-    (folder,) = frozen(20261123, [6], "slow", tmp_path)
+    (folder,) = frozen(seed, [number], "slow", tmp_path)
     answer = trace(folder, "gtm", TraceOptions()).to_dict()
     assert {e["name"] for e in answer["effects"]} == {"gyro_lag", "elevator_delay"}
 

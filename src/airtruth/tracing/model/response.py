@@ -120,8 +120,8 @@ def filter_inputs(record: TraceRecord, change: Change | CompiledChange) -> Filte
     )
     corner = _corners(s, compiled)
     lead = len(y) - record.samples
-    if corner.size:
-        corner[:lead] = 0.0
+    if lead and corner.size:
+        corner = np.concatenate([np.zeros(lead), corner[lead:]])
     return FilterInputs(record, compiled, y, lead, grid, corner, float(y[:, 0].mean()), reference)
 
 
@@ -129,7 +129,7 @@ def _corners(s: Signals, compiled: CompiledChange) -> Array:
     """Variance of the surface that the air sees, per sample; a delay or lag of the surface carries it to later cells."""
     late = tuple(term for term in compiled.surface if term.kind in ("delay", "lag"))
     if s.corner_rad2.size == 0 or not late:
-        return s.corner_rad2.copy()
+        return s.corner_rad2
     cells = s.sub * FINE
     fine = np.append(np.repeat(s.corner_rad2[1:], cells), 0.0)
     moved = through(late, fine, s.dt_s / cells)
