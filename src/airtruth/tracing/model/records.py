@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -44,23 +44,16 @@ _CORNER_NOISE: Final = 20.0
 """The same in standard deviations of the elevator's noise [-]: five of half a fourth difference, sqrt(70)/2 each."""
 
 
-@dataclass(frozen=True)
-class Lead:
-    """What comes before a part of a run: the motion at the start of the part depends on it.
-
-    Attributes
-    ----------
-    y, corner_rad2 : samples before the part, as in `Signals`.
-    elevator_rad, airspeed_m_s, ground_m_s, density_kg_m3, theta_rad : points before the part, as in `Signals`.
-    """
-
-    y: Array
-    elevator_rad: Array
-    airspeed_m_s: Array
-    ground_m_s: Array
-    density_kg_m3: Array
-    theta_rad: Array
-    corner_rad2: Array
+_SERIES: Final = (
+    "y",
+    "elevator_rad",
+    "airspeed_m_s",
+    "ground_m_s",
+    "density_kg_m3",
+    "theta_rad",
+    "corner_rad2",
+)
+"""Attributes of `Signals` that are series in time."""
 
 
 @dataclass(frozen=True)
@@ -96,41 +89,40 @@ class Signals:
     throttle: float | None
     elevator_std_rad: float = 0.0
     corner_rad2: Array = field(default_factory=lambda: np.zeros(0))
-    lead: Lead | None = None
+    lead: Signals | None = None
 
     @property
     def with_lead(self) -> Signals:
         """The part of a run and what comes before it, as one."""
         if self.lead is None:
             return self
-        names = [f.name for f in fields(Lead)]
         both: dict[str, Any] = {
-            name: np.concatenate([getattr(self.lead, name), getattr(self, name)]) for name in names
+            name: np.concatenate([getattr(self.lead, name), getattr(self, name)]) for name in _SERIES
         }
         return replace(self, lead=None, **both)
 
     def part(self, name: str, start: int, first: int, last: int) -> Signals:
         """Samples ``first`` to before ``last``, with those from ``start`` on before them."""
         fine, end = self.sub * FINE, last - 1
-        before = self._cut(
-            start, first, slice(start * self.sub, first * self.sub), slice(start * fine, first * fine)
-        )
-        own = self._cut(
-            first, last, slice(first * self.sub, end * self.sub + 1), slice(first * fine, end * fine + 1)
-        )
-        series: dict[str, Any] = {f.name: getattr(own, f.name) for f in fields(Lead)}
-        lead = before if start < first else None
-        return replace(self, run_id=f"{self.run_id}, {name}", lead=lead, **series)
+        lead = None
+        if start < first:
+            points, cells = slice(start * self.sub, first * self.sub), slice(start * fine, first * fine)
+            lead = self._cut(slice(start, first), points, cells)
+        points, cells = slice(first * self.sub, end * self.sub + 1), slice(first * fine, end * fine + 1)
+        own = self._cut(slice(first, last), points, cells)
+        return replace(own, run_id=f"{self.run_id}, {name}", lead=lead)
 
-    def _cut(self, first: int, last: int, points: slice, fine: slice) -> Lead:
-        return Lead(
-            y=np.ascontiguousarray(self.y[first:last]),
+    def _cut(self, samples: slice, points: slice, fine: slice) -> Signals:
+        return replace(
+            self,
+            y=np.ascontiguousarray(self.y[samples]),
             elevator_rad=self.elevator_rad[fine],
             airspeed_m_s=self.airspeed_m_s[points],
             ground_m_s=self.ground_m_s[points],
             density_kg_m3=self.density_kg_m3[points],
             theta_rad=self.theta_rad[points],
-            corner_rad2=self.corner_rad2[first:last],
+            corner_rad2=self.corner_rad2[samples],
+            lead=None,
         )
 
 

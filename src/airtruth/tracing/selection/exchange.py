@@ -8,8 +8,9 @@ gyro for what remains. An exchange of one member for its rival, and the removal 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -46,25 +47,28 @@ def better_set(
     least : gain in 2 log L below which a member of the new set is removed.
     """
     best: PosteriorFit | None = None
-    for index, effect in enumerate(last.hypothesis.effects):
-        rival = _rival(rounds, last, effect)
-        if rival is None:
-            continue
-        if not may_begin(
-            advance, f"{rival.score.effect.key} in place of {effect.key} beside the other effects"
-        ):
+    for phrase, refit in _tries(problem, rounds, last, effects):
+        if not may_begin(advance, phrase):
             return None
-        tried = _exchanged(problem, last, index, rival)
-        if tried is not None and _cost(tried) < _cost(best or last) - (0.0 if best else BETTER):
-            best = tried
-    for swapped, sizes in other_kinds(effects, last):
-        if not may_begin(advance, f"{' and '.join(e.key for e in swapped)} beside the other effects"):
-            return None
-        hypothesis = replace(last.hypothesis, effects=swapped)
-        tried = fit(problem, hypothesis, replace(last.point, sizes=sizes))
+        tried = refit()
         if tried is not None and _cost(tried) < _cost(best or last) - (0.0 if best else BETTER):
             best = tried
     return None if best is None else _needed(problem, best, least)
+
+
+def _tries(
+    problem: TraceProblem, rounds: Sequence[SearchRound], last: PosteriorFit, effects: Sequence[Effect]
+) -> Iterator[tuple[str, Callable[[], PosteriorFit | None]]]:
+    """Each exchange as a phrase for the progress line, and the function that refits it."""
+    for index, effect in enumerate(last.hypothesis.effects):
+        rival = _rival(rounds, last, effect)
+        if rival is not None:
+            phrase = f"{rival.score.effect.key} in place of {effect.key} beside the other effects"
+            yield phrase, partial(_exchanged, problem, last, index, rival)
+    for swapped, sizes in other_kinds(effects, last):
+        phrase = f"{' and '.join(e.key for e in swapped)} beside the other effects"
+        hypothesis, start = replace(last.hypothesis, effects=swapped), replace(last.point, sizes=sizes)
+        yield phrase, partial(fit, problem, hypothesis, start)
 
 
 def other_kinds(
@@ -77,25 +81,25 @@ def other_kinds(
     """
     twins: dict[str, list[Effect]] = {}
     for effect in effects:
-        place = _late_place(effect)
-        if place:
-            twins.setdefault(place, []).append(effect)
+        signal = _late_signal(effect)
+        if signal:
+            twins.setdefault(signal, []).append(effect)
     own = last.hypothesis.effects
     late_s: dict[str, float] = {}
     for effect in own:
-        place = _late_place(effect)
-        if place:
-            late_s[place] = late_s.get(place, 0.0) + float(_sizes(last, effect.key).sum())
+        signal = _late_signal(effect)
+        if signal:
+            late_s[signal] = late_s.get(signal, 0.0) + float(_sizes(last, effect.key).sum())
     if len(late_s) < 2:
         return
-    rest = tuple(e for e in own if not _late_place(e))
+    rest = tuple(e for e in own if not _late_signal(e))
     begin = [_sizes(last, e.key) for e in rest]
-    for late in itertools.product(*(twins[place] for place in late_s)):
+    for late in itertools.product(*(twins[signal] for signal in late_s)):
         if {e.key for e in (*late, *rest)} != {e.key for e in own}:
             yield (*late, *rest), np.concatenate([np.array(list(late_s.values())), *begin])
 
 
-def _late_place(effect: Effect) -> str:
+def _late_signal(effect: Effect) -> str:
     """Channel whose reading an effect delays, or "surface"; empty for any other effect.
 
     The size of such an effect is a time [s].

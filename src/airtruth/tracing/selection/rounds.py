@@ -105,7 +105,8 @@ class Rival:
 
     Attributes
     ----------
-    effects : names of its effects; excess : its cost at its end less that of the branch that remains.
+    effects : names of its effects.
+    excess : its cost at its end less that of the branch that remains; negative where it costs less with more effects.
     """
 
     effects: tuple[str, ...]

@@ -105,8 +105,10 @@ class _Search:
         missing = tuple(e for e in first.effects if e.key in self.known and e.key not in taken)
         if missing and rounds[-1].anomaly.p_value < _FAILED:
             rounds = self._led(first, missing, rounds)
+        if len(rounds[-1].null.hypothesis.effects) + len(rounds[-1].sets[:1]) < 2:
+            return rounds
         last = self._declared(rounds[-1].null)
-        if last is None or len(last.hypothesis.effects) + len(rounds[-1].sets[:1]) < 2:
+        if last is None:
             return rounds
         least = significant_gain(first.tested, later=True)
         better = better_set(self.problem, rounds, last, first.effects, least, self.advance)
@@ -161,14 +163,13 @@ class _Search:
             ends.append(self.rounds((*starts, following), (*before, replace(own, tied=(), profile=None))))
         if len(ends) == 1:
             return ends[0]
-        costs = [total_cost(rounds[-1]) for rounds in ends]
-        if all(rounds[-1].sets for rounds in ends):  # an effect beside the others has to be significant
-            costs = [
-                c + BETTER * len(r[-1].null.hypothesis.effects) for c, r in zip(costs, ends, strict=True)
-            ]
-        best = int(np.argmin(costs))
+        costs = np.array([total_cost(rounds[-1]) for rounds in ends])
+        counts = np.array([len(rounds[-1].null.hypothesis.effects) for rounds in ends])
+        both_released = all(rounds[-1].sets for rounds in ends)
+        # An effect beside released derivatives has to be significant.
+        best = int(np.argmin(costs + BETTER * counts if both_released else costs))
         won, lost = ends[best], ends[1 - best]
-        rival = Rival(_effects_of(lost[-1]), costs[1 - best] - costs[best])
+        rival = Rival(_effects_of(lost[-1]), float(costs[1 - best] - costs[best]))
         at = len(before)
         return (*won[:at], replace(won[at], rival=rival), *won[at + 1 :])
 
