@@ -1,4 +1,4 @@
-"""Time and memory of the bookkeeping of a large campaign: fly, resume, verify, identify's reduction, tables, report.
+"""Time and memory of the bookkeeping of a large campaign: each command but the flights and the estimators.
 
     python -m benchmarks.bench_scale [--runs 1000000] [--methods 2] [--keep DIR]
 
@@ -17,6 +17,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Generator, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -30,7 +31,7 @@ SAMPLES: Final = 6
 """Samples of a log's run [-]: 0.1 s at 50 Hz."""
 METHODS: Final = ("ls", "iv-f1", "iv-lowpass", "iv-reference", "iv-actuator", "iv-f2")
 """Methods of the estimates, the first ``--methods`` of them."""
-STEPS: Final = ("plan", "fly", "resume", "verify", "identify", "tables", "report", "grow")
+STEPS: Final = ("plan", "fly", "resume", "verify", "identify", "merge", "tables", "report", "grow")
 """Steps in the order in which they are measured."""
 LIMIT_S: Final = 600.0
 """Aim for the time of a step at a million runs [s]."""
@@ -86,7 +87,7 @@ def _child(step: str, out: Path, arguments: argparse.Namespace) -> str:
         return "failed: " + (ended.stderr.splitlines() or ["?"])[-1]
     seconds, size = map(float, ended.stdout.split()[-2:])
     missed = [name for name, over in (("time", seconds > LIMIT_S), ("memory", size > LIMIT_BYTES)) if over]
-    return f"{seconds:10.1f} {size / 1e9:12.2f}" + (
+    return f"{seconds:10.1f} {size / 1e9:12.3f}" + (
         f"   beyond the aim: {', '.join(missed)}" if missed else ""
     )
 
@@ -132,11 +133,10 @@ def _grow(out: Path, runs: int, methods: tuple[str, ...]) -> None:
         yield
 
     campaign.fly_chunks = stop  # type: ignore[assignment]
-    try:
+    with suppress(KeyboardInterrupt):
         campaign.fly(plan.make(CAMPAIGN, runs=runs + runs // 10), out)
-    except KeyboardInterrupt:
-        campaign.fly_chunks = _copied  # type: ignore[assignment]
-        campaign.fly(plan.make(CAMPAIGN, runs=runs + runs // 10), out)
+    campaign.fly_chunks = _copied  # type: ignore[assignment]
+    campaign.fly(plan.make(CAMPAIGN, runs=runs + runs // 10), out)
 
 
 def _verify(out: Path, runs: int, methods: tuple[str, ...]) -> None:
@@ -153,6 +153,18 @@ def _identify(out: Path, runs: int, methods: tuple[str, ...]) -> None:
     with identification.identified(out, "gtm", methods, folder=out) as result:
         identification.write_estimates(out / "estimates.parquet", result, merge=False)
         assert result.summary()
+
+
+def _merge(out: Path, runs: int, methods: tuple[str, ...]) -> None:
+    """A further method into the file of the others, and all rows of it as JSON."""
+    from airtruth import identification
+    from airtruth.identification import from_log
+
+    from_log.from_log = _drawn
+    with identification.identified(out, "gtm", [METHODS[-1]], folder=out) as result:
+        identification.write_estimates(out / "estimates.parquet", result)
+        with open(os.devnull, "w") as file:
+            file.writelines(identification.json_of(result.frames()))
 
 
 def _tables(out: Path, runs: int, methods: tuple[str, ...]) -> None:
@@ -235,11 +247,13 @@ _STEPS: Final[dict[str, Callable[[Path, int, tuple[str, ...]], None]]] = {
     "grow": _grow,
     "verify": _verify,
     "identify": _identify,
+    "merge": _merge,
     "tables": _tables,
     "report": _report,
 }
 """Step -> what it does."""
 
 if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the commands do
+    os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
     main()

@@ -199,6 +199,32 @@ def test_other_versions_are_refused(processes, monkeypatch):
         pass
 
 
+def test_other_versions_are_one_sentence(campaign, tmp_path):
+    """Of a package that Dask itself compares and warns of."""
+    facts = tmp_path / "other" / "numpy-9.9.0.dist-info"
+    facts.mkdir(parents=True)
+    (facts / "METADATA").write_text("Metadata-Version: 2.1\nName: numpy\nVersion: 9.9.0\n")
+    own = Processes(tmp_path, 0)
+    path = os.pathsep.join([str(facts.parent), own.environment["PYTHONPATH"]])
+    own.environment = own.environment | {"PYTHONPATH": path}
+    own.workers.append(own._start_worker())
+    try:
+        command = [sys.executable, "-m", "airtruth", "fly", campaign, "--out", tmp_path / "out"]
+        ended = subprocess.run(
+            [*command, "--cluster", own.file], capture_output=True, text=True, check=False, timeout=120
+        )
+    finally:
+        own.close()
+    assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (2, "", 1)
+    assert "has numpy 9.9.0, this machine" in ended.stderr
+
+
+def test_two_clusters_on_one_machine():
+    """Dask warns of a port of its pages that is taken; the tests turn warnings into errors."""
+    with client.connected("local:1"), client.connected("local:1"):
+        pass
+
+
 def test_a_scheduler_without_workers(tmp_path, monkeypatch):
     monkeypatch.setattr(client, "WORKERS_S", 1.0)
     own = Processes(tmp_path, 0)

@@ -4,16 +4,17 @@ import errno
 from dataclasses import replace
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from airtruth.errors import LogError, StoreError
-from airtruth.identification import identified, identify, spool, write_estimates
+from airtruth.identification import Options, identified, identify, json_of, spool, store, write_estimates
 from airtruth.identification.doubts import doubts
 from airtruth.identification.spool import Spool
 from airtruth.identification.tables import overview_of
 from airtruth.logs import tables
 from airtruth.logs.owners import Owners
-from airtruth.logs.store import read_log, write_log
+from airtruth.logs.store import read_log, read_table, write_log
 from airtruth.table import as_text
 from validation.linear_flight import GTM, as_log, fly
 
@@ -46,7 +47,54 @@ def test_the_file_has_the_bytes_of_an_identification_in_memory(folder, whole, ru
         assert result.summary() == whole.summary()
         assert (result.notes, result.sources, result.methods) == (whole.notes, whole.sources, whole.methods)
         assert result.to_frame().equals(whole.to_frame())
+        text = whole.to_frame().to_json(orient="records", indent=1) + "\n"
+        assert "".join(json_of(result.frames())) == "".join(json_of(whole.frames())) == text
     assert (tmp_path / "parts.parquet").read_bytes() == (tmp_path / "memory.parquet").read_bytes()
+
+
+@pytest.mark.parametrize("options", [Options(), Options(tolerance=0.02)], ids=["kept", "replaced"])
+def test_a_merge_in_parts_has_the_bytes_of_a_merge_of_all_rows(folder, whole, options, tmp_path, monkeypatch):
+    """Into a file of two methods: one of them again, and a third; row groups of five rows, parts of one log."""
+    monkeypatch.setattr(tables, "ROWS_PER_GROUP", 5)
+    monkeypatch.setattr(spool, "RUNS_PER_PART", 1)
+    paths = [tmp_path / "parts.parquet", tmp_path / "whole.parquet"]
+    merged = store._merged
+    for path in paths:
+        write_estimates(path, whole)
+        with identified(folder, GTM, ("iv-f1", "iv-lowpass"), options) as result:
+            monkeypatch.setattr(store, "_merged", merged if path is paths[0] else _refused)
+            write_estimates(path, result, force=True)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    rows = read_table(paths[0])
+    assert list(rows["method"]) == (["ls", "iv-f1", "iv-lowpass"] * 7)
+    assert list(dict.fromkeys(rows["run_id"])) == list(LOG.run_ids)
+    for name in ("ls", "iv-f1"):
+        assert (
+            rows[rows["method"] == name]
+            .reset_index(drop=True)
+            .equals(identify(folder, GTM, [name], options if name == "iv-f1" else None).to_frame())
+        )
+
+
+def _refused(*arguments):
+    raise store._OtherRunsError
+    yield
+
+
+def test_a_merge_of_other_runs_or_columns_holds_all_rows(folder, whole, tmp_path, monkeypatch):
+    monkeypatch.setattr(tables, "ROWS_PER_GROUP", 5)
+    path = tmp_path / "estimates.parquet"
+    write_estimates(path, whole)
+    few = sorted(folder.iterdir())[1:3]
+    write_estimates(path, identify(few, GTM, ["iv-lowpass"]))
+    first = read_table(path)
+    assert len(first) == 7 * 2 + 4
+    table = pq.read_table(path)
+    pq.write_table(table.append_column("remark", [["x"] * len(table)]), path)
+    write_estimates(path, identify(folder, GTM, ["iv-lowpass"]))
+    rows = read_table(path)
+    assert len(rows) == 7 * 3
+    assert rows["remark"].isna().sum() == 7
 
 
 def test_doubts_and_means_of_parts_are_those_of_all_runs(whole):

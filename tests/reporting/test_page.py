@@ -9,11 +9,12 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from report_html import parsed, read_page
 from report_records import GTM, METHODS, histories, log, loop_folder, record, trace_folder
-from report_synthetic import TABLE_1, paper_campaign
+from report_synthetic import ESTIMATED, TABLE_1, TRUTH, paper_campaign, truth_columns
 
 from airtruth.aircraft import load
 from airtruth.errors import ConfigurationError, StoreError
@@ -21,7 +22,8 @@ from airtruth.identification import identify, write_estimates
 from airtruth.logs.histories import FILE, KEY, Histories
 from airtruth.logs.store import write_log
 from airtruth.logs.tables import KEY as METADATA
-from airtruth.reporting import report
+from airtruth.reporting import read_campaign, report, stored_campaign
+from airtruth.reporting.pages import campaign_page, estimates_page
 from airtruth.reporting.pages.assets import DIGESTS, own, uplot
 from airtruth.reporting.pages.declared import declared_at, shifts_table
 from airtruth.reporting.pages.page import data_table
@@ -214,6 +216,42 @@ def test_the_declared_aircraft_stands_beside_the_estimates(identified, tmp_path)
     assert float(row["iv-f1 shift [declared std]"]) == pytest.approx((mean + 1.4312) / 0.07, rel=1e-9)
     files = report(identified, tmp_path / "paper.svg", aircraft=aircraft)
     assert [p.name for p in files] == ["paper-intervals.svg", "paper-shifts.svg"]
+
+
+def test_a_campaign_in_parts_has_the_page_of_the_whole(tmp_path, monkeypatch):
+    """Parts of two runs; the first eleven of 13 runs in the table of runs, twelve among the records."""
+    monkeypatch.setattr(stored_campaign, "RUNS_PER_PART", 2)
+    for module in (estimates_page, campaign_page):
+        monkeypatch.setattr(module, "MOST_RUNS", 11)
+    flown = log(runs=13)
+    folder = tmp_path / "flown"
+    (folder / "logs").mkdir(parents=True)
+    write_log(folder / "logs" / "a.parquet", flown, dtype="float64")
+    write_estimates(folder / "estimates.parquet", identify(folder, GTM, METHODS))
+    truth = truth_columns(14, failed=(5,)) | {"run_id": sorted((*flown.run_ids, "r105"))}
+    truth["status"] = ["failed" if run == "r105" else "ok" for run in truth["run_id"]]
+    failed = truth["status"].index("failed")
+    for name in ESTIMATED:
+        truth[name] = [np.nan if i == failed else TRUTH[ESTIMATED.index(name)] for i in range(14)]
+    pq.write_table(pa.table(truth), folder / "truth.parquet")
+    (tmp_path / "aircraft.toml").write_text(LINEAR)
+    aircraft = load(tmp_path / "aircraft.toml")
+    sources = {"parts": folder, "whole": read_campaign(folder)}
+    assert isinstance(stored_campaign.open_campaign(folder), stored_campaign.StoredCampaign)
+    parts, whole = (
+        report(source, tmp_path / f"{name}.html", aircraft=aircraft)[0].read_text()
+        for name, source in sources.items()
+    )
+    assert "The first 11 of 13 runs" in parts
+    assert "12 of 13 records are shown" in parts
+    assert data_of(parts) == data_of(whole)
+    assert without_last_digits(parts) == without_last_digits(whole)
+
+
+def without_last_digits(page):
+    """A page without what depends on the order of a sum: digits beyond the twelfth, and tenths of a pixel beside a tie."""
+    page = re.sub(r' cx="[\d.]+"', "", page)
+    return re.sub(r"-?\d+\.\d{6,}(e-?\d+)?", lambda number: f"{float(number.group()):.12g}", page)
 
 
 def test_a_trace_has_its_own_aircraft(tmp_path):

@@ -32,6 +32,7 @@ def main() -> None:
     """
     escape_what_cannot_be_encoded()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads for small matrices wait for each other
+    os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")  # pyarrow's own pool keeps what it frees
     signals: list[int] = []
     try:
         with _caught(signals):

@@ -99,38 +99,36 @@ def identify(
     if out is None and len(logs) == 1 and (logs[0] / "logs").is_dir():
         out = logs[0] / "estimates.parquet"
     declared = load(aircraft)
-    with (
-        writing("identify", [*log_files(logs), *aircraft_files(declared)], force=force) as outputs,
-        ExitStack() as kept,
-    ):
-        if out is not None:
-            outputs.require(out)
-            settings = identification.settings_of(declared, options, joint)
-            identification.require_mergeable(out, methods, settings, force=force)
-        with (
-            workers(cluster) as on,
-            announced_compilation("identify", quiet),
-            progress_bar("identify", "estimates", quiet) as advance,
-        ):
-            result = kept.enter_context(
-                identification.identified(
-                    logs,
-                    declared,
-                    methods,
-                    options,
-                    joint=joint,
-                    force=force,
-                    advance=advance,
-                    cluster=on,
-                    folder=None if out is None or isinstance(out, RemotePath) else out.parent,
+    with ExitStack() as kept:
+        with writing("identify", [*log_files(logs), *aircraft_files(declared)], force=force) as outputs:
+            if out is not None:
+                outputs.require(out)
+                settings = identification.settings_of(declared, options, joint)
+                identification.require_mergeable(out, methods, settings, force=force)
+            with (
+                workers(cluster) as on,
+                announced_compilation("identify", quiet),
+                progress_bar("identify", "estimates", quiet) as advance,
+            ):
+                result = kept.enter_context(
+                    identification.identified(
+                        logs,
+                        declared,
+                        methods,
+                        options,
+                        joint=joint,
+                        force=force,
+                        advance=advance,
+                        cluster=on,
+                        folder=None if out is None or isinstance(out, RemotePath) else out.parent,
+                    )
                 )
-            )
-        if out is not None:
-            identification.write_estimates(out, result, force=force)
-        shown = result.to_frame().to_json(orient="records", indent=1) if json_ else result.summary()
-    for sentence in (*result.forced, *result.notes) if json_ and not quiet else ():
-        notice(sentence)
-    print_result(shown)
+            if out is not None:
+                identification.write_estimates(out, result, force=force)
+        for sentence in (*result.forced, *result.notes) if json_ and not quiet else ():
+            notice(sentence)
+        for piece in identification.json_of(result.frames()) if json_ else (result.summary() + "\n",):
+            print_result(piece, end="")
 
 
 @app.command(epilog="Example: airtruth tables out/light out/moderate --out out/tables")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import platform
+import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
@@ -179,7 +180,9 @@ def connected(text: str) -> Iterator[Cluster]:
     _configure()
     with _processes(address) as target:
         try:
-            client = distributed.Client(target, timeout=CONNECT_S, set_as_default=False)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of other versions: `check_versions` refuses them
+                client = distributed.Client(target, timeout=CONNECT_S, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
             raise ConfigurationError(
                 f"--cluster {text}: no scheduler answers within {CONNECT_S:.0f} s ({reason(error)}); start one with "
@@ -209,7 +212,7 @@ def workers(text: str | None) -> Iterator[Cluster | None]:
 
 
 def _configure() -> None:
-    """No dashboard and no messages of Dask's own: a lost worker is an ordinary event."""
+    """No dashboard, no log of what was sent, and no messages of Dask's own: a lost worker is an ordinary event."""
     import logging
 
     import dask
@@ -218,6 +221,7 @@ def _configure() -> None:
         {
             "distributed.worker.daemon": False,  # a worker starts processes of its own
             "distributed.scheduler.dashboard.status.task-stream-length": 0,
+            "distributed.admin.low-level-log-length": 0,  # of messages, each with the runs of a chunk
             "distributed.comm.timeouts.connect": CONNECT_S,
         }
     )
@@ -246,7 +250,7 @@ def _processes(address: Address) -> Iterator[Any]:
         n_workers=address.local,
         threads_per_worker=1,
         processes=True,
-        dashboard_address=None,
+        dashboard_address="127.0.0.1:0",  # of any free port: 8787 may belong to another cluster
         memory_limit=0,
         silence_logs=50,
     ) as cluster:

@@ -20,6 +20,7 @@ from airtruth.identification.result import (
     Settings,
     Source,
     SpooledResult,
+    json_of,
     settings_of,
 )
 from airtruth.identification.run import identified, identify, identify_batch, identify_joint
@@ -49,6 +50,7 @@ __all__ = [
     "identify_actuator",
     "identify_batch",
     "identify_joint",
+    "json_of",
     "linear_auxiliary",
     "overview",
     "quantities",

@@ -2,29 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.charts import Chart, Mark, Panel, Rule
+from airtruth.numerics.order_statistics import quantiles
 from airtruth.physics.short_period import MODAL, PARAMETERS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     import pandas as pd
+
+Array = NDArray[np.float64]
 
 LABELS: Final = {"wn_rad_s": "wn [rad/s]", "zeta": "zeta [-]"}
 """Labels of the modal parameters; a derivative's is its name and [1/rad]."""
-_MIDDLE: Final = (2.5, 97.5)
-"""Percentiles between which 95 % of the runs lie [%]."""
+_MIDDLE: Final = (0.025, 0.975)
+"""Quantiles between which 95 % of the runs lie [-]."""
+_NAMES: Final = (*PARAMETERS, *MODAL)
+"""Parameters of the panels."""
 _COLUMNS: Final = 4
 """Panels side by side [-] (judgement)."""
 
+Frames = Callable[[], Iterable["pd.DataFrame"]]
+"""Returns rows of contract 2 in the same parts at each call, each run in one of them."""
+
 
 def intervals_chart(
-    estimates: pd.DataFrame,
+    estimates: pd.DataFrame | Frames,
     references: Mapping[str, Mapping[str, float]] | None = None,
     confidence: float = 0.95,
 ) -> Chart:
@@ -35,55 +42,76 @@ def intervals_chart(
 
     Parameters
     ----------
-    estimates : rows of contract 2, see `airtruth.identification.result.IdentificationResult.to_frame`.
+    estimates : rows of contract 2, see `airtruth.identification.result.IdentificationResult.to_frame`; or these in parts.
     references : label -> parameter -> value of a rule beside the estimates, such as the truth of a campaign.
     confidence : probability of the intervals [-].
     """
-    methods = list(dict.fromkeys(map(str, estimates["method"])))
-    runs = estimates["run_id"].nunique()
-    by_method = {m: estimates[(estimates["method"] == m) & estimates["converged"]] for m in methods}
-    panels = []
-    for name in (*PARAMETERS, *MODAL):
-        marks = [
-            mark for row, m in enumerate(methods) for mark in _mark(row, by_method[m], name, single=runs == 1)
-        ]
-        rules = tuple(
-            Rule(values[name], label=label, colour="ink")
-            for label, values in (references or {}).items()
-            if name in values
+    frames = estimates if callable(estimates) else lambda: [estimates]
+    runs, first, methods = 0, "", dict[str, None]()
+    for frame in frames():
+        runs += frame["run_id"].nunique()
+        first = first or str(frame["run_id"].iloc[0] if len(frame) else "")
+        methods |= dict.fromkeys(map(str, frame["method"].unique()))
+    marks = _marks(frames, list(methods), single=runs == 1)
+    panels = tuple(
+        Panel(
+            x_label=LABELS.get(name, f"{name} [1/rad]"),
+            rows=tuple(methods),
+            marks=tuple(row[name] for row in marks if name in row),
+            rules=tuple(
+                Rule(values[name], label=label, colour="ink")
+                for label, values in (references or {}).items()
+                if name in values
+            ),
         )
-        panels.append(
-            Panel(
-                x_label=LABELS.get(name, f"{name} [1/rad]"),
-                rows=tuple(methods),
-                marks=tuple(marks),
-                rules=rules,
-            )
-        )
+        for name in _NAMES
+    )
     percent = f"{100.0 * confidence:g} % interval"
     words = (
         f"estimate and {percent}" if runs == 1 else f"mean; mean {percent} (thick); 95 % of the runs (thin)"
     )
-    title = f"Run {estimates['run_id'].iloc[0]}" if runs == 1 else f"{runs} runs"
-    return Chart("intervals", f"{title}: {words}", tuple(panels), _COLUMNS)
+    return Chart("intervals", f"{f'Run {first}' if runs == 1 else f'{runs} runs'}: {words}", panels, _COLUMNS)
 
 
-def _mark(row: int, rows: pd.DataFrame, name: str, *, single: bool) -> list[Mark]:
-    value = _finite(rows[name])
-    if not value.size:
-        return []
-    with np.errstate(over="ignore", invalid="ignore"):
-        centre = float(value.mean())
-        half = _finite(0.5 * (rows[f"{name}_upper"] - rows[f"{name}_lower"]))
-        width = float(half.mean()) if half.size else float("nan")
-        low, high = np.percentile(value, _MIDDLE)
-    widest = None if single else (float(low), float(high))
-    return [Mark(row, centre, centre - width, centre + width, widest)]
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")
+def _marks(frames: Frames, methods: Sequence[str], *, single: bool) -> list[dict[str, Mark]]:
+    """Marks in the row of each method, of the parameters that have a finite estimate of a converged run."""
+    # by columns: numpy adds those of a single part as it adds those of all runs
+    total, count = (np.zeros((2, len(methods), len(_NAMES))) for _ in range(2))
+    for frame in frames():
+        for i, method in enumerate(methods):
+            half = 0.5 * (_values(frame, method, "_upper") - _values(frame, method, "_lower"))
+            for kind, columns in enumerate((_values(frame, method), half)):
+                for k, column in enumerate(columns.T):
+                    finite = column[np.isfinite(column)]
+                    total[kind, i, k] += finite.sum()
+                    count[kind, i, k] += finite.size
+    ends = quantiles(lambda: (_side_by_side(frame, methods) for frame in frames()), _MIDDLE)
+    low, high = ends.reshape(2, len(methods), len(_NAMES)).tolist()
+    centre, width = (total / count).tolist()
+    return [
+        {
+            name: Mark(i, c, c - w, c + w, None if single else (low[i][k], high[i][k]))
+            for k, (name, c, w) in enumerate(zip(_NAMES, centre[i], width[i], strict=True))
+            if count[0, i, k]
+        }
+        for i in range(len(methods))
+    ]
 
 
-def _finite(values: pd.Series[float]) -> NDArray[np.float64]:
-    array = values.to_numpy(dtype=np.float64)
-    return np.asarray(array[np.isfinite(array)], dtype=np.float64)
+def _side_by_side(frame: pd.DataFrame, methods: Sequence[str]) -> Array:
+    """(runs, methods x parameters) estimates of the converged runs, filled up with NaN."""
+    columns = [_values(frame, method) for method in methods]
+    block = np.full((max(map(len, columns)), len(methods) * len(_NAMES)), np.nan)
+    for i, own in enumerate(columns):
+        block[: len(own), i * len(_NAMES) : (i + 1) * len(_NAMES)] = own
+    return block
 
 
-__all__ = ["LABELS", "intervals_chart"]
+def _values(frame: pd.DataFrame, method: str, end: str = "") -> Array:
+    """(runs, parameters) estimates of the converged runs of a method, or bounds of their intervals."""
+    own = frame[(frame["method"] == method) & frame["converged"]]
+    return np.asarray(own[[name + end for name in _NAMES]], dtype=np.float64)
+
+
+__all__ = ["LABELS", "Frames", "intervals_chart"]

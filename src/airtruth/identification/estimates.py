@@ -222,7 +222,7 @@ def estimates_table(estimates: Estimates) -> pd.DataFrame:
         "method": [estimates.method] * len(estimates.run_ids),
         "converged": estimates.converged,
         "iterations": estimates.iterations,
-        "status": [SENTENCES[Status(int(s))] for s in estimates.status],
+        "status": np.array(list(SENTENCES.values()), dtype=object)[estimates.status].tolist(),
     }
     for i, name in enumerate(q.names):
         columns[name] = q.value[:, i]

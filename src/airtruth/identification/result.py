@@ -252,6 +252,15 @@ def frames_of(parts: Parts) -> Iterator[pd.DataFrame]:
             yield _frame([e.rows(first, first + RUNS_PER_FRAME) for e in estimates])
 
 
+def json_of(frames: Iterable[pd.DataFrame]) -> Iterator[str]:
+    """One JSON array of the rows of at least one frame, in pieces: the text of ``to_json`` of the joined frames."""
+    before = "[\n"
+    for frame in frames:
+        yield before + frame.to_json(orient="records", indent=1).removeprefix("[\n").removesuffix("\n]")
+        before = ",\n"
+    yield "\n]\n"
+
+
 def table_of(parts: Parts, forced: Iterable[str], notes: Iterable[str]) -> Table:
     """The estimates of each method with their intervals, or mean and spread over runs; then faults and notes."""
     overridden = (f"Overridden by --force: {sentence}" for sentence in forced)

@@ -95,8 +95,17 @@ def _integral(a: Array, dt_s: float) -> Array:
     return np.asarray(expm(dt_s * np.block([[a, np.eye(2)], [np.zeros((2, 4))]]))[:2, 2:])
 
 
+def spaced(runs: int, most: int = MOST_RECORDS) -> list[int]:
+    """Numbers of evenly spaced runs, the first and the last among them."""
+    return [round(k) for k in np.linspace(0, runs - 1, min(most, runs))]
+
+
 def simulated_records(
-    logs: Logs, estimates: pd.DataFrame, constants: AircraftConstants, most: int = MOST_RECORDS
+    logs: Logs,
+    estimates: pd.DataFrame,
+    constants: AircraftConstants,
+    most: int = MOST_RECORDS,
+    of_runs: int | None = None,
 ) -> Histories:
     """Records beside the simulations by each method that has an estimate of them.
 
@@ -106,6 +115,7 @@ def simulated_records(
     estimates : rows of contract 2, see `airtruth.identification.result.IdentificationResult.to_frame`.
     constants : the aircraft; mass, inertia and lengths that a log states for a run replace its own.
     most : largest number of records; of more, that many evenly spaced ones are chosen.
+    of_runs : number of runs of which ``estimates`` has those to show; None if it has all.
 
     Raises
     ------
@@ -117,7 +127,7 @@ def simulated_records(
     joint = runs == [JOINT]
     if joint:
         runs = [run for _, log in named_logs(logs) for run in log.run_ids]
-    chosen = [runs[round(k)] for k in np.linspace(0, len(runs) - 1, min(most, len(runs)))]
+    chosen = [runs[k] for k in spaced(len(runs), most)]
     own_rows = estimates[estimates["run_id"].isin([JOINT] if joint else chosen)]
     rows = {
         (str(run), str(method)): part.iloc[0]
@@ -128,7 +138,7 @@ def simulated_records(
         for run in log.run_ids:
             own = {method: rows.get((JOINT if joint else run, method)) for method in methods}
             found[run] = _record(log, run, own, of_run(constants, log.metadata, run))
-    return Histories(tuple(found[run] for run in chosen), methods, chosen[0], len(runs))
+    return Histories(tuple(found[run] for run in chosen), methods, chosen[0], of_runs or len(runs))
 
 
 def _record(
@@ -169,4 +179,4 @@ def _record(
     )
 
 
-__all__ = ["MOST_RECORDS", "OUTPUTS", "simulate", "simulated_records"]
+__all__ = ["MOST_RECORDS", "OUTPUTS", "simulate", "simulated_records", "spaced"]

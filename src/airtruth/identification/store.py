@@ -6,7 +6,7 @@ aircraft, constants, sources (name, SHA-256 and runs of each log), notes and for
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,9 +16,8 @@ import pyarrow as pa
 
 from airtruth.errors import LogError, StoreError
 from airtruth.identification.result import IdentificationResult, Settings, SpooledResult
-from airtruth.identification.stored import KEY, KEYS, read_stored
+from airtruth.identification.stored import KEY, KEYS, Stored, open_stored
 from airtruth.logs.remote import location
-from airtruth.logs.store import write_table
 from airtruth.logs.tables import write_parts
 
 FILE: Final = "estimates.parquet"
@@ -78,53 +77,103 @@ def write_estimates(
         "notes": list(result.notes),
         "forced": list(result.forced),
     }
-    kept, known = _kept(path, result.methods, settings, force) if merge else _nothing()
+    old = _kept(path, result.methods, settings, force) if merge else _NOTHING
+    known = old.records
     records = {**known, **{m: _joined(known[m], record) if m in known else record for m in result.methods}}
     metadata = {"schema": 1, KEY: records}
-    if not len(kept):
-        write_parts(path, (pa.Table.from_pandas(f, preserve_index=False) for f in result.frames()), metadata)
-        return
-    rows = result.to_frame()
-    replaced = kept.set_index(list(KEYS)).index.isin(rows.set_index(list(KEYS)).index)
-    write_table(path, _ordered(kept, kept[~replaced], rows), metadata)
-
-
-def _kept(
-    path: Path, methods: Sequence[str], settings: Mapping[str, Any], force: bool
-) -> tuple[pd.DataFrame, dict[str, Any]]:
-    """Rows of the file that remain, without those that ``force`` replaces, and the records of their methods."""
-    nothing = _nothing()
-    if not path.exists():
-        return nothing
+    methods = tuple(dict.fromkeys((*old.methods, *result.methods)))
     try:
-        old, records = read_stored(path)
+        write_parts(
+            path, map(_table, _merged(old, result, methods) if old.methods else result.frames()), metadata
+        )
+    except _OtherRunsError:
+        kept = pd.concat(list(old.frames()), ignore_index=True)
+        write_parts(
+            path,
+            [_table(_together(kept[kept["method"].isin(old.methods)], result.to_frame(), methods))],
+            metadata,
+        )
+
+
+def _table(frame: pd.DataFrame) -> pa.Table:
+    return pa.Table.from_pandas(frame, preserve_index=False)
+
+
+class _OtherRunsError(Exception):
+    """File and result do not have the same runs in the same order, or have other columns."""
+
+
+def _merged(
+    old: Stored, result: IdentificationResult | SpooledResult, methods: Sequence[str]
+) -> Iterator[pd.DataFrame]:
+    """Rows of a file and of a result that have the same runs, in parts."""
+    parts = iter(old.frames())
+    waiting = next(parts)
+    for rows in result.frames():
+        last = rows["run_id"].iloc[-1]
+        while waiting.empty or waiting["run_id"].iloc[-1] <= last:
+            following = next(parts, None)
+            if following is None:
+                break
+            waiting = pd.concat([waiting, following], ignore_index=True)
+        reached = waiting["run_id"] <= last
+        own, waiting = waiting[reached], waiting[~reached]
+        if list(own["run_id"].unique()) != list(rows["run_id"].unique()) or not own.dtypes.equals(
+            rows.dtypes
+        ):
+            raise _OtherRunsError
+        yield _together(own[own["method"].isin(old.methods)], rows, methods)
+    if len(waiting) or next(parts, None) is not None:
+        raise _OtherRunsError
+
+
+def _together(old: pd.DataFrame, rows: pd.DataFrame, methods: Sequence[str]) -> pd.DataFrame:
+    """Rows of a file, those that others replace left out, with the others: runs in the order of their first appearance."""
+    keys = list(KEYS)
+    kept = old[~old.set_index(keys).index.isin(rows.set_index(keys).index)]
+    whole = pd.concat([part for part in (kept, rows) if len(part)], ignore_index=True)
+    runs = {name: i for i, name in enumerate(dict.fromkeys([*old["run_id"], *rows["run_id"]]))}
+    rank = {name: i for i, name in enumerate(methods)}
+    order = np.lexsort((whole["method"].map(rank).to_numpy(), whole["run_id"].map(runs).to_numpy()))
+    return whole.iloc[order].reset_index(drop=True)
+
+
+_NOTHING: Final = Stored((), {}, lambda: ())
+"""A file without estimates."""
+
+
+def _kept(path: Path, methods: Sequence[str], settings: Mapping[str, Any], force: bool) -> Stored:
+    """The file without the methods that ``force`` replaces, whose rows the caller leaves out."""
+    if not path.exists():
+        return _NOTHING
+    try:
+        old = open_stored(path)
     except (StoreError, LogError):
         if force:
-            return nothing
+            return _NOTHING
         raise
-    known: dict[str, Any] = {**records}
-    other = _other_aircraft(known, settings)
+    other = _other_aircraft(old.records, settings)
     if other and not force:
         raise StoreError(
             f"{path}: holds estimates of another aircraft ({other}); choose another --out, or replace the whole "
             "file with --force"
         )
     if other:
-        return nothing
+        return _NOTHING
+    replaced = set()
     for name in methods:
-        difference = _difference(known.get(name), settings) if (old["method"] == name).any() else ""
+        difference = _difference(old.records.get(name), settings) if name in old.methods else ""
         if difference and not force:
             raise StoreError(
                 f"{path}: holds estimates of {name} {difference}; choose another --out, or replace them with --force"
             )
         if difference:
-            old = old[old["method"] != name]
-            known.pop(name, None)
-    return old, known
-
-
-def _nothing() -> tuple[pd.DataFrame, dict[str, Any]]:
-    return pd.DataFrame({name: pd.Series(dtype=object) for name in KEYS}), {}
+            replaced.add(name)
+    return Stored(
+        tuple(name for name in old.methods if name not in replaced),
+        {name: record for name, record in old.records.items() if name not in replaced},
+        old.frames,
+    )
 
 
 def _other_aircraft(known: Mapping[str, Any], settings: Mapping[str, Any]) -> str:
@@ -157,17 +206,6 @@ def _joined(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
     sources = [source for source in old["sources"] if source[0] not in names]
     both = {key: list(dict.fromkeys([*old[key], *new[key]])) for key in ("notes", "forced")}
     return {**new, "sources": [*sources, *new["sources"]], **both}
-
-
-def _ordered(old: pd.DataFrame, kept: pd.DataFrame, rows: pd.DataFrame) -> pd.DataFrame:
-    """Runs in the order of their first appearance, and each with its methods in that order."""
-    whole = pd.concat([part for part in (kept, rows) if len(part)], ignore_index=True)
-    rank = {
-        column: {name: i for i, name in enumerate(dict.fromkeys([*old[column], *rows[column]]))}
-        for column in KEYS
-    }
-    keys = whole["run_id"].map(rank["run_id"]), whole["method"].map(rank["method"])
-    return whole.iloc[np.lexsort((keys[1].to_numpy(), keys[0].to_numpy()))].reset_index(drop=True)
 
 
 __all__ = ["FILE", "require_mergeable", "write_estimates"]

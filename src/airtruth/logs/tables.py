@@ -14,8 +14,10 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Final, Literal
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from airtruth.errors import LogError, StoreError, choices, reason
 from airtruth.logs.atomic import atomic_file
@@ -77,8 +79,54 @@ def read_table(path: Path | str, columns: Sequence[str] | None = None) -> pd.Dat
     return frame if columns is None else frame[list(columns)]
 
 
-ROWS_PER_GROUP: Final = 65_536
-"""Rows of a row group of `write_parts` [-] (judgement: some 20 MB in memory, and few enough groups that a query skips them)."""
+def group_ends(path: Path | str) -> NDArray[np.int64]:
+    """Number of rows up to the end of each row group of a plain table, (groups,).
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be read.
+    """
+    with opened(location(path)) as file:
+        sizes = [file.metadata.row_group(k).num_rows for k in range(file.metadata.num_row_groups)]
+    return np.cumsum(sizes, dtype=np.int64)
+
+
+def read_group(path: Path | str, group: int) -> pd.DataFrame:
+    """Read one row group of a plain table.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be read, or the group is damaged.
+    """
+    path = location(path)
+    with opened(path) as file:
+        return _to_pandas(path, file.read_row_group(group, use_threads=False))
+
+
+def read_rows(path: Path | str, rows: NDArray[np.int64]) -> pd.DataFrame:
+    """Read rows of a plain table by their numbers, which ascend; the memory holds one row group.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be read, or is damaged there.
+    """
+    import pandas as pd
+
+    ends = group_ends(path)
+    group_of = np.searchsorted(ends, rows, side="right")
+    parts: list[pd.DataFrame] = [
+        read_group(path, k).iloc[rows[group_of == k] - (ends[k - 1] if k else 0)]
+        for k in np.unique(group_of).tolist()
+    ]
+    whole: pd.DataFrame = pd.concat(parts, ignore_index=True)
+    return whole
+
+
+ROWS_PER_GROUP: Final = 8_192
+"""Rows of a row group [-] (judgement: some 3 MB in memory, and few enough groups that a query skips them)."""
 
 
 def write_parts(
@@ -309,7 +357,13 @@ def _write(table: pa.Table | pd.DataFrame, file: BinaryIO, metadata: Mapping[str
     if not isinstance(table, pa.Table):
         table = pa.Table.from_pandas(table, preserve_index=False)
     kept = _metadata(table, metadata)
-    pq.write_table(table.replace_schema_metadata(kept), file, compression="zstd", write_page_checksum=True)
+    pq.write_table(
+        table.replace_schema_metadata(kept),
+        file,
+        row_group_size=ROWS_PER_GROUP,
+        compression="zstd",
+        write_page_checksum=True,
+    )
 
 
 def _to_pandas(path: Path, table: pa.Table) -> pd.DataFrame:
@@ -328,9 +382,12 @@ def _to_pandas(path: Path, table: pa.Table) -> pd.DataFrame:
 __all__ = [
     "KEY",
     "ROWS_PER_GROUP",
+    "group_ends",
     "metadata_of",
     "opened",
+    "read_group",
     "read_metadata",
+    "read_rows",
     "read_table",
     "readable",
     "require_memory",

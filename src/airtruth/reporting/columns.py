@@ -66,7 +66,6 @@ def column_parts(
         wanted = _wanted(path, file.schema_arrow.names, kinds, writer, optional)
         for batch in file.iter_batches(batch_size=rows, columns=wanted, use_threads=False):
             yield _cast_table(pa.Table.from_batches([batch]), kinds, path, writer)
-            pa.default_memory_pool().release_unused()
 
 
 @contextmanager

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from airtruth.errors import ConfigurationError, StoreError
 from airtruth.logs.remote import location
 from airtruth.logs.sources import Logs
-from airtruth.reporting.campaign import ESTIMATES, TRUTH, Campaign, read_campaign
+from airtruth.reporting.campaign import ESTIMATES, TRUTH, Campaign, Parted
+from airtruth.reporting.stored_campaign import open_campaign
 from airtruth.result import Result
 
 if TYPE_CHECKING:
@@ -106,7 +107,7 @@ def _of_path(path: Path, logs: Logs | None, aircraft: Aircraft | None) -> Report
         _refuse(logs, aircraft)
         return trace_report(*read_trace(path))
     if (path / TRUTH).is_file():
-        return _of_campaign(read_campaign(path), logs, aircraft)
+        return _of_campaign(open_campaign(path), logs, aircraft)
     estimates = path if path.is_file() else path / ESTIMATES
     if estimates.is_file():
         from airtruth.reporting.campaign import read_estimates
@@ -124,7 +125,7 @@ def _of_path(path: Path, logs: Logs | None, aircraft: Aircraft | None) -> Report
     )
 
 
-def _of_campaign(campaign: Campaign, logs: Logs | None, aircraft: Aircraft | None) -> Report:
+def _of_campaign(campaign: Parted, logs: Logs | None, aircraft: Aircraft | None) -> Report:
     from airtruth.reporting.pages.campaign_page import campaign_report
 
     return campaign_report(campaign, logs, aircraft)

@@ -31,7 +31,7 @@ from airtruth.reporting.paper.published import ESTIMATED
 
 Array = NDArray[np.float64]
 
-RUNS_PER_PART: Final = 2048
+RUNS_PER_PART: Final = 1024
 """Runs of a part [-] (judgement: 0.5 MB for each method)."""
 
 

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import AirtruthError
-from airtruth.identification.charts import intervals_chart
+from airtruth.identification.charts import Frames, intervals_chart
 from airtruth.logs.sources import Logs
-from airtruth.reporting.campaign import ESTIMATES, Campaign
-from airtruth.reporting.pages.estimates_page import runs_tables, shifts_of
+from airtruth.reporting.campaign import ESTIMATES, Campaign, Parted
+from airtruth.reporting.pages.estimates_page import MOST_RUNS, runs_tables, shifts_of
 from airtruth.reporting.pages.identified import SIMULATED, Identified, read_identified
 from airtruth.reporting.pages.origin import of_methods, origin_section
 from airtruth.reporting.pages.page import Report, Section, answer_html, data_table, page_of
@@ -23,13 +23,14 @@ from airtruth.reporting.paper.layout import lay_out
 from airtruth.reporting.paper.published import ESTIMATED, SYMBOLS
 from airtruth.reporting.paper.tables import PaperTable
 from airtruth.reporting.statistics import MethodStatistics
+from airtruth.reporting.stored_campaign import StoredCampaign
 from airtruth.table import as_csv, as_latex, flat, significant
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-def campaign_report(campaign: Campaign, logs: Logs | None = None, aircraft: Aircraft | None = None) -> Report:
+def campaign_report(campaign: Parted, logs: Logs | None = None, aircraft: Aircraft | None = None) -> Report:
     """Return the report of a campaign, each method in the first of the paper's tables that has it.
 
     Parameters
@@ -41,10 +42,15 @@ def campaign_report(campaign: Campaign, logs: Logs | None = None, aircraft: Airc
     laid_out = [lay_out(table) for table in shown]
     rows = [row for table in shown for row in tables.long_form(table).rows]
     latex = [as_latex(one, table.name, SYMBOLS) for one, table in zip(laid_out, shown, strict=True)]
-    frame = _frame(campaign)
-    chart = intervals_chart(frame, {"truth": _truth(campaign)})
-    identified = _identified(campaign, frame, logs, aircraft)
-    shifts, shift_section = shifts_of(identified)
+    flown, truth = _flown(campaign)
+
+    def frames() -> Iterator[pd.DataFrame]:
+        return map(_frame, campaign.parts())
+
+    first = _first(frames(), MOST_RUNS)
+    chart = intervals_chart(frames, {"truth": truth})
+    identified = _identified(campaign, first, flown, logs, aircraft)
+    shifts, shift_section = shifts_of(identified.declared, _means(frames) if identified.declared else first)
     histories = identified.histories
     statistics = {m: s for table in shown for m, s in table.statistics.items()}
     facts = [f"Gust: {campaign.gust}."] if campaign.gust else []
@@ -56,13 +62,16 @@ def campaign_report(campaign: Campaign, logs: Logs | None = None, aircraft: Airc
         ),
         records_section(histories, identified.reason, SIMULATED),
         shift_section,
-        Section("Estimates of each run", "runs", runs_tables(frame)),
+        Section("Estimates of each run", "runs", runs_tables(first, flown)),
         Section("Error per record", "errors", records_tables(histories) if histories else ""),
         origin_section(histories, of_methods(identified.records), facts),
     ]
     return Report(
         page=page_of(
-            campaign.title or campaign.name, answer_html(*_answer(statistics, campaign)), chart, sections
+            campaign.title or campaign.name,
+            answer_html(*_answer(statistics, flown, campaign.runs)),
+            chart,
+            sections,
         ),
         csv=as_csv(flat(campaign.title, tables.LONG_COLUMNS, rows)),
         latex="\n".join(latex),
@@ -70,10 +79,10 @@ def campaign_report(campaign: Campaign, logs: Logs | None = None, aircraft: Airc
     )
 
 
-def _answer(statistics: Mapping[str, MethodStatistics], campaign: Campaign) -> list[str]:
+def _answer(statistics: Mapping[str, MethodStatistics], flown: int, planned: int) -> list[str]:
     """The method nearest to the truth, and the number of runs."""
     relerr = {m: s.relerr.value for m, s in statistics.items() if math.isfinite(s.relerr.value)}
-    runs = f"{int(campaign.flown.sum())} of {len(campaign.run_ids)} runs flew."
+    runs = f"{flown} of {planned} runs flew."
     if not relerr:
         return ["No method has a converged estimate.", runs]
     best = min(relerr, key=lambda m: relerr[m])
@@ -90,14 +99,18 @@ def _percent(value: float) -> str:
     return f"{significant(100.0 * value, 2)} %"
 
 
-def _truth(campaign: Campaign) -> dict[str, float]:
-    truth = campaign.truth[campaign.flown]
+def _flown(campaign: Parted) -> tuple[int, dict[str, float]]:
+    """Number of the runs that flew, and their mean truth."""
+    count, total = 0, np.zeros(len(ESTIMATED))
     with np.errstate(over="ignore"):
-        return dict(zip(ESTIMATED, truth.mean(axis=0).tolist(), strict=True))
+        for part in campaign.parts():
+            count += int(part.flown.sum())
+            total += part.truth[part.flown].sum(axis=0)
+        return count, dict(zip(ESTIMATED, (total / count).tolist(), strict=True))
 
 
 def _frame(campaign: Campaign) -> pd.DataFrame:
-    """The estimates as rows of contract 2."""
+    """The estimates of a part as rows of contract 2, one method after another."""
     import pandas as pd
 
     parts = []
@@ -111,27 +124,63 @@ def _frame(campaign: Campaign) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
+def _first(frames: Iterable[pd.DataFrame], most: int) -> pd.DataFrame:
+    """Rows of the first runs, one method after another."""
+    import pandas as pd
+
+    kept: list[pd.DataFrame] = []
+    runs: list[str] = []
+    for frame in frames:
+        new = list(dict.fromkeys(frame["run_id"]))[: most - len(runs)]
+        kept.append(frame[frame["run_id"].isin(new)])
+        runs += new
+        if len(runs) == most:
+            break
+    whole = pd.concat(kept, ignore_index=True)
+    rank = {name: i for i, name in enumerate(dict.fromkeys(whole["method"]))}
+    return whole.sort_values("method", kind="stable", key=lambda names: names.map(rank), ignore_index=True)
+
+
+def _means(frames: Frames) -> pd.DataFrame:
+    """One row for each method: the means over its converged runs."""
+    import pandas as pd
+
+    total: dict[str, pd.Series[float]] = {}
+    count: dict[str, pd.Series[int]] = {}
+    with np.errstate(over="ignore", invalid="ignore"):
+        for frame in frames():
+            for name, own in frame.groupby("method", sort=False):
+                numbers = own[own["converged"]].drop(columns=["run_id", "method", "converged"])
+                method = str(name)
+                total[method] = numbers.sum() + total.get(method, 0.0)
+                count[method] = numbers.count() + count.get(method, 0)
+    means = [{"method": method, "converged": True, **(total[method] / count[method])} for method in total]
+    return pd.DataFrame(means)
+
+
 def _identified(
-    campaign: Campaign, frame: pd.DataFrame, logs: Logs | None, aircraft: Aircraft | None
+    campaign: Parted, first: pd.DataFrame, flown: int, logs: Logs | None, aircraft: Aircraft | None
 ) -> Identified:
-    if logs is not None or aircraft is not None:
-        return read_identified(campaign.folder / ESTIMATES, logs, aircraft)
+    layout = (flown, len(campaign.methods)) if isinstance(campaign, StoredCampaign) else None
     try:
-        return read_identified(campaign.folder / ESTIMATES)
-    except AirtruthError as error:  # the tables need less of the file than the records do
-        return Identified(frame, {}, None, f"The records are not shown: {error}.")
+        return read_identified(campaign.folder / ESTIMATES, logs, aircraft, layout)
+    except AirtruthError as error:
+        if logs is not None or aircraft is not None:
+            raise
+        # the tables need less of the file than the records do
+        return Identified(first, {}, None, f"The records are not shown: {error}.")
 
 
-def _tables(campaign: Campaign) -> list[PaperTable]:
+def _tables(campaign: Parted) -> list[PaperTable]:
     """The tables that show a method which no earlier table shows; one of all methods if they leave some out."""
     known = tables.statistics_of(campaign)
     shown: list[PaperTable] = []
     methods: set[str] = set()
     for spec in tables.TABLES.values():
-        own = [m for m in spec.columns if m in campaign.estimates]
+        own = [m for m in spec.columns if m in campaign.methods]
         if tables.shows(spec, campaign) and not methods.issuperset(own):
             shown.append(tables.evaluate(spec, campaign, known))
             methods.update(shown[-1].methods)
-    if not methods.issuperset(campaign.estimates):
+    if not methods.issuperset(campaign.methods):
         shown.append(tables.evaluate(tables.all_methods(campaign), campaign, known))
     return shown

@@ -25,6 +25,8 @@ from airtruth.table import Number, Row, as_csv, as_latex, flat
 if TYPE_CHECKING:
     import pandas as pd
 
+    from airtruth.reporting.pages.declared import Declared
+
 
 def estimates_report(title: str, identified: Identified) -> Report:
     """Return the report of estimates.
@@ -40,7 +42,7 @@ def estimates_report(title: str, identified: Identified) -> Report:
     declared = identified.declared
     references = {"declared": declared.values} if declared else None
     chart = intervals_chart(frame, references, confidence=identified.confidence)
-    shifts, shift_section = shifts_of(identified)
+    shifts, shift_section = shifts_of(declared, frame)
     notes = [n for record in identified.records.values() for n in record["notes"]]
     notes += [
         f"Overridden by --force: {s}" for record in identified.records.values() for s in record["forced"]
@@ -61,15 +63,15 @@ def estimates_report(title: str, identified: Identified) -> Report:
     )
 
 
-def shifts_of(identified: Identified) -> tuple[tuple[Chart, ...], Section]:
+def shifts_of(declared: Declared | None, estimates: pd.DataFrame) -> tuple[tuple[Chart, ...], Section]:
     """Return chart and section of the shifts from the declared aircraft; without one, none and an empty section."""
     heading, anchor = "Shifts from the declared aircraft", "shifts"
-    if identified.declared is None:
+    if declared is None:
         return (), Section(heading, anchor, "")
     from airtruth.reporting.pages.declared import shifts_chart, shifts_table
 
-    chart = shifts_chart(identified.declared, identified.frame)
-    table = shifts_table(identified.declared, identified.frame)
+    chart = shifts_chart(declared, estimates)
+    table = shifts_table(declared, estimates)
     return (chart,), Section(heading, anchor, chart_html(chart) + data_table(table, "shifts"))
 
 
@@ -104,10 +106,17 @@ def identification_report(result: IdentificationResult, aircraft: Aircraft | Non
     return estimates_report(f"Identification of {result.settings.aircraft}", identified)
 
 
-def runs_tables(frame: pd.DataFrame) -> str:
-    """Return the table of every run and method as HTML; of many runs, the first `MOST_RUNS` alone."""
+def runs_tables(frame: pd.DataFrame, of_runs: int | None = None) -> str:
+    """Return the table of every run and method as HTML; of many runs, the first `MOST_RUNS` alone.
+
+    Parameters
+    ----------
+    frame : rows of contract 2, of at least the first `MOST_RUNS` runs.
+    of_runs : number of all runs; None for those of ``frame``.
+    """
     runs = list(dict.fromkeys(frame["run_id"]))
-    if len(runs) == 1:
+    total = of_runs or len(runs)
+    if total == 1:
         return ""  # the table of all methods holds them
     kept = frame[frame["run_id"].isin(runs[:MOST_RUNS])]
     names = [name for name in (*PARAMETERS, *MODAL) if name in frame]
@@ -129,10 +138,8 @@ def runs_tables(frame: pd.DataFrame) -> str:
     ]
     columns = ["run", "method", "converged", *(c.replace("_std", " std") for c in shown)]
     notes = (
-        (
-            f"The first {MOST_RUNS} of {len(runs)} runs; estimates.parquet holds all, the table above counts all.",
-        )
-        if len(runs) > MOST_RUNS
+        (f"The first {MOST_RUNS} of {total} runs; estimates.parquet holds all, the table above counts all.",)
+        if total > MOST_RUNS
         else ()
     )
     return data_table(replace(flat("Estimates of each run", columns, rows, notes), keys=2), "runs")

@@ -14,7 +14,7 @@ from airtruth.aircraft import Aircraft
 from airtruth.errors import AirtruthError, StoreError
 from airtruth.identification.estimates import JOINT
 from airtruth.identification.record_constants import Constants
-from airtruth.identification.simulated import simulated_records
+from airtruth.identification.simulated import simulated_records, spaced
 from airtruth.identification.stored import Record, read_stored
 from airtruth.logs.digest import sha256_of
 from airtruth.logs.histories import Histories
@@ -42,7 +42,7 @@ class Identified:
 
     Attributes
     ----------
-    frame : rows of contract 2.
+    frame : rows of contract 2; those of the records alone where more are not needed.
     records : method -> how its rows were made; empty in old files.
     histories : records against model, None where they cannot be simulated; ``reason`` says why.
     declared : derivatives of the declared aircraft, None where it was not given.
@@ -62,7 +62,12 @@ class Identified:
         return float(value) if isinstance(value, int | float) else 0.95
 
 
-def read_identified(path: Path, logs: Logs | None = None, aircraft: Aircraft | None = None) -> Identified:
+def read_identified(
+    path: Path,
+    logs: Logs | None = None,
+    aircraft: Aircraft | None = None,
+    layout: tuple[int, int] | None = None,
+) -> Identified:
     """Read a file of estimates, and simulate the records of its logs.
 
     Parameters
@@ -70,6 +75,8 @@ def read_identified(path: Path, logs: Logs | None = None, aircraft: Aircraft | N
     path : the file.
     logs : its logs; None looks for them beside the file and in the folder ``logs`` there.
     aircraft : the declared aircraft, another model of the records; None for none.
+    layout : numbers of runs and methods of a file that has all methods of a run together, of which the rows of the records
+        alone are read; None for any other file.
 
     Raises
     ------
@@ -78,31 +85,35 @@ def read_identified(path: Path, logs: Logs | None = None, aircraft: Aircraft | N
     AircraftError, TrimError
         If the aircraft cannot be trimmed at the condition of the records.
     """
-    frame, records = read_stored(path)
+    runs, methods = layout or (None, 1)
+    rows = (
+        None if runs is None else np.add.outer(np.array(spaced(runs)) * methods, np.arange(methods)).ravel()
+    )
+    frame, records = read_stored(path, rows)
     if logs is None:
         logs, reason = _beside(path.parent, records)
         if reason:
             return Identified(frame, records, None, reason)
         try:
-            histories = _simulated(logs, frame, records)
+            histories = _simulated(logs, frame, records, runs)
         except AirtruthError as error:
             return Identified(frame, records, None, f"The records cannot be simulated: {error}.")
     else:
-        histories = _simulated(logs, frame, records)
+        histories = _simulated(logs, frame, records, runs)
     if aircraft is None:
         return Identified(frame, records, histories)
     from airtruth.reporting.pages.declared import declared_at  # the tracer takes seconds
 
     declared = declared_at(aircraft, histories)
-    histories = _simulated(logs, declared.before(frame), records)
+    histories = _simulated(logs, declared.before(frame), records, runs)
     return Identified(frame, records, histories, declared=declared)
 
 
-def _simulated(logs: Logs, frame: pd.DataFrame, records: Mapping[str, Record]) -> Histories:
+def _simulated(logs: Logs, frame: pd.DataFrame, records: Mapping[str, Record], runs: int | None) -> Histories:
     if not records:
         raise StoreError("the estimates do not state the constants of their aircraft; identify again")
     own = next(iter(records.values()))["constants"]
-    return simulated_records(logs, frame, Constants(**own))
+    return simulated_records(logs, frame, Constants(**own), of_runs=runs)
 
 
 def _beside(folder: Path, records: Mapping[str, Record]) -> tuple[list[str], str]:

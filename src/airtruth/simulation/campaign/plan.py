@@ -173,8 +173,8 @@ def make(campaign: Path | str | Campaign, seed: int | None = None, runs: int | N
 
 def planned_runs(table: pd.DataFrame) -> list[PlannedRun]:
     """Return the rows of a run table."""
-    records = table.to_dict("records")
-    return [PlannedRun(**{str(column): value for column, value in row.items()}) for row in records]
+    columns = {str(name): table[name].tolist() for name in table.columns}
+    return [PlannedRun(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
 
 
 def chunk_runs(plan: Plan, chunk: int) -> list[PlannedRun]:

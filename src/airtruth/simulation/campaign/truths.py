@@ -14,11 +14,10 @@ import pandas as pd
 import pyarrow as pa
 
 from airtruth.errors import StoreError
-from airtruth.logs import store
 from airtruth.logs.digest import sha256_of, sha256_of_each
 from airtruth.logs.names import chunk_file
 from airtruth.logs.remote import REQUESTS, RemotePath, each
-from airtruth.logs.tables import opened, table_bytes, write_parts
+from airtruth.logs.tables import group_ends, opened, read_group, table_bytes, write_parts
 from airtruth.simulation.campaign.chunk import FlownChunk
 from airtruth.simulation.campaign.numbering import chunk_offsets
 from airtruth.simulation.campaign.plan import Plan
@@ -52,22 +51,37 @@ class Truths:
 
     def content(self, chunk: FlownChunk) -> bytes | None:
         """Bytes of a merged chunk's own file; None if truth.parquet does not hold the chunk."""
-        if self._table is None:
-            return None
         first = int(chunk_offsets(self.plan.table, np.array([chunk.chunk]))[0])
-        rows = slice(first, first + chunk.runs)
-        own = self._table.iloc[rows]
-        if list(own["run_id"]) != list(self.plan.table["run_id"].iloc[rows]):
-            return None
-        return table_bytes(own.reset_index(drop=True))
-
-    @cached_property
-    def _table(self) -> pd.DataFrame | None:
+        end = first + chunk.runs
         try:
-            table = store.read_table(self.out / TRUTH)
+            own = self._merged.rows(first, end)
         except StoreError:
             return None
-        return table if "run_id" in table else None
+        if "run_id" not in own or list(own["run_id"]) != list(self.plan.table["run_id"].iloc[first:end]):
+            return None
+        return table_bytes(own)
+
+    @cached_property
+    def _merged(self) -> _Merged:
+        return _Merged(self.out / TRUTH)
+
+
+class _Merged:
+    """Rows of truth.parquet by their numbers; the memory holds the row groups of the last ones."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._ends = path, group_ends(path)
+        self._groups: dict[int, pd.DataFrame] = {}
+
+    def rows(self, first: int, end: int) -> pd.DataFrame:
+        """Rows from number ``first`` to before ``end``; fewer where the file ends."""
+        low, high = np.searchsorted(self._ends, [first, end - 1], side="right").tolist()
+        kept = range(low, min(high + 1, len(self._ends)))
+        self._groups = {k: self._groups[k] if k in self._groups else read_group(self._path, k) for k in kept}
+        if not kept:
+            return pd.DataFrame()
+        start = int(self._ends[kept[0]]) - len(self._groups[kept[0]])
+        return pd.concat(self._groups.values()).iloc[first - start : end - start].reset_index(drop=True)
 
 
 def find(plan: Plan, out: Path, chunks: Mapping[int, FlownChunk], digest: str | None) -> Truths:
@@ -98,7 +112,7 @@ def find(plan: Plan, out: Path, chunks: Mapping[int, FlownChunk], digest: str | 
     if digest is not None and sha256_of(out / TRUTH) == digest:
         return Truths(plan, out, known, others)
     whole = Truths(plan, out, known, others)
-    compared = ((number, whole.content(chunks[number])) for number in others)
+    compared = ((number, whole.content(chunks[number])) for number in sorted(others))
     same = {n for n, rows in compared if rows is not None and _sha256(rows) == chunks[n].truth_sha256}
     return Truths(plan, out, known, frozenset(same))
 
