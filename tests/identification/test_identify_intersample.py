@@ -72,3 +72,12 @@ def test_leaves_steps_between_two_samples_alone():
         de += np.where(t > start + 0.01, level, np.where(t > start - 0.01, 0.5 * level, 0.0)) * DEG
     bend = servo_bend(de + 0.02 * DEG * rng.standard_normal(de.shape))
     assert (bend == 0.0).all()
+
+
+@pytest.mark.parametrize(("noise_deg", "is_servo"), [(0.0, True), (0.01, True), (0.02, False)])
+def test_an_increment_within_the_noise_is_no_servo(noise_deg, is_servo):
+    """A step of 3.3 deg in one cell, then 0.07 deg, which is 3 sqrt(2) times 0.0165 deg."""
+    de = np.zeros(500)
+    de[100:] = 3.3
+    de[101:] += 0.07
+    assert servo_bend(de[None] * DEG, noise_deg * DEG).any() == is_servo

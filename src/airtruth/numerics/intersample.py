@@ -26,17 +26,19 @@ _MOVING: Final = 0.1
 """Least increment over the largest one that determines rho [-]; judgement."""
 _AGREEING: Final = 0.5
 """Least lower quartile of the ratios over their median that shows a servo [-]; judgement."""
+_SURE: Final = 3.0
+"""Least increment that follows another one by a servo, in standard deviations of an increment's noise [-] (convention)."""
 _SLOWEST: Final = 0.98
 """Largest rho of a servo [-]; judgement: above it the motion over a cell is within sensor noise."""
 _FASTEST: Final = 0.02
 """Least rho of a servo [-]; judgement: below it the servo settles within a cell."""
 
 
-def _decay(increments: Array) -> Array:
+def _decay(increments: Array, noise_std_rad: float) -> Array:
     """(runs,) weighted median of the ratio of neighbouring increments, NaN if nothing moves or the ratios show no servo.
 
     A step within a cell gives ratios above that of the servo, so that the least ones agree. A surface that stops within a
-    cell gives ratios about zero.
+    cell gives ratios about zero: the increment of the median has to exceed the noise.
     """
     if increments.shape[1] < 2:
         return np.full(increments.shape[0], np.nan)
@@ -48,11 +50,11 @@ def _decay(increments: Array) -> Array:
     ranked = np.take_along_axis(ratios, order, axis=1)
     total = np.cumsum(np.take_along_axis(weights, order, axis=1), axis=1)
     whole = np.cumsum(weights, axis=1)[:, -1:]
-    quarter, median = (
-        np.take_along_axis(ranked, np.argmax(total >= share * whole, axis=1)[:, None], axis=1)[:, 0]
-        for share in (0.25, 0.5)
-    )
-    return np.where(quarter > _AGREEING * median, median, np.nan)
+    at_quarter, at_median = (np.argmax(total >= share * whole, axis=1)[:, None] for share in (0.25, 0.5))
+    quarter, median = (np.take_along_axis(ranked, at, axis=1)[:, 0] for at in (at_quarter, at_median))
+    first = np.take_along_axis(np.take_along_axis(weights, order, axis=1), at_median, axis=1)[:, 0]
+    is_sure = median * first >= _SURE * math.sqrt(2.0) * noise_std_rad
+    return np.where((quarter > _AGREEING * median) & is_sure, median, np.nan)
 
 
 @njit(cache=True, error_model="numpy")
@@ -94,7 +96,7 @@ def _bends(elevator: Array, decay: Array, command: Array, bend: Array) -> None:
             out[k + 1] = mean - (13.0 * (start + end) - before - after) / 24.0
 
 
-def servo_bend(elevator: Array) -> Array:
+def servo_bend(elevator: Array, noise_std_rad: float = 0.0) -> Array:
     """Mean over the cell that ends at each sample: reconstructed servo motion minus the smooth hold.
 
     The smooth hold has the area of the cubic through the four nearest samples,
@@ -103,6 +105,7 @@ def servo_bend(elevator: Array) -> Array:
     Parameters
     ----------
     elevator : (runs, samples) measured surface [rad].
+    noise_std_rad : standard deviation of its noise, where it is known [rad].
 
     Returns
     -------
@@ -110,5 +113,5 @@ def servo_bend(elevator: Array) -> Array:
     """
     elevator = np.ascontiguousarray(elevator)  # one layout, so that the kernel compiles once
     bend = np.zeros_like(elevator)
-    _bends(elevator, _decay(np.diff(elevator, axis=1)), np.empty(elevator.shape[1] - 1), bend)
+    _bends(elevator, _decay(np.diff(elevator, axis=1), noise_std_rad), np.empty(elevator.shape[1] - 1), bend)
     return bend

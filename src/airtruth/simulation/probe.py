@@ -20,6 +20,11 @@ Array = NDArray[np.float64]
 
 _FILTERS_S: Final = 0.25
 """Time for the filters of a model in each state, where engines have to run [s] (judgement: several lags of a servo)."""
+_POWER_S: Final = 10.0
+"""Time in which an engine regains the power that initial conditions take from it [s] (judgement: pc7 is within 4e-5 of its
+thrust)."""
+_SAME_RESPONSE: Final = 1e-3
+"""Change of an acceleration at the trim from which an engine has lost power [m/s2], [rad/s2] (judgement: 1e-4 g)."""
 _HOLDS: Final = 12
 """Largest number of commands that hold a surface against augmentation [-] (judgement: each reduces the error tenfold)."""
 _SAME_SURFACE_RAD: Final = 1e-6
@@ -95,8 +100,11 @@ def probe(
     states = _States(executive, trim)
     values = np.empty((*(axis.size for axis in axes), 3))
     surface = np.empty(values.shape[:-1])
-    for at in product(*(range(axis.size) for axis in axes)):
-        v, alpha, command, q = (float(axis[i]) for axis, i in zip(axes, at, strict=True))
+    for i, j, n, k in product(
+        *(range(axes[a].size) for a in (0, 1, 3, 2))
+    ):  # commands last: they cost the least
+        at = (i, j, k, n)
+        v, alpha, command, q = (float(axis[m]) for axis, m in zip(axes, at, strict=True))
         condition = replace(trim.condition, eas_m_s=trim.condition.eas_m_s * v / trim.airspeed_m_s)
         controls = replace(trim.controls, elevator_command_rad=command)
         answer = states.respond(condition, alpha, controls, q)
@@ -147,15 +155,21 @@ class _States:
     """States of the grid, one after the other in one executive.
 
     Engines that run until they are steady keep the speed of the trim, because they cannot follow the motion of a flight
-    test; the filters of the model have time to settle. Where augmentation moves the surface, the command follows until
+    test; the filters of the model have time to settle. A turboprop loses its power where initial conditions are set, and has
+    time to regain it once for each state of motion. Where augmentation moves the surface, the command follows until
     the surface is where the same command puts it at the trim.
     """
 
     def __init__(self, executive: Executive, trim: Trim) -> None:
         self.executive, self.trim = executive, trim
         self.holds = executive.model.elevator.feedback
+        self.loses_power = False
         if executive.model.engine_start_s > 0.0:
             executive.initialise(trim.condition, trim.alpha_rad, trim.controls)
+            steady = executive.respond()
+            executive.initialise(trim.condition, trim.alpha_rad, trim.controls, 0.0, _FILTERS_S)
+            self.loses_power = executive.respond().differs(steady) > _SAME_RESPONSE
+        self.motion: tuple[Condition, float, float] | None = None
 
     def respond(self, condition: Condition, alpha_rad: float, controls: Controls, q_rad_s: float) -> Response:
         """Response in a state of the grid."""
@@ -176,7 +190,13 @@ class _States:
     def _settled(
         self, condition: Condition, alpha_rad: float, controls: Controls, q_rad_s: float
     ) -> Response:
-        self.executive.initialise(condition, alpha_rad, controls, q_rad_s, _FILTERS_S)
+        motion = (condition, alpha_rad, q_rad_s)
+        if self.loses_power and motion == self.motion:
+            self.executive.change_controls(controls, _FILTERS_S)
+        else:
+            settling_s = _POWER_S if self.loses_power else _FILTERS_S
+            self.executive.initialise(condition, alpha_rad, controls, q_rad_s, settling_s)
+        self.motion = motion
         return self.executive.respond()
 
 

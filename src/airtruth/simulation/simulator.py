@@ -214,6 +214,12 @@ class Executive:
             self.fdm[self.model.lateral.aileron] = controls.aileron
             self.fdm[self.model.lateral.rudder] = controls.rudder
 
+    def change_controls(self, controls: Controls, engines_s: float) -> None:
+        """Write other controls in the present state, and let filters and engines follow for a time [s]."""
+        self.fdm.set_trim_status(True)
+        self.hold(controls)
+        self._start_engines(engines_s)
+
     def settle(self, engines_s: float | None = None) -> None:
         """Run the initial conditions and, where there are engines, bring them to their steady state.
 

@@ -283,7 +283,7 @@ def _between(elevator: Array, dt_s: float, cells: int, std_rad: float, servo_s: 
     if dt_s > _STEP_S and servo_s > 0.0:  # a coarse log
         path = held_command(elevator, dt_s, servo_s, cells)
         return smooth(elevator, cells) if path is None else path, np.zeros(0)
-    bend = servo_bend((elevator - elevator[0])[None, :])[0]
+    bend = servo_bend((elevator - elevator[0])[None, :], std_rad)[0]
     corners = np.zeros(0) if bend.any() else corner_variance(elevator, std_rad)
     return _elevator(elevator, bend, cells, corners), corners
 
