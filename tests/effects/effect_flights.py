@@ -67,6 +67,7 @@ def integrate(
         force = 0.5 * oracle.standard_atmosphere(h)[0] * v**2 * oracle.S
         base = oracle.accelerations(tab, u, w, q, theta, h, elevator, start.controls.throttle)
         signals = {"alpha": alpha, "elevator": elevator, "qhat": q * c / (2 * v), "alpha_dot_hat": 0.0}
+        signals["qbar"] = force / oracle.S
         w_dot = base[1]
         for _ in range(6):  # a lift in alpha_dot changes alpha_dot
             signals["alpha_dot_hat"] = (u * w_dot - w * base[0]) / v**2 * c / (2 * v)

@@ -155,6 +155,42 @@ def test_aerodynamic_term_against_an_independent_integration(gtm, paper_conditio
     compare(plain[0], flown, plain[1], reference, 0.015 if key == "lift_alpha_dot" else 0.005)
 
 
+def table_at(x, points, values):
+    return float(np.interp(x, points, values))
+
+
+PAIRS = {
+    "CLde over a break in alpha": (
+        (AeroTerm("CL", "alpha", "above", 8.0, 0.08, "elevator", 0.02),),
+        lambda s: (8.0 * max(0.0, s["alpha"] - 0.08) * (s["elevator"] - 0.02), 0.0),
+    ),
+    "Cmq over the dynamic pressure": (
+        (AeroTerm("Cm", "qbar", "linear", -0.5, 850.0, "qhat"),),
+        lambda s: (0.0, -0.5 * (s["qbar"] - 850.0) * s["qhat"]),
+    ),
+    "Cm over the dynamic pressure": (
+        (AeroTerm("Cm", "qbar", "linear", 2e-4, 900.0),),
+        lambda s: (0.0, 2e-4 * (s["qbar"] - 900.0)),
+    ),
+    "Cmde over a table in alpha": (
+        tuple(
+            AeroTerm("Cm", "alpha", "above", slope, at, "elevator", 0.01)
+            for at, slope in ((0.06, 10.0), (0.08, -4.0), (0.12, -6.0))
+        ),
+        lambda s: (0.0, table_at(s["alpha"], [0.06, 0.08, 0.12], [0.0, 0.2, 0.44]) * (s["elevator"] - 0.01)),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_pair_of_signals_against_an_independent_integration(gtm, paper_condition, plain, tmp_path, name):
+    terms, more = PAIRS[name]
+    plane = flights.changed(gtm, Change(aero=terms), tmp_path)
+    start, flown = flights.fly(plane, paper_condition)
+    reference = flights.integrate(start, flown["elevator_rad"], HZ, lambda s, x: more(s))
+    compare(plain[0], flown, plain[1], reference, 0.005)
+
+
 def test_corrected_derivatives_against_an_independent_integration(gtm, paper_condition, plain, tmp_path):
     start, _ = flights.fly(gtm, paper_condition)
     amounts = {"CLalpha": 0.5, "CLq": 10.0, "CLde": 0.2, "Cmalpha": -0.4, "Cmq": 8.0, "Cmde": 0.3}

@@ -22,7 +22,7 @@ from airtruth.result import Result
 from airtruth.simulation.campaign import plan
 from airtruth.simulation.campaign import run as campaign
 from airtruth.tracing import TraceAnswer, TraceOptions, trace
-from airtruth.tracing.answer import ParameterEstimate
+from airtruth.tracing.answer import Evidence, ParameterEstimate
 from airtruth.tracing.presentation.candidates import candidate_table, probability, ranked
 from airtruth.tracing.presentation.charts import scores_chart, trace_chart
 from airtruth.tracing.presentation.error_table import error_csv, error_table
@@ -101,7 +101,10 @@ def test_text_states_effect_errors_candidates_and_next_flight(answer):
         ({"verdict": "none", "effects": ()}, "None: the declared aircraft explains these records"),
         ({"verdict": "unexplained", "effects": ()}, "Unexplained: the declared aircraft lacks something"),
         ({"verdict": "one_of"}, "One of several: the declared aircraft lacks elevator_delay, or an effect"),
-        ({"provisional": True}, "Provisional: a significant anomaly remains"),
+        (
+            {"provisional": True, "remaining": Evidence(50.0, 1e-4, "q")},
+            "Provisional: a significant anomaly remains",
+        ),
     ],
 )
 def test_verdict_in_one_sentence(answer, changes, sentence):
@@ -137,6 +140,11 @@ def test_learned_increments_are_listed(answer, coefficients, words):
 def test_provisional_without_held_out_says_so(answer):
     alone = replace(answer, provisional=True, records=replace(answer.records, held_out=()))
     assert verdict(alone).endswith("Provisional: no record was held out.")
+
+
+def test_provisional_without_an_anomaly_refers_to_the_notes(answer):
+    calm = replace(answer, provisional=True, remaining=replace(answer.remaining, p_value=0.4))
+    assert verdict(calm).endswith("Provisional: the notes state the reason.")
 
 
 def test_effect_line_names_the_unit_and_takes_an_open_end(answer):

@@ -9,9 +9,11 @@ import trace_flights as flights
 import trace_records as tr
 from scipy.stats import multivariate_normal
 
+from airtruth import aircraft as planes
 from airtruth import report
+from airtruth.aircraft import write as writing
 from airtruth.effects.increment import Shape, increment
-from airtruth.physics.terms import Change, shape_of
+from airtruth.physics.terms import AeroTerm, Change, shape_of, term_value
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
 from airtruth.tracing.effect_module import MODULE, effect_module
@@ -25,8 +27,9 @@ from airtruth.tracing.inference.posterior import (
 )
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.parameters import Parameters, size_index
+from airtruth.tracing.presentation.text import increment_words
 from airtruth.tracing.selection.increment_fit import redundant_increment
-from airtruth.tracing.selection.increments import log_evidences
+from airtruth.tracing.selection.increments import flown, log_evidences, shapes
 from airtruth.units import DEG
 
 
@@ -123,6 +126,67 @@ def test_the_written_module_of_a_reading_changes_the_sensor():
     assert (term.channel, term.signal, term.shape, term.amplitude) == ("alpha_rad", "alpha", "above", -0.4)
 
 
+def of_a_derivative(value):
+    """The same of the derivative Cmde, from an elevator of 0.01 rad on."""
+    return replace(
+        an_effect(value), by="elevator_rad", by_at=0.01, variant="Cm by elevator_rad over alpha_rad"
+    )
+
+
+@pytest.mark.parametrize(
+    "value", [[0.0] * 5 + [-0.1, -0.2, -0.3, -0.4], [0.4, -0.3, 0, 0, 0.5, -1.2, 1.4, -1.5, 1.8]]
+)
+def test_the_written_module_of_a_derivative_has_its_factor(value):
+    (effect,) = executed(effect_module(Answer(of_a_derivative(value))))
+    assert effect.name == "learned_cm_elevator_alpha"
+    change = effect.change(
+        {p.name: {"slope": -4.0, "at": 0.1, "factor": 1.0}[p.name] for p in effect.parameters}
+    )
+    assert {(t.factor, t.factor_at) for t in change.aero} == {("elevator", 0.01)}
+    at = np.linspace(0.0, 0.2, 9)
+    flown = sum(term_value(t, {"alpha": at, "elevator": np.full(9, 0.03)}) for t in change.aero)
+    np.testing.assert_allclose(flown, 0.02 * np.array(value), atol=1e-12)
+
+
+def test_a_learned_derivative_survives_its_file_and_is_named_in_words():
+    effect = of_a_derivative([0.0] * 5 + [-0.1, -0.2, -0.3, -0.4])
+    row = effect.to_dict()
+    assert (row["acts_on"], row["by"], row["by_at"], row["over"]) == ("Cm", "elevator_rad", 0.01, "alpha_rad")
+    assert "by" not in an_effect([0.0] * 9).to_dict()
+    assert increment_words(effect).startswith("Cm by elevator_rad -0.40 at alpha_rad = 0.200")
+
+
+def test_pairs_and_the_dynamic_pressure_are_tried_where_the_airspeed_varies():
+    names = {v: {s.variant for s in shapes(tr.problem([varying(v)]))} for v in (0.0, 0.05)}
+    pairs = {
+        "CL by elevator_rad over alpha_rad",
+        "CL by q_hat over alpha_rad",
+        "Cm by elevator_rad over alpha_rad",
+        "Cm by q_hat over alpha_rad",
+    }
+    pressure = {
+        f"{c}{by} over qbar_pa"
+        for c in ("CL", "Cm")
+        for by in ("", " by alpha_rad", " by elevator_rad", " by q_hat")
+    }
+    assert pairs <= names[0.0]
+    assert names[0.05] - names[0.0] == pressure
+
+
+@pytest.mark.parametrize("signal", ["alpha", "elevator", "qhat", "alpha_dot_hat", "qbar"])
+def test_each_signal_has_one_value_for_each_sample(signal):
+    one = varying(0.05)
+    assert flown(one, signal).shape == (one.samples,)
+
+
+def varying(share):
+    """A record whose airspeed rises by a share."""
+    one = tr.fly(np.random.default_rng(1))
+    speed = one.signals.airspeed_m_s
+    rising = speed * np.linspace(1.0, 1.0 + share, speed.size)
+    return replace(one, signals=replace(one.signals, airspeed_m_s=rising))
+
+
 NEEDED = increment(Shape("Cm", "elevator", -3.0 * DEG, 3.0 * DEG, 6, trim=0.0), 0.01)
 """What a surface lacks that is measured half a degree too far for each degree beyond one."""
 IDLE = increment(Shape("Cm", "alpha", -0.03, 0.03, 4, trim=0.0), 0.01)
@@ -179,3 +243,20 @@ def test_a_break_that_the_library_lacks_is_learned_added_and_confirmed(tmp_path)
     assert "increment" in page
     assert executed(effect_module(result.answer))
     assert "tableData" in next((tmp_path / "out" / "aircraft").rglob("*.xml")).read_text()
+
+
+@pytest.mark.long
+def test_a_derivative_that_depends_on_the_angle_of_attack_is_learned(tmp_path):
+    """Cmde loses 8/rad above 4 deg: from its value at the trim, in the cells beside it, up to the largest alpha."""
+    term = AeroTerm("Cm", "alpha", "above", 8.0, 4.0 * DEG, "elevator", 0.02)
+    writing.changed(planes.load("gtm"), Change(aero=(term,)), tmp_path / "gtm")
+    place = flights.fly(tmp_path, runs=6, seed=3, amplitude=3.0, aircraft=str(tmp_path / "gtm"))
+    answer = trace(place, "gtm", TraceOptions(effects=OTHERS, increments=True), tmp_path / "out").answer
+    (effect,) = answer.effects
+    assert (effect.acts_on, effect.by, effect.over) == ("Cm", "elevator_rad", "alpha_rad")
+    table = effect.table
+    expected = 8.0 * (np.maximum(np.array(table.at), 4.0 * DEG) - table.trim)
+    # the derivative takes up a constant, and the table is zero in the cells of the trim: 0.1 rad^-1 there, of 0.75
+    error = np.array(table.value) - expected
+    assert np.sqrt(np.average(error**2, weights=table.samples)) < 0.1
+    assert answer.updated_aircraft is not None

@@ -8,7 +8,8 @@ import trace_records as tr
 from numba import njit
 from scipy.integrate import solve_ivp
 
-from airtruth.physics.terms import AeroTerm, Change, DeclaredTerm
+from airtruth.errors import ConfigurationError
+from airtruth.physics.terms import AeroTerm, Change, DeclaredTerm, StateTerm
 from airtruth.tracing.model.equations import gust, rates
 from airtruth.tracing.model.kernel_input import AirPoint
 from airtruth.tracing.model.parameters import Common, PerRecord
@@ -148,6 +149,31 @@ def test_shapes_of_aerodynamic_terms(signal, shape, side):
         -tr.FORCE * amplitude * f * math.cos(0.04) / (tr.C.mass_kg * tr.V), rel=1e-9, abs=1e-13
     )
     assert lift[1] == plain[1]
+
+
+@pytest.mark.parametrize("factor", sorted(VALUES))
+@pytest.mark.parametrize(("signal", "s"), [("alpha", 0.04), ("qbar", 0.5 * tr.DENSITY * tr.V**2)])
+def test_a_factor_multiplies_a_term_from_its_origin(factor, signal, s):
+    """Cm += 0.7 (s - 0.9 s) (p - p/4)."""
+    plain, _ = rates_at(Change())
+    term = AeroTerm("Cm", signal, "above", 0.7, 0.9 * s, factor, 0.25 * VALUES[factor])
+    out, _ = rates_at(Change(aero=(term,)))
+    expected = 0.7 * 0.1 * s * 0.75 * VALUES[factor]
+    assert (out[1] - plain[1]) * tr.C.inertia_yy_kg_m2 / (tr.FORCE * tr.C.chord_m) == pytest.approx(
+        expected, rel=1e-8
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (Change(aero=(AeroTerm("Cm", "alpha", "linear", 1.0, factor="qbar"),)), "factor 'qbar'"),
+        (Change(states=(StateTerm("x", "lag", "qbar", 0.1),)), "signal 'qbar'"),
+    ],
+)
+def test_the_dynamic_pressure_is_neither_a_factor_nor_drives_a_state(change, words):
+    with pytest.raises(ConfigurationError, match=words):
+        rates_at(change)
 
 
 def test_lift_in_alpha_dot_is_in_proportion_to_the_alpha_dot_that_it_changes():

@@ -180,7 +180,7 @@ def _write_functions(
     root: ET.Element, model: JsbsimModel, change: Change, where: str, highest_hz: float
 ) -> None:
     factor = declared_total(change.declared, "elevator")
-    signals = {t.signal for t in change.aero} | {s.signal for s in change.states}
+    signals = {name for t in change.aero for name in (t.signal, t.factor)} | {s.signal for s in change.states}
     surface = bool(change.surface) or factor != 1.0
     if not surface and not change.aero:
         return

@@ -80,6 +80,7 @@ def learned(accepted: AcceptedEffect, plant: Plant) -> Learned:
     plant : trim of the flight to come, about which a linear increment counts.
     """
     signal = next(name for name, stated in SIGNAL_NAMES.items() if stated == accepted.over)
+    factor = next((name for name, stated in SIGNAL_NAMES.items() if stated == accepted.by), "")
     memory = next((Memory(s.kind, s.time_s, s.damping) for s in accepted.states), None)
     table = accepted.table
     trims = {"alpha": plant.trim_alpha_rad, "elevator": plant.trim_elevator_rad}
@@ -92,6 +93,8 @@ def learned(accepted: AcceptedEffect, plant: Plant) -> Learned:
         cells=0 if table is None else len(table.at) - 1,
         trim=trims.get(signal, 0.0) if table is None else table.trim,
         memory=memory,
+        factor=factor,
+        factor_trim=accepted.by_at,
     )
     effect = increment(shape)
     effect = effect.with_prior(effect.parameters[0].high)

@@ -1,9 +1,10 @@
 """Increments of a coefficient or of a reading that have no name: piecewise linear functions of a signal, with memory or
 without.
 
-    dC = sum_k b_k/w h_k(s)  [+ a (x - s)],   h_k = max(0, s - s_k) above the trim, min(0, s - s_k) below it
+    dC = sum_k b_k/w h_k(s) [(p - p0)]  [+ a (x - s)],   h_k = max(0, s - s_k) above the trim, min(0, s - s_k) below it
 
-s is the signal, or the state x of a first-order lag or of a mode that the signal drives; w is the width of a cell. The
+s is the signal, or the state x of a first-order lag or of a mode that the signal drives; w is the width of a cell. With a
+factor p, which counts from p0, the function is an increment of the derivative of p. The
 function is zero in the cell that holds the trim, where the derivatives describe the aircraft, and constant outside the
 range in which it was learned. The bends b_k have independent normal priors, which is the prior of an integrated random
 walk: a penalised linear spline.
@@ -34,6 +35,7 @@ SIGNAL_NAMES: Final[Mapping[str, str]] = {
     "elevator": "elevator_rad",
     "qhat": "q_hat",
     "alpha_dot_hat": "alpha_dot_hat",
+    "qbar": "qbar_pa",
 }
 """Signal of a term -> its name in an answer; a rate is multiplied by c/(2V)."""
 Acted = Literal["CL", "Cm", "alpha_rad", "q_rad_s", "az_m_s2"]
@@ -50,6 +52,9 @@ _REACH: Final[Mapping[str, float]] = {"CL": 1.0, "Cm": 0.3, "alpha_rad": 0.1, "q
 """Largest bend over one cell [-, unit of the channel] (judgement: the lift and the moment of a stall; 6 deg of a vane)."""
 _QHAT: Final = 30.0
 """Pitch rate over q c/(2V) by which the share of a reading over q c/(2V) exceeds one over an angle [-] (judgement)."""
+_DERIVATIVE: Final[Mapping[str, float]] = {"": 1.0, "alpha": 7.0, "elevator": 7.0, "qhat": 200.0}
+"""Increment of a derivative by each factor over one of a coefficient [1/rad, -] (judgement: Cm of 0.3 over a Cmde of 2 and a
+Cmq of 60)."""
 _ACTS: Final = {"CL": "lift", "Cm": "pitching moment"}
 """Coefficient in words."""
 _TIME_REACH: Final = 3.0
@@ -93,6 +98,8 @@ class Shape:
     cells : number of equal cells of the range; 0 for a linear increment, which needs ``memory``.
     trim : value of the signal at the trim.
     memory : state between the signal and the increment; None for an increment of the signal itself.
+    factor : one of `airtruth.physics.terms.FACTORS`, whose derivative changes; empty where the coefficient itself does.
+    factor_trim : value of the factor at the trim.
     """
 
     acts_on: Acted
@@ -102,6 +109,8 @@ class Shape:
     cells: int
     trim: float
     memory: Memory | None = None
+    factor: str = ""
+    factor_trim: float = 0.0
 
     @property
     def width(self) -> float:
@@ -128,6 +137,8 @@ class Shape:
     def variant(self) -> str:
         """Variant of the effect: coefficient or channel, signal and memory."""
         over = SIGNAL_NAMES[self.signal]
+        if self.factor:
+            return f"{self.acts_on} by {SIGNAL_NAMES[self.factor]} over {over}"
         if self.memory is None:
             return f"{self.acts_on} over {over}"
         return f"{self.acts_on} over a {self.memory.kind} of {over}"
@@ -152,7 +163,8 @@ class Shape:
         """The pieces as terms of what the increment acts on."""
         if self.acts_on == "CL" or self.acts_on == "Cm":
             coefficient = self.acts_on
-            return Change(states=states, aero=tuple(AeroTerm(coefficient, *piece) for piece in pieces))
+            by = (self.factor, self.factor_trim) if self.factor else ()
+            return Change(states=states, aero=tuple(AeroTerm(coefficient, *piece, *by) for piece in pieces))
         channel = self.acts_on
         return Change(states=states, readings=tuple(ReadingTerm(channel, *piece) for piece in pieces))
 
@@ -170,7 +182,7 @@ class Shape:
         )
 
     def basis(self, signal: ArrayLike) -> Array:
-        """Increments by a unit of each bend.
+        """Increments by a unit of each bend, without the factor.
 
         Parameters
         ----------
@@ -228,7 +240,8 @@ def increment(shape: Shape, prior_std: float = math.inf) -> Increment:
     """
     size = "share" if not shape.cells else ""
     names = [size] if size else [_bend(k) for k in range(len(shape.knots))]
-    reach, step = _REACH[shape.acts_on], _STEP[shape.acts_on]
+    scale = _DERIVATIVE[shape.factor]
+    reach, step = scale * _REACH[shape.acts_on], scale * _STEP[shape.acts_on]
     if size:
         rate = _QHAT if shape.of_reading and shape.signal == "qhat" else 1.0
         reach, step = 10.0 * rate * reach, 100.0 * rate * step

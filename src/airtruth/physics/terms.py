@@ -18,8 +18,12 @@ from airtruth.physics.short_period import PARAMETERS
 
 Array = NDArray[np.float64]
 
-SIGNALS: Final = ("alpha", "elevator", "qhat", "alpha_dot_hat")
-"""Signals of a `StateTerm` or `AeroTerm`, which may name a state as well; their order numbers them for compiled code."""
+SIGNALS: Final = ("alpha", "elevator", "qhat", "alpha_dot_hat", "qbar")
+"""Signals of an `AeroTerm`, which may name a state as well; their order numbers them for compiled code."""
+DRIVERS: Final = SIGNALS[:4]
+"""Signals that may drive a `StateTerm`."""
+FACTORS: Final = ("alpha", "elevator", "qhat")
+"""Signals by which an `AeroTerm` may be multiplied: those of the six derivatives."""
 READINGS: Final = ("alpha_rad", "q_rad_s", "az_m_s2")
 """Channels of a `ReadingTerm`, the outputs of the filter."""
 SHAPES: Final = ("linear", "quadratic", "above", "below")
@@ -77,7 +81,7 @@ class StateTerm:
     ----------
     name : of the state.
     kind : "lag": tau x' = s - x; "mode": x'' + 2 zeta wn x' + wn^2 x = wn^2 s. Both start in equilibrium.
-    signal : one of `SIGNALS`.
+    signal : one of `DRIVERS`.
     time_s : tau of a lag [s]; 1/wn of a mode [s].
     damping : zeta of a mode [-].
     """
@@ -91,17 +95,19 @@ class StateTerm:
 
 @dataclass(frozen=True)
 class AeroTerm:
-    """An increment of a coefficient: coefficient += amplitude f(signal), f by `shape_of`.
+    """An increment of a coefficient: coefficient += amplitude f(signal) [(factor - factor_at)], f by `shape_of`.
 
     Attributes
     ----------
     coefficient : "CL" (force along -z of the body over q_bar S) or "Cm" (about the CG, over q_bar S c).
     signal : one of `SIGNALS` or the name of a `StateTerm`: alpha [rad] of the air at the CG; elevator [rad] that causes
         the forces (surface terms and effectiveness included); qhat = q c/(2V); alpha_dot_hat = alpha_dot c/(2V) of the
-        motion over ground, the influence of this term on it included; zero at a trim.
+        motion over ground, the influence of this term on it included; zero at a trim; qbar [Pa], the dynamic pressure.
     shape : name of f, see `FORMULAS`.
-    amplitude : per unit of f; neutral 0.
+    amplitude : per unit of f [and of the factor]; neutral 0.
     at : origin of f [unit of the signal].
+    factor : one of `FACTORS`, whose derivative then depends on the signal; empty for none.
+    factor_at : origin of the factor [unit of the factor].
     """
 
     coefficient: Literal["CL", "Cm"]
@@ -109,6 +115,8 @@ class AeroTerm:
     shape: Literal["linear", "quadratic", "above", "below"]
     amplitude: float
     at: float = 0.0
+    factor: str = ""
+    factor_at: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -151,6 +159,25 @@ def shape_of(term: AeroTerm | ReadingTerm, signal: ArrayLike) -> Array:
     [0.0, 0.19999999999999998]
     """
     return numbered_shape(SHAPES.index(term.shape), np.asarray(signal, dtype=np.float64) - term.at)
+
+
+def term_value(term: AeroTerm, signals: Mapping[str, Array]) -> Array:
+    """Increment of a coefficient by a term [-], of the shape of the signals.
+
+    Parameters
+    ----------
+    signals : name -> values of one shape, those that the term names among them.
+
+    Examples
+    --------
+    >>> pair = AeroTerm("Cm", "alpha", "above", -2.0, at=0.1, factor="elevator", factor_at=0.02)
+    >>> term_value(pair, {"alpha": np.array([0.05, 0.2]), "elevator": np.array([0.12, 0.12])}).round(
+    ...     12
+    ... ).tolist()
+    [-0.0, -0.02]
+    """
+    value = term.amplitude * shape_of(term, signals[term.signal])
+    return np.asarray(value * (signals[term.factor] - term.factor_at) if term.factor else value)
 
 
 def numbered_shape(number: int, s: Array) -> Array:

@@ -91,6 +91,7 @@ class AcceptedEffect:
     channel : delayed channel, of `sensor_delay` alone.
     about_alpha_rad : angle of attack about which a curvature counts [rad]; None for other effects.
     acts_on, over : of a learned increment: coefficient, and the signal on which it depends; None for other effects.
+    by, by_at : of a learned increment of a derivative: the signal that multiplies the table, and from where it counts.
     relative_size : its swing over that of the declared derivative in the flown range [-]; of a linear one its share.
     table : the increment with its band; None for a linear one, whose share is a parameter.
     states : what lies between signal and increment; empty for a function of the signal itself.
@@ -108,6 +109,8 @@ class AcceptedEffect:
     about_alpha_rad: float | None = None
     acts_on: str | None = None
     over: str | None = None
+    by: str | None = None
+    by_at: float = 0.0
     relative_size: float | None = None
     table: IncrementTable | None = None
     states: tuple[IncrementState, ...] = ()
@@ -140,6 +143,7 @@ class AcceptedEffect:
         return {
             "acts_on": self.acts_on,
             "over": self.over,
+            **({} if self.by is None else {"by": self.by, "by_at": self.by_at}),
             "relative_size": self.relative_size,
             "table": None if self.table is None else {k: list(v) for k, v in asdict(self.table).items()},
             "states": [asdict(state) for state in self.states],

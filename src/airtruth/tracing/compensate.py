@@ -44,7 +44,7 @@ from airtruth.tracing.result import TraceResult
 
 Array = NDArray[np.float64]
 
-MEASURED: Final = ("alpha", "elevator", "qhat")
+MEASURED: Final = ("alpha", "elevator", "qhat", "qbar")
 """Signals of aerodynamic terms that a log measures."""
 OUTPUTS: Final = ("alpha_rad", "q_rad_s", "az_m_s2")
 """Channels that the response to increments changes."""
@@ -152,7 +152,7 @@ def _measurable(change: Change) -> tuple[tuple[AeroTerm, ...], tuple[StateTerm, 
     """Increments in measured signals, and the states that measured signals drive."""
     states = tuple(s for s in change.states if s.signal in MEASURED)
     known = {*MEASURED, *(s.name for s in states)}
-    return tuple(t for t in change.aero if t.signal in known), states
+    return tuple(t for t in change.aero if t.signal in known and t.factor in ("", *known)), states
 
 
 def treatment_of(key: str, change: Change) -> Treatment:
@@ -243,6 +243,7 @@ def _increment_response(
         "alpha": alpha - _origin(alpha, dt_s, taken),
         "elevator": channels["elevator_rad"],
         "qhat": channels["q_rad_s"] * scale.half_chord_time[:, None],
+        "qbar": 0.5 * np.asarray(air_density(channels)) * channels["airspeed_m_s"] ** 2,
     }
     signals |= {s.name: state_of(s, signals[s.signal], dt_s) for s in taken.states}
     more = increments(taken.aero, signals)

@@ -25,17 +25,17 @@ _RANGE: Final = 4.0
 _MATERIAL: Final = 0.2
 """Material size over the learned one [-] (judgement: a fifth of what was worth learning)."""
 _TERMS: Final = {
-    "break above": '({term}("{c}", "{s}", "above", values["slope"], values["at"]),)',
-    "break below": '({term}("{c}", "{s}", "below", values["slope"], values["at"]),)',
+    "break above": '({term}("{c}", "{s}", "above", values["slope"], values["at"]{by}),)',
+    "break below": '({term}("{c}", "{s}", "below", values["slope"], values["at"]{by}),)',
     "step above": """(
-            {term}("{c}", "{s}", "above", values["step"] / values["width"], values["at"]),
-            {term}("{c}", "{s}", "above", -values["step"] / values["width"], values["at"] + values["width"]),
+            {term}("{c}", "{s}", "above", values["step"] / values["width"], values["at"]{by}),
+            {term}("{c}", "{s}", "above", -values["step"] / values["width"], values["at"] + values["width"]{by}),
         )""",
     "step below": """(
-            {term}("{c}", "{s}", "below", -values["step"] / values["width"], values["at"]),
-            {term}("{c}", "{s}", "below", values["step"] / values["width"], values["at"] - values["width"]),
+            {term}("{c}", "{s}", "below", -values["step"] / values["width"], values["at"]{by}),
+            {term}("{c}", "{s}", "below", values["step"] / values["width"], values["at"] - values["width"]{by}),
         )""",
-    "curve": '({term}("{c}", "{s}", "quadratic", values["curvature"], {trim!r}),)',
+    "curve": '({term}("{c}", "{s}", "quadratic", values["curvature"], {trim!r}{by}),)',
     "share": """(
             {term}("{c}", "{s}", "linear", values["share"], {trim!r}),
             {term}("{c}", "{driver}", "linear", -values["share"], {trim!r}),
@@ -113,11 +113,12 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
     driver = _SIGNALS[e.over or ""]
     signal = "learned-state" if e.states else driver
     trim = e.table.trim if e.table is not None else 0.0
+    by = f', "{_SIGNALS[e.by]}", {e.by_at!r}' if e.by else ""
     field, term = ("readings", "ReadingTerm") if e.acts_on in READINGS else ("aero", "AeroTerm")
     values = {name: p.value for name, p in e.parameters.items()} if form is None else form.values
     sizes = {k: v for k, v in values.items() if k not in ("at", "width", "time_s", "damping")}
     if form is not None:
-        terms = _TERMS[form.name].format(term=term, c=e.acts_on, s=signal, driver=driver, trim=trim)
+        terms = _TERMS[form.name].format(term=term, c=e.acts_on, s=signal, driver=driver, trim=trim, by=by)
         sentence = (
             f"Closed form of the learned table ({form.name}): chi-square {form.statistic:.3g} over "
             f"{form.degrees} degrees of freedom."
@@ -126,7 +127,7 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
         terms = _TERMS["share"].format(term=term, c=e.acts_on, s=signal, driver=driver, trim=0.0)
         sentence = "Linear part behind a state."
     else:
-        terms = _of_table(f'{term}("{e.acts_on}"', e.table, signal)
+        terms = _of_table(f'{term}("{e.acts_on}"', e.table, signal, by)
         sizes, values = {"factor": 1.0}, {"factor": 1.0}
         sentence = "No closed form is as good as the learned table, so the effect scales the table."
     state = [(s.kind, s.time_s, s.damping) for s in e.states]
@@ -141,7 +142,7 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
     lines = "".join(f"        {p},\n" for p in parameters)
     yield (
         f"EFFECT_{number} = Effect(\n"
-        f'    name="learned_{(e.acts_on or "").lower()}_{driver}",\n'
+        f'    name="learned_{(e.acts_on or "").lower()}_{f"{_SIGNALS[e.by]}_" if e.by else ""}{driver}",\n'
         f'    variant="{"-".join(k for k, _, _ in state)}",\n'
         f'    where="{"sensor" if e.acts_on in READINGS else "dynamics"}",\n    parameters=(\n{lines}    ),\n'
         f"    describe=_terms_{number},\n"
@@ -160,10 +161,10 @@ def _form(e: AcceptedEffect) -> ClosedForm | None:
     return next((f for f in closed_forms(t.at, t.value, std, t.trim) if f.is_as_good), None)
 
 
-def _of_table(term: str, table: IncrementTable, signal: str) -> str:
+def _of_table(term: str, table: IncrementTable, signal: str, by: str) -> str:
     """Terms of a table with a common factor: its bends, on either side of the trim, where it is flat.
 
-    ``term`` is how each term begins.
+    ``term`` is how each term begins, ``by`` how it ends.
     """
     points, trim = list(table.at), table.trim
     pieces = zip(pairwise(points), pairwise(table.value), strict=True)
@@ -171,7 +172,7 @@ def _of_table(term: str, table: IncrementTable, signal: str) -> str:
     bends = [after - before for before, after in zip([0.0, *slopes], [*slopes, 0.0], strict=True)]
     rows = "".join(
         f'            {term}, "{signal}", "{"above" if x > trim else "below"}", '
-        f'{bend if x > trim else -bend!r} * values["factor"], {x!r}),\n'
+        f'{bend if x > trim else -bend!r} * values["factor"], {x!r}{by}),\n'
         for x, bend in zip(points, bends, strict=True)
     )
     return f"(\n{rows}        )"

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from airtruth.physics import short_period
-from airtruth.physics.terms import AeroTerm, shape_of
+from airtruth.physics.terms import AeroTerm, term_value
 
 Array = NDArray[np.float64]
 
@@ -31,11 +31,11 @@ def increments(aero: Sequence[AeroTerm], signals: Mapping[str, Array]) -> Array:
 
     Parameters
     ----------
-    signals : name -> values of one shape: alpha as the terms count it [rad], elevator [rad], qhat = q c/(2V), states.
+    signals : name -> values of one shape: alpha as the terms count it [rad], elevator [rad], qhat = q c/(2V), qbar [Pa], states.
     """
     total = np.zeros((2, *next(iter(signals.values())).shape))
     for term in aero:
-        total[0 if term.coefficient == "CL" else 1] += term.amplitude * shape_of(term, signals[term.signal])
+        total[0 if term.coefficient == "CL" else 1] += term_value(term, signals)
     return total
 
 

@@ -39,6 +39,8 @@ def in_physical_terms(
         stated,
         acts_on=shape.acts_on,
         over=SIGNAL_NAMES[shape.signal],
+        by=SIGNAL_NAMES[shape.factor] if shape.factor else None,
+        by_at=shape.factor_trim,
         relative_size=relative_swing(problem, fitted, effect),
         table=increment_table(problem, fitted, covariance, effect) if shape.cells else None,
         states=states,

@@ -99,7 +99,7 @@ def write_update(
     shift = float(np.mean([p.alpha_shift_rad for p in plants]))
     change = replace(
         change,
-        aero=tuple(_from_zero_alpha(t, shift) for t in change.aero),
+        aero=tuple(_factor_from_zero_alpha(_from_zero_alpha(t, shift), shift) for t in change.aero),
         readings=tuple(_from_zero_alpha(t, shift) for t in change.readings),
     )
     increments = dict(zip(PARAMETERS, fit.point.common[Common.derivatives].tolist(), strict=True))
@@ -136,6 +136,10 @@ def _bands(case: Case, fit: PosteriorFit) -> Iterator[str]:
 def _from_zero_alpha(term: _Term, shift_rad: float) -> _Term:
     """A term that counts alpha from zero, as an aircraft does; the linear model counts it from the record's trim."""
     return replace(term, at=term.at + shift_rad) if term.signal == "alpha" else term
+
+
+def _factor_from_zero_alpha(term: AeroTerm, shift_rad: float) -> AeroTerm:
+    return replace(term, factor_at=term.factor_at + shift_rad) if term.factor == "alpha" else term
 
 
 __all__ = ["accepted_change", "updated_folder", "write_update"]

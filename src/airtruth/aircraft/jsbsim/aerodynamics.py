@@ -7,7 +7,7 @@ values that a state needs of the previous step, at the start of the next one, be
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
@@ -24,7 +24,8 @@ from airtruth.aircraft.jsbsim.functions import (
 )
 from airtruth.aircraft.jsbsim.surface import Components, Names
 from airtruth.errors import AircraftError, ConfigurationError, choices
-from airtruth.physics.terms import FORMULAS, AeroTerm, StateTerm, shape_of
+from airtruth.physics.terms import FORMULAS, SIGNALS, AeroTerm, StateTerm, shape_of
+from airtruth.units import PSF
 
 _ALPHA_DOT: Final = "aero/alphadot-rad_sec"
 """Property of alpha_dot over ground, one step old [rad/s]."""
@@ -72,7 +73,8 @@ def write(
     made: dict[str, str] = {}
     functions: list[Element] = []
     memory = Components()
-    for name in dict.fromkeys([s.signal for s in states] + [t.signal for t in terms]):
+    factors = [t.factor for t in terms if t.factor]
+    for name in dict.fromkeys([s.signal for s in states] + [t.signal for t in terms] + factors):
         if name in (s.name for s in states):
             continue
         made[name] = f"{root}{name.replace('_', '-')}"
@@ -88,16 +90,17 @@ def write(
     for number, group in enumerate(learned, start=1):
         output = f"{root}{group[0].coefficient}-table-{number}"
         functions += _table(output, group, made[group[0].signal])
+        if group[0].factor:
+            slope, output = output, f"{output}-increment"
+            words = f"{group[0].coefficient} by {group[0].factor}, at = {group[0].factor_at!r}"
+            functions.append(function(output, words, op("product", slope, _factor(group[0], made))))
         by_coefficient[group[0].coefficient].append(output)
     for number, term in enumerate(single, start=1):
         output = f"{root}{term.coefficient}-{number}"
-        functions.append(
-            function(
-                output,
-                _description(term),
-                op("product", term.amplitude, _shape(term, op("sum", made[term.signal], -term.at))),
-            )
-        )
+        formula = op("product", term.amplitude, _shape(term, op("sum", made[term.signal], -term.at)))
+        if term.factor:
+            formula.append(_factor(term, made))
+        functions.append(function(output, _description(term), formula))
         by_coefficient[term.coefficient].append(output)
     first = next((i for i, e in enumerate(aerodynamics) if e.tag == "axis"), len(aerodynamics))
     for offset, element in enumerate(functions):
@@ -108,10 +111,11 @@ def write(
 
 def _grouped(terms: Sequence[AeroTerm]) -> tuple[list[list[AeroTerm]], list[AeroTerm]]:
     """Bends of one coefficient over one signal that are constant beyond their ends, and the other terms."""
-    bends: dict[tuple[str, str], list[AeroTerm]] = {}
+    bends: dict[tuple[str, str, str, float], list[AeroTerm]] = {}
     for term in terms:
         if term.shape in ("above", "below"):
-            bends.setdefault((term.coefficient, term.signal), []).append(term)
+            same = (term.coefficient, term.signal, term.factor, term.factor_at)
+            bends.setdefault(same, []).append(term)
     learned = [group for group in bends.values() if len(group) >= _LEAST_BENDS and _is_constant_beyond(group)]
     taken = {id(term) for group in learned for term in group}
     return learned, [term for term in terms if id(term) not in taken]
@@ -143,7 +147,13 @@ def _table(output: str, group: Sequence[AeroTerm], signal: str) -> list[Element]
 
 
 def _description(term: AeroTerm) -> str:
-    return f"{term.coefficient} += {term.amplitude!r} {FORMULAS[term.shape]}, s = {term.signal}, at = {term.at!r}"
+    pair = f" ({term.factor} - {term.factor_at!r})" if term.factor else ""
+    return f"{term.coefficient} += {term.amplitude!r} {FORMULAS[term.shape]}{pair}, s = {term.signal}, at = {term.at!r}"
+
+
+def _factor(term: AeroTerm, made: Mapping[str, str]) -> Element:
+    """The factor of a term, from its origin; ``made``: signal -> property."""
+    return op("sum", made[term.factor], -term.factor_at)
 
 
 def _shape(term: AeroTerm, deviation: Element) -> Element:
@@ -182,9 +192,10 @@ def _signal(
         formula = op("product", now, "aero/ci2vel")
         memory = Components((component(before, "", prop(_ALPHA_DOT)),), (before,))
         return [function(output, "alpha_dot c/(2V), inertial [-]", formula)], memory
-    raise ConfigurationError(
-        f"signal {name!r}: {choices(name, ('alpha', 'elevator', 'qhat', 'alpha_dot_hat'))}, or a state of the change"
-    )
+    if name == "qbar":
+        formula = op("product", PSF, "aero/qbar-psf")
+        return [function(output, "Dynamic pressure [Pa]", formula)], Components()
+    raise ConfigurationError(f"signal {name!r}: {choices(name, SIGNALS)}, or a state of the change")
 
 
 def _state(state: StateTerm, output: str, source: str) -> Element:

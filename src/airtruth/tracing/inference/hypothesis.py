@@ -116,7 +116,7 @@ def unconstrained_by(effect: Effect, trim_alpha_rad: float) -> tuple[int, ...]:
 
 
 def _is_curvature(term: AeroTerm) -> bool:
-    return term.signal == "alpha" and term.shape == "quadratic"
+    return term.signal == "alpha" and term.shape == "quadratic" and not term.factor
 
 
 __all__ = ["Hypothesis", "unconstrained_by"]

@@ -13,6 +13,8 @@ from airtruth.errors import ConfigurationError, choices
 from airtruth.physics.sensor_errors import KINDS, Kind, SensorErrors
 from airtruth.physics.terms import (
     DECLARED,
+    DRIVERS,
+    FACTORS,
     READINGS,
     SHAPES,
     SIGNALS,
@@ -111,7 +113,7 @@ def _effects(change: Change, first: Ints) -> EffectArrays:
     """Terms of coefficients and readings, and states, by numbers; ``first``: first state of each effect with states."""
     names = [s.name for s in change.states]
     every: list[AeroTerm | ReadingTerm] = [*change.aero, *change.readings]
-    terms = np.zeros((len(every), 4), dtype=np.int64)
+    terms = np.zeros((len(every), 5), dtype=np.int64)
     for i, term in enumerate(every):
         acts_on = term.channel if isinstance(term, ReadingTerm) else term.coefficient
         signal = _index(term.signal, (*SIGNALS, *names), "signal")
@@ -121,14 +123,19 @@ def _effects(change: Change, first: Ints) -> EffectArrays:
             -1 if own else signal,
             _index(term.shape, SHAPES, "shape"),
             first[signal - len(SIGNALS)] if own else -1,
+            -1,
         )
+        if isinstance(term, AeroTerm) and term.factor:
+            _index(term.factor, FACTORS, "factor")
+            terms[i, 4] = SIGNALS.index(term.factor)
     states = np.zeros((len(change.states), 2), dtype=np.int64)
     for i, state in enumerate(change.states):
-        states[i] = _index(state.kind, STATE_KINDS, "state"), _index(state.signal, SIGNALS, "signal")
+        states[i] = _index(state.kind, STATE_KINDS, "state"), _index(state.signal, DRIVERS, "signal")
     return EffectArrays(
         term_index=terms,
         amplitude=np.array([t.amplitude for t in every], dtype=np.float64),
         origin=np.array([t.at for t in every], dtype=np.float64),
+        factor_origin=np.array([getattr(t, "factor_at", 0.0) for t in every], dtype=np.float64),
         state_index=states,
         time_s=np.array([s.time_s for s in change.states], dtype=np.float64),
         damping=np.array([s.damping for s in change.states], dtype=np.float64),

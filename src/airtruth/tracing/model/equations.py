@@ -65,13 +65,15 @@ class Signals(NamedTuple):
 
     Attributes
     ----------
-    alpha, elevator : of the air, of the surface [rad]; qhat, alpha_dot_hat : q c/(2V), alpha' c/(2V) [-].
+    alpha, elevator : of the air, of the surface [rad]; qhat, alpha_dot_hat : q c/(2V), alpha' c/(2V) [-]; qbar : dynamic
+        pressure [Pa].
     """
 
     alpha: float
     elevator: float
     qhat: float
     alpha_dot_hat: float
+    qbar: float
 
 
 @shared
@@ -131,7 +133,9 @@ def _signal(signals: Signals, number: int) -> float:
         return signals.alpha
     if number == 1:
         return signals.elevator
-    return signals.qhat if number == 2 else signals.alpha_dot_hat
+    if number == _ALPHA_DOT:
+        return signals.alpha_dot_hat
+    return signals.qhat if number == 2 else signals.qbar
 
 
 @inner
@@ -155,6 +159,9 @@ def _terms(
         if in_alpha_dot and effects.term_index[t, 0] == 0:
             s /= 1.0 + amplitude * feedback
         increment = amplitude * _shape(effects.term_index[t, 2], s - effects.origin[t])
+        factor = effects.term_index[t, 4]
+        if factor >= 0:
+            increment *= _signal(signals, factor) - effects.factor_origin[t]
         if effects.term_index[t, 0] == 0:
             lift += increment
         else:
@@ -191,7 +198,7 @@ def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
     if model.effects.amplitude.size > 0:
         for turn in range(2):  # terms in alpha' last: they take alpha' with everything else in it
             first = q + ((fz - force * lift) * cosine - fx * sine) / (mass * ground) + weight
-            signals = Signals(alpha, surface, qhat, first * half)
+            signals = Signals(alpha, surface, qhat, first * half, qbar)
             added = _terms(x, signals, model.effects, turn == 1, half * force * cosine / (mass * v))
             lift, moment = lift + added[0], moment + added[1]
     fz -= force * lift
@@ -202,7 +209,7 @@ def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
     out[0] = q + (fz * cosine - fx * sine) / (mass * ground) + weight
     out[1] = fm / aircraft.inertia_kg_m2
     _gust_rates(x, v, late, gusts, out)
-    _effect_rates(x, Signals(alpha, surface, qhat, out[0] * half), model, out)
+    _effect_rates(x, Signals(alpha, surface, qhat, out[0] * half, qbar), model, out)
     return float(fz / mass)
 
 
@@ -265,7 +272,7 @@ def _add_readings(x: Array, alpha: float, at: AirPoint, model: FilterModel, y: A
             surface = effective_elevator(at.elevator_rad, model.aircraft)
             qhat = x[1] * 0.5 * model.aircraft.chord_m / at.airspeed_m_s
             state = effects.term_index[t, 3]
-            own = _signal(Signals(alpha, surface, qhat, 0.0), effects.term_index[t, 1])
+            own = _signal(Signals(alpha, surface, qhat, 0.0, at.qbar_pa), effects.term_index[t, 1])
             s = x[state] if state >= 0 else own
             y[output] += effects.amplitude[t] * _shape(effects.term_index[t, 2], s - effects.origin[t])
 

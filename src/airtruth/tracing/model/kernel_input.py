@@ -75,9 +75,9 @@ class EffectArrays(NamedTuple):
 
     Attributes
     ----------
-    term_index : (terms, 4) what it acts on (0 CL, 1 Cm, 2 + i the reading of output i), signal (-1 for a state), shape,
-        state (-1 for a signal).
-    amplitude, origin : (terms,) of each term.
+    term_index : (terms, 5) what it acts on (0 CL, 1 Cm, 2 + i the reading of output i), signal (-1 for a state), shape,
+        state (-1 for a signal), signal of its factor (-1 for none).
+    amplitude, origin, factor_origin : (terms,) of each term.
     state_index : (states, 2) kind (0 lag, 1 mode), signal.
     time_s, damping : (states,) of each state [s], [-].
     """
@@ -85,6 +85,7 @@ class EffectArrays(NamedTuple):
     term_index: Ints
     amplitude: Array
     origin: Array
+    factor_origin: Array
     state_index: Ints
     time_s: Array
     damping: Array

@@ -108,6 +108,7 @@ def _declared(
         "elevator": surface[None],
         "qhat": qhat[None],
         "alpha_dot_hat": (np.gradient(alpha, dt_s) * half)[None],
+        "qbar": (0.5 * flown["density_kg_m3"] * flown["airspeed_m_s"] ** 2)[None],
     }
     signals |= {s.name: state_of(s, signals[s.signal], dt_s) for s in change.states}
     return increments(change.aero, signals)[:, 0]

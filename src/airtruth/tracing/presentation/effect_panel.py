@@ -44,7 +44,7 @@ def effect_panel(answer: TraceAnswer, shown_: ShownRecord) -> Panel:
         return _learned(table, table.table)
     if change.surface:
         return _surface(shown_.record, change)
-    if change.aero and change.aero[0].signal in _CURVES and not change.states:
+    if change.aero and change.aero[0].signal in _CURVES and not change.aero[0].factor and not change.states:
         return _curve(shown_, change.aero)
     if change.sensors:
         return _sensor(answer, shown_, change)
@@ -119,15 +119,16 @@ def _learned(effect: AcceptedEffect, table: IncrementTable | None) -> Panel:
     if table is None:
         return Panel(title="the effect", words="no table")
     over = effect.over or ""
-    factor, unit = (1.0 / DEG, "deg") if over.endswith("_rad") else (1.0, "-")
+    factor, unit = (1.0 / DEG, "deg") if over.endswith("_rad") else (1.0, "Pa" if over == "qbar_pa" else "-")
+    subject = f"{effect.acts_on} by {effect.by}" if effect.by else effect.acts_on
     x = [factor * at for at in table.at]
     bottom, top = min(table.low), max(table.high)
     most = max(*table.samples, 1)
     density = [bottom - (top - bottom) * _DENSITY * (1.0 - n / most) for n in table.samples]
     return Panel(
-        title=f"the effect: increment of {effect.acts_on}",
-        x_label=f"{'state driven by ' if effect.states else ''}{over.removesuffix('_rad')} [{unit}]",
-        y_label=f"increment of {effect.acts_on}",
+        title=f"the effect: increment of {subject}",
+        x_label=f"{'state driven by ' if effect.states else ''}{over.removesuffix('_rad').removesuffix('_pa')} [{unit}]",
+        y_label=f"increment of {subject}",
         lines=(
             replace(line(x, table.value), label="learned", colour="vermillion"),
             replace(line(x, table.low), label="95 % band", colour="vermillion", stroke="dotted"),

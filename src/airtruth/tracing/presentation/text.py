@@ -10,7 +10,7 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import READINGS
 from airtruth.table import WIDTH, as_text, significant
 from airtruth.tracing.accepted import AcceptedEffect, IncrementTable, ParameterEstimate
-from airtruth.tracing.answer import Evidence, TraceAnswer
+from airtruth.tracing.answer import ANOMALY_LEVEL, Evidence, TraceAnswer
 from airtruth.tracing.presentation.candidates import probability, ranked
 from airtruth.tracing.presentation.derivative_table import derivative_table
 from airtruth.tracing.presentation.error_table import error_table
@@ -62,6 +62,8 @@ def verdict(answer: TraceAnswer) -> str:
             why = "no record was held out"
         elif answer.confirmed is False:
             why = "the held-out records are worse with the effects than without them"
+        elif answer.remaining.p_value > ANOMALY_LEVEL:
+            why = "the notes state the reason"
         else:
             why = f"a significant anomaly remains ({_evidence(answer.remaining)})"
         sentence += f" Provisional: {why}."
@@ -169,12 +171,13 @@ def effect_line(effect: AcceptedEffect) -> str:
 def increment_words(effect: AcceptedEffect) -> str:
     """A learned increment in words: largest value, onset, memory, and size relative to the declared model."""
     over, table = effect.over or "", effect.table
+    subject = f"{effect.acts_on} by {effect.by}" if effect.by else effect.acts_on
     parts = []
     if table is not None:
         i = max(range(len(table.at)), key=lambda k: abs(table.value[k]))
         low, high = significant(table.low[i], 2), significant(table.high[i], 2)
         parts.append(
-            f"{effect.acts_on} {significant(table.value[i], 2)} at {over} = {significant(table.at[i])} "
+            f"{subject} {significant(table.value[i], 2)} at {over} = {significant(table.at[i])} "
             f"(95 %: {low} to {high})"
         )
         parts.append(_onset(table, over))
@@ -186,6 +189,8 @@ def increment_words(effect: AcceptedEffect) -> str:
         whole = (
             f"motion of {effect.acts_on}"
             if effect.acts_on in READINGS
+            else "declared derivative"
+            if effect.by
             else "declared derivative in the flown range"
         )
         parts.append(f"{significant(100.0 * effect.relative_size, 2)} % of the {whole}")

@@ -58,8 +58,10 @@ _DERIVATIVE: Final[Mapping[str, str]] = {
     "elevator": "de",
     "qhat": "q",
     "alpha_dot_hat": "q",
+    "qbar": "alpha",
 }
-"""Derivative with which an increment over a signal is compared; a moment by alpha' with the damping."""
+"""Derivative with which an increment over a signal is compared; a moment by alpha' with the damping, one by the dynamic
+pressure with what the angle of attack does in the same records."""
 
 
 @dataclass(frozen=True)
@@ -183,21 +185,29 @@ def _is_apart_from_zero(problem: TraceProblem, own: FittedIncrement) -> bool:
 def relative_swing(problem: TraceProblem, own: PosteriorFit, effect: Increment) -> float:
     """Size of an increment relative to what is declared [-].
 
-    Its swing over that of the declared derivative in the flown range, of a linear one its share; of a reading, its
-    standard deviation over that of the channel.
+    Its swing over that of the declared derivative in the flown range, of a linear one its share, of a derivative its swing
+    over the declared value; of a reading, its standard deviation over that of the channel.
     """
     shape = effect.shape
     if shape.of_reading:
         return _share_of_channel(problem.records, own, effect)
     bends, _ = fitted_bends(own, effect, own.covariance)
-    index = PARAMETERS.index(f"{shape.acts_on}{_DERIVATIVE[shape.signal]}")
+    index = PARAMETERS.index(f"{shape.acts_on}{_DERIVATIVE[shape.factor or shape.signal]}")
     declared = abs(float(problem.declared_derivatives[index]))
     if not shape.cells:
         return abs(float(bends[0])) / declared
-    signal = np.concatenate([flown(r, shape.signal) for r in problem.records])
-    low, high = np.quantile(signal, _FLOWN)
+    low, high = _flown_range(problem.records, shape.signal)
     values = shape.basis(np.linspace(low, high, 101)) @ bends
+    if shape.factor:
+        return float(np.ptp(values) / declared)
+    if shape.signal == "qbar":
+        low, high = _flown_range(problem.records, "alpha")
     return float(np.ptp(values) / (declared * (high - low)))
+
+
+def _flown_range(records: Sequence[TraceRecord], signal: str) -> tuple[float, float]:
+    low, high = np.quantile(np.concatenate([flown(r, signal) for r in records]), _FLOWN)
+    return float(low), float(high)
 
 
 def _share_of_channel(records: Sequence[TraceRecord], own: PosteriorFit, effect: Increment) -> float:

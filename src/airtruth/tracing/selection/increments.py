@@ -21,10 +21,10 @@ from scipy.special import logsumexp
 
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment, Memory, Shape, increment
-from airtruth.physics.terms import READINGS
+from airtruth.physics.terms import FACTORS, READINGS
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import Whitener
-from airtruth.tracing.model.records import TraceRecord
+from airtruth.tracing.model.records import FINE, TraceRecord
 from airtruth.tracing.selection.score_test import Direction, gradients
 
 Array = NDArray[np.float64]
@@ -37,6 +37,9 @@ _RATE_S: Final = 0.1
 """Width of the mean over which the rate of the angle of attack is taken [s] (judgement: noise of the vane)."""
 _LAGS_S: Final = (0.03, 0.08, 0.2, 0.5, 1.2)
 """Time constants of lags that are tried [s] (judgement: a refit moves them by up to a factor of three)."""
+_LEAST_PRESSURE: Final = 0.04
+"""Least range of the dynamic pressure over its mean in which an increment over it is tried [-] (judgement: an airspeed that
+changes by 2 %)."""
 _SLOW_S: Final = (0.08, 0.2, 0.5)
 """Time constants behind which functions are tried [s] (judgement: separation and hysteresis)."""
 _MODES_HZ: Final = (0.7, 1.4, 2.8, 5.6, 10.0)
@@ -77,8 +80,8 @@ class Screened:
 def shapes(problem: TraceProblem) -> list[Shape]:
     """Every shape that the records can hold, over the range that they cover: of the coefficients, then of the readings."""
     found: list[Shape] = []
-    ranges = {name: _range(problem.records, name) for name in ("alpha", "elevator", "qhat", "alpha_dot_hat")}
     records = problem.records
+    ranges = {name: _range(records, name) for name in ("alpha", "elevator", "qhat", "alpha_dot_hat")}
     trims = {
         "alpha": float(np.mean([r.plant.trim_alpha_rad for r in records])),
         "elevator": float(np.mean([r.plant.trim_elevator_rad for r in records])),
@@ -107,9 +110,35 @@ def shapes(problem: TraceProblem) -> list[Shape]:
             if name == "alpha":
                 for time_s in _SLOW_S:
                     add(CELLS, Memory("lag", time_s))
+    found += _over_pressure_and_pairs(records, ranges, trims)
     of_readings = _of_readings(ranges, trims, highest_hz)
     measured = dict(zip(READINGS, problem.settings.measured, strict=True))
     return found + [shape for shape in of_readings if measured[shape.acts_on]]
+
+
+def _over_pressure_and_pairs(
+    records: Sequence[TraceRecord], ranges: Mapping[str, tuple[float, float]], trims: Mapping[str, float]
+) -> Iterator[Shape]:
+    """Coefficients over the dynamic pressure, and derivatives over the angle of attack and the dynamic pressure.
+
+    The derivative in alpha over alpha is the coefficient over alpha, which is tried without a factor.
+    """
+    coefficients: tuple[Literal["CL", "Cm"], ...] = ("CL", "Cm")
+    pressure = _range(records, "qbar")
+    middle = 0.5 * (pressure[0] + pressure[1])
+    varies = pressure[1] - pressure[0] > _LEAST_PRESSURE * middle
+    low, high = ranges["alpha"]
+    trim = min(max(trims["alpha"], low), high)
+    excited = [name for name in FACTORS if ranges[name][1] > ranges[name][0]]
+    for coefficient in coefficients:
+        if varies:
+            yield Shape(coefficient, "qbar", *pressure, CELLS, middle)
+        for name in excited:
+            by = (name, trims.get(name, 0.0))
+            if name != "alpha" and high > low:
+                yield Shape(coefficient, "alpha", low, high, CELLS, trim, None, *by)
+            if varies:
+                yield Shape(coefficient, "qbar", *pressure, CELLS, middle, None, *by)
 
 
 def _of_readings(
@@ -140,7 +169,9 @@ def flown(record: TraceRecord, signal: str) -> Array:
     if signal == "alpha":
         return alpha
     if signal == "elevator":
-        return s.elevator_rad
+        return s.elevator_rad[:: s.sub * FINE]
+    if signal == "qbar":
+        return np.asarray(0.5 * s.density_kg_m3 * s.airspeed_m_s**2)[:: s.sub]
     half = 0.5 * chord / s.airspeed_m_s[:: s.sub]
     if signal == "qhat":
         return np.asarray(s.y[:, 1] * half)

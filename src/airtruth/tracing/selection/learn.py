@@ -99,11 +99,13 @@ class _Learning:
 
     def grown(self, rounds: tuple[SearchRound, ...]) -> tuple[tuple[SearchRound, ...], float]:
         """The rounds with one more for each accepted increment, and the log evidence of all of them."""
-        tried = shapes(self.problem)
+        every = shapes(self.problem)
         for _ in range(2 * MOST_INCREMENTS):
-            last = rounds[-1]
-            if last.anomaly.p_value > REMAINS or len(_accepted(rounds)) >= MOST_INCREMENTS:
+            last, accepted = rounds[-1], _accepted(rounds)
+            if last.anomaly.p_value > REMAINS or len(accepted) >= MOST_INCREMENTS:
                 break
+            # derivatives over a signal are flexible enough to describe what a first increment has wrong
+            tried = [s for s in every if not (accepted and s.factor)]
             candidates = self._candidates(last.null, last, tried)
             tied = _tied(candidates)
             rounds = (*rounds[:-1], replace(last, candidates=(*last.candidates, *candidates), tied=tied))
