@@ -152,7 +152,7 @@ def test_sigterm_stops_the_workers_and_leaves_a_campaign_that_resumes(tmp_path):
     temporary.mkdir()
     text = CAMPAIGN.read_text(encoding="utf-8") + '\n[[effect]]\nname = "elevator_delay"\ndelay_s = 0.03\n'
     (tmp_path / "c.toml").write_text(text, encoding="utf-8")
-    arguments = ["fly", "c.toml", "--out", "out", "--runs", "400", "--jobs", "2"]
+    arguments = ["fly", "c.toml", "--out", "out", "--runs", "400", "--jobs", "2", "--quiet"]
     process = subprocess.Popen(
         [sys.executable, "-m", "airtruth", *arguments],
         cwd=tmp_path,
