@@ -9,6 +9,7 @@ import pytest
 
 from airtruth.errors import LogError, StoreError
 from airtruth.identification import Options, identified, identify, json_of, spool, store, write_estimates
+from airtruth.identification.charts import intervals_chart
 from airtruth.identification.doubts import doubts
 from airtruth.identification.spool import Spool
 from airtruth.identification.tables import overview_of
@@ -116,6 +117,12 @@ def test_doubts_and_means_of_parts_are_those_of_all_runs(whole):
     assert all(any(word in sentence for sentence in expected) for word in words)
     assert doubts(parts) == expected
     assert as_text(overview_of(parts)) == as_text(overview_of(lambda: [estimates]))
+
+
+def test_estimates_of_no_run_are_an_empty_chart(whole):
+    chart = intervals_chart(whole.to_frame().iloc[:0])
+    assert chart.title.startswith("0 runs")
+    assert not any(panel.marks for panel in chart.panels)
 
 
 def test_a_run_that_two_logs_hold_is_refused_in_any_order_of_names(folder):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import trace_flights as flights
 import trace_records as tr
+from pydantic import TypeAdapter
 from scipy.stats import multivariate_normal
 
 from airtruth import aircraft as planes
@@ -150,9 +151,12 @@ def test_the_written_module_of_a_derivative_has_its_factor(value):
 
 def test_a_learned_derivative_survives_its_file_and_is_named_in_words():
     effect = of_a_derivative([0.0] * 5 + [-0.1, -0.2, -0.3, -0.4])
-    row = effect.to_dict()
-    assert (row["acts_on"], row["by"], row["by_at"], row["over"]) == ("Cm", "elevator_rad", 0.01, "alpha_rad")
-    assert "by" not in an_effect([0.0] * 9).to_dict()
+    plain = an_effect([0.0] * 9)
+    stored = TypeAdapter(AcceptedEffect)  # as `TraceAnswer.from_dict` reads the effects of trace.json
+    assert stored.validate_json(json.dumps(effect.to_dict())) == effect
+    assert stored.validate_json(json.dumps(plain.to_dict())) == plain
+    assert (effect.to_dict()["by"], effect.to_dict()["by_at"]) == ("elevator_rad", 0.01)
+    assert plain.by is None
     assert increment_words(effect).startswith("Cm by elevator_rad -0.40 at alpha_rad = 0.200")
 
 

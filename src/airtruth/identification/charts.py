@@ -76,6 +76,8 @@ def intervals_chart(
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def _marks(frames: Frames, methods: Sequence[str], *, single: bool) -> list[dict[str, Mark]]:
     """Marks in the row of each method, of the parameters that have a finite estimate of a converged run."""
+    if not methods:
+        return []
     # by columns: numpy adds those of a single part as it adds those of all runs
     total, count = (np.zeros((2, len(methods), len(_NAMES))) for _ in range(2))
     for frame in frames():

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 _FILTERS_S: Final = 0.25
 """Time for the filters of a model in each state, where engines have to run [s] (judgement: several lags of a servo)."""
 _POWER_S: Final = 10.0
-"""Time in which an engine regains the power that initial conditions take from it [s] (judgement: pc7 is within 4e-5 of its
+"""Time in which an engine regains the power that initial conditions take from it [s] (judgement: pc7 is within 4e-4 of its
 thrust)."""
 _SAME_RESPONSE: Final = 1e-3
 """Change of an acceleration at the trim from which an engine has lost power [m/s2], [rad/s2] (judgement: 1e-4 g)."""
@@ -100,9 +100,8 @@ def probe(
     states = _States(executive, trim)
     values = np.empty((*(axis.size for axis in axes), 3))
     surface = np.empty(values.shape[:-1])
-    for i, j, n, k in product(
-        *(range(axes[a].size) for a in (0, 1, 3, 2))
-    ):  # commands last: they cost the least
+    # commands innermost: they cost the least
+    for i, j, n, k in product(*(range(axes[a].size) for a in (0, 1, 3, 2))):
         at = (i, j, k, n)
         v, alpha, command, q = (float(axis[m]) for axis, m in zip(axes, at, strict=True))
         condition = replace(trim.condition, eas_m_s=trim.condition.eas_m_s * v / trim.airspeed_m_s)
@@ -155,8 +154,8 @@ class _States:
     """States of the grid, one after the other in one executive.
 
     Engines that run until they are steady keep the speed of the trim, because they cannot follow the motion of a flight
-    test; the filters of the model have time to settle. A turboprop loses its power where initial conditions are set, and has
-    time to regain it once for each state of motion. Where augmentation moves the surface, the command follows until
+    test; the filters of the model have time to settle. A turboprop loses its power where initial conditions are set: it runs
+    in each state of motion until it has regained that power. Where augmentation moves the surface, the command follows until
     the surface is where the same command puts it at the trim.
     """
 

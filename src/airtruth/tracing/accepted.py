@@ -120,6 +120,11 @@ class AcceptedEffect:
         """Name with the variant."""
         return effect_key(self.name, self.variant)
 
+    @property
+    def subject(self) -> str:
+        """Coefficient of a learned increment, or its derivative: `Cm by elevator_rad`; empty for other effects."""
+        return f"{self.acts_on} by {self.by}" if self.by else self.acts_on or ""
+
     def to_dict(self) -> dict[str, Any]:
         """Keys of contract 3; those that do not apply are left out."""
         row: dict[str, Any] = {

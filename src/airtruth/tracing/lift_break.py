@@ -42,8 +42,7 @@ def crossed_breaks(problem: TraceProblem, point: Parameters) -> tuple[float, ...
         if gust_rad < _GUST_RAD:
             continue
         plant = record.plant
-        at = int(np.argmin(np.abs(plant.elevator_rad - plant.trim_elevator_rad)))
-        x, z = plant.values[:, at, plant.qhat.size // 2, :2].T
+        x, z, _ = plant.over_alpha.T
         lift = x * np.sin(plant.alpha_rad) - z * np.cos(plant.alpha_rad)
         low, high = np.quantile(record.signals.y[:, 0] - plant.alpha_shift_rad, _FLOWN)
         crossed |= {angle for angle in breaks_of(plant.alpha_rad, lift) if low < angle < high}
@@ -68,8 +67,8 @@ def break_note(crossed: Sequence[float]) -> str:
     angles = ", ".join(f"{a / DEG:.1f}" for a in crossed)
     return (
         f"the lift curve of the declared aircraft breaks at an angle of attack of {angles} deg, which the records cross in "
-        "gusts; the tracer's uncertainty in gusts is that of a smooth curve, so that the answer is provisional. Records in "
-        "calm air decide"
+        "gusts; the tracer's uncertainty in gusts is that of a smooth curve. The answer is therefore provisional; trace "
+        "records in calm air to confirm it"
     )
 
 

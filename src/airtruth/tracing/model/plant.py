@@ -71,6 +71,20 @@ class Plant:
     derivative_cov: Array
     trim: Trim | None
 
+    @property
+    def over_alpha(self) -> Array:
+        """(alpha, 3) of the tables, at the elevator's point next to its trim and no pitch rate."""
+        return np.asarray(self._steady[:, int(np.argmin(np.abs(self.elevator_rad - self.trim_elevator_rad)))])
+
+    @property
+    def over_elevator(self) -> Array:
+        """(elevator, 3) of the tables, at the angle of attack's point next to its trim and no pitch rate."""
+        return np.asarray(self._steady[int(np.argmin(np.abs(self.alpha_rad - self.trim_alpha_rad)))])
+
+    @property
+    def _steady(self) -> Array:
+        return self.values[:, :, int(np.argmin(np.abs(self.qhat)))]
+
 
 def trim_of(
     aircraft: Aircraft, airspeed_m_s: float, density_kg_m3: float, altitude_m: float, gamma_rad: float

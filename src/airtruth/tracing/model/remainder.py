@@ -74,7 +74,7 @@ def remainder(signals: Signals, plant: Plant) -> Array:
         ]
     )
     if change.aero:
-        found -= _declared(change, flown, surface, qhat, half, dt_s)
+        found -= _declared(change, flown, surface, qhat, pressure, half, dt_s)
     grid = np.arange((signals.y.shape[0] - 1) * signals.sub + 1) * (signals.dt_s / signals.sub)
     time = np.arange(found.shape[1]) * dt_s
     return np.stack([np.interp(grid, time, row) for row in found])
@@ -99,7 +99,13 @@ def track_of(signals: Signals) -> Track:
 
 
 def _declared(
-    change: Change, flown: Mapping[str, Array], surface: Array, qhat: Array, half: Array, dt_s: float
+    change: Change,
+    flown: Mapping[str, Array],
+    surface: Array,
+    qhat: Array,
+    pressure: Array,
+    half: Array,
+    dt_s: float,
 ) -> Array:
     """(2, steps) increments of the dynamics that aircraft.toml declares, along the flown motion."""
     alpha = flown["alpha_rad"]
@@ -108,7 +114,7 @@ def _declared(
         "elevator": surface[None],
         "qhat": qhat[None],
         "alpha_dot_hat": (np.gradient(alpha, dt_s) * half)[None],
-        "qbar": (0.5 * flown["density_kg_m3"] * flown["airspeed_m_s"] ** 2)[None],
+        "qbar": pressure[None],
     }
     signals |= {s.name: state_of(s, signals[s.signal], dt_s) for s in change.states}
     return increments(change.aero, signals)[:, 0]

@@ -120,15 +120,14 @@ def _learned(effect: AcceptedEffect, table: IncrementTable | None) -> Panel:
         return Panel(title="the effect", words="no table")
     over = effect.over or ""
     factor, unit = (1.0 / DEG, "deg") if over.endswith("_rad") else (1.0, "Pa" if over == "qbar_pa" else "-")
-    subject = f"{effect.acts_on} by {effect.by}" if effect.by else effect.acts_on
     x = [factor * at for at in table.at]
     bottom, top = min(table.low), max(table.high)
     most = max(*table.samples, 1)
     density = [bottom - (top - bottom) * _DENSITY * (1.0 - n / most) for n in table.samples]
     return Panel(
-        title=f"the effect: increment of {subject}",
+        title=f"the effect: increment of {effect.subject}",
         x_label=f"{'state driven by ' if effect.states else ''}{over.removesuffix('_rad').removesuffix('_pa')} [{unit}]",
-        y_label=f"increment of {subject}",
+        y_label=f"increment of {effect.subject}",
         lines=(
             replace(line(x, table.value), label="learned", colour="vermillion"),
             replace(line(x, table.low), label="95 % band", colour="vermillion", stroke="dotted"),
@@ -141,11 +140,7 @@ def _learned(effect: AcceptedEffect, table: IncrementTable | None) -> Panel:
 def _declared_curve(plant: Plant, term: AeroTerm) -> Array:
     """The declared coefficient over the term's signal, the other angle at its trim and the pitch rate zero."""
     c = plant.aircraft.constants
-    middle = plant.values[:, :, int(np.argmin(np.abs(plant.qhat)))]
-    if term.signal == "alpha":
-        column = middle[:, int(np.argmin(np.abs(plant.elevator_rad - plant.trim_elevator_rad)))]
-    else:
-        column = middle[int(np.argmin(np.abs(plant.alpha_rad - plant.trim_alpha_rad)))]
+    column = plant.over_alpha if term.signal == "alpha" else plant.over_elevator
     if term.coefficient == "Cm":
         return np.asarray(column[:, 2] / (c.wing_area_m2 * c.chord_m))
     return np.asarray(-column[:, 1] / c.wing_area_m2)

@@ -171,13 +171,12 @@ def effect_line(effect: AcceptedEffect) -> str:
 def increment_words(effect: AcceptedEffect) -> str:
     """A learned increment in words: largest value, onset, memory, and size relative to the declared model."""
     over, table = effect.over or "", effect.table
-    subject = f"{effect.acts_on} by {effect.by}" if effect.by else effect.acts_on
     parts = []
     if table is not None:
         i = max(range(len(table.at)), key=lambda k: abs(table.value[k]))
         low, high = significant(table.low[i], 2), significant(table.high[i], 2)
         parts.append(
-            f"{subject} {significant(table.value[i], 2)} at {over} = {significant(table.at[i])} "
+            f"{effect.subject} {significant(table.value[i], 2)} at {over} = {significant(table.at[i])} "
             f"(95 %: {low} to {high})"
         )
         parts.append(_onset(table, over))

@@ -29,6 +29,8 @@ from airtruth.tracing.selection.score_test import Direction, gradients
 
 Array = NDArray[np.float64]
 
+_COEFFICIENTS: Final[tuple[Literal["CL", "Cm"], ...]] = ("CL", "Cm")
+"""Coefficients that an increment changes."""
 CELLS: Final = 8
 """Number of cells of a function [-] (judgement: a six-record flight test resolves no finer function)."""
 _QUANTILES: Final = (0.005, 0.995)
@@ -79,7 +81,6 @@ class Screened:
 
 def shapes(problem: TraceProblem) -> list[Shape]:
     """Every shape that the records can hold, over the range that they cover: of the coefficients, then of the readings."""
-    found: list[Shape] = []
     records = problem.records
     ranges = {name: _range(records, name) for name in ("alpha", "elevator", "qhat", "alpha_dot_hat")}
     trims = {
@@ -87,8 +88,8 @@ def shapes(problem: TraceProblem) -> list[Shape]:
         "elevator": float(np.mean([r.plant.trim_elevator_rad for r in records])),
     }
     highest_hz = _NYQUIST_SHARE * 0.5 / max(r.signals.dt_s for r in records)
-    coefficients: tuple[Literal["CL", "Cm"], ...] = ("CL", "Cm")
-    for coefficient in coefficients:
+    found: list[Shape] = []
+    for coefficient in _COEFFICIENTS:
         for name, (low, high) in ranges.items():
             trim = min(max(trims.get(name, 0.0), low), high)
 
@@ -123,14 +124,13 @@ def _over_pressure_and_pairs(
 
     The derivative in alpha over alpha is the coefficient over alpha, which is tried without a factor.
     """
-    coefficients: tuple[Literal["CL", "Cm"], ...] = ("CL", "Cm")
     pressure = _range(records, "qbar")
     middle = 0.5 * (pressure[0] + pressure[1])
     varies = pressure[1] - pressure[0] > _LEAST_PRESSURE * middle
     low, high = ranges["alpha"]
     trim = min(max(trims["alpha"], low), high)
     excited = [name for name in FACTORS if ranges[name][1] > ranges[name][0]]
-    for coefficient in coefficients:
+    for coefficient in _COEFFICIENTS:
         if varies:
             yield Shape(coefficient, "qbar", *pressure, CELLS, middle)
         for name in excited:
