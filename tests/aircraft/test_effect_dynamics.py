@@ -7,8 +7,9 @@ from pydantic import ValidationError
 from airtruth import aircraft as planes
 from airtruth.aircraft import Dynamics
 from airtruth.aircraft.dynamics import declared_dynamics, with_change
+from airtruth.aircraft.neutral import effective
 from airtruth.aircraft.write import write_aircraft
-from airtruth.physics.terms import AeroTerm, Change, StateTerm, SurfaceTerm
+from airtruth.physics.terms import AeroTerm, Change, ReadingTerm, StateTerm, SurfaceTerm
 from airtruth.quantity import explain
 
 SURFACE = (SurfaceTerm("delay", 0.02), SurfaceTerm("rate_limit", 0.5))
@@ -50,6 +51,21 @@ def test_a_second_change_stands_behind_the_first_under_a_name_of_its_own():
     assert [r.value for r in twice.surface] == [0.02, 0.5, 0.02, 0.5]
     assert [r.name for r in twice.states] == ["mode", "mode_2"]
     assert [r.signal for r in twice.aero] == ["mode", "alpha_dot_hat", "mode_2", "alpha_dot_hat"]
+
+
+def test_a_reading_keeps_the_state_that_multiplies_it(tmp_path):
+    """Through the neutral terms, the file, a second change and the declared dynamics."""
+    lag = StateTerm("late", "lag", "alpha", 0.1)
+    change = Change(
+        states=(lag,), readings=(ReadingTerm("alpha_rad", "qbar", "above", -2e-4, 900.0, behind="late"),)
+    )
+    assert effective(change) == change
+    once = planes.load(write_aircraft("gtm", change, tmp_path / "once")).file.dynamics
+    assert (once.states, once.readings) == (change.states, change.readings)
+    twice = with_change(once, change)
+    assert [r.behind for r in twice.readings] == ["late", "late_2"]
+    declared = declared_dynamics(twice)
+    assert [r.behind for r in declared.readings] == [s.name for s in declared.states]
 
 
 def test_the_file_says_it_to_the_last_bit(tmp_path):

@@ -54,5 +54,32 @@ def test_terms_add_by_channel_each_over_its_signal():
     np.testing.assert_allclose(more["q_rad_s"][0], expected, atol=2e-9)
 
 
+def test_a_lag_that_depends_on_the_dynamic_pressure_is_what_a_state_is_behind_its_signal():
+    """To first order in the change of the time constant: y' = (s - y)/(tau + dtau), against an integration of it."""
+    speed = np.linspace(38.0, 42.0, 200)
+    truth = {
+        "alpha_rad": SIGNAL[None, :],
+        "elevator_rad": np.zeros((1, 200)),
+        "q_rad_s": np.zeros((1, 200)),
+        "airspeed_m_s": speed[None, :],
+        "density_kg_m3": np.full((1, 200), 1.2),
+    }
+    tau, middle, slope = 0.1, 0.5 * 1.2 * 40.0**2, -2e-5  # [s], [Pa], [s/Pa]: 2 ms of 100 at either end
+
+    def late(t, y):
+        qbar = 0.6 * np.interp(t, T, speed) ** 2
+        return [(np.interp(t, T, SIGNAL) - y[0]) / (tau + slope * (qbar - middle))]
+
+    exact = solve_ivp(late, (0.0, T[-1]), [SIGNAL[0]], t_eval=T, rtol=1e-10, atol=1e-13, max_step=DT / 2).y[0]
+    # behind the lag itself, the increment is that of the lag: L_(tau + d) s = L_tau (s + d/tau (L_tau s - s)) + O(d^2)
+    lag = StateTerm("lag", "lag", "alpha", tau)
+    term = ReadingTerm("alpha_rad", "qbar", "linear", slope / tau, middle, behind="lag")
+    more = reading_increments((term,), (lag,), truth, chord_m=0.3, dt_s=DT)["alpha_rad"]
+    read = state_of(StateTerm("y", "lag", "alpha", tau), SIGNAL[None, :] + more, DT)[0]
+    constant = state_of(StateTerm("y", "lag", "alpha", tau), SIGNAL[None, :], DT)[0]
+    assert np.abs(exact - constant).max() > 1e-4
+    np.testing.assert_allclose(read, exact, atol=0.04 * np.abs(exact - constant).max())
+
+
 def test_sensors_without_terms_read_nothing_else():
     assert reading_increments((), (), {}, 0.3, DT) == {}

@@ -16,7 +16,7 @@ from airtruth.aircraft import write as writing
 from airtruth.effects.increment import Shape, increment
 from airtruth.physics.terms import AeroTerm, Change, shape_of, term_value
 from airtruth.tracing import TraceOptions, trace
-from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
+from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable
 from airtruth.tracing.effect_module import MODULE, effect_module
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
@@ -160,6 +160,38 @@ def test_a_learned_derivative_survives_its_file_and_is_named_in_words():
     assert increment_words(effect).startswith("Cm by elevator_rad -0.40 at alpha_rad = 0.200")
 
 
+CHANGING_LAG = "alpha_rad by a lag of alpha_rad over qbar_pa"
+
+
+def test_a_lag_that_changes_with_the_dynamic_pressure_has_its_module_and_its_words():
+    """Its table is the change of the time constant over the time constant of the state."""
+    table = replace(
+        an_effect([0.0] * 5 + [-0.1, -0.2, -0.3, -0.4]).table,
+        at=tuple(np.linspace(900.0, 1100.0, 9).tolist()),
+    )
+    effect = AcceptedEffect(
+        "increment",
+        {},
+        0.0,
+        1.0,
+        variant=CHANGING_LAG,
+        acts_on="alpha_rad",
+        over="qbar_pa",
+        by="alpha_rad",
+        table=table,
+        states=(IncrementState("lag", "alpha_rad", 0.1, 0.0),),
+    )
+    words = increment_words(effect)
+    assert words.startswith("alpha_rad by a lag of alpha_rad -0.40 at qbar_pa = 1100")
+    assert "the time constant changes by -0.040 s there" in words
+    (learned,) = executed(effect_module(Answer(effect)))
+    assert learned.name == "learned_alpha_rad_alpha_qbar"
+    change = learned.change({p.name: {"slope": -4e-3, "at": 1000.0}[p.name] for p in learned.parameters})
+    (state,), (term,) = change.states, change.readings
+    assert (state.signal, state.time_s) == ("alpha", 0.1)
+    assert (term.channel, term.signal, term.behind) == ("alpha_rad", "qbar", state.name)
+
+
 def test_pairs_and_the_dynamic_pressure_are_tried_where_the_airspeed_varies():
     names = {v: {s.variant for s in shapes(tr.problem([varying(v)]))} for v in (0.0, 0.05)}
     pairs = {
@@ -174,7 +206,7 @@ def test_pairs_and_the_dynamic_pressure_are_tried_where_the_airspeed_varies():
         for by in ("", " by alpha_rad", " by elevator_rad", " by q_hat")
     }
     assert pairs <= names[0.0]
-    assert names[0.05] - names[0.0] == pressure
+    assert names[0.05] - names[0.0] == pressure | {CHANGING_LAG}
 
 
 @pytest.mark.parametrize("signal", ["alpha", "elevator", "qhat", "alpha_dot_hat", "qbar"])

@@ -1,5 +1,7 @@
 """Increments of readings: in the filter, in the flown log, in the updated aircraft, and learned from records."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trace_flights as flights
@@ -8,7 +10,7 @@ import trace_records as tr
 from airtruth import aircraft
 from airtruth.aircraft.write import write_aircraft
 from airtruth.effects.increment import Memory, Shape, increment
-from airtruth.physics.readings import state_of
+from airtruth.physics.readings import reading_increments, state_of
 from airtruth.physics.terms import Change, ReadingTerm, StateTerm
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.compensate import Compensation, Condition, compensated_log
@@ -50,6 +52,35 @@ def test_the_filter_adds_a_mode_to_one_reading(channel, output):
     expected = 0.3 * (state - s.elevator_rad)[:: s.sub * FINE]
     moved = read(problem, Change()) - read(problem, change)
     np.testing.assert_allclose(moved[:, output], expected, atol=1e-3 * np.abs(expected).max())
+
+
+def test_the_filter_changes_the_lag_of_the_vane_with_the_dynamic_pressure():
+    """The innovation changes by the increment of `reading_increments`, along the predicted angle of attack."""
+    one = tr.fly(np.random.default_rng(1), amplitude=2.0 * DEG, sigma_w=0.0, name="a")
+    speed = one.signals.airspeed_m_s * np.linspace(1.0, 1.04, one.signals.airspeed_m_s.size)
+    one = replace(one, signals=replace(one.signals, airspeed_m_s=speed))
+    problem, s = tr.problem([one]), one.signals
+    pressure = 0.5 * s.density_kg_m3 * speed**2
+    shape = Shape(
+        "alpha_rad", "qbar", pressure[0], pressure[-1], 4, pressure.mean(), Memory("lag", 0.1), "alpha", 0.0
+    )
+    change = increment(shape).describe({"bend_1": -0.2, "bend_2": 0.0, "bend_3": -0.1})
+    start = initial_parameters(problem, tr.NOTHING)
+    start.per_record[0, PerRecord.log_gust] = np.log(1e-6)
+    alpha = s.y[:, 0] - respond(one, problem.settings, Change(), start.common, start.per_record[0]).e[:, 0]
+    truth = {
+        "alpha_rad": alpha[None, :],
+        "elevator_rad": np.zeros((1, alpha.size)),
+        "q_rad_s": np.zeros((1, alpha.size)),
+        "airspeed_m_s": speed[None, :: s.sub],
+        "density_kg_m3": s.density_kg_m3[None, :: s.sub],
+    }
+    chord = one.plant.aircraft.constants.chord_m
+    expected = reading_increments(change.readings, change.states, truth, chord, s.dt_s)["alpha_rad"][0]
+    moved = read(problem, Change()) - read(problem, change)
+    assert np.abs(expected).max() > 1e-4
+    np.testing.assert_allclose(moved[:, 0], expected, atol=0.02 * np.abs(expected).max())
+    assert np.abs(moved[:, 1:]).max() < 1e-9
 
 
 def test_the_flown_log_and_the_updated_aircraft_have_the_increment(tmp_path):

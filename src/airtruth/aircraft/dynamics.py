@@ -41,7 +41,10 @@ def with_change(declared: Dynamics | None, change: Change) -> Dynamics | None:
         aero=(*own.aero, *(replace(t, signal=names.get(t.signal, t.signal)) for t in dynamic)),
         readings=(
             *own.readings,
-            *(replace(t, signal=names.get(t.signal, t.signal)) for t in change.readings),
+            *(
+                replace(t, signal=names.get(t.signal, t.signal), behind=names.get(t.behind, t.behind))
+                for t in change.readings
+            ),
         ),
     )
     return None if result == Dynamics() else result
@@ -70,7 +73,11 @@ def declared_dynamics(dynamics: Dynamics | None) -> Change:
         states=tuple(replace(state, name=_DECLARED + state.name) for state in dynamics.states),
         aero=tuple(aero),
         readings=tuple(
-            replace(t, signal=_DECLARED + t.signal if t.signal in inputs else t.signal)
+            replace(
+                t,
+                signal=_DECLARED + t.signal if t.signal in inputs else t.signal,
+                behind=_DECLARED + t.behind if t.behind else "",
+            )
             for t in dynamics.readings
         ),
     )

@@ -16,7 +16,9 @@ def effective(change: Change) -> Change:
     """Return the change without neutral terms, and without states that no term reads."""
     aero = tuple(term for term in change.aero if term.amplitude != 0.0)
     readings = tuple(term for term in change.readings if term.amplitude != 0.0)
-    signals = {term.signal for term in aero} | {term.signal for term in readings}
+    signals = {term.signal for term in aero} | {
+        name for term in readings for name in (term.signal, term.behind)
+    }
     return replace(
         change,
         surface=tuple(term for term in change.surface if not _neutral_surface(term)),

@@ -4,7 +4,8 @@ without.
     dC = sum_k b_k/w h_k(s) [(p - p0)]  [+ a (x - s)],   h_k = max(0, s - s_k) above the trim, min(0, s - s_k) below it
 
 s is the signal, or the state x of a first-order lag or of a mode that the signal drives; w is the width of a cell. With a
-factor p, which counts from p0, the function is an increment of the derivative of p. The
+factor p, which counts from p0, the function is an increment of the derivative of p. With the factor x - p, x the lag of p
+with the time constant tau, it is the change of a lag's time constant over tau, small against one. The
 function is zero in the cell that holds the trim, where the derivatives describe the aircraft, and constant outside the
 range in which it was learned. The bends b_k have independent normal priors, which is the prior of an integrated random
 walk: a penalised linear spline.
@@ -97,8 +98,10 @@ class Shape:
     low, high : range of the signal in which the increment is learned [unit of the signal].
     cells : number of equal cells of the range; 0 for a linear increment, which needs ``memory``.
     trim : value of the signal at the trim.
-    memory : state between the signal and the increment; None for an increment of the signal itself.
-    factor : one of `airtruth.physics.terms.FACTORS`, whose derivative changes; empty where the coefficient itself does.
+    memory : state between the signal and the increment; None for an increment of the signal itself. With a factor, the lag
+        whose time constant changes.
+    factor : one of `airtruth.physics.terms.FACTORS`, whose derivative changes, or whose lag in a reading does; empty where
+        the coefficient or the reading itself does.
     factor_trim : value of the factor at the trim.
     """
 
@@ -134,9 +137,16 @@ class Shape:
         return self.acts_on in READINGS
 
     @property
+    def of_derivative(self) -> bool:
+        """Whether it changes a derivative instead of a coefficient."""
+        return bool(self.factor) and not self.of_reading
+
+    @property
     def variant(self) -> str:
         """Variant of the effect: coefficient or channel, signal and memory."""
         over = SIGNAL_NAMES[self.signal]
+        if self.factor and self.memory is not None:
+            return f"{self.acts_on} by a {self.memory.kind} of {SIGNAL_NAMES[self.factor]} over {over}"
         if self.factor:
             return f"{self.acts_on} by {SIGNAL_NAMES[self.factor]} over {over}"
         if self.memory is None:
@@ -147,6 +157,9 @@ class Shape:
         """Terms of the increment at given parameters."""
         if self.memory is None:
             return self._change(self._bends(values, self.signal))
+        if self.factor:
+            lag = StateTerm(self.state, self.memory.kind, self.factor, self.memory.time_s)
+            return self._change(self._bends(values, self.signal), lag)
         state = StateTerm(
             self.state, self.memory.kind, self.signal, values["time_s"], values.get("damping", 0.0)
         )
@@ -166,7 +179,10 @@ class Shape:
             by = (self.factor, self.factor_trim) if self.factor else ()
             return Change(states=states, aero=tuple(AeroTerm(coefficient, *piece, *by) for piece in pieces))
         channel = self.acts_on
-        return Change(states=states, readings=tuple(ReadingTerm(channel, *piece) for piece in pieces))
+        behind = self.state if self.factor else ""
+        return Change(
+            states=states, readings=tuple(ReadingTerm(channel, *piece, behind=behind) for piece in pieces)
+        )
 
     def _bends(self, values: Mapping[str, float], signal: str) -> tuple[Piece, ...]:
         sides: tuple[Literal["below", "above"], ...] = ("below", "above")
@@ -249,7 +265,7 @@ def increment(shape: Shape, prior_std: float = math.inf) -> Increment:
     parameters = [
         Parameter(name, "-", meaning, -reach, reach, 0.0, step=step, prior_std=prior_std) for name in names
     ]
-    if shape.memory is not None:
+    if shape.memory is not None and not shape.factor:
         parameters += _times(shape.memory)
     acts = _ACTS.get(shape.acts_on, f"reading of {shape.acts_on}")
     return Increment(

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.physics.atmosphere import air_density
 from airtruth.physics.terms import ReadingTerm, StateTerm, shape_of
 
 Array = NDArray[np.float64]
@@ -44,7 +45,8 @@ def reading_increments(
     Parameters
     ----------
     terms, states : of the sensors; states that no term names do not matter.
-    truth : alpha_rad, elevator_rad, q_rad_s and airspeed_m_s, (runs, samples) each, at the CG [SI].
+    truth : alpha_rad, elevator_rad, q_rad_s and airspeed_m_s, (runs, samples) each, at the CG [SI]; with density_kg_m3
+        or altitude_m where a term names the dynamic pressure.
     chord_m : reference chord [m]; qhat = q c/(2V).
     dt_s : sample period [s].
 
@@ -59,11 +61,16 @@ def reading_increments(
         "elevator": truth["elevator_rad"],
         "qhat": truth["q_rad_s"] * (0.5 * chord_m) / truth["airspeed_m_s"],
     }
-    named = {term.signal for term in terms}
+    named = {name for term in terms for name in (term.signal, term.behind)}
+    if "qbar" in named:
+        signals["qbar"] = 0.5 * np.asarray(air_density(truth)) * truth["airspeed_m_s"] ** 2
+    drivers = {s.name: s.signal for s in states}
     signals |= {s.name: state_of(s, signals[s.signal], dt_s) for s in states if s.name in named}
     total: dict[str, Array] = {}
     for term in terms:
         more = term.amplitude * shape_of(term, signals[term.signal])
+        if term.behind:
+            more = more * (signals[term.behind] - signals[drivers[term.behind]])
         total[term.channel] = total.get(term.channel, 0.0) + more
     return total
 

@@ -121,17 +121,20 @@ class AeroTerm:
 
 @dataclass(frozen=True)
 class ReadingTerm:
-    """An increment of a reading: channel += amplitude f(signal), f by `shape_of`.
+    """An increment of a reading: channel += amplitude f(signal) [(x - s)], f by `shape_of`.
 
     It acts where the instrument is, before its lag, delay and scale.
 
     Attributes
     ----------
     channel : one of `READINGS`.
-    signal : "alpha" [rad] of the air at the CG, "elevator" [rad], "qhat" = q c/(2V), or the name of a `StateTerm`.
+    signal : "alpha" [rad] of the air at the CG, "elevator" [rad], "qhat" = q c/(2V), "qbar" [Pa], or the name of a
+        `StateTerm`.
     shape : name of f, see `FORMULAS`.
     amplitude : per unit of f [unit of the channel]; neutral 0.
     at : origin of f [unit of the signal].
+    behind : name of a `StateTerm` x of a signal s; a small lag whose time constant depends on the dynamic pressure has
+        f(qbar) (x - s). Empty for none.
     """
 
     channel: Literal["alpha_rad", "q_rad_s", "az_m_s2"]
@@ -139,6 +142,7 @@ class ReadingTerm:
     shape: Literal["linear", "quadratic", "above", "below"]
     amplitude: float
     at: float = 0.0
+    behind: str = ""
 
 
 def shape_of(term: AeroTerm | ReadingTerm, signal: ArrayLike) -> Array:

@@ -91,7 +91,8 @@ class AcceptedEffect:
     channel : delayed channel, of `sensor_delay` alone.
     about_alpha_rad : angle of attack about which a curvature counts [rad]; None for other effects.
     acts_on, over : of a learned increment: coefficient, and the signal on which it depends; None for other effects.
-    by, by_at : of a learned increment of a derivative: the signal that multiplies the table, and from where it counts.
+    by, by_at : of a learned increment of a derivative: the signal that multiplies the table, and from where it counts; of
+        a lag that changes: the signal that is late.
     relative_size : its swing over that of the declared derivative in the flown range [-]; of a linear one its share.
     table : the increment with its band; None for a linear one, whose share is a parameter.
     states : what lies between signal and increment; empty for a function of the signal itself.
@@ -122,8 +123,10 @@ class AcceptedEffect:
 
     @property
     def subject(self) -> str:
-        """Coefficient of a learned increment, or its derivative: `Cm by elevator_rad`; empty for other effects."""
-        return f"{self.acts_on} by {self.by}" if self.by else self.acts_on or ""
+        """Coefficient or reading of a learned increment, or its derivative: `Cm by elevator_rad`; empty for other effects."""
+        if self.by:
+            return f"{self.acts_on} by {'a lag of ' if self.states else ''}{self.by}"
+        return self.acts_on or ""
 
     def to_dict(self) -> dict[str, Any]:
         """Keys of contract 3; those that do not apply are left out."""

@@ -110,10 +110,12 @@ py-modules = ["{module}"]
 def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
     """Function of the terms and the effect, as Python."""
     form = _form(e)
-    driver = _SIGNALS[e.over or ""]
-    signal = "learned-state" if e.states else driver
+    over, factor = _SIGNALS[e.over or ""], _SIGNALS[e.by] if e.by else ""
+    driver = factor if e.states and factor else over
+    signal = "learned-state" if e.states and not factor else over
     trim = e.table.trim if e.table is not None else 0.0
-    by = f', "{_SIGNALS[e.by]}", {e.by_at!r}' if e.by else ""
+    by = ', behind="learned-state"' if e.states else f', "{factor}", {e.by_at!r}'
+    by = by if factor else ""
     field, term = ("readings", "ReadingTerm") if e.acts_on in READINGS else ("aero", "AeroTerm")
     values = {name: p.value for name, p in e.parameters.items()} if form is None else form.values
     sizes = {k: v for k, v in values.items() if k not in ("at", "width", "time_s", "damping")}
@@ -142,7 +144,7 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
     lines = "".join(f"        {p},\n" for p in parameters)
     yield (
         f"EFFECT_{number} = Effect(\n"
-        f'    name="learned_{(e.acts_on or "").lower()}_{f"{_SIGNALS[e.by]}_" if e.by else ""}{driver}",\n'
+        f'    name="learned_{(e.acts_on or "").lower()}_{f"{factor}_" if factor else ""}{over}",\n'
         f'    variant="{"-".join(k for k, _, _ in state)}",\n'
         f'    where="{"sensor" if e.acts_on in READINGS else "dynamics"}",\n    parameters=(\n{lines}    ),\n'
         f"    describe=_terms_{number},\n"

@@ -113,7 +113,7 @@ def _effects(change: Change, first: Ints) -> EffectArrays:
     """Terms of coefficients and readings, and states, by numbers; ``first``: first state of each effect with states."""
     names = [s.name for s in change.states]
     every: list[AeroTerm | ReadingTerm] = [*change.aero, *change.readings]
-    terms = np.zeros((len(every), 5), dtype=np.int64)
+    terms = np.zeros((len(every), 6), dtype=np.int64)
     for i, term in enumerate(every):
         acts_on = term.channel if isinstance(term, ReadingTerm) else term.coefficient
         signal = _index(term.signal, (*SIGNALS, *names), "signal")
@@ -124,10 +124,13 @@ def _effects(change: Change, first: Ints) -> EffectArrays:
             _index(term.shape, SHAPES, "shape"),
             first[signal - len(SIGNALS)] if own else -1,
             -1,
+            -1,
         )
         if isinstance(term, AeroTerm) and term.factor:
             _index(term.factor, FACTORS, "factor")
             terms[i, 4] = SIGNALS.index(term.factor)
+        if isinstance(term, ReadingTerm) and term.behind:
+            terms[i, 5] = _index(term.behind, tuple(names), "state")
     states = np.zeros((len(change.states), 2), dtype=np.int64)
     for i, state in enumerate(change.states):
         states[i] = _index(state.kind, STATE_KINDS, "state"), _index(state.signal, DRIVERS, "signal")

@@ -272,9 +272,14 @@ def _add_readings(x: Array, alpha: float, at: AirPoint, model: FilterModel, y: A
             surface = effective_elevator(at.elevator_rad, model.aircraft)
             qhat = x[1] * 0.5 * model.aircraft.chord_m / at.airspeed_m_s
             state = effects.term_index[t, 3]
-            own = _signal(Signals(alpha, surface, qhat, 0.0, at.qbar_pa), effects.term_index[t, 1])
-            s = x[state] if state >= 0 else own
-            y[output] += effects.amplitude[t] * _shape(effects.term_index[t, 2], s - effects.origin[t])
+            signals = Signals(alpha, surface, qhat, 0.0, at.qbar_pa)
+            s = x[state] if state >= 0 else _signal(signals, effects.term_index[t, 1])
+            more = effects.amplitude[t] * _shape(effects.term_index[t, 2], s - effects.origin[t])
+            behind = effects.term_index[t, 5]
+            if behind >= 0:
+                driver = _signal(signals, effects.state_index[behind, 1])
+                more *= x[model.states.effect[behind]] - driver
+            y[output] += more
 
 
 @inner

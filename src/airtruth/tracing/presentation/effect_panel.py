@@ -120,13 +120,14 @@ def _learned(effect: AcceptedEffect, table: IncrementTable | None) -> Panel:
         return Panel(title="the effect", words="no table")
     over = effect.over or ""
     factor, unit = (1.0 / DEG, "deg") if over.endswith("_rad") else (1.0, "Pa" if over == "qbar_pa" else "-")
+    behind = "state driven by " if effect.states and not effect.by else ""
     x = [factor * at for at in table.at]
     bottom, top = min(table.low), max(table.high)
     most = max(*table.samples, 1)
     density = [bottom - (top - bottom) * _DENSITY * (1.0 - n / most) for n in table.samples]
     return Panel(
         title=f"the effect: increment of {effect.subject}",
-        x_label=f"{'state driven by ' if effect.states else ''}{over.removesuffix('_rad').removesuffix('_pa')} [{unit}]",
+        x_label=f"{behind}{over.removesuffix('_rad').removesuffix('_pa')} [{unit}]",
         y_label=f"increment of {effect.subject}",
         lines=(
             replace(line(x, table.value), label="learned", colour="vermillion"),

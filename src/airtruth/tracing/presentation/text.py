@@ -179,10 +179,14 @@ def increment_words(effect: AcceptedEffect) -> str:
             f"{effect.subject} {significant(table.value[i], 2)} at {over} = {significant(table.at[i])} "
             f"(95 %: {low} to {high})"
         )
+        if effect.by and effect.states:
+            change_s = table.value[i] * effect.states[0].time_s
+            parts.append(f"the time constant changes by {significant(change_s, 2)} s there")
         parts.append(_onset(table, over))
     parts += [
         f"through a {s.kind} of {significant(s.time_s, 2)} s" + (" (1/wn)" if s.kind == "mode" else "")
         for s in effect.states
+        if not effect.by
     ]
     if effect.relative_size is not None:
         whole = (

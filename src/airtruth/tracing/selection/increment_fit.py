@@ -224,6 +224,7 @@ def _share_of_channel(records: Sequence[TraceRecord], own: PosteriorFit, effect:
             "elevator_rad": s.elevator_rad[None, :: s.sub * FINE],
             "q_rad_s": s.y[None, :, 1],
             "airspeed_m_s": s.airspeed_m_s[None, :: s.sub],
+            "density_kg_m3": s.density_kg_m3[None, :: s.sub],
         }
         chord = r.plant.aircraft.constants.chord_m
         more = reading_increments(terms.readings, terms.states, signals, chord, s.dt_s)

@@ -42,6 +42,8 @@ _LAGS_S: Final = (0.03, 0.08, 0.2, 0.5, 1.2)
 _LEAST_PRESSURE: Final = 0.04
 """Least range of the dynamic pressure over its mean in which an increment over it is tried [-] (judgement: an airspeed that
 changes by 2 %)."""
+_SENSOR_LAGS_S: Final = (0.03, 0.1, 0.3)
+"""Time constants about which a lag of the vane that changes with the dynamic pressure is tried [s] (judgement)."""
 _SLOW_S: Final = (0.08, 0.2, 0.5)
 """Time constants behind which functions are tried [s] (judgement: separation and hysteresis)."""
 _MODES_HZ: Final = (0.7, 1.4, 2.8, 5.6, 10.0)
@@ -52,6 +54,9 @@ _NEARBY: Final = tuple(np.geomspace(1.0 / 1.25, 1.25, 7).tolist())
 """Frequencies tried about that of a leading mode, over it [-] (judgement: half a step of `_STRUCTURE_HZ` to either side)."""
 _DAMPINGS: Final = (0.02, 0.06, 0.2)
 """Damping ratios tried about a leading mode [-] (judgement)."""
+_FINER: Final = (12, 16, 24, 36)
+"""Numbers of cells tried for a leading function [-] (judgement: a break between two knots leaves a quarter of its change of
+slope over a cell, and a finer function has its knots elsewhere)."""
 _STRUCTURE_HZ: Final = (2.8, 4.0, 5.6, 8.0, 11.0)
 """Natural frequencies of modes that are tried at a sensor [Hz] (judgement: closer than `_MODES_HZ`, because the refit has
 to find a narrow peak)."""
@@ -112,7 +117,7 @@ def shapes(problem: TraceProblem) -> list[Shape]:
                 for time_s in _SLOW_S:
                     add(CELLS, Memory("lag", time_s))
     found += _over_pressure_and_pairs(records, ranges, trims)
-    of_readings = _of_readings(ranges, trims, highest_hz)
+    of_readings = [*_of_readings(ranges, trims, highest_hz), *_of_a_changing_lag(records, trims)]
     measured = dict(zip(READINGS, problem.settings.measured, strict=True))
     return found + [shape for shape in of_readings if measured[shape.acts_on]]
 
@@ -156,6 +161,16 @@ def _of_readings(
             for hz in _STRUCTURE_HZ:
                 if hz < highest_hz:
                     yield Shape(channel, name, low, high, 0, trim, _mode(hz))
+
+
+def _of_a_changing_lag(records: Sequence[TraceRecord], trims: Mapping[str, float]) -> Iterator[Shape]:
+    """A lag of the vane over the dynamic pressure: a vane turns into the wind the faster, the faster the wind is."""
+    low, high = _range(records, "qbar")
+    middle = 0.5 * (low + high)
+    if high - low > _LEAST_PRESSURE * middle:
+        for time_s in _SENSOR_LAGS_S:
+            memory = Memory("lag", time_s)
+            yield Shape("alpha_rad", "qbar", low, high, CELLS, middle, memory, "alpha", trims["alpha"])
 
 
 def _mode(hz: float) -> Memory:
@@ -211,11 +226,12 @@ def screen(
 def sharpened(
     problem: TraceProblem, null: PosteriorFit, whitener: Whitener, leading: Sequence[Screened]
 ) -> list[Screened]:
-    """The shapes, those behind a mode with the frequency and damping of largest evidence nearby, best first.
+    """The shapes with the detail of largest evidence, best first: cells of a function, frequency and damping of a mode.
 
     A lightly damped mode is narrower than the steps of the grid, and a refit that begins beside its peak ends there.
     """
-    near = [
+    near = [replace(s.effect.shape, cells=n) for s in leading if s.effect.shape.cells for n in _FINER]
+    near += [
         replace(shape, memory=replace(shape.memory, time_s=shape.memory.time_s / ratio, damping=damping))
         for shape in (s.effect.shape for s in leading)
         if shape.memory is not None and shape.memory.kind == "mode"

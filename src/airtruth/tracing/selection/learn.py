@@ -105,7 +105,7 @@ class _Learning:
             if last.anomaly.p_value > REMAINS or len(accepted) >= MOST_INCREMENTS:
                 break
             # derivatives over a signal are flexible enough to describe what a first increment has wrong
-            tried = [s for s in every if not (accepted and s.factor)]
+            tried = [s for s in every if not (accepted and s.of_derivative)]
             candidates = self._candidates(last.null, last, tried)
             tied = _tied(candidates)
             rounds = (*rounds[:-1], replace(last, candidates=(*last.candidates, *candidates), tied=tied))
