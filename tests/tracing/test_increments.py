@@ -14,6 +14,7 @@ from airtruth import aircraft as planes
 from airtruth import report
 from airtruth.aircraft import write as writing
 from airtruth.effects.increment import Shape, increment
+from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import AeroTerm, Change, shape_of, term_value
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable
@@ -29,8 +30,11 @@ from airtruth.tracing.inference.posterior import (
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.parameters import Parameters, size_index
 from airtruth.tracing.presentation.text import increment_words
-from airtruth.tracing.selection.increment_fit import redundant_increment
+from airtruth.tracing.selection.acceptance import SUPERSEDED, Candidate
+from airtruth.tracing.selection.increment_fit import FittedIncrement, evidence_score, redundant_increment
 from airtruth.tracing.selection.increments import flown, log_evidences, shapes
+from airtruth.tracing.selection.pruning import pruned
+from airtruth.tracing.selection.rounds import RoundStart, search_round
 from airtruth.units import DEG
 
 
@@ -251,6 +255,43 @@ def test_an_increment_that_a_later_one_makes_redundant_is_named(order, expected)
     assert (named.key if named else None) == expected
 
 
+@pytest.mark.parametrize("released", [False, True])
+def test_a_name_and_a_release_that_an_increment_makes_unnecessary_are_given_up(released):
+    rng = np.random.default_rng(5)
+    problem = tr.problem(
+        [
+            beyond_one_degree(tr.fly(rng, amplitude=a * DEG, sigma_w=0.05, name=str(a)))
+            for a in (2.5, -2.5, 2.0)
+        ]
+    )
+    named = EFFECTS["gyro_scale"]
+    hypothesis = tr.NOTHING.plus(named).plus(NEEDED)
+    if released:
+        hypothesis = replace(hypothesis, spread=9.0 * np.diag(np.diag(problem.declared_covariance)))
+    start = initial_parameters(problem, hypothesis)
+    point = Parameters(start.common, start.per_record, np.zeros(1 + NEEDED.bends))
+    every = (named, EFFECTS["elevator_delay"])
+    last = search_round(
+        problem, RoundStart(hypothesis, point, every[1:], scores_only=True), 2, 1, lambda step: None
+    )
+    name, learned = (
+        Candidate(
+            evidence_score(FittedIncrement(e, last.null, 9.0)), last.null, 18.0, NONE, NONE, 0.1, 0.01, ()
+        )
+        for e in (named, NEEDED)
+    )
+    before = tuple(replace(last, candidates=(c,), tied=(c,)) for c in (name, learned))
+    kept = pruned(problem, (*before, last), every, 1, 0.01, lambda step: None)
+    assert [[c.score.effect.key for c in r.tied] for r in kept] == [[], [NEEDED.key], []]
+    assert kept[0].candidates[0].reasons == (SUPERSEDED,)
+    assert [e.key for e in kept[-1].null.hypothesis.effects] == [NEEDED.key]
+    assert kept[-1].null.hypothesis.spread is None
+    assert {s.effect.key for s in kept[-1].table.scores} == {"gyro_scale", "elevator_delay"}
+    without = (replace(last, null=replace(last.null, hypothesis=tr.NOTHING)),)
+    assert pruned(problem, without, every, 1, 0.01, lambda step: None) is without
+
+
+NONE = np.zeros(0)
 OTHERS = ("elevator_delay", "vane_lag", "gyro_lag")
 
 

@@ -18,7 +18,7 @@ from airtruth.tracing.inference.optimise import initial_parameters
 from airtruth.tracing.model.parameters import PerRecord
 from airtruth.tracing.model.records import FINE
 from airtruth.tracing.model.response import respond
-from airtruth.units import DEG
+from airtruth.units import DEG, KT
 
 MODE = StateTerm("bending", "mode", "elevator", 1.0 / (2.0 * np.pi * 7.0), 0.04)
 SHARE = 0.6
@@ -125,3 +125,30 @@ def test_a_mode_at_the_gyro_is_learned_and_written(tmp_path):
         assert abs(estimate.value - truth) < 3.0 * estimate.std, name
     updated = aircraft.load(tmp_path / "out" / "aircraft" / "gtm").file.dynamics
     assert {t.channel for t in updated.readings} == {"q_rad_s"}
+
+
+@pytest.mark.long
+def test_a_lag_of_the_vane_that_falls_with_the_airspeed_is_learned(tmp_path):
+    """A distance constant of 6 m, flown as a constant lag at each of three airspeeds; one cause, and nothing beside it."""
+    truth_s, places = {}, []
+    for eas_kt in (65.0, 78.0, 95.0):
+        lag_s = 6.0 / (eas_kt * KT / np.sqrt(0.81))
+        name = f"eas{eas_kt:.0f}"
+        effects = [("vane_lag", {"tau_s": lag_s})]
+        place = flights.fly(tmp_path / name, effects, name=name, runs=3, seed=11, amplitude=2.5, eas=eas_kt)
+        pressure = 0.5 * 1.225 * (eas_kt * KT) ** 2
+        truth_s[pressure] = lag_s
+        places.append(str(place))
+    options = TraceOptions(effects=("vane_lag", "gyro_lag", "elevator_delay"), increments=True)
+    answer = trace(places, "gtm", options, tmp_path / "out").answer
+    assert {e.key for e in answer.effects} == {
+        "vane_lag",
+        "increment:alpha_rad by a lag of alpha_rad over qbar_pa",
+    }
+    named, learned = sorted(answer.effects, key=lambda e: e.name, reverse=True)
+    (state,), table = learned.states, learned.table
+    for pressure, lag_s in truth_s.items():
+        change = np.interp(pressure, table.at, table.value) * state.time_s
+        assert named.parameters["tau_s"].value + change == pytest.approx(lag_s, rel=0.05)
+    updated = aircraft.load(tmp_path / "out" / "aircraft" / "gtm").file.dynamics
+    assert {t.behind for t in updated.readings} == {s.name for s in updated.states}

@@ -31,6 +31,7 @@ from airtruth.tracing.result import TraceResult
 from airtruth.tracing.selection.budget import Advance, Budget
 from airtruth.tracing.selection.corner_share import with_corner_share
 from airtruth.tracing.selection.learn import with_increments
+from airtruth.tracing.selection.look_alikes import with_look_alikes
 from airtruth.tracing.selection.noise_colour import with_coloured_noise
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.selection.search import search
@@ -157,7 +158,9 @@ def _search(
     )
     if options.learns:
         rounds = with_increments(case.fitted, rounds, case.effects, options.seed, steps)
-    if not rounds:
+    if rounds:
+        rounds = with_look_alikes(case.fitted, rounds, case.effects, steps)
+    else:
         raise LogError(
             f"the declared aircraft {case.fitted.records[0].plant.aircraft.name} does not fly like these records: its "
             "motion diverges; check units and signs with `airtruth check`, and that it is the right aircraft"

@@ -105,6 +105,40 @@ def best_location(problem: TraceProblem, fitted: PosteriorFit) -> tuple[Posterio
     )
 
 
+def relocated(problem: TraceProblem, fitted: PosteriorFit, placed: str = "") -> PosteriorFit:
+    """The fit with every effect that has a location at its best one beside the others.
+
+    The location of an effect is that of the round which accepted it. A cause that was missing then may have moved it to an
+    optimum that a refit beside this cause does not leave.
+
+    Parameters
+    ----------
+    fitted : a fit of any effects; placed : key of an effect that is at its best location already.
+    """
+    for effect in fitted.hypothesis.effects:
+        if location_index(effect) is None or effect.key == placed:
+            continue
+        moved = _with_last(problem, fitted, effect.key)
+        best = None if moved is None else best_location(problem, moved)[0]
+        if best is None or best.cost > fitted.cost - _BETTER:
+            continue
+        sizes = np.concatenate(
+            [best.point.sizes[best.hypothesis.span(e.key)] for e in fitted.hypothesis.effects]
+        )
+        fitted = fit(problem, fitted.hypothesis, replace(best.point, sizes=sizes)) or fitted
+    return fitted
+
+
+def _with_last(problem: TraceProblem, fitted: PosteriorFit, key: str) -> PosteriorFit | None:
+    """The same fit, with another effect as the last."""
+    effects = fitted.hypothesis.effects
+    order = (*(e for e in effects if e.key != key), *(e for e in effects if e.key == key))
+    sizes = np.concatenate([fitted.point.sizes[fitted.hypothesis.span(e.key)] for e in order])
+    return fit(
+        problem, replace(fitted.hypothesis, effects=order), replace(fitted.point, sizes=sizes), iterations=0
+    )
+
+
 def _size_numbers(fitted: PosteriorFit) -> tuple[int, int]:
     """Indices of the location and of the size of the last effect among the sizes."""
     effect = fitted.hypothesis.effects[-1]
@@ -151,4 +185,4 @@ def _at(point: Parameters, number: int, size: float) -> Parameters:
     return replace(point, sizes=sizes)
 
 
-__all__ = ["Profile", "best_location", "location_index"]
+__all__ = ["Profile", "best_location", "location_index", "relocated"]

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import Candidate
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.refit import refit_without
@@ -51,7 +52,7 @@ def better_set(
         if not may_begin(advance, phrase):
             return None
         tried = refit()
-        if tried is not None and _cost(tried) < _cost(best or last) - (0.0 if best else BETTER):
+        if tried is not None and cost_of(tried) < cost_of(best or last) - (0.0 if best else BETTER):
             best = tried
     return None if best is None else _needed(problem, best, least)
 
@@ -61,7 +62,8 @@ def _tries(
 ) -> Iterator[tuple[str, Callable[[], PosteriorFit | None]]]:
     """Each exchange as a phrase for the progress line, and the function that refits it."""
     for index, effect in enumerate(last.hypothesis.effects):
-        rival = _rival(rounds, last, effect)
+        own = next((r for r in rounds if r.tied and r.tied[0].score.effect.key == effect.key), None)
+        rival = None if own is None else best_rival(own, last, effect)
         if rival is not None:
             phrase = f"{rival.score.effect.key} in place of {effect.key} beside the other effects"
             yield phrase, partial(_exchanged, problem, last, index, rival)
@@ -81,25 +83,25 @@ def other_kinds(
     """
     twins: dict[str, list[Effect]] = {}
     for effect in effects:
-        signal = _late_signal(effect)
+        signal = late_signal(effect)
         if signal:
             twins.setdefault(signal, []).append(effect)
     own = last.hypothesis.effects
     late_s: dict[str, float] = {}
     for effect in own:
-        signal = _late_signal(effect)
+        signal = late_signal(effect)
         if signal:
             late_s[signal] = late_s.get(signal, 0.0) + float(_sizes(last, effect.key).sum())
     if len(late_s) < 2:
         return
-    rest = tuple(e for e in own if not _late_signal(e))
+    rest = tuple(e for e in own if not late_signal(e))
     begin = [_sizes(last, e.key) for e in rest]
     for late in itertools.product(*(twins[signal] for signal in late_s)):
         if {e.key for e in (*late, *rest)} != {e.key for e in own}:
             yield (*late, *rest), np.concatenate([np.array(list(late_s.values())), *begin])
 
 
-def _late_signal(effect: Effect) -> str:
+def late_signal(effect: Effect) -> str:
     """Channel whose reading an effect delays, or "surface"; empty for any other effect.
 
     The size of such an effect is a time [s].
@@ -110,11 +112,8 @@ def _late_signal(effect: Effect) -> str:
     return next((term.channel for term in change.sensors if term.kind in _LATE), "")
 
 
-def _rival(rounds: Sequence[SearchRound], last: PosteriorFit, effect: Effect) -> Candidate | None:
+def best_rival(own: SearchRound, last: PosteriorFit, effect: Effect) -> Candidate | None:
     """The best candidate of another name that was refitted in the round of an effect; one, because each costs a refit."""
-    own = next((r for r in rounds if r.tied and r.tied[0].score.effect.key == effect.key), None)
-    if own is None:
-        return None
     taken = {e.name for e in last.hypothesis.effects if e.key != effect.key}
     others = (c for c in own.candidates if c.score.effect.name not in taken | {effect.name})
     return max(others, key=lambda c: c.gain, default=None)
@@ -129,17 +128,22 @@ def _exchanged(
     """
     effects = last.hypothesis.effects
     swapped = (*effects[:index], rival.score.effect, *effects[index + 1 :])
+    return fit(problem, replace(last.hypothesis, effects=swapped), in_place_of(last, effects[index], rival))
+
+
+def in_place_of(last: PosteriorFit, member: Effect, rival: Candidate) -> Parameters:
+    """Where a fit with a rival in place of a member begins: where the rival's refit ended."""
+    effects = [rival.score.effect if e.key == member.key else e for e in last.hypothesis.effects]
     known = {e.key for e in rival.fit.hypothesis.effects}
-    sizes = [_sizes(rival.fit if e.key in known else last, e.key) for e in swapped]
-    start = replace(rival.fit.point, sizes=np.concatenate(sizes))
-    return fit(problem, replace(last.hypothesis, effects=swapped), start)
+    sizes = [_sizes(rival.fit if e.key in known else last, e.key) for e in effects]
+    return replace(rival.fit.point, sizes=np.concatenate(sizes))
 
 
 def _sizes(fitted: PosteriorFit, key: str) -> NDArray[np.float64]:
     return fitted.point.sizes[fitted.hypothesis.span(key)]
 
 
-def _cost(fitted: PosteriorFit) -> float:
+def cost_of(fitted: PosteriorFit) -> float:
     """Negative log-posterior with one for each parameter of an effect."""
     return fitted.cost + len(fitted.point.sizes)
 
@@ -152,7 +156,7 @@ def _needed(problem: TraceProblem, fitted: PosteriorFit, least: float) -> tuple[
         for effect in effects:
             less = refit_without(problem, fitted, effect)
             fits.append(less)
-            losses.append(np.inf if less is None else 2.0 * (_cost(less) - _cost(fitted)))
+            losses.append(np.inf if less is None else 2.0 * (cost_of(less) - cost_of(fitted)))
         order = sorted(range(len(effects)), key=lambda i: -losses[i])
         less = fits[order[-1]]
         if less is None or losses[order[-1]] >= least or len(effects) == 1:
@@ -160,4 +164,4 @@ def _needed(problem: TraceProblem, fitted: PosteriorFit, least: float) -> tuple[
         fitted = less
 
 
-__all__ = ["BETTER", "better_set", "other_kinds"]
+__all__ = ["BETTER", "best_rival", "better_set", "cost_of", "in_place_of", "late_signal", "other_kinds"]

@@ -32,6 +32,7 @@ from airtruth.tracing.selection.increment_fit import (
     refitted,
 )
 from airtruth.tracing.selection.increments import Screened, screen, shapes, sharpened
+from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.ranking import TIE
 from airtruth.tracing.selection.rounds import Rival, RoundStart, SearchRound, search_round
 from airtruth.tracing.selection.search import total_cost
@@ -64,7 +65,8 @@ def with_increments(
     """The rounds of a search with increments of what its effects leave.
 
     Where named effects leave an anomaly, increments are learned beside them and in their stead, and the names
-    remain unless increments alone have a much larger evidence.
+    remain unless increments alone have a much larger evidence. Names that the increments make unnecessary are given up,
+    and so is the release of the derivatives.
 
     Parameters
     ----------
@@ -74,6 +76,17 @@ def with_increments(
     few = len(problem.records) < LEAST_RECORDS
     if few or not rounds or rounds[-1].anomaly.p_value > REMAINS:
         return rounds
+    return pruned(problem, _learned(problem, rounds, effects, seed, advance), effects, seed, REMAINS, advance)
+
+
+def _learned(
+    problem: TraceProblem,
+    rounds: tuple[SearchRound, ...],
+    effects: Sequence[Effect],
+    seed: int,
+    advance: Advance,
+) -> tuple[SearchRound, ...]:
+    """The rounds with increments beside the names, or in their stead."""
     learn = _Learning(problem, tuple(effects), seed, advance)
     grown, evidence = learn.grown(rounds)
     named = rounds[-1].null.hypothesis.effects

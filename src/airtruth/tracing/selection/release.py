@@ -60,6 +60,15 @@ class DeclaredCauses:
         """Keys of the physical causes."""
         return {c.key for c in self.causes}
 
+    def beside(self, hypothesis: Hypothesis) -> DeclaredCauses:
+        """Those that are no effect of a hypothesis, which has them free already."""
+        taken = {e.key for e in hypothesis.effects}
+        return replace(
+            self,
+            causes=tuple(c for c in self.causes if c.key not in taken),
+            effects=tuple(e for e in self.effects if e.key not in taken),
+        )
+
 
 @dataclass(frozen=True)
 class Release:
@@ -104,6 +113,7 @@ def release(
     -------
     None where the records do not contradict the declaration, or where nothing may explain a contradiction.
     """
+    declared = declared.beside(null.hypothesis)
     allowed = declared.causes or declared.wrong_allowed
     if null.hypothesis.spread is not None or not allowed or test.p_value > CONTRADICTED:
         return None
@@ -180,7 +190,8 @@ def size_in_derivatives(key: str, size: float) -> float:
 def explained(problem: TraceProblem, free: PosteriorFit, declared: DeclaredCauses) -> tuple[CauseSet, ...]:
     """Sets that explain the derivatives of a released fit, that of the answer first; the declaration itself is not among
     them."""
-    return simplest_first(_explaining(derivative_likelihood(problem, free), declared))
+    own = derivative_likelihood(problem, free)
+    return simplest_first(_explaining(own, declared.beside(free.hypothesis)))
 
 
 def _explaining(likelihood: DerivativeLikelihood, declared: DeclaredCauses) -> tuple[CauseSet, ...]:

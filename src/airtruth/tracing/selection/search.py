@@ -12,6 +12,7 @@ from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.inference.profile import relocated
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import OUTDONE, Candidate
 from airtruth.tracing.selection.budget import Advance, may_begin
@@ -133,7 +134,8 @@ class _Search:
             own = search_round(self.problem, begin, len(again), self.seed, self.advance, known=self.known)
             if own is None or not own.tied:
                 return rounds
-            fitted, again = own.tied[0].fit, (*again, replace(own, release=None))
+            fitted = relocated(self.problem, own.tied[0].fit, placed=effect.key)
+            again = (*again, replace(own, release=None))
             left = tuple(e for e in begin.effects if e.key != effect.key)
             starts = (*starts, RoundStart(fitted.hypothesis, fitted.point, left, settled=True))
         again = self.rounds(starts, again)
@@ -158,7 +160,7 @@ class _Search:
         behind = not leads or leads[0].gain < own.release_gain + _EFFECT_LEADS
         if behind and (not leads or may_begin(self.advance, phrase)):
             left = tuple(e for e in starts[-1].effects if e.key not in self.declared.keys)
-            fitted = release.refit or release.fit
+            fitted = relocated(self.problem, release.refit or release.fit)
             following = RoundStart(fitted.hypothesis, fitted.point, left, settled=True)
             ends.append(self.rounds((*starts, following), (*before, replace(own, tied=(), profile=None))))
         if len(ends) == 1:
@@ -225,7 +227,8 @@ class _Search:
         self, starts: tuple[RoundStart, ...], rounds: tuple[SearchRound, ...], settled: bool
     ) -> tuple[SearchRound, ...]:
         """The rounds after one that has accepted an effect."""
-        fitted = rounds[-1].tied[0].fit
+        first = rounds[-1].tied[0]
+        fitted = relocated(self.problem, first.fit, placed=first.score.effect.key)
         accepted = {e.key for e in fitted.hypothesis.effects}
         effects = tuple(e for e in starts[-1].effects if e.key not in accepted)
         following = RoundStart(fitted.hypothesis, fitted.point, effects, settled=settled)

@@ -1,0 +1,92 @@
+"""Named effects, and derivatives released from their declaration, that learned increments make unnecessary.
+
+What an increment describes is first described, badly, by the names at hand. Beside the increment they have nothing left to
+describe, and an answer that kept them would name effects that the aircraft has not got.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from airtruth.effects.effect import Effect
+from airtruth.effects.increment import Increment
+from airtruth.tracing.inference.derivative_likelihood import contradiction
+from airtruth.tracing.inference.optimise import fit
+from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.selection.acceptance import SUPERSEDED
+from airtruth.tracing.selection.budget import Advance, may_begin
+from airtruth.tracing.selection.refit import refit_without
+from airtruth.tracing.selection.release import CONTRADICTED
+from airtruth.tracing.selection.rounds import RoundStart, SearchRound, search_round, significant_gain
+
+
+def pruned(
+    problem: TraceProblem,
+    rounds: tuple[SearchRound, ...],
+    effects: Sequence[Effect],
+    seed: int,
+    remains: float,
+    advance: Advance,
+) -> tuple[SearchRound, ...]:
+    """The rounds without the names and the release that their increments make unnecessary.
+
+    Parameters
+    ----------
+    rounds : a finished search; without an increment it remains as it is.
+    effects : candidates, whose scores the last round states.
+    seed : seed of the draws behind p-values; advance : receives the step that begins.
+    remains : probability of the remaining anomaly [-] from which the records count as explained; a larger anomaly than
+        before is not accepted below it.
+    """
+    last = rounds[-1]
+    if not any(isinstance(e, Increment) for e in last.null.hypothesis.effects):
+        return rounds
+    if not may_begin(advance, "remove what the increments make unnecessary"):
+        return rounds
+    declared = _as_declared(problem, last.null)
+    fitted = _with_needed_names(problem, declared or last.null, significant_gain(len(effects), later=True))
+    if fitted is last.null:
+        return rounds
+    needed = {e.key for e in fitted.hypothesis.effects}
+    left = tuple(e for e in effects if e.key not in needed)
+    begin = RoundStart(fitted.hypothesis, fitted.point, left, settled=True, scores_only=True)
+    end = search_round(problem, begin, len(rounds), seed, advance)
+    if end is None or end.anomaly.p_value < min(remains, last.anomaly.p_value):
+        return rounds
+    if declared is None:
+        end = replace(end, sets=last.sets, release=last.release)
+    before = (_kept(r, needed, declared is not None) for r in rounds[:-1])
+    return (*before, end)
+
+
+def _as_declared(problem: TraceProblem, last: PosteriorFit) -> PosteriorFit | None:
+    """A released fit under the declaration again; None where it was not released, or where the records contradict that."""
+    if last.hypothesis.spread is None:
+        return None
+    own = fit(problem, replace(last.hypothesis, spread=None), last.point)
+    return own if own is not None and contradiction(problem, own).p_value > CONTRADICTED else None
+
+
+def _with_needed_names(problem: TraceProblem, fitted: PosteriorFit, least: float) -> PosteriorFit:
+    """The fit without the names whose absence costs less than ``least`` in 2 log L, the cheapest one first."""
+    while True:
+        names = [e for e in fitted.hypothesis.effects if not isinstance(e, Increment)]
+        without = [(less, len(e.parameters)) for e in names if (less := refit_without(problem, fitted, e))]
+        losses = [(2.0 * (less.cost - fitted.cost - count), less) for less, count in without]
+        cheapest = min(losses, key=lambda loss: loss[0], default=None)
+        if cheapest is None or cheapest[0] >= least:
+            return fitted
+        fitted = cheapest[1]
+
+
+def _kept(own: SearchRound, needed: set[str], is_declared: bool) -> SearchRound:
+    """A round whose effect counts only where it is needed, and whose release only where the declaration is wrong."""
+    if own.tied and own.tied[0].score.effect.key not in needed:
+        gone = own.tied[0]
+        others = (replace(c, reasons=(SUPERSEDED,)) if c is gone else c for c in own.candidates)
+        own = replace(own, tied=(), profile=None, candidates=tuple(others))
+    return replace(own, release=None, sets=(), rival=None) if is_declared else own
+
+
+__all__ = ["pruned"]
