@@ -42,6 +42,9 @@ _BETTER_NULL_ITERATIONS: Final = 20
 """Iterations of a null that begins where a candidate ended [-] (judgement: an optimum nearby)."""
 _FRESH_ITERATIONS: Final = 6
 """Iterations with gusts taken as strong for a refit that begins at the declared aircraft [-] (judgement)."""
+_AGREES: Final = 0.2
+"""Share of the size known beforehand by which a converged refit may differ from it without a second one that begins there
+[-] (judgement: another optimum, in which the derivatives have absorbed the effect, has a fraction of its size)."""
 _USUAL: Final = 0.15
 """Share of its plausible range at which the search for an effect without a score begins [-] (judgement)."""
 
@@ -70,6 +73,11 @@ class Refit:
     def parameters(self) -> int:
         """Number of parameters of the effect."""
         return len(self.score.effect.parameters)
+
+    @property
+    def size(self) -> float:
+        """Fitted first parameter of the effect, in its size coordinate."""
+        return float(self.fit.point.sizes[self.fit.hypothesis.span(self.score.effect.key).start])
 
 
 def refit_leaders(
@@ -156,16 +164,20 @@ def refit_known(
     Parameters
     ----------
     fits : refits of the leading candidates; the better of two refits of an effect remains.
-    known : key of an effect -> value of its first parameter, from the kinematic check.
+    known : key of an effect -> value of its first parameter, from the kinematic check. A refit that has ended at this value
+        is not repeated.
     """
     best = {r.score.effect.key: r for r in fits}
     for s in table.scores:
         key = s.effect.key
         if key not in known or len(s.effect.parameters) > 1:
             continue
+        size = s.effect.parameters[0].size(known[key])
+        if key in best and best[key].fit.converged and abs(best[key].size - size) < _AGREES * abs(size):
+            continue
         if not may_begin(advance, f"refit {key} from the kinematic check"):
             break
-        tried = _from_declared(problem, null, s, s.effect.parameters[0].size(known[key]), np.inf)
+        tried = _from_declared(problem, null, s, size, np.inf)
         if tried is not None and (key not in best or tried.cost < best[key].fit.cost):
             best[key] = Refit(s, tried, _freedom_correction(problem, null, s.effect, tried))
     return sorted(best.values(), key=lambda r: r.cost)
