@@ -127,3 +127,11 @@ def test_fewer_effects_lead_with_half_of_the_weight(cost, names):
 
 def test_no_set_has_no_order():
     assert simplest_first(()) == ()
+
+
+def test_a_set_without_a_cause_keeps_the_sizes_of_the_others():
+    whole = CauseSet(("mass_error", "cg_shift"), ("Cmq",), (0.1, 0.02), (0.01, 0.005), np.eye(6), 3.0)
+    less = whole.without({"mass_error", "inertia_error"})
+    assert (less.causes, less.sizes, less.size_std) == (("cg_shift",), (0.02,), (0.005,))
+    assert less.effects == ("cg_shift", "derivatives")
+    assert (less.wrong, less.cost) == (whole.wrong, whole.cost)

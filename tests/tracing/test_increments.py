@@ -31,9 +31,11 @@ from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.parameters import Parameters, size_index
 from airtruth.tracing.presentation.text import increment_words
 from airtruth.tracing.selection.acceptance import SUPERSEDED, Candidate
+from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.increment_fit import FittedIncrement, evidence_score, redundant_increment
 from airtruth.tracing.selection.increments import flown, log_evidences, shapes
 from airtruth.tracing.selection.pruning import pruned
+from airtruth.tracing.selection.release import Release
 from airtruth.tracing.selection.rounds import RoundStart, search_round
 from airtruth.units import DEG
 
@@ -287,6 +289,12 @@ def test_a_name_and_a_release_that_an_increment_makes_unnecessary_are_given_up(r
     assert [e.key for e in kept[-1].null.hypothesis.effects] == [NEEDED.key]
     assert kept[-1].null.hypothesis.spread is None
     assert {s.effect.key for s in kept[-1].table.scores} == {"gyro_scale", "elevator_delay"}
+    causes = CauseSet(("gyro_scale", "cg_shift"), (), (0.1, 0.2), (0.1, 0.1), np.zeros((6, 6)), 1.0)
+    bare = replace(causes, causes=("gyro_scale",), sizes=(0.1,), size_std=(0.1,))
+    sets = (bare, causes, causes.without({"gyro_scale"}))
+    followed = replace(before[0], release=Release(last.declared_test, last.null, sets, 0.0))
+    first = pruned(problem, (followed, before[1], last), every, 1, 0.01, lambda step: None)[0]
+    assert first.release is None if released else [s.effects for s in first.release.sets] == [("cg_shift",)]
     without = (replace(last, null=replace(last.null, hypothesis=tr.NOTHING)),)
     assert pruned(problem, without, every, 1, 0.01, lambda step: None) is without
 

@@ -8,12 +8,15 @@ import trace_records as tr
 
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import AeroTerm, Change
+from airtruth.tracing.declared_model import explaining_effects
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.profile import relocated
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import OUTDONE, SURPASSED, Candidate
+from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.look_alikes import with_look_alikes
+from airtruth.tracing.selection.release import Release
 from airtruth.tracing.selection.rounds import RoundStart, search_round
 from airtruth.units import DEG
 
@@ -90,6 +93,27 @@ def test_a_single_effect_keeps_the_ties_of_its_round(problem):
     vane = candidate(problem, first, 60.0, (), VANE)
     rounds = (replace(first, candidates=(vane,), tied=(vane,)), last)
     assert with_look_alikes(problem, rounds, LIBRARY, lambda step: None) is rounds
+
+
+def test_every_release_that_was_followed_states_its_causes(problem):
+    """The first release was refitted with a mass error and the second with an inertia error; a third was not followed."""
+    mass, inertia = EFFECTS["mass_error"], EFFECTS["inertia_error"]
+    last = scored(problem, mass, inertia)
+
+    def release(*causes):
+        size = (0.1,) * len(causes)
+        return Release(
+            last.declared_test, last.null, (CauseSet(causes, (), size, size, np.zeros((6, 6)), 1.0),), 0.0
+        )
+
+    rounds = tuple(
+        replace(last, release=release(*names))
+        for names in (("mass_error",), ("cg_shift",), ("inertia_error",))
+    )
+    stated = explaining_effects((*rounds, last), last.null.covariance)
+    assert [e.name for e in stated] == ["mass_error", "inertia_error"]
+    span = last.null.hypothesis.span("inertia_error")
+    assert stated[1].parameters["factor"].value == inertia.parameters[0].value(last.null.point.sizes[span][0])
 
 
 def test_a_break_finds_its_angle_again_beside_a_later_effect(problem):

@@ -119,24 +119,28 @@ def explaining_effects(rounds: Sequence[SearchRound], covariance: Array) -> tupl
     ----------
     covariance : of the last fit's common parameters and sizes.
     """
-    at = next((r for r in rounds if r.release is not None), None)
-    release = rounds[-1].release or (None if at is None else at.release)
-    if at is None or release is None:
-        return ()
-    best = release.sets[0]
-    rivals = [s.cost for s in release.sets if set(s.effects) != set(best.effects)]
-    separation = math.sqrt(max(0.0, 2.0 * (min(rivals) - best.cost))) if rivals else 0.0
-    return tuple(
-        AcceptedEffect(
-            name=key,
-            parameters=_estimates(key, best, rounds[-1], covariance),
-            p_value=release.test.p_value,
-            separation_sigma=separation,
-            indistinguishable_from=_look_alikes(key, best, release),
-            gain_2_log_likelihood=at.release_gain,
-        )
-        for key in best.effects
-    )
+    every = [(r, r.release) for r in rounds if r.release is not None]
+    carried = {e.key for e in rounds[-1].null.hypothesis.effects}
+    stated: dict[str, AcceptedEffect] = {}
+    for i, (at, release) in enumerate(every):
+        best = release.sets[0]
+        if (
+            i + 1 < len(every) and not set(best.effects) <= carried
+        ):  # a later release explains these derivatives
+            continue
+        gain = (every[0][0] if at is rounds[-1] else at).release_gain
+        rivals = [s.cost for s in release.sets if set(s.effects) != set(best.effects)]
+        separation = math.sqrt(max(0.0, 2.0 * (min(rivals) - best.cost))) if rivals else 0.0
+        for key in best.effects:
+            stated[key] = AcceptedEffect(
+                name=key,
+                parameters=_estimates(key, best, rounds[-1], covariance),
+                p_value=release.test.p_value,
+                separation_sigma=separation,
+                indistinguishable_from=_look_alikes(key, best, release),
+                gain_2_log_likelihood=gain,
+            )
+    return tuple(stated.values())
 
 
 def cause_sizes(likelihood: DerivativeLikelihood, declared: DeclaredCauses) -> dict[str, tuple[float, float]]:

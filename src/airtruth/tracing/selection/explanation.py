@@ -10,7 +10,7 @@ Statist. Soc. B 41 (1979) 358-367 (declarations with heavy tails).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from types import MappingProxyType
@@ -98,6 +98,16 @@ class CauseSet:
     def effects(self) -> tuple[str, ...]:
         """Keys of its effects: the causes, then `DERIVATIVES` where declarations are wrong."""
         return (*self.causes, *([DERIVATIVES] if self.wrong else []))
+
+    def without(self, keys: Collection[str]) -> CauseSet:
+        """The set without some of its physical causes."""
+        kept = [i for i, key in enumerate(self.causes) if key not in keys]
+        return replace(
+            self,
+            causes=tuple(self.causes[i] for i in kept),
+            sizes=tuple(self.sizes[i] for i in kept),
+            size_std=tuple(self.size_std[i] for i in kept),
+        )
 
 
 @dataclass(frozen=True)

@@ -74,12 +74,13 @@ def _beside_the_others(
             continue
         gain = leader.gain + 2.0 * (cost_of(last) - cost_of(tried))
         is_alike = gain >= leader.gain - TIE and has_converged(tried, gain)
-        old = next((c for c in own.candidates if c.score.effect.key == effect.key), leader)
-        reasons = () if is_alike else old.reasons or (OUTDONE,)
-        tested[effect.key] = replace(old, score=score, fit=tried, gain=gain, reasons=reasons)
-    others = (c for c in own.candidates if c.score.effect.key not in tested)
+        before = next((c for c in own.candidates if c.score.effect.key == effect.key), None)
+        new = before or replace(leader, score=score, fit=tried)
+        reasons = () if is_alike else new.reasons or (OUTDONE,)
+        tested[effect.key] = replace(new, gain=gain, reasons=reasons)
     alike = (c for c in tested.values() if not c.reasons)
-    return replace(own, candidates=(*others, *tested.values()), tied=(leader, *alike))
+    known = {c.score.effect.key: c for c in own.candidates}
+    return replace(own, candidates=tuple((known | tested).values()), tied=(leader, *alike))
 
 
 def _rivals(

@@ -16,6 +16,7 @@ from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.selection.acceptance import SUPERSEDED
 from airtruth.tracing.selection.budget import Advance, may_begin
+from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.refit import refit_without
 from airtruth.tracing.selection.release import CONTRADICTED
 from airtruth.tracing.selection.rounds import RoundStart, SearchRound, search_round, significant_gain
@@ -56,7 +57,8 @@ def pruned(
         return rounds
     if declared is None:
         end = replace(end, sets=last.sets, release=last.release)
-    before = (_kept(r, needed, declared is not None) for r in rounds[:-1])
+    gone = {e.key for e in last.null.hypothesis.effects} - needed
+    before = (_kept(r, gone, declared is not None) for r in rounds[:-1])
     return (*before, end)
 
 
@@ -80,13 +82,22 @@ def _with_needed_names(problem: TraceProblem, fitted: PosteriorFit, least: float
         fitted = cheapest[1]
 
 
-def _kept(own: SearchRound, needed: set[str], is_declared: bool) -> SearchRound:
-    """A round whose effect counts only where it is needed, and whose release only where the declaration is wrong."""
-    if own.tied and own.tied[0].score.effect.key not in needed:
-        gone = own.tied[0]
-        others = (replace(c, reasons=(SUPERSEDED,)) if c is gone else c for c in own.candidates)
+def _kept(own: SearchRound, gone: set[str], is_declared: bool) -> SearchRound:
+    """A round without the effects that are gone, and without its release where the declaration holds again."""
+    if own.tied and own.tied[0].score.effect.key in gone:
+        first = own.tied[0]
+        others = (replace(c, reasons=(SUPERSEDED,)) if c is first else c for c in own.candidates)
         own = replace(own, tied=(), profile=None, candidates=tuple(others))
-    return replace(own, release=None, sets=(), rival=None) if is_declared else own
+    if is_declared:
+        return replace(own, release=None, sets=(), rival=None)
+    if own.release is None:
+        return own
+    sets: dict[tuple[str, ...], CauseSet] = {}
+    for s in own.release.sets:
+        left = s.without(gone)
+        if left.effects:
+            sets.setdefault(left.effects, left)
+    return replace(own, release=replace(own.release, sets=tuple(sets.values())) if sets else None)
 
 
 __all__ = ["pruned"]
