@@ -157,7 +157,7 @@ def _search(
         case.fitted, case.hypothesis, start, case.effects, options.seed, steps, case.declared, known
     )
     if options.learns:
-        rounds = with_increments(case.fitted, rounds, case.effects, options.seed, steps)
+        rounds = with_increments(case.fitted, rounds, case.effects, options.seed, steps, case.declared)
     if rounds:
         rounds = with_look_alikes(case.fitted, rounds, case.effects, steps)
     else:

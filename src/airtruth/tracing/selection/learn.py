@@ -34,8 +34,15 @@ from airtruth.tracing.selection.increment_fit import (
 from airtruth.tracing.selection.increments import Screened, screen, shapes, sharpened
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.ranking import TIE
-from airtruth.tracing.selection.rounds import Rival, RoundStart, SearchRound, search_round
-from airtruth.tracing.selection.search import total_cost
+from airtruth.tracing.selection.release import DeclaredCauses, explained
+from airtruth.tracing.selection.rounds import (
+    NOTHING_DECLARED,
+    Rival,
+    RoundStart,
+    SearchRound,
+    search_round,
+)
+from airtruth.tracing.selection.search import settled, total_cost
 
 Array = NDArray[np.float64]
 
@@ -61,6 +68,7 @@ def with_increments(
     effects: Sequence[Effect],
     seed: int,
     advance: Advance = lambda step: None,
+    declared: DeclaredCauses = NOTHING_DECLARED,
 ) -> tuple[SearchRound, ...]:
     """The rounds of a search with increments of what its effects leave.
 
@@ -72,11 +80,19 @@ def with_increments(
     ----------
     rounds : a finished search; effects : its candidates, whose scores the later rounds state.
     seed : seed of the draws behind p-values; advance : receives the step that begins.
+    declared : candidates that explain released derivatives, which they do again beside the increments.
     """
     few = len(problem.records) < LEAST_RECORDS
     if few or not rounds or rounds[-1].anomaly.p_value > REMAINS:
         return rounds
-    return pruned(problem, _learned(problem, rounds, effects, seed, advance), effects, seed, REMAINS, advance)
+    grown = _learned(problem, rounds, effects, seed, advance)
+    if len(grown) == len(rounds) and grown[-1].null is rounds[-1].null:
+        return grown
+    grown = pruned(problem, grown, effects, seed, REMAINS, advance)
+    last = grown[-1]
+    if last.null.hypothesis.spread is None:
+        return grown
+    return settled(problem, (*grown[:-1], replace(last, sets=explained(problem, last.null, declared))))
 
 
 def _learned(

@@ -71,7 +71,7 @@ def search(
     """
     first = RoundStart(hypothesis, start, tuple(effects))
     own = _Search(problem, seed, advance, declared, known)
-    return _settled(problem, own.improved(first, own.rounds((first,), ())))
+    return settled(problem, own.improved(first, own.rounds((first,), ())))
 
 
 @dataclass(frozen=True)
@@ -250,8 +250,13 @@ def total_cost(last: SearchRound) -> float:
     return own + len(last.null.point.sizes)
 
 
-def _settled(problem: TraceProblem, rounds: tuple[SearchRound, ...]) -> tuple[SearchRound, ...]:
-    """The rounds with the last fit under the best explanation of the derivatives, where they were released."""
+def settled(problem: TraceProblem, rounds: tuple[SearchRound, ...]) -> tuple[SearchRound, ...]:
+    """The rounds with the last fit under the best explanation of the derivatives, where they were released.
+
+    Parameters
+    ----------
+    rounds : a finished search, with what explains the derivatives at its last null.
+    """
     if not rounds or not rounds[-1].sets:
         return rounds
     last = rounds[-1]
@@ -303,4 +308,4 @@ def redundant_effect(problem: TraceProblem, fitted: PosteriorFit, least: float) 
     return None
 
 
-__all__ = ["redundant_effect", "search", "total_cost"]
+__all__ = ["redundant_effect", "search", "settled", "total_cost"]
