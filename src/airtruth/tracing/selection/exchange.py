@@ -52,7 +52,7 @@ def better_set(
         if not may_begin(advance, phrase):
             return None
         tried = refit()
-        if tried is not None and cost_of(tried) < cost_of(best or last) - (0.0 if best else BETTER):
+        if tried is not None and _cost(tried) < _cost(best or last) - (0.0 if best else BETTER):
             best = tried
     return None if best is None else _needed(problem, best, least)
 
@@ -122,28 +122,34 @@ def best_rival(own: SearchRound, last: PosteriorFit, effect: Effect) -> Candidat
 def _exchanged(
     problem: TraceProblem, last: PosteriorFit, index: int, rival: Candidate
 ) -> PosteriorFit | None:
-    """The fit with a rival in place of a member; it begins where the rival's refit ended.
-
-    A refit that begins at the last set can end early or elsewhere, because the member to be replaced has moved the rest.
-    """
+    """The better of the fits with a rival in place of a member."""
     effects = last.hypothesis.effects
-    swapped = (*effects[:index], rival.score.effect, *effects[index + 1 :])
-    return fit(problem, replace(last.hypothesis, effects=swapped), in_place_of(last, effects[index], rival))
+    hypothesis = replace(
+        last.hypothesis, effects=(*effects[:index], rival.score.effect, *effects[index + 1 :])
+    )
+    ends = (fit(problem, hypothesis, start) for start in starts_in_place_of(last, effects[index], rival))
+    return min((end for end in ends if end is not None), key=_cost, default=None)
 
 
-def in_place_of(last: PosteriorFit, member: Effect, rival: Candidate) -> Parameters:
-    """Where a fit with a rival in place of a member begins: where the rival's refit ended."""
+def starts_in_place_of(last: PosteriorFit, member: Effect, rival: Candidate) -> list[Parameters]:
+    """Where fits with a rival in place of a member begin: where the rival's refit ended, and at the last set.
+
+    A refit that begins at the last set can end early or elsewhere, because the member to be replaced has moved the rest; one
+    that begins where the rival's refit ended lacks what was accepted later.
+    """
     effects = [rival.score.effect if e.key == member.key else e for e in last.hypothesis.effects]
     known = {e.key for e in rival.fit.hypothesis.effects}
-    sizes = [_sizes(rival.fit if e.key in known else last, e.key) for e in effects]
-    return replace(rival.fit.point, sizes=np.concatenate(sizes))
+    sizes = np.concatenate([_sizes(rival.fit if e.key in known else last, e.key) for e in effects])
+    own = _sizes(rival.fit, rival.score.effect.key)
+    late = np.concatenate([own if e is rival.score.effect else _sizes(last, e.key) for e in effects])
+    return [replace(rival.fit.point, sizes=sizes), replace(last.point, sizes=late)]
 
 
 def _sizes(fitted: PosteriorFit, key: str) -> NDArray[np.float64]:
     return fitted.point.sizes[fitted.hypothesis.span(key)]
 
 
-def cost_of(fitted: PosteriorFit) -> float:
+def _cost(fitted: PosteriorFit) -> float:
     """Negative log-posterior with one for each parameter of an effect."""
     return fitted.cost + len(fitted.point.sizes)
 
@@ -156,7 +162,7 @@ def _needed(problem: TraceProblem, fitted: PosteriorFit, least: float) -> tuple[
         for effect in effects:
             less = refit_without(problem, fitted, effect)
             fits.append(less)
-            losses.append(np.inf if less is None else 2.0 * (cost_of(less) - cost_of(fitted)))
+            losses.append(np.inf if less is None else 2.0 * (_cost(less) - _cost(fitted)))
         order = sorted(range(len(effects)), key=lambda i: -losses[i])
         less = fits[order[-1]]
         if less is None or losses[order[-1]] >= least or len(effects) == 1:
@@ -164,4 +170,4 @@ def _needed(problem: TraceProblem, fitted: PosteriorFit, least: float) -> tuple[
         fitted = less
 
 
-__all__ = ["BETTER", "best_rival", "better_set", "cost_of", "in_place_of", "late_signal", "other_kinds"]
+__all__ = ["BETTER", "best_rival", "better_set", "late_signal", "other_kinds", "starts_in_place_of"]

@@ -11,8 +11,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
-import numpy as np
-
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment
 from airtruth.tracing.inference.optimise import fit
@@ -20,8 +18,9 @@ from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import OUTDONE, Candidate, has_converged
 from airtruth.tracing.selection.budget import Advance, may_begin
-from airtruth.tracing.selection.exchange import best_rival, cost_of, in_place_of, late_signal
-from airtruth.tracing.selection.ranking import TIE
+from airtruth.tracing.selection.exchange import best_rival, late_signal, starts_in_place_of
+from airtruth.tracing.selection.ranking import TIE, gains_of
+from airtruth.tracing.selection.refit import Refit
 from airtruth.tracing.selection.rounds import SearchRound
 
 _ATTEMPTS: Final = 2
@@ -63,21 +62,26 @@ def _beside_the_others(
     """The round with the rivals of its effect as they are at the end of the search."""
     own, last = rounds[at], rounds[-1].null
     leader, member = own.tied[0], own.tied[0].score.effect
-    tested: dict[str, Candidate] = {}
-    for effect, start in _rivals(own, last, effects):
+    fits = [Refit(leader.score, last, 0.0)]
+    for effect, starts in _rivals(own, last, effects):
         if not may_begin(advance, f"{effect.key} in place of {member.key} beside the other effects"):
             return own
         score = next((s for s in own.table.scores if s.effect.key == effect.key), None)
         exchanged = tuple(effect if e.key == member.key else e for e in last.hypothesis.effects)
-        tried = _converged(problem, last, exchanged, start)
-        if score is None or tried is None:
-            continue
-        gain = leader.gain + 2.0 * (cost_of(last) - cost_of(tried))
-        is_alike = gain >= leader.gain - TIE and has_converged(tried, gain)
-        before = next((c for c in own.candidates if c.score.effect.key == effect.key), None)
-        new = before or replace(leader, score=score, fit=tried)
+        ends = (_converged(problem, last, exchanged, start) for start in starts)
+        tried = min((end for end in ends if end is not None), key=lambda end: end.cost, default=None)
+        if score is not None and tried is not None:
+            fits.append(Refit(score, tried, 0.0))
+    gains = gains_of(problem, last, sorted(fits, key=lambda r: r.cost))
+    tested: dict[str, Candidate] = {}
+    for r in fits[1:]:
+        key = r.score.effect.key
+        gain = leader.gain + gains[key] - gains[member.key]
+        is_alike = gain >= leader.gain - TIE and has_converged(r.fit, gain)
+        before = next((c for c in own.candidates if c.score.effect.key == key), None)
+        new = before or replace(leader, score=r.score, fit=r.fit)
         reasons = () if is_alike else new.reasons or (OUTDONE,)
-        tested[effect.key] = replace(new, gain=gain, reasons=reasons)
+        tested[key] = replace(new, gain=gain, reasons=reasons)
     alike = (c for c in tested.values() if not c.reasons)
     known = {c.score.effect.key: c for c in own.candidates}
     return replace(own, candidates=tuple((known | tested).values()), tied=(leader, *alike))
@@ -85,25 +89,30 @@ def _beside_the_others(
 
 def _rivals(
     own: SearchRound, last: PosteriorFit, effects: Sequence[Effect]
-) -> Iterator[tuple[Effect, Parameters]]:
-    """Rivals of a round's effect, and where the refit of each begins: its ties, its best rival, and what is as late."""
+) -> Iterator[tuple[Effect, list[Parameters]]]:
+    """Rivals of a round's effect, and where their refits begin: what is as late, the ties, and the best rival.
+
+    A delay and a lag of one signal have the same size, a time.
+    """
     member = own.tied[0].score.effect
     taken = {e.key for e in last.hypothesis.effects}
-    best = best_rival(own, last, member)
-    for c in (*own.tied[1:], *(() if best is None else (best,))):
-        if c.score.effect.key not in taken:
-            taken.add(c.score.effect.key)
-            yield c.score.effect, in_place_of(last, member, c)
     for effect in effects:
         if effect.key not in taken and late_signal(member) and late_signal(effect) == late_signal(member):
-            yield effect, last.point  # the size of either is a time
+            taken.add(effect.key)
+            yield effect, [last.point]
+    best = best_rival(own, last, member)
+    for c in (*own.tied[1:], *(() if best is None else (best,))):
+        key = c.score.effect.key
+        if key not in taken:
+            taken.add(key)
+            yield c.score.effect, starts_in_place_of(last, member, c)
 
 
 def _converged(
     problem: TraceProblem, last: PosteriorFit, effects: tuple[Effect, ...], start: Parameters
 ) -> PosteriorFit | None:
     hypothesis = replace(last.hypothesis, effects=effects)
-    if len(start.sizes) != len(hypothesis.parameters) or not np.isfinite(start.sizes).all():
+    if len(start.sizes) != len(hypothesis.parameters):  # a twin with a location
         return None
     own = fit(problem, hypothesis, start)
     for _ in range(_ATTEMPTS):

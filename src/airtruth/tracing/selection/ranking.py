@@ -53,7 +53,7 @@ def rank(
     """
     if not fits:
         return ()
-    gains = _gains(problem, null, fits)
+    gains = gains_of(problem, null, fits)
     ranked = sorted(((gains[r.score.effect.key], r) for r in fits), key=lambda g: -g[0])
     reference = reference_of(problem, null)
     candidates: list[Candidate] = []
@@ -79,8 +79,13 @@ def rank(
     return tuple(candidates)
 
 
-def _gains(problem: TraceProblem, null: PosteriorFit, fits: Sequence[Refit]) -> dict[str, float]:
-    """Key -> gain in 2 log L over the null; those near the best under the autoregression of its innovations."""
+def gains_of(problem: TraceProblem, null: PosteriorFit, fits: Sequence[Refit]) -> dict[str, float]:
+    """Key -> gain in 2 log L over the null; those near the best under the autoregression of its innovations.
+
+    Parameters
+    ----------
+    fits : refits, best first.
+    """
     best = fits[0].fit
     gains = {r.score.effect.key: 2.0 * (null.cost + 1.0 - r.cost) for r in fits}
     near = [r for r in fits if r.fit.cost - best.cost < _NEAR]
@@ -109,4 +114,4 @@ def _whitened_cost(
     return np.inf if again is None else again.cost
 
 
-__all__ = ["TIE", "rank"]
+__all__ = ["TIE", "gains_of", "rank"]
