@@ -318,7 +318,8 @@ def test_a_break_that_the_library_lacks_is_learned_added_and_confirmed(tmp_path)
     effect = increments["Cm over alpha_rad"]
     assert (effect["acts_on"], effect["over"], effect["states"]) == ("Cm", "alpha_rad", [])
     table = effect["table"]
-    assert len(table["at"]) == len(table["value"]) == len(table["samples"]) == 9
+    assert len(table["at"]) == len(table["value"]) == len(table["samples"]) in (9, 13, 17, 25, 37)
+    assert not answer["provisional"]
     assert all(
         low <= v <= high for low, v, high in zip(table["low"], table["value"], table["high"], strict=True)
     )
