@@ -93,7 +93,40 @@ def test_the_file_says_it_to_the_last_bit(tmp_path):
         ({"kind": "delay", "valu": 0.1}, "surface.0.valu: unknown key; did you mean 'value'?"),
     ],
 )
-def test_a_wrong_entry_is_refused_with_the_cure(row, message):
+def test_a_wrong_surface_is_refused_with_the_cure(row, message):
     with pytest.raises(ValidationError) as caught:
         Dynamics.model_validate({"surface": [row]})
+    assert message in "; ".join(explain(caught.value, Dynamics))
+
+
+LATE = {"name": "late", "kind": "lag", "signal": "alpha", "time_s": 0.1}
+READING = {"channel": "alpha_rad", "signal": "qbar", "shape": "linear", "amplitude": 1e-4}
+AERO = {"coefficient": "Cm", "signal": "alpha_dot_hat", "shape": "linear", "amplitude": -9.0}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"states": [LATE | {"signal": "qbar"}]}, "state late: signal 'qbar': allowed: alpha, alpha_dot_hat"),
+        (
+            {"aero": [AERO | {"signal": "alpha_dot"}]},
+            "aero Cm: signal 'alpha_dot': did you mean 'alpha_dot_hat'",
+        ),
+        ({"aero": [AERO | {"factor": "qbar"}]}, "aero Cm: factor 'qbar': allowed: alpha, elevator, qhat"),
+        ({"readings": [READING | {"signal": "alpha_dot_hat"}]}, "readings alpha_rad: signal 'alpha_dot_hat'"),
+        (
+            {"readings": [READING | {"behind": "lat"}]},
+            "readings alpha_rad: behind 'lat': did you mean 'late'?",
+        ),
+        (
+            {"states": [LATE | {"signal": "alpha_dot_hat"}], "readings": [READING | {"signal": "late"}]},
+            "readings alpha_rad: signal 'late': allowed: alpha, elevator, qbar, qhat",
+        ),
+        ({"states": [], "readings": [READING | {"behind": "late"}]}, "behind 'late': declare it in states"),
+    ],
+)
+def test_a_name_that_is_unknown_is_refused_with_those_that_exist(change, message):
+    Dynamics.model_validate({"states": [LATE], "aero": [AERO], "readings": [READING | {"behind": "late"}]})
+    with pytest.raises(ValidationError) as caught:
+        Dynamics.model_validate({"states": [LATE]} | change)
     assert message in "; ".join(explain(caught.value, Dynamics))

@@ -13,6 +13,7 @@ from airtruth.aircraft.probe import Constants, probe
 from airtruth.channels import SIGNALS
 from airtruth.documents import read_toml
 from airtruth.errors import AircraftError, choices
+from airtruth.physics import terms
 from airtruth.physics.sensor_errors import KINDS, SensorErrors
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.physics.terms import AeroTerm, ReadingTerm, StateTerm, SurfaceTerm
@@ -127,6 +128,26 @@ class Dynamics(Strict):
         for name, value in values:
             if value <= 0.0:
                 raise ValueError(f"{name} has to be above 0 (is {value:g})")
+        return self
+
+    @model_validator(mode="after")
+    def _named(self) -> Dynamics:
+        states = tuple(s.name for s in self.states)
+        measured = tuple(s.name for s in self.states if s.signal in terms.MEASURED)
+        named: list[tuple[str, str, tuple[str, ...]]]
+        named = [(f"state {s.name}: signal", s.signal, terms.DRIVERS) for s in self.states]
+        for t in self.aero:
+            named.append((f"aero {t.coefficient}: signal", t.signal, (*terms.SIGNALS, *states)))
+            named.append((f"aero {t.coefficient}: factor", t.factor, ("", *terms.FACTORS)))
+        for r in self.readings:
+            named.append((f"readings {r.channel}: signal", r.signal, (*terms.MEASURED, *measured)))
+            named.append((f"readings {r.channel}: behind", r.behind, ("", *measured)))
+        for name, value, allowed in named:
+            if value not in allowed:
+                known = [n for n in allowed if n]
+                raise ValueError(
+                    f"{name} {value!r}: {choices(value, known) if known else 'declare it in states'}"
+                )
         return self
 
 

@@ -24,6 +24,8 @@ DRIVERS: Final = SIGNALS[:4]
 """Signals that may drive a `StateTerm`."""
 FACTORS: Final = ("alpha", "elevator", "qhat")
 """Signals by which an `AeroTerm` may be multiplied: those of the six derivatives."""
+MEASURED: Final = ("alpha", "elevator", "qhat", "qbar")
+"""Signals that a log measures; a `ReadingTerm` names one of these or a state."""
 READINGS: Final = ("alpha_rad", "q_rad_s", "az_m_s2")
 """Channels of a `ReadingTerm`, the outputs of the filter."""
 SHAPES: Final = ("linear", "quadratic", "above", "below")

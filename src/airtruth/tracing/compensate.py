@@ -30,6 +30,7 @@ from airtruth.physics.atmosphere import air_density
 from airtruth.physics.readings import reading_increments, state_of
 from airtruth.physics.sensor_errors import SensorErrors
 from airtruth.physics.terms import (
+    MEASURED,
     AeroTerm,
     Change,
     ReadingTerm,
@@ -44,8 +45,6 @@ from airtruth.tracing.result import TraceResult
 
 Array = NDArray[np.float64]
 
-MEASURED: Final = ("alpha", "elevator", "qhat", "qbar")
-"""Signals of aerodynamic terms that a log measures."""
 OUTPUTS: Final = ("alpha_rad", "q_rad_s", "az_m_s2")
 """Channels that the response to increments changes."""
 _HEAD_S: Final = 0.1
@@ -316,7 +315,6 @@ def _air_surface(terms: tuple[SurfaceTerm, ...], elevator: Array, dt_s: float) -
 
 
 __all__ = [
-    "MEASURED",
     "Compensation",
     "Condition",
     "Treatment",
