@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import trace_records as tr
+from scaled_records import ACCELEROMETER, GYRO, VANE, fitted, scaled_problem
 
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import AeroTerm, Change
@@ -18,9 +18,7 @@ from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.look_alikes import with_look_alikes
 from airtruth.tracing.selection.release import Release
 from airtruth.tracing.selection.rounds import RoundStart, search_round
-from airtruth.units import DEG
 
-VANE, GYRO, ACCELEROMETER = (EFFECTS[f"{name}_scale"] for name in ("vane", "gyro", "accelerometer"))
 TWIN = replace(GYRO, name="gyro_twin")
 LIBRARY = (VANE, GYRO, ACCELEROMETER, TWIN)
 NONE = np.zeros(0)
@@ -28,22 +26,7 @@ NONE = np.zeros(0)
 
 @pytest.fixture(scope="module")
 def problem():
-    """Two records; the vane reads 1.3 and the gyro 1.1 of the truth."""
-    rng = np.random.default_rng(4)
-    records = []
-    for amplitude in (2.0, -2.0):
-        one = tr.fly(rng, amplitude=amplitude * DEG, sigma_w=0.05, name=str(amplitude))
-        y = one.signals.y * [1.3, 1.1, 1.0]
-        records.append(replace(one, signals=replace(one.signals, y=y)))
-    return tr.problem(records)
-
-
-def fitted(problem, *effects):
-    hypothesis = tr.NOTHING
-    for effect in effects:
-        hypothesis = hypothesis.plus(effect)
-    start = initial_parameters(problem, hypothesis)
-    return fit(problem, hypothesis, Parameters(start.common, start.per_record, np.zeros(len(effects))))
+    return scaled_problem()
 
 
 def scored(problem, *effects):

@@ -1,42 +1,23 @@
 """Sets one exchange away from the one that a search has reached, on records whose sensors' scales are known."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import trace_records as tr
+from scaled_records import ACCELEROMETER, GYRO, VANE, fitted, scaled_problem
 
 from airtruth.effects.registry import EFFECTS
-from airtruth.tracing.inference.optimise import fit, initial_parameters
-from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.exchange import better_set, other_kinds
 from airtruth.tracing.selection.rounds import significant_gain
-from airtruth.units import DEG
 
-VANE, GYRO, ACCELEROMETER = (EFFECTS[f"{name}_scale"] for name in ("vane", "gyro", "accelerometer"))
 LIBRARY = tuple(EFFECTS.values())
 LEAST = significant_gain(33, later=True)
 
 
 @pytest.fixture(scope="module")
 def problem():
-    """Two records; the vane reads 1.3 and the gyro 1.1 of the truth."""
-    rng = np.random.default_rng(4)
-    records = []
-    for amplitude in (2.0, -2.0):
-        one = tr.fly(rng, amplitude=amplitude * DEG, sigma_w=0.05, name=str(amplitude))
-        y = one.signals.y * [1.3, 1.1, 1.0]
-        records.append(replace(one, signals=replace(one.signals, y=y)))
-    return tr.problem(records)
-
-
-def fitted(problem, *effects):
-    hypothesis = tr.NOTHING
-    for effect in effects:
-        hypothesis = hypothesis.plus(effect)
-    start = initial_parameters(problem, hypothesis)
-    return fit(problem, hypothesis, Parameters(start.common, start.per_record, np.zeros(len(effects))))
+    return scaled_problem()
 
 
 def reached(problem, first, second, rivals):

@@ -1,0 +1,33 @@
+"""Two records whose vane and gyro have wrong scales, and fits of effects to them."""
+
+from dataclasses import replace
+
+import numpy as np
+import trace_records as tr
+
+from airtruth.effects.registry import EFFECTS
+from airtruth.tracing.inference.optimise import fit, initial_parameters
+from airtruth.tracing.model.parameters import Parameters
+from airtruth.units import DEG
+
+VANE, GYRO, ACCELEROMETER = (EFFECTS[f"{name}_scale"] for name in ("vane", "gyro", "accelerometer"))
+
+
+def scaled_problem():
+    """Two records; the vane reads 1.3 and the gyro 1.1 of the truth."""
+    rng = np.random.default_rng(4)
+    records = []
+    for amplitude in (2.0, -2.0):
+        one = tr.fly(rng, amplitude=amplitude * DEG, sigma_w=0.05, name=str(amplitude))
+        y = one.signals.y * [1.3, 1.1, 1.0]
+        records.append(replace(one, signals=replace(one.signals, y=y)))
+    return tr.problem(records)
+
+
+def fitted(problem, *effects):
+    """Fit of effects from the declared aircraft."""
+    hypothesis = tr.NOTHING
+    for effect in effects:
+        hypothesis = hypothesis.plus(effect)
+    start = initial_parameters(problem, hypothesis)
+    return fit(problem, hypothesis, Parameters(start.common, start.per_record, np.zeros(len(effects))))
