@@ -124,9 +124,8 @@ def explaining_effects(rounds: Sequence[SearchRound], covariance: Array) -> tupl
     stated: dict[str, AcceptedEffect] = {}
     for i, (at, release) in enumerate(every):
         best = release.sets[0]
-        if (
-            i + 1 < len(every) and not set(best.effects) <= carried
-        ):  # a later release explains these derivatives
+        # a later release explains what the filter does not carry
+        if i + 1 < len(every) and not set(best.effects) <= carried:
             continue
         gain = (every[0][0] if at is rounds[-1] else at).release_gain
         rivals = [s.cost for s in release.sets if set(s.effects) != set(best.effects)]

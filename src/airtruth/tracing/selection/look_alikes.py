@@ -9,11 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Final
 
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment
-from airtruth.tracing.inference.optimise import fit
+from airtruth.tracing.inference.optimise import converged_fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import OUTDONE, Candidate, has_converged
@@ -22,9 +21,6 @@ from airtruth.tracing.selection.exchange import best_rival, late_signal, starts_
 from airtruth.tracing.selection.ranking import TIE, gains_of
 from airtruth.tracing.selection.refit import Refit
 from airtruth.tracing.selection.rounds import SearchRound
-
-_ATTEMPTS: Final = 2
-"""Number of times that a refit may begin again where it ended [-] (judgement)."""
 
 
 def with_look_alikes(
@@ -68,7 +64,8 @@ def _beside_the_others(
             return own
         score = next((s for s in own.table.scores if s.effect.key == effect.key), None)
         exchanged = tuple(effect if e.key == member.key else e for e in last.hypothesis.effects)
-        ends = (_converged(problem, last, exchanged, start) for start in starts)
+        hypothesis = replace(last.hypothesis, effects=exchanged)
+        ends = (converged_fit(problem, hypothesis, start) for start in starts)
         tried = min((end for end in ends if end is not None), key=lambda end: end.cost, default=None)
         if score is not None and tried is not None:
             fits.append(Refit(score, tried, 0.0))
@@ -96,8 +93,10 @@ def _rivals(
     """
     member = own.tied[0].score.effect
     taken = {e.key for e in last.hypothesis.effects}
+    late = late_signal(member)
     for effect in effects:
-        if effect.key not in taken and late_signal(member) and late_signal(effect) == late_signal(member):
+        is_twin = late != "" and late_signal(effect) == late
+        if is_twin and effect.key not in taken and len(effect.parameters) == len(member.parameters):
             taken.add(effect.key)
             yield effect, [last.point]
     best = best_rival(own, last, member)
@@ -106,20 +105,6 @@ def _rivals(
         if key not in taken:
             taken.add(key)
             yield c.score.effect, starts_in_place_of(last, member, c)
-
-
-def _converged(
-    problem: TraceProblem, last: PosteriorFit, effects: tuple[Effect, ...], start: Parameters
-) -> PosteriorFit | None:
-    hypothesis = replace(last.hypothesis, effects=effects)
-    if len(start.sizes) != len(hypothesis.parameters):  # a twin with a location
-        return None
-    own = fit(problem, hypothesis, start)
-    for _ in range(_ATTEMPTS):
-        if own is None or own.converged:
-            break
-        own = fit(problem, hypothesis, own.point)
-    return own
 
 
 __all__ = ["with_look_alikes"]

@@ -15,9 +15,9 @@ from airtruth.tracing.inference.derivative_likelihood import (
     derivative_likelihood,
 )
 from airtruth.tracing.inference.hypothesis import Hypothesis
-from airtruth.tracing.inference.optimise import fit
+from airtruth.tracing.inference.optimise import converged_fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.model.parameters import Common, Parameters
+from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.selection.explanation import (
     WRONG_BY,
     Cause,
@@ -37,8 +37,6 @@ _HOPELESS: Final = 30.0
 """Log-posterior behind the best set from which a set is not refitted [-] (judgement: more than a curve explains)."""
 DIVISORS: Final = ("mass_error", "inertia_error")
 """Causes whose factor divides the coefficients."""
-_ATTEMPTS: Final = 2
-"""Number of times that a fit without the declaration may begin again where it ended [-] (judgement)."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +115,7 @@ def release(
     allowed = declared.causes or declared.wrong_allowed
     if null.hypothesis.spread is not None or not allowed or test.p_value > CONTRADICTED:
         return None
-    free = _converged(problem, released(null.hypothesis, problem), null.point)
+    free = converged_fit(problem, released(null.hypothesis, problem), null.point)
     if free is None:
         return None
     own = derivative_likelihood(problem, free)
@@ -129,16 +127,6 @@ def release(
     strain = least_cost(sets) - (own.cost - peak)
     sets = simplest_first(sets)
     return Release(test, free, sets, strain, refits.get(sets[0].effects))
-
-
-def _converged(problem: TraceProblem, hypothesis: Hypothesis, start: Parameters) -> PosteriorFit | None:
-    """A fit that begins again where it ended, until it converges or `_ATTEMPTS` are spent."""
-    own = fit(problem, hypothesis, start)
-    for _ in range(_ATTEMPTS):
-        if own is None or own.converged:
-            break
-        own = fit(problem, hypothesis, own.point)
-    return own
 
 
 def _refitted(
@@ -168,7 +156,7 @@ def _refitted(
             common[Common.derivatives] -= size * causes[key].direction
             low, high = effects[key].parameters[0].reach
             sizes.append(min(max(size_in_filter(key, size), low), high))
-        own = _converged(problem, hypothesis, replace(start, common=common, sizes=np.array(sizes)))
+        own = converged_fit(problem, hypothesis, replace(start, common=common, sizes=np.array(sizes)))
         if own is not None and own.converged:
             predicted = predicted_cost(plain, [causes[key] for key in s.causes])
             changed[s.effects] = replace(s, cost=s.cost + own.cost - predicted)
