@@ -22,7 +22,7 @@ from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import Candidate
 from airtruth.tracing.selection.budget import Advance, may_begin
-from airtruth.tracing.selection.refit import refit_without
+from airtruth.tracing.selection.refit import losses_without
 from airtruth.tracing.selection.rounds import SearchRound
 
 BETTER: Final = 5.0
@@ -158,14 +158,10 @@ def _needed(problem: TraceProblem, fitted: PosteriorFit, least: float) -> tuple[
     """The effects whose removal costs at least ``least`` in 2 log L, the one that costs most first."""
     while True:
         effects = fitted.hypothesis.effects
-        losses, fits = [], []
-        for effect in effects:
-            less = refit_without(problem, fitted, effect)
-            fits.append(less)
-            losses.append(np.inf if less is None else 2.0 * (_cost(less) - _cost(fitted)))
-        order = sorted(range(len(effects)), key=lambda i: -losses[i])
-        less = fits[order[-1]]
-        if less is None or losses[order[-1]] >= least or len(effects) == 1:
+        removals = losses_without(problem, fitted, effects)
+        order = sorted(range(len(effects)), key=lambda i: -removals[i][0])
+        loss, less = removals[order[-1]]
+        if less is None or loss >= least or len(effects) == 1:
             return tuple(effects[i] for i in order)
         fitted = less
 

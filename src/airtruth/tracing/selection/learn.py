@@ -38,9 +38,8 @@ from airtruth.tracing.selection.release import DeclaredCauses, explained
 from airtruth.tracing.selection.rounds import (
     NOTHING_DECLARED,
     Rival,
-    RoundStart,
     SearchRound,
-    search_round,
+    scored_round,
 )
 from airtruth.tracing.selection.search import settled, total_cost
 
@@ -173,10 +172,7 @@ class _Learning:
 
     def _following(self, rounds: tuple[SearchRound, ...], fitted: PosteriorFit) -> SearchRound | None:
         """The round whose null has the increment; its candidates are scored and none is refitted."""
-        names = {e.key for e in fitted.hypothesis.effects}
-        left = tuple(e for e in self.effects if e.key not in names)
-        begin = RoundStart(fitted.hypothesis, fitted.point, left, settled=True, scores_only=True)
-        own = search_round(self.problem, begin, len(rounds), self.seed, self.advance)
+        own = scored_round(self.problem, fitted, self.effects, len(rounds), self.seed, self.advance)
         last = rounds[-1]
         return None if own is None else replace(own, sets=last.sets, release=last.release)
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment
 from airtruth.tracing.inference.derivative_likelihood import contradiction
@@ -17,9 +19,9 @@ from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.selection.acceptance import SUPERSEDED
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.explanation import CauseSet
-from airtruth.tracing.selection.refit import refit_without
+from airtruth.tracing.selection.refit import losses_without
 from airtruth.tracing.selection.release import CONTRADICTED
-from airtruth.tracing.selection.rounds import RoundStart, SearchRound, search_round, significant_gain
+from airtruth.tracing.selection.rounds import SearchRound, scored_round, significant_gain
 
 
 def pruned(
@@ -49,15 +51,12 @@ def pruned(
     fitted = _with_needed_names(problem, declared or last.null, significant_gain(len(effects), later=True))
     if fitted is last.null:
         return rounds
-    needed = {e.key for e in fitted.hypothesis.effects}
-    left = tuple(e for e in effects if e.key not in needed)
-    begin = RoundStart(fitted.hypothesis, fitted.point, left, settled=True, scores_only=True)
-    end = search_round(problem, begin, len(rounds), seed, advance)
+    end = scored_round(problem, fitted, effects, len(rounds), seed, advance)
     if end is None or end.anomaly.p_value < min(remains, last.anomaly.p_value):
         return rounds
     if declared is None:
         end = replace(end, sets=last.sets, release=last.release)
-    gone = {e.key for e in last.null.hypothesis.effects} - needed
+    gone = {e.key for e in last.null.hypothesis.effects} - {e.key for e in fitted.hypothesis.effects}
     before = (_kept(r, gone, declared is not None) for r in rounds[:-1])
     return (*before, end)
 
@@ -74,12 +73,12 @@ def _with_needed_names(problem: TraceProblem, fitted: PosteriorFit, least: float
     """The fit without the names whose absence costs less than ``least`` in 2 log L, the cheapest one first."""
     while True:
         names = [e for e in fitted.hypothesis.effects if not isinstance(e, Increment)]
-        without = [(less, len(e.parameters)) for e in names if (less := refit_without(problem, fitted, e))]
-        losses = [(2.0 * (less.cost - fitted.cost - count), less) for less, count in without]
-        cheapest = min(losses, key=lambda loss: loss[0], default=None)
-        if cheapest is None or cheapest[0] >= least:
+        loss, less = min(
+            losses_without(problem, fitted, names), key=lambda removal: removal[0], default=(np.inf, None)
+        )
+        if less is None or loss >= least:
             return fitted
-        fitted = cheapest[1]
+        fitted = less
 
 
 def _kept(own: SearchRound, gone: set[str], is_declared: bool) -> SearchRound:

@@ -253,6 +253,21 @@ def refit_without(problem: TraceProblem, fitted: PosteriorFit, effect: Effect) -
     return fit(problem, replace(fitted.hypothesis, effects=rest), point)
 
 
+def losses_without(
+    problem: TraceProblem, fitted: PosteriorFit, effects: Sequence[Effect]
+) -> list[tuple[float, PosteriorFit | None]]:
+    """Loss in 2 log L by the removal of each effect, less 2 for each of its parameters, and the fit without it.
+
+    The loss is infinite where there is no fit.
+    """
+    found: list[tuple[float, PosteriorFit | None]] = []
+    for effect in effects:
+        less = refit_without(problem, fitted, effect)
+        loss = np.inf if less is None else 2.0 * (less.cost - fitted.cost - len(effect.parameters))
+        found.append((loss, less))
+    return found
+
+
 def better_null(problem: TraceProblem, null: PosteriorFit, fits: Sequence[Refit]) -> PosteriorFit | None:
     """The null fitted again from the end of the best refit, if that is a better optimum."""
     if not fits:
@@ -320,4 +335,12 @@ def _ordered_shares(
     return [_SHARES[i] for i in np.argsort(costs, kind="stable")]
 
 
-__all__ = ["LEADING", "Refit", "better_null", "refit_absorbed", "refit_leaders", "refit_without"]
+__all__ = [
+    "LEADING",
+    "Refit",
+    "better_null",
+    "losses_without",
+    "refit_absorbed",
+    "refit_leaders",
+    "refit_without",
+]

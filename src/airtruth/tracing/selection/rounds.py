@@ -250,6 +250,26 @@ def search_round(
         return at_best_location(problem, own, advance)
 
 
+def scored_round(
+    problem: TraceProblem,
+    fitted: PosteriorFit,
+    effects: Sequence[Effect],
+    count: int,
+    seed: int,
+    advance: Advance,
+) -> SearchRound | None:
+    """A round that begins at a fit and scores the candidates that are not in it; none is refitted.
+
+    Parameters
+    ----------
+    effects : candidates of the search; count, seed, advance : as of `search_round`.
+    """
+    taken = {e.key for e in fitted.hypothesis.effects}
+    left = tuple(e for e in effects if e.key not in taken)
+    begin = RoundStart(fitted.hypothesis, fitted.point, left, settled=True, scores_only=True)
+    return search_round(problem, begin, count, seed, advance)
+
+
 def _may_hide_effects(free: Release, fits: Sequence[Refit]) -> bool:
     """Whether released derivatives may have absorbed an effect: no cause explains them well, nor any refit better."""
     best = min((r.cost for r in fits), default=np.inf)
@@ -300,6 +320,7 @@ __all__ = [
     "RoundStart",
     "SearchRound",
     "at_best_location",
+    "scored_round",
     "search_round",
     "significant_gain",
 ]
