@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airtruth.numerics.compiled import inner
+from airtruth.numerics.compiled import allocating, inner
 from airtruth.numerics.discretise import congruence, multiply, whitener
 from airtruth.tracing.model.equations import outputs, rates
 from airtruth.tracing.model.kernel_input import AirPoint, FilterModel
@@ -115,7 +115,7 @@ def spread_of(a: Array, column: Array, dt_s: float) -> Array:
     return np.outer(after, after)
 
 
-@inner
+@allocating
 def corrected(p: Array, k_gain: Array, c: Array) -> Array:
     """Covariance after an update, (I - K C) P, symmetric."""
     n = p.shape[0]
@@ -129,7 +129,7 @@ def corrected(p: Array, k_gain: Array, c: Array) -> Array:
     return out
 
 
-@inner
+@allocating
 def predicted(p: Array, corners: Corners, corner_rad2: float) -> Array:
     """Covariance of the next prediction, with the corner of the cell in between."""
     n = p.shape[0]
@@ -141,7 +141,7 @@ def predicted(p: Array, corners: Corners, corner_rad2: float) -> Array:
     return out
 
 
-@inner
+@allocating
 def gain_at(p: Array, corners: Corners, k_gain: Array, scale: Array) -> tuple[float, float]:
     """Gain of a prediction's covariance, and the matrix that scales its innovation to the steady covariance.
 

@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from airtruth.numerics.ahead import awaited
-from airtruth.numerics.compiled import inner
+from airtruth.numerics.compiled import allocating, inner
 from airtruth.numerics.discretise import multiply, riccati, step, whitener
 from airtruth.tracing.model.equations import gust, outputs, rates
 from airtruth.tracing.model.kernel_input import AirPoint, FilterModel
@@ -52,7 +52,7 @@ def delay_system(delay_s: float) -> Array:
     return system
 
 
-@inner
+@allocating
 def _half_width(state: int, at: AirPoint, model: FilterModel) -> float:
     """Half width of the central difference in a state of the motion."""
     if state == 1:
@@ -170,7 +170,7 @@ def covariance_of(p: Array, c: Array, variance: Array, pc: Array, s: Array) -> N
         s[i, i] += variance[i]
 
 
-@inner
+@allocating
 def update_gain(pc: Array, white: Array, k_gain: Array) -> None:
     """K = P C' W' W."""
     weight = np.empty((OUTPUTS, OUTPUTS))
