@@ -18,6 +18,8 @@ F = TypeVar("F", bound=Callable[..., object])
 
 _WITHOUT_ENTRY: Final[dict[str, Any]] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """numba's options for a function without its entries from Python and C."""
+_UNCOUNTED: Final[dict[str, Any]] = {"_nrt": False, **_WITHOUT_ENTRY}
+"""The same for a function that counts no references to arrays."""
 shared: Final = register_jitable(error_model="numpy")
 """Decorator of a small function that kernels and Python call: from Python it is the plain function."""
 
@@ -32,7 +34,7 @@ def inner(function: F, fastmath: Collection[str] = ()) -> F:
     ----------
     fastmath : LLVM's flags.
     """
-    compiled: F = njit(error_model="numpy", fastmath=set(fastmath), _nrt=False, **_WITHOUT_ENTRY)(function)
+    compiled: F = njit(error_model="numpy", fastmath=set(fastmath), **_UNCOUNTED)(function)
     return compiled
 
 

@@ -46,13 +46,14 @@ def assemble(values, place, coefficient, system, process, noise):  # type: ignor
 
 @inner
 def multiply(a: Numbers, b: Numbers, out: Numbers) -> None:
-    """out = a b, real or complex."""
+    """out = a b, real or complex; the inner loop runs along rows, so that it is vectorised."""
     for i in range(a.shape[0]):
         for j in range(b.shape[1]):
-            total = a[i, 0] * b[0, j]
-            for k in range(1, a.shape[1]):
-                total += a[i, k] * b[k, j]
-            out[i, j] = total
+            out[i, j] = a[i, 0] * b[0, j]
+        for k in range(1, a.shape[1]):
+            factor = a[i, k]
+            for j in range(b.shape[1]):
+                out[i, j] += factor * b[k, j]
 
 
 @inner
@@ -192,6 +193,7 @@ def riccati(phi: Array, c: Array, noise: Array, variance: Array) -> Array:
     """
     n, m = phi.shape[0], c.shape[0]
     a, g, p = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    turned = np.empty((n, n))
     matrix, right = np.empty((n, n)), np.empty((n, 2 * n))
     solved, work, change = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
     for i in range(n):
@@ -208,23 +210,22 @@ def riccati(phi: Array, c: Array, noise: Array, variance: Array) -> Array:
             for j in range(n):
                 right[i, j], right[i, n + j] = a[i, j], g[i, j]
         eliminate(matrix, right)
+        for i in range(n):
+            for j in range(n):
+                turned[i, j] = a[j, i]
         for side in range(2):  # change = a' p (I + g p)^-1 a, then g += a (I + g p)^-1 g a'
             for i in range(n):
                 for j in range(n):
                     solved[i, j] = right[i, side * n + j]
             if side == 0:
                 multiply(p, solved, work)
+                multiply(turned, work, change)
             else:
                 multiply(a, solved, work)
-            for i in range(n):
-                for j in range(n):
-                    total = 0.0
-                    for k in range(n):
-                        total += a[k, i] * work[k, j] if side == 0 else work[i, k] * a[j, k]
-                    if side == 0:
-                        change[i, j] = total
-                    else:
-                        g[i, j] += total
+                multiply(work, turned, solved)
+                for i in range(n):
+                    for j in range(n):
+                        g[i, j] += solved[i, j]
         for i in range(n):
             for j in range(n):
                 solved[i, j] = right[i, j]

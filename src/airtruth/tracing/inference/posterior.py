@@ -213,7 +213,8 @@ def sensitivities_of(
             differences.put(size_index(k), respond(record, settings, change, common, own), h)
     for i in range(PerRecord.size if old is None else 0):
         h = PER_RECORD_STEP[i]
-        moved = respond_to(given, settings, common, _moved(own, i, h))
+        steady = None if i == PerRecord.log_gust else base.steady
+        moved = respond_to(given, settings, common, _moved(own, i, h), steady=steady)
         differences.put(layout.per_record.start + i, moved, h)
     if not (np.isfinite(differences.t).all() and np.isfinite(differences.w).all()):
         return None

@@ -291,6 +291,9 @@ def _innovations(
 def innovations(given: KernelInput, k_gain: Array, corners: Corners, e: Array) -> tuple[bool, float]:
     """Innovations of one record into ``e`` (samples, outputs).
 
+    Where the surface is uncertain, they are scaled to the steady covariance. The kernels are few and flat, because numba
+    optimises what a kernel calls again with it.
+
     Parameters
     ----------
     k_gain : (states, outputs) of the update; zeros for a free run.
@@ -315,42 +318,59 @@ def innovations(given: KernelInput, k_gain: Array, corners: Corners, e: Array) -
     return bool(sound), float(more)
 
 
-def evaluate(given: KernelInput, free_run: bool, e: Array, white: Array, s: Array) -> tuple[float, float]:
-    """Innovations of one record into ``e``, whitener and covariance of the steady filter into ``white`` and ``s``.
+class SteadyFilter(NamedTuple):
+    """Gain of the filter at the record's mean, and the innovations that it expects.
 
-    Where the surface is uncertain, the innovations are scaled to the steady covariance. The kernels are few and flat,
-    because numba optimises what a kernel calls again with it.
-
-    Parameters
+    Attributes
     ----------
-    free_run : no gain: the residuals of a simulation; ``white`` and ``s`` are left alone. The surface is then certain.
+    k_gain : (states, outputs) of the update.
+    white, covariance : (outputs, outputs) whitener W with W S W' = I, and S; logdet : log|S|.
+    corners : recursion where the surface is uncertain.
+    """
 
-    Returns
-    -------
-    log|S| of the steady filter, nan on failure, and the sum over the samples of log|S| beyond it.
+    k_gain: Array
+    white: Array
+    covariance: Array
+    logdet: float
+    corners: Corners
+
+
+def steady_filter(given: KernelInput) -> SteadyFilter | None:
+    """The steady filter of a record; None where its innovations have no covariance.
+
+    It depends on neither the initial state, nor the biases, nor the trim.
     """
     model = given.model
     n = model.states.size
-    none = np.zeros((0, 0))
-    corners = Corners(none, none, none, none, none, model.sensors.variance, none, none, 0.0)
-    if free_run:
-        sound, _ = innovations(given, np.zeros((n, OUTPUTS)), corners, e)
-        return (0.0 if sound else math.nan), 0.0
     a, c = np.empty((n, n)), np.empty((OUTPUTS, n))
     linearise_at_reference(given, a, c)
     process = process_intensity(given.reference.airspeed_m_s, model)
     phi, noise = discrete(a, process, given.dt_s)
-    k_gain, w, cov, logdet, p = gain_of(phi, c, noise, model.sensors.variance)
+    k_gain, white, covariance, logdet, p = gain_of(phi, c, noise, model.sensors.variance)
     if not math.isfinite(logdet):
-        return math.nan, 0.0
-    white[:] = w
-    s[:] = cov
+        return None
+    corners = _certain(model)
     if given.corner_rad2.size > 0:
         spread = spread_of(a, input_column(_reference_state(given), given.reference, model), given.dt_s)
-        variance = model.sensors.variance
-        corners = Corners(phi, noise, spread, p, c, variance, cov, np.asarray(np.linalg.inv(w)), logdet)
-    sound, more = innovations(given, k_gain, corners, e)
-    return (logdet if sound else math.nan), more
+        root = np.asarray(np.linalg.inv(white))
+        corners = Corners(phi, noise, spread, p, c, model.sensors.variance, covariance, root, logdet)
+    return SteadyFilter(k_gain, white, covariance, logdet, corners)
+
+
+def _certain(model: FilterModel) -> Corners:
+    """The recursion of a surface that is known everywhere."""
+    none = np.zeros((0, 0))
+    return Corners(none, none, none, none, none, model.sensors.variance, none, none, 0.0)
+
+
+def free_run(given: KernelInput, e: Array) -> bool:
+    """Residuals of a simulation into ``e`` (samples, outputs); whether the motion keeps its bounds.
+
+    The surface is taken as known between the samples.
+    """
+    certain = given._replace(corner_rad2=np.zeros(0))
+    gain = np.zeros((given.model.states.size, OUTPUTS))
+    return innovations(certain, gain, _certain(given.model), e)[0]
 
 
 def _reference_state(given: KernelInput) -> Array:
@@ -366,4 +386,4 @@ def linearise_at_reference(given: KernelInput, a: Array, c: Array) -> None:
     linearise(_reference_state(given), given.reference, given.model, a, c)
 
 
-__all__ = ["evaluate", "innovations", "linearise_at_reference"]
+__all__ = ["SteadyFilter", "free_run", "innovations", "linearise_at_reference", "steady_filter"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -9,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.physics.terms import Change
+from airtruth.tracing.model import filter as record_filter
 from airtruth.tracing.model.compile import CompiledChange, compile_change
-from airtruth.tracing.model.filter import evaluate
+from airtruth.tracing.model.filter import SteadyFilter
 from airtruth.tracing.model.kernel_input import (
     AircraftArrays,
     AirPoint,
@@ -53,6 +55,7 @@ class Response:
     white, covariance : (3, 3) whitener W with W S W' = I, and S.
     logdet : mean of log|S| over the samples; nan where the motion is lost.
     more_logdet : sum over the samples of log|S| beyond that of ``covariance``, by an uncertain surface.
+    steady : the filter that made the innovations; None for a free run, and where there is none.
     """
 
     e: Array
@@ -60,6 +63,7 @@ class Response:
     covariance: Array
     logdet: float
     more_logdet: float = 0.0
+    steady: SteadyFilter | None = None
 
 
 @dataclass(frozen=True)
@@ -179,19 +183,27 @@ def respond_to(
     *,
     external: External | None = None,
     free_run: bool = False,
+    steady: SteadyFilter | None = None,
 ) -> Response:
-    """`respond` where the same inputs serve many parameters."""
+    """`respond` where the same inputs serve many parameters.
+
+    Parameters
+    ----------
+    steady : filter of parameters that differ in initial state, biases and trim alone; None makes it.
+    """
     e = np.full_like(given.y, LOST)
-    white, covariance = np.eye(OUTPUTS), np.eye(OUTPUTS)
     kernel = kernel_input(given, settings, common, per_record, external)
+    none = np.eye(OUTPUTS)
     if free_run:
-        kernel = kernel._replace(corner_rad2=np.zeros(0))
-    try:
-        logdet, more = evaluate(kernel, free_run, e, white, covariance)
-    except np.linalg.LinAlgError:  # the innovations have no covariance
-        logdet, more = float("nan"), 0.0
+        sound = record_filter.free_run(kernel, e)
+        return Response(e[given.lead :], none, none, 0.0 if sound else math.nan)
+    used = steady or record_filter.steady_filter(kernel)
+    if used is None:
+        return Response(e[given.lead :], none, none, math.nan)
+    sound, more = record_filter.innovations(kernel, used.k_gain, used.corners, e)
     e = e[given.lead :]
-    return Response(e, white, covariance, float(logdet + more / len(e)), float(more))
+    logdet = used.logdet + more / len(e) if sound else math.nan
+    return Response(e, used.white, used.covariance, logdet, more, used)
 
 
 def kernel_input(
