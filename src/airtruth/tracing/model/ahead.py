@@ -7,8 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from airtruth.tracing.model.corners import Corners
-from airtruth.tracing.model.filter import innovations
+from airtruth.tracing.model.filter import innovations, without_update
 from airtruth.tracing.model.kernel_input import (
     AircraftArrays,
     AirPoint,
@@ -45,11 +44,10 @@ def _linearise() -> None:
 
 
 def _filter() -> None:
-    zeros, square = np.zeros((1, OUTPUTS)), np.empty((0, 0))
+    zeros = np.zeros((1, OUTPUTS))
     grid = GridSignals(*[np.ones(1)] * len(GridSignals._fields))
     given = KernelInput(zeros, zeros, grid, np.empty(0), 1.0, 2, np.zeros(4), 0.0, _AT, _model())
-    corners = Corners(square, square, square, square, square, np.ones(OUTPUTS), square, square, 0.0)
-    innovations(given, np.zeros((CORE, OUTPUTS)), corners, np.empty((1, OUTPUTS)))
+    innovations(given, without_update(given.model), np.empty((1, OUTPUTS)))
 
 
 KERNELS: Final[tuple[tuple[str, Callable[[], None]], ...]] = (

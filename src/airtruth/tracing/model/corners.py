@@ -19,7 +19,14 @@ from airtruth.numerics.compiled import allocating, inner
 from airtruth.numerics.discretise import congruence, multiply, whitener
 from airtruth.tracing.model.equations import outputs, rates
 from airtruth.tracing.model.kernel_input import AirPoint, FilterModel
-from airtruth.tracing.model.linearise import covariance_of, delay_system, discrete, update_gain
+from airtruth.tracing.model.linearise import (
+    FirstUpdate,
+    covariance_of,
+    delay_system,
+    discrete,
+    first_update,
+    update_gain,
+)
 from airtruth.tracing.model.parameters import DELAY_ORDER, OUTPUTS
 
 Array = NDArray[np.float64]
@@ -142,8 +149,10 @@ def predicted(p: Array, corners: Corners, corner_rad2: float) -> Array:
 
 
 @allocating
-def gain_at(p: Array, corners: Corners, k_gain: Array, scale: Array) -> tuple[float, float]:
-    """Gain of a prediction's covariance, and the matrix that scales its innovation to the steady covariance.
+def gain_at(
+    p: Array, corners: Corners, k_gain: Array, first: FirstUpdate, scale: Array
+) -> tuple[float, float]:
+    """Gain of a prediction's covariance, the update by alpha and q, and the matrix that scales to the steady covariance.
 
     Returns
     -------
@@ -157,6 +166,7 @@ def gain_at(p: Array, corners: Corners, k_gain: Array, scale: Array) -> tuple[fl
     white = np.zeros((OUTPUTS, OUTPUTS))
     logdet = whitener(s, white)
     update_gain(pc, white, k_gain)
+    first_update(pc, s, first)
     multiply(corners.root, white, scale)
     return logdet - corners.logdet, away
 

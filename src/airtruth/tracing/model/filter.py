@@ -37,8 +37,9 @@ from airtruth.tracing.model.equations import (
     rates,
     settle_effects,
 )
-from airtruth.tracing.model.kernel_input import FilterModel, GridSignals, KernelInput
+from airtruth.tracing.model.kernel_input import AirPoint, FilterModel, GridSignals, KernelInput
 from airtruth.tracing.model.linearise import (
+    FirstUpdate,
     delay_system,
     discrete,
     gain_of,
@@ -237,31 +238,82 @@ def _update(x: Array, k_gain: Array, e: Array) -> bool:
     return True
 
 
+class SteadyFilter(NamedTuple):
+    """Gain of the filter at the record's mean, and the innovations that it expects.
+
+    Attributes
+    ----------
+    k_gain : (states, outputs) of the update; first : the part of it that alpha and q have alone.
+    white, covariance : (outputs, outputs) whitener W with W S W' = I, and S; logdet : log|S|.
+    corners : recursion where the surface is uncertain.
+    """
+
+    k_gain: Array
+    first: FirstUpdate
+    white: Array
+    covariance: Array
+    logdet: float
+    corners: Corners
+
+
+@inner
+def _read(x: Array, at: AirPoint, model: FilterModel, work: Work) -> None:
+    """What the sensors read before lags, delays and slow noise, into ``work.out``."""
+    az = rates(x, at, model, work.rate[0])
+    outputs(x, work.rate[0, 1], az, at, model, work.out)
+
+
+@inner
+def _residual(x: Array, i: int, k: int, given: KernelInput, work: Work) -> float:
+    """Measured less predicted value of an output at a sample."""
+    value = _reading(x, work.out[i], i, given.model)
+    return given.y[k, i] - value - given.model.sensors.bias[i] - given.more[k, i]
+
+
+@inner
+def _innovation(
+    x: Array, k: int, at: AirPoint, given: KernelInput, first: FirstUpdate, work: Work, raw: Array
+) -> None:
+    """Innovation of a sample; that of az is predicted after the update by alpha and q.
+
+    In a linear model this is the innovation of all three at once. Where the lift curve bends, az is predicted at an angle of
+    attack that the vane has measured and not at one that a gust may have moved over the bend.
+    """
+    if k == 0:
+        _read(x, at, given.model, work)
+        _settle_sensors(x, work.out, given.model)
+    else:
+        outputs(x, 0.0, 0.0, at, given.model, work.out)
+    for i in range(2):
+        raw[i] = _residual(x, i, k, given, work)
+    for i in range(x.size):
+        work.tried[i] = x[i] + first.gain[i, 0] * raw[0] + first.gain[i, 1] * raw[1]
+    _read(work.tried, at, given.model, work)
+    raw[2] = _residual(work.tried, 2, k, given, work) + first.share[0] * raw[0] + first.share[1] * raw[1]
+
+
 @awaited
 @njit(cache=True, nogil=True, error_model="numpy")
 def _innovations(
-    given: KernelInput, steps: Steps, work: Work, x: Array, k_gain: Array, corners: Corners, e: Array
+    given: KernelInput, steps: Steps, work: Work, x: Array, steady: SteadyFilter, e: Array
 ) -> tuple[bool, float]:
     """`innovations` from a state ``x``, which moves along the record."""
-    model, grid, states = given.model, given.grid, given.model.states
+    model, grid, states, corners = given.model, given.grid, given.model.states, steady.corners
     n, samples = states.size, given.y.shape[0]
-    uncertain, more_logdet, p = False, 0.0, corners.steady
-    own_gain, scale, raw = k_gain.copy(), np.empty((OUTPUTS, OUTPUTS)), np.empty(OUTPUTS)
+    uncertain, more_logdet, away, p = False, 0.0, 0.0, corners.steady
+    own_gain, own_first = (
+        steady.k_gain.copy(),
+        FirstUpdate(steady.first.gain.copy(), steady.first.share.copy()),
+    )
+    scale, raw = np.empty((OUTPUTS, OUTPUTS)), np.empty(OUTPUTS)
     for k in range(samples):
         at = air_at(grid, k * given.sub)
-        az = rates(x, at, model, work.rate[0])
-        outputs(x, work.rate[0, 1], az, at, model, work.out)
-        if k == 0:
-            _settle_sensors(x, work.out, model)
-        for i in range(OUTPUTS):
-            value = _reading(x, work.out[i], i, model)
-            raw[i] = given.y[k, i] - value - model.sensors.bias[i] - given.more[k, i]
-            e[k, i] = raw[i]
         if uncertain:
-            more, away = gain_at(p, corners, own_gain, scale)
+            more, away = gain_at(p, corners, own_gain, own_first, scale)
             if not math.isfinite(more):
                 return False, 0.0
             more_logdet += more
+            _innovation(x, k, at, given, own_first, work, raw)
             for i in range(OUTPUTS):
                 e[k, i] = 0.0
                 for m in range(OUTPUTS):
@@ -269,7 +321,10 @@ def _innovations(
             uncertain = not settled(away)
             now = own_gain
         else:
-            now, p = k_gain, corners.steady
+            _innovation(x, k, at, given, steady.first, work, raw)
+            for i in range(OUTPUTS):
+                e[k, i] = raw[i]
+            now, p = steady.k_gain, corners.steady
         if k + 1 == samples:
             break
         if not _update(x, now, raw):
@@ -288,16 +343,11 @@ def _innovations(
     return True, more_logdet
 
 
-def innovations(given: KernelInput, k_gain: Array, corners: Corners, e: Array) -> tuple[bool, float]:
+def innovations(given: KernelInput, steady: SteadyFilter, e: Array) -> tuple[bool, float]:
     """Innovations of one record into ``e`` (samples, outputs).
 
     Where the surface is uncertain, they are scaled to the steady covariance. The kernels are few and flat, because numba
     optimises what a kernel calls again with it.
-
-    Parameters
-    ----------
-    k_gain : (states, outputs) of the update; zeros for a free run.
-    corners : recursion where the surface is uncertain; unused if ``given.corner_rad2`` is empty.
 
     Returns
     -------
@@ -314,25 +364,8 @@ def innovations(given: KernelInput, k_gain: Array, corners: Corners, e: Array) -
         np.zeros(3),
         np.zeros(DELAY_ORDER),
     )
-    sound, more = _innovations(given, steps, work, _initial_state(given), k_gain, corners, e)
+    sound, more = _innovations(given, steps, work, _initial_state(given), steady, e)
     return bool(sound), float(more)
-
-
-class SteadyFilter(NamedTuple):
-    """Gain of the filter at the record's mean, and the innovations that it expects.
-
-    Attributes
-    ----------
-    k_gain : (states, outputs) of the update.
-    white, covariance : (outputs, outputs) whitener W with W S W' = I, and S; logdet : log|S|.
-    corners : recursion where the surface is uncertain.
-    """
-
-    k_gain: Array
-    white: Array
-    covariance: Array
-    logdet: float
-    corners: Corners
 
 
 def steady_filter(given: KernelInput) -> SteadyFilter | None:
@@ -346,7 +379,7 @@ def steady_filter(given: KernelInput) -> SteadyFilter | None:
     linearise_at_reference(given, a, c)
     process = process_intensity(given.reference.airspeed_m_s, model)
     phi, noise = discrete(a, process, given.dt_s)
-    k_gain, white, covariance, logdet, p = gain_of(phi, c, noise, model.sensors.variance)
+    k_gain, white, covariance, logdet, p, first = gain_of(phi, c, noise, model.sensors.variance)
     if not math.isfinite(logdet):
         return None
     corners = _certain(model)
@@ -354,7 +387,7 @@ def steady_filter(given: KernelInput) -> SteadyFilter | None:
         spread = spread_of(a, input_column(_reference_state(given), given.reference, model), given.dt_s)
         root = np.asarray(np.linalg.inv(white))
         corners = Corners(phi, noise, spread, p, c, model.sensors.variance, covariance, root, logdet)
-    return SteadyFilter(k_gain, white, covariance, logdet, corners)
+    return SteadyFilter(k_gain, first, white, covariance, logdet, corners)
 
 
 def _certain(model: FilterModel) -> Corners:
@@ -363,14 +396,20 @@ def _certain(model: FilterModel) -> Corners:
     return Corners(none, none, none, none, none, model.sensors.variance, none, none, 0.0)
 
 
+def without_update(model: FilterModel) -> SteadyFilter:
+    """The filter of a free run, whose state no measurement corrects."""
+    n, square = model.states.size, np.eye(OUTPUTS)
+    first = FirstUpdate(np.zeros((n, 2)), np.zeros(2))
+    return SteadyFilter(np.zeros((n, OUTPUTS)), first, square, square, 0.0, _certain(model))
+
+
 def free_run(given: KernelInput, e: Array) -> bool:
     """Residuals of a simulation into ``e`` (samples, outputs); whether the motion keeps its bounds.
 
     The surface is taken as known between the samples.
     """
     certain = given._replace(corner_rad2=np.zeros(0))
-    gain = np.zeros((given.model.states.size, OUTPUTS))
-    return innovations(certain, gain, _certain(given.model), e)[0]
+    return innovations(certain, without_update(given.model), e)[0]
 
 
 def _reference_state(given: KernelInput) -> Array:
@@ -386,4 +425,11 @@ def linearise_at_reference(given: KernelInput, a: Array, c: Array) -> None:
     linearise(_reference_state(given), given.reference, given.model, a, c)
 
 
-__all__ = ["SteadyFilter", "free_run", "innovations", "linearise_at_reference", "steady_filter"]
+__all__ = [
+    "SteadyFilter",
+    "free_run",
+    "innovations",
+    "linearise_at_reference",
+    "steady_filter",
+    "without_update",
+]

@@ -7,7 +7,7 @@ Approximants, 2nd ed. (1996), section 4.6.
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -29,6 +29,19 @@ _RATE_RAD_S: Final = 0.05
 """The same in the pitch rate [rad/s]."""
 _GUST: Final = 0.1
 """The same in a gust state that does not move alpha [-]."""
+
+
+class FirstUpdate(NamedTuple):
+    """The update by alpha and q alone, which precedes that by az.
+
+    Attributes
+    ----------
+    gain : (states, 2) gain of this update.
+    share : (2,) regression of the innovation of az on those of alpha and q.
+    """
+
+    gain: Array
+    share: Array
 
 
 def delay_system(delay_s: float) -> Array:
@@ -141,7 +154,7 @@ def gain(
     dt_s : sample period [s].
     """
     phi, noise = discrete(a, process, dt_s)
-    k_gain, white, s, logdet, _ = gain_of(phi, c, noise, variance)
+    k_gain, white, s, logdet, *_ = gain_of(phi, c, noise, variance)
     return k_gain, white, s, logdet
 
 
@@ -182,24 +195,46 @@ def update_gain(pc: Array, white: Array, k_gain: Array) -> None:
     multiply(pc, weight, k_gain)
 
 
+@inner
+def first_update(pc: Array, s: Array, first: FirstUpdate) -> None:
+    """Write the update by alpha and q.
+
+    Parameters
+    ----------
+    pc, s : P C' and the covariance of the innovations.
+    """
+    determinant = s[0, 0] * s[1, 1] - s[0, 1] * s[1, 0]
+    for i in range(pc.shape[0]):
+        first.gain[i, 0] = (pc[i, 0] * s[1, 1] - pc[i, 1] * s[1, 0]) / determinant
+        first.gain[i, 1] = (pc[i, 1] * s[0, 0] - pc[i, 0] * s[0, 1]) / determinant
+    first.share[0] = (s[2, 0] * s[1, 1] - s[2, 1] * s[1, 0]) / determinant
+    first.share[1] = (s[2, 1] * s[0, 0] - s[2, 0] * s[0, 1]) / determinant
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def gain_of(phi: Array, c: Array, noise: Array, variance: Array) -> tuple[Array, Array, Array, float, Array]:
-    """`gain` of a system in discrete time, and the steady covariance of its prediction."""
+def gain_of(
+    phi: Array, c: Array, noise: Array, variance: Array
+) -> tuple[Array, Array, Array, float, Array, FirstUpdate]:
+    """`gain` of a system in discrete time, the steady covariance of its prediction, and the update by alpha and q."""
     n = phi.shape[0]
     white, s = np.zeros((OUTPUTS, OUTPUTS)), np.zeros((OUTPUTS, OUTPUTS))
     k_gain, pc = np.zeros((n, OUTPUTS)), np.empty((n, OUTPUTS))
+    first = FirstUpdate(np.zeros((n, 2)), np.zeros(2))
     p = riccati(phi, c, noise, variance)
     covariance_of(p, c, variance, pc, s)
     logdet = whitener(s, white)
     if math.isfinite(logdet):
         update_gain(pc, white, k_gain)
-    return k_gain, white, s, logdet, p
+        first_update(pc, s, first)
+    return k_gain, white, s, logdet, p, first
 
 
 __all__ = [
+    "FirstUpdate",
     "covariance_of",
     "delay_system",
     "discrete",
+    "first_update",
     "gain",
     "gain_of",
     "linearise",

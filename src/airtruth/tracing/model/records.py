@@ -27,8 +27,8 @@ _STEP_S: Final = 0.0201
 FINE: Final = 8
 """Cells of the surface's own grid per cell of the filter's."""
 _CUTOFF_HZ: Final = 5.0
-"""Cutoff of the low-pass of airspeed and density [Hz] (judgement): above the phugoid and horizontal gusts, below the
-noise of the sensors."""
+"""Least cutoff of the low-pass of airspeed and density [Hz] (judgement): above the phugoid, below the noise of the
+sensors."""
 _GROUND_SLOPE_M_S2: Final = 0.3
 """Largest error of the acceleration along the path that a longitudinal accelerometer leaves [m/s2] (judgement: a bias of
 0.02 g and an error in attitude of half a degree). A steeper trend of the airspeed is one of the wind."""
@@ -158,7 +158,8 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0) ->
     The elevator between samples has the area of the cubic through the four nearest samples and the
     corners of a first-order servo where the record shows one (`airtruth.numerics.intersample`); in a coarse log it is
     that of the declared servo, or a spline (`airtruth.tracing.model.elevator`). Airspeed
-    and density are low-passed forward and backward (5 Hz): they are inputs, and their noise is not motion.
+    and density are inputs, and their noise is not motion: they are low-passed forward and backward, the density at 5 Hz and
+    the airspeed where its noise exceeds its gusts (`gust_cutoff_hz`).
     Attitude is measured, or the integral of the pitch rate from alpha at the start, level flight.
 
     Parameters
@@ -175,7 +176,7 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0) ->
         dt = float((t[-1] - t[0]) / (len(t) - 1))
         sub = 2 * math.ceil(dt / _STEP_S - 1e-9)
         y = np.stack([channels[name] for name in CHANNELS], axis=1)
-        density = air_density(channels)
+        density, airspeed = air_density(channels), channels["airspeed_m_s"]
         altitude = channels.get("altitude_m")
         if altitude is None:
             altitude = np.full(len(t), _altitude(float(density.mean())))
@@ -192,7 +193,7 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0) ->
                 sub=sub,
                 y=np.ascontiguousarray(y, dtype=np.float64),
                 elevator_rad=elevator,
-                airspeed_m_s=fine(_smooth(channels["airspeed_m_s"], dt), sub),
+                airspeed_m_s=fine(_smooth(airspeed, dt, gust_cutoff_hz(airspeed, dt)), sub),
                 ground_m_s=fine(_ground(channels, theta, dt), sub),
                 density_kg_m3=fine(_smooth(density, dt), sub),
                 theta_rad=fine(theta, sub),
@@ -344,13 +345,35 @@ def fine(x: Array, sub: int) -> Array:
     return np.interp(np.arange((len(x) - 1) * sub + 1) / sub, np.arange(len(x)), x)
 
 
-def _smooth(x: Array, dt_s: float) -> Array:
+def _smooth(x: Array, dt_s: float, cutoff_hz: float = _CUTOFF_HZ) -> Array:
     from scipy.signal import sosfiltfilt
 
     x = np.asarray(x, dtype=np.float64)
-    if 0.45 / dt_s <= _CUTOFF_HZ or len(x) < 40:
+    if 0.45 / dt_s <= cutoff_hz or len(x) < 40:
         return x
-    return np.asarray(sosfiltfilt(butterworth(_CUTOFF_HZ, 2, dt_s).copy(), x))
+    return np.asarray(sosfiltfilt(butterworth(cutoff_hz, 2, dt_s).copy(), x))
+
+
+def gust_cutoff_hz(airspeed_m_s: Array, dt_s: float) -> float:
+    """Frequency at which white noise of the airspeed exceeds its gusts [Hz], `_CUTOFF_HZ` at least; infinite without noise.
+
+    In short times a gust along the path is a random walk. Differences of a walk of variance q per sample in white noise of
+    variance r have the variance q + 2 r and the covariance -r from one to the next. The spectra q/(w dt)^2 and r meet at
+    w = sqrt(q/r)/dt, the corner of the optimal smoother.
+
+    Parameters
+    ----------
+    airspeed_m_s : (samples,); dt_s : sample period [s].
+
+    Source: J. F. Muth, J. Amer. Statist. Assoc. 55 (1960) 299-306, for the random walk in noise.
+    """
+    change = np.diff(np.asarray(airspeed_m_s, dtype=np.float64))
+    change -= change.mean()
+    noise = -float((change[1:] * change[:-1]).mean())
+    if noise <= 0.0:
+        return math.inf
+    walk = max(float((change**2).mean()) - 2.0 * noise, 0.0)
+    return max(_CUTOFF_HZ, math.sqrt(walk / noise) / (2.0 * math.pi * dt_s))
 
 
 def _altitude(density: float) -> float:

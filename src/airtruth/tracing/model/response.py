@@ -200,7 +200,7 @@ def respond_to(
     used = steady or record_filter.steady_filter(kernel)
     if used is None:
         return Response(e[given.lead :], none, none, math.nan)
-    sound, more = record_filter.innovations(kernel, used.k_gain, used.corners, e)
+    sound, more = record_filter.innovations(kernel, used, e)
     e = e[given.lead :]
     logdet = used.logdet + more / len(e) if sound else math.nan
     return Response(e, used.white, used.covariance, logdet, more, used)
