@@ -267,7 +267,7 @@ def _read(x: Array, at: AirPoint, model: FilterModel, work: Work) -> None:
 def _residual(x: Array, i: int, k: int, given: KernelInput, work: Work) -> float:
     """Measured less predicted value of an output at a sample."""
     value = _reading(x, work.out[i], i, given.model)
-    return given.y[k, i] - value - given.model.sensors.bias[i] - given.more[k, i]
+    return float(given.y[k, i] - value - given.model.sensors.bias[i] - given.more[k, i])
 
 
 @inner
