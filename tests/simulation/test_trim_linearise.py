@@ -1,5 +1,7 @@
 """Trim and declared derivatives of the GTM against the paper and an independent set of equations."""
 
+from dataclasses import replace
+
 import numpy as np
 import oracle
 import pytest
@@ -7,7 +9,7 @@ import pytest
 from airtruth.errors import TrimError
 from airtruth.physics import short_period
 from airtruth.simulation.linearise import linearise
-from airtruth.simulation.simulator import Condition
+from airtruth.simulation.simulator import Condition, Executive
 from airtruth.simulation.trim import trim
 from airtruth.units import DEG, FT, KT
 
@@ -22,6 +24,24 @@ def test_trim_at_the_paper_condition(paper_trim):
     assert paper_trim.elevator_rad / DEG == pytest.approx(0.176, abs=0.001)
     assert paper_trim.airspeed_m_s == pytest.approx(42.852, abs=0.001)
     assert paper_trim.density_kg_m3 == pytest.approx(0.99311, rel=2e-5)  # US Standard Atmosphere 1976
+
+
+def test_a_held_throttle_is_balanced_by_the_flight_path(gtm, paper_trim):
+    """At the throttle of level flight the path is level; the excess of thrust over drag climbs, sin(gamma) = X/(m g), but for the
+    angle of attack and the elevator, which are trimmed again."""
+    level = trim(gtm, paper_trim.condition, throttle=paper_trim.controls.throttle)
+    assert level.condition.gamma_rad == pytest.approx(0.0, abs=1e-9)
+    assert level.alpha_rad == pytest.approx(paper_trim.alpha_rad, abs=1e-9)
+    more = paper_trim.controls.throttle + 0.02
+    climbing = trim(gtm, paper_trim.condition, near=paper_trim, throttle=more)
+    assert climbing.controls.throttle == more
+    assert climbing.residual < 1e-6
+    held = replace(paper_trim, controls=replace(paper_trim.controls, throttle=more))
+    executive = Executive(gtm, 1.0 / 200.0)
+    executive.initialise(held.condition, held.alpha_rad, held.controls)
+    r = executive.respond()
+    along = r.u_dot_m_s2 * np.cos(held.alpha_rad) + r.w_dot_m_s2 * np.sin(held.alpha_rad)
+    assert np.sin(climbing.condition.gamma_rad) == pytest.approx(along / 9.80665, rel=0.05)
 
 
 def test_declared_derivatives_are_the_paper_truth(gtm, paper_trim):

@@ -62,8 +62,12 @@ def test_tables_are_read_trilinearly(plant):
     rng = np.random.default_rng(1)
     axes = (plant.alpha_rad, plant.elevator_rad, plant.qhat)
     x = np.stack([rng.uniform(axis[0], axis[-1], 50) for axis in axes], axis=1)
-    other = RegularGridInterpolator(axes, plant.values)(x)
-    np.testing.assert_allclose(np.stack(looked_up(plant, *x.T), axis=1), other, rtol=1e-10, atol=1e-12)
+    pressure = rng.uniform(500.0, 1500.0, 50)
+    other = pressure[:, None] * RegularGridInterpolator(axes, plant.values)(x)
+    other += RegularGridInterpolator(axes[:1], plant.constant)(x[:, :1])
+    np.testing.assert_allclose(
+        np.stack(looked_up(plant, *x.T, pressure), axis=1), other, rtol=1e-10, atol=1e-9
+    )
 
 
 def test_an_aircraft_that_its_tables_hold_has_no_remainder(gtm, paper_trim, plant):

@@ -73,7 +73,9 @@ def test_nonlinear_free_run_against_dop853():
         alpha = theta(t) - math.asin(vg * math.sin(theta(t) - alpha_ground) / v)
         surface = plant.neutral_elevator_rad + factor * (elevator(t) - plant.neutral_elevator_rad)
         qhat = q * c.chord_m / (2.0 * v)
-        fx, fz, fm = qbar * forces(plant, alpha, surface, qhat) + plant.constant * 1.04
+        share = 0.5 * (alpha + 1.0)  # of the one cell from -1 to 1 rad
+        constant = (1.0 - share) * plant.constant[0] + share * plant.constant[1]
+        fx, fz, fm = qbar * forces(plant, alpha, surface, qhat) + constant + 0.04 * plant.engine
         states = np.array([alpha - plant.trim_alpha_rad, qhat, surface - plant.trim_elevator_rad])
         lift = per_record[PerRecord.trim.start] + common[Common.lift] @ states
         moment = per_record[PerRecord.offsets.stop - 1] + common[Common.moment] @ states

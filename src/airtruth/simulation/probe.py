@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import pairwise, product
 from typing import Final
 
 import numpy as np
@@ -29,6 +30,15 @@ _HOLDS: Final = 12
 """Largest number of commands that hold a surface against augmentation [-] (judgement: each reduces the error tenfold)."""
 _SAME_SURFACE_RAD: Final = 1e-6
 """Largest difference of the surface at one command that counts as rounding [rad]."""
+
+_BREAK: Final = 1e-3
+"""Error of a cell's line at its middle, over the range of the force, from which the cell is divided [-] (judgement: 1e-3
+of the lift of a flight test is a fifth of the noise of a good accelerometer)."""
+_NEAR: Final = 0.02
+"""Distance from the end of a cell at which its slope there is taken, over its width [-] (judgement: nearer than most
+breaks, far above rounding)."""
+_DIVISIONS: Final = 3
+"""Number of times that the cells of an axis are searched for breaks [-] (judgement: a degree with three breaks is rare)."""
 
 
 @dataclass(frozen=True)
@@ -120,6 +130,71 @@ def probe(
         elevator_rad=trim.elevator_rad,
         gamma_rad=trim.condition.gamma_rad,
     )
+
+
+def with_breaks(aircraft: Aircraft, trim: Trim, grid: Grid, dt_s: float = 1.0 / 200.0) -> Grid:
+    """Add the angles at which Z and M break between two angles of attack of a grid.
+
+    X turns the flight path by the sine of the angle of attack alone, and its breaks are left out. The elevator is that of the
+    trim and the aircraft does not pitch: the breaks of the other states are taken to be the same.
+
+    Parameters
+    ----------
+    aircraft, trim : the aircraft and its equilibrium.
+    grid : states to evaluate.
+    dt_s : simulation step of the executive [s].
+    """
+    executive = Executive(aircraft, dt_s)
+    force = executive.node("forces/fbz-total-lbs")
+    states = _States(executive, trim)
+
+    def at(alpha: float) -> Array:
+        answer = states.respond(trim.condition, alpha, trim.controls, 0.0)
+        return np.array([force.get_double_value(), answer.q_dot_rad_s2])
+
+    return replace(grid, alpha_rad=with_breaks_of(at, grid.alpha_rad))
+
+
+def with_breaks_of(function: Callable[[float], Array], points: Array) -> Array:
+    """Points of an axis between which a function is nearly linear, those given and the breaks between them.
+
+    Where a cell is not linear, the lines at its two ends meet at its break. A curve, or several breaks, divide the cell
+    instead at its middle.
+
+    Parameters
+    ----------
+    function : (values,) at a point; points : (points,) increasing.
+    """
+    values = {float(x): function(float(x)) for x in points}
+    scale = np.ptp(np.array(list(values.values())), axis=0)
+    scale[scale == 0.0] = np.inf
+    axis = sorted(values)
+    for _ in range(_DIVISIONS):
+        added = []
+        for low, high in pairwise(axis):
+            middle = 0.5 * (low + high)
+            off = np.abs(function(middle) - 0.5 * (values[low] + values[high])) / scale
+            if off.max() > _BREAK:
+                added.append(_meeting(function, low, high, values, int(np.argmax(off))))
+        if not added:
+            break
+        values |= {x: function(x) for x in added}
+        axis = sorted(values)
+    return np.array(axis)
+
+
+def _meeting(
+    function: Callable[[float], Array], low: float, high: float, values: dict[float, Array], component: int
+) -> float:
+    """Where the lines at the ends of a cell meet; its middle where they meet outside."""
+    near = _NEAR * (high - low)
+    left, right = values[low][component], values[high][component]
+    rise = (function(low + near)[component] - left) / near
+    fall = (right - function(high - near)[component]) / near
+    if rise == fall:
+        return 0.5 * (low + high)
+    x = float((right - left + rise * low - fall * high) / (rise - fall))
+    return x if low + near < x < high - near else 0.5 * (low + high)
 
 
 def forces_at_speeds(aircraft: Aircraft, trim: Trim, ratios: Array, dt_s: float = 1.0 / 200.0) -> Array:

@@ -77,11 +77,14 @@ class Trim:
 class _Problem:
     """Unknowns, their ranges and the residual of one trim."""
 
-    def __init__(self, aircraft: Aircraft, condition: Condition, dt_s: float) -> None:
+    def __init__(
+        self, aircraft: Aircraft, condition: Condition, dt_s: float, throttle: float | None = None
+    ) -> None:
         self.executive = Executive(aircraft, dt_s)
         self.condition = condition
         model = self.executive.model
-        self.glides = not model.throttle.command
+        self.throttle = throttle if model.throttle.command else 0.0
+        self.glides = self.throttle is not None
         self.count = 6 if model.lateral is not None else 3
         self.thrifty = self.glides or model.engine_start_s > 0.0 or model.lateral is not None
         self.names = list(_NAMES[: self.count])
@@ -99,7 +102,8 @@ class _Problem:
 
     def controls(self, x: Array) -> Controls:
         """Controls of a vector of unknowns."""
-        return Controls(float(x[1]), 0.0 if self.glides else float(x[2]), *map(float, x[3:]))
+        throttle = float(x[2]) if self.throttle is None else self.throttle
+        return Controls(float(x[1]), throttle, *map(float, x[3:]))
 
     def path(self, x: Array) -> Condition:
         """Condition of a vector of unknowns."""
@@ -127,11 +131,13 @@ def trim(
     dt_s: float = 1.0 / 200.0,
     tolerance: float = TOLERANCE,
     near: Trim | None = None,
+    throttle: float | None = None,
 ) -> Trim:
     """Solve u_dot = w_dot = q_dot = 0 for angle of attack, elevator and throttle by Newton's method.
 
     An aircraft with lateral properties is held straight as well: v_dot = p_dot = r_dot = 0 by aileron, rudder and bank,
-    without sideslip. An aircraft without a throttle glides: the flight-path angle takes the place of the throttle.
+    without sideslip. Where the throttle is given, and for an aircraft without one, which glides, the flight-path angle takes
+    its place.
 
     Parameters
     ----------
@@ -140,13 +146,14 @@ def trim(
     dt_s : simulation step of the executive [s].
     tolerance : largest residual of a trim [m/s2], [rad/s2].
     near : trim to start from, instead of the usual starts.
+    throttle : lever that is held [0..1]; None for one that is a result.
 
     Raises
     ------
     TrimError
         If no start leads to a residual below the tolerance; the message has the residual and the limit reached.
     """
-    problem = _Problem(aircraft, condition, dt_s)
+    problem = _Problem(aircraft, condition, dt_s, throttle)
     best: tuple[float, Array] | None = None
     for x in _near(problem, near) or [problem.start(*start) for start in _START]:
         x, size = _newton(problem, x)

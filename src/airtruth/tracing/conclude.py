@@ -44,7 +44,6 @@ from airtruth.tracing.inference.hypothesis import unconstrained_by
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.profile import Profile, location_index
 from airtruth.tracing.inference.robust import robust_covariance
-from airtruth.tracing.lift_break import break_note, crossed_breaks
 from airtruth.tracing.model.compile import CHANNELS
 from airtruth.tracing.model.parameters import COLOUR_TIME_S, Common
 from airtruth.tracing.prepare import Case
@@ -99,10 +98,7 @@ def conclude(
     verdict = _verdict(stated, declared)
     confirmed = confirmation(stages)
     errors = stage_errors(stages)
-    crossed = () if verdict == "none" else crossed_breaks(case.fitted, last.null.point)
     notes = [*case.notes, *_slow_noise(last.null.point.common)]
-    if crossed:
-        notes.append(break_note(crossed))
     if case.left_out:
         notes.append(
             "the time budget ended the search, which is provisional for it; left out: "
@@ -119,7 +115,6 @@ def conclude(
         provisional=case.held is None
         or confirmed is False
         or bool(case.left_out)
-        or bool(crossed)
         or (bool(stated) and remaining.p_value <= ANOMALY_LEVEL),
         anomaly=_evidence(anomaly),
         remaining=_evidence(remaining),

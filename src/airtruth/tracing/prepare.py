@@ -22,7 +22,15 @@ from airtruth.physics.reconstruction import is_reconstructed
 from airtruth.simulation.trim import Trim
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.model.plant import Plant, declared_derivatives, engines, linear, probed, trim_of
+from airtruth.tracing.model.plant import (
+    Plant,
+    declared_derivatives,
+    engines,
+    linear,
+    probed,
+    trim_of,
+    with_throttle,
+)
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, read
 from airtruth.tracing.model.remainder import remainder
 from airtruth.tracing.model.settings import VANE, declared_change, resolved, settings_of
@@ -329,7 +337,7 @@ def _trim(aircraft: Aircraft, members: Sequence[Signals], speed: float, density:
             at = trim_of(aircraft, speed, density, s.altitude_m, tried)
             levers = [m.throttle for m in members if m.throttle is not None]
             if levers:  # the logged throttle counts, not that of the declared trim
-                at = replace(at, controls=replace(at.controls, throttle=float(np.mean(levers))))
+                at = with_throttle(aircraft, at, float(np.mean(levers)))
             return at
         except TrimError as error:
             problem = error

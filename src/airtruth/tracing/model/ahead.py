@@ -30,7 +30,7 @@ def _model() -> FilterModel:
     whole = np.empty(0, dtype=np.int64)
     return FilterModel(
         AircraftArrays._make(
-            [*[1.0] * 12, np.zeros(3), np.zeros(6), axis, axis, axis, np.zeros((2, 2, 2, 3))]
+            [*[1.0] * 12, np.zeros((2, 3)), np.zeros(6), axis, axis, axis, np.zeros((2, 2, 2, 3))]
         ),
         GustModel(*[1.0] * len(GustModel._fields)),
         EffectArrays(whole.reshape(0, 5), none, none, none, whole.reshape(0, 2), none, none),

@@ -9,7 +9,7 @@ test excites. Airspeed, density, pitch attitude and the speed without the gust a
 angle of attack of the air is theta - asin((V_ground sin(theta - alpha) - w)/V), its pitch rate
 q - (w - w_late)/(tau V) with tau = 4 b/(pi V).
 
-Forces: tables of X, Z, M over alpha, elevator and q c/(2V) times q_bar, the engines' constants, increments of the
+Forces: tables of X, Z, M over alpha, elevator and q c/(2V) times q_bar, constants over alpha, increments of the
 derivatives, and the terms of `airtruth.physics.terms`.
 
 Sources: equations of motion, `airtruth.physics.longitudinal`; gusts, MIL-F-8785C, 3.7.1.1 and 3.7.1.2.
@@ -108,9 +108,9 @@ def _cell(axis: Array, x: float) -> tuple[int, float]:
 
 @inner
 def _look_up(
-    aircraft: AircraftArrays, alpha: float, surface: float, qhat: float
+    aircraft: AircraftArrays, alpha: float, surface: float, qhat: float, qbar: float
 ) -> tuple[float, float, float]:
-    """X, Z [m2] and M [m3] of the air over the dynamic pressure, trilinear in the tables."""
+    """X, Z [N] and M [N m], trilinear in the tables."""
     values = aircraft.values
     i, si = _cell(aircraft.alpha_rad, alpha)
     j, sj = _cell(aircraft.elevator_rad, surface)
@@ -124,7 +124,12 @@ def _look_up(
             fx += w0 * values[i + a, j + b, n, 0] + w1 * values[i + a, j + b, n + 1, 0]
             fz += w0 * values[i + a, j + b, n, 1] + w1 * values[i + a, j + b, n + 1, 1]
             fm += w0 * values[i + a, j + b, n, 2] + w1 * values[i + a, j + b, n + 1, 2]
-    return fx, fz, fm
+    constant = aircraft.constant
+    return (
+        fx * qbar + (1.0 - si) * constant[i, 0] + si * constant[i + 1, 0],
+        fz * qbar + (1.0 - si) * constant[i, 1] + si * constant[i + 1, 1],
+        fm * qbar + (1.0 - si) * constant[i, 2] + si * constant[i + 1, 2],
+    )
 
 
 @inner
@@ -183,10 +188,7 @@ def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
     surface = effective_elevator(at.elevator_rad, aircraft)
     force, half = qbar * aircraft.area_m2, 0.5 * aircraft.chord_m / v
     qhat = (q - gusts.rotary * gusts.level_m_s * late / v) * half
-    fx, fz, fm = _look_up(aircraft, alpha, surface, qhat)
-    fx = fx * qbar + aircraft.constant[0]
-    fz = fz * qbar + aircraft.constant[1]
-    fm = fm * qbar + aircraft.constant[2]
+    fx, fz, fm = _look_up(aircraft, alpha, surface, qhat, qbar)
     d_alpha, d_de, more = (
         alpha - aircraft.trim_alpha_rad,
         surface - aircraft.trim_elevator_rad,

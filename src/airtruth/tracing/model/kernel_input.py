@@ -25,7 +25,7 @@ class AircraftArrays(NamedTuple):
     cg_shift : CG aft of the declared one [chords].
     thrust_arm_m : arm of the thrust below the CG beyond the declared one [m].
     thrust_n, thrust_slope_m2 : thrust at no dynamic pressure [N], and its slope over that [m2].
-    constant : (3,) X, Z [N] and M [N m] that the dynamic pressure leaves alone.
+    constant : (alpha, 3) X, Z [N] and M [N m] that the dynamic pressure leaves alone.
     increments : (6,) of CLalpha, CLq, CLde, Cmalpha, Cmq, Cmde [-].
     alpha_rad, elevator_rad, qhat : axes of the tables [rad, rad, -].
     values : (alpha, elevator, qhat, 3) X, Z [m2] and M [m3] of the air over the dynamic pressure.

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import contextlib
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.errors import AircraftError
+from airtruth.errors import AircraftError, TrimError
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.simulation.disposable import isolated
 from airtruth.simulation.linearise import Linearisation, linearise
-from airtruth.simulation.probe import Grid, forces_at_speeds, probe
+from airtruth.simulation.probe import Grid, forces_at_speeds, probe, with_breaks
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim, trim
 from airtruth.units import DEG, G0
@@ -46,7 +47,9 @@ class Plant:
     ----------
     alpha_rad, elevator_rad, qhat : axes of the tables; qhat = q c/(2V).
     values : (alpha, elevator, qhat, 3) X, Z [m2] and M [m3] of the air over the dynamic pressure.
-    constant : (3,) X, Z [N] and M [N m] that the dynamic pressure leaves alone: the engines'.
+    constant : (alpha, 3) X, Z [N] and M [N m] that the dynamic pressure leaves alone: those of the engines, and what the air
+        does otherwise than in proportion to it (a propeller, the Mach number), along a line through the trim's.
+    engine : (3,) those of the engines at the trim.
     trim_alpha_rad, trim_elevator_rad : origin of the increments of the derivatives [rad].
     neutral_elevator_rad : deflection that an effectiveness leaves alone [rad]: zero, for the linear model its trim.
     alpha_shift_rad : subtracted from the measured alpha and theta [rad]; the linear model counts alpha from its trim.
@@ -62,6 +65,7 @@ class Plant:
     qhat: Array
     values: Array
     constant: Array
+    engine: Array
     trim_alpha_rad: float
     trim_elevator_rad: float
     neutral_elevator_rad: float
@@ -101,12 +105,27 @@ def trim_of(
     return isolated(f"the trim of {aircraft.name}", trim, aircraft, at)
 
 
+def with_throttle(aircraft: Aircraft, at: Trim, throttle: float) -> Trim:
+    """A trim at another throttle.
+
+    A model with lateral properties is held straight at it, as its pilot does: the flight path takes the place of the throttle.
+    Otherwise its propeller would roll it. Where no such trim exists, and for any other model, the throttle alone is replaced.
+    """
+    if aircraft.file.jsbsim is not None and aircraft.file.jsbsim.lateral is not None:
+        with contextlib.suppress(TrimError):
+            return isolated(
+                f"the trim of {aircraft.name}", trim, aircraft, at.condition, near=at, throttle=throttle
+            )
+    return replace(at, controls=replace(at.controls, throttle=throttle))
+
+
 def probed(
     aircraft: Aircraft, at: Trim, alpha: tuple[float, float], elevator: tuple[float, float], q: float
 ) -> Plant:
-    """Tables of the JSBSim aircraft over the stated ranges, on whole degrees where its own tables break.
+    """Tables of the JSBSim aircraft over the stated ranges, on whole degrees and where its own tables break.
 
-    Forces of the air are taken to go with the dynamic pressure at equal qhat, those of the engines to stay.
+    At equal alpha, elevator and qhat the forces are lines over the dynamic pressure. Their constants are those of the settled
+    engines at the trim's angle of attack, and change with it as they do at a held speed of the engines.
 
     Parameters
     ----------
@@ -121,9 +140,10 @@ def probed(
     rates = np.linspace(-1.0, 1.0, _RATES) * max(q * _RATE_MARGIN, _LEAST_RATE_RAD_S)
     commands = whole(elevator[0] + offset, elevator[1] + offset, DEG)
     grid = Grid(whole(alpha[0], alpha[1], DEG), commands, rates, np.ones(1))
+    grid = isolated(f"the breaks of the forces of {aircraft.name}", with_breaks, aircraft, at, grid)
     tables = isolated(f"the table of forces of {aircraft.name}", probe, aircraft, at, grid).tables
     power = engines(aircraft, at)
-    constant = power.constant
+    constant = power.constant + _constants_over_alpha(aircraft, at, grid)
     pressure = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2
     declared = _linearised(aircraft, at)
     constants = aircraft.constants
@@ -132,8 +152,9 @@ def probed(
         alpha_rad=tables.alpha_rad,
         elevator_rad=tables.elevator_rad,
         qhat=tables.q_rad_s * constants.chord_m / (2.0 * at.airspeed_m_s),
-        values=np.ascontiguousarray((tables.values[0] - constant) / pressure),
+        values=np.ascontiguousarray((tables.values[0] - constant[:, None, None]) / pressure),
         constant=constant,
+        engine=power.constant,
         trim_alpha_rad=at.alpha_rad,
         trim_elevator_rad=at.elevator_rad,
         neutral_elevator_rad=0.0,
@@ -143,6 +164,20 @@ def probed(
         derivative_cov=declared_covariance(aircraft, declared.central),
         trim=at,
     )
+
+
+def _constants_over_alpha(aircraft: Aircraft, at: Trim, grid: Grid) -> Array:
+    """(alpha, 3) X, Z [N] and M [N m] that do not go with the dynamic pressure, less those at the trim's angle of attack."""
+    commands = np.array([at.controls.elevator_command_rad])
+    course = replace(grid, command_rad=commands, q_rad_s=np.zeros(1), airspeed=_SPEEDS)
+    tables = isolated(f"the forces of {aircraft.name} at other airspeeds", probe, aircraft, at, course).tables
+    over_speed = tables.values[:, :, 0, 0]
+    pressures = 0.5 * at.density_kg_m3 * tables.airspeed_m_s**2
+    line = np.column_stack([np.ones_like(pressures), pressures])
+    shape = over_speed.shape[1:]
+    constant = np.linalg.lstsq(line, over_speed.reshape(len(pressures), -1), rcond=None)[0][0].reshape(shape)
+    own = int(np.argmin(np.abs(tables.alpha_rad - at.alpha_rad)))
+    return np.asarray(constant - constant[own])
 
 
 @dataclass(frozen=True)
@@ -191,6 +226,7 @@ def linear(
         tenth of the weight for its arm.
     """
     engine_moment = 0.0 if power is None else float(power.constant[2])
+    moment = np.array([0.0, 0.0, engine_moment])
     c = aircraft.constants
     s, chord = c.wing_area_m2, c.chord_m
     pressure = 0.5 * density_kg_m3 * airspeed_m_s**2
@@ -208,7 +244,8 @@ def linear(
         elevator_rad=axis + elevator,
         qhat=axis,
         values=values,
-        constant=np.array([0.0, 0.0, engine_moment]),
+        constant=np.tile(moment, (2, 1)),
+        engine=moment,
         trim_alpha_rad=0.0,
         trim_elevator_rad=elevator,
         neutral_elevator_rad=elevator,
@@ -280,4 +317,5 @@ __all__ = [
     "linear",
     "probed",
     "trim_of",
+    "with_throttle",
 ]

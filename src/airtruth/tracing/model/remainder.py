@@ -63,9 +63,7 @@ def remainder(signals: Signals, plant: Plant) -> Array:
     change = declared_dynamics(plant.aircraft.file.dynamics)
     surface = through(change.surface, flown["elevator_rad"], dt_s)
     qhat = flown["q_rad_s"] * half
-    _, fz, moment = looked_up(plant, flown["alpha_rad"], surface, qhat)
-    fz = fz * pressure + plant.constant[1]
-    moment = moment * pressure + plant.constant[2]
+    _, fz, moment = looked_up(plant, flown["alpha_rad"], surface, qhat, pressure)
     force = pressure * c.wing_area_m2
     found = np.stack(
         [
@@ -120,12 +118,15 @@ def _declared(
     return increments(change.aero, signals)[:, 0]
 
 
-def looked_up(plant: Plant, alpha_rad: Array, elevator_rad: Array, qhat: Array) -> tuple[Array, Array, Array]:
-    """X, Z [m2] and M [m3] of the air over the dynamic pressure, trilinear in the tables of a plant.
+def looked_up(
+    plant: Plant, alpha_rad: Array, elevator_rad: Array, qhat: Array, pressure_pa: Array
+) -> tuple[Array, Array, Array]:
+    """X, Z [N] and M [N m], trilinear in the tables of a plant.
 
     Parameters
     ----------
     alpha_rad, elevator_rad, qhat : (points,); outside the tables their end cells go on.
+    pressure_pa : (points,) dynamic pressure [Pa].
     """
     axes = (plant.alpha_rad, plant.elevator_rad, plant.qhat)
     cells = []
@@ -137,6 +138,8 @@ def looked_up(plant: Plant, alpha_rad: Array, elevator_rad: Array, qhat: Array) 
     for a, b, c in np.ndindex(2, 2, 2):
         share = (u if a else 1.0 - u) * (v if b else 1.0 - v) * (w if c else 1.0 - w)
         total += share[:, None] * plant.values[i + a, j + b, k + c]
+    total *= pressure_pa[:, None]
+    total += (1.0 - u)[:, None] * plant.constant[i] + u[:, None] * plant.constant[i + 1]
     return total[:, 0], total[:, 1], total[:, 2]
 
 

@@ -277,7 +277,7 @@ def pack_aircraft(plant: Plant, compiled: CompiledChange, common: Array) -> Airc
         thrust_arm_m=declared["thrust_arm"],
         thrust_n=float(plant.thrust[0]),
         thrust_slope_m2=float(plant.thrust[1]),
-        constant=plant.constant * (1.0 + common[Common.thrust]),
+        constant=plant.constant + common[Common.thrust] * plant.engine,
         increments=increments,
         alpha_rad=plant.alpha_rad,
         elevator_rad=plant.elevator_rad,
