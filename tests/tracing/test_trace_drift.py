@@ -9,6 +9,7 @@ import trace_flights
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.store import read_log
 from airtruth.tracing import TraceOptions, trace
+from airtruth.tracing.model.airspeed import gust_cutoff_hz, low_passed
 from airtruth.tracing.model.records import read
 from airtruth.units import G0
 from validation.blind import draw, trials
@@ -112,3 +113,28 @@ def test_a_late_surface_while_the_airspeed_changes_by_a_tenth(kind, tmp_path):
     speed = read_log(folder / "log.parquet").channels["airspeed_m_s"]
     assert np.ptp(speed) / speed.mean() > 0.08
     found_delay(folder, 0.02)
+
+
+# -- the low-pass of the airspeed
+
+
+def test_an_airspeed_without_noise_is_taken_as_it_is():
+    walk = np.cumsum(0.1 * np.random.default_rng(1).standard_normal(5000))
+    assert gust_cutoff_hz(40.0 + walk + 0.5 * walk.size * DT, DT) > 25.0
+    smooth = np.sin(2.0 * T)
+    assert gust_cutoff_hz(smooth, DT) == np.inf
+    np.testing.assert_array_equal(low_passed(smooth, DT, np.inf), smooth)
+
+
+def test_gusts_and_noise_meet_at_the_cutoff():
+    """A random walk of 0.1 m/s per sample in noise of 0.05 m/s: the ratio 2 of their spectra' roots is 16 Hz at 50 Hz."""
+    rng = np.random.default_rng(2)
+    x = np.cumsum(0.1 * rng.standard_normal(100_000)) + 0.05 * rng.standard_normal(100_000)
+    assert gust_cutoff_hz(x, DT) == pytest.approx(2.0 / (2.0 * np.pi * DT), rel=0.05)
+
+
+def test_noise_in_calm_air_is_low_passed_at_5_hz():
+    noise = 0.05 * np.random.default_rng(3).standard_normal(500)
+    drift = 40.0 + 0.5 * DT * np.arange(500)
+    assert gust_cutoff_hz(drift + noise, DT) < 8.0
+    assert gust_cutoff_hz(drift + 0.05 * np.tile([1.0, -1.0], 250), DT) == 5.0

@@ -12,11 +12,11 @@ from airtruth.logs.store import write_log
 from airtruth.physics.reconstruction import COLUMNS
 from airtruth.physics.terms import Change
 from airtruth.tracing import trace
-from airtruth.tracing.model.filter import linearise_at_reference
 from airtruth.tracing.model.linearise import discrete, process_intensity
 from airtruth.tracing.model.parameters import Common, PerRecord
 from airtruth.tracing.model.response import filter_inputs, kernel_input, respond
 from airtruth.tracing.model.settings import declared_change, initial_per_record, settings_of
+from airtruth.tracing.model.steady import linearise_at_reference
 
 WITHOUT = settings_of(GTM, 0.05, has_vane=False)
 UNITS = {

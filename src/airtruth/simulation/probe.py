@@ -225,6 +225,35 @@ def forces_at_speeds(aircraft: Aircraft, trim: Trim, ratios: Array, dt_s: float 
     return np.array(rows)
 
 
+def forces_over_alpha(
+    aircraft: Aircraft, trim: Trim, alpha_rad: Array, ratios: Array, dt_s: float = 1.0 / 200.0
+) -> Array:
+    """Forces and moment at the controls of a trim over the angle of attack, at several airspeeds.
+
+    Engines that run keep the speed of the trim, as they do for a moment in a flight.
+
+    Parameters
+    ----------
+    aircraft, trim : the aircraft and its equilibrium.
+    alpha_rad : (alpha,) [rad]; ratios : airspeed over that of the trim (points,) [-].
+    dt_s : simulation step of the executive [s].
+
+    Returns
+    -------
+    (points, alpha, 3) X, Z [N] and M [N m] of the aircraft.
+    """
+    executive = Executive(aircraft, dt_s)
+    forces = executive.nodes(["forces/fbx-total-lbs", "forces/fbz-total-lbs"])
+    states = _States(executive, trim)
+    values = np.empty((ratios.size, alpha_rad.size, 3))
+    for i, j in np.ndindex(values.shape[:2]):
+        condition = replace(trim.condition, eas_m_s=trim.condition.eas_m_s * float(ratios[i]))
+        answer = states.respond(condition, float(alpha_rad[j]), trim.controls, 0.0)
+        moment = answer.q_dot_rad_s2 * aircraft.constants.inertia_yy_kg_m2
+        values[i, j] = [*(node.get_double_value() * LBF for node in forces), moment]
+    return values
+
+
 class _States:
     """States of the grid, one after the other in one executive.
 

@@ -17,7 +17,6 @@ from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem, likelihood_terms, sensitivities_of
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.compile import CompiledChange, compile_change
-from airtruth.tracing.model.filter import linearise_at_reference
 from airtruth.tracing.model.linearise import process_intensity
 from airtruth.tracing.model.parameters import (
     CORE,
@@ -33,6 +32,7 @@ from airtruth.tracing.model.parameters import (
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.response import filter_inputs, kernel_input, respond, respond_to
 from airtruth.tracing.model.settings import GUST_COVARIANCE, Settings, initial_per_record, per_record_prior
+from airtruth.tracing.model.steady import linearise_at_reference
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]

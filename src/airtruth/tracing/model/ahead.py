@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from airtruth.tracing.model.filter import innovations, without_update
+from airtruth.tracing.model.filter import innovations
 from airtruth.tracing.model.kernel_input import (
     AircraftArrays,
     AirPoint,
@@ -20,6 +20,7 @@ from airtruth.tracing.model.kernel_input import (
 )
 from airtruth.tracing.model.linearise import linearise
 from airtruth.tracing.model.parameters import CORE, OUTPUTS, state_layout
+from airtruth.tracing.model.steady import without_update
 
 _AT: Final = AirPoint(*[1.0] * len(AirPoint._fields))
 """Inputs at a point."""

@@ -20,13 +20,10 @@ from airtruth.numerics.ahead import awaited
 from airtruth.numerics.compiled import inner
 from airtruth.numerics.discretise import step
 from airtruth.tracing.model.corners import (
-    Corners,
     corrected,
     gain_at,
-    input_column,
     predicted,
     settled,
-    spread_of,
 )
 from airtruth.tracing.model.equations import (
     air_at,
@@ -41,12 +38,9 @@ from airtruth.tracing.model.kernel_input import AirPoint, FilterModel, GridSigna
 from airtruth.tracing.model.linearise import (
     FirstUpdate,
     delay_system,
-    discrete,
-    gain_of,
-    linearise,
-    process_intensity,
 )
 from airtruth.tracing.model.parameters import CORE, DELAY_ORDER, LEAD, LEAD_COUNT, OUTPUTS
+from airtruth.tracing.model.steady import SteadyFilter, without_update
 
 Array = NDArray[np.float64]
 
@@ -238,24 +232,6 @@ def _update(x: Array, k_gain: Array, e: Array) -> bool:
     return True
 
 
-class SteadyFilter(NamedTuple):
-    """Gain of the filter at the record's mean, and the innovations that it expects.
-
-    Attributes
-    ----------
-    k_gain : (states, outputs) of the update; first : the part of it that alpha and q have alone.
-    white, covariance : (outputs, outputs) whitener W with W S W' = I, and S; logdet : log|S|.
-    corners : recursion where the surface is uncertain.
-    """
-
-    k_gain: Array
-    first: FirstUpdate
-    white: Array
-    covariance: Array
-    logdet: float
-    corners: Corners
-
-
 @inner
 def _read(x: Array, at: AirPoint, model: FilterModel, work: Work) -> None:
     """What the sensors read before lags, delays and slow noise, into ``work.out``."""
@@ -368,41 +344,6 @@ def innovations(given: KernelInput, steady: SteadyFilter, e: Array) -> tuple[boo
     return bool(sound), float(more)
 
 
-def steady_filter(given: KernelInput) -> SteadyFilter | None:
-    """The steady filter of a record; None where its innovations have no covariance.
-
-    It depends on neither the initial state, nor the biases, nor the trim.
-    """
-    model = given.model
-    n = model.states.size
-    a, c = np.empty((n, n)), np.empty((OUTPUTS, n))
-    linearise_at_reference(given, a, c)
-    process = process_intensity(given.reference.airspeed_m_s, model)
-    phi, noise = discrete(a, process, given.dt_s)
-    k_gain, white, covariance, logdet, p, first = gain_of(phi, c, noise, model.sensors.variance)
-    if not math.isfinite(logdet):
-        return None
-    corners = _certain(model)
-    if given.corner_rad2.size > 0:
-        spread = spread_of(a, input_column(_reference_state(given), given.reference, model), given.dt_s)
-        root = np.asarray(np.linalg.inv(white))
-        corners = Corners(phi, noise, spread, p, c, model.sensors.variance, covariance, root, logdet)
-    return SteadyFilter(k_gain, first, white, covariance, logdet, corners)
-
-
-def _certain(model: FilterModel) -> Corners:
-    """The recursion of a surface that is known everywhere."""
-    none = np.zeros((0, 0))
-    return Corners(none, none, none, none, none, model.sensors.variance, none, none, 0.0)
-
-
-def without_update(model: FilterModel) -> SteadyFilter:
-    """The filter of a free run, whose state no measurement corrects."""
-    n, square = model.states.size, np.eye(OUTPUTS)
-    first = FirstUpdate(np.zeros((n, 2)), np.zeros(2))
-    return SteadyFilter(np.zeros((n, OUTPUTS)), first, square, square, 0.0, _certain(model))
-
-
 def free_run(given: KernelInput, e: Array) -> bool:
     """Residuals of a simulation into ``e`` (samples, outputs); whether the motion keeps its bounds.
 
@@ -412,24 +353,4 @@ def free_run(given: KernelInput, e: Array) -> bool:
     return innovations(certain, without_update(given.model), e)[0]
 
 
-def _reference_state(given: KernelInput) -> Array:
-    """The record's mean, effects' states in equilibrium with it."""
-    x = np.zeros(given.model.states.size)
-    x[0] = given.reference_alpha_rad
-    settle_effects(x, x[0], given.reference.elevator_rad, given.model)
-    return x
-
-
-def linearise_at_reference(given: KernelInput, a: Array, c: Array) -> None:
-    """`linearise` at the record's mean, effects' states in equilibrium with it."""
-    linearise(_reference_state(given), given.reference, given.model, a, c)
-
-
-__all__ = [
-    "SteadyFilter",
-    "free_run",
-    "innovations",
-    "linearise_at_reference",
-    "steady_filter",
-    "without_update",
-]
+__all__ = ["free_run", "innovations"]

@@ -14,7 +14,7 @@ from airtruth.errors import AircraftError, TrimError
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.simulation.disposable import isolated
 from airtruth.simulation.linearise import Linearisation, linearise
-from airtruth.simulation.probe import Grid, forces_at_speeds, probe, with_breaks
+from airtruth.simulation.probe import Grid, forces_at_speeds, forces_over_alpha, probe, with_breaks
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim, trim
 from airtruth.units import DEG, G0
@@ -143,7 +143,7 @@ def probed(
     grid = isolated(f"the breaks of the forces of {aircraft.name}", with_breaks, aircraft, at, grid)
     tables = isolated(f"the table of forces of {aircraft.name}", probe, aircraft, at, grid).tables
     power = engines(aircraft, at)
-    constant = power.constant + _constants_over_alpha(aircraft, at, grid)
+    constant = power.constant + _constants_over_alpha(aircraft, at, tables.alpha_rad)
     pressure = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2
     declared = _linearised(aircraft, at)
     constants = aircraft.constants
@@ -166,18 +166,14 @@ def probed(
     )
 
 
-def _constants_over_alpha(aircraft: Aircraft, at: Trim, grid: Grid) -> Array:
+def _constants_over_alpha(aircraft: Aircraft, at: Trim, alpha_rad: Array) -> Array:
     """(alpha, 3) X, Z [N] and M [N m] that do not go with the dynamic pressure, less those at the trim's angle of attack."""
-    commands = np.array([at.controls.elevator_command_rad])
-    course = replace(grid, command_rad=commands, q_rad_s=np.zeros(1), airspeed=_SPEEDS)
-    tables = isolated(f"the forces of {aircraft.name} at other airspeeds", probe, aircraft, at, course).tables
-    over_speed = tables.values[:, :, 0, 0]
-    pressures = 0.5 * at.density_kg_m3 * tables.airspeed_m_s**2
+    work = f"the forces of {aircraft.name} at other airspeeds"
+    forces = isolated(work, forces_over_alpha, aircraft, at, alpha_rad, _SPEEDS)
+    pressures = 0.5 * at.density_kg_m3 * (at.airspeed_m_s * _SPEEDS) ** 2
     line = np.column_stack([np.ones_like(pressures), pressures])
-    shape = over_speed.shape[1:]
-    constant = np.linalg.lstsq(line, over_speed.reshape(len(pressures), -1), rcond=None)[0][0].reshape(shape)
-    own = int(np.argmin(np.abs(tables.alpha_rad - at.alpha_rad)))
-    return np.asarray(constant - constant[own])
+    constant = np.linalg.lstsq(line, forces.reshape(len(pressures), -1), rcond=None)[0][0].reshape(-1, 3)
+    return np.asarray(constant - constant[int(np.argmin(np.abs(alpha_rad - at.alpha_rad)))])
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from airtruth.physics.terms import Change
 from airtruth.tracing.model import filter as record_filter
 from airtruth.tracing.model.compile import CompiledChange, compile_change
-from airtruth.tracing.model.filter import SteadyFilter
 from airtruth.tracing.model.kernel_input import (
     AircraftArrays,
     AirPoint,
@@ -26,6 +25,7 @@ from airtruth.tracing.model.parameters import COLOUR_TIME_S, OUTPUTS, Common, Pe
 from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, nodes
 from airtruth.tracing.model.settings import Settings
+from airtruth.tracing.model.steady import SteadyFilter, steady_filter
 from airtruth.tracing.model.surface import through
 
 Array = NDArray[np.float64]
@@ -197,7 +197,7 @@ def respond_to(
     if free_run:
         sound = record_filter.free_run(kernel, e)
         return Response(e[given.lead :], none, none, 0.0 if sound else math.nan)
-    used = steady or record_filter.steady_filter(kernel)
+    used = steady or steady_filter(kernel)
     if used is None:
         return Response(e[given.lead :], none, none, math.nan)
     sound, more = record_filter.innovations(kernel, used, e)

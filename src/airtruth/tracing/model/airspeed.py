@@ -1,0 +1,76 @@
+"""Airspeed as an input of the filter: the low-pass of its noise, and the speed over ground."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.numerics.prefilter import butterworth
+from airtruth.units import G0
+
+Array = NDArray[np.float64]
+
+_CUTOFF_HZ: Final = 5.0
+"""Least cutoff of the low-pass of airspeed and density [Hz] (judgement): above the phugoid, below the noise of the
+sensors."""
+_GROUND_SLOPE_M_S2: Final = 0.3
+"""Largest error of the acceleration along the path that a longitudinal accelerometer leaves [m/s2] (judgement: a bias of
+0.02 g and an error in attitude of half a degree). A steeper trend of the airspeed is one of the wind."""
+
+
+def low_passed(x: Array, dt_s: float, cutoff_hz: float = _CUTOFF_HZ) -> Array:
+    """Samples without what is above a cutoff [Hz], without lag; as they are where the log is too slow or short for it."""
+    from scipy.signal import sosfiltfilt
+
+    x = np.asarray(x, dtype=np.float64)
+    if 0.45 / dt_s <= cutoff_hz or len(x) < 40:
+        return x
+    return np.asarray(sosfiltfilt(butterworth(cutoff_hz, 2, dt_s).copy(), x))
+
+
+def gust_cutoff_hz(airspeed_m_s: Array, dt_s: float) -> float:
+    """Frequency at which white noise of the airspeed exceeds its gusts [Hz], `_CUTOFF_HZ` at least; infinite without noise.
+
+    In short times a gust along the path is a random walk. Differences of a walk of variance q per sample in white noise of
+    variance r have the variance q + 2 r and the covariance -r from one to the next. The spectra q/(w dt)^2 and r meet at
+    w = sqrt(q/r)/dt, the corner of the optimal smoother.
+
+    Parameters
+    ----------
+    airspeed_m_s : (samples,); dt_s : sample period [s].
+
+    Source: J. F. Muth, J. Amer. Statist. Assoc. 55 (1960) 299-306, for the random walk in noise.
+    """
+    change = np.diff(np.asarray(airspeed_m_s, dtype=np.float64))
+    change -= change.mean()
+    noise = -float((change[1:] * change[:-1]).mean())
+    if noise <= 0.0:
+        return math.inf
+    walk = max(float((change**2).mean()) - 2.0 * noise, 0.0)
+    return max(_CUTOFF_HZ, math.sqrt(walk / noise) / (2.0 * math.pi * dt_s))
+
+
+def ground_speed(channels: Mapping[str, Array], theta: Array, dt_s: float) -> Array:
+    """Speed without gusts (samples,) [m/s]: the integral of the acceleration along the path, and a line.
+
+    The line, which fits the airspeed, takes up the accelerometer's bias and the steady wind; without ax, thrust less drag too.
+    With ax its slope is limited to what the sensors err by, so that a wind that grows along the path does not accelerate the
+    aircraft.
+    """
+    alpha, v = channels["alpha_rad"], np.asarray(channels["airspeed_m_s"], dtype=np.float64)
+    along = -G0 * np.sin(theta - alpha)
+    if "ax_m_s2" in channels:
+        along = along + channels["ax_m_s2"] * np.cos(alpha) + channels["az_m_s2"] * np.sin(alpha)
+    speed = np.concatenate([[0.0], np.cumsum(0.5 * dt_s * (along[1:] + along[:-1]))])
+    time = dt_s * (np.arange(len(v)) - 0.5 * (len(v) - 1))
+    slope = float(time @ (v - speed) / (time @ time))
+    if "ax_m_s2" in channels:
+        slope = min(max(slope, -_GROUND_SLOPE_M_S2), _GROUND_SLOPE_M_S2)
+    return np.asarray(speed + float((v - speed).mean()) + slope * time)
+
+
+__all__ = ["ground_speed", "gust_cutoff_hz", "low_passed"]
