@@ -11,7 +11,7 @@ import pytest
 
 from airtruth import aircraft
 from airtruth.aircraft.jsbsim.confine import LARGEST_BYTES, controls_simulation, model_files
-from airtruth.aircraft.jsbsim.files import copy, read
+from airtruth.aircraft.jsbsim.files import copy, read, write
 from airtruth.aircraft.probe import wheel_root
 from airtruth.errors import AircraftError
 
@@ -211,6 +211,20 @@ def test_a_copy_of_a_model_of_the_wheel_has_no_output(tmp_path):
     assert model.root.find("output") is None
     copy(model, tmp_path / "out")
     assert (tmp_path / "out" / "Engines").is_dir()
+
+
+def test_a_copy_of_a_model_of_the_wheel_does_not_control_the_simulation(tmp_path):
+    """The F-104 of the JSBSim package stops its integrators in a crash; its copy is a model that may be loaded."""
+    crash = wheel_root() / "aircraft" / "f104" / "Systems" / "crash-detect.xml"
+    assert "<output>simulation/" in crash.read_text()
+    f104 = aircraft.load("c172x").file.jsbsim.model_copy(update={"model": "f104"})
+    model = read(tmp_path, f104)
+    copy(model, tmp_path / "f104")
+    write(model, tmp_path / "f104" / "f104.xml")
+    copied = (tmp_path / "f104" / "Systems" / "crash-detect.xml").read_text()
+    assert "<output>simulation/" not in copied
+    assert copied.count("<output>systems/crash-detect/crashed</output>") == 2
+    assert len(model_files(tmp_path / "f104" / "f104.xml")) > 3
 
 
 def test_code_in_the_working_folder_is_not_run(plane, tmp_path):

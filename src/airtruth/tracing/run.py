@@ -33,7 +33,8 @@ from airtruth.tracing.selection.corner_share import with_corner_share
 from airtruth.tracing.selection.learn import with_increments
 from airtruth.tracing.selection.look_alikes import with_look_alikes
 from airtruth.tracing.selection.noise_colour import with_coloured_noise
-from airtruth.tracing.selection.rounds import SearchRound
+from airtruth.tracing.selection.pruning import pruned
+from airtruth.tracing.selection.rounds import LEVEL, SearchRound
 from airtruth.tracing.selection.search import search
 from airtruth.tracing.stages import assess_stages
 from airtruth.tracing.update import updated_folder, write_update
@@ -156,6 +157,8 @@ def _search(
     rounds = search(
         case.fitted, case.hypothesis, start, case.effects, options.seed, steps, case.declared, known
     )
+    if rounds:
+        rounds = pruned(case.fitted, rounds, case.effects, options.seed, LEVEL, steps)
     if options.learns:
         rounds = with_increments(case.fitted, rounds, case.effects, options.seed, steps, case.declared)
     if rounds:

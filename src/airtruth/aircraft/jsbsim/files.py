@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from airtruth.aircraft import JsbsimModel
-from airtruth.aircraft.jsbsim.confine import model_files
+from airtruth.aircraft.jsbsim.confine import controls_simulation, model_files
 from airtruth.aircraft.probe import model_file, wheel_root
 from airtruth.errors import AircraftError, StoreError
 
@@ -59,6 +59,7 @@ def read(folder: Path, model: JsbsimModel) -> Model:
             root[list(root).index(section)] = _parse(_text(file), file)
     for child in [c for c in root if c.tag in ("output", "input")]:
         root.remove(child)  # a copy must not open files or sockets of its own
+    _without_control(root)
     start = re.search(r"<fdm_config[\s>]", text)
     return Model(text[: start.start()] if start else "", root, path)
 
@@ -96,12 +97,26 @@ def copy(read_model: Model, out: Path) -> None:
 
 
 def _copy_file(source: Path, target: Path) -> None:
-    """Copy a file; its XML entities are replaced by their values, because a copy may not declare any."""
+    """Copy a file without what a copy may not have: XML entities, which are replaced by their values, and control of JSBSim."""
     text = _text(source)
-    if "<!DOCTYPE" in text:
-        target.write_text(ET.tostring(_parse(text, source), encoding="unicode") + "\n", encoding="utf-8")
+    root = _parse(text, source)
+    if _without_control(root) or "<!DOCTYPE" in text:
+        target.write_text(ET.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
     else:
         shutil.copyfile(source, target)
+
+
+def _without_control(root: ET.Element) -> bool:
+    """Remove the outputs that stop or re-time the simulation, as those of a crash; whether there were any.
+
+    Models of the JSBSim package may have them, a copy may not.
+    """
+    found = False
+    for parent in root.iter():
+        for child in [c for c in parent if c.tag == "output" and controls_simulation(c.text or "")]:
+            parent.remove(child)
+            found = True
+    return found
 
 
 def _text(path: Path) -> str:

@@ -1,7 +1,7 @@
-"""Named effects, and derivatives released from their declaration, that learned increments make unnecessary.
+"""Named effects, and derivatives released from their declaration, that what was accepted later makes unnecessary.
 
-What an increment describes is first described, badly, by the names at hand. Beside the increment they have nothing left to
-describe, and an answer that kept them would name effects that the aircraft has not got.
+The first effect of a search describes, badly, what others describe better. Beside released derivatives or a learned increment
+it may have nothing left to describe, and an answer that kept it would name an effect that the aircraft has not got.
 """
 
 from __future__ import annotations
@@ -32,23 +32,28 @@ def pruned(
     remains: float,
     advance: Advance,
 ) -> tuple[SearchRound, ...]:
-    """The rounds without the names and the release that their increments make unnecessary.
+    """The rounds without the names, and beside increments the release, that the rest makes unnecessary.
+
+    Beside increments a name needs the gain of a later effect, otherwise that of a first one.
 
     Parameters
     ----------
-    rounds : a finished search; without an increment it remains as it is.
+    rounds : a finished search; one effect alone remains.
     effects : candidates, whose scores the last round states.
     seed : seed of the draws behind p-values; advance : receives the step that begins.
     remains : probability of the remaining anomaly [-] from which the records count as explained; a larger anomaly than
         before is not accepted below it.
     """
     last = rounds[-1]
-    if not any(isinstance(e, Increment) for e in last.null.hypothesis.effects):
+    members = last.null.hypothesis.effects
+    if not members or len(members) + len(last.sets[:1]) < 2:
         return rounds
-    if not may_begin(advance, "remove what the increments make unnecessary"):
+    if not may_begin(advance, "remove what later effects make unnecessary"):
         return rounds
-    declared = _as_declared(problem, last.null)
-    fitted = _with_needed_names(problem, declared or last.null, significant_gain(len(effects), later=True))
+    learned = any(isinstance(e, Increment) for e in members)
+    declared = _as_declared(problem, last.null) if learned else None
+    least = significant_gain(len(effects), later=learned)
+    fitted = _with_needed_names(problem, declared or last.null, least)
     if fitted is last.null:
         return rounds
     end = scored_round(problem, fitted, effects, len(rounds), seed, advance)
