@@ -9,7 +9,8 @@ import trace_records as tr
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.model.parameters import Parameters
-from airtruth.tracing.selection.rounds import significant_gain
+from airtruth.tracing.selection.pruning import pruned
+from airtruth.tracing.selection.rounds import RoundStart, search_round, significant_gain
 from airtruth.tracing.selection.search import redundant_effect
 from airtruth.units import DEG
 
@@ -47,3 +48,18 @@ def test_an_immaterial_effect_goes_however_sure():
         sizes = np.array([share * MATERIAL, found.point.sizes[1]])
         moved = replace(found, point=replace(found.point, sizes=sizes), cost=found.cost - 1e3)
         assert redundant_effect(problem, moved, LEAST) == expected
+
+
+@pytest.mark.parametrize(
+    ("gyro", "expected"), [(1.2, ["gyro_scale", "accelerometer_scale"]), (1.0, ["accelerometer_scale"])]
+)
+def test_a_finished_search_gives_up_an_effect_that_is_not_there(gyro, expected):
+    """The first effect of a search, which a later one or released derivatives made unnecessary."""
+    problem, found = fitted(gyro, 1.1)
+    candidates = (EARLIER, LATER, EFFECTS["vane_scale"])
+    begin = RoundStart(found.hypothesis, found.point, candidates[2:], scores_only=True)
+    last = search_round(problem, begin, 2, 1, lambda step: None)
+    kept = pruned(problem, (last,), candidates, 1, 0.05, lambda step: None)
+    assert [e.key for e in kept[-1].null.hypothesis.effects] == expected
+    alone = (replace(last, null=replace(last.null, hypothesis=tr.NOTHING.plus(LATER))),)
+    assert pruned(problem, alone, candidates, 1, 0.05, lambda step: None) is alone
