@@ -168,19 +168,17 @@ def with_breaks_of(function: Callable[[float], Array], points: Array) -> Array:
     values = {float(x): function(float(x)) for x in points}
     scale = np.ptp(np.array(list(values.values())), axis=0)
     scale[scale == 0.0] = np.inf
-    axis = sorted(values)
+    cells = list(pairwise(sorted(values)))
     for _ in range(_DIVISIONS):
-        added = []
-        for low, high in pairwise(axis):
-            middle = 0.5 * (low + high)
-            off = np.abs(function(middle) - 0.5 * (values[low] + values[high])) / scale
+        divided = []
+        for low, high in cells:
+            off = np.abs(function(0.5 * (low + high)) - 0.5 * (values[low] + values[high])) / scale
             if off.max() > _BREAK:
-                added.append(_meeting(function, low, high, values, int(np.argmax(off))))
-        if not added:
-            break
-        values |= {x: function(x) for x in added}
-        axis = sorted(values)
-    return np.array(axis)
+                x = _meeting(function, low, high, values, int(np.argmax(off)))
+                values[x] = function(x)
+                divided += [(low, x), (x, high)]
+        cells = divided
+    return np.array(sorted(values))
 
 
 def _meeting(

@@ -46,6 +46,8 @@ def gust_cutoff_hz(airspeed_m_s: Array, dt_s: float) -> float:
     Source: J. F. Muth, J. Amer. Statist. Assoc. 55 (1960) 299-306, for the random walk in noise.
     """
     change = np.diff(np.asarray(airspeed_m_s, dtype=np.float64))
+    if change.size < 2:
+        return math.inf
     change -= change.mean()
     noise = -float((change[1:] * change[:-1]).mean())
     if noise <= 0.0:
