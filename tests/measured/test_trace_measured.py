@@ -97,7 +97,7 @@ def test_declared_it_is_not_traced_again(logs, lacking, held):
 
 
 def test_the_second_record_s_interval_holds_the_arm(lacking):
-    """The first one's does not: 13.9 to 15.3 m; its bias is the model's, which no standard error covers."""
+    """The first one's does not: 13.8 to 15.2 m; its bias is the model's, which no standard error covers."""
     low, high = lacking[RECORDS[0]]["effects"][0]["parameters"]["x_m"]["ci95"]
     assert low < ARM_M < high
 
