@@ -47,8 +47,8 @@ class Plant:
     ----------
     alpha_rad, elevator_rad, qhat : axes of the tables; qhat = q c/(2V).
     values : (alpha, elevator, qhat, 3) X, Z [m2] and M [m3] of the air over the dynamic pressure.
-    constant : (alpha, 3) X, Z [N] and M [N m] that the dynamic pressure leaves alone: those of the engines, and what the air
-        does otherwise than in proportion to it (a propeller, the Mach number), along a line through the trim's.
+    constant : (alpha, 3) X, Z [N] and M [N m] at no dynamic pressure, of the lines over it that the forces follow about the trim:
+        those of the engines, and those that a propeller or the Mach number adds.
     engine : (3,) those of the engines at the trim.
     trim_alpha_rad, trim_elevator_rad : origin of the increments of the derivatives [rad].
     neutral_elevator_rad : deflection that an effectiveness leaves alone [rad]: zero, for the linear model its trim.
