@@ -34,11 +34,21 @@ _FASTEST: Final = 0.02
 """Least rho of a servo [-]; judgement: below it the servo settles within a cell."""
 
 
-def _decay(increments: Array, noise_std_rad: float) -> Array:
-    """(runs,) weighted median of the ratio of neighbouring increments, NaN if nothing moves or the ratios show no servo.
+def servo_decay(increments: Array, noise_std_rad: float) -> Array:
+    """Decay rho of a servo over a sample period, by neighbouring increments of the surface.
+
+    It is the weighted median of their ratio.
 
     A step within a cell gives ratios above that of the servo, so that the least ones agree. A surface that stops within a
     cell gives ratios about zero: the increment of the median has to exceed the noise.
+
+    Parameters
+    ----------
+    increments : (runs, samples - 1) [rad]; noise_std_rad : standard deviation of the surface's noise [rad].
+
+    Returns
+    -------
+    (runs,) [-]; NaN if nothing moves or the ratios show no servo.
     """
     if increments.shape[1] < 2:
         return np.full(increments.shape[0], np.nan)
@@ -113,5 +123,7 @@ def servo_bend(elevator: Array, noise_std_rad: float = 0.0) -> Array:
     """
     elevator = np.ascontiguousarray(elevator)  # one layout, so that the kernel compiles once
     bend = np.zeros_like(elevator)
-    _bends(elevator, _decay(np.diff(elevator, axis=1), noise_std_rad), np.empty(elevator.shape[1] - 1), bend)
+    _bends(
+        elevator, servo_decay(np.diff(elevator, axis=1), noise_std_rad), np.empty(elevator.shape[1] - 1), bend
+    )
     return bend

@@ -53,6 +53,7 @@ from airtruth.tracing.selection.omnibus import Anomaly, advice
 from airtruth.tracing.selection.release import CONTRADICTED
 from airtruth.tracing.selection.rounds import LEVEL, SearchRound
 from airtruth.tracing.selection.score_test import Table
+from airtruth.tracing.selection.weights import alike_in_rivals
 from airtruth.tracing.stage_errors import Replay
 from airtruth.tracing.stages import Stages, accepted, before_fit, stage_errors
 from airtruth.tracing.tolerances import tolerances
@@ -87,9 +88,12 @@ def conclude(
     effects = accepted(rounds)
     anomaly, remaining = first.anomaly, last.anomaly
     covariance = robust_covariance(case.fitted, reported(last))
-    stated = (
-        *(_effect(case.fitted, rounds, number, covariance) for number in range(len(effects))),
-        *explaining_effects(rounds, covariance),
+    stated = _with_rivals(
+        (
+            *(_effect(case.fitted, rounds, number, covariance) for number in range(len(effects))),
+            *explaining_effects(rounds, covariance),
+        ),
+        rounds,
     )
     declared = declared_model(case.fitted, rounds, covariance, case.declared)
     sets = alternatives(rounds)
@@ -229,6 +233,22 @@ def _effect(
     if isinstance(effect, Increment):
         return in_physical_terms(problem, final, covariance, effect, accepted)
     return accepted
+
+
+def _with_rivals(
+    stated: Sequence[AcceptedEffect], rounds: Sequence[SearchRound]
+) -> tuple[AcceptedEffect, ...]:
+    """The accepted effects with what a branch that lost has in place of each."""
+    names = [e.name for e in stated]
+    return tuple(
+        replace(
+            e,
+            indistinguishable_from=tuple(
+                sorted({*e.indistinguishable_from, *alike_in_rivals(rounds, e.name, names)})
+            ),
+        )
+        for e in stated
+    )
 
 
 def _widened_by_profile(

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -37,13 +36,12 @@ from airtruth.tracing.selection.release import (
     size_in_filter,
 )
 from airtruth.tracing.selection.rounds import SearchRound
+from airtruth.tracing.selection.weights import weights
 
 Array = NDArray[np.float64]
 
 _LEAST_WEIGHT: Final = 1e-3
 """Posterior weight below which a set of causes is not listed [-] (judgement: one in a thousand)."""
-_MOST_SETS: Final = 400
-"""Number of sets that explain the derivatives and enter the weights [-] (judgement: the others weigh nothing)."""
 
 
 def declared_model(
@@ -261,37 +259,11 @@ def _normal(value: float, std: float) -> ParameterEstimate:
 
 
 def alternatives(rounds: Sequence[SearchRound]) -> tuple[Alternative, ...]:
-    """Sets of effects with their posterior weights, the most probable first.
-
-    The sets combine the tied effects of every round with the sets that explain the derivatives, and contain the
-    branch of the search that lost.
-    """
-    weights: dict[tuple[str, ...], float] = {}
-    tied = [
-        [(c.score.effect.name, 0.5 * (c.gain - r.tied[0].gain)) for c in r.tied] for r in rounds if r.tied
-    ]
-    for added in itertools.product(*tied):
-        for explaining, log_weight in _explanations(rounds):
-            names = tuple(sorted({name for name, _ in added} | set(explaining)))
-            log_weight += sum(gain for _, gain in added)
-            weights[names] = weights.get(names, 0.0) + math.exp(min(0.0, log_weight))
-    for r in rounds:
-        if r.rival is not None:
-            names = tuple(sorted(r.rival.effects))
-            weights[names] = weights.get(names, 0.0) + math.exp(-max(0.0, min(r.rival.excess, 700.0)))
-    total = sum(weights.values())
-    ranked = sorted(weights.items(), key=lambda item: (-item[1], item[0]))
+    """Sets of effects with their posterior weights, the most probable first."""
+    found = weights(rounds)
+    total = sum(found.values())
+    ranked = sorted(found.items(), key=lambda item: (-item[1], item[0]))
     return tuple(Alternative(names, w / total) for names, w in ranked if w >= _LEAST_WEIGHT * total)
-
-
-def _explanations(rounds: Sequence[SearchRound]) -> Iterator[tuple[tuple[str, ...], float]]:
-    """Sets that explain released derivatives, each with the logarithm of its weight."""
-    release = next((r.release for r in reversed(rounds) if r.release is not None), None)
-    if release is None:
-        yield (), 0.0
-        return
-    for s in release.sets[:_MOST_SETS]:
-        yield s.effects, release.cost - s.cost
 
 
 def inclusion(sets: Sequence[Alternative]) -> dict[str, float]:

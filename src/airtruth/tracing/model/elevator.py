@@ -1,4 +1,4 @@
-"""The surface between the samples of a coarse log, where several steps of integration lie in a cell.
+"""The surface between the samples, where its path counts: in a coarse log, and before a rate limit or a play.
 
 A declared servo of first order behind a held command moves in exponentials that meet in corners: with rho =
 exp(-dt/tau) the command that a cell implies is (de[k+1] - rho de[k])/(1 - rho), and where the cells before and after
@@ -25,6 +25,9 @@ _STEP: Final = 0.05
 _MOST_STEPS: Final = 0.5
 """Largest share of cells in which the implied command changes [-] (judgement): a step makes two changes, and in a held
 command a cell without a step separates it from the next one."""
+_BEYOND: Final = 8.0
+"""Change of the implied command over its median from which it is a step [-] (judgement: far in the tail of what a damper
+commands from gusts and noise)."""
 
 
 def held_command(elevator_rad: Array, dt_s: float, tau_s: float, cells: int) -> Array | None:
@@ -40,17 +43,73 @@ def held_command(elevator_rad: Array, dt_s: float, tau_s: float, cells: int) -> 
     -------
     ((samples - 1) cells + 1,) [rad], or None.
     """
-    rho = float(np.exp(-dt_s / tau_s))
-    start, end = elevator_rad[:-1], elevator_rad[1:]
-    command = (end - rho * start) / (1.0 - rho)
+    command = _implied(elevator_rad, dt_s, tau_s)
     least = _STEP * float(np.ptp(command))
     changes = int((np.abs(np.diff(command)) > least).sum())
     if least == 0.0 or changes > _MOST_STEPS * command.size:
         return None
+    path = _exponentials(elevator_rad, command, np.abs(_across(command)) > least, dt_s, tau_s, cells)
+    return np.append(path.ravel(), elevator_rad[-1])
+
+
+def is_held(elevator_rad: Array, dt_s: float, tau_s: float) -> bool:
+    """Whether the command of a servo rests between its steps, see `with_steps`.
+
+    Parameters
+    ----------
+    elevator_rad : (samples,) measured surface [rad].
+    dt_s, tau_s : sample period and time constant of the servo [s].
+    """
+    command = _implied(elevator_rad, dt_s, tau_s)
+    return _BEYOND * float(np.median(np.abs(_across(command)))) < _STEP * float(np.ptp(command))
+
+
+def with_steps(
+    elevator_rad: Array, smoothed_rad: Array, dt_s: float, tau_s: float, cells: int
+) -> tuple[Array, NDArray[np.bool_]]:
+    """A smoothed surface with the steps of its command, which otherwise moves all the time, as a servo follows them.
+
+    A step is a change of the implied command far beyond the usual one: a pilot's input on top of a damper's.
+
+    Parameters
+    ----------
+    elevator_rad : (samples,) measured surface [rad].
+    smoothed_rad : ((samples - 1) cells + 1,) the surface between them without steps [rad].
+    dt_s, tau_s : sample period and time constant of the servo [s].
+    cells : cells of the fine grid per sample.
+
+    Returns
+    -------
+    ((samples - 1) cells + 1,) surface [rad]; (samples - 1,) whether a cell is that of a step, or beside one.
+    """
+    command = _implied(elevator_rad, dt_s, tau_s)
+    changes = np.abs(_across(command))
+    steps = changes > max(_STEP * float(np.ptp(command)), _BEYOND * float(np.median(changes)))
+    path = _exponentials(elevator_rad, command, steps, dt_s, tau_s, cells)
+    found = np.where(steps[:, None], path, smoothed_rad[:-1].reshape(-1, cells))
+    return np.append(found.ravel(), elevator_rad[-1]), steps
+
+
+def _implied(elevator_rad: Array, dt_s: float, tau_s: float) -> Array:
+    """(samples - 1,) command that each cell implies if it is held [rad]."""
+    rho = float(np.exp(-dt_s / tau_s))
+    return np.asarray((elevator_rad[1:] - rho * elevator_rad[:-1]) / (1.0 - rho))
+
+
+def _across(command: Array) -> Array:
+    """Change of the implied command from the cell before each cell to that after it."""
     padded = np.concatenate([command[:1], command, command[-1:]])
-    before, after = padded[:-2], padded[2:]
-    steps = np.abs(after - before) > least
-    before, after = np.where(steps, before, command), np.where(steps, after, command)
+    return np.asarray(padded[2:] - padded[:-2])
+
+
+def _exponentials(
+    elevator_rad: Array, command: Array, steps: NDArray[np.bool_], dt_s: float, tau_s: float, cells: int
+) -> Array:
+    """(samples - 1, cells) path of the servo; the command steps inside the cells of ``steps`` and is held in the others."""
+    rho = float(np.exp(-dt_s / tau_s))
+    start, end = elevator_rad[:-1], elevator_rad[1:]
+    padded = np.concatenate([command[:1], command, command[-1:]])
+    before, after = np.where(steps, padded[:-2], command), np.where(steps, padded[2:], command)
     gap = (end - after) - rho * (start - before)
     share = rho * (before - after) / np.where(gap == 0.0, 1.0, gap)
     x = np.where(steps & (gap != 0.0), np.clip(share, rho, 1.0), rho)
@@ -58,8 +117,23 @@ def held_command(elevator_rad: Array, dt_s: float, tau_s: float, cells: int) -> 
     corner = before + (start - before) * x
     early = before[:, None] + (start - before)[:, None] * np.exp(-time / tau_s)
     late = after[:, None] + (corner - after)[:, None] * np.exp(-time / tau_s) / x[:, None]
-    path = np.where(np.exp(-time / tau_s) >= x[:, None], early, late)
-    return np.append(path.ravel(), elevator_rad[-1])
+    return np.asarray(np.where(np.exp(-time / tau_s) >= x[:, None], early, late))
+
+
+def shaped(mean_rad: Array, path_rad: Array, cells: int) -> Array:
+    """A path with the mean of another one between every two samples.
+
+    Parameters
+    ----------
+    mean_rad, path_rad : (samples - 1) cells + 1 points each, equal at the samples [rad]; cells : per sample.
+    """
+    away = mean_rad - path_rad
+    share = np.arange(cells) / cells
+    parabola = share * (1.0 - share)
+    means = away[:-1].reshape(-1, cells).mean(axis=1)
+    return np.append(
+        (path_rad[:-1].reshape(-1, cells) + np.outer(means, parabola / parabola.mean())).ravel(), path_rad[-1]
+    )
 
 
 def smooth(elevator_rad: Array, cells: int) -> Array:
@@ -69,4 +143,4 @@ def smooth(elevator_rad: Array, cells: int) -> Array:
     return np.asarray(CubicSpline(at, elevator_rad)(fine))
 
 
-__all__ = ["held_command", "smooth"]
+__all__ = ["held_command", "is_held", "shaped", "smooth", "with_steps"]

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
-from airtruth.numerics.intersample import servo_bend
+from airtruth.numerics.intersample import servo_bend, servo_decay
 from airtruth.physics.atmosphere import air_density, altitude_of_density_m
 from airtruth.tracing.model.airspeed import ground_speed, gust_cutoff_hz, low_passed
 from airtruth.tracing.model.compile import CHANNELS
-from airtruth.tracing.model.elevator import held_command, smooth
+from airtruth.tracing.model.elevator import held_command, is_held, shaped, smooth, with_steps
 from airtruth.tracing.model.plant import Plant
 
 Array = NDArray[np.float64]
@@ -259,9 +259,19 @@ def _between(elevator: Array, dt_s: float, cells: int, std_rad: float, servo_s: 
     if dt_s > _STEP_S and servo_s > 0.0:  # a coarse log
         path = held_command(elevator, dt_s, servo_s, cells)
         return smooth(elevator, cells) if path is None else path, np.zeros(0)
-    bend = servo_bend((elevator - elevator[0])[None, :], std_rad)[0]
-    corners = np.zeros(0) if bend.any() else corner_variance(elevator, std_rad)
-    return _elevator(elevator, bend, cells, corners), corners
+    relative = (elevator - elevator[0])[None, :]
+    bend, none = servo_bend(relative, std_rad)[0], np.zeros(0)
+    if bend.any():
+        tau_s = -dt_s / math.log(float(servo_decay(np.diff(relative), std_rad)[0]))
+        if servo_s <= 0.0 or is_held(elevator, dt_s, tau_s):
+            path = held_command(elevator, dt_s, tau_s, cells)
+            mean = _elevator(elevator, bend, cells, none)
+            return mean if path is None else shaped(mean, path, cells), none
+    corners = corner_variance(elevator, std_rad)
+    if servo_s <= 0.0 or not corners.size:
+        return _elevator(elevator, 0.0 * bend, cells, corners), corners
+    path, steps = with_steps(elevator, _elevator(elevator, 0.0 * bend, cells, none), dt_s, servo_s, cells)
+    return path, np.append(0.0, np.where(steps, 0.0, corners[1:]))
 
 
 def _elevator(elevator: Array, bend: Array, sub: int, corners: Array) -> Array:

@@ -23,8 +23,9 @@ from airtruth.physics.readings import state_of
 from airtruth.physics.terms import Change
 from airtruth.simulation.disposable import isolated_flight
 from airtruth.simulation.replay import Track, flown_through, substeps
+from airtruth.simulation.trim import Trim
 from airtruth.tracing.increment_response import increments
-from airtruth.tracing.model.plant import Plant
+from airtruth.tracing.model.plant import Plant, probed
 from airtruth.tracing.model.records import FINE, Signals
 from airtruth.tracing.model.surface import through
 
@@ -63,7 +64,8 @@ def remainder(signals: Signals, plant: Plant) -> Array:
     change = declared_dynamics(plant.aircraft.file.dynamics)
     surface = through(change.surface, flown["elevator_rad"], dt_s)
     qhat = flown["q_rad_s"] * half
-    _, fz, moment = looked_up(plant, flown["alpha_rad"], surface, qhat, pressure)
+    tables = _reaching(plant, at, flown["alpha_rad"], surface, flown["q_rad_s"])
+    _, fz, moment = looked_up(tables, flown["alpha_rad"], surface, qhat, pressure)
     force = pressure * c.wing_area_m2
     found = np.stack(
         [
@@ -76,6 +78,23 @@ def remainder(signals: Signals, plant: Plant) -> Array:
     grid = np.arange((signals.y.shape[0] - 1) * signals.sub + 1) * (signals.dt_s / signals.sub)
     time = np.arange(found.shape[1]) * dt_s
     return np.stack([np.interp(grid, time, row) for row in found])
+
+
+def _reaching(plant: Plant, at: Trim, alpha_rad: Array, surface_rad: Array, q_rad_s: Array) -> Plant:
+    """The plant, with wider tables where the declared model flies beyond those that the record needs.
+
+    At the wrong airspeed, mass or CG it may reach angles that were never flown. Extrapolated tables would turn into a remainder.
+    """
+
+    def within(axis: Array, x: Array) -> bool:
+        return bool(axis[0] <= x.min() and x.max() <= axis[-1])
+
+    rates = plant.qhat * (2.0 * at.airspeed_m_s / plant.aircraft.constants.chord_m)
+    axes = ((plant.alpha_rad, alpha_rad), (plant.elevator_rad, surface_rad), (rates, q_rad_s))
+    if all(within(axis, x) for axis, x in axes):
+        return plant
+    alpha, elevator = ((float(x.min()), float(x.max())) for x in (alpha_rad, surface_rad))
+    return probed(plant.aircraft, at, alpha, elevator, float(np.abs(q_rad_s).max()))
 
 
 def track_of(signals: Signals) -> Track:

@@ -111,8 +111,8 @@ def _learned(
     alone, alone_evidence = learn.grown(bare)
     lead = (total_cost(rounds[-1]) - evidence) - (bare[0].null.cost - alone_evidence)
     if len(alone) > 1 and lead > _NAMES_LEAD:
-        names = tuple(e.name for e in named)
-        return (replace(alone[0], rival=Rival(names, lead)), *alone[1:])
+        names = tuple(sorted({e.name for e in named}))
+        return (replace(alone[0], rival=Rival({names: -lead})), *alone[1:])
     return grown
 
 

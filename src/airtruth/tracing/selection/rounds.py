@@ -105,12 +105,10 @@ class Rival:
 
     Attributes
     ----------
-    effects : names of its effects.
-    excess : its cost at its end less that of the branch that remains; negative where it costs less with more effects.
+    sets : names of each set that it leaves -> logarithm of its weight beside the set of the branch that remains.
     """
 
-    effects: tuple[str, ...]
-    excess: float
+    sets: Mapping[tuple[str, ...], float]
 
 
 @dataclass(frozen=True)

@@ -23,13 +23,13 @@ from airtruth.tracing.selection.release import DeclaredCauses, Release
 from airtruth.tracing.selection.rounds import (
     NOTHING_DECLARED,
     NOTHING_KNOWN,
-    Rival,
     RoundStart,
     SearchRound,
     at_best_location,
     search_round,
     significant_gain,
 )
+from airtruth.tracing.selection.weights import rival_of
 
 _ALTERNATIVES: Final = 2
 """Number of tied effects to try instead of the leader [-] (judgement: each costs the rounds that follow)."""
@@ -171,7 +171,7 @@ class _Search:
         # An effect beside released derivatives has to be significant.
         best = int(np.argmin(costs + BETTER * counts if both_released else costs))
         won, lost = ends[best], ends[1 - best]
-        rival = Rival(_effects_of(lost[-1]), float(costs[1 - best] - costs[best]))
+        rival = rival_of(lost, float(costs[1 - best] - costs[best]))
         at = len(before)
         return (*won[:at], replace(won[at], rival=rival), *won[at + 1 :])
 
