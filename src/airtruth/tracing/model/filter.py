@@ -39,7 +39,7 @@ from airtruth.tracing.model.linearise import (
     FirstUpdate,
     delay_system,
 )
-from airtruth.tracing.model.parameters import CORE, DELAY_ORDER, LEAD, LEAD_COUNT, OUTPUTS
+from airtruth.tracing.model.parameters import AZ, CORE, DELAY_ORDER, LEAD, LEAD_COUNT, OUTPUTS
 from airtruth.tracing.model.steady import SteadyFilter, without_update
 
 Array = NDArray[np.float64]
@@ -248,12 +248,20 @@ def _residual(x: Array, i: int, k: int, given: KernelInput, work: Work) -> float
 
 @inner
 def _innovation(
-    x: Array, k: int, at: AirPoint, given: KernelInput, first: FirstUpdate, work: Work, raw: Array
+    x: Array,
+    k: int,
+    at: AirPoint,
+    given: KernelInput,
+    first: FirstUpdate,
+    steady: SteadyFilter,
+    work: Work,
+    raw: Array,
 ) -> None:
     """Innovation of a sample; that of az is predicted after the update by alpha and q.
 
     In a linear model this is the innovation of all three at once. Where the lift curve bends, az is predicted at an angle of
-    attack that the vane has measured and not at one that a gust may have moved over the bend.
+    attack that the vane has measured and not at one that a gust may have moved over the bend. A late accelerometer shows only
+    a share of this bend, that of a change over the last sample period; the rest of its reading follows the update linearly.
     """
     if k == 0:
         _read(x, at, given.model, work)
@@ -262,10 +270,21 @@ def _innovation(
         outputs(x, 0.0, 0.0, at, given.model, work.out)
     for i in range(2):
         raw[i] = _residual(x, i, k, given, work)
+    late = given.model.states.lag[AZ] >= 0 or given.model.states.delay[AZ] >= 0
     for i in range(x.size):
         work.tried[i] = x[i] + first.gain[i, 0] * raw[0] + first.gain[i, 1] * raw[1]
+    bend = 0.0
+    if late:
+        _read(x, at, given.model, work)
+        bend = -work.out[AZ]
+        for i in range(x.size):
+            bend -= steady.direct[i] * (work.tried[i] - x[i])
     _read(work.tried, at, given.model, work)
-    raw[2] = _residual(work.tried, 2, k, given, work) + first.share[0] * raw[0] + first.share[1] * raw[1]
+    raw[AZ] = _residual(work.tried, AZ, k, given, work) + first.share[0] * raw[0] + first.share[1] * raw[1]
+    if late:
+        bend += work.out[AZ]
+        in_reading = 1.0 if given.model.states.lag[AZ] < 0 else 0.0
+        raw[AZ] += (in_reading - steady.shown) * bend
 
 
 @awaited
@@ -289,7 +308,7 @@ def _innovations(
             if not math.isfinite(more):
                 return False, 0.0
             more_logdet += more
-            _innovation(x, k, at, given, own_first, work, raw)
+            _innovation(x, k, at, given, own_first, steady, work, raw)
             for i in range(OUTPUTS):
                 e[k, i] = 0.0
                 for m in range(OUTPUTS):
@@ -297,7 +316,7 @@ def _innovations(
             uncertain = not settled(away)
             now = own_gain
         else:
-            _innovation(x, k, at, given, steady.first, work, raw)
+            _innovation(x, k, at, given, steady.first, steady, work, raw)
             for i in range(OUTPUTS):
                 e[k, i] = raw[i]
             now, p = steady.k_gain, corners.steady

@@ -18,7 +18,7 @@ from airtruth.numerics.compiled import allocating, inner
 from airtruth.numerics.discretise import multiply, riccati, step, whitener
 from airtruth.tracing.model.equations import gust, outputs, rates
 from airtruth.tracing.model.kernel_input import AirPoint, FilterModel
-from airtruth.tracing.model.parameters import CORE, DELAY_ORDER, OUTPUTS
+from airtruth.tracing.model.parameters import AZ, CORE, DELAY_ORDER, OUTPUTS
 
 Array = NDArray[np.float64]
 
@@ -79,18 +79,24 @@ def _half_width(state: int, at: AirPoint, model: FilterModel) -> float:
     return _ANGLE_RAD / moves if moves > 1e-9 else _GUST
 
 
-def linearise(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array) -> None:
+def linearise(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array) -> Array:
     """A and C of the motion, effects' states, late sensors and slow noise about a state, by central differences.
 
     Parameters
     ----------
     x : (states,) where; at : inputs there.
     a, c : (states, states) and (outputs, states), written.
+
+    Returns
+    -------
+    (states,) row of C of an accelerometer that is not late.
     """
     a[:] = 0.0
     c[:] = 0.0
     _differences(x.copy(), at, model, a, c)
+    direct: Array = c[AZ].copy()
     _add_sensors(model, a, c)
+    return direct
 
 
 @awaited

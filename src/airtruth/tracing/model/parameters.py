@@ -218,6 +218,8 @@ CORE: Final = LEAD + LEAD_COUNT
 """States of the motion and the gusts; those of effects, of late sensors and of slow noise follow [-]."""
 OUTPUTS: Final = 3
 """Outputs of the filter, see `airtruth.tracing.model.compile.CHANNELS` [-]."""
+AZ: Final = 2
+"""Number of az among them."""
 DELAY_ORDER: Final = 8
 """States of a delay [-]. Judgement: two states bend the highest frequencies of von Karman gusts (a delay of 60 ms was
 estimated 3 ms long); eight keep the phase to one degree up to 11 rad."""
@@ -281,6 +283,7 @@ def state_layout(effect: Ints, motion: int, lags: Array, delays: Array, slow: bo
 
 __all__ = [
     "ALPHA",
+    "AZ",
     "BOUNDS",
     "COLOUR_TIME_S",
     "COMMON_STEP",

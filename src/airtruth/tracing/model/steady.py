@@ -21,7 +21,7 @@ from airtruth.tracing.model.linearise import (
     linearise,
     process_intensity,
 )
-from airtruth.tracing.model.parameters import OUTPUTS
+from airtruth.tracing.model.parameters import AZ, OUTPUTS
 
 Array = NDArray[np.float64]
 
@@ -34,6 +34,8 @@ class SteadyFilter(NamedTuple):
     k_gain : (states, outputs) of the update; first : the part of it that alpha and q have alone.
     white, covariance : (outputs, outputs) whitener W with W S W' = I, and S; logdet : log|S|.
     corners : recursion where the surface is uncertain.
+    direct : (states,) slope of az at the CG's accelerometer before its lag and delay.
+    shown : share of a change of az since the last sample that its reading shows [-].
     """
 
     k_gain: Array
@@ -42,6 +44,8 @@ class SteadyFilter(NamedTuple):
     covariance: Array
     logdet: float
     corners: Corners
+    direct: Array
+    shown: float
 
 
 def steady_filter(given: KernelInput) -> SteadyFilter | None:
@@ -52,7 +56,7 @@ def steady_filter(given: KernelInput) -> SteadyFilter | None:
     model = given.model
     n = model.states.size
     a, c = np.empty((n, n)), np.empty((OUTPUTS, n))
-    linearise_at_reference(given, a, c)
+    direct = linearise_at_reference(given, a, c)
     process = process_intensity(given.reference.airspeed_m_s, model)
     phi, noise = discrete(a, process, given.dt_s)
     k_gain, white, covariance, logdet, p, first = gain_of(phi, c, noise, model.sensors.variance)
@@ -63,7 +67,15 @@ def steady_filter(given: KernelInput) -> SteadyFilter | None:
         spread = spread_of(a, input_column(_reference_state(given), given.reference, model), given.dt_s)
         root = np.asarray(np.linalg.inv(white))
         corners = Corners(phi, noise, spread, p, c, model.sensors.variance, covariance, root, logdet)
-    return SteadyFilter(k_gain, first, white, covariance, logdet, corners)
+    shown = _shown(float(model.sensors.lag_s[AZ]), float(model.sensors.delay_s[AZ]), given.dt_s)
+    return SteadyFilter(k_gain, first, white, covariance, logdet, corners, direct, shown)
+
+
+def _shown(lag_s: float, delay_s: float, dt_s: float) -> float:
+    """Share of a ramp over one sample period that a lag and a delay show at its end [-]."""
+    ratio = lag_s / dt_s
+    behind = ratio * -math.expm1(-1.0 / ratio) if ratio > 0.0 else 0.0
+    return (1.0 - behind) * max(0.0, 1.0 - delay_s / dt_s)
 
 
 def _certain(model: FilterModel) -> Corners:
@@ -76,7 +88,7 @@ def without_update(model: FilterModel) -> SteadyFilter:
     """The filter of a free run, whose state no measurement corrects."""
     n, square = model.states.size, np.eye(OUTPUTS)
     first = FirstUpdate(np.zeros((n, 2)), np.zeros(2))
-    return SteadyFilter(np.zeros((n, OUTPUTS)), first, square, square, 0.0, _certain(model))
+    return SteadyFilter(np.zeros((n, OUTPUTS)), first, square, square, 0.0, _certain(model), np.zeros(n), 1.0)
 
 
 def _reference_state(given: KernelInput) -> Array:
@@ -87,9 +99,9 @@ def _reference_state(given: KernelInput) -> Array:
     return x
 
 
-def linearise_at_reference(given: KernelInput, a: Array, c: Array) -> None:
+def linearise_at_reference(given: KernelInput, a: Array, c: Array) -> Array:
     """`linearise` at the record's mean, effects' states in equilibrium with it."""
-    linearise(_reference_state(given), given.reference, given.model, a, c)
+    return linearise(_reference_state(given), given.reference, given.model, a, c)
 
 
 __all__ = ["SteadyFilter", "linearise_at_reference", "steady_filter", "without_update"]
