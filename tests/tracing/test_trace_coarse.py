@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from airtruth.tracing.model.elevator import held_command, smooth
+from airtruth.physics.terms import SurfaceTerm
+from airtruth.tracing.model.elevator import held_command, is_held, shaped, smooth, with_steps
+from airtruth.tracing.model.records import read_between
+from airtruth.tracing.model.surface import through
 from airtruth.units import DEG
 
 TAU = 1.0 / (2.0 * np.pi * 5.0)
@@ -64,3 +67,73 @@ def test_a_spline_follows_a_line_of_the_multisine():
     ]
     assert mean[0] < 0.5 * mean[1]
     np.testing.assert_allclose(smooth(exact[::FINE], FINE)[::FINE], exact[::FINE], atol=1e-14)
+
+
+# -- a log of 50 Hz
+
+DT_50, CELLS = 0.02, 64
+
+
+def damped(noise=0.0, first=1.007):
+    """A 3-2-1-1 on top of a damper that commands a sine of 1 Hz every sample period, 15 ms late: fine time and surface."""
+    t = np.arange(300 * CELLS + 1) * DT_50 / CELLS
+    pilot = servo(
+        t, first + 0.3 * np.array([0.0, 3.0, 5.0, 6.0, 7.0]), DEG * np.array([3.0, -3.0, 3.0, -3.0, 0.0])
+    )
+    times = DT_50 * np.arange(300) + 0.015
+    command = 0.5 * DEG * np.sin(2.0 * np.pi * times)
+    command += noise * np.random.default_rng(2).standard_normal(300)
+    return t, pilot + servo(t, times, command)
+
+
+def means(x):
+    return x[:-1].reshape(-1, CELLS).mean(axis=1)
+
+
+def test_steps_of_a_damped_surface_follow_the_servo():
+    """The error of the mean over a cell is at most a fifth of that of a spline through the samples."""
+    _, exact = damped()
+    samples = exact[::CELLS]
+    assert not is_held(samples, DT_50, TAU)
+    cubic = smooth(samples, CELLS)
+    path, steps = with_steps(samples, cubic, DT_50, TAU, CELLS)
+    worst = [np.abs(means(made - exact)).max() for made in (path, cubic)]
+    assert worst[0] < 0.2 * worst[1]
+    assert 5 <= steps.sum() <= 15
+    np.testing.assert_allclose(path[::CELLS], samples, rtol=1e-14)
+
+
+def test_a_held_command_rests_between_its_steps():
+    t = np.arange(300 * CELLS + 1) * DT_50 / CELLS
+    samples = servo(t, [1.007, 2.013], DEG * np.array([2.0, 0.0]))[::CELLS]
+    assert is_held(samples, DT_50, TAU)
+
+
+def test_a_path_takes_the_means_of_another():
+    rng = np.random.default_rng(3)
+    path = np.cumsum(rng.standard_normal(5 * CELLS + 1))
+    mean = path.copy()
+    mean[np.arange(mean.size) % CELLS > 0] += 0.3
+    made = shaped(mean, path, CELLS)
+    np.testing.assert_allclose(means(made), means(mean), rtol=0.0, atol=1e-12)
+    np.testing.assert_array_equal(made[::CELLS], path[::CELLS])
+
+
+@pytest.mark.parametrize("rate_rad_s", [0.28, 0.43, 0.8])
+def test_a_rate_limit_sees_when_the_surface_begins_to_move(rate_rad_s):
+    """The limited surface from samples of 50 Hz is on average as far off as 0.3 ms of its motion; straight lines begin up to a
+    period early, and leave four times as much or more."""
+    t = np.arange(300 * CELLS + 1) * DT_50 / CELLS
+    exact = servo(t, [1.013, 2.011], DEG * np.array([4.0, -4.0]))
+    limit = [SurfaceTerm("rate_limit", rate_rad_s)]
+    right = through(limit, exact, DT_50 / CELLS)
+    path = read_between(exact[::CELLS], DT_50, CELLS, 0.0, 0.0)[0]
+    straight = np.interp(t, t[::CELLS], exact[::CELLS])
+    late = [
+        np.abs(through(limit, made, DT_50 / CELLS) - right).sum()
+        / (np.abs(np.diff(right)) > 0.0).sum()
+        / rate_rad_s
+        for made in (path, straight)
+    ]
+    assert late[0] < 3e-4
+    assert late[1] > 4.0 * late[0]

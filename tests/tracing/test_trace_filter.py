@@ -306,18 +306,20 @@ def over_break(slope):
     return replace(base, alpha_rad=axis, values=values, constant=np.zeros((3, 3)))
 
 
-def whitened_az(slope, vane_std_rad):
-    """Whitened innovation of az where a gust moves alpha from 0 to 1 deg, and az is that of the lift curve there."""
+def whitened_az(slope, vane_std_rad, change=None, shown=1.0):
+    """Whitened innovation of az where a gust moves alpha from 0 to 1 deg, and az shows a share of the lift curve there."""
     settings = replace(tr.SETTINGS, noise=np.array([vane_std_rad, *tr.SETTINGS.noise[1:]]))
     y = np.zeros((20, 3))
     lift = -0.5 * tr.DENSITY * tr.V**2 * tr.C.wing_area_m2 / tr.C.mass_kg
     y[:, 2] = -G0
     y[-1, 0] = 1.0 * DEG
-    y[-1, 2] += lift * (tr.TRUTH[0] + slope) * 0.5 * DEG
+    y[-1, 2] += shown * lift * (tr.TRUTH[0] + slope) * 0.5 * DEG
     common, per_record = tr.still()
     common[Common.rotary] = -0.5
     per_record[PerRecord.log_gust] = np.log(1.0)
-    flown = respond(tr.record(y, 0.0, plant_=over_break(slope)), settings, Change(), common, per_record)
+    flown = respond(
+        tr.record(y, 0.0, plant_=over_break(slope)), settings, change or Change(), common, per_record
+    )
     return float((flown.e @ flown.white.T)[-1, 2])
 
 
@@ -329,6 +331,22 @@ def test_az_is_predicted_at_the_angle_of_attack_that_the_vane_has_measured(slope
     of the accelerometer for a slope of 1.
     """
     assert abs(whitened_az(slope, 0.001 * DEG)) < 0.25
+
+
+@pytest.mark.parametrize("slope", [1.0, tr.TRUTH[0], 8.0])
+@pytest.mark.parametrize("kind", ["lag", "delay"])
+def test_an_accelerometer_that_is_hardly_late_is_as_one_in_time(slope, kind):
+    """A lag or delay of 1 us: the innovation is continuous where the effect begins, also behind a break."""
+    late = Change(sensors=(SensorTerm("az_m_s2", kind, 1e-6),))
+    in_time = whitened_az(slope, 0.001 * DEG)
+    assert whitened_az(slope, 0.001 * DEG, late) == pytest.approx(in_time, abs=5e-3)
+
+
+@pytest.mark.parametrize("slope", [1.0, tr.TRUTH[0], 8.0])
+def test_an_accelerometer_three_samples_late_does_not_show_the_last_gust(slope):
+    """Its reading is still that of level flight, whatever the lift curve is where the gust has moved alpha."""
+    late = Change(sensors=(SensorTerm("az_m_s2", "delay", 3.0 * tr.DT),))
+    assert abs(whitened_az(slope, 0.001 * DEG, late, shown=0.0)) < 0.25
 
 
 def test_a_straight_lift_curve_has_the_innovations_of_a_linear_filter():

@@ -178,7 +178,7 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0) ->
             q = channels["q_rad_s"]
             theta = channels["alpha_rad"][0] + np.concatenate([[0.0], np.cumsum(0.5 * dt * (q[1:] + q[:-1]))])
         quiet = _quiet(channels["elevator_rad"], dt, elevator_std_rad)
-        elevator, corners = _between(quiet, dt, sub * FINE, elevator_std_rad, servo_s)
+        elevator, corners = read_between(quiet, dt, sub * FINE, elevator_std_rad, servo_s)
         found.append(
             Signals(
                 run_id=run_id,
@@ -254,8 +254,20 @@ def is_constant(x: Array) -> bool:
     return differences >= (1.0 - _CONSTANT_STD / math.sqrt(x.size)) * float(x.var(ddof=1))
 
 
-def _between(elevator: Array, dt_s: float, cells: int, std_rad: float, servo_s: float) -> tuple[Array, Array]:
-    """The surface on a fine grid, and the variance of its mean over each cell (empty for none)."""
+def read_between(
+    elevator: Array, dt_s: float, cells: int, std_rad: float, servo_s: float
+) -> tuple[Array, Array]:
+    """The surface on a fine grid, and the variance of its mean over each cell.
+
+    Parameters
+    ----------
+    elevator : (samples,) [rad], every ``dt_s`` [s]; cells : cells of the fine grid per sample.
+    std_rad : standard deviation of its noise [rad]; servo_s : declared time constant of its servo [s], 0 for none.
+
+    Returns
+    -------
+    ((samples - 1) cells + 1,) surface [rad]; (samples,) variance over the cell that ends at each sample [rad2], empty for none.
+    """
     if dt_s > _STEP_S and servo_s > 0.0:  # a coarse log
         path = held_command(elevator, dt_s, servo_s, cells)
         return smooth(elevator, cells) if path is None else path, np.zeros(0)

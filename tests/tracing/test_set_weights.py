@@ -1,0 +1,54 @@
+"""Weights of the sets that a search leaves, on rounds whose costs are stated."""
+
+import math
+from types import SimpleNamespace
+
+import pytest
+
+from airtruth.tracing.selection.weights import alike_in_rivals, rival_of, weights
+
+
+def tied(**gains):
+    """A round that accepted the first of these effects; the others tied with it."""
+    return SimpleNamespace(
+        tied=[
+            SimpleNamespace(score=SimpleNamespace(effect=SimpleNamespace(name=name)), gain=gain)
+            for name, gain in gains.items()
+        ],
+        release=None,
+        rival=None,
+    )
+
+
+def released(rival=None, **costs):
+    """A round whose released derivatives have these explanations, the first that of the answer."""
+    sets = [SimpleNamespace(effects=(name,), cost=cost) for name, cost in costs.items()]
+    return SimpleNamespace(tied=[], release=SimpleNamespace(sets=sets, cost=sets[0].cost), rival=rival)
+
+
+def test_ties_weigh_by_half_their_difference_in_2_log_l():
+    found = weights([tied(vane_arm=20.0, vane_lag=18.0), tied(gyro_lag=9.0)])
+    assert found == pytest.approx({("gyro_lag", "vane_arm"): 1.0, ("gyro_lag", "vane_lag"): math.exp(-1.0)})
+
+
+def test_explanations_weigh_by_their_cost():
+    found = weights([released(derivatives=5.0, icing=6.5)])
+    assert found == pytest.approx({("derivatives",): 1.0, ("icing",): math.exp(-1.5)})
+
+
+def test_a_branch_that_lost_keeps_every_set_that_it_leaves():
+    """Released derivatives win by 2; the branch that lost has a leader and an effect that tied with it, 3 behind in 2 log L."""
+    lost = [tied(cl_alpha_nonlinear=30.0, airspeed_scale=27.0)]
+    rounds = [released(rival_of(lost, 2.0), derivatives=5.0, icing=5.5)]
+    found = weights(rounds)
+    assert found[("cl_alpha_nonlinear",)] == pytest.approx(math.exp(-2.0))
+    assert found[("airspeed_scale",)] == pytest.approx(math.exp(-3.5))
+    # within 6 in 2 log L
+    assert alike_in_rivals(rounds, "derivatives", ["derivatives"]) == {"cl_alpha_nonlinear"}
+    assert alike_in_rivals(rounds, "derivatives", ["derivatives", "gyro_lag"]) == set()
+
+
+def test_a_branch_of_less_cost_and_more_effects_weighs_no_more_than_the_answer():
+    rounds = [released(rival_of([tied(vane_lag=9.0), tied(vane_scale=8.0)], -1.0), derivatives=5.0)]
+    assert weights(rounds)[("vane_lag", "vane_scale")] == pytest.approx(1.0)
+    assert alike_in_rivals(rounds, "derivatives", ["derivatives", "vane_lag"]) == {"vane_scale"}
