@@ -8,6 +8,12 @@ import pytest
 from airtruth.tracing.selection.weights import alike_in_rivals, rival_of, weights
 
 
+def null(*names, spread=None):
+    """What a weight reads of a fit."""
+    effects = [SimpleNamespace(name=name) for name in names]
+    return SimpleNamespace(hypothesis=SimpleNamespace(spread=spread, effects=effects))
+
+
 def tied(**gains):
     """A round that accepted the first of these effects; the others tied with it."""
     return SimpleNamespace(
@@ -17,13 +23,19 @@ def tied(**gains):
         ],
         release=None,
         rival=None,
+        null=null(),
     )
 
 
-def released(rival=None, **costs):
+def released(rival=None, carried=(), **costs):
     """A round whose released derivatives have these explanations, the first that of the answer."""
     sets = [SimpleNamespace(effects=(name,), cost=cost) for name, cost in costs.items()]
-    return SimpleNamespace(tied=[], release=SimpleNamespace(sets=sets, cost=sets[0].cost), rival=rival)
+    return SimpleNamespace(
+        tied=[],
+        release=SimpleNamespace(sets=sets, cost=sets[0].cost),
+        rival=rival,
+        null=null(*carried, spread=1.0 if carried else None),
+    )
 
 
 def test_ties_weigh_by_half_their_difference_in_2_log_l():
@@ -52,3 +64,11 @@ def test_a_branch_of_less_cost_and_more_effects_weighs_no_more_than_the_answer()
     rounds = [released(rival_of([tied(vane_lag=9.0), tied(vane_scale=8.0)], -1.0), derivatives=5.0)]
     assert weights(rounds)[("vane_lag", "vane_scale")] == pytest.approx(1.0)
     assert alike_in_rivals(rounds, "derivatives", ["derivatives", "vane_lag"]) == {"vane_scale"}
+
+
+def test_effects_that_explained_an_earlier_release_are_in_every_set():
+    """A changed loading, and beside it derivatives whose declaration is wrong as well."""
+    found = weights([released(carried=("cg_shift", "mass_error"), derivatives=5.0, icing=6.0)])
+    assert found == pytest.approx(
+        {("cg_shift", "derivatives", "mass_error"): 1.0, ("cg_shift", "icing", "mass_error"): math.exp(-1.0)}
+    )

@@ -35,7 +35,7 @@ MOST_CAUSES: Final = 3
 more apart)."""
 _LOG_CAUSE: Final = -3.0
 """Logarithm of the prior odds of a usual physical cause [-] (judgement: one in twenty)."""
-_LOADING: Final = ("mass_error", "inertia_error", "cg_shift")
+LOADING: Final = ("mass_error", "inertia_error", "cg_shift")
 """Causes that one event, a change of the loading, moves together."""
 _LOG_SAME_EVENT: Final = -1.0
 """Logarithm of the prior odds of each further cause of the same event [-] (judgement: one in three)."""
@@ -276,8 +276,8 @@ def _sets_of(
 
 def _log_odds(chosen: Sequence[Cause]) -> float:
     """Logarithm of the prior odds of physical causes."""
-    loading = [c.log_odds for c in chosen if c.key in _LOADING]
-    others = sum(c.log_odds for c in chosen if c.key not in _LOADING)
+    loading = [c.log_odds for c in chosen if c.key in LOADING]
+    others = sum(c.log_odds for c in chosen if c.key not in LOADING)
     return others + (loading[0] + _LOG_SAME_EVENT * (len(loading) - 1) if loading else 0.0)
 
 
@@ -305,6 +305,7 @@ def _in_range(chosen: Sequence[Cause], sizes: Array, std: Array) -> Array:
 __all__ = [
     "DERIVATIVES",
     "EXPLAINING",
+    "LOADING",
     "MOST_CAUSES",
     "WRONG_BY",
     "Cause",

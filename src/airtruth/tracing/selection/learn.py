@@ -91,6 +91,9 @@ def with_increments(
     last = grown[-1]
     if last.null.hypothesis.spread is None:
         return grown
+    first = next((r.release for r in rounds if r.release is not None), None)
+    if first is not None:
+        declared = replace(declared, corrections=first.corrections)
     return settled(problem, (*grown[:-1], replace(last, sets=explained(problem, last.null, declared))))
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -47,11 +47,13 @@ class DeclaredCauses:
     ----------
     causes : physical causes; wrong_allowed : whether declarations themselves may be wrong.
     effects : effects of those causes that the filter carries, beyond first order.
+    corrections : causes of a set -> what its refit in the filter cost beyond first order [-].
     """
 
     causes: tuple[Cause, ...] = ()
     wrong_allowed: bool = True
     effects: tuple[Effect, ...] = ()
+    corrections: Mapping[tuple[str, ...], float] = field(default_factory=dict)
 
     @property
     def keys(self) -> Collection[str]:
@@ -78,6 +80,7 @@ class Release:
     sets : what explains the shifts, that of the answer first (`airtruth.tracing.selection.explanation.simplest_first`).
     strain : log-posterior that the most probable set loses to derivatives without any prior [-].
     refit : the first set as effects of the filter, where it carries all of them; else None.
+    corrections : see `DeclaredCauses`.
     """
 
     test: Contradiction
@@ -85,6 +88,7 @@ class Release:
     sets: tuple[CauseSet, ...]
     strain: float
     refit: PosteriorFit | None = None
+    corrections: Mapping[tuple[str, ...], float] = field(default_factory=dict)
 
     @property
     def cost(self) -> float:
@@ -123,10 +127,10 @@ def release(
     if not sets:
         return None
     peak = 0.5 * float(own.vector @ np.linalg.pinv(own.information, hermitian=True) @ own.vector)
-    sets, refits = _refitted(problem, null, free, declared, sets)
+    sets, refits, corrections = _refitted(problem, null, free, declared, sets)
     strain = least_cost(sets) - (own.cost - peak)
     sets = simplest_first(sets)
-    return Release(test, free, sets, strain, refits.get(sets[0].effects))
+    return Release(test, free, sets, strain, refits.get(sets[0].effects), corrections)
 
 
 def _refitted(
@@ -135,7 +139,7 @@ def _refitted(
     free: PosteriorFit,
     declared: DeclaredCauses,
     sets: tuple[CauseSet, ...],
-) -> tuple[tuple[CauseSet, ...], dict[tuple[str, ...], PosteriorFit]]:
+) -> tuple[tuple[CauseSet, ...], dict[tuple[str, ...], PosteriorFit], dict[tuple[str, ...], float]]:
     """The sets with the leading ones refitted in the filter, where it carries their effects; best first.
 
     A shift of the CG bends the moment as the lift is bent, and an inertia stretches it; first order in the derivatives
@@ -145,24 +149,50 @@ def _refitted(
     causes = {c.key: c for c in declared.causes}
     plain = derivative_likelihood(problem, free, robust=False)
     carried = [s for s in sets if s.causes and not s.wrong and set(s.causes) <= set(effects)]
-    changed, refits = {}, {}
+    refits: dict[tuple[str, ...], PosteriorFit] = {}
+    corrections: dict[tuple[str, ...], float] = {}
     for s in carried[:_REFITS]:
         if s.cost > sets[0].cost + _HOPELESS:
             break
-        hypothesis, start = null.hypothesis, free.point
-        common, sizes = start.common.copy(), list(start.sizes)
-        for key, size in zip(s.causes, s.sizes, strict=True):
-            hypothesis = hypothesis.plus(effects[key])
-            common[Common.derivatives] -= size * causes[key].direction
-            low, high = effects[key].parameters[0].reach
-            sizes.append(min(max(size_in_filter(key, size), low), high))
-        own = converged_fit(problem, hypothesis, replace(start, common=common, sizes=np.array(sizes)))
-        if own is not None and own.converged:
-            predicted = predicted_cost(plain, [causes[key] for key in s.causes])
-            changed[s.effects] = replace(s, cost=s.cost + own.cost - predicted)
+        own = _as_effects(problem, null, free, s, effects, causes)
+        if own is not None:
+            corrections[s.causes] = own.cost - predicted_cost(plain, [causes[key] for key in s.causes])
             refits[s.effects] = own
-    ranked = sorted((changed.get(s.effects, s) if not s.wrong else s for s in sets), key=lambda s: s.cost)
-    return tuple(ranked), refits
+    return _corrected(sets, corrections), refits, corrections
+
+
+def _as_effects(
+    problem: TraceProblem,
+    null: PosteriorFit,
+    free: PosteriorFit,
+    s: CauseSet,
+    effects: Mapping[str, Effect],
+    causes: Mapping[str, Cause],
+) -> PosteriorFit | None:
+    """A set refitted as effects of the filter; None where no start converges.
+
+    It begins at the null, or else at the released derivatives, of which first order takes off what the causes bring.
+    """
+    hypothesis, sizes = null.hypothesis, list(null.point.sizes)
+    away = free.point.common.copy()
+    for key, size in zip(s.causes, s.sizes, strict=True):
+        hypothesis = hypothesis.plus(effects[key])
+        away[Common.derivatives] -= size * causes[key].direction
+        low, high = effects[key].parameters[0].reach
+        sizes.append(min(max(size_in_filter(key, size), low), high))
+    for start in (null.point, replace(free.point, common=away)):
+        own = converged_fit(problem, hypothesis, replace(start, sizes=np.array(sizes)))
+        if own is not None and own.converged:
+            return own
+    return None
+
+
+def _corrected(
+    sets: Sequence[CauseSet], corrections: Mapping[tuple[str, ...], float]
+) -> tuple[CauseSet, ...]:
+    """The sets, best first, with the costs of those that were refitted corrected by what first order does not show."""
+    every = (s if s.wrong else replace(s, cost=s.cost + corrections.get(s.causes, 0.0)) for s in sets)
+    return tuple(sorted(every, key=lambda s: s.cost))
 
 
 def size_in_filter(key: str, size: float) -> float:
@@ -184,7 +214,7 @@ def explained(problem: TraceProblem, free: PosteriorFit, declared: DeclaredCause
 
 def _explaining(likelihood: DerivativeLikelihood, declared: DeclaredCauses) -> tuple[CauseSet, ...]:
     sets = explain(likelihood, declared.causes, declared.wrong_allowed)
-    return tuple(s for s in sets if s.effects)
+    return _corrected([s for s in sets if s.effects], declared.corrections)
 
 
 __all__ = [

@@ -17,12 +17,13 @@ from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import OUTDONE, Candidate
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import BETTER, better_set
-from airtruth.tracing.selection.explanation import least_cost
+from airtruth.tracing.selection.explanation import LOADING, least_cost
 from airtruth.tracing.selection.refit import refit_without
 from airtruth.tracing.selection.release import DeclaredCauses, Release
 from airtruth.tracing.selection.rounds import (
     NOTHING_DECLARED,
     NOTHING_KNOWN,
+    Rival,
     RoundStart,
     SearchRound,
     at_best_location,
@@ -162,11 +163,14 @@ class _Search:
             left = tuple(e for e in starts[-1].effects if e.key not in self.declared.keys)
             fitted = relocated(self.problem, release.refit or release.fit)
             following = RoundStart(fitted.hypothesis, fitted.point, left, settled=True)
-            ends.append(self.rounds((*starts, following), (*before, replace(own, tied=(), profile=None))))
+            corrected = replace(self, declared=replace(self.declared, corrections=release.corrections))
+            ends.append(
+                corrected.rounds((*starts, following), (*before, replace(own, tied=(), profile=None)))
+            )
         if len(ends) == 1:
             return ends[0]
         costs = np.array([total_cost(rounds[-1]) for rounds in ends])
-        counts = np.array([len(rounds[-1].null.hypothesis.effects) for rounds in ends])
+        counts = np.array([_events(rounds[-1].null.hypothesis.effects) for rounds in ends])
         both_released = all(rounds[-1].sets for rounds in ends)
         # An effect beside released derivatives has to be significant.
         best = int(np.argmin(costs + BETTER * counts if both_released else costs))
@@ -235,6 +239,12 @@ class _Search:
         return self.rounds((*starts, following), rounds)
 
 
+def _events(effects: Sequence[Effect]) -> int:
+    """Number of effects; those of a changed loading come together."""
+    other = sum(e.key not in LOADING for e in effects)
+    return other + (len(effects) > other)
+
+
 def _effects_of(last: SearchRound) -> tuple[str, ...]:
     """Names of the effects of a branch that ends with this round."""
     explaining = last.sets[0].effects if last.sets else ()
@@ -268,7 +278,20 @@ def settled(problem: TraceProblem, rounds: tuple[SearchRound, ...]) -> tuple[Sea
     )
     first = next(r.release for r in rounds if r.release is not None)
     end = replace(last, null=null, gls=gls or null, release=replace(first, fit=last.null, sets=last.sets))
-    return (*rounds[:-1], end)
+    return (*rounds[:-1], _with_declared(problem, end, last))
+
+
+def _with_declared(problem: TraceProblem, end: SearchRound, last: SearchRound) -> SearchRound:
+    """The last round with the set of its effects under the declaration, where derivatives are released beside effects."""
+    effects = last.null.hypothesis.effects
+    if not effects:
+        return end
+    declared = fit(problem, replace(last.null.hypothesis, spread=None), last.null.point)
+    if declared is None:
+        return end
+    names = tuple(sorted({e.name for e in effects}))
+    excess = declared.cost + len(declared.point.sizes) - total_cost(last)
+    return replace(end, rival=Rival({**(end.rival.sets if end.rival else {}), names: -max(0.0, excess)}))
 
 
 def _variants(own: SearchRound) -> tuple[Candidate, ...]:

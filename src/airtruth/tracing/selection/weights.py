@@ -31,13 +31,22 @@ def weights(rounds: Sequence[SearchRound]) -> dict[tuple[str, ...], float]:
     tied = [
         [(c.score.effect.name, 0.5 * (c.gain - r.tied[0].gain)) for c in r.tied] for r in rounds if r.tied
     ]
+    carried = _carried(rounds)
     for added in itertools.product(*tied):
         for explaining, log_weight in _explanations(rounds):
-            add([*(name for name, _ in added), *explaining], log_weight + sum(gain for _, gain in added))
+            every = [*(name for name, _ in added), *explaining, *carried]
+            add(every, log_weight + sum(gain for _, gain in added))
     for r in rounds:
         for names, log_weight in () if r.rival is None else r.rival.sets.items():
             add(names, log_weight)
     return found
+
+
+def _carried(rounds: Sequence[SearchRound]) -> set[str]:
+    """Effects beside released derivatives that no round accepted: they explained derivatives that were released before."""
+    last = rounds[-1].null.hypothesis
+    leaders = {r.tied[0].score.effect.name for r in rounds if r.tied}
+    return set() if last.spread is None else {e.name for e in last.effects} - leaders
 
 
 def rival_of(lost: Sequence[SearchRound], excess: float) -> Rival:
