@@ -1,6 +1,7 @@
 """Sets of causes of shifted derivatives: evidence, sizes and ranking, against independent values."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from airtruth.tracing.selection.explanation import (
     simplest_first,
     size_of,
 )
+from airtruth.tracing.selection.release import DeclaredCauses, explained
 
 DECLARED = np.array([4.787, 31.7, 0.480, -1.785, -41.2, -1.787])
 """Derivatives of aircraft/gtm."""
@@ -135,3 +137,20 @@ def test_a_set_without_a_cause_keeps_the_sizes_of_the_others():
     assert (less.causes, less.sizes, less.size_std) == (("cg_shift",), (0.02,), (0.005,))
     assert less.effects == ("cg_shift", "derivatives")
     assert (less.wrong, less.cost) == (whole.wrong, whole.cost)
+
+
+def test_what_a_refit_shows_beyond_first_order_is_kept(monkeypatch):
+    """Also beside other effects, where the sets are explained again; sets of other causes and wrong declarations keep theirs."""
+    monkeypatch.setattr(
+        "airtruth.tracing.selection.release.derivative_likelihood",
+        lambda problem, free: likelihood(-0.3 * DIRECTIONS["tail"]),
+    )
+    free = SimpleNamespace(hypothesis=SimpleNamespace(effects=()))
+    plain = explained(None, free, DeclaredCauses(causes_of(DIRECTIONS)))
+    kept = explained(None, free, DeclaredCauses(causes_of(DIRECTIONS), corrections={("cg_shift",): -200.0}))
+    costs = [{(s.effects, s.wrong): s.cost for s in sets} for sets in (plain, kept)]
+    assert kept[0].effects == ("cg_shift",) != plain[0].effects
+    changed = {key for key in costs[0] if costs[1][key] != costs[0][key]}
+    assert changed == {(("cg_shift",), ())}
+    assert costs[1][("cg_shift",), ()] == pytest.approx(costs[0][("cg_shift",), ()] - 200.0)
+'''

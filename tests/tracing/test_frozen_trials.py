@@ -124,3 +124,33 @@ def test_released_derivatives_do_not_take_the_part_of_an_effect(number, tmp_path
     assert {e["name"] for e in answer["effects"]} == {
         e.key.split(":")[0] for e in draw(20261126, number, "triple").effects
     }
+
+
+def test_an_airspeed_that_reads_low_is_named(tmp_path):
+    """A factor of 0.850, lambda 65, logged at 15.6 Hz. The declared model trims 8 deg above the angle that was flown, and flies
+    beyond the tables of the record; with their extrapolation wrong derivatives were named."""
+    from airtruth.tracing import TraceOptions, trace
+    from validation.blind.trials import frozen
+
+    (folder,) = frozen(20261203, [0], "coarse", tmp_path)
+    answer = trace(folder, "gtm", TraceOptions()).to_dict()
+    (effect,) = answer["effects"]
+    assert (effect["name"], answer["provisional"]) == ("airspeed_scale", False)
+    low, high = effect["parameters"]["factor"]["ci95"]
+    assert low < 0.8503 < high
+
+
+@pytest.mark.parametrize(
+    ("number", "named"),
+    [(0, {"cg_shift", "inertia_error"}), (11, {"cg_shift", "inertia_error"})],
+)
+def test_a_changed_loading_is_named(number, named, tmp_path):
+    """CG, mass and inertia, lambda 73 and 47, of which that of the mass is below 4. Wrong derivatives explain the second as well
+    to first order, and an airspeed scale the first; the refit in the filter tells them apart."""
+    from airtruth.tracing import TraceOptions, trace
+    from validation.blind.trials import frozen
+
+    (folder,) = frozen(20261214, [number], "composite", tmp_path)
+    answer = trace(folder, "gtm", TraceOptions()).to_dict()
+    assert {e["name"] for e in answer["effects"]} == named
+    assert not answer["provisional"]
