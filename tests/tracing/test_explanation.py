@@ -153,4 +153,3 @@ def test_what_a_refit_shows_beyond_first_order_is_kept(monkeypatch):
     changed = {key for key in costs[0] if costs[1][key] != costs[0][key]}
     assert changed == {(("cg_shift",), ())}
     assert costs[1][("cg_shift",), ()] == pytest.approx(costs[0][("cg_shift",), ()] - 200.0)
-'''
