@@ -154,3 +154,17 @@ def test_a_changed_loading_is_named(number, named, tmp_path):
     answer = trace(folder, "gtm", TraceOptions()).to_dict()
     assert {e["name"] for e in answer["effects"]} == named
     assert not answer["provisional"]
+
+
+def test_coloured_noise_behind_a_strong_effect_is_found(tmp_path):
+    """A vane 60 ms late, lambda 344, moderate gusts, coloured noise. At the declared aircraft the delay drives the share of slow
+    noise to its limit; without slow noise an increment was learned beside the delay."""
+    from airtruth.tracing import TraceOptions, trace
+    from validation.blind.trials import frozen
+
+    (folder,) = frozen(20261221, [30], "drift", tmp_path)
+    answer = trace(folder, "gtm", TraceOptions()).to_dict()
+    (effect,) = answer["effects"]
+    assert (effect["name"], effect["channel"], answer["provisional"]) == ("sensor_delay", "alpha_rad", False)
+    low, high = effect["parameters"]["delay_s"]["ci95"]
+    assert low < 0.06 < high

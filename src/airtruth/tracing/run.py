@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from airtruth import __version__
@@ -24,18 +25,19 @@ from airtruth.tracing.answer import ANOMALY_LEVEL, TraceAnswer
 from airtruth.tracing.conclude import conclude
 from airtruth.tracing.declared_model import declared_p_value
 from airtruth.tracing.kinematic_start import disagreement, kinematic_check, starts_of
+from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.prepare import Case, prepare
 from airtruth.tracing.replay import flown_again
 from airtruth.tracing.result import TraceResult
-from airtruth.tracing.selection.budget import Advance, Budget
+from airtruth.tracing.selection.budget import Advance, Budget, may_begin
 from airtruth.tracing.selection.corner_share import with_corner_share
 from airtruth.tracing.selection.learn import with_increments
 from airtruth.tracing.selection.look_alikes import with_look_alikes
-from airtruth.tracing.selection.noise_colour import with_coloured_noise
+from airtruth.tracing.selection.noise_colour import beside, with_coloured_noise
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.rounds import LEVEL, SearchRound
-from airtruth.tracing.selection.search import search
+from airtruth.tracing.selection.search import search, total_cost
 from airtruth.tracing.stages import assess_stages
 from airtruth.tracing.update import updated_folder, write_update
 
@@ -154,11 +156,9 @@ def _search(
     steps = advance if limited is None else limited
     case, start = with_coloured_noise(case)
     case = with_corner_share(case, start)
-    rounds = search(
-        case.fitted, case.hypothesis, start, case.effects, options.seed, steps, case.declared, known
-    )
-    if rounds:
-        rounds = pruned(case.fitted, rounds, case.effects, options.seed, LEVEL, steps)
+    rounds = _pruned_search(case, start, options, steps, known)
+    if rounds and rounds[-1].null.hypothesis.effects and not case.fitted.settings.coloured:
+        case, rounds = _with_later_colour(case, rounds, options, steps, known)
     if options.learns:
         rounds = with_increments(case.fitted, rounds, case.effects, options.seed, steps, case.declared)
     if rounds:
@@ -169,6 +169,38 @@ def _search(
             "motion diverges; check units and signs with `airtruth check`, and that it is the right aircraft"
         )
     return (case if limited is None else replace(case, left_out=limited.left_out)), rounds
+
+
+def _pruned_search(
+    case: Case, start: Parameters, options: TraceOptions, advance: Advance, known: Mapping[str, float]
+) -> tuple[SearchRound, ...]:
+    """The rounds of a search without the names that later ones make unnecessary."""
+    rounds = search(
+        case.fitted, case.hypothesis, start, case.effects, options.seed, advance, case.declared, known
+    )
+    return rounds and pruned(case.fitted, rounds, case.effects, options.seed, LEVEL, advance)
+
+
+def _with_later_colour(
+    case: Case,
+    rounds: tuple[SearchRound, ...],
+    options: TraceOptions,
+    advance: Advance,
+    known: Mapping[str, float],
+) -> tuple[Case, tuple[SearchRound, ...]]:
+    """The search again with slow noise that shows beside what it explained, where that explains more.
+
+    At the declared aircraft a strong effect drives slow noise to its limits, and it does not enter.
+    """
+    coloured, point = beside(case, rounds[-1].null)
+    phrase = "search with coloured noise"
+    if not coloured.fitted.settings.coloured or not may_begin(advance, phrase):
+        return case, rounds
+    start = replace(point, sizes=np.empty(0))
+    again = _pruned_search(coloured, start, options, advance, known)
+    if again and total_cost(again[-1]) < total_cost(rounds[-1]):
+        return coloured, again
+    return case, rounds
 
 
 def _effects(options: TraceOptions) -> list[Effect]:

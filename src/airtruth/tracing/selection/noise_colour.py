@@ -44,11 +44,19 @@ SHARES: Final = np.r_[Common.colour_shares]
 
 def with_coloured_noise(case: Case) -> tuple[Case, Parameters]:
     """The case, with slow noise where its fitted records show some, and the parameters at which its search begins."""
-    problem, hypothesis = case.fitted, case.hypothesis
-    start = initial_parameters(problem, hypothesis)
-    null = fit(problem, hypothesis, start)
-    if null is None:
-        return case, start
+    start = initial_parameters(case.fitted, case.hypothesis)
+    null = fit(case.fitted, case.hypothesis, start)
+    return (case, start) if null is None else beside(case, null)
+
+
+def beside(case: Case, null: PosteriorFit) -> tuple[Case, Parameters]:
+    """The case, with slow noise where its fitted records show some beside what a fit explains, and where a refit ends.
+
+    Parameters
+    ----------
+    null : a fit of the case without slow noise.
+    """
+    problem, hypothesis = case.fitted, null.hypothesis
     if not problem.settings.noise_is_declared:
         return case, null.point
     settings = replace(problem.settings, coloured=True)
