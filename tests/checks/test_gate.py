@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from faults import FAULTS
 from tiers import sampled
 
 from airtruth import aircraft as planes
+from airtruth.checks.columns import dropouts
 from airtruth.checks.corrections import catalogue
 from airtruth.checks.fault import CODES
 from airtruth.checks.gate import inspect, require
@@ -245,3 +247,19 @@ def test_damaged_aircraft_are_not_refused(tmp_path, gtm):
         log = read_log(folder / "log.parquet")
         assert certain(inspect(log, gtm)) == [], folder.name
         assert certain(inspect(log)) == [], folder.name
+
+
+QUANTISED = [0.3, -0.3, 0.0, 12.3, 0.0, -15.0, -24.6, -9.9, 0.0, 0.3, 0.0, 0.0, -0.3, 0.3, 0.0, 0.6]
+"""A coarse gyro of 0.3 deg/s in a doublet [deg/s]: it passes zero on the way from 12 to -15, and rests at zero."""
+
+
+def test_a_coarse_sample_of_zero_between_two_signs_is_no_dropout():
+    channels = {"q_rad_s": np.tile(np.deg2rad(QUANTISED), (1, 4))}
+    assert list(dropouts(SimpleNamespace(channels=channels))) == []
+
+
+def test_a_sample_of_zero_that_comes_back_is_a_dropout():
+    x = np.deg2rad(np.tile(QUANTISED, (1, 4)))
+    x[:, 6::16] = 0.0
+    ((name, bad, count),) = dropouts(SimpleNamespace(channels={"q_rad_s": x}))
+    assert (name, bad.tolist(), count) == ("q_rad_s", [True], int((x == 0.0).sum()))

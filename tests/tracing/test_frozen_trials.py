@@ -168,3 +168,17 @@ def test_coloured_noise_behind_a_strong_effect_is_found(tmp_path):
     assert (effect["name"], effect["channel"], answer["provisional"]) == ("sensor_delay", "alpha_rad", False)
     low, high = effect["parameters"]["delay_s"]["ci95"]
     assert low < 0.06 < high
+
+
+def test_a_refit_does_not_stay_where_derivatives_keep_a_part_of_an_effect(tmp_path):
+    """A vane scale of 1.227, lambda 95, logged at 19.2 Hz. The refit that began at the null ended at 1.147, with 34 less in
+    log-posterior than that which begins at the declared aircraft, and wrong derivatives were named beside it."""
+    from airtruth.tracing import TraceOptions, trace
+    from validation.blind.trials import frozen
+
+    (folder,) = frozen(20261222, [17], "coarse", tmp_path)
+    answer = trace(folder, "gtm", TraceOptions()).to_dict()
+    (effect,) = answer["effects"]
+    assert (effect["name"], answer["provisional"]) == ("vane_scale", False)
+    low, high = effect["parameters"]["factor"]["ci95"]
+    assert low < 1.2273 < high

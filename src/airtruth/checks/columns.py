@@ -168,7 +168,8 @@ def constant(batch: Batch) -> Iterator[tuple[str, Bools]]:
 def dropouts(batch: Batch) -> Iterator[tuple[str, Bools, int]]:
     """Channels with samples of exactly zero amid others, and the runs and number of samples.
 
-    A channel that is about zero (a rate) drops out only where it jumps to zero and back: at rest it may be zero.
+    A channel that is about zero (a rate) drops out only where it jumps to zero and back: at rest it may be zero, and so may a
+    coarse sample on its way from one sign to the other.
     """
     for name in ("alpha_rad", "q_rad_s", "az_m_s2", "theta_rad", "ax_m_s2", "airspeed_m_s", "density_kg_m3"):
         x = batch.channels.get(name)
@@ -192,9 +193,13 @@ def _drops_out(x: Array, zero: Bools) -> bool:
     if not inside.any():
         return False
     usual = max(1.4826 * float(np.median(np.abs(steps[inside]))), 1e-3 * float(np.ptp(x)))
-    jumps = (zero[1:] != zero[:-1]) & (np.abs(steps) > JUMP * usual)
-    to_zero, from_zero = int((jumps & zero[1:]).sum()), int((jumps & zero[:-1]).sum())
-    return to_zero > 0 and from_zero > 0
+    edges = np.flatnonzero(zero[1:] != zero[:-1]) + 1
+    if zero[0]:
+        edges = edges[1:]
+    starts, ends = edges[:-1:2], edges[1::2]
+    before, after = x[starts[: ends.size] - 1], x[ends]
+    far = np.minimum(np.abs(before), np.abs(after)) > JUMP * usual
+    return bool((far & (before * after > 0.0)).any())
 
 
 def frozen(batch: Batch) -> Iterator[tuple[str, Bools, float]]:

@@ -31,6 +31,8 @@ _ATTEMPTS: Final = 3
 _SHARES: Final = (2.0, 1.0, 0.6, 0.3, 0.1, 0.02)
 """Multiples of the size that the score suggests at which a refit may begin [-] (judgement: a score extrapolates along a
 straight line, and overstates a size that acts in a curve more often than it understates one)."""
+_TWICE: Final = 3
+"""Number of leading candidates whose refit begins a second time, at the declared aircraft [-] (judgement: a refit each)."""
 _SAME: Final = 0.5
 """Difference in log L below which two refits have reached the same optimum [-] (judgement: one standard error)."""
 _EXPLAINED: Final = 0.2
@@ -117,7 +119,22 @@ def refit_leaders(
             break
         first = fits[0].fit
         fits[0] = replace(fits[0], fit=fit(problem, first.hypothesis, first.point) or first)
-    return sorted(fits, key=lambda r: r.cost)
+    started_twice = [_from_both(problem, null, r, advance) for r in fits[:_TWICE]]
+    return sorted([*started_twice, *fits[_TWICE:]], key=lambda r: r.cost)
+
+
+def _from_both(problem: TraceProblem, null: PosteriorFit, r: Refit, advance: Advance) -> Refit:
+    """The better of a refit and of one that begins at the declared aircraft with its size.
+
+    Derivatives that have absorbed an effect at the null may keep a part of it in another optimum.
+    """
+    effect = r.score.effect
+    if len(effect.parameters) > 1 or not may_begin(advance, f"refit {effect.key} from the declared aircraft"):
+        return r
+    tried = _from_declared(problem, null, r.score, r.size, r.fit.cost)
+    if tried is None or tried.cost > r.fit.cost - _BETTER:
+        return r
+    return Refit(r.score, tried, _freedom_correction(problem, null, effect, tried))
 
 
 def refit_absorbed(
