@@ -182,3 +182,20 @@ def test_a_refit_does_not_stay_where_derivatives_keep_a_part_of_an_effect(tmp_pa
     assert (effect["name"], answer["provisional"]) == ("vane_scale", False)
     low, high = effect["parameters"]["factor"]["ci95"]
     assert low < 1.2273 < high
+
+
+@pytest.mark.parametrize(
+    ("number", "named", "factor"), [(12, "airspeed_scale", 1.15), (16, "vane_scale", 1.25)]
+)
+def test_a_scale_that_a_damped_aircraft_hides_is_named_alone(number, named, factor, tmp_path):
+    """With a pitch damper, lambda 83 and 43. The first had an elevator effectiveness beside it, of an explanation that had been
+    given up. The second had no score, because refitted derivatives had absorbed it, and a break of Cm was named."""
+    from airtruth.tracing import TraceOptions, trace
+    from validation.blind.trials import frozen
+
+    (folder,) = frozen(20261233, [number], "loop", tmp_path)
+    answer = trace(folder, "gtm", TraceOptions()).to_dict()
+    (effect,) = answer["effects"]
+    assert (effect["name"], answer["provisional"]) == (named, False)
+    low, high = effect["parameters"]["factor"]["ci95"]
+    assert low < factor < high

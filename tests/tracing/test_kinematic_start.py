@@ -1,12 +1,15 @@
 """The kinematic check gives a trace its starting points, and contradictions between the two are stated."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
+from airtruth.checks.result import Finding
 from airtruth.logs.store import iter_logs
 from airtruth.simulation.campaign import run as campaign
 from airtruth.tracing import TraceOptions, trace
+from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.kinematic_start import disagreement, kinematic_check, starts_of
 
 LAG_S = 0.2
@@ -76,3 +79,13 @@ def test_a_trace_refits_the_cause_and_agrees(logs, gtm):
         check, replace(result.answer, effects=(replace(effect, parameters={"tau_s": other}),))
     )
     assert "vane_lag: the trace estimates 0.5" in note
+
+
+def test_a_bias_of_the_check_is_compared_with_that_of_the_trace():
+    """A gyro bias of 0.02 to 0.04 rad/s by kinematics beyond a declared 0.01, and -0.05 by the trace."""
+    found = Finding("gyro_bias", "rad/s", "", 0.04, 0.005, 0.03, 0.05, 0.01, 0.001, "shown")
+    check = SimpleNamespace(verdict="errors", possible=(), findings=(found,))
+    own = ParameterEstimate(-0.05, 0.01, (-0.07, -0.03))
+    effect = AcceptedEffect("gyro_bias", {"value": own}, 1e-9, 5.0)
+    (note,) = disagreement(check, SimpleNamespace(effects=(effect,)))
+    assert note == "gyro_bias: the trace estimates -0.05, the kinematic check 0.02 to 0.04"

@@ -49,10 +49,12 @@ def starts_of(check: CheckResult | None) -> dict[str, float]:
 
 
 def _beyond_declared(one: Finding) -> float:
-    """Error in addition to the declared one; an effect adds to the declaration."""
-    if KINDS[ERRORS[one.name].kind].is_factor:
-        return one.value / one.declared
-    return one.value - one.declared
+    """Error in addition to the declared one; an effect adds to the declaration.
+
+    A bias is no error of `ERRORS`: the check estimates it beside them.
+    """
+    is_factor = one.name in ERRORS and KINDS[ERRORS[one.name].kind].is_factor
+    return one.value / one.declared if is_factor else one.value - one.declared
 
 
 def disagreement(check: CheckResult | None, answer: TraceAnswer) -> list[str]:

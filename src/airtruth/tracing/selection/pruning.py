@@ -87,7 +87,7 @@ def _with_needed_names(problem: TraceProblem, fitted: PosteriorFit, least: float
 
 
 def _kept(own: SearchRound, gone: set[str], is_declared: bool) -> SearchRound:
-    """A round without the effects that are gone, and without its release where the declaration holds again."""
+    """A round without the effects that are gone, and without its release where nothing of its explanation is left."""
     if own.tied and own.tied[0].score.effect.key in gone:
         first = own.tied[0]
         others = (replace(c, reasons=(SUPERSEDED,)) if c is first else c for c in own.candidates)
@@ -96,12 +96,14 @@ def _kept(own: SearchRound, gone: set[str], is_declared: bool) -> SearchRound:
         return replace(own, release=None, sets=(), rival=None)
     if own.release is None:
         return own
+    if not own.release.sets[0].without(gone).effects:
+        return replace(own, release=None)
     sets: dict[tuple[str, ...], CauseSet] = {}
     for s in own.release.sets:
         left = s.without(gone)
         if left.effects:
             sets.setdefault(left.effects, left)
-    return replace(own, release=replace(own.release, sets=tuple(sets.values())) if sets else None)
+    return replace(own, release=replace(own.release, sets=tuple(sets.values())))
 
 
 __all__ = ["pruned"]

@@ -144,6 +144,8 @@ def refit_absorbed(
     fits: Sequence[Refit],
     advance: Advance,
     skip: Collection[str] = (),
+    *,
+    either_sign: bool = False,
 ) -> list[Refit]:
     """The refits with those of effects that refitted derivatives may have absorbed, best first.
 
@@ -153,6 +155,7 @@ def refit_absorbed(
     Parameters
     ----------
     fits : refits of the leading candidates; skip : keys of effects that are not refitted.
+    either_sign : whether a two-sided size begins at a usual size of either sign, and not at zero.
     """
     known = {r.score.effect.key for r in fits} | set(skip)
     found = list(fits)
@@ -161,10 +164,11 @@ def refit_absorbed(
             continue
         if not may_begin(advance, f"refit {s.effect.key} from the declared aircraft"):
             continue
-        rival = min((r.fit.cost for r in found), default=np.inf)
-        tried = _from_declared(problem, null, s, _usual_size(s), rival)
-        if tried is not None:
-            found.append(Refit(s, tried, 0.0))
+        for size in _usual_sizes(s, either_sign):
+            rival = min((r.fit.cost for r in found), default=np.inf)
+            tried = _from_declared(problem, null, s, size, rival)
+            if tried is not None:
+                found.append(Refit(s, tried, 0.0))
     return sorted(found, key=lambda r: r.cost)
 
 
@@ -200,10 +204,13 @@ def refit_known(
     return sorted(best.values(), key=lambda r: r.cost)
 
 
-def _usual_size(s: Score) -> float:
-    """Size at which the search for an effect without a score begins."""
+def _usual_sizes(s: Score, either_sign: bool) -> tuple[float, ...]:
+    """Sizes at which the search for an effect without a score begins."""
     first = s.effect.parameters[0]
-    return _USUAL * first.reach[1] if first.one_sided else 0.0
+    low, high = (_USUAL * end for end in first.reach)
+    if first.one_sided:
+        return (high,)
+    return (high, low) if either_sign else (0.0,)
 
 
 def _from_declared(

@@ -18,7 +18,7 @@ from airtruth.tracing.selection.acceptance import OUTDONE, Candidate
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import BETTER, better_set
 from airtruth.tracing.selection.explanation import LOADING, least_cost
-from airtruth.tracing.selection.refit import refit_without
+from airtruth.tracing.selection.refit import refit_absorbed, refit_without
 from airtruth.tracing.selection.release import DeclaredCauses, Release
 from airtruth.tracing.selection.rounds import (
     NOTHING_DECLARED,
@@ -40,6 +40,8 @@ instead [-] (convention)."""
 _FAILED: Final = 1e-6
 """Probability of the remaining anomaly below which a search has failed, and what the kinematic check names leads another
 [-] (judgement: an anomaly beyond doubt)."""
+_REMAINS: Final = 0.01
+"""Probability of the remaining anomaly below which effects without a score are refitted [-] (that of the verdict)."""
 _EFFECT_LEADS: Final = 30.0
 """Gain in 2 log L by which an effect has to lead for the released derivatives not to be followed beside it [-]
 (judgement: what a later effect may still add to them)."""
@@ -107,6 +109,8 @@ class _Search:
         missing = tuple(e for e in first.effects if e.key in self.known and e.key not in taken)
         if missing and rounds[-1].anomaly.p_value < _FAILED:
             rounds = self._led(first, missing, rounds)
+        if rounds[-1].anomaly.p_value < _REMAINS and len(rounds[-1].null.hypothesis.effects) < 2:
+            rounds = self._with_absorbed(first, rounds)
         if len(rounds[-1].null.hypothesis.effects) + len(rounds[-1].sets[:1]) < 2:
             return rounds
         last = self._declared(rounds[-1].null)
@@ -115,6 +119,18 @@ class _Search:
         least = significant_gain(first.tested, later=True)
         better = better_set(self.problem, rounds, last, first.effects, least, self.advance)
         return rounds if better is None else self._led(first, better, rounds)
+
+    def _with_absorbed(self, first: RoundStart, rounds: tuple[SearchRound, ...]) -> tuple[SearchRound, ...]:
+        """The rounds, or those led by an effect that refitted derivatives had absorbed, so that it had no score."""
+        null, last = rounds[0].null, rounds[-1]
+        taken = {e.key for e in last.null.hypothesis.effects}
+        table = rounds[0].table
+        fits = refit_absorbed(self.problem, null, table, (), self.advance, taken, either_sign=True)
+        if not fits or fits[0].cost > total_cost(last):
+            return rounds
+        effect = fits[0].score.effect
+        size = effect.parameters[0].value(fits[0].size)
+        return replace(self, known={**self.known, effect.key: size})._led(first, (effect,), rounds)
 
     def _declared(self, last: PosteriorFit) -> PosteriorFit | None:
         """The fit under the declaration of the derivatives: released ones absorb what a wrong effect leaves."""
