@@ -32,6 +32,15 @@ NOT_WORSE = 1.02
 pytestmark = pytest.mark.long
 
 
+def answered(seed, number, mode, folder):
+    """The answer to one trial, flown again."""
+    from airtruth.tracing import TraceOptions, trace
+    from validation.blind.trials import frozen
+
+    (flown,) = frozen(seed, [number], mode, folder)
+    return trace(flown, "gtm", TraceOptions()).to_dict()
+
+
 def names(effect):
     return {effect["name"], *effect["indistinguishable_from"]}
 
@@ -44,11 +53,7 @@ def marked(number):
 
 @pytest.mark.parametrize("number", [marked(number) for number in range(COUNT)])
 def test_a_trial_is_answered_as_it_was(number, tmp_path):
-    from airtruth.tracing import TraceOptions, trace
-    from validation.blind.trials import frozen
-
-    (folder,) = frozen(SEED, [number], "mixed", tmp_path)
-    answer = trace(folder, "gtm", TraceOptions()).to_dict()
+    answer = answered(SEED, number, "mixed", tmp_path)
     effects = answer["effects"]
     assert answer["verdict"] in ("none", "traced", "one_of", "learned", "unexplained")
     if number in NULLS:
@@ -68,22 +73,14 @@ def test_a_trial_is_answered_as_it_was(number, tmp_path):
 def test_a_set_one_exchange_away_is_reached(seed, number, tmp_path):
     """A late gyro and a late surface, lambda 735 and 1051: the search alone accepted the gyro's delay and a lag of the surface,
     with the gyro's lag or wrong derivatives. The log-posterior of the two that were flown is larger by 20 in the first."""
-    from airtruth.tracing import TraceOptions, trace
-    from validation.blind.trials import frozen
-
-    (folder,) = frozen(seed, [number], "slow", tmp_path)
-    answer = trace(folder, "gtm", TraceOptions()).to_dict()
+    answer = answered(seed, number, "slow", tmp_path)
     assert {e["name"] for e in answer["effects"]} == {"gyro_lag", "elevator_delay"}
 
 
 def test_a_late_gyro_that_makes_the_free_run_diverge_is_traced(tmp_path):
     """A gyro lag of 0.303 s and a surface delay of 38.8 ms in calm air, lambda 50,000. Without both, the refitted derivatives
     are those of an unstable aircraft, and the free run leaves all bounds."""
-    from airtruth.tracing import TraceOptions, trace
-    from validation.blind.trials import frozen
-
-    (folder,) = frozen(20261124, [0], "slow", tmp_path)
-    answer = trace(folder, "gtm", TraceOptions()).to_dict()
+    answer = answered(20261124, 0, "slow", tmp_path)
     assert [e["name"] for e in answer["effects"]] == ["gyro_lag", "elevator_delay"]
     assert not answer["provisional"]
     (lag,) = answer["effects"][0]["parameters"].values()
@@ -115,12 +112,9 @@ def test_the_second_half_of_a_single_record_begins_in_motion(number, tmp_path):
 def test_released_derivatives_do_not_take_the_part_of_an_effect(number, tmp_path):
     """Three effects, lambda 131 and 141. In the first trial wrong derivatives of lift had taken the part of an accelerometer
     that is not at the CG, in the second a thrust line with a wrong Cmq that of the downwash lag."""
-    from airtruth.tracing import TraceOptions, trace
     from validation.blind.draw import draw
-    from validation.blind.trials import frozen
 
-    (folder,) = frozen(20261126, [number], "triple", tmp_path)
-    answer = trace(folder, "gtm", TraceOptions()).to_dict()
+    answer = answered(20261126, number, "triple", tmp_path)
     assert {e["name"] for e in answer["effects"]} == {
         e.key.split(":")[0] for e in draw(20261126, number, "triple").effects
     }
@@ -129,11 +123,7 @@ def test_released_derivatives_do_not_take_the_part_of_an_effect(number, tmp_path
 def test_an_airspeed_that_reads_low_is_named(tmp_path):
     """A factor of 0.850, lambda 65, logged at 15.6 Hz. The declared model trims 8 deg above the angle that was flown, and flies
     beyond the tables of the record; with their extrapolation wrong derivatives were named."""
-    from airtruth.tracing import TraceOptions, trace
-    from validation.blind.trials import frozen
-
-    (folder,) = frozen(20261203, [0], "coarse", tmp_path)
-    answer = trace(folder, "gtm", TraceOptions()).to_dict()
+    answer = answered(20261203, 0, "coarse", tmp_path)
     (effect,) = answer["effects"]
     assert (effect["name"], answer["provisional"]) == ("airspeed_scale", False)
     low, high = effect["parameters"]["factor"]["ci95"]
@@ -147,11 +137,7 @@ def test_an_airspeed_that_reads_low_is_named(tmp_path):
 def test_a_changed_loading_is_named(number, named, tmp_path):
     """CG, mass and inertia, lambda 73 and 47, of which that of the mass is below 4. Wrong derivatives explain the second as well
     to first order, and an airspeed scale the first; the refit in the filter tells them apart."""
-    from airtruth.tracing import TraceOptions, trace
-    from validation.blind.trials import frozen
-
-    (folder,) = frozen(20261214, [number], "composite", tmp_path)
-    answer = trace(folder, "gtm", TraceOptions()).to_dict()
+    answer = answered(20261214, number, "composite", tmp_path)
     assert {e["name"] for e in answer["effects"]} == named
     assert not answer["provisional"]
 
@@ -159,11 +145,7 @@ def test_a_changed_loading_is_named(number, named, tmp_path):
 def test_coloured_noise_behind_a_strong_effect_is_found(tmp_path):
     """A vane 60 ms late, lambda 344, moderate gusts, coloured noise. At the declared aircraft the delay drives the share of slow
     noise to its limit; without slow noise an increment was learned beside the delay."""
-    from airtruth.tracing import TraceOptions, trace
-    from validation.blind.trials import frozen
-
-    (folder,) = frozen(20261221, [30], "drift", tmp_path)
-    answer = trace(folder, "gtm", TraceOptions()).to_dict()
+    answer = answered(20261221, 30, "drift", tmp_path)
     (effect,) = answer["effects"]
     assert (effect["name"], effect["channel"], answer["provisional"]) == ("sensor_delay", "alpha_rad", False)
     low, high = effect["parameters"]["delay_s"]["ci95"]
@@ -173,11 +155,7 @@ def test_coloured_noise_behind_a_strong_effect_is_found(tmp_path):
 def test_a_refit_does_not_stay_where_derivatives_keep_a_part_of_an_effect(tmp_path):
     """A vane scale of 1.227, lambda 95, logged at 19.2 Hz. The refit that began at the null ended at 1.147, with 34 less in
     log-posterior than that which begins at the declared aircraft, and wrong derivatives were named beside it."""
-    from airtruth.tracing import TraceOptions, trace
-    from validation.blind.trials import frozen
-
-    (folder,) = frozen(20261222, [17], "coarse", tmp_path)
-    answer = trace(folder, "gtm", TraceOptions()).to_dict()
+    answer = answered(20261222, 17, "coarse", tmp_path)
     (effect,) = answer["effects"]
     assert (effect["name"], answer["provisional"]) == ("vane_scale", False)
     low, high = effect["parameters"]["factor"]["ci95"]
@@ -190,11 +168,7 @@ def test_a_refit_does_not_stay_where_derivatives_keep_a_part_of_an_effect(tmp_pa
 def test_a_scale_that_a_damped_aircraft_hides_is_named_alone(number, named, factor, tmp_path):
     """With a pitch damper, lambda 83 and 43. The first had an elevator effectiveness beside it, of an explanation that had been
     given up. The second had no score, because refitted derivatives had absorbed it, and a break of Cm was named."""
-    from airtruth.tracing import TraceOptions, trace
-    from validation.blind.trials import frozen
-
-    (folder,) = frozen(20261233, [number], "loop", tmp_path)
-    answer = trace(folder, "gtm", TraceOptions()).to_dict()
+    answer = answered(20261233, number, "loop", tmp_path)
     (effect,) = answer["effects"]
     assert (effect["name"], answer["provisional"]) == (named, False)
     low, high = effect["parameters"]["factor"]["ci95"]

@@ -96,10 +96,16 @@ def _implied(elevator_rad: Array, dt_s: float, tau_s: float) -> Array:
     return np.asarray((elevator_rad[1:] - rho * elevator_rad[:-1]) / (1.0 - rho))
 
 
+def _neighbours(command: Array) -> tuple[Array, Array]:
+    """Implied commands of the cell before each cell and of that after it."""
+    padded = np.concatenate([command[:1], command, command[-1:]])
+    return padded[:-2], padded[2:]
+
+
 def _across(command: Array) -> Array:
     """Change of the implied command from the cell before each cell to that after it."""
-    padded = np.concatenate([command[:1], command, command[-1:]])
-    return np.asarray(padded[2:] - padded[:-2])
+    before, after = _neighbours(command)
+    return np.asarray(after - before)
 
 
 def _exponentials(
@@ -108,8 +114,7 @@ def _exponentials(
     """(samples - 1, cells) path of the servo; the command steps inside the cells of ``steps`` and is held in the others."""
     rho = float(np.exp(-dt_s / tau_s))
     start, end = elevator_rad[:-1], elevator_rad[1:]
-    padded = np.concatenate([command[:1], command, command[-1:]])
-    before, after = np.where(steps, padded[:-2], command), np.where(steps, padded[2:], command)
+    before, after = (np.where(steps, beside, command) for beside in _neighbours(command))
     gap = (end - after) - rho * (start - before)
     share = rho * (before - after) / np.where(gap == 0.0, 1.0, gap)
     x = np.where(steps & (gap != 0.0), np.clip(share, rho, 1.0), rho)

@@ -279,10 +279,10 @@ def read_between(
             path = held_command(elevator, dt_s, tau_s, cells)
             mean = _elevator(elevator, bend, cells, none)
             return mean if path is None else shaped(mean, path, cells), none
-    corners = corner_variance(elevator, std_rad)
+    corners, unbent = corner_variance(elevator, std_rad), np.zeros_like(bend)
     if servo_s <= 0.0 or not corners.size:
-        return _elevator(elevator, 0.0 * bend, cells, corners), corners
-    path, steps = with_steps(elevator, _elevator(elevator, 0.0 * bend, cells, none), dt_s, servo_s, cells)
+        return _elevator(elevator, unbent, cells, corners), corners
+    path, steps = with_steps(elevator, _elevator(elevator, unbent, cells, none), dt_s, servo_s, cells)
     return path, np.append(0.0, np.where(steps, 0.0, corners[1:]))
 
 

@@ -37,6 +37,7 @@ from airtruth.tracing.selection.ranking import TIE
 from airtruth.tracing.selection.release import DeclaredCauses, explained
 from airtruth.tracing.selection.rounds import (
     NOTHING_DECLARED,
+    REMAINS,
     Rival,
     SearchRound,
     scored_round,
@@ -50,8 +51,6 @@ MOST_INCREMENTS: Final = 3
 LEAST_RECORDS: Final = 3
 """Least number of fitted records [-] (judgement: the gusts of one or two flights can resemble an increment, and
 a measured record of 60 s always leaves an anomaly beside a linear model)."""
-REMAINS: Final = 0.01
-"""Probability of the remaining anomaly below which increments are learned [-]; that of an unexplained verdict."""
 _REFITTED: Final = 3
 """Number of shapes that are refitted for one increment [-] (judgement: a refit costs seconds to a minute)."""
 _HOPELESS: Final = 8.0

@@ -33,6 +33,9 @@ Array = NDArray[np.float64]
 
 LEVEL: Final = 0.05
 """Significance level of the scores in the first round, after Holm's correction [-] (convention)."""
+REMAINS: Final = 0.01
+"""Probability of the remaining anomaly below which effects without a score are refitted and increments learned [-]; that of an
+unexplained verdict."""
 LATER_LEVEL: Final = 0.001
 """The same in later rounds [-] (judgement: a misspecified model always leaves a small residual, and a stricter level
 adds fewer false effects at the price of small true ones)."""
