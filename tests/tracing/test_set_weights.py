@@ -8,22 +8,26 @@ import pytest
 from airtruth.tracing.selection.weights import alike_in_rivals, rival_of, weights
 
 
-def null(*names, spread=None):
-    """What a weight reads of a fit."""
+def null(*names, spread=None, z=100.0):
+    """What a weight reads of a fit; each size is ``z`` standard deviations."""
     effects = [SimpleNamespace(name=name) for name in names]
-    return SimpleNamespace(hypothesis=SimpleNamespace(spread=spread, effects=effects))
+    return SimpleNamespace(
+        hypothesis=SimpleNamespace(spread=spread, effects=effects, span=lambda key: slice(0, 1)),
+        point=SimpleNamespace(sizes=[z]),
+        size_std=lambda number: 1.0,
+    )
 
 
-def tied(**gains):
+def tied(z=100.0, **gains):
     """A round that accepted the first of these effects; the others tied with it."""
     return SimpleNamespace(
         tied=[
-            SimpleNamespace(score=SimpleNamespace(effect=SimpleNamespace(name=name)), gain=gain)
+            SimpleNamespace(score=SimpleNamespace(effect=SimpleNamespace(name=name, key=name)), gain=gain)
             for name, gain in gains.items()
         ],
         release=None,
         rival=None,
-        null=null(),
+        null=null(z=z),
     )
 
 
@@ -39,8 +43,34 @@ def released(rival=None, carried=(), **costs):
 
 
 def test_ties_weigh_by_half_their_difference_in_2_log_l():
-    found = weights([tied(vane_arm=20.0, vane_lag=18.0), tied(gyro_lag=9.0)])
-    assert found == pytest.approx({("gyro_lag", "vane_arm"): 1.0, ("gyro_lag", "vane_lag"): math.exp(-1.0)})
+    found = weights([tied(vane_arm=60.0, vane_lag=58.0), tied(gyro_lag=40.0)])
+    assert found == pytest.approx(
+        {
+            ("gyro_lag", "vane_arm"): 1.0,
+            ("gyro_lag", "vane_lag"): math.exp(-1.0),
+            ("vane_arm",): math.exp(5.0 - 20.0),
+            ("gyro_lag",): math.exp(5.0 - 30.0),
+        },
+        rel=1e-12,
+        abs=0.0,
+    )
+
+
+def test_an_effect_of_little_evidence_may_be_absent():
+    """Prior odds of 3 and Occam's factor of 2 in log L stand against half the square of a size of four standard deviations; the gain
+    of 30 in 2 log L of its own round says no more."""
+    found = weights([tied(vane_arm=60.0), tied(gyro_lag=30.0, z=4.0)])
+    assert found[("vane_arm",)] == pytest.approx(math.exp(5.0 - 8.0))
+    assert () not in weights([tied(gyro_lag=30.0, z=4.0)])
+
+
+def test_beside_an_effect_the_declared_derivatives_may_be_right():
+    """The null costs 12 against 5 for the best explanation, whose cost contains one for its parameter."""
+    one = released(inertia_error=5.0)
+    one.null.cost = 12.0
+    found = weights([tied(gyro_lag=40.0), one])
+    assert found[("gyro_lag", "inertia_error")] == pytest.approx(1.0)
+    assert found[("gyro_lag",)] == pytest.approx(math.exp(4.0 - 7.0))
 
 
 def test_explanations_weigh_by_their_cost():

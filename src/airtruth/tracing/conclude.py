@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -44,10 +44,9 @@ from airtruth.tracing.inference.hypothesis import unconstrained_by
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.profile import Profile, location_index
 from airtruth.tracing.inference.robust import robust_covariance
-from airtruth.tracing.model.compile import CHANNELS
-from airtruth.tracing.model.parameters import COLOUR_TIME_S, Common
+from airtruth.tracing.model.parameters import Common
+from airtruth.tracing.notes import notes
 from airtruth.tracing.prepare import Case
-from airtruth.tracing.replay import disagreement
 from airtruth.tracing.selection.acceptance import Candidate
 from airtruth.tracing.selection.omnibus import Anomaly, advice
 from airtruth.tracing.selection.release import CONTRADICTED
@@ -60,9 +59,6 @@ from airtruth.tracing.tolerances import tolerances
 
 Array = NDArray[np.float64]
 
-_WORTH_A_NOTE: Final = 0.02
-"""Share of slow noise in a sensor's variance from which a note mentions it [-] (judgement: a smaller share
-is of no use to a reader)."""
 _TRACEABLE: Final = 4.0
 """Root of the noncentrality from which an effect counts as traceable [-] (judgement: after Holm's correction at 5 %
 over 33 candidates such an effect is significant in four of five flights, as norm.cdf(4 - norm.isf(0.05/66)) = 0.80)."""
@@ -102,18 +98,6 @@ def conclude(
     verdict = _verdict(stated, declared)
     confirmed = confirmation(stages)
     errors = stage_errors(stages)
-    notes = [*case.notes, *_slow_noise(last.null.point.common)]
-    if case.left_out:
-        notes.append(
-            "the time budget ended the search, which is provisional for it; left out: "
-            + "; ".join(case.left_out)
-        )
-    if replay is not None:
-        notes += disagreement(replay, errors)
-    if forced:
-        notes.append(
-            "the logs contradict physics and were traced all the same (--force): " + "; ".join(forced)
-        )
     return TraceAnswer(
         verdict=verdict,
         provisional=case.held is None
@@ -134,7 +118,7 @@ def conclude(
             tuple(r.signals.run_id for r in case.fitted.records),
             tuple(r.signals.run_id for r in case.held.records) if case.held else (),
         ),
-        notes=tuple(notes),
+        notes=tuple(notes(stages, last, errors, replay, forced)),
         tolerances=tolerances(stages),
         replay=replay,
         forced=tuple(forced),
@@ -156,21 +140,6 @@ def _verdict(effects: Sequence[AcceptedEffect], declared: DeclaredModel) -> Verd
 
 def _evidence(anomaly: Anomaly) -> Evidence:
     return Evidence(anomaly.statistic, anomaly.p_value, anomaly.where)
-
-
-def _slow_noise(common: Array) -> Iterator[str]:
-    shares = {
-        channel: float(share) for channel, share in zip(CHANNELS, common[Common.colour_shares], strict=True)
-    }
-    named = [
-        f"{100.0 * share:.0f} % of {channel}" for channel, share in shares.items() if share > _WORTH_A_NOTE
-    ]
-    if named:
-        time_s = COLOUR_TIME_S * math.exp(common[Common.log_colour_time])
-        yield (
-            f"part of the sensor noise is slow: of the noise variance, {', '.join(named)} is correlated over "
-            f"{time_s:.2g} s"
-        )
 
 
 def estimates(effect: Effect, sizes: Array, covariance: Array) -> dict[str, ParameterEstimate]:

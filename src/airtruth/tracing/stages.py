@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.tracing.inference.assess import Assessment, assess, fitted_noise_floor
+from airtruth.tracing.inference.feedback import responds_to_motion
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.compile import CHANNELS, compile_change
@@ -65,6 +66,14 @@ class Stages:
     def reported(self) -> tuple[TraceProblem, dict[str, list[Assessment]]]:
         """Records that a report shows, held-out ones where there are any, and their assessments."""
         return (self.case.held, self.held) if self.case.held is not None else (self.case.fitted, self.fitted)
+
+
+def in_closed_loop(stages: Stages) -> bool:
+    """Whether the elevator of the records that a report shows responds to the motion."""
+    problem, assessed = stages.reported
+    return responds_to_motion(
+        [r.signals.sampled_elevator_rad for r in problem.records], [a.whitened for a in assessed["before"]]
+    )
 
 
 def accepted(rounds: Sequence[SearchRound]) -> list[tuple[Candidate, tuple[Candidate, ...]]]:

@@ -25,7 +25,7 @@ _STEP: Final = 0.05
 _MOST_STEPS: Final = 0.5
 """Largest share of cells in which the implied command changes [-] (judgement): a step makes two changes, and in a held
 command a cell without a step separates it from the next one."""
-_BEYOND: Final = 8.0
+_BEYOND: Final = 5.5
 """Change of the implied command over its median from which it is a step [-] (judgement: far in the tail of what a damper
 commands from gusts and noise)."""
 
@@ -84,10 +84,12 @@ def with_steps(
     """
     command = _implied(elevator_rad, dt_s, tau_s)
     changes = np.abs(_across(command))
-    steps = changes > max(_STEP * float(np.ptp(command)), _BEYOND * float(np.median(changes)))
+    near = changes > max(_STEP * float(np.ptp(command)), _BEYOND * float(np.median(changes)))
+    before, after = _neighbours(changes)
+    steps = near & (changes >= before) & (changes > after)
     path = _exponentials(elevator_rad, command, steps, dt_s, tau_s, cells)
-    found = np.where(steps[:, None], path, smoothed_rad[:-1].reshape(-1, cells))
-    return np.append(found.ravel(), elevator_rad[-1]), steps
+    made = np.where(near[:, None], path, smoothed_rad[:-1].reshape(-1, cells))
+    return np.append(made.ravel(), elevator_rad[-1]), near
 
 
 def _implied(elevator_rad: Array, dt_s: float, tau_s: float) -> Array:

@@ -85,6 +85,11 @@ class Signals:
     lead: Signals | None = None
 
     @property
+    def sampled_elevator_rad(self) -> Array:
+        """(samples,) elevator at the samples [rad]."""
+        return self.elevator_rad[:: self.sub * FINE]
+
+    @property
     def with_lead(self) -> Signals:
         """The part of a run and what comes before it, as one."""
         if self.lead is None:

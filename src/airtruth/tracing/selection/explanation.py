@@ -42,7 +42,7 @@ _LOG_SAME_EVENT: Final = -1.0
 _LOG_WRONG: Final = -1.0
 """Logarithm of the prior odds of wrong declarations, and of each derivative that they concern [-] (judgement: they are
 the most frequent cause)."""
-_REFERENCE: Final = 4.0
+REFERENCE: Final = 4.0
 """Log-evidence that a single cause of usual size costs beyond one for its parameter [-]: prior odds of 3.0 and an Occam
 factor of 2.0; it makes sets comparable with the refit of an effect, whose size has no prior."""
 _CERTAIN_SHAPE: Final = 0.02
@@ -269,7 +269,7 @@ def _sets_of(
             size_std=tuple(std[i].tolist()),
             covariance=covariance[i],
             cost=float(
-                likelihood.cost - gained[i] + occam[i] - in_range[i] - odds - (_REFERENCE if several else 0.0)
+                likelihood.cost - gained[i] + occam[i] - in_range[i] - odds - (REFERENCE if several else 0.0)
             ),
         )
 
@@ -307,6 +307,7 @@ __all__ = [
     "EXPLAINING",
     "LOADING",
     "MOST_CAUSES",
+    "REFERENCE",
     "WRONG_BY",
     "Cause",
     "CauseSet",

@@ -7,11 +7,14 @@ import math
 from collections.abc import Collection, Iterator, Sequence
 from typing import Final
 
+from airtruth.tracing.selection.explanation import REFERENCE
 from airtruth.tracing.selection.ranking import TIE
 from airtruth.tracing.selection.rounds import Rival, SearchRound
 
 _MOST_SETS: Final = 400
 """Number of sets that explain the derivatives and enter the weights [-] (judgement: the others weigh nothing)."""
+_LEAST_STD: Final = 1e-12
+"""Least standard deviation of a size [-]: that of a size at the end of its range is zero."""
 _LEAST_LOG: Final = -700.0
 """Least logarithm of a weight [-]: smaller ones underflow."""
 
@@ -20,7 +23,8 @@ def weights(rounds: Sequence[SearchRound]) -> dict[tuple[str, ...], float]:
     """Names of each set -> its weight beside the set that the search accepted.
 
     The sets combine the tied effects of every round with the sets that explain the derivatives, and contain those of the
-    branches that lost.
+    branches that lost, and those without one of the accepted effects. An effect is accepted by a test, so that no set is
+    empty for want of the only one.
     """
     found: dict[tuple[str, ...], float] = {}
 
@@ -36,6 +40,10 @@ def weights(rounds: Sequence[SearchRound]) -> dict[tuple[str, ...], float]:
         for explaining, log_weight in _explanations(rounds):
             every = [*(name for name, _ in added), *explaining, *carried]
             add(every, log_weight + sum(gain for _, gain in added))
+    for rest, lost in _without_one(rounds):
+        for explaining, log_weight in _explanations(rounds):
+            if rest or explaining or carried:
+                add([*rest, *explaining, *carried], log_weight + lost)
     for r in rounds:
         for names, log_weight in () if r.rival is None else r.rival.sets.items():
             add(names, log_weight)
@@ -47,6 +55,21 @@ def _carried(rounds: Sequence[SearchRound]) -> set[str]:
     last = rounds[-1].null.hypothesis
     leaders = {r.tied[0].score.effect.name for r in rounds if r.tied}
     return set() if last.spread is None else {e.name for e in last.effects} - leaders
+
+
+def _without_one(rounds: Sequence[SearchRound]) -> Iterator[tuple[list[str], float]]:
+    """The accepted effects without each one of them, and the logarithm of the weight of that set.
+
+    What is lost is the smaller of its gain when it was accepted and of A. Wald's statistic of its size at the end (Trans. Am.
+    Math. Soc. 54 (1943) 426-482).
+    """
+    last = rounds[-1].null
+    leaders = [r.tied[0] for r in rounds if r.tied]
+    for leader in leaders:
+        at = last.hypothesis.span(leader.score.effect.key).start
+        wald = (float(last.point.sizes[at]) / max(last.size_std(at), _LEAST_STD)) ** 2
+        others = [c.score.effect.name for c in leaders if c is not leader]
+        yield others, REFERENCE + 1.0 - 0.5 * min(leader.gain, wald)
 
 
 def rival_of(lost: Sequence[SearchRound], excess: float) -> Rival:
@@ -77,13 +100,19 @@ def alike_in_rivals(rounds: Sequence[SearchRound], key: str, accepted: Collectio
 
 
 def _explanations(rounds: Sequence[SearchRound]) -> Iterator[tuple[tuple[str, ...], float]]:
-    """Sets that explain released derivatives, each with the logarithm of its weight."""
-    release = next((r.release for r in reversed(rounds) if r.release is not None), None)
-    if release is None:
+    """Sets that explain released derivatives, each with the logarithm of its weight.
+
+    Beside accepted effects one more set is that of these alone: the declared derivatives are right.
+    """
+    released = next((r for r in reversed(rounds) if r.release is not None), None)
+    if released is None or released.release is None:
         yield (), 0.0
         return
+    release, null = released.release, released.null
     for s in release.sets[:_MOST_SETS]:
         yield s.effects, release.cost - s.cost
+    if null.hypothesis.spread is None and any(r.tied for r in rounds):
+        yield (), release.cost - null.cost + REFERENCE
 
 
 __all__ = ["alike_in_rivals", "rival_of", "weights"]

@@ -1,0 +1,72 @@
+"""Notes of an answer: what a reader has to know of the logs, the search and the report besides the effects."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.tracing.model.compile import CHANNELS
+from airtruth.tracing.model.parameters import COLOUR_TIME_S, Common
+from airtruth.tracing.replay import disagreement
+from airtruth.tracing.selection.rounds import SearchRound
+from airtruth.tracing.stage_errors import Errors, Replay
+from airtruth.tracing.stages import Stages, in_closed_loop
+
+Array = NDArray[np.float64]
+
+_WORTH_A_NOTE: Final = 0.02
+"""Share of slow noise in a sensor's variance from which a note mentions it [-] (judgement: a smaller share
+is of no use to a reader)."""
+_IN_LOOP: Final = (
+    "the elevator responds to the motion (a damper, an autopilot or a pilot): gusts move it too, so that the free run of a "
+    "false model may come closer than that of the true one; the innovations remain a valid test"
+)
+"""Note of a trace in closed loop."""
+
+
+def notes(
+    stages: Stages, last: SearchRound, errors: Errors, replay: Replay | None, forced: Sequence[str]
+) -> Iterator[str]:
+    """Each note, in words.
+
+    Parameters
+    ----------
+    stages, last : assessed stages, and the last round of the search.
+    errors : errors of every stage; replay : records flown again in JSBSim, None where nothing was flown again.
+    forced : faults of the logs that the caller overruled.
+    """
+    yield from stages.case.notes
+    yield from _slow_noise(last.null.point.common)
+    if in_closed_loop(stages):
+        yield _IN_LOOP
+    if stages.case.left_out:
+        yield (
+            "the time budget ended the search, which is provisional for it; left out: "
+            + "; ".join(stages.case.left_out)
+        )
+    if replay is not None:
+        yield from disagreement(replay, errors)
+    if forced:
+        yield "the logs contradict physics and were traced all the same (--force): " + "; ".join(forced)
+
+
+def _slow_noise(common: Array) -> Iterator[str]:
+    shares = {
+        channel: float(share) for channel, share in zip(CHANNELS, common[Common.colour_shares], strict=True)
+    }
+    named = [
+        f"{100.0 * share:.0f} % of {channel}" for channel, share in shares.items() if share > _WORTH_A_NOTE
+    ]
+    if named:
+        time_s = COLOUR_TIME_S * math.exp(common[Common.log_colour_time])
+        yield (
+            f"part of the sensor noise is slow: of the noise variance, {', '.join(named)} is correlated over "
+            f"{time_s:.2g} s"
+        )
+
+
+__all__ = ["notes"]
