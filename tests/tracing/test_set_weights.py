@@ -57,8 +57,10 @@ def test_ties_weigh_by_half_their_difference_in_2_log_l():
 
 
 def test_an_effect_of_little_evidence_may_be_absent():
-    """Prior odds of 3 and Occam's factor of 2 in log L stand against half the square of a size of four standard deviations; the gain
-    of 30 in 2 log L of its own round says no more."""
+    """Prior odds of 3 and Occam's factor of 2 in log L stand against half the square of a size of four standard deviations.
+
+    The gain of 30 in 2 log L of its own round says no more.
+    """
     found = weights([tied(vane_arm=60.0), tied(gyro_lag=30.0, z=4.0)])
     assert found[("vane_arm",)] == pytest.approx(math.exp(5.0 - 8.0))
     assert () not in weights([tied(gyro_lag=30.0, z=4.0)])
