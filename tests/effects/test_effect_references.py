@@ -275,3 +275,20 @@ def test_state_of_any_name_and_signal_can_be_read(gtm, paper_condition, plain, t
         lambda alpha: (start.elevator_rad,),
     )
     compare(plain[0], flown, plain[1], reference, 0.005)
+
+
+def test_hysteresis_of_the_moment_against_an_independent_integration(gtm, paper_condition, plain, tmp_path):
+    """Cm += 0.5 x, x the play of the angle of attack with a half width of 5 mrad, by its definition."""
+    half, amplitude = 5e-3, 0.5
+    state = StateTerm("hysteresis", "play", "alpha", half_width=half)
+    change = Change(states=(state,), aero=(AeroTerm("Cm", state.name, "linear", amplitude),))
+    start, flown = flights.fly(flights.changed(gtm, change, tmp_path), paper_condition)
+    x = [start.alpha_rad]
+
+    def moment(signals, _):
+        x[0] = min(max(x[0], signals["alpha"] - half), signals["alpha"] + half)
+        return 0.0, amplitude * x[0]
+
+    reference = flights.integrate(start, flown["elevator_rad"], HZ, moment)
+    assert np.ptp(flown["alpha_rad"]) > 4.0 * half
+    compare(plain[0], flown, plain[1], reference, 0.02)

@@ -83,3 +83,11 @@ def test_a_lag_that_depends_on_the_dynamic_pressure_is_what_a_state_is_behind_it
 
 def test_sensors_without_terms_read_nothing_else():
     assert reading_increments((), (), {}, 0.3, DT) == {}
+
+
+def test_a_play_rests_until_its_signal_has_moved_by_half_a_width():
+    """By hand: up by 0.3 with a half width of 0.1 moves it by 0.2; the way back takes 0.2 before it moves again."""
+    signal = np.array([[0.0, 0.05, 0.3, 0.2, 0.1, -0.1, -0.05]])
+    expected = [[0.0, 0.0, 0.2, 0.2, 0.2, 0.0, 0.0]]
+    found = state_of(StateTerm("x", "play", "alpha", half_width=0.1), signal, DT)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-15)

@@ -173,3 +173,22 @@ def test_a_scale_that_a_damped_aircraft_hides_is_named_alone(number, named, fact
     assert (effect["name"], answer["provisional"]) == (named, False)
     low, high = effect["parameters"]["factor"]["ci95"]
     assert low < factor < high
+
+
+@pytest.mark.parametrize(
+    ("number", "variant", "half_width_rad"),
+    [
+        (5, "Cm over a play of alpha_rad", (0.013, 0.021)),
+        (8, "alpha_rad over a play of alpha_rad", (0.0002, 0.0006)),
+    ],
+)
+def test_hysteresis_is_learned_as_a_play(number, variant, half_width_rad, tmp_path):
+    """Hysteresis of Cm, and friction of the vane, 0.48 mrad wide; lambda beyond the library 680 and 123.
+
+    Without plays among the shapes the first left an anomaly of 2e-56, and the second was called a late vane, provisionally.
+    """
+    answer = answered(20261217, number, "off-library", tmp_path)
+    assert answer["verdict"] == "learned"
+    learned = next(e for e in answer["effects"] if e["variant"] == variant)
+    (state,) = learned["states"]
+    assert half_width_rad[0] < state["half_width"] < half_width_rad[1]

@@ -17,7 +17,7 @@ from airtruth.effects.increment import Shape, increment
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import AeroTerm, Change, shape_of, term_value
 from airtruth.tracing import TraceOptions, trace
-from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable
+from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable, ParameterEstimate
 from airtruth.tracing.effect_module import MODULE, effect_module
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
@@ -131,6 +131,27 @@ def test_the_written_module_of_a_reading_changes_the_sensor():
     (term,) = effect.change({"slope": -0.4, "at": 0.1}).readings
     assert effect.where == "sensor"
     assert (term.channel, term.signal, term.shape, term.amplitude) == ("alpha_rad", "alpha", "above", -0.4)
+
+
+def test_hysteresis_has_its_module_its_words_and_its_file():
+    state = IncrementState("play", "alpha_rad", 0.0, half_width=0.02)
+    share = {"share": ParameterEstimate(-0.6, 0.01, (-0.62, -0.58))}
+    effect = AcceptedEffect(
+        "increment",
+        share,
+        0.0,
+        1.0,
+        variant="Cm over a play of alpha_rad",
+        acts_on="Cm",
+        over="alpha_rad",
+        states=(state,),
+    )
+    (written,) = executed(effect_module(Answer(effect)))
+    (play,) = written.change({"share": -0.6}).states
+    assert (play.kind, play.signal, play.half_width) == ("play", "alpha", 0.02)
+    assert "through a play of half width 0.020" in increment_words(effect)
+    stored = TypeAdapter(AcceptedEffect)
+    assert stored.validate_json(json.dumps(effect.to_dict())) == effect
 
 
 def of_a_derivative(value):

@@ -9,7 +9,7 @@ import trace_records as tr
 from scipy.linalg import block_diag
 
 from airtruth.effects.registry import EFFECTS
-from airtruth.physics.terms import AeroTerm, Change, SensorTerm, StateTerm, SurfaceTerm
+from airtruth.physics.terms import AeroTerm, Change, ReadingTerm, SensorTerm, StateTerm, SurfaceTerm
 from airtruth.tracing.inference.optimise import initial_parameters
 from airtruth.tracing.model.linearise import gain
 from airtruth.tracing.model.parameters import Common, PerRecord
@@ -97,6 +97,51 @@ def test_two_states_do_not_take_each_other_s_place():
     second = lag.change({"dCLalpha": 1.0, "tau_s": 0.2})
     np.testing.assert_allclose(tr.free(first + second), tr.free(second + first), rtol=0.0, atol=1e-14)
     assert np.abs(tr.free(first + second) - tr.free(first)).max() > 1e-9
+
+
+def play_of(alpha_rad, half_width_rad):
+    """The play's definition, sample by sample."""
+    x = [alpha_rad[0]]
+    for s in alpha_rad[1:]:
+        x.append(min(max(x[-1], s - half_width_rad), s + half_width_rad))
+    return np.array(x)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.3])
+def test_friction_of_the_vane_is_a_play_of_the_angle_of_attack(share):
+    """The motion does not feel the vane, so that its reading is the play of the reading without friction."""
+    plain = tr.free()
+    swing = np.ptp(plain[:, 0])
+    state = StateTerm("own", "play", "alpha", half_width=share * swing)
+    pieces = (
+        ReadingTerm("alpha_rad", "own", "linear", 1.0),
+        ReadingTerm("alpha_rad", "alpha", "linear", -1.0),
+    )
+    rubbing = tr.free(Change(states=(state,), readings=pieces))
+    np.testing.assert_allclose(rubbing[:, 1:], plain[:, 1:], rtol=0.0, atol=1e-14 * swing)
+    # it turns between samples, and the play of the samples turns at one of them
+    expected = play_of(plain[:, 0], share * swing)
+    np.testing.assert_allclose(rubbing[:, 0], expected, rtol=0.0, atol=0.01 * swing)
+
+
+def test_a_play_without_a_width_is_its_signal():
+    """It moves once in a step of integration, so that its error falls with the step."""
+    amplitude, plain = 0.3, tr.free(sub=16)
+    terms = (AeroTerm("Cm", "own", "linear", amplitude), AeroTerm("Cm", "alpha", "linear", -amplitude))
+    none = Change(states=(StateTerm("own", "play", "alpha", half_width=1e-15),), aero=terms)
+    errors = [np.abs(tr.free(none, sub=sub) - plain)[:, 1].max() for sub in (2, 4, 8)]
+    assert errors[0] < 0.05 * np.abs(plain[:, 1]).max()
+    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.2)
+    assert errors[1] / errors[2] == pytest.approx(2.0, rel=0.2)
+
+
+def test_a_play_wider_than_the_motion_rests_at_the_start():
+    amplitude = 0.3
+    terms = (AeroTerm("Cm", "own", "linear", amplitude), AeroTerm("Cm", "alpha", "linear", -amplitude))
+    wide = tr.free(Change(states=(StateTerm("own", "play", "alpha", half_width=1.0),), aero=terms))
+    trim = tr.record(np.zeros((len(tr.T), 3)), np.zeros_like).plant.trim_alpha_rad
+    start = AeroTerm("Cm", "alpha", "linear", -amplitude, at=trim)
+    np.testing.assert_allclose(wide, tr.free(Change(aero=(start,))), rtol=0.0, atol=1e-12)
 
 
 # -- sensors of a known motion

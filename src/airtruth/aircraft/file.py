@@ -112,7 +112,7 @@ class Dynamics(Strict):
     """Dynamics of the JSBSim model that its forces in a steady state do not show; a trace adds them to its filter.
 
     `airtruth trace` writes them into an updated aircraft. surface: terms between the measured surface and the air, in
-    sequence; states: lags and modes; aero: increments of CL and Cm whose signal is alpha_dot c/(2V) or a state; readings:
+    sequence; states: lags, modes and plays; aero: increments of CL and Cm whose signal is alpha_dot c/(2V) or a state; readings:
     increments of what the sensors read, which campaigns fly as well.
     """
 
@@ -124,7 +124,12 @@ class Dynamics(Strict):
     @model_validator(mode="after")
     def _positive(self) -> Dynamics:
         values = [(f"surface {t.kind}: value", t.value) for t in self.surface]
-        values += [(f"state {t.name}: time_s", t.time_s) for t in self.states]
+        values += [
+            (f"state {t.name}: half_width", t.half_width)
+            if t.kind == "play"
+            else (f"state {t.name}: time_s", t.time_s)
+            for t in self.states
+        ]
         for name, value in values:
             if value <= 0.0:
                 raise ValueError(f"{name} has to be above 0 (is {value:g})")
@@ -135,7 +140,10 @@ class Dynamics(Strict):
         states = tuple(s.name for s in self.states)
         measured = tuple(s.name for s in self.states if s.signal in terms.MEASURED)
         named: list[tuple[str, str, tuple[str, ...]]]
-        named = [(f"state {s.name}: signal", s.signal, terms.DRIVERS) for s in self.states]
+        named = [
+            (f"state {s.name}: signal", s.signal, terms.FACTORS if s.kind == "play" else terms.DRIVERS)
+            for s in self.states
+        ]
         for t in self.aero:
             named.append((f"aero {t.coefficient}: signal", t.signal, (*terms.SIGNALS, *states)))
             named.append((f"aero {t.coefficient}: factor", t.factor, ("", *terms.FACTORS)))

@@ -1,4 +1,4 @@
-"""Short closed forms of a learned increment: a break, a step, a curve, or a part behind a lag or a mode.
+"""Short closed forms of a learned increment: a break, a step, a curve, or a part behind a state.
 
 A form is as good as the table if its weighted residual is no larger than the band allows: chi-square over the points
 that have samples, the standard deviations those of the band.

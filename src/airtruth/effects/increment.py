@@ -3,9 +3,9 @@ without.
 
     dC = sum_k b_k/w h_k(s) [(p - p0)]  [+ a (x - s)],   h_k = max(0, s - s_k) above the trim, min(0, s - s_k) below it
 
-s is the signal, or the state x of a first-order lag or of a mode that the signal drives; w is the width of a cell. With a
-factor p, which counts from p0, the function is an increment of the derivative of p. With the factor x - p, x the lag of p
-with the time constant tau, it is the change of a lag's time constant over tau, small against one. The
+s is the signal, or the state x of a first-order lag, of a mode or of a play that the signal drives; w is the width of a
+cell. With a factor p, which counts from p0, the function is an increment of the derivative of p. With the factor x - p, x
+the lag of p with the time constant tau, it is the change of a lag's time constant over tau, small against one. The
 function is zero in the cell that holds the trim, where the derivatives describe the aircraft, and constant outside the
 range in which it was learned. The bends b_k have independent normal priors, which is the prior of an integrated random
 walk: a penalised linear spline.
@@ -58,8 +58,8 @@ _DERIVATIVE: Final[Mapping[str, float]] = {"": 1.0, "alpha": 7.0, "elevator": 7.
 Cmq of 60)."""
 _ACTS: Final = {"CL": "lift", "Cm": "pitching moment"}
 """Coefficient in words."""
-_TIME_REACH: Final = 3.0
-"""Largest ratio by which a refit may lengthen or shorten a time constant [-] (judgement: the grid's steps are smaller)."""
+_REACH_OF_MEMORY: Final = 3.0
+"""Largest ratio by which a refit may change a time constant or a half width [-] (judgement: the grid's steps are smaller)."""
 
 
 @dataclass(frozen=True)
@@ -68,14 +68,23 @@ class Memory:
 
     Attributes
     ----------
-    kind : "lag" or "mode".
+    kind : "lag", "mode" or "play".
     time_s : time constant of the lag, 1/wn of the mode [s].
     damping : damping ratio of the mode [-].
+    half_width : of the play [unit of the signal].
     """
 
-    kind: Literal["lag", "mode"]
-    time_s: float
+    kind: Literal["lag", "mode", "play"]
+    time_s: float = 0.0
     damping: float = 0.0
+    half_width: float = 0.0
+
+    @property
+    def values(self) -> dict[str, float]:
+        """What a refit estimates of it, by name."""
+        if self.kind == "play":
+            return {"half_width": self.half_width}
+        return {"time_s": self.time_s} | ({"damping": self.damping} if self.kind == "mode" else {})
 
 
 class Piece(NamedTuple):
@@ -160,9 +169,8 @@ class Shape:
         if self.factor:
             lag = StateTerm(self.state, self.memory.kind, self.factor, self.memory.time_s)
             return self._change(self._bends(values, self.signal), lag)
-        state = StateTerm(
-            self.state, self.memory.kind, self.signal, values["time_s"], values.get("damping", 0.0)
-        )
+        estimated = {name: values[name] for name in self.memory.values}
+        state = StateTerm(self.state, self.memory.kind, self.signal, **estimated)
         if self.cells:
             return self._change(self._bends(values, state.name), state)
         share = values["share"]
@@ -260,13 +268,13 @@ def increment(shape: Shape, prior_std: float = math.inf) -> Increment:
     reach, step = scale * _REACH[shape.acts_on], scale * _STEP[shape.acts_on]
     if size:
         rate = _QHAT if shape.of_reading and shape.signal == "qhat" else 1.0
-        reach, step = 10.0 * rate * reach, 100.0 * rate * step
+        reach, step = 20.0 * rate * reach, 100.0 * rate * step
     meaning = "part that acts through the state [1/unit of the signal]" if size else "bend over one cell"
     parameters = [
         Parameter(name, "-", meaning, -reach, reach, 0.0, step=step, prior_std=prior_std) for name in names
     ]
     if shape.memory is not None and not shape.factor:
-        parameters += _times(shape.memory)
+        parameters += [_of_memory(name, value, shape.memory) for name, value in shape.memory.values.items()]
     acts = _ACTS.get(shape.acts_on, f"reading of {shape.acts_on}")
     return Increment(
         name=NAME,
@@ -281,13 +289,15 @@ def increment(shape: Shape, prior_std: float = math.inf) -> Increment:
     )
 
 
-def _times(memory: Memory) -> list[Parameter]:
-    low, high = memory.time_s / _TIME_REACH, memory.time_s * _TIME_REACH
+def _of_memory(name: str, value: float, memory: Memory) -> Parameter:
+    """What a refit estimates of a memory: a time constant, a damping ratio or a half width."""
+    if name == "damping":
+        return Parameter(name, "-", "damping ratio", 0.01, 0.7, 0.0, is_location=True, step=0.5)
+    low, high = value / _REACH_OF_MEMORY, value * _REACH_OF_MEMORY
+    if name == "half_width":
+        return Parameter(name, "-", "half width of the play", low, high, 0.0, is_location=True, step=value)
     meaning = "time constant" if memory.kind == "lag" else "inverse of the natural frequency in rad/s"
-    times = [Parameter("time_s", "s", meaning, low, high, 0.0, is_location=True, step=memory.time_s)]
-    if memory.kind == "mode":
-        times.append(Parameter("damping", "-", "damping ratio", 0.01, 0.7, 0.0, is_location=True, step=0.5))
-    return times
+    return Parameter(name, "s", meaning, low, high, 0.0, is_location=True, step=value)
 
 
 __all__ = ["NAME", "SIGNAL_NAMES", "Increment", "Memory", "Shape", "increment"]

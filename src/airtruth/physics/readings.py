@@ -14,11 +14,13 @@ Array = NDArray[np.float64]
 
 
 def state_of(term: StateTerm, signal: Array, dt_s: float) -> Array:
-    """A lag or a mode of a signal (runs, samples), from equilibrium, exact for a signal linear between samples.
+    """A lag, a mode or a play of a signal (runs, samples), from equilibrium, exact for a signal linear between samples.
 
-    Source: G. F. Franklin, J. D. Powell and M. Workman, Digital Control of Dynamic Systems, 3rd ed., 1998, 6.3.2
-    (triangle hold).
+    Sources: G. F. Franklin, J. D. Powell and M. Workman, Digital Control of Dynamic Systems, 3rd ed., 1998, 6.3.2
+    (triangle hold); play, A. Visintin, Differential Models of Hysteresis, 1994, section III.2.
     """
+    if term.kind == "play":
+        return _played(signal, term.half_width)
     from scipy.signal import (
         cont2discrete,
         lfilter,
@@ -31,6 +33,14 @@ def state_of(term: StateTerm, signal: Array, dt_s: float) -> Array:
     b = b.ravel()
     start = lfilter_zi(b, a)[None, :] * signal[:, :1]
     return np.asarray(lfilter(b, a, signal, axis=1, zi=start)[0])
+
+
+def _played(signal: Array, half_width: float) -> Array:
+    out = np.empty_like(signal)
+    out[:, 0] = signal[:, 0]
+    for k in range(1, signal.shape[1]):
+        out[:, k] = np.clip(out[:, k - 1], signal[:, k] - half_width, signal[:, k] + half_width)
+    return out
 
 
 def reading_increments(

@@ -37,7 +37,7 @@ FORMULAS: Final[Mapping[str, str]] = {
     "below": "min(0, s - at)",
 }
 """The same functions as text, s the signal."""
-STATE_KINDS: Final = ("lag", "mode")
+STATE_KINDS: Final = ("lag", "mode", "play")
 """Kinds of a `StateTerm`; their order numbers them for compiled code."""
 Quantity = Literal["mass", "inertia", "elevator", "cg", "thrust_arm"]
 """Quantities that an aircraft declares and an effect may change."""
@@ -82,17 +82,20 @@ class StateTerm:
     Attributes
     ----------
     name : of the state.
-    kind : "lag": tau x' = s - x; "mode": x'' + 2 zeta wn x' + wn^2 x = wn^2 s. Both start in equilibrium.
-    signal : one of `DRIVERS`.
-    time_s : tau of a lag [s]; 1/wn of a mode [s].
+    kind : "lag": tau x' = s - x; "mode": x'' + 2 zeta wn x' + wn^2 x = wn^2 s; "play": x rests until |s - x| reaches a half
+        width and then follows s at that distance: hysteresis, or friction. All start in equilibrium, x = s.
+    signal : one of `DRIVERS`; of a play one of `FACTORS`.
+    time_s : tau of a lag [s]; 1/wn of a mode [s]; 0 of a play.
     damping : zeta of a mode [-].
+    half_width : of a play [unit of the signal].
     """
 
     name: str
-    kind: Literal["lag", "mode"]
+    kind: Literal["lag", "mode", "play"]
     signal: str
-    time_s: float
+    time_s: float = 0.0
     damping: float = 0.0
+    half_width: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -45,15 +45,17 @@ class IncrementState:
 
     Attributes
     ----------
-    kind : "lag" or "mode"; signal : what drives it.
-    time_s : time constant, or 1/wn of a mode [s].
+    kind : "lag", "mode" or "play"; signal : what drives it.
+    time_s : time constant, or 1/wn of a mode [s]; 0 of a play.
     damping : damping ratio of a mode [-].
+    half_width : of a play [unit of the signal].
     """
 
-    kind: Literal["lag", "mode"]
+    kind: Literal["lag", "mode", "play"]
     signal: str
     time_s: float
     damping: float = 0.0
+    half_width: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -96,7 +96,7 @@ class Compensation:
 
     Attributes
     ----------
-    aero, states : increments of the coefficients, and the lags and modes that they may take as signals.
+    aero, states : increments of the coefficients, and the states that they may take as signals.
     conditions : derivatives of the aircraft per flight condition; a record takes those of the nearest airspeed.
     from_trim : whether alpha counts from the record's own trim, as in a trace with the linear model.
     sensors, readings : errors of sensors, and increments of what they read.

@@ -118,7 +118,7 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
     by = by if factor else ""
     field, term = ("readings", "ReadingTerm") if e.acts_on in READINGS else ("aero", "AeroTerm")
     values = {name: p.value for name, p in e.parameters.items()} if form is None else form.values
-    sizes = {k: v for k, v in values.items() if k not in ("at", "width", "time_s", "damping")}
+    sizes = {k: v for k, v in values.items() if k not in ("at", "width", "time_s", "damping", "half_width")}
     if form is not None:
         terms = _TERMS[form.name].format(term=term, c=e.acts_on, s=signal, driver=driver, trim=trim, by=by)
         sentence = (
@@ -132,8 +132,10 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
         terms = _of_table(f'{term}("{e.acts_on}"', e.table, signal, by)
         sizes, values = {"factor": 1.0}, {"factor": 1.0}
         sentence = "No closed form is as good as the learned table, so the effect scales the table."
-    state = [(s.kind, s.time_s, s.damping) for s in e.states]
-    states = "".join(f'StateTerm("learned-state", "{k}", "{driver}", {t!r}, {d!r}),' for k, t, d in state)
+    states = "".join(
+        f'StateTerm("learned-state", "{s.kind}", "{driver}", {s.time_s!r}, {s.damping!r}, {s.half_width!r}),'
+        for s in e.states
+    )
     yield (
         f"def _terms_{number}(values):\n    return Change(\n        states=({states}),\n        {field}={terms},\n    )\n"
     )
@@ -145,7 +147,7 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
     yield (
         f"EFFECT_{number} = Effect(\n"
         f'    name="learned_{(e.acts_on or "").lower()}_{f"{factor}_" if factor else ""}{over}",\n'
-        f'    variant="{"-".join(k for k, _, _ in state)}",\n'
+        f'    variant="{"-".join(s.kind for s in e.states)}",\n'
         f'    where="{"sensor" if e.acts_on in READINGS else "dynamics"}",\n    parameters=(\n{lines}    ),\n'
         f"    describe=_terms_{number},\n"
         f'    explanation="Learned from flight logs: {e.variant}.",\n'

@@ -1,7 +1,7 @@
 """The response of the linear aircraft to increments of its coefficients.
 
 An effect adds known increments dCL(t), dCm(t) to the coefficients: functions of the measured angle of attack,
-elevator and pitch rate, or of lags and modes that these drive. The equations of motion are linear in the rest,
+elevator and pitch rate, or of states that these drive. The equations of motion are linear in the rest,
 so the motion is the sum of two: that of the linear aircraft under its elevator, and the response d of the same
 aircraft to the increments,
 

@@ -32,7 +32,7 @@ def in_physical_terms(
     shape = effect.shape
     values = {name: estimate.value for name, estimate in stated.parameters.items()}
     states = tuple(
-        IncrementState(s.kind, SIGNAL_NAMES[s.signal], s.time_s, s.damping)
+        IncrementState(s.kind, SIGNAL_NAMES[s.signal], s.time_s, s.damping, s.half_width)
         for s in shape.terms(values).states
     )
     return replace(

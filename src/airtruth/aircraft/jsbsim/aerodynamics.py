@@ -202,6 +202,12 @@ def _state(state: StateTerm, output: str, source: str) -> Element:
     if state.kind == "lag":
         later = lag(state.time_s, source, f"{output}-input-before", f"{output}-before")
         return function(output, f"Lag of {state.signal}, tau = {state.time_s!r} s", from_start(source, later))
+    if state.kind == "play":
+        half, words = state.half_width, f"Play of {state.signal}, half width {state.half_width!r}"
+        low, high = op("difference", source, half), op("sum", source, half)
+        return function(
+            output, words, from_start(source, op("max", low, op("min", high, f"{output}-before")))
+        )
     return function(
         output,
         f"Mode driven by {state.signal}, wn = {1.0 / state.time_s!r} rad/s, zeta = {state.damping!r}",
@@ -226,7 +232,8 @@ def _mode(state: StateTerm, output: str, source: str) -> Element:
 
 
 def _memory(state: StateTerm, output: str, source: str) -> Components:
-    held = [(f"{output}-input-before", source), (f"{output}-before", output)]
+    held = [] if state.kind == "play" else [(f"{output}-input-before", source)]
+    held.append((f"{output}-before", output))
     parts: list[Element] = []
     if state.kind == "mode":
         # at the first step what was two steps ago is the settled state, which the functions still hold

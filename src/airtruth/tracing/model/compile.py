@@ -133,7 +133,8 @@ def _effects(change: Change, first: Ints) -> EffectArrays:
             terms[i, 5] = _index(term.behind, tuple(names), "state")
     states = np.zeros((len(change.states), 2), dtype=np.int64)
     for i, state in enumerate(change.states):
-        states[i] = _index(state.kind, STATE_KINDS, "state"), _index(state.signal, DRIVERS, "signal")
+        allowed = FACTORS if state.kind == "play" else DRIVERS
+        states[i] = _index(state.kind, STATE_KINDS, "state"), _index(state.signal, allowed, "signal")
     return EffectArrays(
         term_index=terms,
         amplitude=np.array([t.amplitude for t in every], dtype=np.float64),
@@ -142,6 +143,7 @@ def _effects(change: Change, first: Ints) -> EffectArrays:
         state_index=states,
         time_s=np.array([s.time_s for s in change.states], dtype=np.float64),
         damping=np.array([s.damping for s in change.states], dtype=np.float64),
+        half_width=np.array([s.half_width for s in change.states], dtype=np.float64),
     )
 
 

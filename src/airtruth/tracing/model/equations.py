@@ -53,6 +53,11 @@ _LEAD_GAIN: Final = (0.58, 0.84, 1.39)
 """Gains at these corners [-]; fitted with them."""
 _READING: Final = 2
 """First number of a reading among what a term acts on, see `EffectArrays`."""
+_PLAY: Final = 2
+"""Number of the play in `airtruth.physics.terms.STATE_KINDS`."""
+_PLAY_S: Final = 0.05
+"""Time constant of the lag that takes the place of a play in the linearisation [s] (judgement: a play follows a motion that is
+large against its width at once)."""
 _ALPHA_DOT: Final = 3
 """Number of the signal alpha_dot_hat in `airtruth.physics.terms.SIGNALS`."""
 
@@ -176,7 +181,10 @@ def _terms(
 
 @inner
 def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
-    """x' of the motion, the gusts and the effects' states into ``out``; returns az at the CG [m/s2]."""
+    """x' of the motion, the gusts and the effects' states into ``out``; returns az at the CG [m/s2].
+
+    A play has no x': that of a lag in its place serves the linearisation, and `hold_plays` and `move_plays` replace it.
+    """
     aircraft, gusts = model.aircraft, model.gusts
     v, ground, qbar = at.airspeed_m_s, at.ground_m_s, at.qbar_pa
     upward = gust(x, gusts.rolloff)
@@ -231,12 +239,37 @@ def _effect_rates(x: Array, signals: Signals, model: FilterModel, out: Array) ->
     for k in range(effects.time_s.size):
         at = model.states.effect[k]
         s = _signal(signals, effects.state_index[k, 1])
-        if effects.state_index[k, 0] == 0:
+        if effects.state_index[k, 0] == _PLAY:
+            out[at] = (s - x[at]) / _PLAY_S
+        elif effects.state_index[k, 0] == 0:
             out[at] = (s - x[at]) / effects.time_s[k]
         else:
             wn = 1.0 / effects.time_s[k]
             out[at] = x[at + 1]
             out[at + 1] = wn * wn * (s - x[at]) - 2.0 * effects.damping[k] * wn * x[at + 1]
+
+
+@inner
+def hold_plays(x: Array, tried: Array, model: FilterModel) -> None:
+    """Put the states of plays in ``tried`` back to those of ``x``: they do not move within a step."""
+    effects = model.effects
+    for k in range(effects.time_s.size):
+        if effects.state_index[k, 0] == _PLAY:
+            tried[model.states.effect[k]] = x[model.states.effect[k]]
+
+
+@inner
+def move_plays(x: Array, at: AirPoint, model: FilterModel) -> None:
+    """Move the states of plays to no more than their half width from their signals."""
+    effects = model.effects
+    for k in range(effects.time_s.size):
+        if effects.state_index[k, 0] == _PLAY:
+            alpha = air_alpha(x, gust(x, model.gusts.rolloff), model.gusts.level_m_s, at)
+            surface = effective_elevator(at.elevator_rad, model.aircraft)
+            qhat = x[1] * 0.5 * model.aircraft.chord_m / at.airspeed_m_s
+            s = _signal(Signals(alpha, surface, qhat, 0.0, at.qbar_pa), effects.state_index[k, 1])
+            i, half = model.states.effect[k], effects.half_width[k]
+            x[i] = min(max(x[i], s - half), s + half)
 
 
 def settle_effects(x: Array, alpha_rad: float, elevator_rad: float, model: FilterModel) -> None:
@@ -314,7 +347,9 @@ __all__ = [
     "air_at",
     "effective_elevator",
     "gust",
+    "hold_plays",
     "lead_decay",
+    "move_plays",
     "outputs",
     "rates",
     "settle_effects",

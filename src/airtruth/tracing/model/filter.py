@@ -29,7 +29,9 @@ from airtruth.tracing.model.equations import (
     air_at,
     effective_elevator,
     gust,
+    hold_plays,
     lead_decay,
+    move_plays,
     outputs,
     rates,
     settle_effects,
@@ -155,6 +157,7 @@ def _advance_motion(
         at = air_at(grid, point + (0 if stage == 0 else (2 if stage == 3 else 1)))
         for m in range(motion):
             tried[m] = x[m] + (share * h * rate[stage - 1, m] if stage > 0 else 0.0)
+        hold_plays(x, tried, model)
         if stage > 0:
             j = 1 if stage == 3 else 0
             for i in range(LEAD_COUNT):
@@ -167,8 +170,10 @@ def _advance_motion(
     for m in range(motion):
         slope = rate[0, m] + 2.0 * rate[1, m] + 2.0 * rate[2, m] + rate[3, m]
         x[m] += h / 6.0 * slope
+    hold_plays(tried, x, model)
     for i in range(LEAD_COUNT):
         x[LEAD + i] = tried[LEAD + i]
+    move_plays(x, air_at(grid, point + 2), model)
 
 
 @inner

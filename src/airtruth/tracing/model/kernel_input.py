@@ -79,8 +79,8 @@ class EffectArrays(NamedTuple):
         state (-1 for a signal), signal of its factor (-1 for none), row of ``state_index`` that is behind its signal by
         another factor (-1 for none).
     amplitude, origin, factor_origin : (terms,) of each term.
-    state_index : (states, 2) kind (0 lag, 1 mode), signal.
-    time_s, damping : (states,) of each state [s], [-].
+    state_index : (states, 2) kind (0 lag, 1 mode, 2 play), signal.
+    time_s, damping, half_width : (states,) of each state [s], [-], [unit of the signal].
     """
 
     term_index: Ints
@@ -90,6 +90,7 @@ class EffectArrays(NamedTuple):
     state_index: Ints
     time_s: Array
     damping: Array
+    half_width: Array
 
 
 class SensorArrays(NamedTuple):

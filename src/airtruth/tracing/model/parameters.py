@@ -250,12 +250,12 @@ def effect_states(kinds: list[str]) -> tuple[Ints, int]:
 
     Parameters
     ----------
-    kinds : kind of each `airtruth.physics.terms.StateTerm`: a lag has one state, a mode has two.
+    kinds : kind of each `airtruth.physics.terms.StateTerm`: a mode has two states, others have one.
     """
     first, at = [], CORE
     for kind in kinds:
         first.append(at)
-        at += 1 if kind == "lag" else 2
+        at += 2 if kind == "mode" else 1
     return np.array(first, dtype=np.int64), at
 
 

@@ -9,7 +9,7 @@ from typing import Final
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import READINGS
 from airtruth.table import WIDTH, as_text, significant
-from airtruth.tracing.accepted import AcceptedEffect, IncrementTable, ParameterEstimate
+from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable, ParameterEstimate
 from airtruth.tracing.answer import ANOMALY_LEVEL, Evidence, TraceAnswer
 from airtruth.tracing.presentation.candidates import probability, ranked
 from airtruth.tracing.presentation.derivative_table import derivative_table
@@ -168,6 +168,14 @@ def effect_line(effect: AcceptedEffect) -> str:
     return f"{effect.key}: {', '.join(parts)}{words}"
 
 
+def _through(state: IncrementState) -> str:
+    if state.kind == "play":
+        return f"through a play of half width {significant(state.half_width, 2)}"
+    return f"through a {state.kind} of {significant(state.time_s, 2)} s" + (
+        " (1/wn)" if state.kind == "mode" else ""
+    )
+
+
 def increment_words(effect: AcceptedEffect) -> str:
     """A learned increment in words: largest value, onset, memory, and size relative to the declared model."""
     over, table = effect.over or "", effect.table
@@ -183,11 +191,7 @@ def increment_words(effect: AcceptedEffect) -> str:
             change_s = table.value[i] * effect.states[0].time_s
             parts.append(f"the time constant changes by {significant(change_s, 2)} s there")
         parts.append(_onset(table, over))
-    parts += [
-        f"through a {s.kind} of {significant(s.time_s, 2)} s" + (" (1/wn)" if s.kind == "mode" else "")
-        for s in effect.states
-        if not effect.by
-    ]
+    parts += [_through(s) for s in effect.states if not effect.by]
     if effect.relative_size is not None:
         whole = (
             f"motion of {effect.acts_on}"

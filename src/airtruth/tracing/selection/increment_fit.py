@@ -83,8 +83,8 @@ class FittedIncrement:
 def refitted(problem: TraceProblem, null: PosteriorFit, s: Screened, tried: int) -> FittedIncrement | None:
     """All parameters with the increment; the prior's standard deviation is estimated again, once."""
     memory, effect = s.effect.shape.memory, s.effect
-    times = [] if memory is None else [memory.time_s, memory.damping][: len(effect.parameters) - effect.bends]
-    sizes = np.concatenate([null.point.sizes, s.start, times])
+    of_memory = [] if memory is None or effect.shape.factor else list(memory.values.values())
+    sizes = np.concatenate([null.point.sizes, s.start, of_memory])
     start = replace(null.point, sizes=sizes)
     own = fit(problem, null.hypothesis.plus(effect), start, iterations=_ITERATIONS)
     if own is None:

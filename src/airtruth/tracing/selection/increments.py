@@ -60,6 +60,9 @@ slope over a cell, and a finer function has its knots elsewhere)."""
 _STRUCTURE_HZ: Final = (2.8, 4.0, 5.6, 8.0, 11.0)
 """Natural frequencies of modes that are tried at a sensor [Hz] (judgement: closer than `_MODES_HZ`, because the refit has
 to find a narrow peak)."""
+_PLAYS: Final = (0.01, 0.03, 0.1, 0.25)
+"""Half widths of plays of the angle of attack that are tried, over its range [-] (judgement: a refit moves them by up to a factor
+of three)."""
 _SENSED: Final = ("q_rad_s", "az_m_s2")
 """Channels at which a mode is tried: gyro and accelerometer feel the structure, a vane does not (judgement)."""
 _NYQUIST_SHARE: Final = 0.5
@@ -116,6 +119,8 @@ def shapes(problem: TraceProblem) -> list[Shape]:
             if name == "alpha":
                 for time_s in _SLOW_S:
                     add(CELLS, Memory("lag", time_s))
+                for share in _PLAYS:
+                    add(0, Memory("play", half_width=share * (high - low)))
     found += _over_pressure_and_pairs(records, ranges, trims)
     of_readings = [*_of_readings(ranges, trims, highest_hz), *_of_a_changing_lag(records, trims)]
     measured = dict(zip(READINGS, problem.settings.measured, strict=True))
@@ -149,7 +154,7 @@ def _over_pressure_and_pairs(
 def _of_readings(
     ranges: Mapping[str, tuple[float, float]], trims: Mapping[str, float], highest_hz: float
 ) -> Iterator[Shape]:
-    """A curve of the vane, and modes of the structure at gyro and accelerometer that each signal drives."""
+    """A curve and a friction of the vane, and modes of the structure at gyro and accelerometer that each signal drives."""
     for name in ("alpha", "elevator", "qhat"):
         low, high = ranges[name]
         if high <= low:
@@ -157,6 +162,10 @@ def _of_readings(
         trim = min(max(trims.get(name, 0.0), low), high)
         if name == "alpha":
             yield Shape("alpha_rad", name, low, high, CELLS, trim)
+            for share in _PLAYS:
+                yield Shape(
+                    "alpha_rad", name, low, high, 0, trim, Memory("play", half_width=share * (high - low))
+                )
         for channel in _SENSED:
             for hz in _STRUCTURE_HZ:
                 if hz < highest_hz:
@@ -264,10 +273,10 @@ def log_evidences(gradient: Array, information: Array, stds: Array) -> Array:
 
 
 def _directions(e: Increment) -> list[Direction]:
-    """One direction for each bend, the other bends at zero and the times as the shape has them."""
+    """One direction for each bend, the other bends at zero and the memory as the shape has it."""
     memory = e.shape.memory
-    times = {} if memory is None else {"time_s": memory.time_s, "damping": memory.damping}
-    zero = {p.name: times.get(p.name, 0.0) for p in e.parameters}
+    of_memory = {} if memory is None else memory.values
+    zero = {p.name: of_memory.get(p.name, 0.0) for p in e.parameters}
     return [Direction(_single(e, p.name, zero), (), p.step) for p in e.parameters[: e.bends]]
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -22,6 +23,10 @@ from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.refit import losses_without
 from airtruth.tracing.selection.release import CONTRADICTED
 from airtruth.tracing.selection.rounds import SearchRound, scored_round, significant_gain
+
+_ALIKE: Final = 0.01
+"""Ratio of two probabilities of an anomaly that is left from which they count as alike [-] (judgement: where something is
+missing anyway, two decades do not keep a name that explains nothing)."""
 
 
 def pruned(
@@ -41,7 +46,7 @@ def pruned(
     rounds : a finished search; one effect alone remains.
     effects : candidates, whose scores the last round states.
     seed : seed of the draws behind p-values; advance : receives the step that begins.
-    remains : probability of the remaining anomaly [-] from which the records count as explained; a larger anomaly than
+    remains : probability of the remaining anomaly [-] from which the records count as explained; a far larger anomaly than
         before is not accepted below it.
     """
     last = rounds[-1]
@@ -57,7 +62,7 @@ def pruned(
     if fitted is last.null:
         return rounds
     end = scored_round(problem, fitted, effects, len(rounds), seed, advance)
-    if end is None or end.anomaly.p_value < min(remains, last.anomaly.p_value):
+    if end is None or end.anomaly.p_value < min(remains, _ALIKE * last.anomaly.p_value):
         return rounds
     if declared is None:
         end = replace(end, sets=last.sets, release=last.release)

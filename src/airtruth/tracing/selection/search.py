@@ -17,7 +17,7 @@ from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import OUTDONE, Candidate
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import BETTER, better_set
-from airtruth.tracing.selection.explanation import LOADING, least_cost
+from airtruth.tracing.selection.explanation import LOADING, REFERENCE, least_cost
 from airtruth.tracing.selection.refit import refit_absorbed, refit_without
 from airtruth.tracing.selection.release import DeclaredCauses, Release
 from airtruth.tracing.selection.rounds import (
@@ -306,7 +306,8 @@ def _with_declared(problem: TraceProblem, end: SearchRound, last: SearchRound) -
         return end
     names = tuple(sorted({e.name for e in effects}))
     excess = declared.cost + len(declared.point.sizes) - total_cost(last)
-    return replace(end, rival=Rival({**(end.rival.sets if end.rival else {}), names: -max(0.0, excess)}))
+    log_weight = min(0.0, REFERENCE - max(0.0, excess))
+    return replace(end, rival=Rival({**(end.rival.sets if end.rival else {}), names: log_weight}))
 
 
 def _variants(own: SearchRound) -> tuple[Candidate, ...]:
