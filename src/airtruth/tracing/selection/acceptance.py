@@ -30,6 +30,8 @@ SUPERSEDED: Final = "it explains nothing beside another effect"
 """Reason of a candidate that became redundant."""
 SURPASSED: Final = "a set of effects without it explains more"
 """Reason of a candidate that leads alone, and not beside other effects."""
+UNSUPPORTED: Final = "no test of the declared aircraft is significant over all tests"
+"""Reason of a candidate whose score is significant among the scores alone."""
 IMMATERIAL: Final = "its size is immaterial"
 """Reason of a candidate that is too small to matter."""
 IMPROBABLE: Final = 0.001

@@ -20,7 +20,7 @@ from airtruth.tracing.inference.profile import Profile, best_location, location_
 from airtruth.tracing.inference.whitening import Whitener, autoregression
 from airtruth.tracing.model.parameters import Common, Parameters
 from airtruth.tracing.selection import score_test
-from airtruth.tracing.selection.acceptance import SUPERSEDED, SURPASSED, Candidate, has_converged
+from airtruth.tracing.selection.acceptance import SUPERSEDED, SURPASSED, UNSUPPORTED, Candidate, has_converged
 from airtruth.tracing.selection.budget import Advance
 from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.omnibus import Anomaly, anomalies
@@ -248,7 +248,7 @@ def search_round(
         )
         if own.release_leads:
             own = replace(own, tied=())
-        return at_best_location(problem, own, advance)
+        return at_best_location(problem, _with_evidence(own, begin), advance)
 
 
 def scored_round(
@@ -303,6 +303,20 @@ def _refit_whitened(problem: TraceProblem, null: PosteriorFit, whitener: Whitene
         ).all():
             return again
     return fit(problem, null.hypothesis, null.point, whitener, iterations=0, free_levels=False) or null
+
+
+def _with_evidence(own: SearchRound, begin: RoundStart) -> SearchRound:
+    """The round without an effect where no test of the declared aircraft is significant over all tests.
+
+    The scores are tested at `LEVEL` among themselves; with the tests that name no effect they are a larger family. A refit that
+    gains as much as a later effect has to needs no such test: refitted derivatives may hide an effect from every score.
+    """
+    if begin.hypothesis.effects or begin.leader or own.release is not None or not own.tied:
+        return own
+    if own.anomaly.p_value <= LEVEL or own.tied[0].gain >= significant_gain(begin.tested, later=True):
+        return own
+    weak = (replace(c, reasons=(*c.reasons, UNSUPPORTED)) for c in own.candidates)
+    return replace(own, tied=(), candidates=tuple(weak))
 
 
 def _tied(candidates: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
