@@ -146,6 +146,7 @@ def refit_absorbed(
     skip: Collection[str] = (),
     *,
     either_sign: bool = False,
+    rival: float = np.inf,
 ) -> list[Refit]:
     """The refits with those of effects that refitted derivatives may have absorbed, best first.
 
@@ -156,6 +157,7 @@ def refit_absorbed(
     ----------
     fits : refits of the leading candidates; skip : keys of effects that are not refitted.
     either_sign : whether a two-sided size begins at a usual size of either sign, and not at zero.
+    rival : cost of another explanation; refits that stay far behind end early.
     """
     known = {r.score.effect.key for r in fits} | set(skip)
     found = list(fits)
@@ -165,8 +167,8 @@ def refit_absorbed(
         if not may_begin(advance, f"refit {s.effect.key} from the declared aircraft"):
             continue
         for size in _usual_sizes(s, either_sign):
-            rival = min((r.fit.cost for r in found), default=np.inf)
-            tried = _from_declared(problem, null, s, size, rival)
+            ahead = min((r.fit.cost for r in found), default=rival)
+            tried = _from_declared(problem, null, s, size, min(ahead, rival))
             if tried is not None:
                 found.append(Refit(s, tried, 0.0))
     return sorted(found, key=lambda r: r.cost)
@@ -198,7 +200,8 @@ def refit_known(
             continue
         if not may_begin(advance, f"refit {key} from the kinematic check"):
             break
-        tried = _from_declared(problem, null, s, size, np.inf)
+        ahead = min((r.fit.cost for r in best.values()), default=np.inf)
+        tried = _from_declared(problem, null, s, size, ahead)
         if tried is not None and (key not in best or tried.cost < best[key].fit.cost):
             best[key] = Refit(s, tried, _freedom_correction(problem, null, s.effect, tried))
     return sorted(best.values(), key=lambda r: r.cost)

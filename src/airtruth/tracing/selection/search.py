@@ -124,8 +124,11 @@ class _Search:
         null, last = rounds[0].null, rounds[-1]
         taken = {e.key for e in last.null.hypothesis.effects}
         table = rounds[0].table
-        fits = refit_absorbed(self.problem, null, table, (), self.advance, taken, either_sign=True)
-        if not fits or fits[0].cost > total_cost(last):
+        cost = total_cost(last)
+        fits = refit_absorbed(
+            self.problem, null, table, (), self.advance, taken, either_sign=True, rival=cost
+        )
+        if not fits or fits[0].cost > cost:
             return rounds
         effect = fits[0].score.effect
         size = effect.parameters[0].value(fits[0].size)
