@@ -6,11 +6,12 @@ from types import SimpleNamespace
 import pytest
 
 from airtruth.checks.result import Finding
+from airtruth.effects.registry import EFFECTS
 from airtruth.logs.store import iter_logs
 from airtruth.simulation.campaign import run as campaign
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
-from airtruth.tracing.kinematic_start import disagreement, kinematic_check, starts_of
+from airtruth.tracing.kinematic_start import disagreement, kinematic_check, starts_of, within_kinematics
 
 LAG_S = 0.2
 CAMPAIGN = """
@@ -89,3 +90,23 @@ def test_a_bias_of_the_check_is_compared_with_that_of_the_trace():
     effect = AcceptedEffect("gyro_bias", {"value": own}, 1e-9, 5.0)
     (note,) = disagreement(check, SimpleNamespace(effects=(effect,)))
     assert note == "gyro_bias: the trace estimates -0.05, the kinematic check 0.02 to 0.04"
+
+
+def allowed(errors=(), p_value=0.5, state="not needed"):
+    """Range of a gyro scale and of an inertia beside a check that estimates a scale of 1.002 +- 0.004."""
+    found = Finding("gyro_scale", "-", "", 1.002, 0.004, 0.994, 1.01, 1.0, 0.015, state)
+    check = SimpleNamespace(
+        p_value=p_value, possible=(SimpleNamespace(errors=errors),), findings=(found,), verdict="agrees"
+    )
+    effects = within_kinematics([EFFECTS["gyro_scale"], EFFECTS["inertia_error"]], check)
+    return [(e.parameters[0].low, e.parameters[0].high) for e in effects]
+
+
+def test_a_check_without_an_error_limits_what_a_trace_may_name():
+    """Five standard errors about the estimate; effects that are no error of an instrument keep their range."""
+    plain = [(e.low, e.high) for e in (EFFECTS[k].parameters[0] for k in ("gyro_scale", "inertia_error"))]
+    assert allowed() == [pytest.approx((0.982, 1.022)), plain[1]]
+    assert allowed(errors=(SimpleNamespace(name="vane_lag"),)) == plain
+    assert allowed(p_value=0.01) == plain
+    assert allowed(state="not shown") == plain
+    assert list(within_kinematics([EFFECTS["gyro_scale"]], None)) == [EFFECTS["gyro_scale"]]

@@ -1,23 +1,32 @@
-"""What the kinematics of the fitted records tell before aerodynamics: sizes at which refits begin, and disagreement.
+"""What the kinematics of the fitted records tell before aerodynamics: where refits begin, how far they go, and disagreement.
 
 A refit of the derivatives can absorb a slow vane, which then has no score and is never a candidate. The kinematic check
-needs no aerodynamics and knows it. Its causes are therefore always refitted, from the declared aircraft.
+needs no aerodynamics and knows it. Its causes are therefore always refitted, from the declared aircraft. Where it needs no
+error of an instrument at all, it limits the errors that a trace may name.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from typing import Final
 
 from airtruth.aircraft import Aircraft
 from airtruth.checks.kinematics import check_kinematics, declared_errors
 from airtruth.checks.kinematics_model import ERRORS
 from airtruth.checks.result import CheckResult, Finding
+from airtruth.effects.effect import Effect
 from airtruth.effects.registry import EFFECTS
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.sensor_errors import KINDS
 from airtruth.tracing.answer import TraceAnswer
+
+_ERRORS: Final = 5.0
+"""Standard errors of the kinematic check beyond which it excludes an error of an instrument [-] (judgement: its noise is not
+quite white)."""
+_FITS: Final = 0.05
+"""Probability of the check's absolute test from which it fits the records [-] (convention)."""
 
 
 def kinematic_check(
@@ -46,6 +55,27 @@ def starts_of(check: CheckResult | None) -> dict[str, float]:
         return {}
     named = {f.name for cause in check.possible for f in cause.errors}
     return {f.name: _beyond_declared(f) for f in check.findings if f.name in named and f.name in EFFECTS}
+
+
+def within_kinematics(effects: Sequence[Effect], check: CheckResult | None) -> tuple[Effect, ...]:
+    """The effects, those of instruments no larger than a check allows that needs no error of an instrument.
+
+    A range ends `_ERRORS` standard errors from the estimate of the check, and contains the neutral value. A refit that ends at
+    an end of its range is not accepted. Errors that the records do not show keep their range.
+    """
+    if check is None or check.p_value < _FITS or [c.errors for c in check.possible] != [()]:
+        return tuple(effects)
+    shown = {f.name: f for f in check.findings if f.name in ERRORS and f.state != "not shown"}
+    return tuple(_limited(e, shown[e.key]) if e.key in shown else e for e in effects)
+
+
+def _limited(effect: Effect, found: Finding) -> Effect:
+    only, reach = effect.parameters[0], _ERRORS * found.std
+    low, high = (
+        _beyond_declared(replace(found, value=x)) for x in (found.value - reach, found.value + reach)
+    )
+    low, high = max(only.low, min(low, only.neutral)), min(only.high, max(high, only.neutral))
+    return replace(effect, parameters=(replace(only, low=low, high=high),))
 
 
 def _beyond_declared(one: Finding) -> float:
@@ -88,4 +118,4 @@ def _key(name: str, channel: str | None) -> str:
     return f"{name}:{channel}" if channel else name
 
 
-__all__ = ["disagreement", "kinematic_check", "starts_of"]
+__all__ = ["disagreement", "kinematic_check", "starts_of", "within_kinematics"]

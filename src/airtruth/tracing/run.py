@@ -24,7 +24,12 @@ from airtruth.logs.sources import Logs, named_logs
 from airtruth.tracing.answer import ANOMALY_LEVEL, TraceAnswer
 from airtruth.tracing.conclude import conclude
 from airtruth.tracing.declared_model import declared_p_value
-from airtruth.tracing.kinematic_start import disagreement, kinematic_check, starts_of
+from airtruth.tracing.kinematic_start import (
+    disagreement,
+    kinematic_check,
+    starts_of,
+    within_kinematics,
+)
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.prepare import Case, prepare
@@ -96,6 +101,7 @@ def _traced(
     held = set() if case.held is None else {r.signals.run_id for r in case.held.records}
     # a reconstructed alpha agrees with q and az by construction
     kinematics = None if not case.has_vane else kinematic_check(checked, declared, held)
+    case = replace(case, effects=within_kinematics(case.effects, kinematics))
     case, rounds = _search(case, options, advance, starts_of(kinematics))
     advance("assess every stage on fitted and held-out records")
     stages = assess_stages(case, rounds)
