@@ -24,7 +24,6 @@ from airtruth.tracing.inference.posterior import (
     Priors,
     Sensitivities,
     TraceProblem,
-    at_bounds,
     likelihood_terms,
     marginal_information,
     prior_cost,
@@ -136,13 +135,13 @@ class PosteriorSearch:
         return np.array(steps), np.array(promised)
 
     def _step(self, point: Parameters, at: Evaluated, damping: float) -> tuple[Array, float]:
-        fixed = self.hypothesis.fixed
+        fixed, ends = self.hypothesis.fixed, self._ends(point)
         while True:
             gradient, information, eliminated = marginal_information(
                 self.priors, point, at.terms, levels=self.levels, damping=damping, fixed=fixed
             )
             shared = scaled_step(gradient, information, damping)
-            stopped = tuple(i for i in at_bounds(point) if i not in fixed and _outward(point, i, shared[i]))
+            stopped = tuple(i for i, sign in ends if i not in fixed and sign * shared[i] > 0.0)
             if not stopped:
                 break
             fixed += stopped
@@ -151,6 +150,14 @@ class PosteriorSearch:
         gain = float(-gradient @ shared)
         gain += sum(float(e.solved[:, 0] @ e.information @ e.solved[:, 0]) for e in eliminated)
         return np.concatenate([shared, own.ravel()]), 0.5 * gain
+
+    def _ends(self, point: Parameters) -> list[tuple[int, float]]:
+        """Indices of the common parameters and sizes at an end of their range, and 1 for the upper end, -1 for the lower."""
+        ranges = [(i, float(point.common[i]), low, high) for i, (low, high) in BOUNDS.items()]
+        first = Layout(len(point.sizes)).sizes.start
+        for k, size in enumerate(point.sizes):
+            ranges.append((first + k, float(size), *self.hypothesis.parameter(k).ends))
+        return [(i, 1.0 if at == high else -1.0) for i, at, low, high in ranges if at in (low, high)]
 
     def move(self, x: Array, step: Array, index: Ints) -> Array:
         """Steps taken within the plausible ranges; see `Problems.move`."""
@@ -173,12 +180,6 @@ class PosteriorSearch:
     def shortfall(self, x: Array, at: Evaluated) -> float:
         """Gain in log-likelihood that a step at the least damping promises."""
         return self._step(self.shape.of_vector(x), at, _LEAST_DAMPING)[1]
-
-
-def _outward(point: Parameters, index: int, step: float) -> bool:
-    low, high = BOUNDS[index]
-    value = point.common[index]
-    return bool((value == low and step < 0.0) or (value == high and step > 0.0))
 
 
 def fit(
