@@ -13,7 +13,7 @@ from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.model.parameters import Common, Parameters
+from airtruth.tracing.model.parameters import Common, Parameters, PerRecord
 from airtruth.tracing.model.response import respond
 from airtruth.tracing.selection.acceptance import IMPROBABLE, declared_probability, own_probability
 from airtruth.tracing.selection.budget import Advance, may_begin
@@ -219,12 +219,17 @@ def _usual_sizes(s: Score, either_sign: bool) -> tuple[float, ...]:
 def _from_declared(
     problem: TraceProblem, null: PosteriorFit, s: Score, size: float, rival: float
 ) -> PosteriorFit | None:
-    """A refit that begins at the declared aircraft, with the noise levels of the null."""
+    """A refit that begins at the declared aircraft, with the levels of noise and gusts of the null.
+
+    From strong gusts the levels would fall for many steps far behind a rival, and the search would be given up.
+    """
     hypothesis = null.hypothesis.plus(s.effect)
     start = initial_parameters(problem, hypothesis, _at(null, s, size).sizes, _FRESH_ITERATIONS)
     common = start.common.copy()
     common[Common.noise] = null.point.common[Common.noise]
-    return fit(problem, hypothesis, replace(start, common=common), rival=rival)
+    per_record = start.per_record.copy()
+    per_record[:, PerRecord.log_gust] = null.point.per_record[:, PerRecord.log_gust]
+    return fit(problem, hypothesis, replace(start, common=common, per_record=per_record), rival=rival)
 
 
 def _leading(
