@@ -273,6 +273,19 @@ def test_intervals_of_derivatives_hold_the_truth_on_the_declared_mass():
     assert set_scoring.parameters_covered(truth) == [True, False]
 
 
+def test_a_curvature_adds_its_slope_where_the_answer_counts_it_from():
+    """CL'' / 2 = 20 per rad2, from 5.57 deg in the truth and from 1 deg more in the answer: a slope of 40 times 1 deg."""
+    declared = {"CLalpha": 5.0, "CLq": 30.0, "CLde": 0.5, "Cmalpha": -2.0, "Cmq": -40.0, "Cmde": -1.8}
+    truth = case("derivative", {"cl_alpha_nonlinear:quadratic": ({"CLalpha2": 20.0}, 90.0)}, {})
+    truth["truth"]["trial"]["body"] = {"mass": 1.0, "inertia": 1.0, "cg": 0.0}
+    truth["answer"]["derivatives"] = {"declared": declared}
+    named = {"name": "cl_alpha_nonlinear", "about_alpha_rad": np.radians(6.57)}
+    truth["answer"]["effects"] = [named]
+    assert set_scoring.true_derivatives(truth)["CLalpha"] == pytest.approx(5.0 + 40.0 * np.radians(1.0))
+    truth["answer"]["effects"] = []
+    assert set_scoring.true_derivatives(truth) == pytest.approx(declared)
+
+
 def test_an_effect_that_worsens_a_held_out_error_has_to_say_so():
     """Ten seconds of three channels: 1/sqrt(1500) of the innovations, 1/sqrt(3 10/0.39) of the free run."""
     for kind, ratio, expected in (

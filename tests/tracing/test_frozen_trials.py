@@ -192,3 +192,24 @@ def test_hysteresis_is_learned_as_a_play(number, variant, half_width_rad, tmp_pa
     learned = next(e for e in answer["effects"] if e["variant"] == variant)
     (state,) = learned["states"]
     assert half_width_rad[0] < state["half_width"] < half_width_rad[1]
+
+
+@pytest.mark.parametrize(
+    ("seed", "number", "mode", "named", "value"),
+    [
+        (20261305, 13, "drift", "downwash_lag", -35.0),
+        (20261304, 12, "loop", "airspeed_scale", 0.85),
+        (20261233, 8, "loop", "accelerometer_scale", 1.2),
+    ],
+)
+def test_an_effect_is_not_lost_on_the_way_to_its_optimum(seed, number, mode, named, value, tmp_path):
+    """A size held at the end of its range, gust levels far above those of calm air, and free runs in a closed loop.
+
+    The answers were a thrust moment with wrong derivatives, mass and inertia, and a gyro bias; lambda 986, 87 and 12.
+    """
+    answer = answered(seed, number, mode, tmp_path)
+    (effect,) = answer["effects"]
+    assert effect["name"] == named
+    (parameter,) = effect["parameters"].values()
+    low, high = parameter["ci95"]
+    assert low < value < high

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from validation.blind.causes import COMPOSITIONS, TIME_CONSTANT_S
-from validation.blind.figures import CONDITIONS, LOG_STEP_S, STRONG, TOGETHER, held_out
+from validation.blind.figures import ALPHA_TRIM_RAD, CONDITIONS, LOG_STEP_S, STRONG, TOGETHER, held_out
 from validation.blind.scoring import (
     Case,
     accepted,
@@ -31,6 +31,7 @@ from validation.blind.scoring import (
 _OWN_FORMULA: Final = ("tail_effectiveness", "wing_effectiveness", "icing")
 """Effects whose parameter in the truth is not that of the library."""
 _LOADING: Final = ("cg_shift", "mass_error", "inertia_error")
+_CURVED: Final = {"CLalpha2": "CLalpha", "Cmalpha2": "Cmalpha"}
 _QUANTILE: Final = 1.96
 _ERRORS: Final = 2.0
 
@@ -68,10 +69,19 @@ def reported(case: Case) -> bool:
 
 
 def true_derivatives(case: Case) -> dict[str, float]:
-    """Derivatives of the truth as a tracer sees them in the motion: on the declared mass, inertia and CG."""
+    """Derivatives of the truth as a tracer sees them in the motion: on the declared mass, inertia and CG.
+
+    A curvature of the truth counts from `ALPHA_TRIM_RAD`, and adds its slope where the answer counts it from.
+    """
     truth, declared = case["truth"], case["answer"]["derivatives"]["declared"]
     body = truth["trial"]["body"]
     total = {name: value + truth["increments"][name] for name, value in declared.items()}
+    for effect in effects(case):
+        stated = (e for e in case["answer"]["effects"] if e["name"] == base(effect["key"]))
+        about = next((e.get("about_alpha_rad") for e in stated), None)
+        for name, slope in _CURVED.items():
+            if about is not None and name in effect["values"]:
+                total[slope] += 2.0 * effect["values"][name] * (about - ALPHA_TRIM_RAD)
     result = {name: value / body["mass"] for name, value in total.items() if name.startswith("CL")}
     for name in ("alpha", "q", "de"):
         moment = total[f"Cm{name}"] + body["cg"] * total[f"CL{name}"]
