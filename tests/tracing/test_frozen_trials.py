@@ -200,12 +200,13 @@ def test_hysteresis_is_learned_as_a_play(number, variant, half_width_rad, tmp_pa
         (20261305, 13, "drift", "downwash_lag", -35.0),
         (20261304, 12, "loop", "airspeed_scale", 0.85),
         (20261233, 8, "loop", "accelerometer_scale", 1.2),
+        (20261304, 35, "loop", "vane_lag", 0.01937),
     ],
 )
 def test_an_effect_is_not_lost_on_the_way_to_its_optimum(seed, number, mode, named, value, tmp_path):
-    """A size held at the end of its range, gust levels far above those of calm air, and free runs in a closed loop.
+    """A size at the end of its range, gust levels far above calm air, free runs in a closed loop, a damped elevator as instrument.
 
-    The answers were a thrust moment with wrong derivatives, mass and inertia, and a gyro bias; lambda 986, 87 and 12.
+    Answers were a thrust moment with wrong derivatives, mass and inertia, a gyro bias, and a refusal; lambda 986, 87, 12 and 73.
     """
     answer = answered(seed, number, mode, tmp_path)
     (effect,) = answer["effects"]

@@ -220,9 +220,11 @@ def motion(c: Channels, dt_s: float, aircraft: Aircraft | None) -> list[Relation
     force = az * np.cos(alpha) - ax * np.sin(alpha) + G0 * np.cos(attitude - alpha)
     heave = spectrum(integral(force / v, dt_s), dt_s)
     angle = spectrum(alpha, dt_s)
-    factors = regress(angle, np.stack([pitched, heave], axis=1), instruments(elevator, dt_s))
-    channels = ("alpha_rad", "airspeed_m_s", "az_m_s2", "q_rad_s", "theta_rad")
-    result.append(_factor_test("alpha", channels, factors, ALPHA_STD))
+    kinematic = np.stack([pitched, heave], axis=1)
+    result.append(_alpha_test(regress(angle, kinematic, instruments(elevator, dt_s))))
+    if "elevator_command_rad" in c:
+        by_command = regress(angle, kinematic, instruments(c["elevator_command_rad"], dt_s))
+        result[-1] = _nearer(result[-1], _alpha_test(by_command), by_command.strength > WEAK)
     causes = [spectrum(integral(x, dt_s), dt_s) for x in (elevator, alpha, q)]
     control = regress(spectrum(q, dt_s), np.stack(causes, axis=1))
     result.append(_sign_test(control))
@@ -255,6 +257,20 @@ def _factor_test(
     figures = np.concatenate([factors.value, std, factors.share[:, None], factors.strength[:, None]], axis=1)
     informed = bool(ok[-1] and (std[-1] < INFORMED).all())
     return Relation(name, channels, np.where(ok, distance, 0.0), figures, informed)
+
+
+def _alpha_test(factors: Factors) -> Relation:
+    channels = ("alpha_rad", "airspeed_m_s", "az_m_s2", "q_rad_s", "theta_rad")
+    return _factor_test("alpha", channels, factors, ALPHA_STD)
+
+
+def _nearer(by_elevator: Relation, by_command: Relation, is_strong: NDArray[np.bool_]) -> Relation:
+    """The relation with the smaller distance of two instruments, where the command is a strong one.
+
+    A damper moves the elevator with the gusts that move alpha. The elevator is no valid instrument then; the pilot's command is.
+    """
+    smaller = np.minimum(by_elevator.distance, by_command.distance)
+    return replace(by_elevator, distance=np.where(is_strong, smaller, by_elevator.distance))
 
 
 def _sign_test(control: Factors) -> Relation:
