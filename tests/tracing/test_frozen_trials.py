@@ -204,7 +204,7 @@ def test_hysteresis_is_learned_as_a_play(number, variant, half_width_rad, tmp_pa
     ],
 )
 def test_an_effect_is_not_lost_on_the_way_to_its_optimum(seed, number, mode, named, value, tmp_path):
-    """A size at the end of its range, gust levels far above calm air, free runs in a closed loop, a damped elevator as instrument.
+    """A size at the end of its range, gust levels far above calm air, free runs in a loop, a damped elevator as instrument.
 
     Answers were a thrust moment with wrong derivatives, mass and inertia, a gyro bias, and a refusal; lambda 986, 87, 12 and 73.
     """

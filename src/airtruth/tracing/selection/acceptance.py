@@ -44,6 +44,8 @@ smaller number rejects true effects)."""
 _SMALL_SHORTFALL: Final = 0.02
 """Share of its gain that a refit may still lack and count as converged [-] (judgement: rate limits and backlash give no
 smooth cost)."""
+_BEYOND_DOUBT: Final = 25.0
+"""Gain in 2 log L from which the free run of a closed loop refuses no effect [-] (judgement: that of a later effect)."""
 _DIVERGED: Final = 1e6
 """Residual over the share that gusts and sensors explain, beyond which a free run has diverged [-] (judgement)."""
 _SEVERAL: Final = 3
@@ -129,7 +131,7 @@ def assess_candidate(
     """
     size, std = _size(s, own)
     excess = float(inflation(problem, own)[size_index(_first_size(s, own))])
-    left_out = tested_on_left_out(problem, own, reference)
+    left_out = tested_on_left_out(problem, own, reference, gain)
     reasons = [
         *_fit_reasons(s, own, gain, least, excess),
         *left_out.reasons,
@@ -155,8 +157,14 @@ class LeftOutTest:
     reasons: tuple[str, ...]
 
 
-def tested_on_left_out(problem: TraceProblem, own: PosteriorFit, reference: Reference) -> LeftOutTest:
-    """Whether a fit worsens likelihood or free run of records left out; in a closed loop the likelihood alone counts."""
+def tested_on_left_out(
+    problem: TraceProblem, own: PosteriorFit, reference: Reference, gain: float
+) -> LeftOutTest:
+    """Whether a fit worsens likelihood or free run of records left out.
+
+    In a closed loop the likelihood alone counts where the gain in 2 log L is beyond doubt: there a free run is no valid test, and
+    refuses effects of little evidence all the same.
+    """
     for way, before in zip(_ways(problem), reference.left_out, strict=True):
         likelihood, after = way(problem, own)
         likelihood_gain, unaided = before[0] - likelihood, before[1]
@@ -169,7 +177,7 @@ def tested_on_left_out(problem: TraceProblem, own: PosteriorFit, reference: Refe
         *(["it worsens the likelihood of records left out"] if _is_loss(likelihood_gain) else []),
         *(
             ["it worsens the free run of records left out"]
-            if (loses or in_channels) and not reference.in_loop
+            if (loses or in_channels) and not (reference.in_loop and gain >= _BEYOND_DOUBT)
             else []
         ),
     )

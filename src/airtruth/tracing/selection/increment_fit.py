@@ -155,7 +155,7 @@ def assessed(problem: TraceProblem, own: FittedIncrement, reference: Reference) 
     ratios = inflation(problem, own.fit)
     first = size_index(own.fit.hypothesis.span(own.effect.key).start)
     excess = float(np.mean(ratios[first : first + own.effect.bends] ** 2))
-    left_out = tested_on_left_out(problem, own.fit, reference)
+    left_out = tested_on_left_out(problem, own.fit, reference, gain)
     swing = relative_swing(problem, own.fit, own.effect)
     reasons = (
         *([] if has_converged(own.fit, gain) else [UNCONVERGED]),

@@ -41,6 +41,8 @@ instead [-] (convention)."""
 _FAILED: Final = 1e-6
 """Probability of the remaining anomaly below which a search has failed, and what the kinematic check names leads another
 [-] (judgement: an anomaly beyond doubt)."""
+_WEAK: Final = 40.0
+"""Gain in 2 log L of a single effect below which one that refitted derivatives had absorbed may explain more [-] (judgement)."""
 _EFFECT_LEADS: Final = 30.0
 """Gain in 2 log L by which an effect has to lead for the released derivatives not to be followed beside it [-]
 (judgement: what a later effect may still add to them)."""
@@ -108,7 +110,8 @@ class _Search:
         missing = tuple(e for e in first.effects if e.key in self.known and e.key not in taken)
         if missing and rounds[-1].anomaly.p_value < _FAILED:
             rounds = self._led(first, missing, rounds)
-        if rounds[-1].anomaly.p_value < REMAINS and len(rounds[-1].null.hypothesis.effects) < 2:
+        weak = [r.tied[0].gain < _WEAK for r in rounds if r.tied] == [True]
+        if (rounds[-1].anomaly.p_value < REMAINS or weak) and len(rounds[-1].null.hypothesis.effects) < 2:
             rounds = self._with_absorbed(first, rounds)
         if len(rounds[-1].null.hypothesis.effects) + len(rounds[-1].sets[:1]) < 2:
             return rounds
