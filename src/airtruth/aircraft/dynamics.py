@@ -53,7 +53,7 @@ def with_change(declared: Dynamics | None, change: Change) -> Dynamics | None:
 def declared_dynamics(dynamics: Dynamics | None) -> Change:
     """Return an aircraft's dynamics as a change of its steady forces.
 
-    In a steady state a state equals its input, and the tables of steady forces hold its increment at that value:
+    In steady flight a state equals its input, and the tables of steady forces hold its increment at that value:
     the increment of the input itself is subtracted.
     """
     if dynamics is None:

@@ -58,7 +58,7 @@ def starts_of(check: CheckResult | None) -> dict[str, float]:
 
 
 def within_kinematics(effects: Sequence[Effect], check: CheckResult | None) -> tuple[Effect, ...]:
-    """The effects, those of instruments no larger than a check allows that needs no error of an instrument.
+    """The effects; errors of instruments have the range that a check allows, if the check needs none of them.
 
     A range ends `_ERRORS` standard errors from the estimate of the check, and contains the neutral value. A refit that ends at
     an end of its range is not accepted. Errors that the records do not show keep their range.

@@ -98,9 +98,9 @@ def _implied(elevator_rad: Array, dt_s: float, tau_s: float) -> Array:
     return np.asarray((elevator_rad[1:] - rho * elevator_rad[:-1]) / (1.0 - rho))
 
 
-def _neighbours(command: Array) -> tuple[Array, Array]:
-    """Implied commands of the cell before each cell and of that after it."""
-    padded = np.concatenate([command[:1], command, command[-1:]])
+def _neighbours(values: Array) -> tuple[Array, Array]:
+    """Values of the cell before each cell, and of the cell after it."""
+    padded = np.concatenate([values[:1], values, values[-1:]])
     return padded[:-2], padded[2:]
 
 

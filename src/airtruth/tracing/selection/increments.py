@@ -24,7 +24,7 @@ from airtruth.effects.increment import Increment, Memory, Shape, increment
 from airtruth.physics.terms import FACTORS, READINGS
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import Whitener
-from airtruth.tracing.model.records import FINE, TraceRecord
+from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.selection.score_test import Direction, gradients
 
 Array = NDArray[np.float64]
@@ -193,7 +193,7 @@ def flown(record: TraceRecord, signal: str) -> Array:
     if signal == "alpha":
         return alpha
     if signal == "elevator":
-        return s.elevator_rad[:: s.sub * FINE]
+        return s.sampled_elevator_rad
     if signal == "qbar":
         return np.asarray(0.5 * s.density_kg_m3 * s.airspeed_m_s**2)[:: s.sub]
     half = 0.5 * chord / s.airspeed_m_s[:: s.sub]
