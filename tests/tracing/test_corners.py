@@ -12,8 +12,9 @@ from scipy.linalg import expm, solve_discrete_are
 from airtruth.physics.terms import Change, SensorTerm, SurfaceTerm
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import TraceProblem
+from airtruth.tracing.model.elevator_path import corner_variance
 from airtruth.tracing.model.parameters import PerRecord
-from airtruth.tracing.model.records import corner_variance, read
+from airtruth.tracing.model.records import read
 from airtruth.tracing.model.response import filter_inputs, respond
 from airtruth.tracing.selection.corner_share import corner_share
 from airtruth.units import DEG, G0

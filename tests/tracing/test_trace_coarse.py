@@ -5,7 +5,7 @@ import pytest
 
 from airtruth.physics.terms import SurfaceTerm
 from airtruth.tracing.model.elevator import held_command, is_held, shaped, smooth, with_steps
-from airtruth.tracing.model.records import read_between
+from airtruth.tracing.model.elevator_path import read_between
 from airtruth.tracing.model.surface import through
 from airtruth.units import DEG
 
@@ -127,7 +127,7 @@ def test_a_rate_limit_sees_when_the_surface_begins_to_move(rate_rad_s):
     exact = servo(t, [1.013, 2.011], DEG * np.array([4.0, -4.0]))
     limit = [SurfaceTerm("rate_limit", rate_rad_s)]
     right = through(limit, exact, DT_50 / CELLS)
-    path = read_between(exact[::CELLS], DT_50, CELLS, 0.0, 0.0)[0]
+    path = read_between(exact[::CELLS], DT_50, CELLS, 0.0, 0.0).surface_rad
     straight = np.interp(t, t[::CELLS], exact[::CELLS])
     late = [
         np.abs(through(limit, made, DT_50 / CELLS) - right).sum()

@@ -43,7 +43,7 @@ def held_command(elevator_rad: Array, dt_s: float, tau_s: float, cells: int) -> 
     -------
     ((samples - 1) cells + 1,) [rad], or None.
     """
-    command = _implied(elevator_rad, dt_s, tau_s)
+    command = implied_command(elevator_rad, dt_s, tau_s)
     least = _STEP * float(np.ptp(command))
     changes = int((np.abs(np.diff(command)) > least).sum())
     if least == 0.0 or changes > _MOST_STEPS * command.size:
@@ -60,7 +60,7 @@ def is_held(elevator_rad: Array, dt_s: float, tau_s: float) -> bool:
     elevator_rad : (samples,) measured surface [rad].
     dt_s, tau_s : sample period and time constant of the servo [s].
     """
-    command = _implied(elevator_rad, dt_s, tau_s)
+    command = implied_command(elevator_rad, dt_s, tau_s)
     return _BEYOND * float(np.median(np.abs(_across(command)))) < _STEP * float(np.ptp(command))
 
 
@@ -82,7 +82,7 @@ def with_steps(
     -------
     ((samples - 1) cells + 1,) surface [rad]; (samples - 1,) whether a cell is that of a step, or beside one.
     """
-    command = _implied(elevator_rad, dt_s, tau_s)
+    command = implied_command(elevator_rad, dt_s, tau_s)
     changes = np.abs(_across(command))
     near = changes > max(_STEP * float(np.ptp(command)), _BEYOND * float(np.median(changes)))
     before, after = _neighbours(changes)
@@ -92,7 +92,35 @@ def with_steps(
     return np.append(made.ravel(), elevator_rad[-1]), near
 
 
-def _implied(elevator_rad: Array, dt_s: float, tau_s: float) -> Array:
+def step_share(dt_s: float, tau_s: float, phase: float) -> float:
+    """How far a servo moves in a sample period after a unit step of its command at a phase [-]."""
+    return -float(np.expm1(-(1.0 - phase) * dt_s / tau_s))
+
+
+def servo_path(
+    elevator_rad: Array, command_rad: Array, dt_s: float, tau_s: float, cells: int, phase: float
+) -> Array:
+    """((samples - 1) cells + 1,) path of a servo whose command steps once a sample, through its samples [rad].
+
+    Parameters
+    ----------
+    elevator_rad : (samples,) surface [rad].
+    command_rad : (samples,) command before the step in each cell, and after the last [rad].
+    dt_s, tau_s : sample period and time constant of the servo [s].
+    cells : cells of the fine grid per sample.
+    phase : time of the steps after a sample, in sample periods (0 to 1).
+    """
+    time, at = np.arange(cells) * (dt_s / cells), phase * dt_s
+    before, after = command_rad[:-1, None], command_rad[1:, None]
+    start = elevator_rad[:-1, None] - before
+    corner = before + start * np.exp(-at / tau_s) - after
+    path = np.where(
+        time < at, before + start * np.exp(-time / tau_s), after + corner * np.exp((at - time) / tau_s)
+    )
+    return np.append(path.ravel(), elevator_rad[-1])
+
+
+def implied_command(elevator_rad: Array, dt_s: float, tau_s: float) -> Array:
     """(samples - 1,) command that each cell implies if it is held [rad]."""
     rho = float(np.exp(-dt_s / tau_s))
     return np.asarray((elevator_rad[1:] - rho * elevator_rad[:-1]) / (1.0 - rho))
@@ -150,4 +178,13 @@ def smooth(elevator_rad: Array, cells: int) -> Array:
     return np.asarray(CubicSpline(at, elevator_rad)(fine))
 
 
-__all__ = ["held_command", "is_held", "shaped", "smooth", "with_steps"]
+__all__ = [
+    "held_command",
+    "implied_command",
+    "is_held",
+    "servo_path",
+    "shaped",
+    "smooth",
+    "step_share",
+    "with_steps",
+]

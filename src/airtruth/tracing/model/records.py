@@ -12,17 +12,14 @@ from numpy.typing import NDArray
 
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
-from airtruth.numerics.intersample import servo_bend, servo_decay
 from airtruth.physics.atmosphere import air_density, altitude_of_density_m
 from airtruth.tracing.model.airspeed import ground_speed, gust_cutoff_hz, low_passed
 from airtruth.tracing.model.compile import CHANNELS
-from airtruth.tracing.model.elevator import held_command, is_held, shaped, smooth, with_steps
+from airtruth.tracing.model.elevator_path import LONGEST_STEP_S, read_between
 from airtruth.tracing.model.plant import Plant
 
 Array = NDArray[np.float64]
 
-_STEP_S: Final = 0.0201
-"""Longest step of integration [s], with room for rounding (judgement): the short period turns 0.1 rad in it."""
 FINE: Final = 8
 """Cells of the surface's own grid per cell of the filter's."""
 _QUIET_S: Final = 0.2
@@ -31,10 +28,6 @@ _QUIET_STD: Final = 3.0
 """Distance from that median up to which the elevator is at rest, in standard deviations of its noise [-] (convention)."""
 _CONSTANT_STD: Final = 3.0
 """Standard deviations of von Neumann's ratio below 1 up to which an elevator at rest is constant [-] (convention)."""
-_CORNER_SHARE: Final = 0.05
-"""Least corner, as a share of the elevator's range [-] (judgement): a smaller one moves the aircraft by less."""
-_CORNER_NOISE: Final = 20.0
-"""The same in standard deviations of the elevator's noise [-]: five of half a fourth difference, sqrt(70)/2 each."""
 
 
 _SERIES: Final = (
@@ -62,7 +55,8 @@ class Signals:
     elevator_rad : (fine points,) `FINE` cells to a cell of the filter's grid.
     airspeed_m_s, ground_m_s, density_kg_m3, theta_rad : (points,) on the filter's grid; ground: speed without the gust.
     altitude_m : mean pressure altitude [m].
-    elevator_std_rad : standard deviation of the noise that remains in the smoothed elevator [rad].
+    elevator_std_rad : standard deviation of the noise that remains in the smoothed elevator [rad]; 0 behind a damper,
+        which turns the surface throughout, so that a play does not rest at the extremes of the noise.
     throttle : its mean where it is logged, None elsewhere [0..1].
     corner_rad2 : (samples,) variance of the elevator's mean over the cell that ends at each sample, about that of
         ``elevator_rad``; empty where the samples show its motion.
@@ -172,7 +166,7 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0) ->
         channels = {name: values[rows] for name, values in log.channels.items()}
         t = log.t_s[rows]
         dt = float((t[-1] - t[0]) / (len(t) - 1))
-        sub = 2 * math.ceil(dt / _STEP_S - 1e-9)
+        sub = 2 * math.ceil(dt / LONGEST_STEP_S - 1e-9)
         y = np.stack([channels[name] for name in CHANNELS], axis=1)
         density, airspeed = air_density(channels), channels["airspeed_m_s"]
         altitude = channels.get("altitude_m")
@@ -183,26 +177,39 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0) ->
             q = channels["q_rad_s"]
             theta = channels["alpha_rad"][0] + np.concatenate([[0.0], np.cumsum(0.5 * dt * (q[1:] + q[:-1]))])
         quiet = _quiet(channels["elevator_rad"], dt, elevator_std_rad)
-        elevator, corners = read_between(quiet, dt, sub * FINE, elevator_std_rad, servo_s)
+        between = read_between(
+            quiet,
+            dt,
+            sub * FINE,
+            elevator_std_rad,
+            servo_s,
+            np.asarray(channels["q_rad_s"], dtype=np.float64),
+        )
         found.append(
             Signals(
                 run_id=run_id,
                 dt_s=dt,
                 sub=sub,
                 y=np.ascontiguousarray(y, dtype=np.float64),
-                elevator_rad=elevator,
+                elevator_rad=between.surface_rad,
                 airspeed_m_s=fine(low_passed(airspeed, dt, gust_cutoff_hz(airspeed, dt)), sub),
                 ground_m_s=fine(ground_speed(channels, theta, dt), sub),
                 density_kg_m3=fine(low_passed(density, dt), sub),
                 theta_rad=fine(theta, sub),
                 altitude_m=float(np.mean(altitude)),
-                elevator_std_rad=elevator_std_rad
-                * float(np.sqrt((quiet == channels["elevator_rad"]).mean())),
+                elevator_std_rad=0.0
+                if between.damped
+                else _unsmoothed_std(quiet, channels["elevator_rad"], elevator_std_rad),
                 throttle=float(channels["throttle"].mean()) if "throttle" in channels else None,
-                corner_rad2=corners,
+                corner_rad2=between.corner_rad2,
             )
         )
     return found
+
+
+def _unsmoothed_std(quiet: Array, raw: Array, std_rad: float) -> float:
+    """Standard deviation of the noise that `_quiet` leaves [rad]."""
+    return std_rad * float(np.sqrt((quiet == raw).mean()))
 
 
 def _quiet(elevator: Array, dt_s: float, std: float) -> Array:
@@ -257,89 +264,6 @@ def is_constant(x: Array) -> bool:
     """
     differences = 0.5 * float((np.diff(x) ** 2).mean())
     return differences >= (1.0 - _CONSTANT_STD / math.sqrt(x.size)) * float(x.var(ddof=1))
-
-
-def read_between(
-    elevator: Array, dt_s: float, cells: int, std_rad: float, servo_s: float
-) -> tuple[Array, Array]:
-    """The surface on a fine grid, and the variance of its mean over each cell.
-
-    Parameters
-    ----------
-    elevator : (samples,) [rad], every ``dt_s`` [s]; cells : cells of the fine grid per sample.
-    std_rad : standard deviation of its noise [rad]; servo_s : declared time constant of its servo [s], 0 for none.
-
-    Returns
-    -------
-    ((samples - 1) cells + 1,) surface [rad]; (samples,) variance over the cell that ends at each sample [rad2], empty for none.
-    """
-    if dt_s > _STEP_S and servo_s > 0.0:  # a coarse log
-        path = held_command(elevator, dt_s, servo_s, cells)
-        return smooth(elevator, cells) if path is None else path, np.zeros(0)
-    relative = (elevator - elevator[0])[None, :]
-    bend, none = servo_bend(relative, std_rad)[0], np.zeros(0)
-    if bend.any():
-        tau_s = -dt_s / math.log(float(servo_decay(np.diff(relative), std_rad)[0]))
-        if servo_s <= 0.0 or is_held(elevator, dt_s, tau_s):
-            path = held_command(elevator, dt_s, tau_s, cells)
-            mean = _elevator(elevator, bend, cells, none)
-            return mean if path is None else shaped(mean, path, cells), none
-    corners, unbent = corner_variance(elevator, std_rad), np.zeros_like(bend)
-    if servo_s <= 0.0 or not corners.size:
-        return _elevator(elevator, unbent, cells, corners), corners
-    path, steps = with_steps(elevator, _elevator(elevator, unbent, cells, none), dt_s, servo_s, cells)
-    return path, np.append(0.0, np.where(steps, 0.0, corners[1:]))
-
-
-def _elevator(elevator: Array, bend: Array, sub: int, corners: Array) -> Array:
-    """Parabolas of the cubic's area; straight beside a corner, because the samples across it say nothing of the cell."""
-    relative = elevator - elevator[0]
-    edge = np.concatenate([relative[:1], relative, relative[-1:]])
-    cubic = (edge[1:-2] + edge[2:-1] - edge[:-3] - edge[3:]) / 24.0
-    if corners.size:
-        at = np.pad(corners[1:] > 0.0, 1)
-        cubic[at[:-2] | at[1:-1] | at[2:]] = 0.0
-        cubic += _shared_steps(np.diff(relative), corners[1:] > 0.0)
-    bend = bend.copy()
-    bend[1:] += cubic
-    share = np.arange(sub) / sub
-    cells = elevator[:-1, None] + (elevator[1:] - elevator[:-1])[:, None] * share
-    cells += 6.0 * bend[1:, None] * share * (1.0 - share)
-    return np.append(cells.ravel(), elevator[-1])
-
-
-def _shared_steps(change: Array, corner: NDArray[np.bool_]) -> Array:
-    """(cells,) mean of a surface less that of a straight line, where a sample lies within a step that two cells share.
-
-    Beside both cells the surface rests. It moves straight through both, or steps at the sample: then the means are off by half
-    of each change. The middle of the two is taken.
-    """
-    alone = np.pad(~corner, 1, constant_values=True)
-    shared = corner[:-1] & corner[1:] & (change[:-1] * change[1:] > 0.0) & alone[:-3] & alone[3:]
-    shift = np.zeros(change.size)
-    shift[:-1] -= np.where(shared, 0.25 * change[:-1], 0.0)
-    shift[1:] += np.where(shared, 0.25 * change[1:], 0.0)
-    return shift
-
-
-def corner_variance(elevator: Array, std_rad: float) -> Array:
-    """Variance of an elevator's mean over each cell where its samples show a corner; empty if they show none.
-
-    A surface that moves in one direction between two samples has any mean between them, all alike: the variance is the
-    square of the change over 12. Half the fourth difference bounds that change from above where the samples are smooth:
-    it is as large as the change at a step, and falls with the fourth power of the sample period elsewhere.
-
-    Parameters
-    ----------
-    elevator : (samples,) [rad]; std_rad : standard deviation of its noise [rad].
-    """
-    if len(elevator) < 5:
-        return np.zeros(0)
-    rough = np.pad(np.abs(np.diff(elevator, 4)) / 2.0, 2, mode="edge")
-    change = np.minimum(np.abs(np.diff(elevator)), np.maximum(rough[:-1], rough[1:]))
-    least = max(_CORNER_SHARE * float(np.ptp(elevator)), _CORNER_NOISE * std_rad)
-    change = np.where(change > least, change, 0.0)
-    return np.append(0.0, change**2 / 12.0) if change.any() else np.zeros(0)
 
 
 def fine(x: Array, sub: int) -> Array:

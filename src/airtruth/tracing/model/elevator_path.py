@@ -1,0 +1,149 @@
+"""The elevator between its samples: its most likely path, and how far others through the same samples differ from it."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.numerics.intersample import servo_bend, servo_decay
+from airtruth.tracing.model.damper import damper_surface, find_damper
+from airtruth.tracing.model.elevator import (
+    held_command,
+    is_held,
+    shaped,
+    smooth,
+    with_steps,
+)
+
+Array = NDArray[np.float64]
+
+LONGEST_STEP_S: Final = 0.0201
+"""Longest step of integration [s], with room for rounding (judgement): the short period turns 0.1 rad in it."""
+_CORNER_SHARE: Final = 0.05
+"""Least corner, as a share of the elevator's range [-] (judgement): a smaller one moves the aircraft by less."""
+_CORNER_NOISE: Final = 20.0
+"""The same in standard deviations of the elevator's noise [-]: five of half a fourth difference, sqrt(70)/2 each."""
+
+
+class Between(NamedTuple):
+    """The surface between its samples.
+
+    Attributes
+    ----------
+    surface_rad : ((samples - 1) cells + 1,) on a fine grid [rad].
+    corner_rad2 : (samples,) variance of its mean over the cell that ends at each sample [rad2]; empty for none.
+    damped : whether a damper moves it throughout.
+    """
+
+    surface_rad: Array
+    corner_rad2: Array = np.zeros(0)
+    damped: bool = False
+
+
+def read_between(
+    elevator: Array, dt_s: float, cells: int, std_rad: float, servo_s: float, q_rad_s: Array | None = None
+) -> Between:
+    """The surface on a fine grid, and the variance of its mean over each cell.
+
+    Behind a declared servo and a command that moves with the samples it is the sum of a damper's share and the rest, where
+    the pitch rate shows a damper (`airtruth.tracing.model.damper`).
+
+    Parameters
+    ----------
+    elevator : (samples,) [rad], every ``dt_s`` [s]; cells : cells of the fine grid per sample.
+    std_rad : standard deviation of its noise [rad]; servo_s : declared time constant of its servo [s], 0 for none.
+    q_rad_s : (samples,) measured pitch rate [rad/s].
+    """
+    if dt_s > LONGEST_STEP_S and servo_s > 0.0:  # a coarse log
+        path = held_command(elevator, dt_s, servo_s, cells)
+        return Between(smooth(elevator, cells) if path is None else path)
+    relative = (elevator - elevator[0])[None, :]
+    bend, none = servo_bend(relative, std_rad)[0], np.zeros(0)
+    if bend.any():
+        tau_s = -dt_s / math.log(float(servo_decay(np.diff(relative), std_rad)[0]))
+        if servo_s <= 0.0 or is_held(elevator, dt_s, tau_s):
+            path = held_command(elevator, dt_s, tau_s, cells)
+            mean = _elevator(elevator, bend, cells, none)
+            return Between(mean if path is None else shaped(mean, path, cells))
+    corners = corner_variance(elevator, std_rad)
+    if servo_s <= 0.0 or not corners.size:
+        return Between(_elevator(elevator, np.zeros_like(bend), cells, corners), corners)
+    damper = None if q_rad_s is None else find_damper(elevator, q_rad_s, dt_s, servo_s)
+    if damper is None or q_rad_s is None:
+        path, steps = _behind_servo(elevator, dt_s, cells, servo_s)
+        return Between(path, np.append(0.0, np.where(steps, 0.0, corners[1:])))
+    own = damper_surface(damper, q_rad_s, dt_s, servo_s, cells)
+    rest = elevator - own[::cells]
+    pilot = held_command(rest, dt_s, servo_s, cells) if is_held(rest, dt_s, servo_s) else None
+    return Between(
+        own + (_behind_servo(rest, dt_s, cells, servo_s)[0] if pilot is None else pilot), none, True
+    )
+
+
+def _behind_servo(
+    elevator: Array, dt_s: float, cells: int, servo_s: float
+) -> tuple[Array, NDArray[np.bool_]]:
+    """A smooth surface with the steps of its command, see `with_steps`."""
+    smoothed = _elevator(elevator, np.zeros(elevator.size), cells, np.zeros(0))
+    return with_steps(elevator, smoothed, dt_s, servo_s, cells)
+
+
+def _elevator(elevator: Array, bend: Array, sub: int, corners: Array) -> Array:
+    """Parabolas of the cubic's area; straight beside a corner, because the samples across it say nothing of the cell."""
+    relative = elevator - elevator[0]
+    edge = np.concatenate([relative[:1], relative, relative[-1:]])
+    cubic = (edge[1:-2] + edge[2:-1] - edge[:-3] - edge[3:]) / 24.0
+    if corners.size:
+        at = np.pad(corners[1:] > 0.0, 1)
+        cubic[at[:-2] | at[1:-1] | at[2:]] = 0.0
+        cubic += _shared_steps(np.diff(relative), corners[1:] > 0.0)
+    bend = bend.copy()
+    bend[1:] += cubic
+    share = np.arange(sub) / sub
+    cells = elevator[:-1, None] + (elevator[1:] - elevator[:-1])[:, None] * share
+    cells += 6.0 * bend[1:, None] * share * (1.0 - share)
+    return np.append(cells.ravel(), elevator[-1])
+
+
+def _shared_steps(change: Array, corner: NDArray[np.bool_]) -> Array:
+    """(cells,) mean of a surface less that of a straight line, where a sample lies within a step that two cells share.
+
+    Beside both cells the surface rests. It moves straight through both, or steps at the sample: then the means are off by half
+    of each change. The middle of the two is taken.
+    """
+    alone = np.pad(~corner, 1, constant_values=True)
+    shared = corner[:-1] & corner[1:] & (change[:-1] * change[1:] > 0.0) & alone[:-3] & alone[3:]
+    shift = np.zeros(change.size)
+    shift[:-1] -= np.where(shared, 0.25 * change[:-1], 0.0)
+    shift[1:] += np.where(shared, 0.25 * change[1:], 0.0)
+    return shift
+
+
+def corner_variance(elevator: Array, std_rad: float) -> Array:
+    """Variance of an elevator's mean over each cell where its samples show a corner; empty if they show none.
+
+    A surface that moves in one direction between two samples has any mean between them, all alike: the variance is the
+    square of the change over 12. Half the fourth difference bounds that change from above where the samples are smooth:
+    it is as large as the change at a step, and falls with the fourth power of the sample period elsewhere.
+
+    Parameters
+    ----------
+    elevator : (samples,) [rad]; std_rad : standard deviation of its noise [rad].
+    """
+    if len(elevator) < 5:
+        return np.zeros(0)
+    rough = np.pad(np.abs(np.diff(elevator, 4)) / 2.0, 2, mode="edge")
+    change = np.minimum(np.abs(np.diff(elevator)), np.maximum(rough[:-1], rough[1:]))
+    change = np.where(change > _least_corner(elevator, std_rad), change, 0.0)
+    return np.append(0.0, change**2 / 12.0) if change.any() else np.zeros(0)
+
+
+def _least_corner(elevator: Array, std_rad: float) -> float:
+    """Least change of the surface within a cell that counts as a corner [rad]."""
+    return max(_CORNER_SHARE * float(np.ptp(elevator)), _CORNER_NOISE * std_rad)
+
+
+__all__ = ["LONGEST_STEP_S", "Between", "corner_variance", "read_between"]
