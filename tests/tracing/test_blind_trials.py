@@ -1,9 +1,11 @@
 """The runner: resumes, does not depend on jobs; the scores count what they say; the committed logs."""
 
 import json
+import shutil
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -76,6 +78,20 @@ def test_the_tracer_is_shown_a_log_and_nothing_else(plan, cases):
     log = read_log(plan.log(0) / "log.parquet")
     validate(log)
     assert set(log.metadata) == {"schema", "aircraft", "sample_rate_hz"}
+
+
+def test_weak_trials_can_be_left_out(plan, cases):
+    """Of a null, a weak and a strong effect, the first and the last are traced."""
+    only = replace(plan, count=3, out=plan.out.parent / "only", only_counted=True)
+    for folder in ("truth", "logs"):
+        shutil.copytree(plan.out / folder, only.out / folder)
+    for number, noncentrality in ((1, 5.0), (2, 50.0)):
+        trial = {"effects": [{"key": "vane_lag"}], "composition": "single"}
+        truth = {"trial": trial, "lambda": {"vane_lag": noncentrality}}
+        only.file("truth", number).write_text(json.dumps(truth))
+    shutil.copytree(plan.log(0), only.log(2))
+    assert [case["truth"] for case in trials.run(only, 1)] == [cases[0]["truth"], truth]
+    assert not only.file("answer", 1).exists()
 
 
 def test_a_tracer_that_fails_is_counted(plan, cases):

@@ -36,12 +36,24 @@ def main() -> int:
         default="validation.blind.tracing:answer",
         help="MODULE:FUNCTION, a log's path in, an answer out",
     )
+    parser.add_argument(
+        "--only-counted",
+        action="store_true",
+        help="trace only the trials without an effect and those above the noncentrality that the scores count",
+    )
     arguments = parser.parse_args()
     if arguments.trials < 1 or arguments.jobs < 1:
         parser.error("--trials and --jobs must be at least 1")
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(name, "1")  # of the workers
-    plan = Plan(arguments.trials, arguments.seed, arguments.mode, arguments.out, arguments.tracer)
+    plan = Plan(
+        arguments.trials,
+        arguments.seed,
+        arguments.mode,
+        arguments.out,
+        arguments.tracer,
+        arguments.only_counted,
+    )
     with workers(arguments.cluster) as cluster:
         cases = run(plan, arguments.jobs, cluster)
     scores = scoring.score(cases)

@@ -23,6 +23,7 @@ from airtruth.logs.store import read_log, write_text
 from validation.blind import draw, information, refit, tracing
 from validation.blind.figures import CHANNELS
 from validation.blind.flight import LeftRangeError
+from validation.blind.set_scoring import strong
 
 _ATTEMPTS: Final = 3
 _NEXT: Final = 1_000_000
@@ -30,13 +31,17 @@ _NEXT: Final = 1_000_000
 
 @dataclass(frozen=True)
 class Plan:
-    """What to do: trials 0 to ``count`` - 1 of a seed and mode, into ``out``, by the tracer MODULE:NAME."""
+    """What to do: trials 0 to ``count`` - 1 of a seed and mode, into ``out``, by the tracer MODULE:NAME.
+
+    ``only_counted``: trace only what a score counts, the trials without an effect and those above the noncentrality.
+    """
 
     count: int
     seed: int
     mode: str
     out: Path
     tracer: str = "validation.blind.tracing:answer"
+    only_counted: bool = False
 
     def file(self, stage: str, number: int) -> Path:
         """JSON file of one trial and stage, "truth" or "answer"."""
@@ -82,7 +87,7 @@ def trace(plan: Plan, number: int) -> dict[str, Any]:
 
 
 def run(plan: Plan, jobs: int, cluster: Cluster | None = None) -> list[dict[str, Any]]:
-    """All trials, in order: {"truth": .., "answer": ..} each.
+    """All trials that are traced, in order: {"truth": .., "answer": ..} each.
 
     Parameters
     ----------
@@ -92,12 +97,18 @@ def run(plan: Plan, jobs: int, cluster: Cluster | None = None) -> list[dict[str,
     """
     for folder in ("truth", "answer", "logs"):
         (plan.out / folder).mkdir(parents=True, exist_ok=True)
-    numbers = range(plan.count)
+    numbers = list(range(plan.count))
     _stage(plan, "truth", fly, [k for k in numbers if not plan.file("truth", k).exists()], jobs, cluster)
+    if plan.only_counted:
+        numbers = [k for k in numbers if _counts(json.loads(plan.file("truth", k).read_text()))]
     _stage(plan, "answer", trace, [k for k in numbers if not _answered(plan, k)], jobs, cluster)
     return [
         {stage: json.loads(plan.file(stage, k).read_text()) for stage in ("truth", "answer")} for k in numbers
     ]
+
+
+def _counts(truth: dict[str, Any]) -> bool:
+    return not truth["trial"]["effects"] or strong({"truth": truth})
 
 
 def frozen(seed: int, numbers: Sequence[int], mode: str, out: Path) -> list[Path]:
