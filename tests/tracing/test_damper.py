@@ -5,9 +5,11 @@ import pytest
 from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
+from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.terms import SurfaceTerm
 from airtruth.tracing.model.damper import Damper, damper_surface, find_damper
 from airtruth.tracing.model.elevator_path import read_between
+from airtruth.tracing.model.records import read
 from airtruth.tracing.model.surface import through
 from airtruth.units import DEG
 
@@ -48,7 +50,9 @@ def flown(pilot, damper, q):
 
 
 def means(surface):
-    return surface[:-1].reshape(-1, CELLS).mean(axis=1)
+    """(samples - 1,) mean over each cell, by the trapezoidal rule."""
+    middles = 0.5 * (surface[1:] + surface[:-1])
+    return middles.reshape(SAMPLES - 1, -1).mean(axis=1)
 
 
 @pytest.mark.parametrize("phase", [0.0, 0.25, 0.75])
@@ -66,7 +70,7 @@ def test_the_samples_show_gain_and_phase(pilot, phase):
     for seed in range(4):
         q, damper = pitch_rate(seed), Damper(0.5, phase)
         noise = NOISE * np.random.default_rng(300 + seed).standard_normal(SAMPLES)
-        seen = find_damper(flown(pilot(seed), damper, q)[::CELLS] + noise, q, DT, TAU)
+        seen = find_damper(flown(pilot(seed), damper, q)[::CELLS] + noise, q, DT, TAU, NOISE)
         assert seen is not None
         assert seen.gain_s == pytest.approx(damper.gain_s, rel=0.1)
         assert seen.phase == pytest.approx(phase, abs=0.1)
@@ -77,29 +81,54 @@ def test_no_damper_in_open_loop(pilot):
     for seed in range(10):
         noise = NOISE * np.random.default_rng(400 + seed).standard_normal(SAMPLES)
         surface = flown(pilot(seed), Damper(0.0, 0.0), pitch_rate(seed))[::CELLS] + noise
-        assert find_damper(surface, pitch_rate(seed), DT, TAU) is None
+        assert find_damper(surface, pitch_rate(seed), DT, TAU, NOISE) is None
 
 
 def test_no_damper_where_nothing_moves():
-    assert find_damper(np.zeros(50), pitch_rate(1)[:50], DT, TAU) is None
-    assert find_damper(pitch_rate(1)[:50], np.zeros(50), DT, TAU) is None
-    assert find_damper(np.arange(5.0), np.arange(5.0), DT, TAU) is None
+    assert find_damper(np.zeros(50), pitch_rate(1)[:50], DT, TAU, NOISE) is None
+    assert find_damper(pitch_rate(1)[:50], np.zeros(50), DT, TAU, NOISE) is None
+    assert find_damper(np.arange(5.0), np.arange(5.0), DT, TAU, NOISE) is None
 
 
-def test_the_path_between_samples_is_as_good_as_the_samples():
-    """The mean over a cell is off by less than the noise of a sample; without the pitch rate by twice as much or more."""
+def surface_of(samples, q):
+    """The elevator of `read` for one record, on its fine grid."""
+    channels = {
+        name: np.zeros(SAMPLES)
+        for name in ("alpha_rad", "az_m_s2", "theta_rad", "altitude_m", "airspeed_m_s")
+    }
+    channels |= {"elevator_rad": samples, "q_rad_s": q, "airspeed_m_s": np.full(SAMPLES, 38.0)}
+    log = FlightLog({}, ("a",), np.array([0, SAMPLES]), np.arange(SAMPLES) * DT, channels)
+    return read(log, NOISE, TAU)[0]
+
+
+def noisy(exact, seed):
+    return exact[::CELLS] + NOISE * np.random.default_rng(seed).standard_normal(SAMPLES)
+
+
+@pytest.mark.parametrize("pilot", [stepped, multisine])
+def test_the_path_between_samples_is_as_good_as_the_samples(pilot):
+    """The mean over a cell is off by less than the noise of a sample."""
+    errors = []
+    for seed in range(6):
+        q = pitch_rate(seed)
+        exact = flown(pilot(seed), Damper(0.5, 0.75), q)
+        signals = surface_of(noisy(exact, 500 + seed), q)
+        assert signals.elevator_std_rad == 0.0
+        errors.append(((means(signals.elevator_rad) - means(exact)) ** 2).mean())
+    assert np.sqrt(np.mean(errors)) < NOISE
+
+
+def test_the_pitch_rate_makes_the_path_better():
+    """Without it the error of the mean over a cell is at least 1.5 times as large."""
     errors = []
     for seed in range(6):
         q = pitch_rate(seed)
         exact = flown(stepped(seed), Damper(0.5, 0.75), q)
-        samples = exact[::CELLS] + NOISE * np.random.default_rng(500 + seed).standard_normal(SAMPLES)
-        between = read_between(samples, DT, CELLS, NOISE, TAU, q)
-        assert between.damped
-        blind = read_between(samples, DT, CELLS, NOISE, TAU)
-        errors.append([(means(made.surface_rad - exact) ** 2).mean() for made in (between, blind)])
-    rms = np.sqrt(np.mean(errors, axis=0))
-    assert rms[0] < NOISE
-    assert rms[1] > 2.0 * rms[0]
+        samples = noisy(exact, 500 + seed)
+        made = (surface_of(samples, q).elevator_rad, read_between(samples, DT, CELLS, NOISE, TAU).surface_rad)
+        errors.append([((means(path) - means(exact)) ** 2).mean() for path in made])
+    seen, blind = np.sqrt(np.mean(errors, axis=0))
+    assert blind > 1.5 * seen
 
 
 @pytest.mark.parametrize("width_rad", [0.002, 0.0045])
@@ -109,18 +138,18 @@ def test_a_play_behind_a_damper_keeps_its_width(width_rad):
     for seed in range(8):
         q = pitch_rate(seed)
         exact = flown(stepped(seed), Damper(0.5, 0.75), q)
-        samples = exact[::CELLS] + NOISE * np.random.default_rng(600 + seed).standard_normal(SAMPLES)
         right = means(through([SurfaceTerm("backlash", width_rad)], exact, DT / CELLS))
-        path = read_between(samples, DT, CELLS, NOISE, TAU, q).surface_rad
-        widths.append(_width(path, right, width_rad))
+        signals = surface_of(noisy(exact, 600 + seed), q)
+        widths.append(_width(signals.elevator_rad, right, width_rad))
     assert np.mean(widths) == pytest.approx(width_rad, rel=0.02)
 
 
 def _width(path, right, width):
     """Width of the play behind ``path`` that is nearest to ``right``."""
+    step = DT * (SAMPLES - 1) / (path.size - 1)
 
     def away(trial):
-        play = through([SurfaceTerm("backlash", trial)], path, DT / CELLS)
+        play = through([SurfaceTerm("backlash", trial)], path, step)
         return float(((means(play) - right) ** 2).sum())
 
     return float(minimize_scalar(away, bounds=(0.3 * width, 1.5 * width), method="bounded").x)

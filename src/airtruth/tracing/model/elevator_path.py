@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.numerics.intersample import servo_bend, servo_decay
-from airtruth.tracing.model.damper import damper_surface, find_damper
 from airtruth.tracing.model.elevator import (
     held_command,
     is_held,
@@ -35,27 +34,19 @@ class Between(NamedTuple):
     ----------
     surface_rad : ((samples - 1) cells + 1,) on a fine grid [rad].
     corner_rad2 : (samples,) variance of its mean over the cell that ends at each sample [rad2]; empty for none.
-    damped : whether a damper moves it throughout.
     """
 
     surface_rad: Array
     corner_rad2: Array = np.zeros(0)
-    damped: bool = False
 
 
-def read_between(
-    elevator: Array, dt_s: float, cells: int, std_rad: float, servo_s: float, q_rad_s: Array | None = None
-) -> Between:
+def read_between(elevator: Array, dt_s: float, cells: int, std_rad: float, servo_s: float) -> Between:
     """The surface on a fine grid, and the variance of its mean over each cell.
-
-    Behind a declared servo and a command that moves with the samples it is the sum of a damper's share and the rest, where
-    the pitch rate shows a damper (`airtruth.tracing.model.damper`).
 
     Parameters
     ----------
     elevator : (samples,) [rad], every ``dt_s`` [s]; cells : cells of the fine grid per sample.
     std_rad : standard deviation of its noise [rad]; servo_s : declared time constant of its servo [s], 0 for none.
-    q_rad_s : (samples,) measured pitch rate [rad/s].
     """
     if dt_s > LONGEST_STEP_S and servo_s > 0.0:  # a coarse log
         path = held_command(elevator, dt_s, servo_s, cells)
@@ -71,24 +62,9 @@ def read_between(
     corners = corner_variance(elevator, std_rad)
     if servo_s <= 0.0 or not corners.size:
         return Between(_elevator(elevator, np.zeros_like(bend), cells, corners), corners)
-    damper = None if q_rad_s is None else find_damper(elevator, q_rad_s, dt_s, servo_s)
-    if damper is None or q_rad_s is None:
-        path, steps = _behind_servo(elevator, dt_s, cells, servo_s)
-        return Between(path, np.append(0.0, np.where(steps, 0.0, corners[1:])))
-    own = damper_surface(damper, q_rad_s, dt_s, servo_s, cells)
-    rest = elevator - own[::cells]
-    pilot = held_command(rest, dt_s, servo_s, cells) if is_held(rest, dt_s, servo_s) else None
-    return Between(
-        own + (_behind_servo(rest, dt_s, cells, servo_s)[0] if pilot is None else pilot), none, True
-    )
-
-
-def _behind_servo(
-    elevator: Array, dt_s: float, cells: int, servo_s: float
-) -> tuple[Array, NDArray[np.bool_]]:
-    """A smooth surface with the steps of its command, see `with_steps`."""
-    smoothed = _elevator(elevator, np.zeros(elevator.size), cells, np.zeros(0))
-    return with_steps(elevator, smoothed, dt_s, servo_s, cells)
+    smoothed = _elevator(elevator, np.zeros_like(bend), cells, none)
+    path, steps = with_steps(elevator, smoothed, dt_s, servo_s, cells)
+    return Between(path, np.append(0.0, np.where(steps, 0.0, corners[1:])))
 
 
 def _elevator(elevator: Array, bend: Array, sub: int, corners: Array) -> Array:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,8 @@ from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.atmosphere import air_density, altitude_of_density_m
 from airtruth.tracing.model.airspeed import ground_speed, gust_cutoff_hz, low_passed
 from airtruth.tracing.model.compile import CHANNELS
-from airtruth.tracing.model.elevator_path import LONGEST_STEP_S, read_between
+from airtruth.tracing.model.damper import damper_surface, find_damper
+from airtruth.tracing.model.elevator_path import LONGEST_STEP_S, Between, read_between
 from airtruth.tracing.model.plant import Plant
 
 Array = NDArray[np.float64]
@@ -149,7 +151,8 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0) ->
     and backlash and rate limits would take each new extreme for motion.
     The elevator between samples has the area of the cubic through the four nearest samples and the
     corners of a first-order servo where the record shows one (`airtruth.numerics.intersample`); in a coarse log it is
-    that of the declared servo, or a spline (`airtruth.tracing.model.elevator`). Airspeed
+    that of the declared servo, or a spline (`airtruth.tracing.model.elevator`). What a pitch damper moves follows from the
+    pitch rate (`airtruth.tracing.model.damper`). Airspeed
     and density are inputs, and their noise is not motion: they are low-passed forward and backward, the density at 5 Hz and
     the airspeed where its noise exceeds its gusts (`gust_cutoff_hz`).
     Attitude is measured, or the integral of the pitch rate from alpha at the start, level flight.
@@ -176,40 +179,49 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0) ->
         if theta is None:
             q = channels["q_rad_s"]
             theta = channels["alpha_rad"][0] + np.concatenate([[0.0], np.cumsum(0.5 * dt * (q[1:] + q[:-1]))])
-        quiet = _quiet(channels["elevator_rad"], dt, elevator_std_rad)
-        between = read_between(
-            quiet,
-            dt,
-            sub * FINE,
-            elevator_std_rad,
-            servo_s,
-            np.asarray(channels["q_rad_s"], dtype=np.float64),
-        )
+        surface = _surface(channels, dt, sub * FINE, elevator_std_rad, servo_s)
         found.append(
             Signals(
                 run_id=run_id,
                 dt_s=dt,
                 sub=sub,
                 y=np.ascontiguousarray(y, dtype=np.float64),
-                elevator_rad=between.surface_rad,
+                elevator_rad=surface.between.surface_rad,
                 airspeed_m_s=fine(low_passed(airspeed, dt, gust_cutoff_hz(airspeed, dt)), sub),
                 ground_m_s=fine(ground_speed(channels, theta, dt), sub),
                 density_kg_m3=fine(low_passed(density, dt), sub),
                 theta_rad=fine(theta, sub),
                 altitude_m=float(np.mean(altitude)),
-                elevator_std_rad=0.0
-                if between.damped
-                else _unsmoothed_std(quiet, channels["elevator_rad"], elevator_std_rad),
+                elevator_std_rad=surface.std_rad,
                 throttle=float(channels["throttle"].mean()) if "throttle" in channels else None,
-                corner_rad2=between.corner_rad2,
+                corner_rad2=surface.between.corner_rad2,
             )
         )
     return found
 
 
-def _unsmoothed_std(quiet: Array, raw: Array, std_rad: float) -> float:
-    """Standard deviation of the noise that `_quiet` leaves [rad]."""
-    return std_rad * float(np.sqrt((quiet == raw).mean()))
+class _Surface(NamedTuple):
+    """A surface between its samples, and the noise that remains in it [rad], see `Signals`."""
+
+    between: Between
+    std_rad: float
+
+
+def _surface(
+    channels: Mapping[str, Array], dt_s: float, cells: int, std_rad: float, servo_s: float
+) -> _Surface:
+    """The smoothed elevator on a fine grid; behind a damper that of the pilot, and the damper's share."""
+    raw = np.asarray(channels["elevator_rad"], dtype=np.float64)
+    q = np.asarray(channels["q_rad_s"], dtype=np.float64)
+    is_fast = servo_s > 0.0 and dt_s <= LONGEST_STEP_S
+    damper = find_damper(raw, q, dt_s, servo_s, std_rad) if is_fast else None
+    if damper is None:
+        quiet = _quiet(raw, dt_s, std_rad)
+        remaining = std_rad * float(np.sqrt((quiet == raw).mean()))
+        return _Surface(read_between(quiet, dt_s, cells, std_rad, servo_s), remaining)
+    own = damper_surface(damper, q, dt_s, servo_s, cells)
+    pilot = read_between(_quiet(raw - own[::cells], dt_s, std_rad), dt_s, cells, std_rad, servo_s)
+    return _Surface(pilot._replace(surface_rad=pilot.surface_rad + own), 0.0)
 
 
 def _quiet(elevator: Array, dt_s: float, std: float) -> Array:
