@@ -1,5 +1,8 @@
 """Profile likelihood along the location of an effect: few samples show a break, and several optima are common.
 
+A rate limit has several optima too, where the surface is at its limit for most of a record; its size takes the place of a
+location.
+
 Source: W. Q. Meeker and L. A. Escobar, The American Statistician 49 (1995) 48-53 (profile likelihood intervals).
 """
 
@@ -27,6 +30,9 @@ _ITERATIONS: Final = 12
 """Most iterations at one location [-]; judgement: the fit next to it is the start."""
 _LEAST: Final = 0.01
 """Smallest standard error for the grid over the plausible range [-]; judgement."""
+_LEAST_LIMIT: Final = 0.01
+"""Smallest standard error for the grid about a rate limit, relative to its size [-] (measured: optima of a record in calm air
+lie 1.7 to 2.1 % apart)."""
 _MOST: Final = 0.12
 """Largest standard error for the grid over the plausible range [-]; judgement."""
 _BETTER: Final = 0.1
@@ -74,8 +80,8 @@ class Profile:
 
 
 def location_index(effect: Effect) -> int | None:
-    """Index of the effect's location among its parameters, None if it has none."""
-    return next((j for j, p in enumerate(effect.parameters) if p.is_location), None)
+    """Index of the effect's location, or limit, among its parameters; None if it has none."""
+    return next((j for j, p in enumerate(effect.parameters) if p.is_location or p.is_limit), None)
 
 
 def best_location(problem: TraceProblem, fitted: PosteriorFit) -> tuple[PosteriorFit, Profile]:
@@ -149,8 +155,10 @@ def _size_numbers(fitted: PosteriorFit) -> tuple[int, int]:
 def _along(problem: TraceProblem, fitted: PosteriorFit) -> list[PosteriorFit]:
     """Fits at locations on either side, each from the one before."""
     number, _ = _size_numbers(fitted)
-    low, high = fitted.hypothesis.parameter(number).ends
-    std = min(max(fitted.size_std(number), _LEAST * (high - low)), _MOST * (high - low))
+    parameter = fitted.hypothesis.parameter(number)
+    low, high = parameter.ends
+    least = _LEAST_LIMIT * float(fitted.point.sizes[number]) if parameter.is_limit else _LEAST * (high - low)
+    std = min(max(fitted.size_std(number), least), _MOST * (high - low))
     fits = []
     for side in (-1.0, 1.0):
         point = fitted.point
