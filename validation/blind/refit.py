@@ -224,7 +224,7 @@ def _least(left: Callable[[Array], Array], x: Array) -> float:
         for _ in range(_HALVINGS):
             try:
                 tried = left(x + move)
-            except RuntimeError:  # it cannot be trimmed there
+            except (RuntimeError, np.linalg.LinAlgError):  # it cannot be trimmed there
                 tried = np.full_like(r, np.inf)
             if tried @ tried < before:
                 x, r = x + move, tried
