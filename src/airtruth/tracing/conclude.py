@@ -11,18 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.tracing.answer import (
     ANOMALY_LEVEL,
-    Z95,
     AcceptedEffect,
     CandidateScore,
     DeclaredModel,
     Derivatives,
     Evidence,
-    ParameterEstimate,
     RecordNames,
     TraceAnswer,
     VerdictName,
@@ -42,8 +39,8 @@ from airtruth.tracing.increment_table import in_physical_terms, increment_rows, 
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, derivative_likelihood
 from airtruth.tracing.inference.hypothesis import unconstrained_by
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.inference.profile import Profile, location_index
 from airtruth.tracing.inference.robust import robust_covariance
+from airtruth.tracing.intervals import estimates, widened_by_profile, widened_by_rejected
 from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.notes import notes
 from airtruth.tracing.prepare import Case
@@ -142,27 +139,6 @@ def _evidence(anomaly: Anomaly) -> Evidence:
     return Evidence(anomaly.statistic, anomaly.p_value, anomaly.where)
 
 
-def estimates(effect: Effect, sizes: Array, covariance: Array) -> dict[str, ParameterEstimate]:
-    """Value, standard deviation and 95 % interval of each parameter of an effect.
-
-    Parameters
-    ----------
-    sizes, covariance : (parameters,) in the size coordinates of the effect, and their covariance.
-    """
-    found = {}
-    for i, p in enumerate(effect.parameters):
-        size, std = float(sizes[i]), float(np.sqrt(max(covariance[i, i], 0.0)))
-        value = p.value(size)
-        low, high = sorted((p.value(size - Z95 * std), p.value(size + Z95 * std)))
-        slope = abs(p.value(size + 0.01 * std) - value) / 0.01 if math.isfinite(value) else math.inf
-        found[p.name] = ParameterEstimate(value, slope, (_finite(low), _finite(high)))
-    return found
-
-
-def _finite(end: float) -> float | None:
-    return max(end, -1e300) if math.isfinite(end) else None
-
-
 def reported(last: SearchRound) -> PosteriorFit:
     """The fit whose sizes are reported: that under the autoregression, where it moved away from the null."""
     stayed = np.array_equal(last.gls.point.common, last.null.point.common)
@@ -181,9 +157,11 @@ def _effect(
         for c in own.candidates
         if c is not best and c.score.effect.name != effect.name and c.gain <= best.gain
     ]
-    stated = estimates(effect, final.point.sizes[span], covariance[Common.size :, Common.size :][span, span])
+    own_covariance = covariance[Common.size :, Common.size :][span, span]
+    stated = estimates(effect, final.point.sizes[span], own_covariance)
     if own.profile is not None:
-        stated = _widened_by_profile(effect, stated, own.profile)
+        stated = widened_by_profile(effect, stated, own.profile)
+    stated = widened_by_rejected(effect, stated, rounds[-1], np.sqrt(np.diag(own_covariance)))
     is_curvature = bool(unconstrained_by(effect, final.hypothesis.trim_alpha_rad))
     accepted = AcceptedEffect(
         name=effect.name,
@@ -218,19 +196,6 @@ def _with_rivals(
         )
         for e in stated
     )
-
-
-def _widened_by_profile(
-    effect: Effect, stated: dict[str, ParameterEstimate], profile: Profile
-) -> dict[str, ParameterEstimate]:
-    """Estimates whose intervals of size and location contain those of the profile likelihood."""
-    widened = dict(stated)
-    at = location_index(effect) or 0
-    for j, ends in ((0, profile.size_interval()), (at, profile.location_interval())):
-        p = effect.parameters[j]
-        all_ends = [*(e for e in widened[p.name].ci95 if e is not None), *map(p.value, ends)]
-        widened[p.name] = replace(widened[p.name], ci95=(min(all_ends), max(all_ends)))
-    return widened
 
 
 def _p_value(own: SearchRound, best: Candidate) -> float:

@@ -1,0 +1,103 @@
+"""95 % intervals of the parameters of an accepted effect."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.effects.effect import Effect
+from airtruth.tracing.accepted import ParameterEstimate
+from airtruth.tracing.answer import Z95
+from airtruth.tracing.inference.profile import Profile, location_index
+from airtruth.tracing.selection.acceptance import Candidate, has_converged
+from airtruth.tracing.selection.rounds import REMAINS, SearchRound, significant_gain
+
+Array = NDArray[np.float64]
+
+
+def estimates(effect: Effect, sizes: Array, covariance: Array) -> dict[str, ParameterEstimate]:
+    """Value, standard deviation and 95 % interval of each parameter of an effect.
+
+    Parameters
+    ----------
+    sizes, covariance : (parameters,) in the size coordinates of the effect, and their covariance.
+    """
+    found = {}
+    for i, p in enumerate(effect.parameters):
+        size, std = float(sizes[i]), float(np.sqrt(max(covariance[i, i], 0.0)))
+        value = p.value(size)
+        low, high = sorted((p.value(size - Z95 * std), p.value(size + Z95 * std)))
+        slope = abs(p.value(size + 0.01 * std) - value) / 0.01 if math.isfinite(value) else math.inf
+        found[p.name] = ParameterEstimate(value, slope, (_finite(low), _finite(high)))
+    return found
+
+
+def _finite(end: float) -> float | None:
+    return max(end, -1e300) if math.isfinite(end) else None
+
+
+def widened_by_profile(
+    effect: Effect, stated: dict[str, ParameterEstimate], profile: Profile
+) -> dict[str, ParameterEstimate]:
+    """Estimates whose intervals of size and location contain those of the profile likelihood."""
+    widened = dict(stated)
+    at = location_index(effect) or 0
+    for j, ends in ((0, profile.size_interval()), (at, profile.location_interval())):
+        p = effect.parameters[j]
+        widened[p.name] = _containing(widened[p.name], map(p.value, ends))
+    return widened
+
+
+def widened_by_rejected(
+    effect: Effect, stated: dict[str, ParameterEstimate], last: SearchRound, stds: Array
+) -> dict[str, ParameterEstimate]:
+    """Estimates whose intervals contain those beside effects that explain the remaining anomaly, and are not accepted.
+
+    Where an anomaly remains the model lacks something, which may have moved the estimates. An effect that gains as much as a
+    later effect has to, and fails another test, shows how far.
+
+    Parameters
+    ----------
+    effect : an accepted effect; stated : its estimates.
+    last : the last round of the search.
+    stds : (parameters,) standard deviations of the estimates in the size coordinates of the effect.
+    """
+    if last.anomaly.p_value >= REMAINS:
+        return stated
+    least = significant_gain(len(last.table.scores) + len(last.null.hypothesis.effects), later=True)
+    rejected = [c for c in last.candidates if c.reasons and c.gain >= least and has_converged(c.fit, c.gain)]
+    widened = dict(stated)
+    for candidate in rejected:
+        for i, ends in enumerate(_beside(effect, candidate, last, stds)):
+            name = effect.parameters[i].name
+            widened[name] = _containing(widened[name], ends)
+    return widened
+
+
+def _beside(effect: Effect, rejected: Candidate, last: SearchRound, stds: Array) -> list[tuple[float, float]]:
+    """Ends of the interval of each parameter of an effect beside a candidate, as robust as those of the answer."""
+    own, beside = last.null.hypothesis.span(effect.key), rejected.fit.hypothesis.span(effect.key)
+    ends = []
+    for i, p in enumerate(effect.parameters):
+        plain = last.null.size_std(own.start + i)
+        ratio = max(float(stds[i]) / plain, 1.0) if plain > 0.0 else 1.0
+        inflated = ratio * rejected.fit.size_std(beside.start + i)
+        size = float(rejected.fit.point.sizes[beside.start + i])
+        ends.append((p.value(size - Z95 * inflated), p.value(size + Z95 * inflated)))
+    return ends
+
+
+def _containing(stated: ParameterEstimate, ends: Iterable[float]) -> ParameterEstimate:
+    """The estimate with an interval that contains more ends; an end at infinity is open."""
+    low, high = stated.ci95
+    more = list(ends)
+    bottom = min(-math.inf if low is None else low, *more)
+    top = max(math.inf if high is None else high, *more)
+    return replace(stated, ci95=(_finite(bottom), _finite(top)))
+
+
+__all__ = ["estimates", "widened_by_profile", "widened_by_rejected"]
