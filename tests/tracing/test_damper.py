@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
-from scipy.signal import lfilter
+from scipy.signal import cont2discrete, dlsim, lfilter
 
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.terms import SurfaceTerm
@@ -84,9 +84,23 @@ def test_no_damper_in_open_loop(pilot):
         assert find_damper(surface, pitch_rate(seed), DT, TAU, NOISE) is None
 
 
+@pytest.mark.parametrize("pilot", [stepped, multisine])
+@pytest.mark.parametrize("noise", [0.0, NOISE])
+def test_an_ideal_gyro_in_open_loop_shows_no_damper(pilot, noise):
+    """The pitch rate then responds smoothly to the surface, and a combination of its samples explains the surface."""
+    a, b = np.array([[-1.2, 0.98], [-25.0, -1.5]]), np.array([[-0.1], [-30.0]])
+    for seed in range(6):
+        surface = flown(pilot(seed), Damper(0.0, 0.0), pitch_rate(seed))
+        ad, bd, *_ = cont2discrete((a, b, np.eye(2), np.zeros((2, 1))), DT / CELLS)
+        q = dlsim((ad, bd, np.array([[0.0, 1.0]]), np.zeros((1, 1)), DT / CELLS), surface)[1][::CELLS, 0]
+        samples = surface[::CELLS] + noise * np.random.default_rng(700 + seed).standard_normal(SAMPLES)
+        assert find_damper(samples, q, DT, TAU, noise) is None
+
+
 def test_no_damper_where_nothing_moves():
     assert find_damper(np.zeros(50), pitch_rate(1)[:50], DT, TAU, NOISE) is None
     assert find_damper(pitch_rate(1)[:50], np.zeros(50), DT, TAU, NOISE) is None
+    assert find_damper(pitch_rate(1)[:50], np.append(np.zeros(49), 1.0), DT, TAU, NOISE) is None
     assert find_damper(np.arange(5.0), np.arange(5.0), DT, TAU, NOISE) is None
 
 
