@@ -66,15 +66,17 @@ def find_damper(
     dt_s, tau_s : sample period and time constant of the servo [s].
     noise_rad : standard deviation of the noise of the surface [rad], below which differences show nothing.
     """
-    if len(elevator_rad) < 2 * (_ORDER + 1) or np.ptp(q_rad_s) == 0.0:
+    if len(elevator_rad) < 2 * (_ORDER + 1):
         return None
     command = np.diff(implied_command(elevator_rad, dt_s, tau_s), _ORDER)
+    if not command.any():
+        return None
     rho = float(np.exp(-dt_s / tau_s))
     floor = noise_rad * _SPREAD * np.sqrt(1.0 + rho * rho) / (1.0 - rho)
     alone, best, least = np.hypot(command, floor).sum(), Damper(0.0, 0.0), np.inf
     for phase in _PHASES.tolist():
         fed_back = _fed_back(q_rad_s, phase, dt_s, tau_s)
-        if not (command.any() and fed_back.any()):
+        if not fed_back.any():
             return None
         (gain,) = _least_absolute(command, fed_back[:, None])
         left = np.hypot(command - gain * fed_back, floor).sum()

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -179,38 +179,31 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0) ->
         if theta is None:
             q = channels["q_rad_s"]
             theta = channels["alpha_rad"][0] + np.concatenate([[0.0], np.cumsum(0.5 * dt * (q[1:] + q[:-1]))])
-        surface = _surface(channels, dt, sub * FINE, elevator_std_rad, servo_s)
+        between, remaining_rad = _surface(channels, dt, sub * FINE, elevator_std_rad, servo_s)
         found.append(
             Signals(
                 run_id=run_id,
                 dt_s=dt,
                 sub=sub,
                 y=np.ascontiguousarray(y, dtype=np.float64),
-                elevator_rad=surface.between.surface_rad,
+                elevator_rad=between.surface_rad,
                 airspeed_m_s=fine(low_passed(airspeed, dt, gust_cutoff_hz(airspeed, dt)), sub),
                 ground_m_s=fine(ground_speed(channels, theta, dt), sub),
                 density_kg_m3=fine(low_passed(density, dt), sub),
                 theta_rad=fine(theta, sub),
                 altitude_m=float(np.mean(altitude)),
-                elevator_std_rad=surface.std_rad,
+                elevator_std_rad=remaining_rad,
                 throttle=float(channels["throttle"].mean()) if "throttle" in channels else None,
-                corner_rad2=surface.between.corner_rad2,
+                corner_rad2=between.corner_rad2,
             )
         )
     return found
 
 
-class _Surface(NamedTuple):
-    """A surface between its samples, and the noise that remains in it [rad], see `Signals`."""
-
-    between: Between
-    std_rad: float
-
-
 def _surface(
     channels: Mapping[str, Array], dt_s: float, cells: int, std_rad: float, servo_s: float
-) -> _Surface:
-    """The smoothed elevator on a fine grid; behind a damper that of the pilot, and the damper's share."""
+) -> tuple[Between, float]:
+    """The smoothed elevator between its samples, the damper's share included, and the noise that remains in it [rad]."""
     raw = np.asarray(channels["elevator_rad"], dtype=np.float64)
     q = np.asarray(channels["q_rad_s"], dtype=np.float64)
     is_fast = servo_s > 0.0 and dt_s <= LONGEST_STEP_S
@@ -218,10 +211,10 @@ def _surface(
     if damper is None:
         quiet = _quiet(raw, dt_s, std_rad)
         remaining = std_rad * float(np.sqrt((quiet == raw).mean()))
-        return _Surface(read_between(quiet, dt_s, cells, std_rad, servo_s), remaining)
+        return read_between(quiet, dt_s, cells, std_rad, servo_s), remaining
     own = damper_surface(damper, q, dt_s, servo_s, cells)
     pilot = read_between(_quiet(raw - own[::cells], dt_s, std_rad), dt_s, cells, std_rad, servo_s)
-    return _Surface(pilot._replace(surface_rad=pilot.surface_rad + own), 0.0)
+    return pilot._replace(surface_rad=pilot.surface_rad + own), 0.0
 
 
 def _quiet(elevator: Array, dt_s: float, std: float) -> Array:
