@@ -153,6 +153,29 @@ def test_a_rival_out_of_reach_ends_a_search():
     assert found.status == (Status.OUTRUN,)
 
 
+def test_a_step_with_renewed_derivatives_may_have_a_margin_of_its_own():
+    """Every step of a search without reuse has renewed derivatives."""
+    options = Options(100, stopping=Stopping(1e-14), outrun_renewed=1e-3)
+    found = minimise(LeastSquares(meyer), np.array([[0.02, 4000.0, 250.0]]), options, rival=-1e30)
+    assert found.status == (Status.OUTRUN,)
+
+
+def test_derivatives_that_promise_too_much_are_renewed():
+    """The slope of exp(x) at its start is that of a far steeper curve at the end: steps with it creep."""
+
+    def exponential(x):
+        return np.array([np.exp(x[0]) - 1e-3]), np.array([[np.exp(x[0])]])
+
+    counts = {}
+    for creeping in (0.0, 0.5):
+        problems = LeastSquares(exponential)
+        options = Options(1000, stopping=Stopping(promised=1e-14), reuse=True, stale=1e-6, creeping=creeping)
+        found = minimise(problems, np.array([[3.0]]), options)
+        assert found.x[0, 0] == pytest.approx(np.log(1e-3), abs=1e-3)
+        counts[creeping] = problems.reused
+    assert counts[0.5] < 0.5 * counts[0.0]
+
+
 def test_the_damping_follows_the_gain_ratio():
     """Down where the quadratic model is good, up where it is poor; a rejected step restarts it."""
     d = Damping(initial=1.0, least=0.05, poor=3.0, fair=1.0, good=0.1, rejected=10.0, restart=40.0)

@@ -9,7 +9,7 @@ from scaled_records import ACCELEROMETER, GYRO, VANE, fitted, scaled_problem
 
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.selection.exchange import better_set, other_kinds
-from airtruth.tracing.selection.rounds import significant_gain
+from airtruth.tracing.selection.rounds import scored_round, significant_gain
 
 LIBRARY = tuple(EFFECTS.values())
 LEAST = significant_gain(33, later=True)
@@ -20,8 +20,8 @@ def problem():
     return scaled_problem()
 
 
-def reached(problem, first, second, rivals):
-    """A search that has accepted two effects; ``rivals`` were refitted in its second round."""
+def reached(problem, first, second, rivals, scored=()):
+    """A search that has accepted two effects; ``rivals`` were refitted in its second round, ``scored`` has scores at its end."""
 
     def candidate(gain, *effects):
         return SimpleNamespace(
@@ -33,13 +33,13 @@ def reached(problem, first, second, rivals):
     return (
         SimpleNamespace(tied=leaders[:1], candidates=leaders[:1]),
         SimpleNamespace(tied=leaders[1:], candidates=(leaders[1], *others)),
-        SimpleNamespace(tied=(), candidates=(), null=leaders[1].fit),
+        scored_round(problem, leaders[1].fit, scored, 2, 1, lambda step: None),
     )
 
 
 def better_of(problem, *search):
     rounds = reached(problem, *search)
-    return better_set(problem, rounds, rounds[-1].null, LIBRARY, LEAST, lambda step: None)
+    return better_set(problem, rounds, rounds[-1].null, LIBRARY, LEAST, lambda step: None)[0]
 
 
 def test_a_wrong_member_gives_way_to_its_rival(problem):
@@ -56,6 +56,19 @@ def test_what_explains_most_comes_first(problem):
 
 def test_a_right_set_stays(problem):
     assert better_of(problem, GYRO, VANE, [ACCELEROMETER]) is None
+
+
+def test_what_remains_points_to_an_effect_that_makes_another_redundant(problem):
+    better = better_of(problem, GYRO, ACCELEROMETER, [], [VANE])
+    assert better is not None
+    assert {e.key for e in better} == {"vane_scale", "gyro_scale"}
+
+
+def test_every_exchange_is_kept_for_the_look_alikes(problem):
+    rounds = reached(problem, GYRO, VANE, [ACCELEROMETER])
+    better, fits = better_set(problem, rounds, rounds[-1].null, LIBRARY, LEAST, lambda step: None)
+    assert better is None
+    assert [[e.key for e in f.hypothesis.effects] for f in fits] == [["gyro_scale", "accelerometer_scale"]]
 
 
 def test_late_members_are_late_in_another_way():

@@ -1,14 +1,12 @@
 """Minimise cost functions by damped Gauss-Newton or Fisher-scoring steps: one Levenberg-Marquardt solver.
 
-The solver knows nothing of a model. A caller describes its problems by three functions (`Problems`): evaluate a
-point, propose a step at a given damping, and apply a step within bounds. The solver chooses the damping, accepts or
-rejects the steps and ends the search. It works on several problems of one shape side by side, each with a damping, a
-status and an iteration count of its own; every call of the caller's functions gets all problems that still run, so
-that a caller can evaluate them in one vectorised or parallel pass.
+The solver knows nothing of a model. A caller describes its problems by three functions (`Problems`): evaluate a point,
+propose a step at a given damping, and apply a step within bounds. The solver chooses the damping, accepts or rejects the
+steps and ends the search. It works on several problems of one shape side by side. Every call of the caller's functions
+gets all problems that still run, so that a caller can evaluate them in one vectorised or parallel pass.
 
-The tracer's posterior is one problem whose step eliminates the parameters of each record, and reuses derivatives
-(`Options.reuse`). A batch of runs is many problems: ``evaluate`` gets the rows of those that still run, and ``step``
-stacks their gradients and curvatures for one call of `airtruth.numerics.normal_equations.scaled_step`.
+The tracer's posterior is one problem that reuses derivatives (`Options.reuse`). A batch of runs is many problems, whose
+gradients and curvatures ``step`` stacks for one call of `airtruth.numerics.normal_equations.scaled_step`.
 
 Sources: D. W. Marquardt, J. Soc. Indust. Appl. Math. 11 (1963) 431-441 (steps damped on the scaled diagonal, factor
 10); K. Madsen, H. B. Nielsen and O. Tingleff, Methods for Non-Linear Least Squares Problems, 2nd ed. (2004), section
@@ -134,10 +132,9 @@ class Stopping:
     Attributes
     ----------
     undamped : promised by an undamped step, which is then taken: converged.
-    promised : promised by the damped step. Converged if an undamped step promises less than ``promised_confirm``,
-        else `Status.SHORT`.
-    decrease : achieved by an accepted step. Converged if an undamped step promises less than ``decrease_confirm``,
-        else the search continues.
+    promised : promised by the damped step. Converged if an undamped one promises less than ``promised_confirm``, else
+        `Status.SHORT`.
+    decrease : achieved by an accepted step. Converged if an undamped one promises less than ``decrease_confirm``.
     rejected : promised by an undamped step after a rejected one: converged.
     """
 
@@ -157,12 +154,13 @@ class Options:
     ----------
     iterations : most iterations.
     damping, stopping : see there.
-    reuse : whether a trial point is evaluated with the derivatives of the point before it. They are renewed once a
-        step decreases the cost by less than ``stale``. Only renewed derivatives end a search.
-    chords : most further steps with the same derivatives after a trial that decreases the cost by less than half of
-        what was promised: they lead back into a curved valley.
+    reuse : whether a trial point is evaluated with the derivatives of the point before it. They are renewed once a step
+        decreases the cost by less than ``stale`` or by less than ``creeping`` of its promise. Only renewed ones end a search.
+    chords : most further steps with the same derivatives after a trial that decreases the cost by less than half of its
+        promise: they lead back into a curved valley.
     outrun : margin behind a rival's cost beyond which a search ends, provided that four more steps like the last
         would not make it up [unit of the cost].
+    outrun_renewed : the same after a step with renewed derivatives.
     """
 
     iterations: int
@@ -170,8 +168,10 @@ class Options:
     stopping: Stopping = field(default_factory=Stopping)
     reuse: bool = False
     stale: float = 0.0
+    creeping: float = 0.0
     chords: int = 0
     outrun: float = np.inf
+    outrun_renewed: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -268,7 +268,8 @@ def _iterate(problems: Problems[E], searches: Sequence[_Search[E]], options: Opt
     for trial in trials:
         decrease = _accept_or_reject(problems, trial, options, rival)
         search = trial.search
-        if search.status is Status.RUNNING and not search.fresh and decrease < options.stale:
+        limit = max(options.stale, options.creeping * trial.promised)
+        if search.status is Status.RUNNING and not search.fresh and decrease < limit:
             stale.append(search)
     for search in _renew(problems, stale):
         search.status = Status.SHORT
@@ -353,8 +354,9 @@ def _accept_or_reject(problems: Problems[E], trial: _Trial[E], options: Options,
         search.x, search.at = trial.x, trial.at
         search.damping = options.damping.after(search.damping, decrease / max(trial.promised, _TINY))
         behind = trial.at.cost - rival
+        margin = min(options.outrun, options.outrun_renewed) if search.fresh else options.outrun
         small = stopping.decrease is not None and decrease < stopping.decrease and search.fresh
-        if behind > options.outrun and 4.0 * decrease < behind:
+        if behind > margin and 4.0 * decrease < behind:
             search.status = Status.OUTRUN
         elif small and _promises_less(problems, search, options, stopping.decrease_confirm):
             search.status = Status.CONVERGED

@@ -52,13 +52,14 @@ _SEARCH: Final = Options(
     ),
     reuse=True,
     stale=1.0,
+    creeping=0.5,
     chords=3,
     outrun=20.0,
 )
 """How the posterior is searched; decreases in log-likelihood [-], judgements. A step that would gain 0.002 moves the
 estimates by 0.06 standard errors, one of 0.05 by 0.3. The last 0.5 is for tables with breaks, which give the gain of
-the filter, and with it the cost, small breaks too. Derivatives cost ten times what a trial costs, so that they serve
-until they gain less than 1."""
+the filter, and with it the cost, small breaks too. Derivatives cost twenty times what a trial costs, so that they serve
+until they gain less than 1, or less than half of what they promise."""
 _ROUGH_M_S: Final = 1.0
 """Gust level in which a search starts where nothing is known [m/s]: the records then weigh little and no start is far
 (judgement)."""
@@ -191,6 +192,7 @@ def fit(
     iterations: int = ITERATIONS,
     free_levels: bool = True,
     rival: float = np.inf,
+    only_better: bool = False,
 ) -> PosteriorFit | None:
     """The largest posterior from a start; None where not even the start can be evaluated.
 
@@ -199,10 +201,11 @@ def fit(
     whitener : an autoregression that is held; with one, levels should not be free.
     free_levels : whether noise and gust levels and the share of slow noise are fitted.
     rival : cost of a better hypothesis; the search ends early once it is plainly out of reach.
+    only_better : whether an end that does not lead the rival is of no use, so that the search ends once it will not.
     """
     priors = problem.priors(hypothesis)
     search = PosteriorSearch(problem, hypothesis, priors, whitener, free_levels, start)
-    options = replace(_SEARCH, iterations=iterations)
+    options = replace(_SEARCH, iterations=iterations, outrun_renewed=0.0 if only_better else np.inf)
     solution = minimise(search, start.vector[None, :], options, rival)
     (at,), (x,), (status,) = solution.at, solution.x, solution.status
     if at is None:
@@ -221,13 +224,15 @@ def fit(
     )
 
 
-def converged_fit(problem: TraceProblem, hypothesis: Hypothesis, start: Parameters) -> PosteriorFit | None:
-    """A fit that begins again where it ended, until it converges or `_ATTEMPTS` are spent; None as `fit`."""
-    own = fit(problem, hypothesis, start)
+def converged_fit(
+    problem: TraceProblem, hypothesis: Hypothesis, start: Parameters, rival: float = np.inf
+) -> PosteriorFit | None:
+    """A fit that begins again where it ended, until it converges or `_ATTEMPTS` are spent; None and ``rival`` as `fit`."""
+    own = fit(problem, hypothesis, start, rival=rival)
     for _ in range(_ATTEMPTS):
         if own is None or own.converged:
             break
-        own = fit(problem, hypothesis, own.point)
+        own = fit(problem, hypothesis, own.point, rival=rival)
     return own
 
 

@@ -190,7 +190,7 @@ def sensitivities_of(
     ----------
     index : number of the record.
     per_record_only : differentiate in the record's own parameters alone.
-    old : derivatives at a nearby point, which are whitened again and kept for all parameters but the sizes.
+    old : derivatives at a nearby point, which are whitened again and kept.
     """
     record, settings = problem.records[index], problem.settings
     common, own, sizes = point.common, point.per_record[index], point.sizes
@@ -202,8 +202,9 @@ def sensitivities_of(
     differences = _Differences(base, layout.total)
     if old is not None:
         differences.take(old)
+        return differences.sensitivities
     if not per_record_only:
-        for i in free_common(settings) if old is None else ():
+        for i in free_common(settings):
             h = COMMON_STEP[i]
             differences.put(i, respond_to(given, settings, _moved(common, i, h), own), h)
         for k in range(len(sizes)):
@@ -211,15 +212,14 @@ def sensitivities_of(
             h = _LOCATION_STEP * p.step if p.is_location or abs(sizes[k]) > p.step else p.step
             change = hypothesis.change(_moved(sizes, k, h))
             differences.put(size_index(k), respond(record, settings, change, common, own), h)
-    for i in range(PerRecord.size if old is None else 0):
+    for i in range(PerRecord.size):
         h = PER_RECORD_STEP[i]
         steady = None if i == PerRecord.log_gust else base.steady
         moved = respond_to(given, settings, common, _moved(own, i, h), steady=steady)
         differences.put(layout.per_record.start + i, moved, h)
     if not (np.isfinite(differences.t).all() and np.isfinite(differences.w).all()):
         return None
-    r = base.e @ base.white.T
-    return Sensitivities(r, base.logdet, differences.t, differences.w, base.white, differences.more)
+    return differences.sensitivities
 
 
 def _moved(x: Array, index: int, step: float) -> Array:
@@ -248,6 +248,13 @@ class _Differences:
         self.t[:] = old.t @ turn
         self.w[:] = turn.T @ old.w @ turn
         self.more[:] = old.more
+
+    @property
+    def sensitivities(self) -> Sensitivities:
+        """The response with what was put or taken."""
+        base = self.base
+        r = base.e @ base.white.T
+        return Sensitivities(r, base.logdet, self.t, self.w, base.white, self.more)
 
 
 def likelihood_terms(sensitivities: Sensitivities, whitener: Whitener, levels: bool) -> LikelihoodTerms:

@@ -84,15 +84,18 @@ def location_index(effect: Effect) -> int | None:
     return next((j for j, p in enumerate(effect.parameters) if p.is_location or p.is_limit), None)
 
 
-def best_location(problem: TraceProblem, fitted: PosteriorFit) -> tuple[PosteriorFit, Profile]:
+def best_location(
+    problem: TraceProblem, fitted: PosteriorFit, only_better: bool = False
+) -> tuple[PosteriorFit, Profile]:
     """The best optimum of the last effect of a fit along its location, and the profile about it.
 
     Parameters
     ----------
     fitted : a fit whose last effect has a location.
+    only_better : whether the profile itself is of no use, so that no fit is completed that will not lead.
     """
     for _ in range(_RESTARTS):
-        tried = _along(problem, fitted)
+        tried = _along(problem, fitted, only_better)
         lowest = min(tried, key=lambda f: f.cost)
         if lowest.cost > fitted.cost - _BETTER:
             break
@@ -125,7 +128,7 @@ def relocated(problem: TraceProblem, fitted: PosteriorFit, placed: str = "") -> 
         if location_index(effect) is None or effect.key == placed:
             continue
         moved = _with_last(problem, fitted, effect.key)
-        best = None if moved is None else best_location(problem, moved)[0]
+        best = None if moved is None else best_location(problem, moved, only_better=True)[0]
         if best is None or best.cost > fitted.cost - _BETTER:
             continue
         sizes = np.concatenate(
@@ -152,7 +155,7 @@ def _size_numbers(fitted: PosteriorFit) -> tuple[int, int]:
     return first + (location_index(effect) or 0), first
 
 
-def _along(problem: TraceProblem, fitted: PosteriorFit) -> list[PosteriorFit]:
+def _along(problem: TraceProblem, fitted: PosteriorFit, only_better: bool) -> list[PosteriorFit]:
     """Fits at locations on either side, each from the one before."""
     number, _ = _size_numbers(fitted)
     parameter = fitted.hypothesis.parameter(number)
@@ -167,7 +170,11 @@ def _along(problem: TraceProblem, fitted: PosteriorFit) -> list[PosteriorFit]:
             if not low < location < high:
                 break
             hypothesis = _with_location(fitted.hypothesis, location)
-            tried = fit(problem, hypothesis, _at(point, number, location), iterations=_ITERATIONS)
+            start = _at(point, number, location)
+            rival = fitted.cost - (_BETTER if only_better else 0.0)
+            tried = fit(
+                problem, hypothesis, start, iterations=_ITERATIONS, rival=rival, only_better=only_better
+            )
             if tried is None:
                 break
             fits.append(tried)

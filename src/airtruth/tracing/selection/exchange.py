@@ -2,7 +2,10 @@
 
 A search accepts one effect after another. Two causes that are alike at first may lead it to a set of three that together
 imitate them: the delay of a gyro in place of its lag, then a lag of the surface in place of its delay, then the lag of the
-gyro for what remains. An exchange of one member for its rival, and the removal of what becomes redundant, leads back.
+gyro for what remains. An exchange of one member for its rival, and the removal of what becomes redundant, leads back. So does
+an effect to which what remains points: it is added, and what it makes redundant is removed.
+
+Source: P. Pudil, J. Novovicova and J. Kittler, Pattern Recognition Letters 15 (1994) 1119-1125 (floating search).
 """
 
 from __future__ import annotations
@@ -22,11 +25,13 @@ from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import Candidate
 from airtruth.tracing.selection.budget import Advance, may_begin
-from airtruth.tracing.selection.refit import losses_without
-from airtruth.tracing.selection.rounds import SearchRound
+from airtruth.tracing.selection.refit import losses_without, refit_scored
+from airtruth.tracing.selection.rounds import MOST_EFFECTS, REMAINS, SearchRound
 
 BETTER: Final = 5.0
 """Log-posterior by which another set has to lead [-] (judgement: a gain of 10 in 2 log L, as that of a first effect)."""
+_ADDED: Final = 2
+"""Number of effects that are added for what remains [-] (judgement: each costs a refit)."""
 _LATE: Final = ("delay", "lag")
 """Kinds of terms that delay a signal."""
 
@@ -38,8 +43,10 @@ def better_set(
     effects: Sequence[Effect],
     least: float,
     advance: Advance,
-) -> tuple[Effect, ...] | None:
-    """The effects of a better set, the one that explains most first; None where no exchange leads by `BETTER`.
+) -> tuple[tuple[Effect, ...] | None, tuple[PosteriorFit, ...]]:
+    """The effects of a better set, the one that explains most first, and the fit of every exchange.
+
+    There is no better set where no exchange leads by `BETTER`.
 
     Parameters
     ----------
@@ -48,13 +55,18 @@ def better_set(
     least : gain in 2 log L below which a member of the new set is removed.
     """
     best: PosteriorFit | None = None
+    fits: list[PosteriorFit] = []
     for phrase, refit in _tries(problem, rounds, last, effects):
         if not may_begin(advance, phrase):
-            return None
+            return None, tuple(fits)
         tried = refit()
-        if tried is not None and _cost(tried) < _cost(best or last) - (0.0 if best else BETTER):
-            best = tried
-    return None if best is None else _needed(problem, best, least)
+        if tried is not None:
+            fits.append(tried)
+            if _cost(tried) < _cost(best or last) - (0.0 if best else BETTER):
+                best = tried
+    needed = () if best is None else _needed(problem, best, least)
+    kept = {e.key for e in needed} != {e.key for e in last.hypothesis.effects}
+    return needed if kept and 0 < len(needed) <= MOST_EFFECTS else None, tuple(fits)
 
 
 def _tries(
@@ -70,7 +82,12 @@ def _tries(
     for swapped, sizes in other_kinds(effects, last):
         phrase = f"{' and '.join(e.key for e in swapped)} beside the other effects"
         hypothesis, start = replace(last.hypothesis, effects=swapped), replace(last.point, sizes=sizes)
-        yield phrase, partial(fit, problem, hypothesis, start)
+        yield phrase, partial(fit, problem, hypothesis, start, rival=last.cost)
+    table, adjusted = rounds[-1].table, rounds[-1].adjusted
+    for i in np.argsort(adjusted, kind="stable")[:_ADDED]:
+        if adjusted[i] < REMAINS:
+            phrase = f"{table.scores[i].effect.key} beside the other effects"
+            yield phrase, partial(refit_scored, problem, last, table, int(i))
 
 
 def other_kinds(
@@ -127,7 +144,8 @@ def _exchanged(
     hypothesis = replace(
         last.hypothesis, effects=(*effects[:index], rival.score.effect, *effects[index + 1 :])
     )
-    ends = (fit(problem, hypothesis, start) for start in starts_in_place_of(last, effects[index], rival))
+    starts = starts_in_place_of(last, effects[index], rival)
+    ends = (fit(problem, hypothesis, start, rival=last.cost) for start in starts)
     return min((end for end in ends if end is not None), key=_cost, default=None)
 
 

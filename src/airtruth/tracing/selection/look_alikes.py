@@ -65,7 +65,10 @@ def _beside_the_others(
         score = next((s for s in own.table.scores if s.effect.key == effect.key), None)
         exchanged = tuple(effect if e.key == member.key else e for e in last.hypothesis.effects)
         hypothesis = replace(last.hypothesis, effects=exchanged)
-        ends = (converged_fit(problem, hypothesis, start) for start in starts)
+        ends: list[PosteriorFit | None] = [
+            f for f in rounds[-1].exchanged if f.hypothesis == hypothesis and f.converged
+        ]
+        ends = ends or [converged_fit(problem, hypothesis, start, last.cost) for start in starts]
         tried = min((end for end in ends if end is not None), key=lambda end: end.cost, default=None)
         if score is not None and tried is not None:
             fits.append(Refit(score, tried, 0.0))

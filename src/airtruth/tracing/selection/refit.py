@@ -17,6 +17,7 @@ from airtruth.tracing.model.parameters import Common, Parameters, PerRecord
 from airtruth.tracing.model.response import respond
 from airtruth.tracing.selection.acceptance import IMPROBABLE, declared_probability, own_probability
 from airtruth.tracing.selection.budget import Advance, may_begin
+from airtruth.tracing.selection.freedom import Freedom, without_last_effect
 from airtruth.tracing.selection.score_test import Score, Table
 
 LEADING: Final = 8
@@ -103,6 +104,7 @@ def refit_leaders(
     if not significant.any():
         return []
     fits: list[Refit] = []
+    freedom = Freedom(problem, null)
     for i in _leading(problem, null, table, significant, wanted):
         s = table.scores[i]
         if s.effect.key in skip:
@@ -112,18 +114,20 @@ def refit_leaders(
         ahead = min((r.fit.cost for r in fits), default=rival)
         best = _refit(problem, null, s, table.white_sizes[i], min(ahead, rival))
         if best is not None:
-            fits.append(Refit(s, best, _freedom_correction(problem, null, s.effect, best)))
+            fits.append(Refit(s, best, freedom.correction(s.effect, best)))
     for _ in range(_ATTEMPTS):  # the leader at least has to converge
         fits.sort(key=lambda r: r.cost)
         if not fits or fits[0].fit.converged:
             break
         first = fits[0].fit
         fits[0] = replace(fits[0], fit=fit(problem, first.hypothesis, first.point) or first)
-    started_twice = [_from_both(problem, null, r, advance) for r in fits[:_TWICE]]
+    started_twice = [_from_both(problem, null, r, freedom, advance) for r in fits[:_TWICE]]
     return sorted([*started_twice, *fits[_TWICE:]], key=lambda r: r.cost)
 
 
-def _from_both(problem: TraceProblem, null: PosteriorFit, r: Refit, advance: Advance) -> Refit:
+def _from_both(
+    problem: TraceProblem, null: PosteriorFit, r: Refit, freedom: Freedom, advance: Advance
+) -> Refit:
     """The better of a refit and of one that begins at the declared aircraft with its size.
 
     Derivatives that have absorbed an effect at the null may keep a part of it in another optimum.
@@ -131,10 +135,10 @@ def _from_both(problem: TraceProblem, null: PosteriorFit, r: Refit, advance: Adv
     effect = r.score.effect
     if len(effect.parameters) > 1 or not may_begin(advance, f"refit {effect.key} from the declared aircraft"):
         return r
-    tried = _from_declared(problem, null, r.score, r.size, r.fit.cost)
+    tried = _from_declared(problem, null, r.score, r.size, r.fit.cost - _BETTER, only_better=True)
     if tried is None or tried.cost > r.fit.cost - _BETTER:
         return r
-    return Refit(r.score, tried, _freedom_correction(problem, null, effect, tried))
+    return Refit(r.score, tried, freedom.correction(effect, tried))
 
 
 def refit_absorbed(
@@ -191,6 +195,7 @@ def refit_known(
         is not repeated.
     """
     best = {r.score.effect.key: r for r in fits}
+    freedom = Freedom(problem, null)
     for s in table.scores:
         key = s.effect.key
         if key not in known or len(s.effect.parameters) > 1:
@@ -203,7 +208,7 @@ def refit_known(
         ahead = min((r.fit.cost for r in best.values()), default=np.inf)
         tried = _from_declared(problem, null, s, size, ahead)
         if tried is not None and (key not in best or tried.cost < best[key].fit.cost):
-            best[key] = Refit(s, tried, _freedom_correction(problem, null, s.effect, tried))
+            best[key] = Refit(s, tried, freedom.correction(s.effect, tried))
     return sorted(best.values(), key=lambda r: r.cost)
 
 
@@ -217,9 +222,15 @@ def _usual_sizes(s: Score, either_sign: bool) -> tuple[float, ...]:
 
 
 def _from_declared(
-    problem: TraceProblem, null: PosteriorFit, s: Score, size: float, rival: float
+    problem: TraceProblem,
+    null: PosteriorFit,
+    s: Score,
+    size: float,
+    rival: float,
+    *,
+    only_better: bool = False,
 ) -> PosteriorFit | None:
-    """A refit that begins at the declared aircraft, with the levels of noise and gusts of the null.
+    """A refit that begins at the declared aircraft, with the levels of noise and gusts of the null; options as of `fit`.
 
     From strong gusts the levels would fall for many steps far behind a rival, and the search would be given up.
     """
@@ -229,7 +240,8 @@ def _from_declared(
     common[Common.noise] = null.point.common[Common.noise]
     per_record = start.per_record.copy()
     per_record[:, PerRecord.log_gust] = null.point.per_record[:, PerRecord.log_gust]
-    return fit(problem, hypothesis, replace(start, common=common, per_record=per_record), rival=rival)
+    start = replace(start, common=common, per_record=per_record)
+    return fit(problem, hypothesis, start, rival=rival, only_better=only_better)
 
 
 def _leading(
@@ -261,28 +273,14 @@ def _leading(
     return order
 
 
-def _freedom_correction(
-    problem: TraceProblem, null: PosteriorFit, effect: Effect, best: PosteriorFit
-) -> float:
-    free = null.hypothesis.plus(effect).unconstrained
-    if free == null.hypothesis.unconstrained:
-        return 0.0
-    hypothesis = replace(null.hypothesis, also_unconstrained=free)
-    ends = [fit(problem, hypothesis, start) for start in (null.point, _without_effect(null, best))]
-    return max([null.cost - end.cost for end in ends if end is not None], default=0.0)
-
-
-def _without_effect(null: PosteriorFit, best: PosteriorFit) -> Parameters:
-    """The parameters of a refit without those of its last effect."""
-    return replace(best.point, sizes=best.point.sizes[: len(null.point.sizes)])
-
-
-def refit_without(problem: TraceProblem, fitted: PosteriorFit, effect: Effect) -> PosteriorFit | None:
-    """A fit again, without one of its effects."""
+def refit_without(
+    problem: TraceProblem, fitted: PosteriorFit, effect: Effect, rival: float = np.inf
+) -> PosteriorFit | None:
+    """A fit again, without one of its effects; ``rival`` as of `fit`."""
     span = fitted.hypothesis.span(effect.key)
     rest = tuple(e for e in fitted.hypothesis.effects if e.key != effect.key)
     point = replace(fitted.point, sizes=np.delete(fitted.point.sizes, span))
-    return fit(problem, replace(fitted.hypothesis, effects=rest), point)
+    return fit(problem, replace(fitted.hypothesis, effects=rest), point, rival=rival)
 
 
 def losses_without(
@@ -290,11 +288,11 @@ def losses_without(
 ) -> list[tuple[float, PosteriorFit | None]]:
     """Loss in 2 log L by the removal of each effect, less 2 for each of its parameters, and the fit without it.
 
-    The loss is infinite where there is no fit.
+    The loss is infinite where there is no fit, and a large one is an upper bound.
     """
     found: list[tuple[float, PosteriorFit | None]] = []
     for effect in effects:
-        less = refit_without(problem, fitted, effect)
+        less = refit_without(problem, fitted, effect, fitted.cost)
         loss = np.inf if less is None else 2.0 * (less.cost - fitted.cost - len(effect.parameters))
         found.append((loss, less))
     return found
@@ -304,9 +302,14 @@ def better_null(problem: TraceProblem, null: PosteriorFit, fits: Sequence[Refit]
     """The null fitted again from the end of the best refit, if that is a better optimum."""
     if not fits:
         return None
-    start = _without_effect(null, fits[0].fit)
+    start = without_last_effect(null, fits[0].fit)
     again = fit(problem, null.hypothesis, start, iterations=_BETTER_NULL_ITERATIONS)
     return again if again is not None and again.cost < null.cost - _BETTER else None
+
+
+def refit_scored(problem: TraceProblem, null: PosteriorFit, table: Table, number: int) -> PosteriorFit | None:
+    """A null and one effect of a table of scores, beside which all parameters are free."""
+    return _refit(problem, null, table.scores[number], table.white_sizes[number], np.inf)
 
 
 def _refit(
@@ -333,7 +336,8 @@ def _refit(
         if (best.converged and gain > _EXPLAINED * s.z**2) or (again and not (is_limit and gain < _BETTER)):
             break
     if _is_improbable(problem, null):
-        tried = _from_declared(problem, null, s, white_size, rival)
+        known = np.inf if best is None else best.cost - _SAME
+        tried = _from_declared(problem, null, s, white_size, min(rival, known), only_better=known < rival)
         if tried is not None and (best is None or tried.cost < best.cost):
             best = tried
     return best
@@ -374,5 +378,6 @@ __all__ = [
     "losses_without",
     "refit_absorbed",
     "refit_leaders",
+    "refit_scored",
     "refit_without",
 ]

@@ -154,7 +154,8 @@ def _refitted(
     for s in carried[:_REFITS]:
         if s.cost > sets[0].cost + _HOPELESS:
             break
-        own = _as_effects(problem, null, free, s, effects, causes)
+        ahead = min((r.cost for r in refits.values()), default=np.inf)
+        own = _as_effects(problem, null, free, s, effects, causes, ahead)
         if own is not None:
             corrections[s.causes] = own.cost - predicted_cost(plain, [causes[key] for key in s.causes])
             refits[s.effects] = own
@@ -168,8 +169,9 @@ def _as_effects(
     s: CauseSet,
     effects: Mapping[str, Effect],
     causes: Mapping[str, Cause],
+    rival: float,
 ) -> PosteriorFit | None:
-    """A set refitted as effects of the filter; None where no start converges.
+    """A set refitted as effects of the filter; None where no start converges. ``rival`` as of `fit`.
 
     It begins at the null, or else at the released derivatives, of which first order takes off what the causes bring.
     """
@@ -181,7 +183,7 @@ def _as_effects(
         low, high = effects[key].parameters[0].reach
         sizes.append(min(max(size_in_filter(key, size), low), high))
     for start in (null.point, replace(free.point, common=away)):
-        own = converged_fit(problem, hypothesis, replace(start, sizes=np.array(sizes)))
+        own = converged_fit(problem, hypothesis, replace(start, sizes=np.array(sizes)), rival)
         if own is not None and own.converged:
             return own
     return None

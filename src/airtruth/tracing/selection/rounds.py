@@ -130,6 +130,7 @@ class SearchRound:
     release : the derivatives released from a declaration that the records contradict; None where they do not.
     sets : what explains the derivatives at a null that is released, that of the answer first; empty at any other.
     rival : the branch of the search that began at this round and lost; None where there is none.
+    exchanged : fits with one effect of the null exchanged for a rival, where the search has tried them.
     """
 
     null: PosteriorFit
@@ -145,6 +146,7 @@ class SearchRound:
     release: Release | None = None
     sets: tuple[CauseSet, ...] = ()
     rival: Rival | None = None
+    exchanged: tuple[PosteriorFit, ...] = ()
 
     @property
     def release_gain(self) -> float:

@@ -119,8 +119,12 @@ class _Search:
         if last is None:
             return rounds
         least = significant_gain(first.tested, later=True)
-        better = better_set(self.problem, rounds, last, first.effects, least, self.advance)
-        return rounds if better is None else self._led(first, better, rounds)
+        better, exchanged = better_set(self.problem, rounds, last, first.effects, least, self.advance)
+        if better is not None:
+            return self._led(first, better, rounds)
+        if last is rounds[-1].null:
+            rounds = (*rounds[:-1], replace(rounds[-1], exchanged=exchanged))
+        return rounds
 
     def _with_absorbed(self, first: RoundStart, rounds: tuple[SearchRound, ...]) -> tuple[SearchRound, ...]:
         """The rounds, or those led by an effect that refitted derivatives had absorbed, so that it had no score."""
@@ -146,7 +150,10 @@ class _Search:
     def _led(
         self, first: RoundStart, effects: Sequence[Effect], rounds: tuple[SearchRound, ...]
     ) -> tuple[SearchRound, ...]:
-        """The rounds of a search that accepts these effects first, if they explain more than others, or as much with fewer."""
+        """The rounds of a search that accepts these effects first, if they explain more than others.
+
+        As much is enough for fewer effects, and where they alone leave no anomaly.
+        """
         starts: tuple[RoundStart, ...] = (first,)
         again: tuple[SearchRound, ...] = ()
         for effect in effects:
@@ -162,7 +169,8 @@ class _Search:
             starts = (*starts, RoundStart(fitted.hypothesis, fitted.point, left, settled=True))
         again = self.rounds(starts, again)
         simpler = len(_effects_of(again[-1])) < len(_effects_of(rounds[-1]))
-        lead = 0.0 if simpler else BETTER
+        cleaner = again[-1].anomaly.p_value > _CLEAN and rounds[-1].anomaly.p_value < REMAINS
+        lead = 0.0 if simpler or cleaner else BETTER
         return again if total_cost(again[-1]) < total_cost(rounds[-1]) - lead else rounds
 
     def _branches(
@@ -346,7 +354,7 @@ def redundant_effect(problem: TraceProblem, fitted: PosteriorFit, least: float) 
         count = len(effect.parameters)
         if abs(fitted.point.sizes[at]) < effect.parameters[0].material:
             return i
-        less = refit_without(problem, fitted, effect)
+        less = refit_without(problem, fitted, effect, fitted.cost)
         if less is not None and 2.0 * (less.cost - fitted.cost - count) < least:
             return i
         at += count
