@@ -156,6 +156,7 @@ class Options:
     damping, stopping : see there.
     reuse : whether a trial point is evaluated with the derivatives of the point before it. They are renewed once a step
         decreases the cost by less than ``stale`` or by less than ``creeping`` of its promise. Only renewed ones end a search.
+    renewed_end : whether they are renewed where a search ends otherwise.
     chords : most further steps with the same derivatives after a trial that decreases the cost by less than half of its
         promise: they lead back into a curved valley.
     outrun : margin behind a rival's cost beyond which a search ends, provided that four more steps like the last
@@ -169,6 +170,7 @@ class Options:
     reuse: bool = False
     stale: float = 0.0
     creeping: float = 0.0
+    renewed_end: bool = True
     chords: int = 0
     outrun: float = np.inf
     outrun_renewed: float = np.inf
@@ -182,7 +184,6 @@ class Solution(Generic[E]):
     ----------
     x : (problems, parameters); of a problem whose start cannot be evaluated, that start.
     at : the last evaluation: at ``x``, or before the undamped step that ended the search; None where there is none.
-    status, iterations : of each problem.
     """
 
     x: Array
@@ -193,8 +194,6 @@ class Solution(Generic[E]):
 
 @dataclass
 class _Search(Generic[E]):
-    """State of one search."""
-
     number: int
     x: Array
     at: E | None
@@ -238,7 +237,7 @@ def minimise(problems: Problems[E], start: Array, options: Options, rival: float
     for search in searches:
         if search.status is Status.RUNNING:
             search.status = Status.ITERATIONS
-    _renew(problems, [s for s in searches if not s.fresh])
+    _renew(problems, [s for s in searches if options.renewed_end and not s.fresh])
     return Solution(
         np.array([s.x for s in searches]),
         tuple(s.at for s in searches),

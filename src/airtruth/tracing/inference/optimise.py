@@ -252,8 +252,11 @@ def initial_parameters(
     own[:, PerRecord.log_gust] = np.log(_ROUGH_M_S)
     first = np.zeros(len(hypothesis.parameters)) if sizes is None else sizes
     point = Parameters(np.zeros(Common.size), own, first)
-    fitted = fit(problem, hypothesis, point, iterations=iterations, free_levels=False)
-    return point if fitted is None else fitted.point
+    search = PosteriorSearch(
+        problem, hypothesis, problem.priors(hypothesis), NO_WHITENER, levels=False, shape=point
+    )
+    options = replace(_SEARCH, iterations=iterations, renewed_end=False)
+    return point.of_vector(minimise(search, point.vector[None, :], options).x[0])
 
 
 def _covariance(search: PosteriorSearch, at: Evaluated) -> Array:
