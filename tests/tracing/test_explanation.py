@@ -119,10 +119,10 @@ def test_the_weight_of_wrong_declarations_is_the_sum_over_their_sets():
 
 
 @pytest.mark.parametrize(
-    ("cost", "names"), [(0.69, ("cg_shift",)), (0.70, ("cg_shift", "tail_effectiveness"))]
+    ("cost", "names"), [(2.30, ("cg_shift",)), (2.31, ("cg_shift", "tail_effectiveness"))]
 )
-def test_fewer_effects_lead_with_half_of_the_weight(cost, names):
-    """exp(-cost) is a half at 0.693."""
+def test_fewer_effects_lead_unless_the_odds_against_them_are_strong(cost, names):
+    """exp(-cost) is a tenth at ln 10 = 2.3026."""
     sets = (cause_set(0.0, "cg_shift", "tail_effectiveness"), cause_set(cost, "cg_shift"))
     assert simplest_first(sets)[0].causes == names
 

@@ -228,3 +228,21 @@ def test_a_surface_effect_behind_a_damper_has_its_size(number, seed, named, valu
     (parameter,) = effect["parameters"].values()
     low, high = parameter["ci95"]
     assert low < value < high
+
+
+def test_a_downwash_lag_is_no_wrong_cmq(tmp_path):
+    """Beside inertia and accelerometer arm the answer was derivatives, provisionally: released, they hide the score of the lag."""
+    answer = answered(20261503, 7, "triple", tmp_path)
+    named = {e["name"] for e in answer["effects"]}
+    assert (named, answer["provisional"]) == ({"inertia_error", "accelerometer_arm", "downwash_lag"}, False)
+
+
+def test_slow_noise_takes_no_effect_away(tmp_path):
+    """The search with slow noise lost the delay of the surface, which the search before had accepted."""
+    from airtruth.tracing import TraceOptions, trace
+    from validation.blind.trials import frozen
+
+    (folder,) = frozen(20261508, [48], "slow", tmp_path)
+    runs = read_log(folder / "log.parquet", ()).run_ids
+    answer = trace(folder, "gtm", TraceOptions(hold_out=runs[1:])).to_dict()
+    assert {e["name"] for e in answer["effects"]} == {"gyro_lag", "elevator_delay"}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -178,11 +178,16 @@ def _search(
 
 
 def _pruned_search(
-    case: Case, start: Parameters, options: TraceOptions, advance: Advance, known: Mapping[str, float]
+    case: Case,
+    start: Parameters,
+    options: TraceOptions,
+    advance: Advance,
+    known: Mapping[str, float],
+    other: Sequence[Effect] = (),
 ) -> tuple[SearchRound, ...]:
     """The rounds of a search without the names that later ones make unnecessary."""
     rounds = search(
-        case.fitted, case.hypothesis, start, case.effects, options.seed, advance, case.declared, known
+        case.fitted, case.hypothesis, start, case.effects, options.seed, advance, case.declared, known, other
     )
     return rounds and pruned(case.fitted, rounds, case.effects, options.seed, LEVEL, advance)
 
@@ -196,14 +201,16 @@ def _with_later_colour(
 ) -> tuple[Case, tuple[SearchRound, ...]]:
     """The search again with slow noise that shows beside what it explained, where that explains more.
 
-    At the declared aircraft a strong effect drives slow noise to its limits, and it does not enter.
+    At the declared aircraft a strong effect drives slow noise to its limits, and it does not enter. Slow noise can take the
+    share of an effect too, so that the effects of the first search are tried beside it.
     """
     coloured, point = beside(case, rounds[-1].null)
     phrase = "search with coloured noise"
     if not coloured.fitted.settings.coloured or not may_begin(advance, phrase):
         return case, rounds
     start = replace(point, sizes=np.empty(0))
-    again = _pruned_search(coloured, start, options, advance, known)
+    accepted = rounds[-1].null.hypothesis.effects
+    again = _pruned_search(coloured, start, options, advance, known, accepted)
     if again and total_cost(again[-1]) < total_cost(rounds[-1]):
         return coloured, again
     return case, rounds

@@ -47,9 +47,9 @@ REFERENCE: Final = 4.0
 factor of 2.0; it makes sets comparable with the refit of an effect, whose size has no prior."""
 _CERTAIN_SHAPE: Final = 0.02
 """Relative uncertainty of a direction that follows from definitions [-] (judgement: second order in the size)."""
-_AS_PROBABLE: Final = 0.5
-"""Posterior weight over that of the most probable effects from which fewer effects are preferred [-] (judgement: odds of two
-to one tell nothing apart)."""
+_AS_PROBABLE: Final = 0.1
+"""Posterior weight over that of the most probable effects from which fewer effects are preferred [-] (judgement: a further cause
+is named where the odds for it are strong, from ten to one by H. Jeffreys, Theory of Probability, 3rd ed. (1961), appendix B)."""
 _LEAST_SHARE: Final = 1e-15
 """Least probability of the plausible range of a size [-] (judgement: below it a set is out of the question)."""
 
@@ -170,7 +170,7 @@ def explain(
 
 
 def simplest_first(sets: Sequence[CauseSet]) -> tuple[CauseSet, ...]:
-    """The sets, that of the fewest effects among those about as probable as the most probable ones first.
+    """The sets, that of the fewest effects first against which the odds of the most probable ones are not strong.
 
     Wrong declarations of any derivatives are one effect, whose weight is the sum over its sets.
     """

@@ -93,7 +93,7 @@ def refit_leaders(
     skip: Collection[str] = (),
     rival: float = np.inf,
 ) -> list[Refit]:
-    """Refit the leading candidates, best first; none where no score is significant.
+    """Refit the leading candidates, best first; none where no score is significant and none is wanted.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def refit_leaders(
     wanted : keys of effects that have to be among the refitted ones; skip : keys of those that are not.
     rival : cost of another explanation; refits that stay far behind end early.
     """
-    if not significant.any():
+    if not significant.any() and not wanted:
         return []
     fits: list[Refit] = []
     freedom = Freedom(problem, null)

@@ -57,6 +57,7 @@ def search(
     advance: Advance = lambda step: None,
     declared: DeclaredCauses = NOTHING_DECLARED,
     known: Mapping[str, float] = NOTHING_KNOWN,
+    other: Sequence[Effect] = (),
 ) -> tuple[SearchRound, ...]:
     """Rounds of scoring, refitting and acceptance, until nothing more is accepted.
 
@@ -72,10 +73,14 @@ def search(
     advance : receives the step that begins.
     declared : candidates that explain a contradiction of the declared derivatives.
     known : effects that are always refitted, with the value [SI] at which their refit begins.
+    other : effects that another search accepted, in their order; where this one accepts others, they lead a second one.
     """
     first = RoundStart(hypothesis, start, tuple(effects))
     own = _Search(problem, seed, advance, declared, known)
-    return settled(problem, own.improved(first, own.rounds((first,), ())))
+    rounds = own.improved(first, own.rounds((first,), ()))
+    if rounds and {e.key for e in other} - {e.key for e in rounds[-1].null.hypothesis.effects}:
+        rounds = own.led(first, other, rounds)
+    return settled(problem, rounds)
 
 
 @dataclass(frozen=True)
@@ -109,7 +114,7 @@ class _Search:
         taken = {e.key for e in rounds[-1].null.hypothesis.effects}
         missing = tuple(e for e in first.effects if e.key in self.known and e.key not in taken)
         if missing and rounds[-1].anomaly.p_value < _FAILED:
-            rounds = self._led(first, missing, rounds)
+            rounds = self.led(first, missing, rounds)
         weak = [r.tied[0].gain < _WEAK for r in rounds if r.tied] == [True]
         if (rounds[-1].anomaly.p_value < REMAINS or weak) and len(rounds[-1].null.hypothesis.effects) < 2:
             rounds = self._with_absorbed(first, rounds)
@@ -121,7 +126,7 @@ class _Search:
         least = significant_gain(first.tested, later=True)
         better, exchanged = better_set(self.problem, rounds, last, first.effects, least, self.advance)
         if better is not None:
-            return self._led(first, better, rounds)
+            return self.led(first, better, rounds)
         if last is rounds[-1].null:
             rounds = (*rounds[:-1], replace(rounds[-1], exchanged=exchanged))
         return rounds
@@ -139,7 +144,7 @@ class _Search:
             return rounds
         effect = fits[0].score.effect
         size = effect.parameters[0].value(fits[0].size)
-        return replace(self, known={**self.known, effect.key: size})._led(first, (effect,), rounds)
+        return replace(self, known={**self.known, effect.key: size}).led(first, (effect,), rounds)
 
     def _declared(self, last: PosteriorFit) -> PosteriorFit | None:
         """The fit under the declaration of the derivatives: released ones absorb what a wrong effect leaves."""
@@ -147,7 +152,7 @@ class _Search:
             return last
         return fit(self.problem, replace(last.hypothesis, spread=None), last.point)
 
-    def _led(
+    def led(
         self, first: RoundStart, effects: Sequence[Effect], rounds: tuple[SearchRound, ...]
     ) -> tuple[SearchRound, ...]:
         """The rounds of a search that accepts these effects first, if they explain more than others.
