@@ -231,7 +231,7 @@ def test_a_surface_effect_behind_a_damper_has_its_size(number, seed, named, valu
 
 
 def test_a_downwash_lag_is_no_wrong_cmq(tmp_path):
-    """Beside inertia and accelerometer arm the answer was derivatives, provisionally: released, they hide the score of the lag."""
+    """Beside inertia and accelerometer arm the answer was derivatives: released, they hide the score of the lag."""
     answer = answered(20261503, 7, "triple", tmp_path)
     named = {e["name"] for e in answer["effects"]}
     assert (named, answer["provisional"]) == ({"inertia_error", "accelerometer_arm", "downwash_lag"}, False)
