@@ -5,13 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from airtruth.numerics.levenberg_marquardt import (
-    Damping,
-    Options,
-    Status,
-    Stopping,
-    minimise,
-)
+from airtruth.numerics.levenberg_marquardt import Status, minimise
+from airtruth.numerics.levenberg_marquardt_options import Damping, Options, Stopping
 from airtruth.numerics.normal_equations import scaled_inverse, scaled_step
 
 T_MEYER = 45.0 + 5.0 * np.arange(1, 17)

@@ -1,12 +1,14 @@
 """Minimise cost functions by damped Gauss-Newton or Fisher-scoring steps: one Levenberg-Marquardt solver.
 
-The solver knows nothing of a model. A caller describes its problems by three functions (`Problems`): evaluate a point,
-propose a step at a given damping, and apply a step within bounds. The solver chooses the damping, accepts or rejects the
-steps and ends the search. It works on several problems of one shape side by side. Every call of the caller's functions
-gets all problems that still run, so that a caller can evaluate them in one vectorised or parallel pass.
+The solver knows nothing of a model. A caller describes its problems by three functions (`Problems`): evaluate a
+point, propose a step at a given damping, and apply a step within bounds. The solver chooses the damping, accepts or
+rejects the steps and ends the search. It works on several problems of one shape side by side, each with a damping, a
+status and an iteration count of its own. Every call of the caller's functions gets all problems that still run, so
+that a caller can evaluate them in one vectorised or parallel pass.
 
-The tracer's posterior is one problem that reuses derivatives (`Options.reuse`). A batch of runs is many problems, whose
-gradients and curvatures ``step`` stacks for one call of `airtruth.numerics.normal_equations.scaled_step`.
+The tracer's posterior is one problem whose step eliminates the parameters of each record, and reuses derivatives
+(`Options.reuse`). A batch of runs is many problems: ``evaluate`` gets the rows of those that still run, and ``step``
+stacks their gradients and curvatures for one call of `airtruth.numerics.normal_equations.scaled_step`.
 
 Sources: D. W. Marquardt, J. Soc. Indust. Appl. Math. 11 (1963) 431-441 (steps damped on the scaled diagonal, factor
 10); K. Madsen, H. B. Nielsen and O. Tingleff, Methods for Non-Linear Least Squares Problems, 2nd ed. (2004), section
@@ -17,12 +19,14 @@ steps for maximum likelihood).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import Final, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from airtruth.numerics.levenberg_marquardt_options import Options
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -89,94 +93,6 @@ class Problems(Protocol[E]):
 
 
 @dataclass(frozen=True)
-class Damping:
-    """Schedule of the damping, relative to the scaled diagonal of the information [-].
-
-    The gain ratio is the decrease of the cost over the decrease that the step promised. A step whose decrease exceeds
-    ``slack`` is accepted.
-
-    Attributes
-    ----------
-    initial, least : at the start, and the smallest.
-    most : the search stalls beyond this.
-    rejected : factor after a rejected step, which is followed by at least ``restart``.
-    poor, fair, good : factors after an accepted step with a gain ratio up to ``poor_ratio``, between, and above
-        ``good_ratio``.
-    slack : least decrease of an accepted step [unit of the cost]; slightly negative tolerates rounding.
-    """
-
-    initial: float = 1e-3
-    least: float = 1e-9
-    most: float = 1e9
-    rejected: float = 10.0
-    restart: float = 0.0
-    poor: float = 3.0
-    fair: float = 1.0
-    good: float = 0.1
-    poor_ratio: float = 0.25
-    good_ratio: float = 0.75
-    slack: float = 0.0
-
-    def after(self, damping: float, ratio: float | None) -> float:
-        """Damping that follows a gain ratio; None for a rejected step."""
-        if ratio is None:
-            return max(damping * self.rejected, self.restart, self.least)
-        factor = self.good if ratio > self.good_ratio else self.fair if ratio > self.poor_ratio else self.poor
-        return max(damping * factor, self.least)
-
-
-@dataclass(frozen=True)
-class Stopping:
-    """Decreases of the cost at which a search ends [unit of the cost]; a rule whose value is None is not applied.
-
-    Attributes
-    ----------
-    undamped : promised by an undamped step, which is then taken: converged.
-    promised : promised by the damped step. Converged if an undamped one promises less than ``promised_confirm``, else
-        `Status.SHORT`.
-    decrease : achieved by an accepted step. Converged if an undamped one promises less than ``decrease_confirm``.
-    rejected : promised by an undamped step after a rejected one: converged.
-    """
-
-    undamped: float | None = None
-    promised: float | None = None
-    promised_confirm: float | None = None
-    decrease: float | None = None
-    decrease_confirm: float | None = None
-    rejected: float | None = None
-
-
-@dataclass(frozen=True)
-class Options:
-    """How to search.
-
-    Attributes
-    ----------
-    iterations : most iterations.
-    damping, stopping : see there.
-    reuse : whether a trial point is evaluated with the derivatives of the point before it. They are renewed once a step
-        decreases the cost by less than ``stale`` or by less than ``creeping`` of its promise. Only renewed ones end a search.
-    renewed_end : whether they are renewed where a search ends otherwise.
-    chords : most further steps with the same derivatives after a trial that decreases the cost by less than half of its
-        promise: they lead back into a curved valley.
-    outrun : margin behind a rival's cost beyond which a search ends, provided that four more steps like the last
-        would not make it up [unit of the cost].
-    outrun_renewed : the same after a step with renewed derivatives.
-    """
-
-    iterations: int
-    damping: Damping = field(default_factory=Damping)
-    stopping: Stopping = field(default_factory=Stopping)
-    reuse: bool = False
-    stale: float = 0.0
-    creeping: float = 0.0
-    renewed_end: bool = True
-    chords: int = 0
-    outrun: float = np.inf
-    outrun_renewed: float = np.inf
-
-
-@dataclass(frozen=True)
 class Solution(Generic[E]):
     """Where the searches ended.
 
@@ -184,6 +100,7 @@ class Solution(Generic[E]):
     ----------
     x : (problems, parameters); of a problem whose start cannot be evaluated, that start.
     at : the last evaluation: at ``x``, or before the undamped step that ended the search; None where there is none.
+    status, iterations : of each problem.
     """
 
     x: Array
@@ -194,6 +111,8 @@ class Solution(Generic[E]):
 
 @dataclass
 class _Search(Generic[E]):
+    """State of one search."""
+
     number: int
     x: Array
     at: E | None
@@ -396,4 +315,4 @@ def _renew(problems: Problems[E], searches: Sequence[_Search[E]]) -> list[_Searc
     return failed
 
 
-__all__ = ["Damping", "Evaluation", "Options", "Problems", "Solution", "Status", "Stopping", "minimise"]
+__all__ = ["Evaluation", "Problems", "Solution", "Status", "minimise"]

@@ -18,13 +18,14 @@ from airtruth.identification.likelihood.options import (
 )
 from airtruth.numerics import levenberg_marquardt as solver
 from airtruth.numerics import normal_equations
+from airtruth.numerics.levenberg_marquardt_options import Damping, Options, Stopping
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Scored = tuple[Array, Array, Array]
 """Negative log-likelihood (active,), its gradient (active, free), information (active, free, free)."""
 
-DAMPING: Final = solver.Damping(initial=1e-3, least=1e-3, most=0.9e9)
+DAMPING: Final = Damping(initial=1e-3, least=1e-3, most=0.9e9)
 """Damping relative to the information; judgement: from nearly undamped to steps of rounding size."""
 RIDGE: Final = 1e-14
 """Added to the unit diagonal of the scaled information [-]; judgement: keeps a factorisation from an exact zero, far
@@ -143,11 +144,11 @@ def maximise(
     problems = _Posterior(evaluate, declared, prior_weights(options), free, level)
     x = declared[:, free]
     x[:, :six] = start
-    how = solver.Options(
+    how = Options(
         iterations=options.maximum_iterations,
         damping=DAMPING,
         # the decrement of the last step: tolerance^2/2 for a step of `tolerance` standard errors
-        stopping=solver.Stopping(undamped=0.5 * options.tolerance**2),
+        stopping=Stopping(undamped=0.5 * options.tolerance**2),
     )
     end = solver.minimise(problems, x, how)
     z = declared.copy()

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_lyapunov
 
 from airtruth.numerics.discretise import step
-from airtruth.numerics.levenberg_marquardt import Damping, Options, Stopping, minimise
+from airtruth.numerics.levenberg_marquardt import minimise
+from airtruth.numerics.levenberg_marquardt_options import Damping, Options, Stopping
 from airtruth.numerics.normal_equations import scaled_step
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem, likelihood_terms, sensitivities_of

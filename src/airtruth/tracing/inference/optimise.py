@@ -9,13 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.numerics.levenberg_marquardt import (
-    Damping,
-    Options,
-    Status,
-    Stopping,
-    minimise,
-)
+from airtruth.numerics.levenberg_marquardt import Status, minimise
+from airtruth.numerics.levenberg_marquardt_options import Damping, Options, Stopping
 from airtruth.numerics.normal_equations import scaled_inverse, scaled_step
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import (

@@ -27,7 +27,6 @@ from airtruth.tracing.selection.acceptance import Candidate
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.refit import losses_without, refit_scored
 from airtruth.tracing.selection.rounds import MOST_EFFECTS, REMAINS, SearchRound
-from airtruth.tracing.selection.score_test import Table
 
 BETTER: Final = 5.0
 """Log-posterior by which another set has to lead [-] (judgement: a gain of 10 in 2 log L, as that of a first effect)."""
@@ -84,23 +83,21 @@ def _tries(
         phrase = f"{' and '.join(e.key for e in swapped)} beside the other effects"
         hypothesis, start = replace(last.hypothesis, effects=swapped), replace(last.point, sizes=sizes)
         yield phrase, partial(fit, problem, hypothesis, start, rival=last.cost)
-    table, adjusted = _scored(rounds, last)
-    for i in np.argsort(adjusted, kind="stable")[:_ADDED]:
-        if adjusted[i] < REMAINS:
-            phrase = f"{table.scores[i].effect.key} beside the other effects"
-            yield phrase, partial(refit_scored, problem, last, table, int(i))
+    scored = _scored(rounds, last)
+    for i in np.argsort(scored.adjusted, kind="stable")[:_ADDED]:
+        if scored.adjusted[i] < REMAINS:
+            phrase = f"{scored.table.scores[i].effect.key} beside the other effects"
+            yield phrase, partial(refit_scored, problem, last, scored.table, int(i))
 
 
-def _scored(rounds: Sequence[SearchRound], last: PosteriorFit) -> tuple[Table, NDArray[np.float64]]:
-    """Scores and Holm's p-values of the round with the effects of a fit, under the declaration of the derivatives.
+def _scored(rounds: Sequence[SearchRound], last: PosteriorFit) -> SearchRound:
+    """The round that scores beside the effects of a fit under the declaration of the derivatives; else the last one.
 
     Released derivatives absorb a part of what an effect would explain, and its score with it.
     """
+    own = ((r, r.null.hypothesis) for r in reversed(rounds))
     effects = last.hypothesis.effects
-    same = (r.null.hypothesis for r in reversed(rounds))
-    declared = next((k for k, h in enumerate(same) if h.spread is None and h.effects == effects), 0)
-    own = rounds[-1 - declared]
-    return own.table, own.adjusted
+    return next((r for r, h in own if h.spread is None and h.effects == effects), rounds[-1])
 
 
 def other_kinds(

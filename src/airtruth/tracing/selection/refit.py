@@ -112,7 +112,7 @@ def refit_leaders(
         if not may_begin(advance, f"refit {s.effect.key}"):
             continue
         ahead = min((r.fit.cost for r in fits), default=rival)
-        best = _refit(problem, null, s, table.white_sizes[i], min(ahead, rival))
+        best = refit_scored(problem, null, table, i, min(ahead, rival))
         if best is not None:
             fits.append(Refit(s, best, freedom.correction(s.effect, best)))
     for _ in range(_ATTEMPTS):  # the leader at least has to converge
@@ -307,20 +307,20 @@ def better_null(problem: TraceProblem, null: PosteriorFit, fits: Sequence[Refit]
     return again if again is not None and again.cost < null.cost - _BETTER else None
 
 
-def refit_scored(problem: TraceProblem, null: PosteriorFit, table: Table, number: int) -> PosteriorFit | None:
-    """A null and one effect of a table of scores, beside which all parameters are free."""
-    return _refit(problem, null, table.scores[number], table.white_sizes[number], np.inf)
-
-
-def _refit(
-    problem: TraceProblem, null: PosteriorFit, s: Score, white_size: float, rival: float
+def refit_scored(
+    problem: TraceProblem, null: PosteriorFit, table: Table, number: int, rival: float = np.inf
 ) -> PosteriorFit | None:
     """The null and one effect with all parameters free, from multiples of the size that the score suggests.
 
     An improbable null has absorbed part of a large effect, and the search from there can end in another optimum. So
     one more refit begins at the declared aircraft, with the size that the score has without an autoregression,
     because an autoregression can absorb such an effect as a whole.
+
+    Parameters
+    ----------
+    table, number : scores at the null, and the index of the effect's; rival : as of `fit`.
     """
+    s, white_size = table.scores[number], table.white_sizes[number]
     hypothesis = null.hypothesis.plus(s.effect)
     is_limit = s.effect.parameters[0].is_limit
     best: PosteriorFit | None = None
@@ -336,8 +336,8 @@ def _refit(
         if (best.converged and gain > _EXPLAINED * s.z**2) or (again and not (is_limit and gain < _BETTER)):
             break
     if _is_improbable(problem, null):
-        known = np.inf if best is None else best.cost - _SAME
-        tried = _from_declared(problem, null, s, white_size, min(rival, known), only_better=known < rival)
+        to_beat = np.inf if best is None else best.cost - _SAME
+        tried = _from_declared(problem, null, s, white_size, min(rival, to_beat), only_better=to_beat < rival)
         if tried is not None and (best is None or tried.cost < best.cost):
             best = tried
     return best

@@ -18,7 +18,7 @@ from airtruth.tracing.selection.acceptance import OUTDONE, Candidate
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import BETTER, better_set
 from airtruth.tracing.selection.explanation import LOADING, REFERENCE, least_cost
-from airtruth.tracing.selection.refit import refit_absorbed, refit_without
+from airtruth.tracing.selection.refit import losses_without, refit_absorbed
 from airtruth.tracing.selection.release import DeclaredCauses, Release
 from airtruth.tracing.selection.rounds import (
     NOTHING_DECLARED,
@@ -73,7 +73,7 @@ def search(
     advance : receives the step that begins.
     declared : candidates that explain a contradiction of the declared derivatives.
     known : effects that are always refitted, with the value [SI] at which their refit begins.
-    other : effects that another search accepted, in their order; where this one accepts others, they lead a second one.
+    other : effects that another search accepted, in their order; they lead a further search where this one lacks any.
     """
     first = RoundStart(hypothesis, start, tuple(effects))
     own = _Search(problem, seed, advance, declared, known)
@@ -356,13 +356,12 @@ def redundant_effect(problem: TraceProblem, fitted: PosteriorFit, least: float) 
     """
     at = 0
     for i, effect in enumerate(fitted.hypothesis.effects[:-1]):
-        count = len(effect.parameters)
         if abs(fitted.point.sizes[at]) < effect.parameters[0].material:
             return i
-        less = refit_without(problem, fitted, effect, fitted.cost)
-        if less is not None and 2.0 * (less.cost - fitted.cost - count) < least:
+        ((loss, _),) = losses_without(problem, fitted, (effect,))
+        if loss < least:
             return i
-        at += count
+        at += len(effect.parameters)
     return None
 
 
