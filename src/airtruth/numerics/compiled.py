@@ -16,8 +16,13 @@ from numba.extending import register_jitable
 
 F = TypeVar("F", bound=Callable[..., object])
 
-_WITHOUT_ENTRY: Final[dict[str, Any]] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-"""numba's options for a function without its entries from Python and C."""
+_WITHOUT_ENTRY: Final[dict[str, Any]] = {
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "forceinline": True,
+}
+"""numba's options for a function without its entries from Python and C, inlined where it is called: a call copies each
+array of the tuples that it passes, which takes three quarters of the time of the filter."""
 _UNCOUNTED: Final[dict[str, Any]] = {"_nrt": False, **_WITHOUT_ENTRY}
 """The same for a function that counts no references to arrays."""
 shared: Final = register_jitable(error_model="numpy")

@@ -132,7 +132,14 @@ class _Trial(Generic[E]):
     at: E | None
 
 
-def minimise(problems: Problems[E], start: Array, options: Options, rival: float = np.inf) -> Solution[E]:
+def minimise(
+    problems: Problems[E],
+    start: Array,
+    options: Options,
+    rival: float = np.inf,
+    near: Sequence[E] | None = None,
+    at_near: bool = False,
+) -> Solution[E]:
     """Minimise the cost of each problem.
 
     Parameters
@@ -141,10 +148,13 @@ def minimise(problems: Problems[E], start: Array, options: Options, rival: float
     start : (problems, parameters).
     options : how to search.
     rival : cost of a competitor; a search that cannot reach it ends early.
+    near : evaluations near the start, one per problem, whose derivatives the first steps use.
+    at_near : whether they are those of the start itself, so that the derivatives are as new.
     """
     index = np.arange(len(start))
-    first = problems.evaluate(start, index, None)
-    searches = [_Search(i, start[i], at, options.damping.initial) for i, at in enumerate(first)]
+    first = problems.evaluate(start, index, near)
+    fresh = near is None or at_near
+    searches = [_Search(i, start[i], at, options.damping.initial, fresh) for i, at in enumerate(first)]
     for search in searches:
         if search.at is None:
             search.status = Status.FAILED

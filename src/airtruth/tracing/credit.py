@@ -10,7 +10,7 @@ import numpy as np
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.tracing.answer import AcceptedEffect
-from airtruth.tracing.inference.assess import assess
+from airtruth.tracing.inference.assess import own_likelihood
 from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.explanation import DERIVATIVES
@@ -36,7 +36,7 @@ def credit(effects: Sequence[AcceptedEffect], stages: Stages) -> dict[str, float
 
         def one(i: int, model: StageModel = less) -> float:
             own = assessed["after"][i].per_record
-            return assess(problem, i, model.hypothesis, model.common, model.sizes, own).likelihood
+            return own_likelihood(problem, i, model.hypothesis, model.common, model.sizes, own)
 
         lost = sum(problem.each(one, records)) - after
         if np.isfinite(lost) and np.isfinite(step) and step > 0.0:

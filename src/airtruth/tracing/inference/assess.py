@@ -15,7 +15,12 @@ from airtruth.numerics.levenberg_marquardt import minimise
 from airtruth.numerics.levenberg_marquardt_options import Damping, Options, Stopping
 from airtruth.numerics.normal_equations import scaled_step
 from airtruth.tracing.inference.hypothesis import Hypothesis
-from airtruth.tracing.inference.posterior import TraceProblem, likelihood_terms, sensitivities_of
+from airtruth.tracing.inference.posterior import (
+    Sensitivities,
+    TraceProblem,
+    likelihood_terms,
+    sensitivities_of,
+)
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.compile import CompiledChange, compile_change
 from airtruth.tracing.model.linearise import process_intensity
@@ -31,7 +36,7 @@ from airtruth.tracing.model.parameters import (
     PerRecord,
 )
 from airtruth.tracing.model.records import TraceRecord
-from airtruth.tracing.model.response import filter_inputs, kernel_input, respond, respond_to
+from airtruth.tracing.model.response import Response, filter_inputs, kernel_input, respond, respond_to
 from airtruth.tracing.model.settings import GUST_COVARIANCE, Settings, initial_per_record, per_record_prior
 from airtruth.tracing.model.steady import linearise_at_reference
 
@@ -41,14 +46,19 @@ Ints = NDArray[np.int64]
 _SEARCH: Final = Options(
     iterations=30,
     damping=Damping(initial=1e-6, least=1e-6, most=np.inf, poor=0.1, fair=0.1),
-    stopping=Stopping(decrease=0.01),
+    stopping=Stopping(promised=0.01, decrease=0.01),
+    reuse=True,
+    stale=0.1,
+    creeping=0.5,
+    renewed_end=False,
 )
 """How a record's own parameters are searched; judgement: ten parameters that are well determined, so that steps are
-nearly undamped. A search ends once a step gains 0.01 in log-likelihood, 0.14 standard errors."""
+nearly undamped. A search ends once a step with renewed derivatives promises or gains 0.01 in log-likelihood, 0.14
+standard errors."""
 _MOST_LOG_STEP: Final = 1.0
 """Largest step of the logarithm of the gust level [-]: a factor of e (judgement)."""
 _FREE_RUN_ITERATIONS: Final = 3
-"""Most Gauss-Newton iterations of a free run [-]; judgement: the simulation is nearly linear in what is free."""
+"""Most steps of a free run with the same derivatives [-]; judgement: the simulation is nearly linear in what is free."""
 _FREE_RUN_GAIN: Final = 1e-3
 """Relative decrease of the squared residuals that ends them [-]; judgement."""
 _UNSTABLE: Final = 10.0
@@ -98,23 +108,17 @@ def assess(
     settled : they are at their best already.
     """
     record, settings = problem.records[index], problem.settings
-    alone = TraceProblem((record,), settings)
-    own = initial_per_record(record, settings) if per_record is None else per_record.copy()
-    if not settled:
-        own = _fit_own(alone, hypothesis, common, sizes, own)
-    point = Parameters(common, own[None, :], sizes)
-    at = sensitivities_of(alone, 0, hypothesis, point, per_record_only=True)
+    own = per_record
+    if own is None or not settled:
+        own = _fit_own(problem, index, hypothesis, common, sizes, own)
     compiled = compile_change(hypothesis.change(sizes))
     response = respond(record, settings, compiled, common, own)
-    if at is None:
-        likelihood, whitened = np.inf, np.full_like(record.signals.y, np.nan)
-    else:
-        likelihood, whitened = likelihood_terms(at, NO_WHITENER, levels=False).cost, at.r
     residual = free_run(record, settings, compiled, common, own, hypothesis.unconstrained)
     with np.errstate(over="ignore", invalid="ignore"):  # the model may leave all bounds on this record
         innovation, free = (np.sqrt((x**2).mean(axis=0)) for x in (response.e, residual))
+        whitened = response.e @ response.white.T
     return Assessment(
-        likelihood=float(likelihood),
+        likelihood=_negative_log_likelihood(response),
         innovation=innovation,
         free_run=free,
         residual=residual,
@@ -124,6 +128,23 @@ def assess(
     )
 
 
+def own_likelihood(
+    problem: TraceProblem, index: int, hypothesis: Hypothesis, common: Array, sizes: Array, per_record: Array
+) -> float:
+    """Negative log-likelihood of one record, own parameters at their best; parameters as of `assess`."""
+    own = _fit_own(problem, index, hypothesis, common, sizes, per_record)
+    compiled = compile_change(hypothesis.change(sizes))
+    return _negative_log_likelihood(respond(problem.records[index], problem.settings, compiled, common, own))
+
+
+def _negative_log_likelihood(response: Response) -> float:
+    """Infinite where the motion leaves all bounds."""
+    if not np.isfinite(response.logdet):
+        return np.inf
+    white = response.e @ response.white.T
+    return 0.5 * (len(white) * response.logdet + float((white**2).sum()))
+
+
 @dataclass(frozen=True)
 class _OwnEvaluated:
     """Negative log-posterior of one record in its own parameters, gradient and information."""
@@ -131,6 +152,7 @@ class _OwnEvaluated:
     cost: float
     gradient: Array
     information: Array
+    sensitivities: Sensitivities
 
 
 @dataclass(frozen=True)
@@ -147,11 +169,12 @@ class _OwnSearch:
     def evaluate(
         self, x: Array, index: Ints, near: Sequence[_OwnEvaluated] | None
     ) -> list[_OwnEvaluated | None]:
-        return [self._evaluate(row) for row in x]
+        return [self._evaluate(row, None if near is None else near[k]) for k, row in enumerate(x)]
 
-    def _evaluate(self, own: Array) -> _OwnEvaluated | None:
+    def _evaluate(self, own: Array, near: _OwnEvaluated | None) -> _OwnEvaluated | None:
         point = Parameters(self.common, own[None, :], self.sizes)
-        at = sensitivities_of(self.problem, 0, self.hypothesis, point, per_record_only=True)
+        old = None if near is None else near.sensitivities
+        at = sensitivities_of(self.problem, 0, self.hypothesis, point, per_record_only=True, old=old)
         if at is None:
             return None
         cost, gradient, information = likelihood_terms(at, NO_WHITENER, levels=True)
@@ -160,6 +183,7 @@ class _OwnSearch:
             cost + 0.5 * float(off @ self.precision @ off),
             gradient[rows] + self.precision @ off,
             information[rows, rows] + self.precision,
+            at,
         )
 
     def step(self, x: Array, at: Sequence[_OwnEvaluated], damping: Array, index: Ints) -> tuple[Array, Array]:
@@ -174,8 +198,19 @@ class _OwnSearch:
         return x + step
 
 
-def _fit_own(alone: TraceProblem, hypothesis: Hypothesis, common: Array, sizes: Array, start: Array) -> Array:
-    """Own parameters of a single record at their best, all else given."""
+def _fit_own(
+    problem: TraceProblem,
+    index: int,
+    hypothesis: Hypothesis,
+    common: Array,
+    sizes: Array,
+    start: Array | None,
+) -> Array:
+    """Own parameters of one record at their best, all else given; it begins at `initial_per_record` without a start."""
+    record, settings = problem.records[index], problem.settings
+    alone = TraceProblem((record,), settings)
+    if start is None:
+        start = initial_per_record(record, settings)
     ((mean, precision),) = alone.priors(hypothesis).per_record
     search = _OwnSearch(alone, hypothesis, common, sizes, mean, precision)
     return np.asarray(minimise(search, start[None, :], _SEARCH).x[0])
@@ -203,9 +238,8 @@ def free_run(
     free = PerRecord.deterministic
     mean, precision = per_record_prior(record, settings, unconstrained)
     prior = np.diag(precision)[free]
-    residual = respond(record, settings, compiled, common, own, free_run=True).e
+    residual, t = _free_run_slopes(record, settings, compiled, common, own, weight)
     for _ in range(_FREE_RUN_ITERATIONS):
-        residual, t = _free_run_slopes(record, settings, compiled, common, own, weight)
         off = (own - mean)[free]
         move = -np.linalg.solve(t @ t.T + np.diag(prior), t @ (residual * weight).ravel() + prior * off)
         if not np.isfinite(move).all():
@@ -337,4 +371,4 @@ def _linear_model(
     return _LinearModel(a, c, process, kernel.model.sensors.variance, kernel.model.states.noise)
 
 
-__all__ = ["Assessment", "assess", "fitted_noise_floor", "free_run", "noise_floor"]
+__all__ = ["Assessment", "assess", "fitted_noise_floor", "free_run", "noise_floor", "own_likelihood"]

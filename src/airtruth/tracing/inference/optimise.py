@@ -13,6 +13,7 @@ from airtruth.numerics.levenberg_marquardt import Status, minimise
 from airtruth.numerics.levenberg_marquardt_options import Damping, Options, Stopping
 from airtruth.numerics.normal_equations import scaled_inverse, scaled_step
 from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.nearby import begins_at, nearby
 from airtruth.tracing.inference.posterior import (
     LikelihoodTerms,
     PosteriorFit,
@@ -188,6 +189,7 @@ def fit(
     free_levels: bool = True,
     rival: float = np.inf,
     only_better: bool = False,
+    near: PosteriorFit | None = None,
 ) -> PosteriorFit | None:
     """The largest posterior from a start; None where not even the start can be evaluated.
 
@@ -197,11 +199,14 @@ def fit(
     free_levels : whether noise and gust levels and the share of slow noise are fitted.
     rival : cost of a better hypothesis; the search ends early once it is plainly out of reach.
     only_better : whether an end that does not lead the rival is of no use, so that the search ends once it will not.
+    near : a fit of the same problem whose derivatives the first steps use, with other effects perhaps.
     """
     priors = problem.priors(hypothesis)
     search = PosteriorSearch(problem, hypothesis, priors, whitener, free_levels, start)
     options = replace(_SEARCH, iterations=iterations, outrun_renewed=0.0 if only_better else np.inf)
-    solution = minimise(search, start.vector[None, :], options, rival)
+    first = None if near is None else [Evaluated(near.cost, (), nearby(near, hypothesis))]
+    at_near = near is not None and begins_at(near, hypothesis, start)
+    solution = minimise(search, start.vector[None, :], options, rival, first, at_near)
     (at,), (x,), (status,) = solution.at, solution.x, solution.status
     if at is None:
         return None
@@ -220,14 +225,18 @@ def fit(
 
 
 def converged_fit(
-    problem: TraceProblem, hypothesis: Hypothesis, start: Parameters, rival: float = np.inf
+    problem: TraceProblem,
+    hypothesis: Hypothesis,
+    start: Parameters,
+    rival: float = np.inf,
+    near: PosteriorFit | None = None,
 ) -> PosteriorFit | None:
-    """A fit that begins again where it ended, until it converges or `_ATTEMPTS` are spent; None and ``rival`` as `fit`."""
-    own = fit(problem, hypothesis, start, rival=rival)
+    """A fit that begins again where it ended, until it converges or `_ATTEMPTS` are spent; None, options as of `fit`."""
+    own = fit(problem, hypothesis, start, rival=rival, near=near)
     for _ in range(_ATTEMPTS):
         if own is None or own.converged:
             break
-        own = fit(problem, hypothesis, own.point, rival=rival)
+        own = fit(problem, hypothesis, own.point, rival=rival, near=own)
     return own
 
 
@@ -268,4 +277,11 @@ def _covariance(search: PosteriorSearch, at: Evaluated) -> Array:
     return scaled_inverse(marginal.information, _RIDGE)
 
 
-__all__ = ["ITERATIONS", "Evaluated", "PosteriorSearch", "converged_fit", "fit", "initial_parameters"]
+__all__ = [
+    "ITERATIONS",
+    "Evaluated",
+    "PosteriorSearch",
+    "converged_fit",
+    "fit",
+    "initial_parameters",
+]

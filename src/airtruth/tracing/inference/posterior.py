@@ -190,7 +190,7 @@ def sensitivities_of(
     ----------
     index : number of the record.
     per_record_only : differentiate in the record's own parameters alone.
-    old : derivatives at a nearby point, which are whitened again and kept.
+    old : derivatives at a nearby point, which are whitened again and kept; those in a size that are NaN are made.
     """
     record, settings = problem.records[index], problem.settings
     common, own, sizes = point.common, point.per_record[index], point.sizes
@@ -200,18 +200,25 @@ def sensitivities_of(
         return None
     layout = Layout(len(sizes))
     differences = _Differences(base, layout.total)
+
+    def put_size(k: int) -> None:
+        p = hypothesis.parameter(k)
+        h = _LOCATION_STEP * p.step if p.is_location or abs(sizes[k]) > p.step else p.step
+        change = hypothesis.change(_moved(sizes, k, h))
+        differences.put(size_index(k), respond(record, settings, change, common, own), h)
+
     if old is not None:
         differences.take(old)
-        return differences.sensitivities
+        for k in range(len(sizes)):
+            if np.isnan(old.t[size_index(k), 0, 0]):
+                put_size(k)
+        return differences.sensitivities if np.isfinite(differences.t).all() else None
     if not per_record_only:
         for i in free_common(settings):
             h = COMMON_STEP[i]
             differences.put(i, respond_to(given, settings, _moved(common, i, h), own), h)
         for k in range(len(sizes)):
-            p = hypothesis.parameter(k)
-            h = _LOCATION_STEP * p.step if p.is_location or abs(sizes[k]) > p.step else p.step
-            change = hypothesis.change(_moved(sizes, k, h))
-            differences.put(size_index(k), respond(record, settings, change, common, own), h)
+            put_size(k)
     for i in range(PerRecord.size):
         h = PER_RECORD_STEP[i]
         steady = None if i == PerRecord.log_gust else base.steady

@@ -99,7 +99,7 @@ def best_location(
         lowest = min(tried, key=lambda f: f.cost)
         if lowest.cost > fitted.cost - _BETTER:
             break
-        again = fit(problem, fitted.hypothesis, lowest.point)
+        again = fit(problem, fitted.hypothesis, lowest.point, near=lowest)
         if again is None or again.cost >= fitted.cost:
             break
         fitted = again
@@ -134,7 +134,7 @@ def relocated(problem: TraceProblem, fitted: PosteriorFit, placed: str = "") -> 
         sizes = np.concatenate(
             [best.point.sizes[best.hypothesis.span(e.key)] for e in fitted.hypothesis.effects]
         )
-        fitted = fit(problem, fitted.hypothesis, replace(best.point, sizes=sizes)) or fitted
+        fitted = fit(problem, fitted.hypothesis, replace(best.point, sizes=sizes), near=best) or fitted
     return fitted
 
 
@@ -144,7 +144,11 @@ def _with_last(problem: TraceProblem, fitted: PosteriorFit, key: str) -> Posteri
     order = (*(e for e in effects if e.key != key), *(e for e in effects if e.key == key))
     sizes = np.concatenate([fitted.point.sizes[fitted.hypothesis.span(e.key)] for e in order])
     return fit(
-        problem, replace(fitted.hypothesis, effects=order), replace(fitted.point, sizes=sizes), iterations=0
+        problem,
+        replace(fitted.hypothesis, effects=order),
+        replace(fitted.point, sizes=sizes),
+        iterations=0,
+        near=fitted,
     )
 
 
@@ -164,21 +168,27 @@ def _along(problem: TraceProblem, fitted: PosteriorFit, only_better: bool) -> li
     std = min(max(fitted.size_std(number), least), _MOST * (high - low))
     fits = []
     for side in (-1.0, 1.0):
-        point = fitted.point
+        before = fitted
         for offset in _OFFSETS:
             location = float(fitted.point.sizes[number]) + side * offset * std
             if not low < location < high:
                 break
             hypothesis = _with_location(fitted.hypothesis, location)
-            start = _at(point, number, location)
+            start = _at(before.point, number, location)
             rival = fitted.cost - (_BETTER if only_better else 0.0)
             tried = fit(
-                problem, hypothesis, start, iterations=_ITERATIONS, rival=rival, only_better=only_better
+                problem,
+                hypothesis,
+                start,
+                iterations=_ITERATIONS,
+                rival=rival,
+                only_better=only_better,
+                near=before,
             )
             if tried is None:
                 break
             fits.append(tried)
-            point = tried.point
+            before = tried
             if tried.cost - fitted.cost > 2.0 * _CHI2_95 and offset >= _WIDE:
                 break
     return fits

@@ -82,7 +82,7 @@ def _tries(
     for swapped, sizes in other_kinds(effects, last):
         phrase = f"{' and '.join(e.key for e in swapped)} beside the other effects"
         hypothesis, start = replace(last.hypothesis, effects=swapped), replace(last.point, sizes=sizes)
-        yield phrase, partial(fit, problem, hypothesis, start, rival=last.cost)
+        yield phrase, partial(fit, problem, hypothesis, start, rival=last.cost, near=last)
     scored = _scored(rounds, last)
     for i in np.argsort(scored.adjusted, kind="stable")[:_ADDED]:
         if scored.adjusted[i] < REMAINS:
@@ -155,7 +155,7 @@ def _exchanged(
         last.hypothesis, effects=(*effects[:index], rival.score.effect, *effects[index + 1 :])
     )
     starts = starts_in_place_of(last, effects[index], rival)
-    ends = (fit(problem, hypothesis, start, rival=last.cost) for start in starts)
+    ends = (fit(problem, hypothesis, start, rival=last.cost, near=last) for start in starts)
     return min((end for end in ends if end is not None), key=_cost, default=None)
 
 

@@ -33,8 +33,8 @@ class Freedom:
             return 0.0
         hypothesis = replace(null.hypothesis, also_unconstrained=free)
         if free not in self._from_null:
-            self._from_null[free] = fit(problem, hypothesis, null.point)
-        ends = (self._from_null[free], fit(problem, hypothesis, without_last_effect(null, best)))
+            self._from_null[free] = fit(problem, hypothesis, null.point, near=null)
+        ends = (self._from_null[free], fit(problem, hypothesis, without_last_effect(null, best), near=best))
         return max([null.cost - end.cost for end in ends if end is not None], default=0.0)
 
 

@@ -75,7 +75,7 @@ def _as_declared(problem: TraceProblem, last: PosteriorFit) -> PosteriorFit | No
     """A released fit under the declaration again; None where it was not released, or where the records contradict that."""
     if last.hypothesis.spread is None:
         return None
-    own = fit(problem, replace(last.hypothesis, spread=None), last.point)
+    own = fit(problem, replace(last.hypothesis, spread=None), last.point, near=last)
     return own if own is not None and contradiction(problem, own).p_value > CONTRADICTED else None
 
 

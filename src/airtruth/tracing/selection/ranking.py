@@ -110,7 +110,7 @@ def _whitened_cost(
     common[Common.noise] = levels.point.common[Common.noise]
     per_record[:, PerRecord.log_gust] = levels.point.per_record[:, PerRecord.log_gust]
     start = replace(own.point, common=common, per_record=per_record)
-    again = fit(problem, own.hypothesis, start, whitener, iterations=_ITERATIONS, free_levels=False)
+    again = fit(problem, own.hypothesis, start, whitener, iterations=_ITERATIONS, free_levels=False, near=own)
     return np.inf if again is None else again.cost
 
 

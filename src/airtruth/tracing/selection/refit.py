@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.hypothesis import Hypothesis
-from airtruth.tracing.inference.optimise import fit, initial_parameters
+from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.model.parameters import Common, Parameters, PerRecord
 from airtruth.tracing.model.response import respond
 from airtruth.tracing.selection.acceptance import IMPROBABLE, declared_probability, own_probability
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.freedom import Freedom, without_last_effect
+from airtruth.tracing.selection.from_declared import at, from_declared
 from airtruth.tracing.selection.score_test import Score, Table
 
 LEADING: Final = 8
@@ -43,8 +43,6 @@ _BETTER: Final = 2.0
 """Gain in log L that counts as another optimum [-] (judgement)."""
 _BETTER_NULL_ITERATIONS: Final = 20
 """Iterations of a null that begins where a candidate ended [-] (judgement: an optimum nearby)."""
-_FRESH_ITERATIONS: Final = 6
-"""Iterations with gusts taken as strong for a refit that begins at the declared aircraft [-] (judgement)."""
 _AGREES: Final = 0.2
 """Share of the size known beforehand by which a converged refit may differ from it without a second one that begins there
 [-] (judgement: another optimum, in which the derivatives have absorbed the effect, has a fraction of its size)."""
@@ -120,7 +118,7 @@ def refit_leaders(
         if not fits or fits[0].fit.converged:
             break
         first = fits[0].fit
-        fits[0] = replace(fits[0], fit=fit(problem, first.hypothesis, first.point) or first)
+        fits[0] = replace(fits[0], fit=fit(problem, first.hypothesis, first.point, near=first) or first)
     started_twice = [_from_both(problem, null, r, freedom, advance) for r in fits[:_TWICE]]
     return sorted([*started_twice, *fits[_TWICE:]], key=lambda r: r.cost)
 
@@ -135,7 +133,7 @@ def _from_both(
     effect = r.score.effect
     if len(effect.parameters) > 1 or not may_begin(advance, f"refit {effect.key} from the declared aircraft"):
         return r
-    tried = _from_declared(problem, null, r.score, r.size, r.fit.cost - _BETTER, only_better=True)
+    tried = from_declared(problem, null, r.score, r.size, r.fit.cost - _BETTER, only_better=True)
     if tried is None or tried.cost > r.fit.cost - _BETTER:
         return r
     return Refit(r.score, tried, freedom.correction(effect, tried))
@@ -172,7 +170,7 @@ def refit_absorbed(
             continue
         for size in _usual_sizes(s, either_sign):
             ahead = min((r.fit.cost for r in found), default=rival)
-            tried = _from_declared(problem, null, s, size, min(ahead, rival))
+            tried = from_declared(problem, null, s, size, min(ahead, rival))
             if tried is not None:
                 found.append(Refit(s, tried, 0.0))
     return sorted(found, key=lambda r: r.cost)
@@ -206,7 +204,7 @@ def refit_known(
         if not may_begin(advance, f"refit {key} from the kinematic check"):
             break
         ahead = min((r.fit.cost for r in best.values()), default=np.inf)
-        tried = _from_declared(problem, null, s, size, ahead)
+        tried = from_declared(problem, null, s, size, ahead)
         if tried is not None and (key not in best or tried.cost < best[key].fit.cost):
             best[key] = Refit(s, tried, freedom.correction(s.effect, tried))
     return sorted(best.values(), key=lambda r: r.cost)
@@ -219,29 +217,6 @@ def _usual_sizes(s: Score, either_sign: bool) -> tuple[float, ...]:
     if first.one_sided:
         return (high,)
     return (high, low) if either_sign else (0.0,)
-
-
-def _from_declared(
-    problem: TraceProblem,
-    null: PosteriorFit,
-    s: Score,
-    size: float,
-    rival: float,
-    *,
-    only_better: bool = False,
-) -> PosteriorFit | None:
-    """A refit that begins at the declared aircraft, with the levels of noise and gusts of the null; options as of `fit`.
-
-    From strong gusts the levels would fall for many steps far behind a rival, and the search would be given up.
-    """
-    hypothesis = null.hypothesis.plus(s.effect)
-    start = initial_parameters(problem, hypothesis, _at(null, s, size).sizes, _FRESH_ITERATIONS)
-    common = start.common.copy()
-    common[Common.noise] = null.point.common[Common.noise]
-    per_record = start.per_record.copy()
-    per_record[:, PerRecord.log_gust] = null.point.per_record[:, PerRecord.log_gust]
-    start = replace(start, common=common, per_record=per_record)
-    return fit(problem, hypothesis, start, rival=rival, only_better=only_better)
 
 
 def _leading(
@@ -303,12 +278,16 @@ def better_null(problem: TraceProblem, null: PosteriorFit, fits: Sequence[Refit]
     if not fits:
         return None
     start = without_last_effect(null, fits[0].fit)
-    again = fit(problem, null.hypothesis, start, iterations=_BETTER_NULL_ITERATIONS)
+    again = fit(problem, null.hypothesis, start, iterations=_BETTER_NULL_ITERATIONS, near=fits[0].fit)
     return again if again is not None and again.cost < null.cost - _BETTER else None
 
 
 def refit_scored(
-    problem: TraceProblem, null: PosteriorFit, table: Table, number: int, rival: float = np.inf
+    problem: TraceProblem,
+    null: PosteriorFit,
+    table: Table,
+    number: int,
+    rival: float = np.inf,
 ) -> PosteriorFit | None:
     """The null and one effect with all parameters free, from multiples of the size that the score suggests.
 
@@ -325,7 +304,7 @@ def refit_scored(
     is_limit = s.effect.parameters[0].is_limit
     best: PosteriorFit | None = None
     for share in _ordered_shares(problem, null, hypothesis, s):
-        tried = fit(problem, hypothesis, _at(null, s, share * s.size), rival=rival)
+        tried = fit(problem, hypothesis, at(null, s, share * s.size), rival=rival, near=null)
         if tried is None:
             continue
         again = best is not None and abs(tried.cost - best.cost) < _SAME
@@ -337,7 +316,7 @@ def refit_scored(
             break
     if _is_improbable(problem, null):
         to_beat = np.inf if best is None else best.cost - _SAME
-        tried = _from_declared(problem, null, s, white_size, min(rival, to_beat), only_better=to_beat < rival)
+        tried = from_declared(problem, null, s, white_size, min(rival, to_beat), only_better=to_beat < rival)
         if tried is not None and (best is None or tried.cost < best.cost):
             best = tried
     return best
@@ -348,19 +327,13 @@ def _is_improbable(problem: TraceProblem, null: PosteriorFit) -> bool:
     return min(declared_probability(problem, null), own_probability(problem, null)) < IMPROBABLE
 
 
-def _at(null: PosteriorFit, s: Score, size: float) -> Parameters:
-    low, high = s.effect.parameters[0].reach
-    sizes = s.direction.sizes(min(max(size, low), high))
-    return replace(null.point, sizes=np.concatenate([null.point.sizes, sizes]))
-
-
 def _ordered_shares(
     problem: TraceProblem, null: PosteriorFit, hypothesis: Hypothesis, s: Score
 ) -> list[float]:
     """`_SHARES`, the most likely size first, all other parameters as in the null."""
     costs = []
     for share in _SHARES:
-        point = _at(null, s, share * s.size)
+        point = at(null, s, share * s.size)
         change = hypothesis.change(point.sizes)
         total = 0.0
         for record, local in zip(problem.records, point.per_record, strict=True):

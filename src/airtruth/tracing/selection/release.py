@@ -119,7 +119,7 @@ def release(
     allowed = declared.causes or declared.wrong_allowed
     if null.hypothesis.spread is not None or not allowed or test.p_value > CONTRADICTED:
         return None
-    free = converged_fit(problem, released(null.hypothesis, problem), null.point)
+    free = converged_fit(problem, released(null.hypothesis, problem), null.point, near=null)
     if free is None:
         return None
     own = derivative_likelihood(problem, free)

@@ -86,6 +86,7 @@ class RoundStart:
     settled : whether the round follows a replacement or a choice between tied effects; neither is made twice.
     scores_only : whether the candidates are scored and none is refitted.
     leader : key of the effect that leads the round, whatever others gain; "" for the one that gains most.
+    near : a fit near the start, whose derivatives the first steps use.
     """
 
     hypothesis: Hypothesis
@@ -95,6 +96,7 @@ class RoundStart:
     settled: bool = False
     scores_only: bool = False
     leader: str = ""
+    near: PosteriorFit | None = None
 
     @property
     def tested(self) -> int:
@@ -201,10 +203,10 @@ def search_round(
     -------
     The round; None where not even its null can be fitted.
     """
-    start, restarts = begin.start, _RESTARTS
+    start, near, restarts = begin.start, begin.near, _RESTARTS
     while True:
         advance(f"round {count + 1}: refit without further effects")
-        null = fit(problem, begin.hypothesis, start)
+        null = fit(problem, begin.hypothesis, start, near=near)
         if null is None:
             return None
         whitener = autoregression(null.innovations)
@@ -229,7 +231,7 @@ def search_round(
                 fits = refit_known(problem, null, table, fits, known, advance)
             better = better_null(problem, null, fits) if restarts else None
             if better is not None:
-                start, restarts = better.point, restarts - 1
+                start, near, restarts = better.point, better, restarts - 1
                 continue
             least = significant_gain(begin.tested, later=count > 0)
             candidates = rank(problem, null, fits, least, begin.replacement, begin.leader)
@@ -269,7 +271,7 @@ def scored_round(
     """
     taken = {e.key for e in fitted.hypothesis.effects}
     left = tuple(e for e in effects if e.key not in taken)
-    begin = RoundStart(fitted.hypothesis, fitted.point, left, settled=True, scores_only=True)
+    begin = RoundStart(fitted.hypothesis, fitted.point, left, settled=True, scores_only=True, near=fitted)
     return search_round(problem, begin, count, seed, advance)
 
 
@@ -296,7 +298,15 @@ def _refit_whitened(problem: TraceProblem, null: PosteriorFit, whitener: Whitene
 
     An autoregression of a misfit can absorb the very motion that shows the derivatives.
     """
-    again = fit(problem, null.hypothesis, null.point, whitener, iterations=_GLS_ITERATIONS, free_levels=False)
+    again = fit(
+        problem,
+        null.hypothesis,
+        null.point,
+        whitener,
+        iterations=_GLS_ITERATIONS,
+        free_levels=False,
+        near=null,
+    )
     if again is not None:
         std = np.sqrt(np.diag(null.covariance)[Common.derivatives])
         if (
@@ -304,7 +314,10 @@ def _refit_whitened(problem: TraceProblem, null: PosteriorFit, whitener: Whitene
             < _FAR * std
         ).all():
             return again
-    return fit(problem, null.hypothesis, null.point, whitener, iterations=0, free_levels=False) or null
+    return (
+        fit(problem, null.hypothesis, null.point, whitener, iterations=0, free_levels=False, near=null)
+        or null
+    )
 
 
 def _with_evidence(own: SearchRound, begin: RoundStart) -> SearchRound:

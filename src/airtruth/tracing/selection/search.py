@@ -150,7 +150,7 @@ class _Search:
         """The fit under the declaration of the derivatives: released ones absorb what a wrong effect leaves."""
         if last.hypothesis.spread is None:
             return last
-        return fit(self.problem, replace(last.hypothesis, spread=None), last.point)
+        return fit(self.problem, replace(last.hypothesis, spread=None), last.point, near=last)
 
     def led(
         self, first: RoundStart, effects: Sequence[Effect], rounds: tuple[SearchRound, ...]
@@ -171,7 +171,7 @@ class _Search:
             fitted = relocated(self.problem, own.tied[0].fit, placed=effect.key)
             again = (*again, replace(own, release=None))
             left = tuple(e for e in begin.effects if e.key != effect.key)
-            starts = (*starts, RoundStart(fitted.hypothesis, fitted.point, left, settled=True))
+            starts = (*starts, RoundStart(fitted.hypothesis, fitted.point, left, settled=True, near=fitted))
         again = self.rounds(starts, again)
         simpler = len(_effects_of(again[-1])) < len(_effects_of(rounds[-1]))
         cleaner = again[-1].anomaly.p_value > _CLEAN and rounds[-1].anomaly.p_value < REMAINS
@@ -196,7 +196,7 @@ class _Search:
         if behind and (not leads or may_begin(self.advance, phrase)):
             left = tuple(e for e in starts[-1].effects if e.key not in self.declared.keys)
             fitted = relocated(self.problem, release.refit or release.fit)
-            following = RoundStart(fitted.hypothesis, fitted.point, left, settled=True)
+            following = RoundStart(fitted.hypothesis, fitted.point, left, settled=True, near=fitted)
             corrected = replace(self, declared=replace(self.declared, corrections=release.corrections))
             ends.append(
                 corrected.rounds((*starts, following), (*before, replace(own, tied=(), profile=None)))
@@ -269,7 +269,7 @@ class _Search:
         fitted = relocated(self.problem, first.fit, placed=first.score.effect.key)
         accepted = {e.key for e in fitted.hypothesis.effects}
         effects = tuple(e for e in starts[-1].effects if e.key not in accepted)
-        following = RoundStart(fitted.hypothesis, fitted.point, effects, settled=settled)
+        following = RoundStart(fitted.hypothesis, fitted.point, effects, settled=settled, near=fitted)
         return self.rounds((*starts, following), rounds)
 
 
@@ -306,7 +306,7 @@ def settled(problem: TraceProblem, rounds: tuple[SearchRound, ...]) -> tuple[Sea
     last = rounds[-1]
     spread = last.sets[0].covariance - problem.declared_covariance
     hypothesis = replace(last.null.hypothesis, spread=spread)
-    null = fit(problem, hypothesis, last.null.point) or last.null
+    null = fit(problem, hypothesis, last.null.point, near=last.null) or last.null
     gls = fit(
         problem, hypothesis, last.gls.point, last.whitener, free_levels=last.whitener.order == 0, iterations=6
     )
@@ -320,7 +320,7 @@ def _with_declared(problem: TraceProblem, end: SearchRound, last: SearchRound) -
     effects = last.null.hypothesis.effects
     if not effects:
         return end
-    declared = fit(problem, replace(last.null.hypothesis, spread=None), last.null.point)
+    declared = fit(problem, replace(last.null.hypothesis, spread=None), last.null.point, near=last.null)
     if declared is None:
         return end
     names = tuple(sorted({e.name for e in effects}))
