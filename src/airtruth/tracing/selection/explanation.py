@@ -50,6 +50,9 @@ _CERTAIN_SHAPE: Final = 0.02
 _AS_PROBABLE: Final = 0.1
 """Posterior weight over that of the most probable effects from which fewer effects are preferred [-] (judgement: a further cause
 is named where the odds for it are strong, from ten to one by H. Jeffreys, Theory of Probability, 3rd ed. (1961), appendix B)."""
+_NEGLIGIBLE: Final = 60.0
+"""Log-posterior behind the most probable set from which a set is left out [-] (judgement: twice what a refit may still change).
+"""
 _LEAST_SHARE: Final = 1e-15
 """Least probability of the plausible range of a size [-] (judgement: below it a set is out of the question)."""
 
@@ -153,7 +156,9 @@ def causes_of(directions: Mapping[str, Array]) -> tuple[Cause, ...]:
 def explain(
     likelihood: DerivativeLikelihood, causes: Sequence[Cause], wrong_allowed: bool = True
 ) -> tuple[CauseSet, ...]:
-    """Every set of up to `MOST_CAUSES` causes and wrong declarations, the most probable first.
+    """Sets of up to `MOST_CAUSES` causes and wrong declarations, the most probable first.
+
+    Those farther than `_NEGLIGIBLE` behind the first are not among them.
 
     Parameters
     ----------
@@ -161,12 +166,18 @@ def explain(
     wrong_allowed : whether declarations may be wrong.
     """
     subsets = tuple(_subsets()) if wrong_allowed else ((),)
-    found: list[CauseSet] = []
+    evidence: list[tuple[tuple[_Evidence, ...], NDArray[np.int64], Array]] = []
     for count in range(min(MOST_CAUSES, len(causes)) + 1):
         for chosen in combinations(causes, count):
-            by_scale = [_sets_of(likelihood, chosen, subsets, scale) for scale in WRONG_BY]
-            found += [_mixed(scales) for scales in zip(*by_scale, strict=True)]
-    return tuple(sorted((s for s in found if np.isfinite(s.cost)), key=lambda s: s.cost))
+            scales = tuple(_evidence(likelihood, chosen, subsets, scale) for scale in WRONG_BY)
+            evidence.append((scales, *_mixed(scales)))
+    least = min(float(np.nanmin(cost, initial=np.inf)) for _, _, cost in evidence)
+    found = (
+        scales[best[i]].set_of(i, cost[i])
+        for scales, best, cost in evidence
+        for i in np.flatnonzero(cost <= least + _NEGLIGIBLE)
+    )
+    return tuple(sorted(found, key=lambda s: s.cost))
 
 
 def simplest_first(sets: Sequence[CauseSet]) -> tuple[CauseSet, ...]:
@@ -191,11 +202,12 @@ def least_cost(sets: Sequence[CauseSet]) -> float:
     return min(s.cost for s in sets)
 
 
-def _mixed(scales: Sequence[CauseSet]) -> CauseSet:
-    """One set with the evidence of the mixture, and the prior of its best part."""
-    best = min(scales, key=lambda s: s.cost)
-    mean = np.logaddexp.reduce([-s.cost for s in scales]) - np.log(len(scales))
-    return replace(best, cost=float(-mean)) if best.wrong else best
+def _mixed(scales: Sequence[_Evidence]) -> tuple[NDArray[np.int64], Array]:
+    """Index of each set's best part, and the cost of its mixture: that of the best part where no declaration is wrong."""
+    costs = np.stack([e.cost for e in scales])
+    mean = np.logaddexp.reduce(-costs, axis=0) - np.log(len(scales))
+    wrong = np.array([bool(subset) for subset in scales[0].subsets])
+    return np.argmin(costs, axis=0), np.where(wrong, -mean, costs.min(axis=0))
 
 
 def size_of(likelihood: DerivativeLikelihood, cause: Cause) -> tuple[float, float]:
@@ -205,8 +217,8 @@ def size_of(likelihood: DerivativeLikelihood, cause: Cause) -> tuple[float, floa
     where they are right.
     """
     certain = replace(cause, shape=0.0, low=-np.inf, high=np.inf)
-    (only,) = _sets_of(likelihood, (certain,), ((),), 1.0)
-    return only.sizes[0], only.size_std[0]
+    only = _evidence(likelihood, (certain,), ((),), 1.0)
+    return float(only.sizes[0, 0]), float(only.size_std[0, 0])
 
 
 def predicted_cost(likelihood: DerivativeLikelihood, causes: Sequence[Cause]) -> float:
@@ -225,12 +237,35 @@ def _subsets() -> Iterator[tuple[int, ...]]:
         yield from combinations(range(len(PARAMETERS)), count)
 
 
-def _sets_of(
+@dataclass(frozen=True)
+class _Evidence:
+    """Physical causes with each set of wrong declarations; attributes as of `CauseSet`, one row per set."""
+
+    causes: tuple[str, ...]
+    subsets: tuple[tuple[int, ...], ...]
+    sizes: Array
+    size_std: Array
+    covariance: Array
+    cost: Array
+
+    def set_of(self, number: int, cost: float) -> CauseSet:
+        """One of the sets, with the cost of its mixture."""
+        return CauseSet(
+            causes=self.causes,
+            wrong=tuple(PARAMETERS[k] for k in self.subsets[number]),
+            sizes=tuple(self.sizes[number].tolist()),
+            size_std=tuple(self.size_std[number].tolist()),
+            covariance=self.covariance[number],
+            cost=float(cost),
+        )
+
+
+def _evidence(
     likelihood: DerivativeLikelihood,
     chosen: Sequence[Cause],
-    subsets: Sequence[tuple[int, ...]],
+    subsets: tuple[tuple[int, ...], ...],
     wrong_by: float,
-) -> Iterator[CauseSet]:
+) -> _Evidence:
     """One set of physical causes with each set of wrong declarations, see `WRONG_BY`."""
     information, vector, declared = likelihood.information, likelihood.vector, likelihood.declared
     own = np.repeat(declared[None], len(subsets), axis=0)
@@ -259,19 +294,11 @@ def _sets_of(
     least = np.linalg.slogdet(np.eye(6) + declared @ information)[1]
     occam = 0.5 * (np.linalg.slogdet(turned)[1] - least)
     in_range = _in_range(chosen, sizes, std)
-    for i, subset in enumerate(subsets):
-        odds = _log_odds(chosen) + (_LOG_WRONG * (1 + len(subset)) if subset else 0.0)
-        several = bool(chosen or subset)
-        yield CauseSet(
-            causes=tuple(c.key for c in chosen),
-            wrong=tuple(PARAMETERS[k] for k in subset),
-            sizes=tuple(sizes[i].tolist()),
-            size_std=tuple(std[i].tolist()),
-            covariance=covariance[i],
-            cost=float(
-                likelihood.cost - gained[i] + occam[i] - in_range[i] - odds - (REFERENCE if several else 0.0)
-            ),
-        )
+    wrong = np.array([len(subset) for subset in subsets])
+    odds = _log_odds(chosen) + np.where(wrong > 0, _LOG_WRONG * (1 + wrong), 0.0)
+    several = (wrong > 0) | bool(chosen)
+    cost = likelihood.cost - gained + occam - in_range - odds - np.where(several, REFERENCE, 0.0)
+    return _Evidence(tuple(c.key for c in chosen), subsets, sizes, std, covariance, cost)
 
 
 def _log_odds(chosen: Sequence[Cause]) -> float:
