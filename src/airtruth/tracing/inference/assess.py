@@ -137,6 +137,15 @@ def own_likelihood(
     return _negative_log_likelihood(respond(problem.records[index], problem.settings, compiled, common, own))
 
 
+def likelihood_at(problem: TraceProblem, hypothesis: Hypothesis, point: Parameters) -> float:
+    """Negative log-likelihood of all records at a point; infinite where a motion leaves all bounds."""
+    compiled = compile_change(hypothesis.change(point.sizes))
+    return sum(
+        _negative_log_likelihood(respond(record, problem.settings, compiled, point.common, own))
+        for record, own in zip(problem.records, point.per_record, strict=True)
+    )
+
+
 def _negative_log_likelihood(response: Response) -> float:
     """Infinite where the motion leaves all bounds."""
     if not np.isfinite(response.logdet):
@@ -371,4 +380,12 @@ def _linear_model(
     return _LinearModel(a, c, process, kernel.model.sensors.variance, kernel.model.states.noise)
 
 
-__all__ = ["Assessment", "assess", "fitted_noise_floor", "free_run", "noise_floor", "own_likelihood"]
+__all__ = [
+    "Assessment",
+    "assess",
+    "fitted_noise_floor",
+    "free_run",
+    "likelihood_at",
+    "noise_floor",
+    "own_likelihood",
+]

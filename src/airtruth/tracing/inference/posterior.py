@@ -16,6 +16,7 @@ from typing import Final, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.physics.terms import DECLARED
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.whitening import Whitener
 from airtruth.tracing.model.parameters import (
@@ -214,7 +215,10 @@ def sensitivities_of(
                 put_size(k)
         return differences.sensitivities if np.isfinite(differences.t).all() else None
     if not per_record_only:
+        has_shift = given.compiled.declared["cg"] != DECLARED["cg"]
         for i in free_common(settings):
+            if i == Common.mounting and not has_shift:
+                continue
             h = COMMON_STEP[i]
             differences.put(i, respond_to(given, settings, _moved(common, i, h), own), h)
         for k in range(len(sizes)):

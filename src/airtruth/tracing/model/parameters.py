@@ -33,6 +33,8 @@ class Common:
     rolloff : high-frequency rolloff of the gusts, less 1/2: -1/2 is Dryden's, 1/2 is von Karman's [-].
     inertia : relative change of the pitch inertia at equal derivatives of the pitch acceleration [-]; it changes the
         curvature of the tables alone.
+    mounting : share of a shift of the CG that moves the CG past the sensors, less 1/2 [-]: 1/2 if they are bolted to the
+        airframe, -1/2 if they keep their declared distance from the CG.
     colour_shares : share of the noise variance of alpha, q and az that is slow [-].
     log_colour_time : logarithm of the correlation time of the slow noise over `COLOUR_TIME_S`.
     colour : shares and correlation time; noise : everything that describes the sensors' noise (indices).
@@ -52,6 +54,7 @@ class Common:
         "thrust",
         "rolloff",
         "inertia",
+        "mounting",
         "colour_alpha",
         "colour_q",
         "colour_az",
@@ -68,6 +71,7 @@ class Common:
     thrust: Final = names.index("thrust")
     rolloff: Final = names.index("rolloff")
     inertia: Final = names.index("inertia")
+    mounting: Final = names.index("mounting")
     colour_shares: Final = _span(names, "colour_alpha", "colour_az")
     log_colour_time: Final = names.index("log_colour_time")
     colour: Final = _span(names, "colour_alpha", "log_colour_time")
@@ -117,7 +121,7 @@ class PerRecord:
 COMMON_STEP: Final = np.array(
     [1e-3, 1e-1, 1e-3, 1e-4, 1e-2, 1e-4]  # derivatives
     + [1e-4] * 3  # log noise
-    + [1e-3] * 8
+    + [1e-3] * 9
 )
 """Steps of the one-sided differences in `Common` [units there]; judgement: about 1e-3 of a declared standard deviation,
 large against rounding and small against the curvature of the innovations."""
@@ -128,11 +132,12 @@ COLOUR_TIME_S: Final = 0.1
 BOUNDS: Final[dict[int, tuple[float, float]]] = {
     Common.rotary: (-0.75, 0.75),
     Common.rolloff: (-0.75, 0.75),
+    Common.mounting: (-0.75, 0.75),
     **dict.fromkeys(range(Common.colour_shares.start, Common.colour_shares.stop), (0.0, 0.95)),
     Common.log_colour_time: (-1.6, 1.0),
 }
 """Range of the bounded common parameters [units there]; judgement. Gusts: none to all, and a quarter beyond for a form
-that is neither of the two. Slow noise: some white noise has to remain, and the correlation time stays between 20 and
+that is neither of the two; the sensors' mounting likewise. Slow noise: some white noise has to remain, and the correlation time stays between 20 and
 270 ms, because slower noise cannot be told from motion."""
 
 

@@ -248,7 +248,7 @@ def filter_model(given: FilterInputs, settings: Settings, common: Array, per_rec
         rotary=0.5 + float(common[Common.rotary]),
         rotary_time_s=4.0 * span / (np.pi * given.reference.airspeed_m_s),
     )
-    sensors = pack_sensors(compiled, settings, common, per_record)
+    sensors = pack_sensors(compiled, settings, common, per_record, record.plant.aircraft.constants.chord_m)
     return FilterModel(
         aircraft=pack_aircraft(record.plant, compiled, common),
         gusts=gusts,
@@ -287,15 +287,16 @@ def pack_aircraft(plant: Plant, compiled: CompiledChange, common: Array) -> Airc
 
 
 def pack_sensors(
-    compiled: CompiledChange, settings: Settings, common: Array, per_record: Array
+    compiled: CompiledChange, settings: Settings, common: Array, per_record: Array, chord_m: float
 ) -> SensorArrays:
     """Errors and noise of the outputs' sensors."""
+    moved_m = (0.5 + float(common[Common.mounting])) * compiled.declared["cg"] * chord_m
     noise = (settings.noise * np.exp(common[Common.log_noise])) ** 2
     share = np.clip(common[Common.colour_shares], 0.0, _MOST_SLOW)
     return SensorArrays(
         bias=per_record[PerRecord.bias] + compiled.bias,
         scale=compiled.scale,
-        arm_m=compiled.arm_m,
+        arm_m=compiled.arm_m + moved_m,
         lag_s=compiled.lag_s,
         delay_s=compiled.delay_s,
         variance=noise * (1.0 - share) + settings.resolution**2,

@@ -33,6 +33,8 @@ _ROTARY_STD: Final = 0.5
 """Prior standard deviation of the share of the rotary gust [-]: none and all are one away from the middle (judgement)."""
 _ROLLOFF_STD: Final = 0.5
 """The same of the rolloff between Dryden's and von Karman's spectrum [-] (judgement)."""
+_MOUNTING_STD: Final = 0.5
+"""The same of the share of a shift of the CG that moves the CG past the sensors [-] (judgement)."""
 _NOISE_STD: Final = 0.1
 """Prior standard deviation of the logarithm of declared noise [-]: data sheets are right within 10 % (judgement)."""
 _NOISE_UNKNOWN_STD: Final = 1.0
@@ -251,6 +253,7 @@ def common_prior(
     diagonal[Common.rotary] = _ROTARY_STD**-2
     diagonal[Common.thrust] = settings.thrust_std**-2
     diagonal[Common.rolloff] = _ROLLOFF_STD**-2
+    diagonal[Common.mounting] = _MOUNTING_STD**-2
     diagonal[Common.colour] = np.array(_COLOUR_STD) ** -2.0
     return precision + np.diag(diagonal)
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.assess import likelihood_at
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.model.response import respond
 from airtruth.tracing.selection.acceptance import IMPROBABLE, declared_probability, own_probability
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.freedom import Freedom, without_last_effect
@@ -333,14 +333,7 @@ def _ordered_shares(
     """`_SHARES`, the most likely size first, all other parameters as in the null."""
     costs = []
     for share in _SHARES:
-        point = at(null, s, share * s.size)
-        change = hypothesis.change(point.sizes)
-        total = 0.0
-        for record, local in zip(problem.records, point.per_record, strict=True):
-            moved = respond(record, problem.settings, change, point.common, local)
-            white = moved.e @ moved.white.T
-            total += 0.5 * len(white) * moved.logdet + 0.5 * float((white**2).sum())
-        costs.append(total if np.isfinite(total) else np.inf)
+        costs.append(likelihood_at(problem, hypothesis, at(null, s, share * s.size)))
     return [_SHARES[i] for i in np.argsort(costs, kind="stable")]
 
 

@@ -15,6 +15,7 @@ from airtruth.tracing.inference.derivative_likelihood import (
     derivative_likelihood,
 )
 from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.assess import likelihood_at
 from airtruth.tracing.inference.optimise import converged_fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.parameters import Common
@@ -173,7 +174,8 @@ def _as_effects(
 ) -> PosteriorFit | None:
     """A set refitted as effects of the filter; None where no start converges. ``rival`` as of `fit`.
 
-    It begins at the null, or else at the released derivatives, of which first order takes off what the causes bring.
+    It begins at the null or at the released derivatives, of which first order takes off what the causes bring: where the records
+    are more likely, and then at the other where it ends behind the null.
     """
     hypothesis, sizes = null.hypothesis, list(null.point.sizes)
     away = free.point.common.copy()
@@ -182,9 +184,12 @@ def _as_effects(
         away[Common.derivatives] -= size * causes[key].direction
         low, high = effects[key].parameters[0].reach
         sizes.append(min(max(size_in_filter(key, size), low), high))
-    for start in (null.point, replace(free.point, common=away)):
-        own = converged_fit(problem, hypothesis, replace(start, sizes=np.array(sizes)), rival)
-        if own is not None and own.converged:
+    starts = [
+        replace(start, sizes=np.array(sizes)) for start in (null.point, replace(free.point, common=away))
+    ]
+    for start in sorted(starts, key=lambda s: likelihood_at(problem, hypothesis, s)):
+        own = converged_fit(problem, hypothesis, start, rival)
+        if own is not None and own.converged and own.cost < null.cost:
             return own
     return None
 
