@@ -10,7 +10,7 @@ from airtruth.tracing.selection.weights import alike_in_rivals, rival_of, weight
 
 def null(*names, spread=None, z=100.0):
     """What a weight reads of a fit; each size is ``z`` standard deviations."""
-    effects = [SimpleNamespace(name=name) for name in names]
+    effects = [SimpleNamespace(name=name, key=name) for name in names]
     return SimpleNamespace(
         hypothesis=SimpleNamespace(spread=spread, effects=effects, span=lambda key: slice(0, 1)),
         point=SimpleNamespace(sizes=[z]),
@@ -31,14 +31,14 @@ def tied(z=100.0, **gains):
     )
 
 
-def released(rival=None, carried=(), **costs):
+def released(rival=None, carried=(), spread=None, **costs):
     """A round whose released derivatives have these explanations, the first that of the answer."""
     sets = [SimpleNamespace(effects=(name,), cost=cost) for name, cost in costs.items()]
     return SimpleNamespace(
         tied=[],
         release=SimpleNamespace(sets=sets, cost=sets[0].cost),
         rival=rival,
-        null=null(*carried, spread=1.0 if carried else None),
+        null=null(*carried, spread=spread),
     )
 
 
@@ -100,7 +100,18 @@ def test_a_branch_of_less_cost_and_more_effects_weighs_no_more_than_the_answer()
 
 def test_effects_that_explained_an_earlier_release_are_in_every_set():
     """A changed loading, and beside it derivatives whose declaration is wrong as well."""
-    found = weights([released(carried=("cg_shift", "mass_error"), derivatives=5.0, icing=6.0)])
+    carried = ("cg_shift", "mass_error")
+    found = weights([released(carried=carried, spread=1.0, derivatives=5.0, icing=6.0)])
     assert found == pytest.approx(
         {("cg_shift", "derivatives", "mass_error"): 1.0, ("cg_shift", "icing", "mass_error"): math.exp(-1.0)}
+    )
+
+
+def test_effects_of_an_earlier_release_are_in_every_set_of_a_later_one():
+    """The last derivatives that were released are explained beside a changed loading, and refitted under the declaration."""
+    end = tied(z=100.0)
+    end.tied, end.null = [], null("cg_shift", "inertia_error")
+    later = released(carried=("cg_shift", "elevator_effectiveness"), inertia_error=5.0, icing=6.0)
+    assert weights([released(cg_shift=5.0), later, end]) == pytest.approx(
+        {("cg_shift", "inertia_error"): 1.0, ("cg_shift", "icing"): math.exp(-1.0)}
     )

@@ -35,7 +35,7 @@ def off_optimum():
     common, per_record = point.common.copy(), point.per_record.copy()
     common[Common.derivatives] = 0.5 * MORE
     common[Common.log_noise] = [0.05, -0.08, 0.03]
-    common[Common.rotary :] = [0.3, 0.1, -0.2, 0.03, 0.2, 0.4, 0.1, -0.3]
+    common[Common.rotary :] = [0.3, 0.1, -0.2, 0.03, 0.1, 0.2, 0.4, 0.1, -0.3]
     per_record[0] += [0.001, 0.01, 0.3, -0.2, 0.002, 0.003, 0.02, 0.003, -0.0004, 0.2]
     return problem, Parameters(common, per_record, point.sizes)
 

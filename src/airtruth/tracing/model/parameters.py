@@ -136,9 +136,9 @@ BOUNDS: Final[dict[int, tuple[float, float]]] = {
     **dict.fromkeys(range(Common.colour_shares.start, Common.colour_shares.stop), (0.0, 0.95)),
     Common.log_colour_time: (-1.6, 1.0),
 }
-"""Range of the bounded common parameters [units there]; judgement. Gusts: none to all, and a quarter beyond for a form
-that is neither of the two; the sensors' mounting likewise. Slow noise: some white noise has to remain, and the correlation time stays between 20 and
-270 ms, because slower noise cannot be told from motion."""
+"""Range of the bounded common parameters [units there]; judgement. Gusts and the mounting of the sensors: none to all, and a
+quarter beyond for a form that is neither of the two. Slow noise: some white noise has to remain, and the correlation time stays
+between 20 and 270 ms, because slower noise cannot be told from motion."""
 
 
 @dataclass(frozen=True)

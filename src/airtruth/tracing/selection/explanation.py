@@ -77,6 +77,11 @@ class Cause:
     shape: float = _CERTAIN_SHAPE
     log_odds: float = _LOG_CAUSE
 
+    def most_probable(self, size: float, std: float) -> float:
+        """Size within its plausible range that is most probable, where records tell ``size`` with an error of ``std`` [-]."""
+        told = size * self.std**2 / (self.std**2 + std**2)
+        return min(max(told, self.low), self.high)
+
 
 @dataclass(frozen=True)
 class CauseSet:

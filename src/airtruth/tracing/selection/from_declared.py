@@ -6,11 +6,15 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.parameters import Common, Parameters, PerRecord
 from airtruth.tracing.selection.score_test import Score
+
+Array = NDArray[np.float64]
 
 _ITERATIONS: Final = 6
 """Iterations with gusts taken as strong [-] (judgement)."""
@@ -19,28 +23,47 @@ _ITERATIONS: Final = 6
 def from_declared(
     problem: TraceProblem,
     null: PosteriorFit,
-    s: Score,
-    size: float,
-    rival: float,
+    hypothesis: Hypothesis,
+    sizes: Array,
+    rival: float = np.inf,
     *,
     only_better: bool = False,
 ) -> PosteriorFit | None:
-    """A refit of an effect beside a null, with the levels of noise and gusts of the null; options as of `fit`.
+    """A refit with the levels of noise and gusts of a null; None and options as of `fit`.
 
     From strong gusts the levels would fall for many steps far behind a rival, and the search would be given up.
 
     Parameters
     ----------
-    s, size : score of the effect, and the size at which it begins.
+    hypothesis, sizes : what is refitted, and the sizes of its effects at which the search begins.
     """
-    hypothesis = null.hypothesis.plus(s.effect)
-    start = initial_parameters(problem, hypothesis, at(null, s, size).sizes, _ITERATIONS)
+    start = initial_parameters(problem, hypothesis, sizes, _ITERATIONS)
     common = start.common.copy()
     common[Common.noise] = null.point.common[Common.noise]
     per_record = start.per_record.copy()
     per_record[:, PerRecord.log_gust] = null.point.per_record[:, PerRecord.log_gust]
     start = replace(start, common=common, per_record=per_record)
     return fit(problem, hypothesis, start, rival=rival, only_better=only_better, near=null)
+
+
+def with_effect(
+    problem: TraceProblem,
+    null: PosteriorFit,
+    s: Score,
+    size: float,
+    rival: float,
+    *,
+    only_better: bool = False,
+) -> PosteriorFit | None:
+    """`from_declared` of a null's effects and one more.
+
+    Parameters
+    ----------
+    s, size : score of the further effect, and the size at which it begins.
+    """
+    hypothesis = null.hypothesis.plus(s.effect)
+    sizes = at(null, s, size).sizes
+    return from_declared(problem, null, hypothesis, sizes, rival, only_better=only_better)
 
 
 def at(null: PosteriorFit, s: Score, size: float) -> Parameters:
@@ -50,4 +73,4 @@ def at(null: PosteriorFit, s: Score, size: float) -> Parameters:
     return replace(null.point, sizes=np.concatenate([null.point.sizes, sizes]))
 
 
-__all__ = ["at", "from_declared"]
+__all__ = ["at", "from_declared", "with_effect"]

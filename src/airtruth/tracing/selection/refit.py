@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
-from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.assess import likelihood_at
+from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.selection.acceptance import IMPROBABLE, declared_probability, own_probability
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.freedom import Freedom, without_last_effect
-from airtruth.tracing.selection.from_declared import at, from_declared
+from airtruth.tracing.selection.from_declared import at, with_effect
 from airtruth.tracing.selection.score_test import Score, Table
 
 LEADING: Final = 8
@@ -133,7 +133,7 @@ def _from_both(
     effect = r.score.effect
     if len(effect.parameters) > 1 or not may_begin(advance, f"refit {effect.key} from the declared aircraft"):
         return r
-    tried = from_declared(problem, null, r.score, r.size, r.fit.cost - _BETTER, only_better=True)
+    tried = with_effect(problem, null, r.score, r.size, r.fit.cost - _BETTER, only_better=True)
     if tried is None or tried.cost > r.fit.cost - _BETTER:
         return r
     return Refit(r.score, tried, freedom.correction(effect, tried))
@@ -170,7 +170,7 @@ def refit_absorbed(
             continue
         for size in _usual_sizes(s, either_sign):
             ahead = min((r.fit.cost for r in found), default=rival)
-            tried = from_declared(problem, null, s, size, min(ahead, rival))
+            tried = with_effect(problem, null, s, size, min(ahead, rival))
             if tried is not None:
                 found.append(Refit(s, tried, 0.0))
     return sorted(found, key=lambda r: r.cost)
@@ -204,7 +204,7 @@ def refit_known(
         if not may_begin(advance, f"refit {key} from the kinematic check"):
             break
         ahead = min((r.fit.cost for r in best.values()), default=np.inf)
-        tried = from_declared(problem, null, s, size, ahead)
+        tried = with_effect(problem, null, s, size, ahead)
         if tried is not None and (key not in best or tried.cost < best[key].fit.cost):
             best[key] = Refit(s, tried, freedom.correction(s.effect, tried))
     return sorted(best.values(), key=lambda r: r.cost)
@@ -316,7 +316,7 @@ def refit_scored(
             break
     if _is_improbable(problem, null):
         to_beat = np.inf if best is None else best.cost - _SAME
-        tried = from_declared(problem, null, s, white_size, min(rival, to_beat), only_better=to_beat < rival)
+        tried = with_effect(problem, null, s, white_size, min(rival, to_beat), only_better=to_beat < rival)
         if tried is not None and (best is None or tried.cost < best.cost):
             best = tried
     return best

@@ -9,13 +9,13 @@ from typing import Final
 import numpy as np
 
 from airtruth.effects.effect import Effect
+from airtruth.tracing.inference.assess import likelihood_at
 from airtruth.tracing.inference.derivative_likelihood import (
     Contradiction,
     DerivativeLikelihood,
     derivative_likelihood,
 )
 from airtruth.tracing.inference.hypothesis import Hypothesis
-from airtruth.tracing.inference.assess import likelihood_at
 from airtruth.tracing.inference.optimise import converged_fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.parameters import Common
@@ -28,6 +28,7 @@ from airtruth.tracing.selection.explanation import (
     predicted_cost,
     simplest_first,
 )
+from airtruth.tracing.selection.from_declared import from_declared
 
 CONTRADICTED: Final = 0.01
 """Probability below which records contradict the declared derivatives [-] (convention: one true declaration in a
@@ -172,26 +173,32 @@ def _as_effects(
     causes: Mapping[str, Cause],
     rival: float,
 ) -> PosteriorFit | None:
-    """A set refitted as effects of the filter; None where no start converges. ``rival`` as of `fit`.
+    """A set refitted as effects of the filter; None where no start converges before the null. ``rival`` as of `fit`.
 
-    It begins at the null or at the released derivatives, of which first order takes off what the causes bring: where the records
-    are more likely, and then at the other where it ends behind the null.
+    It begins at the declared aircraft, else at the released derivatives, of which first order takes off what the causes bring,
+    or at the null, where the records are more likely.
     """
     hypothesis, sizes = null.hypothesis, list(null.point.sizes)
     away = free.point.common.copy()
-    for key, size in zip(s.causes, s.sizes, strict=True):
+    for key, told, std in zip(s.causes, s.sizes, s.size_std, strict=True):
         hypothesis = hypothesis.plus(effects[key])
-        away[Common.derivatives] -= size * causes[key].direction
         low, high = effects[key].parameters[0].reach
-        sizes.append(min(max(size_in_filter(key, size), low), high))
-    starts = [
-        replace(start, sizes=np.array(sizes)) for start in (null.point, replace(free.point, common=away))
-    ]
-    for start in sorted(starts, key=lambda s: likelihood_at(problem, hypothesis, s)):
-        own = converged_fit(problem, hypothesis, start, rival)
-        if own is not None and own.converged and own.cost < null.cost:
-            return own
-    return None
+        size = min(max(size_in_filter(key, causes[key].most_probable(told, std)), low), high)
+        away[Common.derivatives] -= size_in_derivatives(key, size) * causes[key].direction
+        sizes.append(size)
+    first = np.array(sizes)
+    own = from_declared(problem, null, hypothesis, first, rival)
+    if _leads(own, null):
+        return own
+    starts = [replace(start, sizes=first) for start in (null.point, replace(free.point, common=away))]
+    own = converged_fit(
+        problem, hypothesis, min(starts, key=lambda start: likelihood_at(problem, hypothesis, start)), rival
+    )
+    return own if _leads(own, null) else None
+
+
+def _leads(own: PosteriorFit | None, null: PosteriorFit) -> bool:
+    return own is not None and own.converged and own.cost < null.cost
 
 
 def _corrected(

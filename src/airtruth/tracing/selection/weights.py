@@ -51,10 +51,15 @@ def weights(rounds: Sequence[SearchRound]) -> dict[tuple[str, ...], float]:
 
 
 def _carried(rounds: Sequence[SearchRound]) -> set[str]:
-    """Effects beside released derivatives that no round accepted: they explained derivatives that were released before."""
+    """Effects beside the derivatives released last that no round accepted: they explained derivatives released before."""
     last = rounds[-1].null.hypothesis
     leaders = {r.tied[0].score.effect.name for r in rounds if r.tied}
-    return set() if last.spread is None else {e.name for e in last.effects} - leaders
+    released = next((r.null.hypothesis for r in reversed(rounds) if r.release is not None), None)
+    beside = released if released is not None and last.spread is None else last
+    if beside is last and last.spread is None:
+        return set()
+    kept = {e.key for e in last.effects}
+    return {e.name for e in beside.effects if e.key in kept} - leaders
 
 
 def _without_one(rounds: Sequence[SearchRound]) -> Iterator[tuple[list[str], float]]:
