@@ -94,8 +94,7 @@ def test_nonlinear_free_run_against_dop853(bolted):
         turn = (fz * math.cos(alpha) - fx * math.sin(alpha)) / (m * vg)
         slope = [q + turn + G0 * math.cos(theta(t) - alpha_ground) / vg, fm / (c.inertia_yy_kg_m2 * inertia)]
         ahead = bolted * cg * c.chord_m
-        vane = math.atan2(v * math.sin(alpha) - q * ahead, v * math.cos(alpha))
-        return slope, (vane, q, fz / m - ahead * slope[1])
+        return slope, (alpha - q * ahead / v, q, fz / m - ahead * slope[1])
 
     end = 2.0
     t = np.arange(round(end / tr.DT) + 1) * tr.DT
