@@ -171,6 +171,43 @@ def test_derivatives_that_promise_too_much_are_renewed():
     assert counts[0.5] < 0.5 * counts[0.0]
 
 
+class Line:
+    """A linear function that counts how often it is evaluated."""
+
+    def __init__(self):
+        rng = np.random.default_rng(2)
+        self.a, self.b, self.calls = rng.standard_normal((8, 3)), rng.standard_normal(8), 0
+        self.best = np.linalg.lstsq(self.a, self.b, rcond=None)[0]
+
+    def __call__(self, x):
+        self.calls += 1
+        return self.a @ x - self.b, self.a
+
+
+NEARBY = Options(30, stopping=Stopping(promised=1e-12), reuse=True, stale=1e-9)
+
+
+def test_a_search_may_begin_with_derivatives_from_nearby():
+    """Those that are 5 % off lead to the solution, and are renewed before the search ends."""
+    line = Line()
+    problems = LeastSquares(line)
+    near = [At(np.nan, np.empty(0), 1.05 * line.a)]
+    found = minimise(problems, np.zeros((1, 3)), NEARBY, near=near)
+    assert found.status == (Status.CONVERGED,)
+    np.testing.assert_allclose(found.x[0], line.best, rtol=1e-5)
+    assert 0 < problems.reused < line.calls
+
+
+@pytest.mark.parametrize("at_near", [False, True])
+def test_derivatives_at_the_start_itself_need_no_renewal(at_near):
+    line = Line()
+    problems = LeastSquares(line)
+    near = [At(np.nan, np.empty(0), line.a)]
+    found = minimise(problems, line.best[None, :], NEARBY, near=near, at_near=at_near)
+    assert found.status == (Status.CONVERGED,)
+    assert (line.calls == problems.reused) == at_near
+
+
 def test_the_damping_follows_the_gain_ratio():
     """Down where the quadratic model is good, up where it is poor; a rejected step restarts it."""
     d = Damping(initial=1.0, least=0.05, poor=3.0, fair=1.0, good=0.1, rejected=10.0, restart=40.0)

@@ -142,6 +142,21 @@ def test_a_changed_loading_is_named(number, named, tmp_path):
     assert not answer["provisional"]
 
 
+@pytest.mark.parametrize("number", [5, 28, 31, 32])
+def test_a_changed_loading_is_named_beside_sensors_that_moved_with_the_airframe(number, tmp_path):
+    """CG, mass and inertia, lambda 71 to 198. The sensors keep their places in the airframe, and a refit from the null or from the
+    released derivatives diverged. Wrong derivatives, a curvature or an airspeed scale were named."""
+    from validation.blind.draw import draw
+
+    answer = answered(20261506, number, "composite", tmp_path)
+    flown = {e.key: e.values for e in draw(20261506, number, "composite").effects}
+    assert {e["name"] for e in answer["effects"]} == set(flown)
+    assert not answer["provisional"]
+    for effect in answer["effects"]:
+        for name, p in effect["parameters"].items():
+            assert abs(p["value"] - flown[effect["name"]][name]) < 3.0 * p["std"]
+
+
 def test_coloured_noise_behind_a_strong_effect_is_found(tmp_path):
     """A vane 60 ms late, lambda 344, moderate gusts, coloured noise. At the declared aircraft the delay drives the share of slow
     noise to its limit; without slow noise an increment was learned beside the delay."""

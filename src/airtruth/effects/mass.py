@@ -62,8 +62,8 @@ EFFECTS: Final = (
             ),
         ),
         describe=_change("cg", "dx_mac"),
-        explanation="The centre of gravity lies behind or ahead of its declared position. The sensors keep their "
-        "declared distance from it.",
+        explanation="The centre of gravity lies behind or ahead of its declared position. The records tell how far "
+        "it has moved past the sensors.",
         source="Moment transfer: dCm = CL dx + ...; Etkin and Reid, Dynamics of Flight, 3rd ed., 1996, ch. 2. "
         "Material: 1 % of the chord.",
         distinguished_by="Two loadings; with one, Cmalpha and Cmq absorb it.",
