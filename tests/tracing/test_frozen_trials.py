@@ -144,8 +144,8 @@ def test_a_changed_loading_is_named(number, named, tmp_path):
 
 @pytest.mark.parametrize("number", [5, 28, 31, 32])
 def test_a_changed_loading_is_named_beside_sensors_that_moved_with_the_airframe(number, tmp_path):
-    """CG, mass and inertia, lambda 71 to 198. The sensors keep their places in the airframe, and a refit from the null or from the
-    released derivatives diverged. Wrong derivatives, a curvature or an airspeed scale were named."""
+    """CG, mass and inertia, lambda 71 to 198. The sensors are bolted to the airframe, and a refit from the null or from
+    the released derivatives diverged. Wrong derivatives, a curvature or an airspeed scale were named."""
     from validation.blind.draw import draw
 
     answer = answered(20261506, number, "composite", tmp_path)

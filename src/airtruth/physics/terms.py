@@ -208,7 +208,7 @@ class DeclaredTerm:
     ----------
     quantity : "mass", "inertia" (Iyy), "elevator" (all forces and moments of the surface's deflection from trim): a
         factor, neutral 1. "cg": shift of the CG aft [chords]; "thrust_arm": shift of the thrust line down, nose-up
-        positive [m]: neutral 0. Sensors keep their position relative to the CG.
+        positive [m]: neutral 0. Sensors keep their position relative to the CG; a `SensorTerm` moves them.
     """
 
     quantity: Quantity

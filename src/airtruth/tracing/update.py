@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -15,21 +15,31 @@ from airtruth.effects.increment import Increment
 from airtruth.errors import StoreError
 from airtruth.logs import atomic
 from airtruth.physics.short_period import PARAMETERS
-from airtruth.physics.terms import AeroTerm, Change, ReadingTerm
+from airtruth.physics.terms import DECLARED, AeroTerm, Change, ReadingTerm, SensorTerm, declared_total
 from airtruth.tracing.increment_table import increment_table
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import robust_covariance
 from airtruth.tracing.model.parameters import Common
+from airtruth.tracing.model.response import moved_past_sensors_m
+from airtruth.tracing.model.settings import VANE
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.rounds import SearchRound
 
+_WITH_ARM: Final = (VANE, "az_m_s2")
+"""Channels whose reading depends on where their sensor is."""
 _Term = TypeVar("_Term", AeroTerm, ReadingTerm)
 
 
-def accepted_change(rounds: Sequence[SearchRound]) -> Change:
-    """The accepted effects at their estimated sizes."""
+def accepted_change(case: Case, rounds: Sequence[SearchRound], chord_m: float) -> Change:
+    """The accepted effects at their estimated sizes, with sensors that a shift of the CG has moved relative to it."""
     final = rounds[-1].gls
-    return final.hypothesis.added(final.point.sizes)
+    change = final.hypothesis.added(final.point.sizes)
+    shift = declared_total(change.declared, "cg")
+    if shift == DECLARED["cg"]:
+        return change
+    moved_m = moved_past_sensors_m(final.point.common, shift, chord_m)
+    arms = (SensorTerm(c, "arm", moved_m) for c in _WITH_ARM if c != VANE or case.has_vane)
+    return replace(change, sensors=(*change.sensors, *arms))
 
 
 def updated_folder(aircraft: Aircraft, out: Path) -> Path:
@@ -88,7 +98,7 @@ def write_update(
         If the model cannot take the effect, or the folder cannot be written; as `updated_folder`.
     """
     folder = updated_folder(aircraft, out)
-    change = accepted_change(rounds)
+    change = accepted_change(case, rounds, aircraft.constants.chord_m)
     released = rounds[-1].null.hypothesis.spread is not None
     refits = (released or contradicted) and aircraft.file.jsbsim is not None
     if (change == Change() and not refits) or (aircraft.file.jsbsim is None and change.in_aircraft):

@@ -286,17 +286,21 @@ def pack_aircraft(plant: Plant, compiled: CompiledChange, common: Array) -> Airc
     )
 
 
+def moved_past_sensors_m(common: Array, shift: float, chord_m: float) -> float:
+    """Distance by which a CG that lies ``shift`` chords aft has moved past the sensors [m]; see `Common.mounting`."""
+    return (0.5 + float(common[Common.mounting])) * shift * chord_m
+
+
 def pack_sensors(
     compiled: CompiledChange, settings: Settings, common: Array, per_record: Array, chord_m: float
 ) -> SensorArrays:
     """Errors and noise of the outputs' sensors."""
-    moved_m = (0.5 + float(common[Common.mounting])) * compiled.declared["cg"] * chord_m
     noise = (settings.noise * np.exp(common[Common.log_noise])) ** 2
     share = np.clip(common[Common.colour_shares], 0.0, _MOST_SLOW)
     return SensorArrays(
         bias=per_record[PerRecord.bias] + compiled.bias,
         scale=compiled.scale,
-        arm_m=compiled.arm_m + moved_m,
+        arm_m=compiled.arm_m + moved_past_sensors_m(common, compiled.declared["cg"], chord_m),
         lag_s=compiled.lag_s,
         delay_s=compiled.delay_s,
         variance=noise * (1.0 - share) + settings.resolution**2,
@@ -313,6 +317,7 @@ __all__ = [
     "filter_inputs",
     "filter_model",
     "kernel_input",
+    "moved_past_sensors_m",
     "pack_aircraft",
     "pack_sensors",
     "respond",
