@@ -2,7 +2,8 @@
 
 Six records of data/undeclared against the whole library, wall and CPU time of the search itself (the bar: 10 s
 on two cores), as a multiple of one refit without effects, for one and two threads; and a check that both give
-the same answer.
+the same answer. First the time of one flight of the filter, as a multiple of one recursion of `scipy.signal.dlsim` with as many
+states.
 """
 
 from __future__ import annotations
@@ -11,20 +12,45 @@ import json
 import time
 from pathlib import Path
 
+import numpy as np
+from scipy.signal import dlsim
+
 from airtruth import aircraft
 from airtruth.effects.registry import EFFECTS
 from airtruth.logs.store import read_log
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.inference.optimise import fit, initial_parameters
-from airtruth.tracing.prepare import prepare
+from airtruth.tracing.model.parameters import CORE, OUTPUTS, Common
+from airtruth.tracing.model.response import filter_inputs, respond_to
+from airtruth.tracing.prepare import Case, prepare
 
+FLIGHTS = 200
+"""Flights of the filter that are timed."""
 DATA = Path(__file__).resolve().parents[1] / "data" / "undeclared"
+
+
+def flight(case: Case) -> str:
+    """One flight of the filter against a linear recursion of the same length."""
+    record, settings = case.fitted.records[0], case.fitted.settings
+    point = initial_parameters(case.fitted, case.hypothesis)
+    given = filter_inputs(record, case.hypothesis.change(point.sizes))
+    start = time.perf_counter()
+    for _ in range(FLIGHTS):
+        respond_to(given, settings, np.zeros(Common.size), point.per_record[0])
+    filtered = (time.perf_counter() - start) / FLIGHTS
+    system = (0.9 * np.eye(CORE), np.ones((CORE, 1)), np.ones((OUTPUTS, CORE)), np.zeros((OUTPUTS, 1)), 1.0)
+    inputs = np.ones((record.samples, 1))
+    start = time.perf_counter()
+    dlsim(system, inputs)
+    linear = time.perf_counter() - start
+    return f"one flight of the filter: {1e3 * filtered:.2f} ms of {record.samples} samples, {filtered / linear:.2f} of dlsim"
 
 
 def main() -> None:
     """Print the table."""
     gtm = aircraft.load("gtm")
     trace([read_log(DATA / "f.parquet")], gtm, TraceOptions())  # compiles
+    print(flight(prepare([read_log(DATA / "f.parquet")], gtm, [], TraceOptions())))
     print(f"{len(EFFECTS)} effects; s wall (CPU), refits without effects that would take as long")
     print(f"{'set':4} {'verdict':12} {'one thread':>18} {'two threads':>18} {'refits':>7} same answer")
     for path in sorted(DATA.glob("*.parquet")):
