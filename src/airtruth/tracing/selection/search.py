@@ -115,9 +115,11 @@ class _Search:
         missing = tuple(e for e in first.effects if e.key in self.known and e.key not in taken)
         if missing and rounds[-1].anomaly.p_value < _FAILED:
             rounds = self.led(first, missing, rounds)
-        weak = [r.tied[0].gain < _WEAK for r in rounds if r.tied] == [True]
-        if (rounds[-1].anomaly.p_value < REMAINS or weak) and len(rounds[-1].null.hypothesis.effects) < 2:
-            rounds = self._with_absorbed(first, rounds)
+        weak = [r.tied[0].gain < _WEAK for r in rounds if r.tied]
+        if (rounds[-1].anomaly.p_value < REMAINS or weak == [True]) and len(
+            rounds[-1].null.hypothesis.effects
+        ) < 2:
+            rounds = self._with_absorbed(first, rounds, beside=not any(weak))
         if len(rounds[-1].null.hypothesis.effects) + len(rounds[-1].sets[:1]) < 2:
             return rounds
         last = self._declared(rounds[-1].null)
@@ -131,20 +133,32 @@ class _Search:
             rounds = (*rounds[:-1], replace(rounds[-1], exchanged=exchanged))
         return rounds
 
-    def _with_absorbed(self, first: RoundStart, rounds: tuple[SearchRound, ...]) -> tuple[SearchRound, ...]:
-        """The rounds, or those led by an effect that refitted derivatives had absorbed, so that it had no score."""
-        null, last = rounds[0].null, rounds[-1]
-        taken = {e.key for e in last.null.hypothesis.effects}
-        table = rounds[0].table
+    def _with_absorbed(
+        self, first: RoundStart, rounds: tuple[SearchRound, ...], beside: bool
+    ) -> tuple[SearchRound, ...]:
+        """The rounds, or those led by an effect that refitted derivatives had absorbed, so that it had no score.
+
+        Parameters
+        ----------
+        beside : whether it is refitted beside the accepted effect, and not in its place.
+        """
+        last = rounds[-1]
+        accepted = last.null.hypothesis.effects
+        base = last if beside else rounds[0]
+        null = self._declared(base.null)
+        if null is None:
+            return rounds
+        taken = {e.key for e in accepted}
         cost = total_cost(last)
         fits = refit_absorbed(
-            self.problem, null, table, (), self.advance, taken, either_sign=True, rival=cost
+            self.problem, null, base.table, (), self.advance, taken, either_sign=True, rival=cost
         )
         if not fits or fits[0].cost > cost:
             return rounds
         effect = fits[0].score.effect
         size = effect.parameters[0].value(fits[0].size)
-        return replace(self, known={**self.known, effect.key: size}).led(first, (effect,), rounds)
+        leaders = (*(accepted if beside else ()), effect)
+        return replace(self, known={**self.known, effect.key: size}).led(first, leaders, rounds)
 
     def _declared(self, last: PosteriorFit) -> PosteriorFit | None:
         """The fit under the declaration of the derivatives: released ones absorb what a wrong effect leaves."""
