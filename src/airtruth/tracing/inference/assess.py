@@ -15,12 +15,7 @@ from airtruth.numerics.levenberg_marquardt import minimise
 from airtruth.numerics.levenberg_marquardt_options import Damping, Options, Stopping
 from airtruth.numerics.normal_equations import scaled_step
 from airtruth.tracing.inference.hypothesis import Hypothesis
-from airtruth.tracing.inference.posterior import (
-    Sensitivities,
-    TraceProblem,
-    likelihood_terms,
-    sensitivities_of,
-)
+from airtruth.tracing.inference.posterior import TraceProblem, likelihood_terms, sensitivities_of
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.compile import CompiledChange, compile_change
 from airtruth.tracing.model.linearise import process_intensity
@@ -46,19 +41,15 @@ Ints = NDArray[np.int64]
 _SEARCH: Final = Options(
     iterations=30,
     damping=Damping(initial=1e-6, least=1e-6, most=np.inf, poor=0.1, fair=0.1),
-    stopping=Stopping(promised=0.01, decrease=0.01),
-    reuse=True,
-    stale=0.1,
-    creeping=0.5,
-    renewed_end=False,
+    stopping=Stopping(decrease=0.01),
 )
 """How a record's own parameters are searched; judgement: ten parameters that are well determined, so that steps are
-nearly undamped. A search ends once a step with renewed derivatives promises or gains 0.01 in log-likelihood, 0.14
-standard errors."""
+nearly undamped. A search ends once a step gains 0.01 in log-likelihood, 0.14 standard errors. Derivatives that serve several
+steps end it early, by hundreds in log-likelihood, where it begins without knowledge of the gusts."""
 _MOST_LOG_STEP: Final = 1.0
 """Largest step of the logarithm of the gust level [-]: a factor of e (judgement)."""
 _FREE_RUN_ITERATIONS: Final = 3
-"""Most steps of a free run with the same derivatives [-]; judgement: the simulation is nearly linear in what is free."""
+"""Most Gauss-Newton iterations of a free run [-]; judgement: the simulation is nearly linear in what is free."""
 _FREE_RUN_GAIN: Final = 1e-3
 """Relative decrease of the squared residuals that ends them [-]; judgement."""
 _UNSTABLE: Final = 10.0
@@ -161,7 +152,6 @@ class _OwnEvaluated:
     cost: float
     gradient: Array
     information: Array
-    sensitivities: Sensitivities
 
 
 @dataclass(frozen=True)
@@ -178,12 +168,11 @@ class _OwnSearch:
     def evaluate(
         self, x: Array, index: Ints, near: Sequence[_OwnEvaluated] | None
     ) -> list[_OwnEvaluated | None]:
-        return [self._evaluate(row, None if near is None else near[k]) for k, row in enumerate(x)]
+        return [self._evaluate(row) for row in x]
 
-    def _evaluate(self, own: Array, near: _OwnEvaluated | None) -> _OwnEvaluated | None:
+    def _evaluate(self, own: Array) -> _OwnEvaluated | None:
         point = Parameters(self.common, own[None, :], self.sizes)
-        old = None if near is None else near.sensitivities
-        at = sensitivities_of(self.problem, 0, self.hypothesis, point, per_record_only=True, old=old)
+        at = sensitivities_of(self.problem, 0, self.hypothesis, point, per_record_only=True)
         if at is None:
             return None
         cost, gradient, information = likelihood_terms(at, NO_WHITENER, levels=True)
@@ -192,7 +181,6 @@ class _OwnSearch:
             cost + 0.5 * float(off @ self.precision @ off),
             gradient[rows] + self.precision @ off,
             information[rows, rows] + self.precision,
-            at,
         )
 
     def step(self, x: Array, at: Sequence[_OwnEvaluated], damping: Array, index: Ints) -> tuple[Array, Array]:
@@ -247,8 +235,9 @@ def free_run(
     free = PerRecord.deterministic
     mean, precision = per_record_prior(record, settings, unconstrained)
     prior = np.diag(precision)[free]
-    residual, t = _free_run_slopes(record, settings, compiled, common, own, weight)
+    residual = respond(record, settings, compiled, common, own, free_run=True).e
     for _ in range(_FREE_RUN_ITERATIONS):
+        residual, t = _free_run_slopes(record, settings, compiled, common, own, weight)
         off = (own - mean)[free]
         move = -np.linalg.solve(t @ t.T + np.diag(prior), t @ (residual * weight).ravel() + prior * off)
         if not np.isfinite(move).all():

@@ -6,7 +6,7 @@ it may have nothing left to describe, and an answer that kept it would name an e
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -58,7 +58,7 @@ def pruned(
     learned = any(isinstance(e, Increment) for e in members)
     declared = _as_declared(problem, last.null) if learned else None
     least = significant_gain(len(effects), later=learned)
-    fitted = _with_needed_names(problem, declared or last.null, least)
+    fitted = _with_needed_names(problem, declared or last.null, least, _latest_causes(rounds))
     if fitted is last.null:
         return rounds
     end = scored_round(problem, fitted, effects, len(rounds), seed, advance)
@@ -79,10 +79,31 @@ def _as_declared(problem: TraceProblem, last: PosteriorFit) -> PosteriorFit | No
     return own if own is not None and contradiction(problem, own).p_value > CONTRADICTED else None
 
 
-def _with_needed_names(problem: TraceProblem, fitted: PosteriorFit, least: float) -> PosteriorFit:
-    """The fit without the names whose absence costs less than ``least`` in 2 log L, the cheapest one first."""
+def _latest_causes(rounds: Sequence[SearchRound]) -> Collection[str]:
+    """Names of the causes that explain released derivatives, where nothing was accepted after them.
+
+    The evidence of their sets has weighed each of them already.
+    """
+    for r in reversed(rounds):
+        if r.tied:
+            return ()
+        if r.release is not None:
+            return r.release.sets[0].effects
+    return ()
+
+
+def _with_needed_names(
+    problem: TraceProblem, fitted: PosteriorFit, least: float, kept: Collection[str]
+) -> PosteriorFit:
+    """The fit without the names whose absence costs less than ``least`` in 2 log L, the cheapest one first.
+
+    Parameters
+    ----------
+    kept : names that remain.
+    """
     while True:
-        names = [e for e in fitted.hypothesis.effects if not isinstance(e, Increment)]
+        effects = fitted.hypothesis.effects
+        names = [e for e in effects if not isinstance(e, Increment) and e.name not in kept]
         loss, less = min(
             losses_without(problem, fitted, names), key=lambda removal: removal[0], default=(np.inf, None)
         )
