@@ -115,6 +115,20 @@ def test_assess_ends_at_the_fit_s_own_optimum(fitted):
         np.testing.assert_allclose(far.free_run, near.free_run, rtol=0.01)
 
 
+@pytest.mark.parametrize("level_m_s", [0.02, 5.0])
+def test_a_model_that_flies_badly_is_assessed_at_its_best(fitted, level_m_s):
+    """Half of the static stability is missing: the record needs strong gusts, from wherever the search begins."""
+    problem, found = fitted
+    common = found.point.common.copy()
+    common[Common.Cmalpha] += 0.9
+    begin = found.point.per_record[0].copy()
+    begin[PerRecord.log_gust] = np.log(level_m_s)
+    near = assess(problem, 0, ONE, common, found.point.sizes, begin)
+    far = assess(problem, 0, ONE, common, found.point.sizes)
+    assert far.likelihood == pytest.approx(near.likelihood, abs=0.5)
+    assert near.per_record[PerRecord.log_gust] > np.log(0.3)
+
+
 def test_error_is_in_the_channels_units_and_the_effect_lowers_it(fitted):
     problem, found = fitted
     with_it = [assess(problem, i, ONE, found.point.common, found.point.sizes) for i in range(5)]
