@@ -127,6 +127,17 @@ def test_fewer_effects_lead_unless_the_odds_against_them_are_strong(cost, names)
     assert simplest_first(sets)[0].causes == names
 
 
+@pytest.mark.parametrize(("cost", "names"), [(0.69, ("cg_shift",)), (0.70, ("cg_shift", "inertia_error"))])
+def test_a_further_cause_of_a_changed_loading_needs_odds_of_two(cost, names):
+    """exp(-cost) is a half at ln 2 = 0.6931; mass, CG and inertia are one event."""
+    sets = (
+        cause_set(0.0, "cg_shift", "inertia_error"),
+        cause_set(cost, "cg_shift"),
+        cause_set(2.0, "cg_shift", "tail_effectiveness"),
+    )
+    assert simplest_first(sets)[0].causes == names
+
+
 def test_no_set_has_no_order():
     assert simplest_first(()) == ()
 

@@ -50,6 +50,8 @@ _CERTAIN_SHAPE: Final = 0.02
 _AS_PROBABLE: Final = 0.1
 """Posterior weight over that of the most probable effects from which fewer effects are preferred [-] (judgement: a further cause
 is named where the odds for it are strong, from ten to one by H. Jeffreys, Theory of Probability, 3rd ed. (1961), appendix B)."""
+_AS_PROBABLE_IN_EVENT: Final = 0.5
+"""The same for a further cause of the same event [-] (judgement: a changed loading changes CG, mass and inertia, as a rule)."""
 _NEGLIGIBLE: Final = 60.0
 """Log-posterior behind the most probable set from which a set is left out [-] (judgement: twice what a refit may still change).
 """
@@ -186,9 +188,10 @@ def explain(
 
 
 def simplest_first(sets: Sequence[CauseSet]) -> tuple[CauseSet, ...]:
-    """The sets, that of the fewest effects first against which the odds of the most probable ones are not strong.
+    """The sets, that of the fewest events first against which the odds of the most probable ones are not strong.
 
-    Wrong declarations of any derivatives are one effect, whose weight is the sum over its sets.
+    Of sets of as many events, the fewest effects are first that are half as probable as the best of them. Wrong declarations of
+    any derivatives are one effect, whose weight is the sum over its sets.
     """
     if not sets:
         return ()
@@ -197,9 +200,18 @@ def simplest_first(sets: Sequence[CauseSet]) -> tuple[CauseSet, ...]:
     for s in sets:
         weights[s.effects] = weights.get(s.effects, 0.0) + float(np.exp(least - s.cost))
     enough = _AS_PROBABLE * max(weights.values())
-    names = min((n for n, w in weights.items() if w >= enough), key=lambda n: (len(n), -weights[n]))
+    fewest = min(events(n) for n, w in weights.items() if w >= enough)
+    among = {n: w for n, w in weights.items() if w >= enough and events(n) == fewest}
+    likely = _AS_PROBABLE_IN_EVENT * max(among.values())
+    names = min((n for n, w in among.items() if w >= likely), key=lambda n: (len(n), -among[n]))
     first = min((s for s in sets if s.effects == names), key=lambda s: s.cost)
     return (first, *(s for s in sets if s is not first))
+
+
+def events(effects: Sequence[str]) -> int:
+    """Number of effects; those of a changed loading come together."""
+    other = sum(key not in LOADING for key in effects)
+    return other + (len(effects) > other)
 
 
 def least_cost(sets: Sequence[CauseSet]) -> float:
@@ -344,6 +356,7 @@ __all__ = [
     "Cause",
     "CauseSet",
     "causes_of",
+    "events",
     "explain",
     "least_cost",
     "simplest_first",

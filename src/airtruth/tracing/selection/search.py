@@ -17,7 +17,7 @@ from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import OUTDONE, Candidate
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import BETTER, better_set
-from airtruth.tracing.selection.explanation import LOADING, REFERENCE, least_cost
+from airtruth.tracing.selection.explanation import REFERENCE, events, least_cost
 from airtruth.tracing.selection.refit import losses_without, refit_absorbed
 from airtruth.tracing.selection.release import DeclaredCauses, Release
 from airtruth.tracing.selection.rounds import (
@@ -218,7 +218,7 @@ class _Search:
         if len(ends) == 1:
             return ends[0]
         costs = np.array([total_cost(rounds[-1]) for rounds in ends])
-        counts = np.array([_events(rounds[-1].null.hypothesis.effects) for rounds in ends])
+        counts = np.array([events([e.key for e in r[-1].null.hypothesis.effects]) for r in ends])
         both_released = all(rounds[-1].sets for rounds in ends)
         # An effect beside released derivatives has to be significant.
         best = int(np.argmin(costs + BETTER * counts if both_released else costs))
@@ -285,12 +285,6 @@ class _Search:
         effects = tuple(e for e in starts[-1].effects if e.key not in accepted)
         following = RoundStart(fitted.hypothesis, fitted.point, effects, settled=settled, near=fitted)
         return self.rounds((*starts, following), rounds)
-
-
-def _events(effects: Sequence[Effect]) -> int:
-    """Number of effects; those of a changed loading come together."""
-    other = sum(e.key not in LOADING for e in effects)
-    return other + (len(effects) > other)
 
 
 def _effects_of(last: SearchRound) -> tuple[str, ...]:
