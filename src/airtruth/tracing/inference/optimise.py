@@ -277,11 +277,4 @@ def _covariance(search: PosteriorSearch, at: Evaluated) -> Array:
     return scaled_inverse(marginal.information, _RIDGE)
 
 
-__all__ = [
-    "ITERATIONS",
-    "Evaluated",
-    "PosteriorSearch",
-    "converged_fit",
-    "fit",
-    "initial_parameters",
-]
+__all__ = ["ITERATIONS", "Evaluated", "PosteriorSearch", "converged_fit", "fit", "initial_parameters"]

@@ -161,6 +161,13 @@ class Parameters:
         """All in one array: common, sizes, then the records one by one."""
         return np.concatenate([self.common, self.sizes, self.per_record.ravel()])
 
+    def with_levels(self, other: Parameters) -> Parameters:
+        """The parameters with the levels of noise and gusts of others for the same records."""
+        common, per_record = self.common.copy(), self.per_record.copy()
+        common[Common.noise] = other.common[Common.noise]
+        per_record[:, PerRecord.log_gust] = other.per_record[:, PerRecord.log_gust]
+        return Parameters(common, per_record, self.sizes)
+
     def of_vector(self, vector: Array) -> Parameters:
         """Parameters of the same shape from such an array."""
         layout = Layout(self.sizes.size)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.model.parameters import Common, Parameters, PerRecord
+from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.score_test import Score
 
 Array = NDArray[np.float64]
@@ -37,12 +37,7 @@ def from_declared(
     ----------
     hypothesis, sizes : what is refitted, and the sizes of its effects at which the search begins.
     """
-    start = initial_parameters(problem, hypothesis, sizes, _ITERATIONS)
-    common = start.common.copy()
-    common[Common.noise] = null.point.common[Common.noise]
-    per_record = start.per_record.copy()
-    per_record[:, PerRecord.log_gust] = null.point.per_record[:, PerRecord.log_gust]
-    start = replace(start, common=common, per_record=per_record)
+    start = initial_parameters(problem, hypothesis, sizes, _ITERATIONS).with_levels(null.point)
     return fit(problem, hypothesis, start, rival=rival, only_better=only_better, near=null)
 
 

@@ -11,7 +11,6 @@ import numpy as np
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import Whitener, autoregression
-from airtruth.tracing.model.parameters import Common, PerRecord
 from airtruth.tracing.selection.acceptance import (
     IMMATERIAL,
     OUTDONE,
@@ -106,10 +105,7 @@ def _whitened_cost(
     problem: TraceProblem, own: PosteriorFit, whitener: Whitener, levels: PosteriorFit
 ) -> float:
     """Cost under an autoregression, at the noise and gust levels of another fit, so that only the motion counts."""
-    common, per_record = own.point.common.copy(), own.point.per_record.copy()
-    common[Common.noise] = levels.point.common[Common.noise]
-    per_record[:, PerRecord.log_gust] = levels.point.per_record[:, PerRecord.log_gust]
-    start = replace(own.point, common=common, per_record=per_record)
+    start = own.point.with_levels(levels.point)
     again = fit(problem, own.hypothesis, start, whitener, iterations=_ITERATIONS, free_levels=False, near=own)
     return np.inf if again is None else again.cost
 

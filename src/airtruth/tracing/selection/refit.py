@@ -283,11 +283,7 @@ def better_null(problem: TraceProblem, null: PosteriorFit, fits: Sequence[Refit]
 
 
 def refit_scored(
-    problem: TraceProblem,
-    null: PosteriorFit,
-    table: Table,
-    number: int,
-    rival: float = np.inf,
+    problem: TraceProblem, null: PosteriorFit, table: Table, number: int, rival: float = np.inf
 ) -> PosteriorFit | None:
     """The null and one effect with all parameters free, from multiples of the size that the score suggests.
 
@@ -331,9 +327,7 @@ def _ordered_shares(
     problem: TraceProblem, null: PosteriorFit, hypothesis: Hypothesis, s: Score
 ) -> list[float]:
     """`_SHARES`, the most likely size first, all other parameters as in the null."""
-    costs = []
-    for share in _SHARES:
-        costs.append(likelihood_at(problem, hypothesis, at(null, s, share * s.size)))
+    costs = [likelihood_at(problem, hypothesis, at(null, s, share * s.size)) for share in _SHARES]
     return [_SHARES[i] for i in np.argsort(costs, kind="stable")]
 
 

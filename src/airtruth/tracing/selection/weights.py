@@ -55,8 +55,8 @@ def _carried(rounds: Sequence[SearchRound]) -> set[str]:
     last = rounds[-1].null.hypothesis
     leaders = {r.tied[0].score.effect.name for r in rounds if r.tied}
     released = next((r.null.hypothesis for r in reversed(rounds) if r.release is not None), None)
-    beside = released if released is not None and last.spread is None else last
-    if beside is last and last.spread is None:
+    beside = released if last.spread is None else last
+    if beside is None:
         return set()
     kept = {e.key for e in last.effects}
     return {e.name for e in beside.effects if e.key in kept} - leaders
