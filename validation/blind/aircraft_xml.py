@@ -66,6 +66,7 @@ class Shape:
 SHAPES: Final = (
     "alpha-above",
     "alpha-square",
+    "alpha-elevator",
     "alphadot",
     "elevator-below",
     "elevator-odd-square",
@@ -100,6 +101,8 @@ def _function(shape: str, at: float) -> str:
         return f"<max>{_value(0.0)}{from_at}</max>"
     if shape == "alpha-square":
         return _product(from_at, from_at)
+    if shape == "alpha-elevator":
+        return _product(from_at, elevator)
     if shape == "alphadot":
         return _product(_property(ALIVE), _property("aero/alphadot-rad_sec"), _property("aero/ci2vel"))
     if shape == "elevator-below":

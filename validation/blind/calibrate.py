@@ -15,7 +15,7 @@ import numpy as np
 from validation.blind.aircraft_xml import Body
 from validation.blind.draw import AIRS, Trial, draw
 from validation.blind.information import Directions, Whitener, difference, directions, noise_model
-from validation.blind.truths import EFFECTS, LIBRARY, OFF_LIBRARY, Added
+from validation.blind.truths import EFFECTS, FURTHER, LIBRARY, OFF_LIBRARY, Added
 
 _HEAD = '''"""Sizes with a noncentrality of 16 in calm, light and moderate air; printed by `blind.calibrate`.
 
@@ -54,7 +54,7 @@ def main() -> None:
         whiten = noise_model(trial, air)
         tools.append((whiten, directions(trial, whiten)))
     print(_HEAD)
-    for key in (*LIBRARY, *OFF_LIBRARY):
+    for key in (*LIBRARY, *OFF_LIBRARY, *FURTHER):
         print(f'    "{key}": ({", ".join(f"{s:.3g}" for s in sizes(key, trial, tools))}),', flush=True)
     print("}")
 

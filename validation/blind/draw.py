@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.logs.flight_log import FlightLog
-from airtruth.logs.store import write_log
+from airtruth.logs.store import write_log, write_text
 from validation.blind import causes, gusts, sensors, surface
 from validation.blind.aircraft_xml import Body
 from validation.blind.damper import Damper
@@ -21,17 +22,19 @@ from validation.blind.figures import (
     CONDITIONS,
     DEG,
     DERIVATIVES,
+    LEAVE_ONE_OUT,
     LENGTH_M,
     LOG_STEP_S,
     SIGMA_M_S,
     SPAN_M,
     STEP_S,
+    WITHHELD,
     G,
 )
 from validation.blind.flight import Truth
 from validation.blind.sizes import SIZE16
 from validation.blind.surface import Manoeuvre
-from validation.blind.truths import EFFECTS, LIBRARY, OFF_LIBRARY, Added, Parts, combined, model
+from validation.blind.truths import EFFECTS, FURTHER, LIBRARY, OFF_LIBRARY, Added, Parts, combined, model
 
 Array = NDArray[np.float64]
 
@@ -43,6 +46,8 @@ MODES: Final = (
     "off-library",
     "clutter",
     "curve",
+    "unmodelled",
+    LEAVE_ONE_OUT,
     *causes.COMPOSITIONS,
     *CONDITIONS,
 )
@@ -81,7 +86,8 @@ class Trial:
     Attributes
     ----------
     seed, number : of the trial.
-    composition : "null", "single", "pair", "off-library", "clutter", or one of `causes.COMPOSITIONS` or `CONDITIONS`.
+    composition : "null", "single", "pair", "off-library", "clutter", `LEAVE_ONE_OUT`, or one of `causes.COMPOSITIONS` or
+        `CONDITIONS`.
     effects : the effects proper; clutter : small ones besides.
     body : drawn derivatives, mass, inertia, CG.
     air : "calm", "light" or "moderate"; spectrum of the gusts; whether they have a rotary part.
@@ -130,7 +136,7 @@ def draw(seed: int, number: int, mode: str = "mixed") -> Trial:
     trial = Trial(
         seed=seed,
         number=number,
-        composition="single" if mode == "curve" else composition,
+        composition={"curve": "single", "unmodelled": "off-library"}.get(composition, composition),
         effects=effects,
         clutter=clutter,
         body=_body(rng),
@@ -164,7 +170,9 @@ def _pooled(
 ) -> tuple[tuple[Added, ...], tuple[Added, ...]]:
     """Effects and clutter of a composition, from their pools."""
     own = composition if composition != "clutter" else ("single" if rng.random() < 0.6 else "null")
-    sizes = _CURVE_SIZES if own == "curve" else _SIZES
+    sizes = {"curve": _CURVE_SIZES, "unmodelled": _TRIPLE_SIZES, LEAVE_ONE_OUT: _TRIPLE_SIZES}.get(
+        own, _SIZES
+    )
     if own in CONDITIONS:
         own, sizes = ("null" if rng.random() < _WITHOUT else "single"), _TRIPLE_SIZES
     pool, count = {
@@ -173,6 +181,8 @@ def _pooled(
         "curve": (CURVE, 1),
         "pair": (LIBRARY, 2),
         "off-library": (OFF_LIBRARY, 1),
+        "unmodelled": (OFF_LIBRARY + FURTHER, 1),
+        LEAVE_ONE_OUT: (tuple(key for key in LIBRARY if key != "airspeed_scale"), 1),
     }[own]
     keys = [str(key) for key in rng.choice(pool, count, replace=False)]
     clutter_keys: list[str] = []
@@ -411,10 +421,12 @@ def _rate(log_step_s: float) -> float:
 
 
 def write(trial: Trial, folder: Path) -> Path:
-    """Fly a trial and write its log, float32; its path."""
+    """Fly a trial and write its log, float32, and the names that a tracer has to do without; the log's path."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "log.parquet"
     write_log(path, fly(trial))
+    if trial.composition == LEAVE_ONE_OUT:
+        write_text(folder / WITHHELD, json.dumps([effect.name for effect in trial.effects]))
     return path
 
 

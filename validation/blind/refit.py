@@ -19,7 +19,16 @@ from numpy.typing import NDArray
 from validation.blind.aircraft_xml import Body, Shape
 from validation.blind.causes import COMPOSITIONS, DECLARED, increments
 from validation.blind.draw import Trial, open_loop
-from validation.blind.figures import APART, BEYOND, BODY, CONDITIONS, DERIVATIVES, STRONG, TOGETHER
+from validation.blind.figures import (
+    APART,
+    BEYOND,
+    BODY,
+    CONDITIONS,
+    DERIVATIVES,
+    LEAVE_ONE_OUT,
+    STRONG,
+    TOGETHER,
+)
 from validation.blind.flight import Truth
 from validation.blind.information import (
     COARSE_S,
@@ -74,7 +83,8 @@ def lambdas(trial: Trial) -> dict[str, float]:
         if not EFFECTS[effect.key].library and value > STRONG:
             result[BEYOND] = min(value, beyond(trial, d, whiten, along))
         elif len(everything) == 1 and value > STRONG and effect.key != "airspeed_scale":
-            result[APART] = min(value, apart(trial, effect, d, whiten, along))
+            key = BEYOND if trial.composition == LEAVE_ONE_OUT else APART
+            result[key] = min(value, apart(trial, effect, d, whiten, along))
     if trial.composition in COMPOSITIONS and len(trial.effects) > 1:
         result[TOGETHER] = together(trial, whiten, along)
     return result

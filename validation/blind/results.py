@@ -82,7 +82,7 @@ def _of_sets(mode: str, scores: Mapping[str, Any]) -> str:
 
 
 def _of_single_effects(scores: Mapping[str, Any]) -> str:
-    strong, off, pairs, clutter = (scores[k] for k in ("strong", "off_library", "pairs", "clutter"))
+    strong, pairs, clutter = (scores[k] for k in ("strong", "pairs", "clutter"))
     summary: list[tuple[str, object]] = [
         ("trials; tracer failed", f"{scores['trials']}; {len(scores['failed'])}"),
         *((f"false traces on nulls, {air}", s) for air, s in scores["false_trace"].items()),
@@ -106,18 +106,8 @@ def _of_single_effects(scores: Mapping[str, Any]) -> str:
         ("held-out error after / truth's own, median", _averaged(scores["after_over_oracle"])),
         ("held-out error before / truth's own, median", _averaged(scores["before_over_oracle"])),
         ("calm air: held-out error after / before, median", _averaged(scores["calm_after_over_before"])),
-        ("off-library: unexplained, learned or provisional", off["flagged"]),
-        ("off-library: an increment was learned", off["learned"]),
-        (
-            "off-library, learned: held-out error after over the truth's own",
-            _averaged(off["after_over_oracle"]),
-        ),
-        (
-            "off-library, learned: held-out error before over the truth's own",
-            _averaged(off["before_over_oracle"]),
-        ),
-        ("off-library: named without reservation", off["named_without_reservation"]),
-        ("off-library: passed as none", off["passed_as_none"]),
+        *_of_lacking("off-library", scores["off_library"]),
+        *_of_lacking("leave-one-out", scores["leave_one_out"]),
         ("pairs, both above: both in the sets", pairs["both_in_sets"]),
         ("pairs: one of them in the sets", pairs["one_in_sets"]),
         ("pairs: the first name is one of them", pairs["first_is_one"]),
@@ -171,6 +161,28 @@ def _of_single_effects(scores: Mapping[str, Any]) -> str:
         rows.append((truth, sum(row.values()), row.get(truth, 0), others))
     parts.append(_table(("truth", "trials", "so named", "otherwise"), rows))
     return "\n\n".join(parts)
+
+
+def _of_lacking(mode: str, scores: Mapping[str, Any]) -> list[tuple[str, object]]:
+    """Rows of `scoring.lacking`."""
+    rows: list[tuple[str, object]] = [
+        (f"{mode}: unexplained, learned or provisional", scores["flagged"]),
+        (f"{mode}: an increment was learned", scores["learned"]),
+    ]
+    for words, key in (
+        (", learned", ""),
+        ("", "_of_all"),
+        (", effects that increments express", "_of_curves"),
+    ):
+        for stage in ("after", "before"):
+            error = _averaged(scores[f"{stage}_over_oracle{key}"])
+            rows.append((f"{mode}{words}: held-out error {stage} over the truth's own", error))
+    return [
+        *rows,
+        (f"{mode}: named without reservation", scores["named_without_reservation"]),
+        (f"{mode}: passed as none", scores["passed_as_none"]),
+        (f"{mode}: held-out error worse, and the answer does not say so", scores["worse_in_silence"]),
+    ]
 
 
 def as_json(scores: Mapping[str, Any]) -> str:

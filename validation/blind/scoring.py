@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from scipy.stats import beta, chi2, ncx2, norm
 
-from validation.blind.figures import APART, BEYOND, STRONG
+from validation.blind.figures import APART, BEYOND, LEAVE_ONE_OUT, STRONG
 
 Case = Mapping[str, Any]
 
@@ -28,6 +28,8 @@ HOLM: Final = 0.05 / 33
 """The same where the smallest of the library's p-values starts Holm's procedure."""
 INCREMENT: Final = "increment"
 """Name of every learned increment in an answer (contract 3)."""
+CURVES: Final = ("elevator_asymmetry", "cm_alpha_nonlinear", "cl_alpha_nonlinear", "downwash_lag")
+"""Effects of the library that increments can express: a coefficient over a signal."""
 WORSE: Final = 1.02
 """A held-out error counts as worse above this ratio."""
 
@@ -292,6 +294,33 @@ def by_effect(cases: Sequence[Case]) -> list[dict[str, Any]]:
     return rows
 
 
+def lacking(cases: Sequence[Case]) -> dict[str, Any]:
+    """Figures of cases whose effect the tracer's library lacks."""
+    curves = [c for c in cases if base(effects(c)[0]["key"]) in CURVES]
+    groups = {"": [c for c in cases if learned(c)], "_of_all": cases, "_of_curves": curves}
+    return {
+        "flagged": share(
+            c["answer"]["verdict"] in ("unexplained", "learned")
+            or bool(accepted(c) and c["answer"]["provisional"])
+            for c in cases
+        ),
+        "learned": share(bool(learned(c)) for c in cases),
+        **{
+            f"{stage}_over_oracle{key}": median(ratio(c, stage, "oracle") for c in some)
+            for key, some in groups.items()
+            for stage in ("after", "before")
+        },
+        "named_without_reservation": share(
+            bool(accepted(c)) and not c["answer"]["provisional"] for c in cases
+        ),
+        "passed_as_none": share(c["answer"]["verdict"] == "none" for c in cases),
+        "worse_in_silence": share(
+            (ratio(c, "after", "before") or 0.0) > WORSE and c["answer"].get("confirmed") is not False
+            for c in cases
+        ),
+    }
+
+
 def score(cases: Sequence[Case]) -> dict[str, Any]:
     """All figures of some trials; `Share` where there is a count."""
     nulls, singles = of(cases, "null"), of(cases, "single")
@@ -328,20 +357,8 @@ def score(cases: Sequence[Case]) -> dict[str, Any]:
             "second_effect": share(len(accepted(c)) > 1 for c in detected),
         },
         "very_strong_in_set": share(in_set(c, dominant(c)) for c in strong if noncentrality(c) > 150.0),
-        "off_library": {
-            "flagged": share(
-                c["answer"]["verdict"] in ("unexplained", "learned")
-                or bool(accepted(c) and c["answer"]["provisional"])
-                for c in off
-            ),
-            "learned": share(bool(learned(c)) for c in off),
-            "after_over_oracle": median(ratio(c, "after", "oracle") for c in off if learned(c)),
-            "before_over_oracle": median(ratio(c, "before", "oracle") for c in off if learned(c)),
-            "named_without_reservation": share(
-                bool(accepted(c)) and not c["answer"]["provisional"] for c in off
-            ),
-            "passed_as_none": share(c["answer"]["verdict"] == "none" for c in off),
-        },
+        "off_library": lacking(off),
+        "leave_one_out": lacking([c for c in of(cases, LEAVE_ONE_OUT) if beyond(c) > STRONG]),
         "pairs": {
             "both_in_sets": share(all(in_set(c, e["key"]) for e in effects(c)) for c in pairs),
             "one_in_sets": share(any(in_set(c, e["key"]) for e in effects(c)) for c in pairs),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter
 
-from validation.blind.figures import BIAS, CHORD_M, DEG, LOG_STEP_S, NOISE, QUANTUM
+from validation.blind.figures import ALPHA_TRIM_RAD, BIAS, CHORD_M, DEG, LOG_STEP_S, NOISE, QUANTUM
 from validation.blind.surface import lagged, late, played
 
 Array = NDArray[np.float64]
@@ -24,9 +24,9 @@ MODE_DAMPING: Final = 0.02
 
 @dataclass(frozen=True)
 class Fault:
-    """What a sensor does beyond its declaration: kind "arm", "lag", "delay", "scale", "friction" or "mode".
+    """What a sensor does beyond its declaration: kind "arm", "cross", "curve", "lag", "delay", "scale", "friction" or "mode".
 
-    ``at`` is the frequency of a mode [Hz].
+    ``at`` is the frequency of a mode [Hz]. A cross fault is the share of az in the reading, counted from its start.
     """
 
     channel: str
@@ -47,6 +47,10 @@ def placed(channels: Mapping[str, Array], faults: Sequence[Fault], cg: float) ->
     x = arms["alpha_rad"]
     result["alpha_rad"] = np.arctan2(v * np.sin(alpha) - q * x, v * np.cos(alpha))
     result["az_m_s2"] = channels["az_m_s2"] - arms["az_m_s2"] * channels["q_dot_rad_s2"]
+    for fault in faults:
+        if fault.kind == "cross":
+            az = channels["az_m_s2"]
+            result[fault.channel] = result[fault.channel] + fault.value * (az - az[0])
     return result
 
 
@@ -59,6 +63,8 @@ def faulty(values: Array, faults: Sequence[Fault], step_s: float) -> Array:
             values = late(values, fault.value, step_s)
         elif fault.kind == "scale":
             values = values * fault.value
+        elif fault.kind == "curve":
+            values = values + fault.value * np.square(values - ALPHA_TRIM_RAD)
         elif fault.kind == "friction":
             values = played(values, fault.value)
         elif fault.kind == "mode":

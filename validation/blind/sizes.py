@@ -40,4 +40,9 @@ SIZE16: Final[dict[str, tuple[float, float, float]]] = {
     "thrust_lag": (0.0354, 0.12, 0.185),
     "separation_switch": (0.001, 0.00265, 0.00389),
     "vane_friction": (0.000167, 0.000544, 0.000898),
+    "stall_state": (0.0198, 0.0675, 0.102),
+    "cg_drift": (0.000121, 0.000439, 0.000722),
+    "elevator_in_wake": (0.759, 2.15, 2.98),
+    "vane_curve": (0.216, 0.725, 1.27),
+    "gyro_g_sensitivity": (0.000788, 0.00409, 0.00643),
 }

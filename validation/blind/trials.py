@@ -21,8 +21,9 @@ from airtruth.cluster import Cluster, LostWorkError
 from airtruth.errors import StoreError
 from airtruth.logs.store import read_log, write_text
 from validation.blind import draw, information, refit, tracing
-from validation.blind.figures import CHANNELS
+from validation.blind.figures import CHANNELS, LEAVE_ONE_OUT, STRONG
 from validation.blind.flight import LeftRangeError
+from validation.blind.scoring import beyond
 from validation.blind.set_scoring import strong
 
 _ATTEMPTS: Final = 3
@@ -108,6 +109,8 @@ def run(plan: Plan, jobs: int, cluster: Cluster | None = None) -> list[dict[str,
 
 
 def _counts(truth: dict[str, Any]) -> bool:
+    if truth["trial"]["composition"] in ("off-library", LEAVE_ONE_OUT):
+        return beyond({"truth": truth}) > STRONG
     return not truth["trial"]["effects"] or strong({"truth": truth})
 
 

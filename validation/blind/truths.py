@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
-from validation.blind import causes
+from validation.blind import causes, states
 from validation.blind.aircraft_xml import Body, Shape, linear
 from validation.blind.figures import ALPHA_TRIM_RAD, DEG
-from validation.blind.flight import Model, Start, State
+from validation.blind.flight import Model, Start
 from validation.blind.sensors import Fault
 
 Values = Mapping[str, float]
@@ -104,76 +104,11 @@ def _sensor(channel: str, kind: str, parameter: str) -> Callable[[Values], Parts
 
 def _shape(coefficient: str, shape: str, parameter: str) -> Callable[[Values], Parts]:
     def parts(v: Values) -> Parts:
-        at = v.get("at_alpha_rad", ALPHA_TRIM_RAD if shape == "alpha-square" else 0.0)
+        about_trim = shape in ("alpha-square", "alpha-elevator")
+        at = v.get("at_alpha_rad", ALPHA_TRIM_RAD if about_trim else 0.0)
         return Parts(shapes=(Shape(coefficient, shape, v[parameter], at),))
 
     return parts
-
-
-def _hysteresis(amplitude: float, width_rad: float) -> Start:
-    """Cm by play in alpha: amplitude (play - alpha)."""
-
-    def start(alpha: float) -> State:
-        y = alpha
-
-        def state(alpha: float, q: float, v: float, dt: float) -> tuple[float, float]:
-            nonlocal y
-            y = min(max(y, alpha - width_rad / 2.0), alpha + width_rad / 2.0)
-            return 0.0, amplitude * (y - alpha)
-
-        return state
-
-    return start
-
-
-def _slosh(gain: float, frequency_hz: float) -> Start:
-    """A moment by a fuel mass that swings with the pitch rate: x'' + 0.1 wn x' + wn^2 x = wn^2 q, Cm += gain x c/(2V)."""
-    wn = 2.0 * math.pi * frequency_hz
-
-    def start(_: float) -> State:
-        x = rate = 0.0
-
-        def state(alpha: float, q: float, v: float, dt: float) -> tuple[float, float]:
-            nonlocal x, rate
-            rate += dt * (wn * wn * (q - x) - 0.1 * wn * rate)
-            x += dt * rate
-            return 0.0, gain * x * 0.1395 / v
-
-        return state
-
-    return start
-
-
-def _thrust_lag(gain: float, tau_s: float) -> Start:
-    """Thrust that follows the intake's angle of attack late: Cm += gain (x - alpha at the start), tau x' = alpha - x."""
-
-    def start(first: float) -> State:
-        x = first
-
-        def state(alpha: float, q: float, v: float, dt: float) -> tuple[float, float]:
-            nonlocal x
-            x += dt * (alpha - x) / tau_s
-            return 0.0, gain * (x - first)
-
-        return state
-
-    return start
-
-
-def _switch(moment: float, lift: float) -> Start:
-    """Separation that comes above 1.2 deg over trim and goes below 0.4 deg: a step in Cm and CL."""
-
-    def start(_: float) -> State:
-        on = False
-
-        def state(alpha: float, q: float, v: float, dt: float) -> tuple[float, float]:
-            nonlocal on
-            on = alpha > ALPHA_TRIM_RAD + (0.4 if on else 1.2) * DEG
-            return (lift, moment) if on else (0.0, 0.0)
-
-        return state
-
-    return start
 
 
 def _lag_values(size: float, _: float) -> dict[str, float]:
@@ -254,25 +189,25 @@ EFFECTS: Final[dict[str, Kind]] = {
         _shape("Cm", "elevator-odd-square", "Cmde2"), _alone("Cmde2"), 15.0, library=False
     ),
     "cm_hysteresis": Kind(
-        lambda v: Parts(states=(_hysteresis(v["Cmplay"], 2.0 * DEG),)),
+        lambda v: Parts(states=(states.hysteresis(v["Cmplay"], 2.0 * DEG),)),
         _alone("Cmplay"),
         1.2,
         library=False,
     ),
     "fuel_slosh": Kind(
-        lambda v: Parts(states=(_slosh(v["gain"], v["frequency_hz"]),)),
+        lambda v: Parts(states=(states.slosh(v["gain"], v["frequency_hz"]),)),
         lambda size, draw: {"gain": size, "frequency_hz": 1.0 + 2.0 * draw},
         15.0,
         library=False,
     ),
     "thrust_lag": Kind(
-        lambda v: Parts(states=(_thrust_lag(v["gain"], 0.5),)),
+        lambda v: Parts(states=(states.thrust_lag(v["gain"], 0.5),)),
         _alone("gain"),
         1.2,
         library=False,
     ),
     "separation_switch": Kind(
-        lambda v: Parts(states=(_switch(v["dCm"], 0.5 * v["dCm"]),)),
+        lambda v: Parts(states=(states.switch(v["dCm"], 0.5 * v["dCm"]),)),
         _alone("dCm"),
         0.04,
         library=False,
@@ -284,6 +219,38 @@ EFFECTS: Final[dict[str, Kind]] = {
         signed=False,
         smooth=False,
         library=False,
+    ),
+    "stall_state": Kind(
+        lambda v: Parts(states=(states.stall(v["dCL"]),)),
+        _alone("dCL"),
+        1.0,
+        signed=False,
+        library=False,
+        pooled=False,
+    ),
+    "cg_drift": Kind(
+        lambda v: Parts(states=(states.drifting_cg(v["rate_mac_s"]),)),
+        _alone("rate_mac_s"),
+        0.02,
+        library=False,
+        pooled=False,
+    ),
+    "elevator_in_wake": Kind(
+        _shape("Cm", "alpha-elevator", "Cmalphade"), _alone("Cmalphade"), 20.0, library=False, pooled=False
+    ),
+    "vane_curve": Kind(
+        _sensor("alpha_rad", "curve", "curve_per_rad"),
+        _alone("curve_per_rad"),
+        5.0,
+        library=False,
+        pooled=False,
+    ),
+    "gyro_g_sensitivity": Kind(
+        _sensor("q_rad_s", "cross", "rad_s_per_m_s2"),
+        _alone("rad_s_per_m_s2"),
+        0.02,
+        library=False,
+        pooled=False,
     ),
     "tail_effectiveness": _cause("tail_effectiveness", causes.tail_values, 0.45),
     "wing_effectiveness": _cause("wing_effectiveness", causes.tail_values, 0.4),
@@ -306,7 +273,9 @@ def shrunk(effect: Added, share: float) -> Added:
 
 
 LIBRARY: Final = tuple(key for key, kind in EFFECTS.items() if kind.library and kind.pooled)
-OFF_LIBRARY: Final = tuple(key for key, kind in EFFECTS.items() if not kind.library)
+OFF_LIBRARY: Final = tuple(key for key, kind in EFFECTS.items() if not kind.library and kind.pooled)
+FURTHER: Final = tuple(key for key, kind in EFFECTS.items() if not kind.library and not kind.pooled)
+"""Effects outside the library that joined after the frozen trials, whose draws depend on the pools above."""
 
 
 def combined(effects: Iterable[Added]) -> Parts:
