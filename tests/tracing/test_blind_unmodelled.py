@@ -126,7 +126,7 @@ def test_a_withheld_effect_is_withheld_with_all_of_its_variants(tmp_path, monkey
 
 
 @pytest.mark.slow
-def test_the_noncentrality_beyond_the_rest_of_the_library(tmp_path):
+def test_the_noncentrality_beyond_the_rest_of_the_library():
     """That of `APART`: an effect withheld leaves what its nearest rival does."""
     trial = replace(
         draw.draw(3, 0, LEAVE_ONE_OUT),

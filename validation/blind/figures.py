@@ -67,9 +67,9 @@ QUANTUM: Final = {"alpha_rad": 0.05 * DEG, "q_rad_s": 0.3 * DEG, "az_m_s2": 0.01
 CONDITIONS: Final = ("drift", "loop", "coarse")
 """Modes of one effect or none, in records that are not at one airspeed, not in open loop, or not at 50 Hz."""
 LEAVE_ONE_OUT: Final = "leave-one-out"
-"""Mode of single effects that the tracer's library is deprived of."""
+"""Mode in which the true effect, a single one, is withheld from the tracer's library."""
 WITHHELD: Final = "withheld.json"
-"""File beside the log of such a trial: the public names that the tracer's library is deprived of."""
+"""File beside the log of such a trial: the public names that are withheld."""
 STRONG: Final = 30.0
 """Noncentrality above which an effect has to be found."""
 BEYOND: Final = "beyond the library"
