@@ -77,6 +77,14 @@ def test_a_set_one_exchange_away_is_reached(seed, number, tmp_path):
     assert {e["name"] for e in answer["effects"]} == {"gyro_lag", "elevator_delay"}
 
 
+def test_a_name_that_imitates_gives_way_to_an_increment(tmp_path):
+    """A thrust that comes late, lambda 223 beyond the library: an elastic mode with the damping of a lag left no anomaly."""
+    answer = answered(20261707, 10, "unmodelled", tmp_path)
+    assert answer["verdict"] == "learned"
+    assert {e["name"] for e in answer["effects"]} == {"increment"}
+    assert {e["acts_on"] for e in answer["effects"]} == {"Cm"}
+
+
 def test_a_late_gyro_that_makes_the_free_run_diverge_is_traced(tmp_path):
     """A gyro lag of 0.303 s and a surface delay of 38.8 ms in calm air, lambda 50,000. Without both, the refitted derivatives
     are those of an unstable aircraft, and the free run leaves all bounds."""

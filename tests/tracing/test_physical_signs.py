@@ -1,5 +1,6 @@
-"""Sizes that no aircraft has are not accepted, and the reason says so."""
+"""Sizes, times and damping ratios that no aircraft has are not accepted, and the reason says so."""
 
+import numpy as np
 import pytest
 
 from airtruth.effects.registry import EFFECTS
@@ -39,3 +40,28 @@ def test_every_sign_has_sizes_on_its_side():
     for key, sign in signed.items():
         low, high = EFFECTS[key].parameters[0].reach
         assert max(sign * low, sign * high) > EFFECTS[key].parameters[0].material
+
+
+def test_a_mode_without_the_damping_of_a_mode():
+    """A damping ratio that a refit drives to the end of its range is that of a lag; a frequency within it says nothing."""
+    effect = EFFECTS["elastic_mode"]
+    end = next(p for p in effect.parameters if p.name == "damping").high
+
+    def given(frequency_hz, damping):
+        values = {"dCmalpha": -0.4, "frequency_hz": frequency_hz, "damping": damping}
+        sizes = np.array([p.size(values[p.name]) for p in effect.parameters])
+        return list(acceptance.shape_reasons(effect, sizes))
+
+    assert end <= 0.2
+    assert given(3.0, 0.05) == []
+    assert given(3.0, end) == ["its damping ratio ends at the limit of the plausible range"]
+    assert given(0.5, end) == [
+        "its natural frequency ends at the limit of the plausible range",
+        "its damping ratio ends at the limit of the plausible range",
+    ]
+
+
+def test_a_break_may_lie_at_the_end_of_the_records():
+    effect = EFFECTS["cm_alpha_nonlinear:break"]
+    at = effect.parameters[1]
+    assert list(acceptance.shape_reasons(effect, np.array([0.3, at.size(at.high)]))) == []

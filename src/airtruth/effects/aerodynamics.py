@@ -209,7 +209,7 @@ EFFECTS: Final = (
                 "-",
                 "damping ratio",
                 low=0.01,
-                high=0.5,
+                high=0.2,
                 material=0.0,
                 is_location=True,
                 step=0.01,
@@ -219,7 +219,8 @@ EFFECTS: Final = (
         explanation="Part of the pitching moment acts through a lightly damped mode: bending of the fuselage, or a "
         "liquid that sloshes.",
         source="Cm += dCmalpha (x - alpha), x'' + 2 zeta wn x' + wn^2 x = wn^2 alpha: a mode driven by the load, its "
-        "quasi-steady part in Cmalpha.",
+        "quasi-steady part in Cmalpha. A damping ratio of at most 0.2 (judgement): a mode with more is a lag, which is not "
+        "a structure or a liquid.",
         distinguished_by="A sweep or multisine through its frequency.",
     ),
 )

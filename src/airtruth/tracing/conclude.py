@@ -44,6 +44,7 @@ from airtruth.tracing.intervals import estimates, widened_by_profile, widened_by
 from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.notes import notes
 from airtruth.tracing.prepare import Case
+from airtruth.tracing.reservations import reservations
 from airtruth.tracing.selection.acceptance import Candidate
 from airtruth.tracing.selection.omnibus import Anomaly, advice
 from airtruth.tracing.selection.release import CONTRADICTED
@@ -94,12 +95,14 @@ def conclude(
     sizes = cause_sizes(likelihood, case.declared)
     verdict = _verdict(stated, declared)
     confirmed = confirmation(stages)
+    reserved = reservations(stated)
     errors = stage_errors(stages)
     return TraceAnswer(
         verdict=verdict,
         provisional=case.held is None
         or confirmed is False
         or bool(case.left_out)
+        or bool(reserved)
         or (bool(stated) and remaining.p_value <= ANOMALY_LEVEL),
         anomaly=_evidence(anomaly),
         remaining=_evidence(remaining),
@@ -115,7 +118,7 @@ def conclude(
             tuple(r.signals.run_id for r in case.fitted.records),
             tuple(r.signals.run_id for r in case.held.records) if case.held else (),
         ),
-        notes=tuple(notes(stages, last, errors, replay, forced)),
+        notes=(*reserved, *notes(stages, last, errors, replay, forced)),
         tolerances=tolerances(stages),
         replay=replay,
         forced=tuple(forced),

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.assess import Assessment, noise_floor
 from airtruth.tracing.inference.cross_validate import LeftOut, leave_one_out, one_by_the_other
 from airtruth.tracing.inference.feedback import responds_to_motion
@@ -136,6 +137,7 @@ def assess_candidate(
         *_fit_reasons(s, own, gain, least, excess),
         *left_out.reasons,
         *size_reasons(s, size, max(r.plant.aircraft.constants.span_m for r in problem.records)),
+        *shape_reasons(s.effect, own.point.sizes[_first_size(s, own) :]),
     ]
     return Candidate(
         s, own, gain, left_out.likelihood_gain, left_out.free_run_gain, size, std, tuple(reasons)
@@ -225,6 +227,21 @@ def size_reasons(s: Score, size: float, span_m: float) -> Iterator[str]:
     span = high - low
     if high - size < _AT_END * span or (size - low < _AT_END * span and low != 0.0):
         yield "its size ends at the limit of the plausible range"
+
+
+def shape_reasons(effect: Effect, sizes: Array) -> Iterator[str]:
+    """Why the times, frequencies and damping ratios of an effect are not accepted, in words.
+
+    A location in an angle may end anywhere: beyond the range of the records its effect is that of a slope.
+
+    Parameters
+    ----------
+    sizes : (parameters,) in their size coordinates.
+    """
+    for p, size in zip(effect.parameters[1:], sizes[1:], strict=True):
+        low, high = p.reach
+        if p.unit != "rad" and min(high - size, size - low) < _AT_END * (high - low):
+            yield f"its {p.meaning} ends at the limit of the plausible range"
 
 
 def _free_run_gain(

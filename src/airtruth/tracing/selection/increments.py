@@ -154,7 +154,10 @@ def _over_pressure_and_pairs(
 def _of_readings(
     ranges: Mapping[str, tuple[float, float]], trims: Mapping[str, float], highest_hz: float
 ) -> Iterator[Shape]:
-    """A curve and a friction of the vane, and modes of the structure at gyro and accelerometer that each signal drives."""
+    """A curve and a friction of the vane, a gyro that feels the load, and modes of the structure at gyro and accelerometer.
+
+    The load factor follows the angle of attack, so that the gyro's increment is a function of it.
+    """
     for name in ("alpha", "elevator", "qhat"):
         low, high = ranges[name]
         if high <= low:
@@ -162,6 +165,7 @@ def _of_readings(
         trim = min(max(trims.get(name, 0.0), low), high)
         if name == "alpha":
             yield Shape("alpha_rad", name, low, high, CELLS, trim)
+            yield Shape("q_rad_s", name, low, high, CELLS, trim)
             for share in _PLAYS:
                 yield Shape(
                     "alpha_rad", name, low, high, 0, trim, Memory("play", half_width=share * (high - low))

@@ -55,6 +55,9 @@ _REFITTED: Final = 3
 """Number of shapes that are refitted for one increment [-] (judgement: a refit costs seconds to a minute)."""
 _HOPELESS: Final = 8.0
 """Log evidence behind the leading shape from which a shape is not refitted [-] (judgement)."""
+_PROMISING: Final = 1.0 / 3.0
+"""Log evidence of a shape without a refit, over that of the names, from which it is refitted in their stead [-] (judgement:
+refits of memory have doubled it)."""
 _NAMES_LEAD: Final = 5.0
 """Log evidence by which increments alone have to lead for named effects to be given up [-] (judgement: a name is
 preferred to a curve)."""
@@ -70,9 +73,9 @@ def with_increments(
 ) -> tuple[SearchRound, ...]:
     """The rounds of a search with increments of what its effects leave.
 
-    Where named effects leave an anomaly, increments are learned beside them and in their stead, and the names
-    remain unless increments alone have a much larger evidence. Names that the increments make unnecessary are given up,
-    and so is the release of the derivatives.
+    Where named effects leave an anomaly, increments are learned beside them. In their stead they are learned in any case: names
+    that fit may imitate what the library lacks. The names remain unless increments alone have a much larger evidence. Names that
+    the increments make unnecessary are given up, and so is the release of the derivatives.
 
     Parameters
     ----------
@@ -80,8 +83,7 @@ def with_increments(
     seed : seed of the draws behind p-values; advance : receives the step that begins.
     declared : candidates that explain released derivatives, which they do again beside the increments.
     """
-    few = len(problem.records) < LEAST_RECORDS
-    if few or not rounds or rounds[-1].anomaly.p_value > REMAINS:
+    if len(problem.records) < LEAST_RECORDS or not rounds:
         return rounds
     grown = _learned(problem, rounds, effects, seed, advance)
     if len(grown) == len(rounds) and grown[-1].null is rounds[-1].null:
@@ -110,8 +112,9 @@ def _learned(
     if not named or rounds[0].release is not None or rounds[-1].null.hypothesis.spread is not None:
         return grown
     bare = (replace(rounds[0], tied=(), profile=None),)
-    alone, alone_evidence = learn.grown(bare)
-    lead = (total_cost(rounds[-1]) - evidence) - (bare[0].null.cost - alone_evidence)
+    gain = bare[0].null.cost - (total_cost(rounds[-1]) - evidence)
+    alone, alone_evidence = replace(learn, promising=_PROMISING * gain).grown(bare)
+    lead = alone_evidence - gain
     if len(alone) > 1 and lead > _NAMES_LEAD:
         names = tuple(sorted({e.name for e in named}))
         return (replace(alone[0], rival=Rival({names: -lead})), *alone[1:])
@@ -120,12 +123,18 @@ def _learned(
 
 @dataclass(frozen=True)
 class _Learning:
-    """What every increment of a trace shares."""
+    """What every increment of a trace shares.
+
+    Attributes
+    ----------
+    promising : log evidence without a refit that a first increment needs for one [-].
+    """
 
     problem: TraceProblem
     effects: tuple[Effect, ...]
     seed: int
     advance: Advance
+    promising: float = 0.0
 
     def grown(self, rounds: tuple[SearchRound, ...]) -> tuple[tuple[SearchRound, ...], float]:
         """The rounds with one more for each accepted increment, and the log evidence of all of them."""
@@ -186,7 +195,8 @@ class _Learning:
             return ()
         present = {e.variant for e in _increments_of(null)}
         tried = [s for s in every if s.variant not in present]
-        leading = _leading(screen(self.problem, last.null, NO_WHITENER, tried))
+        least = 0.0 if present else self.promising
+        leading = _leading(screen(self.problem, last.null, NO_WHITENER, tried), least)
         leading = sharpened(self.problem, last.null, NO_WHITENER, leading)
         learned = []
         for s in leading:
@@ -216,13 +226,13 @@ def _accepted(rounds: Sequence[SearchRound]) -> list[Candidate]:
     return [r.tied[0] for r in rounds if r.tied and isinstance(r.tied[0].score.effect, Increment)]
 
 
-def _leading(screened: Sequence[Screened]) -> list[Screened]:
-    """The best shape of each variant, as far as their evidence is near that of the first."""
+def _leading(screened: Sequence[Screened], least: float) -> list[Screened]:
+    """The best shape of each variant, as far as their evidence is near that of the first and above ``least``."""
     best: dict[str, Screened] = {}
     for s in screened:
         best.setdefault(s.effect.variant, s)
     first = screened[0].log_evidence if screened else 0.0
-    near = [s for s in best.values() if s.log_evidence > max(first - _HOPELESS, 0.0)]
+    near = [s for s in best.values() if s.log_evidence > max(first - _HOPELESS, least)]
     return near[:_REFITTED]
 
 

@@ -1,0 +1,50 @@
+"""Reservations: what makes the names of an answer provisional although they leave no anomaly.
+
+An effect outside the library can look like several named ones together. Each further name fits more of it, so that a good fit by
+many names is weaker evidence for each of them than a good fit by one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from airtruth.tracing.accepted import AcceptedEffect
+
+MANY: Final = 3
+"""Number of separate causes from which their names are provisional [-] (judgement: in the blind trials an effect outside
+the library is answered by three or more names about as often as three true causes are)."""
+_ONE_EVENT: Final = frozenset({"cg_shift", "mass_error", "inertia_error"})
+"""Effects that one event brings, and which count as one cause: a load that is not declared, or a lost part."""
+
+
+def reservations(effects: Sequence[AcceptedEffect]) -> tuple[str, ...]:
+    """Each reason against relying on the names of an answer, in words.
+
+    Parameters
+    ----------
+    effects : those of the answer, the explanation of its derivatives among them.
+    """
+    named = [e for e in effects if e.acts_on is None]
+    listed = ", ".join(e.key for e in named)
+    found = []
+    if named and len(named) < len(effects):
+        found.append(
+            f"the library lacks an effect of these records, which may also have caused what {listed} explain"
+            f"{'' if len(named) > 1 else 's'}: the names are provisional until a flight of their own confirms them"
+        )
+    if causes(named) >= MANY:
+        found.append(
+            f"{listed} are {MANY} causes or more, and one effect that the library lacks can look like as many: the names are "
+            "provisional until a flight of their own confirms each"
+        )
+    return tuple(found)
+
+
+def causes(named: Sequence[AcceptedEffect]) -> int:
+    """Number of separate causes among named effects; CG, mass and inertia count as one."""
+    apart = [e for e in named if e.name not in _ONE_EVENT]
+    return len(apart) + (len(apart) < len(named))
+
+
+__all__ = ["MANY", "causes", "reservations"]

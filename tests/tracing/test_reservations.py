@@ -1,0 +1,44 @@
+"""Names that are provisional without an anomaly: several causes at once, and names beside an increment."""
+
+import pytest
+
+from airtruth.tracing.accepted import AcceptedEffect
+from airtruth.tracing.reservations import MANY, causes, reservations
+
+
+def effects(*names):
+    return [
+        AcceptedEffect(name, {}, 1e-9, 5.0, acts_on="Cm" if name == "increment" else None) for name in names
+    ]
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        (),
+        ("vane_lag",),
+        ("vane_lag", "elevator_delay"),
+        ("cg_shift", "mass_error", "inertia_error"),
+        ("cg_shift", "mass_error", "inertia_error", "vane_lag"),
+        ("increment",),
+        ("increment", "increment"),
+    ],
+)
+def test_one_or_two_causes_or_increments_alone_are_not_reserved(names):
+    """A load that is not declared moves CG, mass and inertia together: one cause."""
+    assert reservations(effects(*names)) == ()
+
+
+def test_three_causes_are_provisional():
+    names = ("accelerometer_scale", "gyro_bias", "derivatives")
+    (reason,) = reservations(effects(*names))
+    assert causes(effects(*names)) == MANY
+    assert reason.startswith("accelerometer_scale, gyro_bias, derivatives are 3 causes or more")
+
+
+def test_names_beside_an_increment_are_provisional():
+    (one,) = reservations(effects("vane_arm", "increment"))
+    assert "what vane_arm explains:" in one
+    two, many = reservations(effects("vane_arm", "cg_shift", "derivatives", "increment"))
+    assert "what vane_arm, cg_shift, derivatives explain:" in two
+    assert "or more" in many
