@@ -3,6 +3,7 @@
 import pytest
 
 from airtruth.tracing.accepted import AcceptedEffect
+from airtruth.tracing.answer import Alternative
 from airtruth.tracing.reservations import MANY, causes, reservations
 
 
@@ -26,19 +27,27 @@ def effects(*names):
 )
 def test_one_or_two_causes_or_increments_alone_are_not_reserved(names):
     """A load that is not declared moves CG, mass and inertia together: one cause."""
-    assert reservations(effects(*names)) == ()
+    assert reservations(effects(*names), ()) == ()
 
 
 def test_three_causes_are_provisional():
     names = ("accelerometer_scale", "gyro_bias", "derivatives")
-    (reason,) = reservations(effects(*names))
+    (reason,) = reservations(effects(*names), ())
     assert causes(effects(*names)) == MANY
     assert reason.startswith("accelerometer_scale, gyro_bias, derivatives are 3 causes or more")
 
 
+def test_a_leading_set_that_is_improbable_is_provisional():
+    sets = [Alternative(("inertia_error", "mass_error"), 0.28), Alternative(("airspeed_scale",), 0.14)]
+    (reason,) = reservations(effects("inertia_error", "mass_error"), sets)
+    assert reason.startswith("the leading set of causes has a posterior weight of 28 %:")
+    assert reservations(effects("vane_lag"), [Alternative(("vane_lag",), 0.5)]) == ()
+    assert reservations(effects("increment"), sets) == ()
+
+
 def test_names_beside_an_increment_are_provisional():
-    (one,) = reservations(effects("vane_arm", "increment"))
+    (one,) = reservations(effects("vane_arm", "increment"), ())
     assert "what vane_arm explains:" in one
-    two, many = reservations(effects("vane_arm", "cg_shift", "derivatives", "increment"))
+    two, many = reservations(effects("vane_arm", "cg_shift", "derivatives", "increment"), ())
     assert "what vane_arm, cg_shift, derivatives explain:" in two
     assert "or more" in many

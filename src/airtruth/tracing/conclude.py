@@ -95,7 +95,7 @@ def conclude(
     sizes = cause_sizes(likelihood, case.declared)
     verdict = _verdict(stated, declared)
     confirmed = confirmation(stages)
-    reserved = reservations(stated)
+    reserved = reservations(stated, sets)
     errors = stage_errors(stages)
     return TraceAnswer(
         verdict=verdict,

@@ -10,20 +10,24 @@ from collections.abc import Sequence
 from typing import Final
 
 from airtruth.tracing.accepted import AcceptedEffect
+from airtruth.tracing.answer import Alternative
 
 MANY: Final = 3
 """Number of separate causes from which their names are provisional [-] (judgement: in the blind trials an effect outside
 the library is answered by three or more names about as often as three true causes are)."""
+LEAST_WEIGHT: Final = 0.5
+"""Posterior weight of the leading set of causes below which its names are provisional [-]: another set is more probable."""
 _ONE_EVENT: Final = frozenset({"cg_shift", "mass_error", "inertia_error"})
 """Effects that one event brings, and which count as one cause: a load that is not declared, or a lost part."""
 
 
-def reservations(effects: Sequence[AcceptedEffect]) -> tuple[str, ...]:
+def reservations(effects: Sequence[AcceptedEffect], sets: Sequence[Alternative]) -> tuple[str, ...]:
     """Each reason against relying on the names of an answer, in words.
 
     Parameters
     ----------
     effects : those of the answer, the explanation of its derivatives among them.
+    sets : sets of causes with their posterior weights, the leading one first.
     """
     named = [e for e in effects if e.acts_on is None]
     listed = ", ".join(e.key for e in named)
@@ -38,6 +42,11 @@ def reservations(effects: Sequence[AcceptedEffect]) -> tuple[str, ...]:
             f"{listed} are {MANY} causes or more, and one effect that the library lacks can look like as many: the names are "
             "provisional until a flight of their own confirms each"
         )
+    if named and sets and sets[0].weight < LEAST_WEIGHT:
+        found.append(
+            f"the leading set of causes has a posterior weight of {100.0 * sets[0].weight:.0f} %: it is one of the sets of "
+            "`alternatives`, and more probably another of them"
+        )
     return tuple(found)
 
 
@@ -47,4 +56,4 @@ def causes(named: Sequence[AcceptedEffect]) -> int:
     return len(apart) + (len(apart) < len(named))
 
 
-__all__ = ["MANY", "causes", "reservations"]
+__all__ = ["LEAST_WEIGHT", "MANY", "causes", "reservations"]

@@ -55,9 +55,9 @@ _REFITTED: Final = 3
 """Number of shapes that are refitted for one increment [-] (judgement: a refit costs seconds to a minute)."""
 _HOPELESS: Final = 8.0
 """Log evidence behind the leading shape from which a shape is not refitted [-] (judgement)."""
-_PROMISING: Final = 1.0 / 3.0
-"""Log evidence of a shape without a refit, over that of the names, from which it is refitted in their stead [-] (judgement:
-refits of memory have doubled it)."""
+_PROMISING: Final = 0.2
+"""Log evidence of a shape without a refit, over that of names without an anomaly, from which it is refitted in their stead [-]
+(judgement: refits have tripled it)."""
 _NAMES_LEAD: Final = 5.0
 """Log evidence by which increments alone have to lead for named effects to be given up [-] (judgement: a name is
 preferred to a curve)."""
@@ -113,7 +113,8 @@ def _learned(
         return grown
     bare = (replace(rounds[0], tied=(), profile=None),)
     gain = bare[0].null.cost - (total_cost(rounds[-1]) - evidence)
-    alone, alone_evidence = replace(learn, promising=_PROMISING * gain).grown(bare)
+    promising = _PROMISING * gain if rounds[-1].anomaly.p_value > REMAINS else 0.0
+    alone, alone_evidence = replace(learn, promising=promising).grown(bare)
     lead = alone_evidence - gain
     if len(alone) > 1 and lead > _NAMES_LEAD:
         names = tuple(sorted({e.name for e in named}))
