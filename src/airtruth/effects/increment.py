@@ -39,24 +39,32 @@ SIGNAL_NAMES: Final[Mapping[str, str]] = {
     "qbar": "qbar_pa",
 }
 """Signal of a term -> its name in an answer; a rate is multiplied by c/(2V)."""
-Acted = Literal["CL", "Cm", "alpha_rad", "q_rad_s", "az_m_s2"]
+Acted = Literal["CL", "Cm", "CX", "alpha_rad", "q_rad_s", "az_m_s2"]
 """Coefficient, or channel whose reading changes."""
 _STEP: Final[Mapping[str, float]] = {
     "CL": 1e-3,
     "Cm": 1e-4,
+    "CX": 1e-4,
     "alpha_rad": 1e-4,
     "q_rad_s": 1e-3,
     "az_m_s2": 1e-2,
 }
 """Step of the differences in a bend [-, unit of the channel] (judgement: small against noise, large against rounding)."""
-_REACH: Final[Mapping[str, float]] = {"CL": 1.0, "Cm": 0.3, "alpha_rad": 0.1, "q_rad_s": 1.0, "az_m_s2": 30.0}
+_REACH: Final[Mapping[str, float]] = {
+    "CL": 1.0,
+    "Cm": 0.3,
+    "CX": 0.1,
+    "alpha_rad": 0.1,
+    "q_rad_s": 1.0,
+    "az_m_s2": 30.0,
+}
 """Largest bend over one cell [-, unit of the channel] (judgement: the lift and the moment of a stall; 6 deg of a vane)."""
 _QHAT: Final = 30.0
 """Pitch rate over q c/(2V) by which the share of a reading over q c/(2V) exceeds one over an angle [-] (judgement)."""
 _DERIVATIVE: Final[Mapping[str, float]] = {"": 1.0, "alpha": 7.0, "elevator": 7.0, "qhat": 200.0}
 """Increment of a derivative by each factor over one of a coefficient [1/rad, -] (judgement: Cm of 0.3 over a Cmde of 2 and a
 Cmq of 60)."""
-_ACTS: Final = {"CL": "lift", "Cm": "pitching moment"}
+_ACTS: Final = {"CL": "lift", "Cm": "pitching moment", "CX": "axial force"}
 """Coefficient in words."""
 _REACH_OF_MEMORY: Final = 3.0
 """Largest ratio by which a refit may change a time constant or a half width [-] (judgement: the grid's steps are smaller)."""
@@ -102,7 +110,7 @@ class Shape:
 
     Attributes
     ----------
-    acts_on : "CL", "Cm", or the channel whose reading changes.
+    acts_on : "CL", "Cm", "CX", or the channel whose reading changes.
     signal : one of `airtruth.physics.terms.SIGNALS`.
     low, high : range of the signal in which the increment is learned [unit of the signal].
     cells : number of equal cells of the range; 0 for a linear increment, which needs ``memory``.
@@ -182,7 +190,7 @@ class Shape:
 
     def _change(self, pieces: tuple[Piece, ...], *states: StateTerm) -> Change:
         """The pieces as terms of what the increment acts on."""
-        if self.acts_on == "CL" or self.acts_on == "Cm":
+        if self.acts_on == "CL" or self.acts_on == "Cm" or self.acts_on == "CX":
             coefficient = self.acts_on
             by = (self.factor, self.factor_trim) if self.factor else ()
             return Change(states=states, aero=tuple(AeroTerm(coefficient, *piece, *by) for piece in pieces))

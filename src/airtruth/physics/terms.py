@@ -104,7 +104,8 @@ class AeroTerm:
 
     Attributes
     ----------
-    coefficient : "CL" (force along -z of the body over q_bar S) or "Cm" (about the CG, over q_bar S c).
+    coefficient : "CL" (force along -z of the body over q_bar S), "Cm" (about the CG, over q_bar S c) or "CX" (force along x of
+        the body through the CG over q_bar S, which changes the airspeed and ax alone).
     signal : one of `SIGNALS` or the name of a `StateTerm`: alpha [rad] of the air at the CG; elevator [rad] that causes
         the forces (surface terms and effectiveness included); qhat = q c/(2V); alpha_dot_hat = alpha_dot c/(2V) of the
         motion over ground, the influence of this term on it included; zero at a trim; qbar [Pa], the dynamic pressure.
@@ -115,7 +116,7 @@ class AeroTerm:
     factor_at : origin of the factor [unit of the factor].
     """
 
-    coefficient: Literal["CL", "Cm"]
+    coefficient: Literal["CL", "Cm", "CX"]
     signal: str
     shape: Literal["linear", "quadratic", "above", "below"]
     amplitude: float

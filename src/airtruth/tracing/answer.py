@@ -10,7 +10,7 @@ from typing import Any, Final, Literal, TypeGuard
 
 from airtruth.errors import StoreError
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate, effect_key
-from airtruth.tracing.stage_errors import Errors, Replay, Tolerances
+from airtruth.tracing.stage_errors import AxialErrors, Errors, Replay, Tolerances
 
 ANSWER: Final = "trace.json"
 """Name of the file in the folder of a trace."""
@@ -184,6 +184,7 @@ class TraceAnswer:
     credit : effect -> log-likelihood of the held-out records that is lost without it, over the step from *declared* to
         *after* [-].
     alternatives, inclusion : sets of effects with their weights; effect -> its probability.
+    axial_force : errors of ax as declared, and with the increments of CX; None where ax was not compared.
     """
 
     verdict: VerdictName
@@ -208,12 +209,13 @@ class TraceAnswer:
     alternatives: tuple[Alternative, ...] = ()
     inclusion: dict[str, float] = field(default_factory=dict)
     credit: dict[str, float] = field(default_factory=dict)
+    axial_force: AxialErrors | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Contract 3: what trace.json holds."""
         found = {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
         found["shown_by"] = {"anomaly": self.anomaly.where, "remaining": self.remaining.where}
-        optional = {name for name in ("tolerances", "replay") if getattr(self, name) is None}
+        optional = {name for name in ("tolerances", "replay", "axial_force") if getattr(self, name) is None}
         optional |= set() if self.forced else {"forced"}
         return {name: value for name, value in found.items() if name not in optional}
 

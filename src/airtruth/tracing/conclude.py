@@ -24,6 +24,7 @@ from airtruth.tracing.answer import (
     TraceAnswer,
     VerdictName,
 )
+from airtruth.tracing.axial_force import AxialForce
 from airtruth.tracing.confirmation import confirmation
 from airtruth.tracing.credit import credit
 from airtruth.tracing.declared_model import (
@@ -34,6 +35,7 @@ from airtruth.tracing.declared_model import (
     detectable_causes,
     explaining_effects,
     inclusion,
+    with_axial_force,
 )
 from airtruth.tracing.increment_table import in_physical_terms, increment_rows, least_certain
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, derivative_likelihood
@@ -68,6 +70,7 @@ def conclude(
     updated_aircraft: str | None = None,
     replay: Replay | None = None,
     forced: Sequence[str] = (),
+    axial: AxialForce | None = None,
 ) -> TraceAnswer:
     """State the answer of a trace.
 
@@ -77,6 +80,7 @@ def conclude(
     updated_aircraft : folder of the updated aircraft, None where none was written.
     replay : records flown again in JSBSim, None where nothing was flown again.
     forced : faults of the logs that the caller overruled.
+    axial : what ax shows; None where it was not compared.
     """
     case, first, last = stages.case, rounds[0], rounds[-1]
     effects = accepted(rounds)
@@ -89,13 +93,14 @@ def conclude(
         ),
         rounds,
     )
-    declared = declared_model(case.fitted, rounds, covariance, case.declared)
+    along = () if axial is None else axial.increments
+    declared = with_axial_force(declared_model(case.fitted, rounds, covariance, case.declared), along)
     sets = alternatives(rounds)
     likelihood = derivative_likelihood(case.fitted, first.null)
     sizes = cause_sizes(likelihood, case.declared)
-    verdict = _verdict(stated, declared)
+    verdict = _verdict((*stated, *along), declared)
     confirmed = confirmation(stages)
-    reserved = reservations(stated, sets)
+    reserved = reservations((*stated, *along), sets)
     errors = stage_errors(stages)
     return TraceAnswer(
         verdict=verdict,
@@ -106,13 +111,13 @@ def conclude(
         or (bool(stated) and remaining.p_value <= ANOMALY_LEVEL),
         anomaly=_evidence(anomaly),
         remaining=_evidence(remaining),
-        effects=stated,
+        effects=(*stated, *along),
         candidates=_candidates(case, rounds, stated, sizes),
         error=errors,
         derivatives=_derivatives(case, rounds, covariance),
         updated_aircraft=updated_aircraft,
         detectability=_detectability(case, rounds, likelihood, sizes),
-        next_flight=_next_flight(effects, verdict, remaining, list(least_certain(stated))),
+        next_flight=_next_flight(effects, verdict, remaining, list(least_certain((*stated, *along)))),
         model=case.model,
         records=RecordNames(
             tuple(r.signals.run_id for r in case.fitted.records),
@@ -127,6 +132,7 @@ def conclude(
         alternatives=sets,
         inclusion=inclusion(sets),
         credit=credit(stated, stages),
+        axial_force=None if axial is None else axial.errors,
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -85,6 +86,27 @@ def declared_model(
             for i, name in enumerate(PARAMETERS)
         },
         where="the derivatives" if by_derivatives else anomaly.where,
+    )
+
+
+def with_axial_force(declared: DeclaredModel, along: Sequence[AcceptedEffect]) -> DeclaredModel:
+    """The test of the declared model with the axial force, which the derivatives and the anomaly do not contain.
+
+    Parameters
+    ----------
+    along : accepted increments of CX.
+    """
+    p_value = min((e.p_value for e in along), default=1.0)
+    if 2.0 * p_value >= declared.p_value:
+        return declared
+    gain = next(e.gain_2_log_likelihood or 0.0 for e in along if e.p_value == p_value)
+    return replace(
+        declared,
+        consistent=2.0 * p_value > ANOMALY_LEVEL,
+        statistic=gain,
+        degrees=1,
+        p_value=2.0 * p_value,
+        where="the axial force",
     )
 
 
@@ -281,4 +303,5 @@ __all__ = [
     "detectable_causes",
     "explaining_effects",
     "inclusion",
+    "with_axial_force",
 ]

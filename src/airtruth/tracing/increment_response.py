@@ -34,7 +34,7 @@ def increments(aero: Sequence[AeroTerm], signals: Mapping[str, Array]) -> Array:
     signals : name -> values of one shape: alpha as the terms count it [rad], elevator [rad], qhat = q c/(2V), qbar [Pa], states.
     """
     total = np.zeros((2, *next(iter(signals.values())).shape))
-    for term in aero:
+    for term in (t for t in aero if t.coefficient != "CX"):
         total[0 if term.coefficient == "CL" else 1] += term_value(term, signals)
     return total
 

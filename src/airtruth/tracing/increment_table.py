@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.effects.increment import SIGNAL_NAMES, Increment
+from airtruth.effects.increment import SIGNAL_NAMES, Increment, Shape
 from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable
 from airtruth.tracing.answer import Z95, CandidateScore
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
@@ -51,13 +51,21 @@ def increment_table(
     problem: TraceProblem, fitted: PosteriorFit, covariance: Array, effect: Increment
 ) -> IncrementTable:
     """The increment at the ends of its cells, with its pointwise 95 % band and the samples about each point."""
-    shape = effect.shape
-    bends, spread = fitted_bends(fitted, effect, covariance)
+    signal = np.concatenate([flown(r, effect.shape.signal) for r in problem.records])
+    return table_of(effect.shape, *fitted_bends(fitted, effect, covariance), signal)
+
+
+def table_of(shape: Shape, bends: Array, spread: Array, signal: Array) -> IncrementTable:
+    """The table of a shape.
+
+    Parameters
+    ----------
+    bends, spread : (bends,) and their covariance (bends, bends); signal : (samples,) of the fitted records.
+    """
     at = np.linspace(shape.low, shape.high, shape.cells + 1)
     basis = shape.basis(at)
     value = basis @ bends
     half = Z95 * np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", basis, spread, basis), 0.0))
-    signal = np.concatenate([flown(r, shape.signal) for r in problem.records])
     edges = np.concatenate([[-np.inf], at[:-1] + 0.5 * shape.width, [np.inf]])
     samples = np.histogram(signal, edges)[0]
     return IncrementTable(
@@ -75,11 +83,13 @@ def least_certain(effects: Sequence[AcceptedEffect]) -> Iterator[str]:
         table = effect.table
         if table is None:
             continue
+        planned = effect.acts_on in ("CL", "Cm")
+        computed = " `airtruth plan --from` computes the input." if planned else ""
         widths = [high - low for low, high in zip(table.low, table.high, strict=True)]
         i = int(np.argmax(widths))
         yield (
             f"The increment of {effect.variant} is least certain at {table.at[i]:.3g} ({table.samples[i]} samples): "
-            "records that hold the signal there narrow its band. `airtruth plan --from` computes the input."
+            f"records that hold the signal there narrow its band.{computed}"
         )
 
 
@@ -105,4 +115,4 @@ def increment_rows(rounds: Sequence[SearchRound]) -> Iterator[CandidateScore]:
         )
 
 
-__all__ = ["in_physical_terms", "increment_rows", "increment_table", "least_certain"]
+__all__ = ["in_physical_terms", "increment_rows", "increment_table", "least_certain", "table_of"]

@@ -22,6 +22,7 @@ from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.provenance import Provenance, digests_of
 from airtruth.logs.sources import Logs, named_logs
 from airtruth.tracing.answer import ANOMALY_LEVEL, TraceAnswer
+from airtruth.tracing.axial_force import axial_force
 from airtruth.tracing.conclude import conclude
 from airtruth.tracing.declared_model import declared_p_value
 from airtruth.tracing.kinematic_start import (
@@ -105,15 +106,21 @@ def _traced(
     case, rounds = _search(case, options, advance, starts_of(kinematics))
     advance("assess every stage on fitted and held-out records")
     stages = assess_stages(case, rounds)
+    advance("compare ax with the declared axial force")
+    axial = axial_force(case, checked, declared, rounds[-1].gls) if options.learns else None
     origin = provenance_of(logs, declared, options)
     if out is None:
         return TraceResult(
-            _with_notes(conclude(stages, rounds, forced=forced), kinematics), rounds, stages, origin
+            _with_notes(conclude(stages, rounds, forced=forced, axial=axial), kinematics),
+            rounds,
+            stages,
+            origin,
         )
     advance("write the updated aircraft")
-    updated = write_update(case, rounds, declared, out, declared_p_value(rounds) <= ANOMALY_LEVEL)
+    contradicted = declared_p_value(rounds) <= ANOMALY_LEVEL
+    updated = write_update(case, rounds, declared, out, contradicted, axial)
     replay = flown_again(stages, declared, updated)
-    answer = _with_notes(conclude(stages, rounds, updated, replay, forced), kinematics)
+    answer = _with_notes(conclude(stages, rounds, updated, replay, forced, axial), kinematics)
     result = TraceResult(answer, rounds, stages, origin)
     result.write(out)
     return result

@@ -76,6 +76,30 @@ class Errors:
 
 
 @dataclass(frozen=True)
+class AxialRms:
+    """Root mean squares of ax beyond a model, each record about its mean [m/s2]; None where no record is held out."""
+
+    fit: float
+    held_out: float | None = None
+
+    def to_dict(self) -> dict[str, float]:
+        """The sets that there are."""
+        return {"fit": self.fit} | ({} if self.held_out is None else {"held_out": self.held_out})
+
+
+@dataclass(frozen=True)
+class AxialErrors:
+    """Errors of the axial force: as declared, and with the learned increments of CX."""
+
+    declared: AxialRms
+    after: AxialRms
+
+    def to_dict(self) -> dict[str, Any]:
+        """Both stages."""
+        return {"declared": self.declared.to_dict(), "after": self.after.to_dict()}
+
+
+@dataclass(frozen=True)
 class Excursions:
     """Free runs of some records against the tolerances of a training simulator.
 
@@ -135,4 +159,16 @@ class Replay:
         return {name: dict(rms) for name, rms in both.items() if rms is not None}
 
 
-__all__ = ["SETS", "STAGES", "BySet", "Errors", "Excursions", "PerChannel", "Replay", "Rms", "Tolerances"]
+__all__ = [
+    "SETS",
+    "STAGES",
+    "AxialErrors",
+    "AxialRms",
+    "BySet",
+    "Errors",
+    "Excursions",
+    "PerChannel",
+    "Replay",
+    "Rms",
+    "Tolerances",
+]

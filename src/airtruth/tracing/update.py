@@ -16,6 +16,8 @@ from airtruth.errors import StoreError
 from airtruth.logs import atomic
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.physics.terms import DECLARED, AeroTerm, Change, ReadingTerm, SensorTerm, declared_total
+from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
+from airtruth.tracing.axial_force import AxialForce
 from airtruth.tracing.increment_table import increment_table
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import robust_covariance
@@ -77,6 +79,7 @@ def write_update(
     aircraft: Aircraft,
     out: Path,
     contradicted: bool = False,
+    axial: AxialForce | None = None,
 ) -> str | None:
     """Write the aircraft with the accepted effects and the refitted derivatives to OUT/aircraft/NAME.
 
@@ -87,6 +90,7 @@ def write_update(
     ----------
     contradicted : whether the records contradict the declared model; its derivatives are then refitted although no
         effect was accepted.
+    axial : increments of CX that ax shows; None for none.
 
     Returns
     -------
@@ -99,6 +103,8 @@ def write_update(
     """
     folder = updated_folder(aircraft, out)
     change = accepted_change(case, rounds, aircraft.constants.chord_m)
+    along = () if axial is None else axial.increments
+    change += Change() if axial is None else axial.change
     released = rounds[-1].null.hypothesis.spread is not None
     refits = (released or contradicted) and aircraft.file.jsbsim is not None
     if (change == Change() and not refits) or (aircraft.file.jsbsim is None and change.in_aircraft):
@@ -115,7 +121,7 @@ def write_update(
     increments = dict(zip(PARAMETERS, fit.point.common[Common.derivatives].tolist(), strict=True))
     release = rounds[-1].release
     causes = release.sets[0].effects if released and release is not None else ()
-    names = dict.fromkeys([*(e.key for e in fit.hypothesis.effects), *causes])
+    names = dict.fromkeys([*(e.key for e in fit.hypothesis.effects), *(e.key for e in along), *causes])
     found = ", ".join(names) or "no effect of the library explains the residual"
     note = f"Traced from measured records: {found}."
     corrections = None
@@ -124,7 +130,7 @@ def write_update(
         elevator = float(np.mean([p.trim_elevator_rad for p in plants]))
         corrections = Corrections(increments, alpha + shift, elevator)
         note += " Derivatives refitted: " + ", ".join(f"{k} {v:+.4g}" for k, v in increments.items()) + "."
-    note += "".join(f"\n{line}" for line in _bands(case, fit))
+    note += "".join(f"\n{line}" for line in (*_bands(case, fit), *map(_band, along)))
     with atomic.new_folder(folder) as new:
         write_aircraft(aircraft, change, new, note, corrections)
     return str(folder)
@@ -135,12 +141,19 @@ def _bands(case: Case, fit: PosteriorFit) -> Iterator[str]:
     learned = [e for e in fit.hypothesis.effects if isinstance(e, Increment) and e.shape.cells]
     covariance = robust_covariance(case.fitted, fit) if learned else np.zeros((0, 0))
     for effect in learned:
-        table = increment_table(case.fitted, fit, covariance, effect)
-        rows = zip(table.at, table.low, table.high, table.samples, strict=True)
-        band = "; ".join(
-            f"{x:.4g}: {low:.3g} to {high:.3g} ({samples} samples)" for x, low, high, samples in rows
-        )
-        yield f"95 % band of {effect.key}: {band}."
+        yield _line(effect.key, increment_table(case.fitted, fit, covariance, effect))
+
+
+def _band(effect: AcceptedEffect) -> str:
+    return "" if effect.table is None else _line(effect.key, effect.table)
+
+
+def _line(key: str, table: IncrementTable) -> str:
+    rows = zip(table.at, table.low, table.high, table.samples, strict=True)
+    band = "; ".join(
+        f"{x:.4g}: {low:.3g} to {high:.3g} ({samples} samples)" for x, low, high, samples in rows
+    )
+    return f"95 % band of {key}: {band}."
 
 
 def _from_zero_alpha(term: _Term, shift_rad: float) -> _Term:

@@ -35,6 +35,10 @@ _ROUNDING: Final = 1e-9
 """Sum of slopes beyond the last bend, over the largest, that counts as zero [-] (judgement: above rounding)."""
 _UP: Final = {"Z": -1.0, "NORMAL": 1.0}
 """Axis that carries a force along -z of the body, and its sign."""
+_FORWARD: Final = {"X": 1.0, "AXIAL": -1.0}
+"""Axis that carries a force along x of the body, and its sign: JSBSim counts AXIAL aft."""
+_PARTNER: Final = {"Z": "X", "X": "Z", "NORMAL": "AXIAL", "AXIAL": "NORMAL"}
+"""Axis beside which JSBSim accepts another."""
 
 
 def write(
@@ -85,7 +89,7 @@ def write(
         made[state.name] = f"{root}state-{state.name}"
         functions.append(_state(state, made[state.name], made[state.signal]))
         memory += _memory(state, made[state.name], made[state.signal])
-    by_coefficient: dict[str, list[str]] = {"CL": [], "Cm": []}
+    by_coefficient: dict[str, list[str]] = {"CL": [], "Cm": [], "CX": []}
     learned, single = _grouped(terms)
     for number, group in enumerate(learned, start=1):
         output = f"{root}{group[0].coefficient}-table-{number}"
@@ -253,6 +257,12 @@ def _to_axes(aerodynamics: Element, by_coefficient: dict[str, list[str]], root: 
         first = next((i for i, e in enumerate(aerodynamics) if e.tag == "axis"), len(aerodynamics))
         aerodynamics.insert(first, total)
         _force(aerodynamics, root, where)
+    if by_coefficient["CX"]:
+        force = op("product", "aero/qbar-psf", "metrics/Sw-sqft", op("sum", *by_coefficient["CX"], 0.0))
+        words = "Sum of the increments of CX: force along x of the body [lbf]"
+        first = next((i for i, e in enumerate(aerodynamics) if e.tag == "axis"), len(aerodynamics))
+        aerodynamics.insert(first, function(f"{root}axial-lbs", words, force))
+        _axial(aerodynamics, root, where)
     moments: list[Element | float | str] = []
     if by_coefficient["Cm"]:
         moments.append(
@@ -268,6 +278,9 @@ def _to_axes(aerodynamics: Element, by_coefficient: dict[str, list[str]], root: 
         # JSBSim applies forces at its reference point; this takes them back to the CG
         ahead = op("quotient", op("difference", "inertia/cg-x-in", "metrics/aero-rp-x-in"), 12.0)
         moments.append(op("product", -1.0, ahead, f"{root}force-lbs"))
+    if by_coefficient["CX"]:
+        above = op("quotient", op("difference", "inertia/cg-z-in", "metrics/aero-rp-z-in"), 12.0)
+        moments.append(op("product", -1.0, above, f"{root}axial-lbs"))
     if moments:
         _axis(aerodynamics, "PITCH").append(
             function(
@@ -282,16 +295,63 @@ def _axis(aerodynamics: Element, name: str) -> Element:
 
 
 def _force(aerodynamics: Element, root: str, where: str) -> None:
-    names = {a.get("name", "").upper() for a in aerodynamics.findall("axis")}
-    for name, sign in _UP.items():
-        if name in names or (name == "Z" and "X" in names):
-            formula = op("product", sign, f"{root}force-lbs")
-            _axis(aerodynamics, name).append(function(f"{root}{name}-lbs", "Increments of CL [lbf]", formula))
-            return
-    if not names & {"LIFT", "DRAG"}:
-        raise AircraftError(
-            f"{where}: its <aerodynamics> have no axis LIFT, Z or NORMAL that could carry lift"
+    """The force along -z of the body, in the axes of the model."""
+    if not _along_body(aerodynamics, _UP, root, "force", "CL"):
+        wind = {"LIFT": op("cos", "aero/alpha-rad"), "DRAG": op("sin", "aero/alpha-rad")}
+        _along_wind(
+            aerodynamics,
+            wind,
+            root,
+            "force",
+            "CL",
+            f"{where}: its <aerodynamics> have no axis LIFT, Z or NORMAL that could carry lift",
         )
-    for name, component_of in (("LIFT", "cos"), ("DRAG", "sin")):
-        formula = op("product", f"{root}force-lbs", op(component_of, "aero/alpha-rad"))
-        _axis(aerodynamics, name).append(function(f"{root}{name}-lbs", "Increments of CL [lbf]", formula))
+
+
+def _axial(aerodynamics: Element, root: str, where: str) -> None:
+    """The force along x of the body, in the axes of the model."""
+    if not _along_body(aerodynamics, _FORWARD, root, "axial", "CX"):
+        wind = {
+            "LIFT": op("sin", "aero/alpha-rad"),
+            "DRAG": op("product", -1.0, op("cos", "aero/alpha-rad")),
+        }
+        _along_wind(
+            aerodynamics,
+            wind,
+            root,
+            "axial",
+            "CX",
+            f"{where}: its <aerodynamics> have no axis DRAG, X or AXIAL that could carry an axial force",
+        )
+
+
+def _along_body(
+    aerodynamics: Element, signs: Mapping[str, float], root: str, force: str, coefficient: str
+) -> bool:
+    """Add a force to the body axis that carries it; False where the model has no body axes."""
+    names = {a.get("name", "").upper() for a in aerodynamics.findall("axis")}
+    for name, sign in signs.items():
+        if name in names or _PARTNER[name] in names:
+            formula = op("product", sign, f"{root}{force}-lbs")
+            words = f"Increments of {coefficient} [lbf]"
+            _axis(aerodynamics, name).append(function(f"{root}{force}-{name}-lbs", words, formula))
+            return True
+    return False
+
+
+def _along_wind(
+    aerodynamics: Element,
+    components: Mapping[str, Element],
+    root: str,
+    force: str,
+    coefficient: str,
+    missing: str,
+) -> None:
+    """Add the components of a force to lift and drag."""
+    names = {a.get("name", "").upper() for a in aerodynamics.findall("axis")}
+    if not names & set(components):
+        raise AircraftError(missing)
+    for name, share in components.items():
+        formula = op("product", f"{root}{force}-lbs", share)
+        words = f"Increments of {coefficient} [lbf]"
+        _axis(aerodynamics, name).append(function(f"{root}{force}-{name}-lbs", words, formula))

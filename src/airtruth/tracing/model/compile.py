@@ -112,7 +112,9 @@ def compile_change(change: Change) -> CompiledChange:
 def _effects(change: Change, first: Ints) -> EffectArrays:
     """Terms of coefficients and readings, and states, by numbers; ``first``: first state of each effect with states."""
     names = [s.name for s in change.states]
-    every: list[AeroTerm | ReadingTerm] = [*change.aero, *change.readings]
+    # the airspeed is measured, so that an axial force moves no output of the filter
+    every: list[AeroTerm | ReadingTerm] = [t for t in change.aero if t.coefficient != "CX"]
+    every += change.readings
     terms = np.zeros((len(every), 6), dtype=np.int64)
     for i, term in enumerate(every):
         acts_on = term.channel if isinstance(term, ReadingTerm) else term.coefficient

@@ -144,6 +144,8 @@ def _declared_curve(plant: Plant, term: AeroTerm) -> Array:
     column = plant.over_alpha if term.signal == "alpha" else plant.over_elevator
     if term.coefficient == "Cm":
         return np.asarray(column[:, 2] / (c.wing_area_m2 * c.chord_m))
+    if term.coefficient == "CX":
+        return np.asarray(column[:, 0] / c.wing_area_m2)
     return np.asarray(-column[:, 1] / c.wing_area_m2)
 
 

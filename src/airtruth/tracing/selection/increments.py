@@ -21,6 +21,7 @@ from scipy.special import logsumexp
 
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment, Memory, Shape, increment
+from airtruth.numerics.rates import smooth_rate
 from airtruth.physics.terms import FACTORS, READINGS
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import Whitener
@@ -203,9 +204,7 @@ def flown(record: TraceRecord, signal: str) -> Array:
     half = 0.5 * chord / s.airspeed_m_s[:: s.sub]
     if signal == "qhat":
         return np.asarray(s.y[:, 1] * half)
-    width = max(round(_RATE_S / s.dt_s), 1)
-    smooth = np.convolve(np.pad(alpha, width, mode="edge"), np.ones(width) / width, mode="same")[width:-width]
-    return np.asarray(np.gradient(smooth, s.dt_s) * half)
+    return smooth_rate(alpha, _RATE_S, s.dt_s) * half
 
 
 def _range(records: Sequence[TraceRecord], signal: str) -> tuple[float, float]:

@@ -1,0 +1,229 @@
+"""The axial force that a record shows beyond the declared one, as a coefficient.
+
+    y = (m (ax + q^2 x - q_dot z) - X(alpha, elevator, q c/(2V)))/(q_bar S)
+
+X is that of the declared JSBSim model, its engines included; ax is measured at (x, z) from the CG. Errors of sensors and of the
+surface that a trace accepted are undone before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
+
+from airtruth.aircraft import Aircraft
+from airtruth.logs.flight_log import FlightLog, batches
+from airtruth.numerics.rates import smooth_rate
+from airtruth.physics.sensor_errors import Kind, SensorErrors
+from airtruth.physics.sensors import accelerometer_ax
+from airtruth.physics.terms import Change, SensorTerm, declared_total
+from airtruth.simulation.disposable import isolated
+from airtruth.simulation.probe import forces_over_alpha
+from airtruth.tracing.compensate import Compensation, compensated_batch
+from airtruth.tracing.model.plant import Plant
+from airtruth.tracing.model.records import FINE, TraceRecord
+from airtruth.tracing.model.surface import through
+from airtruth.units import DEG
+
+Array = NDArray[np.float64]
+
+CHANNEL: Final = "ax_m_s2"
+"""The accelerometer along x."""
+_UNDONE: Final[tuple[Kind, ...]] = ("scale", "bias", "lag", "delay")
+"""Its declared errors that are undone before its position counts."""
+_FINE_RAD: Final = 0.1 * DEG
+"""Step of the angle of attack at which X is probed between the points of the tables [rad] (judgement: a tenth of theirs)."""
+_RATE_S: Final = 0.1
+"""Width of the mean over which rates are taken [s] (judgement: noise of vane, gyro and surface)."""
+
+
+@dataclass(frozen=True)
+class AxialSeries:
+    """One record.
+
+    Attributes
+    ----------
+    y : (samples,) axial force beyond the declared one, over q_bar S [-].
+    tolerances : (samples, n) what the uncertainty of the declarations brings into ``y``, each per standard deviation [-].
+    signals : name of a signal of an `AeroTerm` -> (samples,), as measured.
+    instruments : signal whose noise is in ``y`` -> (samples,) the signal as other channels show it.
+    unit_m_s2 : (samples,) ax of a unit of the coefficient [m/s2].
+    dt_s : sample period [s].
+    """
+
+    y: Array
+    tolerances: Array
+    signals: Mapping[str, Array]
+    instruments: Mapping[str, Array]
+    unit_m_s2: Array
+    dt_s: float
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Standard deviations of what the tracer does not estimate.
+
+    Attributes
+    ----------
+    share : of a declared slope of the axial force, relative [-].
+    alpha_slope, elevator_slope, rate_slope : least ones of the slopes of CX [1/rad, 1/rad, -].
+    late_s : time by which vane and surface are late [s].
+    x_m, z_m : position of the accelerometer [m].
+    scale : of the accelerometer [-].
+    """
+
+    share: float = 0.1
+    alpha_slope: float = 0.02
+    elevator_slope: float = 0.01
+    rate_slope: float = 1.0
+    late_s: float = 0.005
+    x_m: float = 0.05
+    z_m: float = 0.02
+    scale: float = 0.01
+
+
+TOLERANCE: Final = Tolerance()
+"""Judgement: wind-tunnel slopes of the axial force to 10 %, a vane or a surface late by a quarter of a sample at 50 Hz, and an
+accelerometer that is surveyed to some centimetres."""
+
+
+def axial_series(
+    log: FlightLog, records: Sequence[TraceRecord], change: Change, aircraft: Aircraft
+) -> list[AxialSeries]:
+    """The series of those records that the log holds.
+
+    Parameters
+    ----------
+    log : with the channel ax.
+    records : of a trace with a JSBSim model.
+    change : the declared errors of the sensors with the accepted effects.
+    """
+    own = _accelerometer(aircraft)
+    taken = Compensation(
+        conditions=(),
+        states=tuple(s for s in change.states if any(t.signal == s.name for t in change.readings)),
+        sensors=(*change.sensors, *(SensorTerm(CHANNEL, kind, own.value(kind)) for kind in _UNDONE)),
+        readings=change.readings,
+    )
+    by_run = {r.signals.run_id: r for r in records}
+    plants = {id(r.plant): r.plant for r in records}
+    between = {key: _between_points(plant) for key, plant in plants.items()}
+    found = []
+    for batch in batches(log):
+        undone = compensated_batch(batch, aircraft.constants, taken)
+        for row, run_id in enumerate(batch.run_ids):
+            if run_id in by_run:
+                channels = {name: values[row] for name, values in undone.channels.items()}
+                record = by_run[run_id]
+                found.append(_series(channels, record, between[id(record.plant)], change, aircraft))
+    return found
+
+
+def _series(
+    channels: Mapping[str, Array],
+    record: TraceRecord,
+    between: tuple[Array, Array],
+    change: Change,
+    aircraft: Aircraft,
+) -> AxialSeries:
+    s, plant, c = record.signals, record.plant, aircraft.constants
+    own = _accelerometer(aircraft)
+    factor = declared_total(change.declared, "elevator")
+    neutral = plant.neutral_elevator_rad
+    cells = s.sub * FINE
+    surface = through(change.surface, s.elevator_rad, s.dt_s / cells)[::cells]
+    elevator = neutral + factor * (surface - neutral)
+    alpha, q = channels["alpha_rad"], channels["q_rad_s"]
+    speed, density = s.airspeed_m_s[:: s.sub], s.density_kg_m3[:: s.sub]
+    pressure = 0.5 * density * speed**2
+    half = 0.5 * c.chord_m / speed
+    q_dot = smooth_rate(q, _RATE_S, s.dt_s)
+    ax = channels[CHANNEL] - accelerometer_ax(0.0, q, q_dot, own.x_m, own.z_m)
+    mass = plant.trim.mass_kg if plant.trim is not None else c.mass_kg
+    mass = mass * declared_total(change.declared, "mass")
+    force = pressure * c.wing_area_m2
+    declared = pressure * _looked_up(plant, alpha, elevator, q * half)
+    declared = declared + np.interp(alpha, plant.alpha_rad, plant.constant[:, 0])
+    declared = declared + pressure * np.interp(alpha, *between)
+    per_alpha, per_elevator = _slopes(plant, c.wing_area_m2)
+    t = TOLERANCE
+    shown = _without_noise(alpha, (channels["az_m_s2"], q, elevator))
+    off_alpha, off_elevator = shown - plant.trim_alpha_rad, elevator - plant.trim_elevator_rad
+    inertial = mass / force
+    tolerances = [
+        max(t.share * abs(per_alpha), t.alpha_slope) * off_alpha,
+        max(t.share * abs(per_elevator), t.elevator_slope) * off_elevator,
+        t.rate_slope * q * half,
+        t.late_s * per_alpha * smooth_rate(shown, _RATE_S, s.dt_s),
+        t.late_s * per_elevator * smooth_rate(elevator, _RATE_S, s.dt_s),
+        t.z_m * inertial * q_dot,
+        t.x_m * inertial * q**2,
+        t.scale * (declared - declared.mean()) / force,  # not of ax itself, whose noise is that of y
+    ]
+    return AxialSeries(
+        y=(mass * ax - declared) / force,
+        tolerances=np.stack(tolerances, axis=1),
+        instruments={"alpha": shown},
+        signals={"alpha": alpha, "elevator": elevator, "qhat": q * half},
+        unit_m_s2=force / mass,
+        dt_s=s.dt_s,
+    )
+
+
+def _without_noise(alpha: Array, others: Sequence[Array]) -> Array:
+    """The angle of attack as other channels show it, by linear regression on them and their squares: an instrument.
+
+    Noise of the vane is in ``y`` too, so that it would show as an axial force over the measured angle of attack.
+    """
+    columns = [x - x.mean() for x in others]
+    columns += [x**2 for x in columns]
+    scaled = [x / max(float(np.abs(x).max()), 1e-12) for x in columns]
+    design = np.column_stack([np.ones(len(alpha)), *scaled])
+    return np.asarray(design @ np.linalg.lstsq(design, alpha, rcond=None)[0])
+
+
+def _accelerometer(aircraft: Aircraft) -> SensorErrors:
+    return aircraft.file.sensors[CHANNEL].errors() if CHANNEL in aircraft.file.sensors else SensorErrors()
+
+
+def _looked_up(plant: Plant, alpha: Array, elevator: Array, qhat: Array) -> Array:
+    """(samples,) X of the air over the dynamic pressure [m2]."""
+    axes = (plant.alpha_rad, plant.elevator_rad, plant.qhat)
+    table = RegularGridInterpolator(axes, plant.values[..., 0], bounds_error=False, fill_value=None)
+    return np.asarray(table(np.stack([alpha, elevator, qhat], axis=1)))
+
+
+def _between_points(plant: Plant) -> tuple[Array, Array]:
+    """Angles of attack (points,) [rad], and what X has there beyond the plant's tables, over the dynamic pressure (points,) [m2].
+
+    The points of the tables are those where Z and M break; the breaks of X lie between them.
+    """
+    at = plant.trim
+    if at is None:
+        return plant.alpha_rad, np.zeros(len(plant.alpha_rad))
+    alpha = np.arange(plant.alpha_rad[0], plant.alpha_rad[-1], _FINE_RAD)
+    words = f"the axial force of {plant.aircraft.name}"
+    exact = isolated(words, forces_over_alpha, plant.aircraft, at, alpha, np.ones(1))[0, :, 0]
+    pressure = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2
+    elevator = np.full(len(alpha), at.elevator_rad)
+    tables = pressure * _looked_up(plant, alpha, elevator, np.zeros(len(alpha)))
+    tables = tables + np.interp(alpha, plant.alpha_rad, plant.constant[:, 0])
+    return alpha, (exact - tables) / pressure
+
+
+def _slopes(plant: Plant, area_m2: float) -> tuple[float, float]:
+    """Declared slopes of CX over the angle of attack and over the elevator at the trim [1/rad]."""
+    over_alpha = np.gradient(plant.over_alpha[:, 0], plant.alpha_rad) / area_m2
+    over_elevator = np.gradient(plant.over_elevator[:, 0], plant.elevator_rad) / area_m2
+    return (
+        float(np.interp(plant.trim_alpha_rad, plant.alpha_rad, over_alpha)),
+        float(np.interp(plant.trim_elevator_rad, plant.elevator_rad, over_elevator)),
+    )
+
+
+__all__ = ["CHANNEL", "TOLERANCE", "AxialSeries", "Tolerance", "axial_series"]
