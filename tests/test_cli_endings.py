@@ -133,6 +133,7 @@ def test_a_name_outside_the_encoding_of_the_terminal_is_escaped(tmp_path, enviro
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_guessed_mapping_is_valid_toml_on_any_terminal(tmp_path):
     log = tmp_path / "flight.csv"

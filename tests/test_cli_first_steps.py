@@ -361,6 +361,7 @@ def test_the_steps_of_a_trace_are_those_of_a_loop_in_its_middle():
     assert remaining.left_s == pytest.approx(9.0 * 13.0 / 33.2)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 def test_a_bar_on_a_terminal_leaves_the_result_as_it_is(tmp_path):

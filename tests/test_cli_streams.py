@@ -138,7 +138,7 @@ def test_streams_of_quick_commands(name, home):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sampled(SLOW, 5))
+@pytest.mark.parametrize("name", sampled(SLOW, 13))
 def test_streams_of_every_command(name, campaign):
     check_endings(name, campaign)
 

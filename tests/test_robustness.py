@@ -61,9 +61,9 @@ def test_a_killed_command_ends_with_the_files_of_an_undisturbed_one(verbs, tmp_p
     ("limit", "value"),
     [
         ("RLIMIT_NOFILE", 9),
-        ("RLIMIT_AS", 800_000 * 1024),
+        pytest.param("RLIMIT_AS", 800_000 * 1024, marks=pytest.mark.long),
         ("RLIMIT_AS", 1_100_000_000),
-        ("RLIMIT_FSIZE", 20_000),
+        pytest.param("RLIMIT_FSIZE", 20_000, marks=pytest.mark.long),
     ],
 )
 def test_a_lack_of_a_resource_is_one_sentence_and_tears_nothing(few, tmp_path, limit, value):

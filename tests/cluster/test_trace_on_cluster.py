@@ -82,6 +82,7 @@ def test_files_that_do_not_appear_are_named(declared, logs, tmp_path):
     )
 
 
+@pytest.mark.long
 def test_sets_are_traced_by_themselves_and_once(cluster, declared, logs, tmp_path):
     sets = [logs / "a.parquet", logs / "b.parquet", tmp_path / "none.parquet"]
     seen = []

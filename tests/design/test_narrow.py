@@ -267,6 +267,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(searching, "_UNITS", 2)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_command_line_writes_a_campaign_that_flies(quick, tmp_path):
     out = tmp_path / "next.toml"

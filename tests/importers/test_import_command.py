@@ -26,6 +26,7 @@ def folder(tmp_path_factory):
     return place
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_guess_import_check_identify(folder):
     guessed = run("import", "--guess", folder / "f.csv")

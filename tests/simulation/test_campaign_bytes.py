@@ -58,6 +58,7 @@ def test_chunks_flown_backwards_by_one_pilot_are_the_same(once, tmp_path):
         assert (logs / path.name).read_bytes() == path.read_bytes()
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_campaign_grows_to_the_files_of_a_longer_one(once, tmp_path):
     """Seven runs grow to 20, whose last chunk has two, then to 25, where a chunk of 20 is flown whole."""

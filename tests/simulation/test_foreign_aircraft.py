@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from fly_campaigns import channel, fly
+from tiers import sampled
 
 pytestmark = pytest.mark.slow
 
@@ -12,7 +13,7 @@ FLOWN = {"c172x": (80.0, 5000.0, 4.0), "f16": (300.0, 10000.0, 1.0), "T38": (300
 START = {"manoeuvre": [{"kind": "doublet", "amplitude_deg": 0.0, "start_s": 0.5, "step_s": 0.5}]}
 
 
-@pytest.mark.parametrize("name", FLOWN)
+@pytest.mark.parametrize("name", sampled(FLOWN, 3))
 def test_doublet_through_a_few_lines_of_aircraft_toml(tmp_path, name):
     eas, altitude, amplitude = FLOWN[name]
     condition = {"eas_kt": eas, "altitude_ft": altitude}

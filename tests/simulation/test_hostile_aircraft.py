@@ -8,6 +8,7 @@ import hostile_models as hostile
 import numpy as np
 import pytest
 from fly_campaigns import command, runs_recorded, write
+from tiers import sampled
 
 from airtruth import aircraft
 from airtruth.errors import AircraftError, FlightError
@@ -142,19 +143,20 @@ def test_a_model_that_ends_the_simulation_is_a_failed_flight(plane):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", sampled([2, 1], 2))
 def test_flights_that_exit_with_code_0_are_failed_runs(tmp_path, plane, doubles, jobs):
     doubles("ENDS_IN", "flight")
     fails(tmp_path, campaign(tmp_path, plane), jobs, "the flight ends its process each time (exit code 0)")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", sampled([2, 1], 2))
 def test_flights_that_die_are_failed_runs(tmp_path, plane, jobs):
     hostile.spoil(plane, hostile.recursion(hostile.IN_FLIGHT))
     fails(tmp_path, campaign(tmp_path, plane), jobs, "the flight ends its process each time (SIGSEGV)")
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_endless_flights_are_failed_runs(tmp_path, plane, doubles, monkeypatch):
     doubles("SECONDS_OF_A_RUN", "1.0")

@@ -114,6 +114,7 @@ def test_lag_is_first_order(ideal, tmp_path):
     np.testing.assert_allclose(got, expected, atol=1e-7)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_lag_in_coarse_logs_is_that_of_the_simulation(tmp_path):
     """A lag is computed at 200 Hz whatever the rate of the log."""

@@ -38,6 +38,7 @@ class Killer:
             os.kill(self.killed, signal.SIGKILL)
 
 
+@pytest.mark.long
 def test_workers_write_the_bytes_of_a_local_campaign_into_a_store(
     bucket: str, campaign: Path, local: Path
 ) -> None:

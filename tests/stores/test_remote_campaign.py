@@ -64,6 +64,7 @@ def test_damage_in_a_store_is_named_and_repaired(bucket: str, campaign: Path, lo
     assert verify(out).intact
 
 
+@pytest.mark.long
 def test_the_commands_take_urls(bucket: str, campaign: Path, local: Path) -> None:
     url = f"{bucket}/by command"
     flown = command("fly", campaign, "--out", url, "--runs", 8, "--jobs", 1, "--quiet")
@@ -156,6 +157,7 @@ def test_no_such_bucket_is_one_sentence(bucket: str, campaign: Path) -> None:
     )
 
 
+@pytest.mark.long
 def test_a_store_without_write_permission_is_one_sentence_and_resumes(
     campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

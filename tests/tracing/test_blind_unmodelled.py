@@ -125,6 +125,7 @@ def test_a_withheld_effect_is_withheld_with_all_of_its_variants(tmp_path, monkey
     assert seen[1].learns
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_the_noncentrality_beyond_the_rest_of_the_library():
     """That of `APART`: an effect withheld leaves what its nearest rival does."""

@@ -33,7 +33,7 @@ FLOWN = {
 }
 
 
-@pytest.mark.parametrize("key", sampled(FLOWN, 4))
+@pytest.mark.parametrize("key", sampled(FLOWN, 8))
 def test_what_was_added_is_not_traced_again(key, tmp_path):
     flown = tf.fly(tmp_path, [(key, FLOWN[key])], runs=6)
     options = TraceOptions(effects=tuple({key, *FEW}))
@@ -58,6 +58,7 @@ def late(tmp_path_factory):
 OPTIONS = TraceOptions(effects=("vane_lag",))
 
 
+@pytest.mark.long
 def test_an_earlier_update_is_replaced(late, tmp_path):
     first = trace([late], "gtm", OPTIONS, tmp_path).to_dict()
     (tmp_path / "aircraft" / "gtm" / "stale.xml").write_text("of the earlier one")

@@ -108,6 +108,7 @@ def test_one_record_works_and_is_provisional(command, log, tmp_path):
     assert answer == json.loads((tmp_path / "out" / "trace.json").read_text())
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
 def test_json_on_a_full_stdout_is_one_message(log, tmp_path):

@@ -79,6 +79,7 @@ def found_delay(logs, truth_s):
     return answer
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_late_surface_in_records_of_two_flight_conditions(tmp_path):
     """75 and 90 kt: the declared derivatives, trims and gusts of each; one delay."""

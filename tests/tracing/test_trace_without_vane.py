@@ -112,6 +112,7 @@ def test_without_a_vane_nothing_is_traced_where_nothing_is_missing(tmp_path):
     assert (tmp_path / "out" / "trace.json").exists()
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_without_a_vane_an_elevator_delay_is_traced(tmp_path):
     place = fly(tmp_path / "late", [("elevator_delay", {"delay_s": 0.08})], runs=6, duration=8.0)
