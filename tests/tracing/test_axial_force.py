@@ -60,7 +60,9 @@ def test_written_terms_are_a_force_along_x_through_the_cg(name, tmp_path):
     alpha = start.alpha_rad + np.array([-0.02, 0.0, 0.03])
     before, after = (forces_over_alpha(p, start, alpha, np.ones(1))[0] for p in (plane, changed))
     force = 0.5 * start.density_kg_m3 * start.airspeed_m_s**2 * plane.constants.wing_area_m2
-    np.testing.assert_allclose(after[:, 0] - before[:, 0], force * 0.3 * (alpha - 0.05), rtol=0, atol=1e-6 * force)
+    np.testing.assert_allclose(
+        after[:, 0] - before[:, 0], force * 0.3 * (alpha - 0.05), rtol=0, atol=1e-6 * force
+    )
     np.testing.assert_allclose(after[:, 1:], before[:, 1:], rtol=0, atol=1e-6 * force)
 
 

@@ -37,6 +37,16 @@ def test_three_causes_are_provisional():
     assert reason.startswith("accelerometer_scale, gyro_bias, derivatives are 3 causes or more")
 
 
+def test_an_axial_force_beside_another_effect_is_provisional():
+    """Where a wrong effect leaves an error of the angle of attack, ax shows it as an axial force."""
+    along = AcceptedEffect("increment", {}, 1e-9, 5.0, variant="CX over alpha_rad", acts_on="CX")
+    assert reservations([along], ()) == ()
+    (reason,) = reservations([*effects("vane_scale"), along], ())
+    assert "where vane_scale is not the true cause" in reason
+    (reason,) = reservations([*effects("increment"), along], ())
+    assert "where increment is not the true cause" in reason
+
+
 def test_a_leading_set_that_is_improbable_is_provisional():
     sets = [Alternative(("inertia_error", "mass_error"), 0.28), Alternative(("airspeed_scale",), 0.14)]
     (reason,) = reservations(effects("inertia_error", "mass_error"), sets)

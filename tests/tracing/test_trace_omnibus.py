@@ -21,7 +21,7 @@ from airtruth.units import DEG
 
 pytestmark = pytest.mark.slow
 
-ELEVATOR, STATIC, SURFACE, HISTORY, VANE = FAMILIES
+ELEVATOR, STATIC, SURFACE, HISTORY, DRIFT, VANE = FAMILIES
 DRAWS = 20
 
 
@@ -204,6 +204,21 @@ def test_a_vane_that_sticks_is_seen_as_friction():
         records.append(changed(made, more))
     found = seen(records)
     assert found[VANE].p_value < 1e-6
+
+
+@pytest.mark.parametrize("drifts", ["moment", "gyro"])
+def test_a_drift_is_seen_in_time(drifts):
+    """A CG that moves by 1 % of the chord in 4 s at a CL of 0.6, Cm of 0.006; a gyro by 0.5 deg/s."""
+    records = []
+    for made in pair(np.random.default_rng(11)):
+        time = np.linspace(0.0, 1.0, nodes(made.signals.elevator_rad).size)
+        moment = External(np.zeros(time.size), 0.006 * time, np.zeros_like(made.signals.y))
+        more = np.zeros_like(made.signals.y)
+        more[:, 1] = 0.5 * DEG * np.linspace(0.0, 1.0, len(more))
+        records.append(changed(made, difference(made, external=moment) if drifts == "moment" else more))
+    found = seen(records)
+    assert found[DRIFT].p_value < 1e-6
+    assert found[DRIFT].p_value < min(found[name].p_value for name in (STATIC, SURFACE, VANE))
 
 
 def test_advice_for_each_place():

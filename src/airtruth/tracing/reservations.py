@@ -17,6 +17,8 @@ MANY: Final = 3
 the library is answered by three or more names about as often as three true causes are)."""
 LEAST_WEIGHT: Final = 0.5
 """Posterior weight of the leading set of causes below which its names are provisional [-]: another set is more probable."""
+_AXIAL: Final = "CX"
+"""Coefficient whose increments a wrong angle of attack imitates: ax shows them, after the effects of the other channels."""
 _ONE_EVENT: Final = frozenset({"cg_shift", "mass_error", "inertia_error"})
 """Effects that one event brings, and which count as one cause: a load that is not declared, or a lost part."""
 
@@ -32,7 +34,13 @@ def reservations(effects: Sequence[AcceptedEffect], sets: Sequence[Alternative])
     named = [e for e in effects if e.acts_on is None]
     listed = ", ".join(e.key for e in named)
     found = []
-    if named and len(named) < len(effects):
+    beside = [e for e in effects if e.acts_on != _AXIAL]
+    if beside and len(beside) < len(effects):
+        found.append(
+            f"ax contradicts the declared axial force, and does so too where {', '.join(e.key for e in beside)} "
+            f"{'are' if len(beside) > 1 else 'is'} not the true cause: both are provisional"
+        )
+    if named and len(named) < len(beside):
         found.append(
             f"the library lacks an effect of these records, which may also have caused what {listed} explain"
             f"{'' if len(named) > 1 else 's'}: the names are provisional until a flight of their own confirms them"

@@ -280,6 +280,16 @@ def _history(view: View) -> Series:
     return [(to, fine(s - s[0], view.sub)) for to in (LIFT, MOMENT) for s in shapes]
 
 
+def _drift(view: View) -> Series:
+    """Lift, moment and their slopes over the angle of attack, vane and gyro that drift in time: fuel that moves, a sensor that
+    warms up."""
+    span = view.high_rad - view.low_rad
+    middle = (view.alpha_rad - 0.5 * (view.low_rad + view.high_rad)) / (0.5 * span)
+    time = np.linspace(0.0, 1.0, len(middle))
+    forces = [(to, fine(s, view.sub)) for to in (LIFT, MOMENT) for s in (time, time * middle)]
+    return [*forces, (ALPHA, time), (Q, time)]
+
+
 def _vane(view: View) -> Series:
     """A vane with friction: the distance to a vane with play, and the sign of the rate."""
     span = view.high_rad - view.low_rad
@@ -308,6 +318,11 @@ FAMILIES: Final = {
     ),
     "lift or moment by the history of the angle of attack": Family(
         _history, "sweep the same range of angles of attack up and down, at two rates."
+    ),
+    "a drift in time": Family(
+        _drift,
+        "repeat the manoeuvre at the start and at the end of a long record, log the fuel, and compare the sensors at rest "
+        "before and after the flight.",
     ),
     "friction of the vane": Family(
         _vane,
