@@ -25,7 +25,8 @@ BREAK = AeroTerm("CX", "alpha", "above", -0.8, at=0.11)
 """A drag that rises from 6.3 deg on, 2.5 deg above it as much as the declared CX changes over the flown range."""
 NOISE_M_S2 = 0.0016 * 9.80665
 """White noise of ax that aircraft/gtm declares."""
-OWN = {"gtm": Condition(75 * KT, 7000 * FT), "c172x": Condition(100 * KT, 4000 * FT)}
+OWN = {"gtm": (Condition(75 * KT, 7000 * FT), 1e-6), "c172x": (Condition(100 * KT, 4000 * FT), 1e-5)}
+"""Condition, and the error over q_bar S: the axial force changes alpha', on which c172x has terms of its own."""
 
 
 @pytest.fixture(scope="module")
@@ -53,17 +54,16 @@ def shown(log):
 @pytest.mark.parametrize("name", OWN)
 def test_written_terms_are_a_force_along_x_through_the_cg(name, tmp_path):
     """Models with body axes (gtm) and with lift and drag (c172x); expected: q_bar S amplitude (alpha - at)."""
-    plane, at = planes.load(name), OWN[name]
+    plane, (at, tolerance) = planes.load(name), OWN[name]
     term = AeroTerm("CX", "alpha", "linear", 0.3, at=0.05)
     changed = planes.load(write_aircraft(plane, Change(aero=(term,)), tmp_path / "changed"))
     start = trim(plane, at)
     alpha = start.alpha_rad + np.array([-0.02, 0.0, 0.03])
     before, after = (forces_over_alpha(p, start, alpha, np.ones(1))[0] for p in (plane, changed))
     force = 0.5 * start.density_kg_m3 * start.airspeed_m_s**2 * plane.constants.wing_area_m2
-    np.testing.assert_allclose(
-        after[:, 0] - before[:, 0], force * 0.3 * (alpha - 0.05), rtol=0, atol=1e-6 * force
-    )
-    np.testing.assert_allclose(after[:, 1:], before[:, 1:], rtol=0, atol=1e-6 * force)
+    along = force * 0.3 * (alpha - 0.05)
+    np.testing.assert_allclose(after[:, 0] - before[:, 0], along, rtol=0, atol=tolerance * force)
+    np.testing.assert_allclose(after[:, 1:], before[:, 1:], rtol=0, atol=tolerance * force)
 
 
 def test_an_undeclared_drag_is_learned_over_alpha(dragged):
