@@ -1,5 +1,7 @@
 """Names that are provisional without an anomaly: several causes at once, and names beside an increment."""
 
+from dataclasses import replace
+
 import pytest
 
 from airtruth.tracing.accepted import AcceptedEffect
@@ -47,12 +49,36 @@ def test_an_axial_force_beside_another_effect_is_provisional():
     assert "where increment is not the true cause" in reason
 
 
-def test_a_leading_set_that_is_improbable_is_provisional():
+def test_a_cause_that_is_improbable_is_provisional():
     sets = [Alternative(("inertia_error", "mass_error"), 0.28), Alternative(("airspeed_scale",), 0.14)]
     (reason,) = reservations(effects("inertia_error", "mass_error"), sets)
-    assert reason.startswith("the leading set of causes has a posterior weight of 28 %:")
+    assert reason.startswith(
+        "the sets of causes without inertia_error, mass_error are together more probable"
+    )
     assert reservations(effects("vane_lag"), [Alternative(("vane_lag",), 0.5)]) == ()
     assert reservations(effects("increment"), sets) == ()
+
+
+def test_a_cause_that_most_sets_contain_is_not_reserved():
+    """Sets that add a little to the same cause share its weight."""
+    sets = [
+        Alternative(("tail_effectiveness",), 0.45),
+        Alternative(("derivatives", "tail_effectiveness"), 0.4),
+    ]
+    assert reservations(effects("tail_effectiveness"), sets) == ()
+    (tied,) = effects("elevator_delay")
+    tied = replace(tied, indistinguishable_from=("actuator_lag",))
+    sets = [Alternative(("elevator_delay",), 0.45), Alternative(("actuator_lag",), 0.45)]
+    assert reservations([tied], sets) == ()
+
+
+def test_names_that_increments_replace_are_provisional():
+    sets = [Alternative(("cl_alpha_nonlinear", "cm_alpha_nonlinear"), 0.8), Alternative(("increment",), 0.2)]
+    (reason,) = reservations(effects("cl_alpha_nonlinear", "cm_alpha_nonlinear"), sets)
+    assert reason.startswith(
+        "learned increments explain the records without cl_alpha_nonlinear, cm_alpha_nonlinear"
+    )
+    assert "20 %" in reason
 
 
 def test_names_beside_an_increment_are_provisional():

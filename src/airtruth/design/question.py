@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from airtruth.design.separation import Member, clipped
 from airtruth.effects.effect import Effect, Parameter
+from airtruth.effects.increment import NAME as INCREMENT
 from airtruth.effects.registry import EFFECTS, named
 from airtruth.errors import ConfigurationError
 from airtruth.physics.resolution import LinearPoint, resolved
@@ -95,7 +96,7 @@ def tied_in(answer: TraceAnswer) -> tuple[Hypothesised, ...]:
     """The first effect of an answer with those that explain its records as well; or the two by which its leading sets
     differ. Empty where there are none that an input separates."""
     for accepted in answer.effects:
-        names = {accepted.name, *accepted.indistinguishable_from}
+        names = {accepted.name, *accepted.indistinguishable_from} - {INCREMENT}
         if accepted.key not in EFFECTS or (len(names) == 1 and not accepted.other_variants):
             continue
         tied = [c.key for c in answer.candidates if c.testable and not c.why_not and c.name in names]

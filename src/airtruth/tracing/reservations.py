@@ -9,14 +9,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+from airtruth.effects.increment import NAME
 from airtruth.tracing.accepted import AcceptedEffect
 from airtruth.tracing.answer import Alternative
 
 MANY: Final = 3
 """Number of separate causes from which their names are provisional [-] (judgement: in the blind trials an effect outside
 the library is answered by three or more names about as often as three true causes are)."""
-LEAST_WEIGHT: Final = 0.5
-"""Posterior weight of the leading set of causes below which its names are provisional [-]: another set is more probable."""
+LEAST_INCLUSION: Final = 0.5
+"""Posterior probability of a named cause below which the names are provisional [-]: the sets without it are more probable."""
+UNNAMED: Final = 0.05
+"""Posterior weight of increments without any name from which the names are provisional [-] (convention)."""
 _AXIAL: Final = "CX"
 """Coefficient whose increments a wrong angle of attack imitates: ax shows them, after the effects of the other channels."""
 _ONE_EVENT: Final = frozenset({"cg_shift", "mass_error", "inertia_error"})
@@ -50,12 +53,25 @@ def reservations(effects: Sequence[AcceptedEffect], sets: Sequence[Alternative])
             f"{listed} are {MANY} causes or more, and one effect that the library lacks can look like as many: the names are "
             "provisional until a flight of their own confirms each"
         )
-    if named and sets and sets[0].weight < LEAST_WEIGHT:
+    doubtful = [e.key for e in named if _probability(e, sets) < LEAST_INCLUSION]
+    if sets and doubtful:
         found.append(
-            f"the leading set of causes has a posterior weight of {100.0 * sets[0].weight:.0f} %: it is one of the sets of "
-            "`alternatives`, and more probably another of them"
+            f"the sets of causes without {', '.join(doubtful)} are together more probable than those with: the names are "
+            "provisional"
+        )
+    unnamed = sum(s.weight for s in sets if s.effects == (NAME,))
+    if named and len(named) == len(effects) and unnamed > UNNAMED:
+        found.append(
+            f"learned increments explain the records without {listed}, with a posterior weight of {100.0 * unnamed:.0f} %: the "
+            "names are provisional"
         )
     return tuple(found)
+
+
+def _probability(effect: AcceptedEffect, sets: Sequence[Alternative]) -> float:
+    """Posterior probability of an effect or one that looks the same in the records."""
+    alike = {effect.name, *effect.indistinguishable_from}
+    return sum(s.weight for s in sets if alike & set(s.effects))
 
 
 def causes(named: Sequence[AcceptedEffect]) -> int:
@@ -64,4 +80,4 @@ def causes(named: Sequence[AcceptedEffect]) -> int:
     return len(apart) + (len(apart) < len(named))
 
 
-__all__ = ["LEAST_WEIGHT", "MANY", "causes", "reservations"]
+__all__ = ["LEAST_INCLUSION", "MANY", "UNNAMED", "causes", "reservations"]

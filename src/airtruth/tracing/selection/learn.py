@@ -119,7 +119,23 @@ def _learned(
     if len(alone) > 1 and lead > _NAMES_LEAD:
         names = tuple(sorted({e.name for e in named}))
         return (replace(alone[0], rival=Rival({names: -lead})), *alone[1:])
+    learned = tuple(c.score.effect for c in _accepted(alone))
+    if learned and grown is rounds and _acts_on(learned) != _acts_on(named):
+        sets = {} if grown[0].rival is None else dict(grown[0].rival.sets)
+        rival = Rival({**sets, tuple(sorted({e.name for e in learned})): lead})
+        return (replace(grown[0], rival=rival), *grown[1:])
     return grown
+
+
+def _acts_on(effects: Sequence[Effect]) -> set[str]:
+    """Coefficients and channels that effects change; the where of those that change neither."""
+    found: set[str] = set()
+    for effect in effects:
+        change = effect.change({p.name: p.high for p in effect.parameters})
+        own = {str(t.coefficient) for t in change.aero}
+        own |= {str(t.channel) for t in change.readings} | {t.channel for t in change.sensors}
+        found |= own or {effect.where}
+    return found
 
 
 @dataclass(frozen=True)
