@@ -19,6 +19,8 @@ from airtruth.tracing.answer import DeclaredModel
 from airtruth.tracing.axial_force import axial_force
 from airtruth.tracing.declared_model import with_axial_force
 from airtruth.tracing.prepare import prepare
+from airtruth.tracing.presentation.error_table import axial_words
+from airtruth.tracing.stage_errors import AxialErrors, AxialRms
 from airtruth.units import FT, KT
 
 BREAK = AeroTerm("CX", "alpha", "above", -0.8, at=0.11)
@@ -133,3 +135,14 @@ def test_the_updated_aircraft_flies_with_the_drag(dragged, tmp_path):
     assert again["verdict"] == "none"
     declared = (a["axial_force"]["declared"]["held_out"] for a in (answer, again))
     assert next(declared) > 6.0 * next(declared)
+
+
+def test_the_errors_in_words():
+    held, alone = (
+        AxialErrors(AxialRms(0.2, 0.16), AxialRms(0.03, 0.024)),
+        AxialErrors(AxialRms(0.2), AxialRms(0.2)),
+    )
+    assert axial_words(held) == (
+        "RMS of ax beyond the declared model on held-out records 0.160 m/s2, with the increment of CX 0.0240 m/s2."
+    )
+    assert axial_words(alone) == "RMS of ax beyond the declared model on fitted records 0.200 m/s2."

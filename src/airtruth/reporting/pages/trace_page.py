@@ -25,7 +25,7 @@ from airtruth.tracing.presentation.charts import (
     trace_charts,
 )
 from airtruth.tracing.presentation.derivative_table import derivative_table
-from airtruth.tracing.presentation.error_table import error_csv, error_table
+from airtruth.tracing.presentation.error_table import axial_words, error_csv, error_table
 from airtruth.tracing.presentation.html import verdict_html
 from airtruth.tracing.presentation.text import detectable
 from airtruth.tracing.presentation.tolerances import tolerance_table
@@ -181,6 +181,7 @@ def closing(answer: TraceAnswer) -> list[str]:
     forced = [f"Overridden by --force: {sentence}" for sentence in answer.forced]
     return [
         f"Fitted: {', '.join(records.fitted)}; held out: {', '.join(records.held_out) or 'none'}.",
+        *([axial_words(answer.axial_force)] if answer.axial_force else []),
         *(f"{note}." for note in answer.notes),
         *forced,
     ]

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from typing import Final
 
 from airtruth.channels import shown
-from airtruth.table import MISSING, Group, Number, Row, Table, as_csv, flat
+from airtruth.table import MISSING, Group, Number, Row, Table, as_csv, flat, significant
 from airtruth.tracing.answer import TraceAnswer
-from airtruth.tracing.stage_errors import SETS, STAGES, PerChannel, Rms
+from airtruth.tracing.stage_errors import SETS, STAGES, AxialErrors, PerChannel, Rms
 
 SET_NAMES: Final = {"held_out": "held-out records", "fit": "fitted records"}
 """One of `SETS` -> its name in a heading."""
@@ -56,6 +56,16 @@ def error_table(answer: TraceAnswer) -> Table:
     )
 
 
+def axial_words(errors: AxialErrors) -> str:
+    """The errors of ax as a sentence: held-out records where there are any, else fitted ones."""
+    declared, after = errors.declared, errors.after
+    records, before, then = SET_NAMES["fit"], declared.fit, after.fit
+    if declared.held_out is not None and after.held_out is not None:
+        records, before, then = SET_NAMES["held_out"], declared.held_out, after.held_out
+    words = f"RMS of ax beyond the declared model on {records} {significant(before)} m/s2"
+    return words + ("." if then == before else f", with the increment of CX {significant(then)} m/s2.")
+
+
 def error_csv(answer: TraceAnswer) -> str:
     """The errors in long form, in SI with all digits."""
     rows: list[Row] = []
@@ -98,4 +108,4 @@ def _row(channel: str, signal: float, cells: list[float | None]) -> Row:
     return (name, Number(signal * factor, digits=3), *numbers)
 
 
-__all__ = ["CSV_COLUMNS", "error_csv", "error_table", "stages_of"]
+__all__ = ["CSV_COLUMNS", "axial_words", "error_csv", "error_table", "stages_of"]

@@ -13,10 +13,9 @@ from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementT
 from airtruth.tracing.answer import ANOMALY_LEVEL, Evidence, TraceAnswer
 from airtruth.tracing.presentation.candidates import probability, ranked
 from airtruth.tracing.presentation.derivative_table import derivative_table
-from airtruth.tracing.presentation.error_table import error_table
+from airtruth.tracing.presentation.error_table import axial_words, error_table
 from airtruth.tracing.presentation.tolerances import tolerance_table
 from airtruth.tracing.selection.explanation import DERIVATIVES, EXPLAINING
-from airtruth.tracing.stage_errors import AxialErrors
 
 MOST_CANDIDATES: Final = 8
 """Number of candidates in the text [-] (judgement: as many as a round refits)."""
@@ -42,7 +41,7 @@ def as_trace_text(answer: TraceAnswer) -> str:
         *([effect_line(e), *effect_details(e, answer.credit.get(e.key))] for e in answer.effects),
         as_text(error_table(answer)).rstrip("\n").splitlines(),
         *([as_text(tolerances).rstrip("\n").splitlines()] if tolerances else []),
-        *([_wrapped("Axial force", _axial(answer.axial_force))] if answer.axial_force else []),
+        *([_wrapped("Axial force", axial_words(answer.axial_force))] if answer.axial_force else []),
         as_text(derivative_table(answer)).rstrip("\n").splitlines(),
         *([_wrapped("Sets of causes", _sets(answer))] if len(answer.alternatives) > 1 else []),
         ["Candidates, accepted effects first, then by significance:", *_candidate_lines(answer)],
@@ -118,17 +117,6 @@ def _causes(answer: TraceAnswer) -> str:
     if wrong:
         parts.append(f"the declared {_listed(wrong)} {'are' if len(wrong) > 1 else 'is'} wrong")
     return "; ".join(parts)
-
-
-def _axial(errors: AxialErrors) -> str:
-    """RMS of ax beyond the model, on held-out records where there are any."""
-    declared, after = errors.declared, errors.after
-    if declared.held_out is None or after.held_out is None:
-        where, before, then = "fitted", declared.fit, after.fit
-    else:
-        where, before, then = "held-out", declared.held_out, after.held_out
-    words = f"RMS of ax beyond the declared model on {where} records {significant(before)} m/s2"
-    return words + ("." if then == before else f", with the increment of CX {significant(then)} m/s2.")
 
 
 def _sets(answer: TraceAnswer) -> str:
