@@ -128,6 +128,11 @@ def _cause(
     )
 
 
+def _further(parts: Callable[[Values], Parts], name: str, largest: float, signed: bool = True) -> Kind:
+    """An effect of the mode `unmodelled` alone: neither the library nor the older pools hold it."""
+    return Kind(parts, _alone(name), largest, signed, library=False, pooled=False)
+
+
 EFFECTS: Final[dict[str, Kind]] = {
     "elevator_delay": Kind(
         lambda v: Parts(chain=(("delay", v["delay_s"]),)),
@@ -220,38 +225,11 @@ EFFECTS: Final[dict[str, Kind]] = {
         smooth=False,
         library=False,
     ),
-    "stall_state": Kind(
-        lambda v: Parts(states=(states.stall(v["dCL"]),)),
-        _alone("dCL"),
-        1.0,
-        signed=False,
-        library=False,
-        pooled=False,
-    ),
-    "cg_drift": Kind(
-        lambda v: Parts(states=(states.drifting_cg(v["rate_mac_s"]),)),
-        _alone("rate_mac_s"),
-        0.02,
-        library=False,
-        pooled=False,
-    ),
-    "elevator_in_wake": Kind(
-        _shape("Cm", "alpha-elevator", "Cmalphade"), _alone("Cmalphade"), 20.0, library=False, pooled=False
-    ),
-    "vane_curve": Kind(
-        _sensor("alpha_rad", "curve", "curve_per_rad"),
-        _alone("curve_per_rad"),
-        5.0,
-        library=False,
-        pooled=False,
-    ),
-    "gyro_g_sensitivity": Kind(
-        _sensor("q_rad_s", "cross", "rad_s_per_m_s2"),
-        _alone("rad_s_per_m_s2"),
-        0.02,
-        library=False,
-        pooled=False,
-    ),
+    "stall_state": _further(lambda v: Parts(states=(states.stall(v["dCL"]),)), "dCL", 1.0, signed=False),
+    "cg_drift": _further(lambda v: Parts(states=(states.drifting_cg(v["rate_mac_s"]),)), "rate_mac_s", 0.02),
+    "elevator_in_wake": _further(_shape("Cm", "alpha-elevator", "Cmalphade"), "Cmalphade", 20.0),
+    "vane_curve": _further(_sensor("alpha_rad", "curve", "curve_per_rad"), "curve_per_rad", 5.0),
+    "gyro_g_sensitivity": _further(_sensor("q_rad_s", "cross", "rad_s_per_m_s2"), "rad_s_per_m_s2", 0.02),
     "tail_effectiveness": _cause("tail_effectiveness", causes.tail_values, 0.45),
     "wing_effectiveness": _cause("wing_effectiveness", causes.tail_values, 0.4),
     "icing": _cause("icing", causes.ice_values, 3.5),
