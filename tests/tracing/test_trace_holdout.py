@@ -9,6 +9,7 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import Change
+from airtruth.tracing.inference import assess as assessing
 from airtruth.tracing.inference.assess import assess, noise_floor
 from airtruth.tracing.inference.cross_validate import leave_one_out, one_by_the_other
 from airtruth.tracing.inference.hypothesis import Hypothesis
@@ -127,6 +128,23 @@ def test_a_model_that_flies_badly_is_assessed_at_its_best(fitted, level_m_s):
     far = assess(problem, 0, ONE, common, found.point.sizes)
     assert far.likelihood == pytest.approx(near.likelihood, abs=0.5)
     assert near.per_record[PerRecord.log_gust] > np.log(0.3)
+
+
+def test_a_free_run_without_slopes_ends_where_it_began(fitted, monkeypatch):
+    """A motion that diverges has equal slopes of 1e150 everywhere, beside which no prior counts: their matrix is singular."""
+    problem, found = fitted
+    arguments = problem, 0, ONE, found.point.common, found.point.sizes, found.point.per_record[0]
+    expected = assess(*arguments)
+    slopes = assessing._free_run_slopes
+
+    def diverging(*given):
+        residual, t = slopes(*given)
+        return residual, np.full_like(t, 1e150)
+
+    monkeypatch.setattr(assessing, "_free_run_slopes", diverging)
+    found_again = assess(*arguments)
+    assert np.isfinite(found_again.residual).all()
+    assert found_again.likelihood == expected.likelihood
 
 
 def test_error_is_in_the_channels_units_and_the_effect_lowers_it(fitted):

@@ -239,7 +239,10 @@ def free_run(
     for _ in range(_FREE_RUN_ITERATIONS):
         residual, t = _free_run_slopes(record, settings, compiled, common, own, weight)
         off = (own - mean)[free]
-        move = -np.linalg.solve(t @ t.T + np.diag(prior), t @ (residual * weight).ravel() + prior * off)
+        try:
+            move = -np.linalg.solve(t @ t.T + np.diag(prior), t @ (residual * weight).ravel() + prior * off)
+        except np.linalg.LinAlgError:  # the simulation diverges, and its slopes are beyond any prior
+            break
         if not np.isfinite(move).all():
             break
         trial = own.copy()

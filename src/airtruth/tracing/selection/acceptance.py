@@ -169,7 +169,10 @@ def tested_on_left_out(
     """
     for way, before in zip(_ways(problem), reference.left_out, strict=True):
         likelihood, after = way(problem, own)
-        likelihood_gain, unaided = before[0] - likelihood, before[1]
+        with np.errstate(
+            invalid="ignore"
+        ):  # neither can follow the record: no number, which counts as a loss
+            likelihood_gain, unaided = before[0] - likelihood, before[1]
         if not _is_loss(likelihood_gain):
             break
     free, covariance = _free_run_gain(problem, unaided, after, reference.weight)
