@@ -9,7 +9,9 @@ import trace_flights as flights
 
 from airtruth import aircraft as planes
 from airtruth.aircraft.write import write_aircraft
-from airtruth.physics.terms import AeroTerm, Change
+from airtruth.physics.atmosphere import air_density
+from airtruth.physics.readings import reading_increments
+from airtruth.physics.terms import AeroTerm, Change, ReadingTerm, StateTerm
 from airtruth.simulation.probe import forces_over_alpha
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import trim
@@ -17,7 +19,9 @@ from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.accepted import AcceptedEffect
 from airtruth.tracing.answer import DeclaredModel
 from airtruth.tracing.axial_force import axial_force
+from airtruth.tracing.axial_series import axial_series
 from airtruth.tracing.declared_model import with_axial_force
+from airtruth.tracing.model.records import read
 from airtruth.tracing.prepare import prepare
 from airtruth.tracing.presentation.error_table import axial_words
 from airtruth.tracing.stage_errors import AxialErrors, AxialRms
@@ -90,6 +94,34 @@ def test_the_declared_aircraft_lacks_nothing_along_x(clean):
     assert found.change == Change()
     assert found.errors.after == found.errors.declared
     assert NOISE_M_S2 < found.errors.declared.held_out < 1.4 * NOISE_M_S2
+
+
+@pytest.mark.parametrize(
+    ("term", "state"),
+    [
+        (ReadingTerm("alpha_rad", "alpha", "linear", 0.05, at=0.1), None),
+        (ReadingTerm("alpha_rad", "late", "linear", 0.05, at=0.1), StateTerm("late", "lag", "alpha", 0.1)),
+        (
+            ReadingTerm("alpha_rad", "qbar", "above", 1e-3, at=800.0, behind="late"),
+            StateTerm("late", "lag", "alpha", 0.1),
+        ),
+    ],
+)
+def test_readings_that_a_trace_learned_are_undone(clean, term, state):
+    """A curve of the vane, one behind a lag, and a lag that changes: the angle of attack of the series lacks the increment."""
+    log, plane = flights.log_of(clean, [0]), planes.load("gtm")
+    case = prepare([log], plane, (), TraceOptions(hold_out=()))
+    whole = replace(case.fitted.records[0], signals=read(log)[0])
+    change = Change(readings=(term,), states=() if state is None else (state,))
+    (plain,), (undone,) = (axial_series(log, [whole], c, plane) for c in (Change(), change))
+    signals = {
+        name: log.channels[name][None, :] for name in ("alpha_rad", "elevator_rad", "q_rad_s", "airspeed_m_s")
+    }
+    signals["density_kg_m3"] = air_density(log.channels)[None, :]
+    more = reading_increments(change.readings, change.states, signals, plane.constants.chord_m, plain.dt_s)
+    expected = plain.signals["alpha"] - more["alpha_rad"][0]
+    np.testing.assert_allclose(undone.signals["alpha"], expected, rtol=0, atol=1e-12)
+    assert np.abs(more["alpha_rad"]).max() > 1e-4
 
 
 def test_noise_of_the_vane_is_no_axial_force(clean):

@@ -66,8 +66,6 @@ their mean."""
 _MEAN_S: Final = 0.1
 """Interval over which the series are averaged [s] (judgement: shorter than a manoeuvre, longer than delays between the channels,
 which gusts would turn into an axial force)."""
-_LOSS: Final = 2.0
-"""Standard errors that count as a loss on records left out [-] (convention)."""
 
 
 @dataclass(frozen=True)
@@ -79,13 +77,11 @@ class AxialForce:
     increments : accepted increments of CX; empty for none.
     change : the same as terms.
     errors : ax beyond the declared model, and beyond that with the increments.
-    p_value : probability of such an increment by chance, all shapes counted [-]; 1 for none.
     """
 
     increments: tuple[AcceptedEffect, ...]
     change: Change
     errors: AxialErrors
-    p_value: float
 
 
 @dataclass(frozen=True)
@@ -98,16 +94,19 @@ class _Means:
 
 @dataclass(frozen=True)
 class _Learned:
-    """One shape at its estimate: bends (n,), covariance (n, n), log evidence, and the gain of each record left out (records,), in
-    log L and as a share of all records' squares.
+    """One shape at its estimate.
+
+    Attributes
+    ----------
+    bends, covariance : (n,) and (n, n) [-].
+    log_evidence : log of the posterior odds, all shapes equally probable beforehand [-].
+    explained : share of ax beyond the model, in squares, that it explains on records left out in turn [-].
     """
 
     effect: Increment
     bends: Array
     covariance: Array
     log_evidence: float
-    excess: float
-    gains: Array
     explained: float
 
 
@@ -135,13 +134,11 @@ def axial_force(
     learned = _learned(fitted, _shapes(case, fitted))
     best = max(learned, key=lambda own: own.log_evidence, default=None)
     accepted = [best] if best is not None and _is_accepted(best, case, fitted) else []
-    p_value = float(np.exp(-accepted[0].log_evidence)) if accepted else 1.0
     others = [o.log_evidence for o in learned if best and o.effect.shape.signal != best.effect.shape.signal]
     return AxialForce(
         increments=tuple(_stated(own, max([0.0, *others]), case, fitted) for own in accepted),
         change=sum((_terms(own) for own in accepted), Change()),
         errors=AxialErrors(_rms(fitted, held, []), _rms(fitted, held, accepted)),
-        p_value=p_value,
     )
 
 
@@ -182,21 +179,19 @@ def _learned(fitted: Sequence[AxialSeries], shapes: Sequence[Shape]) -> list[_Le
         std = float(stds[int(np.argmax(evidence))])
         bends, inverse = _estimate(gradient, information, std)
         excess = _excess(records, bases, weights, bends, inverse)
-        gains = []
+        gain = 0.0
         for i in range(len(records)):
             rest = [k for k in range(len(records)) if k != i]
             without = _normal([records[k] for k in rest], [bases[k] for k in rest], weights[rest])
             b, _ = _estimate(*without, std)
-            gains.append(_gain(records[i].y, bases[i] @ b, float(weights[i])))
+            gain += _gain(records[i].y, bases[i] @ b, float(weights[i]))
         found.append(
             _Learned(
                 effect=effect.with_prior(std),
                 bends=bends,
                 covariance=inverse * excess,
                 log_evidence=float(logsumexp(evidence) - np.log(len(stds))) / excess - np.log(len(shapes)),
-                excess=excess,
-                gains=np.array(gains),
-                explained=float(np.sum(gains)) / _squares(records, weights),
+                explained=gain / _squares(records, weights),
             )
         )
     return found
@@ -256,9 +251,9 @@ def _normal(records: Sequence[_Means], bases: Sequence[Array], weights: Array) -
     return eliminated(gradient, information, range(count + tolerances, len(gradient)))
 
 
-def _gain(y: Array, increment_: Array, weight: float) -> float:
+def _gain(y: Array, more: Array, weight: float) -> float:
     """Gain in log L of a record by an increment, its constant free and the declared slopes as they are."""
-    before, after = y - y.mean(), y - increment_ - (y - increment_).mean()
+    before, after = y - y.mean(), y - more - (y - more).mean()
     return float(0.5 * weight**2 * (before @ before - after @ after))
 
 
@@ -292,14 +287,12 @@ def _excess(
 
 
 def _is_accepted(own: _Learned, case: Case, fitted: Sequence[AxialSeries]) -> bool:
-    """The rules of every learned increment: evidence, two standard deviations, no loss on records left out, a material size."""
+    """Whether it has evidence, exceeds two standard deviations, explains records left out and is material."""
     wald = float(own.bends @ np.linalg.solve(own.covariance, own.bends))
-    error = float(own.gains.std(ddof=1) * np.sqrt(len(own.gains)))
     return (
         own.log_evidence >= LEAST_ODDS
         and float(chi2.sf(wald, len(own.bends))) < _TWO_DEVIATIONS
         and own.explained >= _EXPLAINED
-        and float(own.gains.sum()) > -_LOSS * error
         and _relative_swing(own, case, fitted) >= _MATERIAL
     )
 

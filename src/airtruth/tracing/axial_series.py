@@ -102,11 +102,18 @@ def axial_series(
     log : with the channel ax.
     records : of a trace with a JSBSim model.
     change : the declared errors of the sensors with the accepted effects.
+
+    Raises
+    ------
+    AircraftError
+        If the declared aircraft cannot be probed between the points of its tables.
     """
     own = _accelerometer(aircraft)
     taken = Compensation(
         conditions=(),
-        states=tuple(s for s in change.states if any(t.signal == s.name for t in change.readings)),
+        states=tuple(
+            s for s in change.states if any(s.name in (t.signal, t.behind) for t in change.readings)
+        ),
         sensors=(*change.sensors, *(SensorTerm(CHANNEL, kind, own.value(kind)) for kind in _UNDONE)),
         readings=change.readings,
     )
