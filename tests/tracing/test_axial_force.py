@@ -11,7 +11,7 @@ from airtruth import aircraft as planes
 from airtruth.aircraft.write import write_aircraft
 from airtruth.physics.atmosphere import air_density
 from airtruth.physics.readings import reading_increments
-from airtruth.physics.terms import AeroTerm, Change, ReadingTerm, StateTerm
+from airtruth.physics.terms import AeroTerm, Change, ReadingTerm, SensorTerm, StateTerm
 from airtruth.simulation.probe import forces_over_alpha
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import trim
@@ -122,6 +122,19 @@ def test_readings_that_a_trace_learned_are_undone(clean, term, state):
     expected = plain.signals["alpha"] - more["alpha_rad"][0]
     np.testing.assert_allclose(undone.signals["alpha"], expected, rtol=0, atol=1e-12)
     assert np.abs(more["alpha_rad"]).max() > 1e-4
+
+
+def test_an_accepted_error_of_the_airspeed_is_undone(clean):
+    """An airspeed that reads 10 % more: the same series as that of the right one, where the effect is accepted."""
+    log, plane = flights.log_of(clean, [0]), planes.load("gtm")
+    case = prepare([log], plane, (), TraceOptions(hold_out=()))
+    high = replace(log, channels=log.channels | {"airspeed_m_s": 1.1 * log.channels["airspeed_m_s"]})
+    records = [replace(case.fitted.records[0], signals=read(one)[0]) for one in (log, high)]
+    change = Change(sensors=(SensorTerm("airspeed_m_s", "scale", 1.1),))
+    (right,) = axial_series(log, records[:1], Change(), plane)
+    (undone,) = axial_series(high, records[1:], change, plane)
+    np.testing.assert_allclose(undone.y, right.y, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(undone.unit_m_s2, right.unit_m_s2, rtol=1e-9)
 
 
 def test_noise_of_the_vane_is_no_axial_force(clean):

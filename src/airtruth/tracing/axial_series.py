@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 
 CHANNEL: Final = "ax_m_s2"
 """The accelerometer along x."""
+_SPEED: Final = "airspeed_m_s"
+"""The airspeed, whose accepted errors are undone too."""
 _UNDONE: Final[tuple[Kind, ...]] = ("scale", "bias", "lag", "delay")
 """Its declared errors that are undone before its position counts."""
 _FINE_RAD: Final = 0.1 * DEG
@@ -127,17 +129,21 @@ def axial_series(
             if run_id in by_run:
                 channels = {name: values[row] for name, values in undone.channels.items()}
                 record = by_run[run_id]
-                found.append(_series(channels, record, between[id(record.plant)], change, aircraft))
+                # the record's own airspeed is low-passed, and lacks the declared errors alone
+                ratio = channels[_SPEED] / batch.channels[_SPEED][row]
+                found.append(_series(channels, record, ratio, between[id(record.plant)], change, aircraft))
     return found
 
 
 def _series(
     channels: Mapping[str, Array],
     record: TraceRecord,
+    ratio: Array,
     between: tuple[Array, Array],
     change: Change,
     aircraft: Aircraft,
 ) -> AxialSeries:
+    """One series; ``ratio``: airspeed without its accepted error over that with it; ``between``: X between the points."""
     s, plant, c = record.signals, record.plant, aircraft.constants
     own = _accelerometer(aircraft)
     factor = declared_total(change.declared, "elevator")
@@ -146,7 +152,7 @@ def _series(
     surface = through(change.surface, s.elevator_rad, s.dt_s / cells)[::cells]
     elevator = neutral + factor * (surface - neutral)
     alpha, q = channels["alpha_rad"], channels["q_rad_s"]
-    speed, density = s.airspeed_m_s[:: s.sub], s.density_kg_m3[:: s.sub]
+    speed, density = s.airspeed_m_s[:: s.sub] * ratio, s.density_kg_m3[:: s.sub]
     pressure = 0.5 * density * speed**2
     half = 0.5 * c.chord_m / speed
     q_dot = smooth_rate(q, _RATE_S, s.dt_s)
