@@ -21,6 +21,7 @@ from airtruth.tracing.answer import DeclaredModel
 from airtruth.tracing.axial_force import axial_force
 from airtruth.tracing.axial_series import axial_series
 from airtruth.tracing.declared_model import with_axial_force
+from airtruth.tracing.model.parameters import PerRecord
 from airtruth.tracing.model.records import read
 from airtruth.tracing.prepare import prepare
 from airtruth.tracing.presentation.error_table import axial_words
@@ -31,6 +32,8 @@ BREAK = AeroTerm("CX", "alpha", "above", -0.8, at=0.11)
 """A drag that rises from 6.3 deg on, 2.5 deg above it as much as the declared CX changes over the flown range."""
 NOISE_M_S2 = 0.0016 * 9.80665
 """White noise of ax that aircraft/gtm declares."""
+STILL = np.zeros(PerRecord.size)
+"""Own parameters of a record without biases."""
 OWN = {"gtm": (Condition(75 * KT, 7000 * FT), 1e-6), "c172x": (Condition(100 * KT, 4000 * FT), 1e-5)}
 """Condition, and the error over q_bar S: the axial force changes alpha', on which c172x has terms of its own."""
 
@@ -53,8 +56,13 @@ def shown(log):
     """What ax of a log shows at the declared aircraft, without a search."""
     plane = planes.load("gtm")
     case = prepare([log], plane, (), TraceOptions())
-    nothing = SimpleNamespace(hypothesis=case.hypothesis, point=SimpleNamespace(sizes=np.zeros(0)))
-    return axial_force(case, [log], plane, nothing)
+    still = np.zeros((len(case.fitted.records), PerRecord.size))
+    held = [SimpleNamespace(per_record=STILL) for _ in (case.held.records if case.held is not None else ())]
+    stages = SimpleNamespace(case=case, best="before", held={"before": held})
+    nothing = SimpleNamespace(
+        hypothesis=case.hypothesis, point=SimpleNamespace(sizes=np.zeros(0), per_record=still)
+    )
+    return axial_force(stages, [log], plane, nothing)
 
 
 @pytest.mark.parametrize("name", OWN)
@@ -113,7 +121,7 @@ def test_readings_that_a_trace_learned_are_undone(clean, term, state):
     case = prepare([log], plane, (), TraceOptions(hold_out=()))
     whole = replace(case.fitted.records[0], signals=read(log)[0])
     change = Change(readings=(term,), states=() if state is None else (state,))
-    (plain,), (undone,) = (axial_series(log, [whole], c, plane) for c in (Change(), change))
+    (plain,), (undone,) = (axial_series(log, [whole], [STILL], c, plane) for c in (Change(), change))
     signals = {
         name: log.channels[name][None, :] for name in ("alpha_rad", "elevator_rad", "q_rad_s", "airspeed_m_s")
     }
@@ -131,10 +139,19 @@ def test_an_accepted_error_of_the_airspeed_is_undone(clean):
     high = replace(log, channels=log.channels | {"airspeed_m_s": 1.1 * log.channels["airspeed_m_s"]})
     records = [replace(case.fitted.records[0], signals=read(one)[0]) for one in (log, high)]
     change = Change(sensors=(SensorTerm("airspeed_m_s", "scale", 1.1),))
-    (right,) = axial_series(log, records[:1], Change(), plane)
-    (undone,) = axial_series(high, records[1:], change, plane)
+    (right,) = axial_series(log, records[:1], [STILL], Change(), plane)
+    (undone,) = axial_series(high, records[1:], [STILL], change, plane)
     np.testing.assert_allclose(undone.y, right.y, rtol=0, atol=1e-9)
     np.testing.assert_allclose(undone.unit_m_s2, right.unit_m_s2, rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_a_bias_of_the_vane_is_no_axial_force(tmp_path):
+    """0.02 rad: the filter estimates it for each record, and X at the wrong angle is off by 0.1 m/s2."""
+    log = flights.fly(tmp_path, [("vane_bias", {"value": 0.02})], runs=6, amplitude=3.0)
+    answer = trace(log, "gtm", TraceOptions()).to_dict()
+    assert all(e.get("acts_on") is None for e in answer["effects"])
+    assert answer["axial_force"]["declared"]["held_out"] < 1.4 * NOISE_M_S2
 
 
 def test_noise_of_the_vane_is_no_axial_force(clean):

@@ -33,7 +33,7 @@ from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.answer import Z95
 from airtruth.tracing.axial_series import CHANNEL, AxialSeries, axial_series
 from airtruth.tracing.increment_table import table_of
-from airtruth.tracing.inference.posterior import PosteriorFit
+from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import MEMORY_S, long_run
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.increment_fit import LEAST_ODDS
@@ -41,6 +41,7 @@ from airtruth.tracing.selection.increments import CELLS, log_evidences
 from airtruth.tracing.selection.learn import LEAST_RECORDS
 from airtruth.tracing.selection.score_test import eliminated
 from airtruth.tracing.stage_errors import AxialErrors, AxialRms
+from airtruth.tracing.stages import Stages
 
 Array = NDArray[np.float64]
 
@@ -111,26 +112,31 @@ class _Learned:
 
 
 def axial_force(
-    case: Case, logs: Sequence[FlightLog], aircraft: Aircraft, last: PosteriorFit
+    stages: Stages, logs: Sequence[FlightLog], aircraft: Aircraft, last: PosteriorFit
 ) -> AxialForce | None:
     """Learn what ax shows beyond the declared axial force.
 
     Parameters
     ----------
-    case : of the trace; logs : its records, checked.
-    last : fit with the accepted effects; their errors of sensors and surface are undone.
+    stages : assessed stages, whose best has the biases of the held-out records; logs : the records, checked.
+    last : fit with the accepted effects; its biases and the accepted errors of sensors and surface are undone.
 
     Returns
     -------
     None where ax, a vane or a JSBSim model is missing, the throttle moves, or there are fewer than three fitted records.
     """
+    case = stages.case
     usable = case.model == "aircraft" and case.has_vane and len(case.fitted.records) >= LEAST_RECORDS
     if not usable or not all(CHANNEL in log.channels and _is_steady(log) for log in logs):
         return None
     change = last.hypothesis.change(last.point.sizes)
-    fitted = [s for log in logs for s in axial_series(log, case.fitted.records, change, aircraft)]
-    held_records = case.held.records if case.held is not None else ()
-    held = [s for log in logs for s in axial_series(log, held_records, change, aircraft)]
+
+    def series(problem: TraceProblem | None, own: Sequence[Array]) -> list[AxialSeries]:
+        records = () if problem is None else problem.records
+        return [s for log in logs for s in axial_series(log, records, own, change, aircraft)]
+
+    fitted = series(case.fitted, list(last.point.per_record))
+    held = series(case.held, [a.per_record for a in stages.held.get(stages.best, ())])
     learned = _learned(fitted, _shapes(case, fitted))
     best = max(learned, key=lambda own: own.log_evidence, default=None)
     accepted = [best] if best is not None and _is_accepted(best, case, fitted) else []

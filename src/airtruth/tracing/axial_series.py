@@ -25,6 +25,7 @@ from airtruth.physics.terms import Change, SensorTerm, declared_total
 from airtruth.simulation.disposable import isolated
 from airtruth.simulation.probe import forces_over_alpha
 from airtruth.tracing.compensate import Compensation, compensated_batch
+from airtruth.tracing.model.parameters import PerRecord
 from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import FINE, TraceRecord
 from airtruth.tracing.model.surface import through
@@ -36,10 +37,12 @@ CHANNEL: Final = "ax_m_s2"
 """The accelerometer along x."""
 _SPEED: Final = "airspeed_m_s"
 """The airspeed, whose accepted errors are undone too."""
+_BIASED: Final = ("alpha_rad", "q_rad_s")
+"""Channels whose estimated biases are undone, in the order of the records' own parameters."""
 _UNDONE: Final[tuple[Kind, ...]] = ("scale", "bias", "lag", "delay")
 """Its declared errors that are undone before its position counts."""
 _FINE_RAD: Final = 0.1 * DEG
-"""Step of the angle of attack at which X is probed between the points of the tables [rad] (judgement: a tenth of theirs)."""
+"""Step of the angle of attack between the points of the tables [rad] (judgement: a tenth of theirs)."""
 _RATE_S: Final = 0.1
 """Width of the mean over which rates are taken [s] (judgement: noise of vane, gyro and surface)."""
 
@@ -74,6 +77,7 @@ class Tolerance:
     ----------
     share : of a declared slope of the axial force, relative [-].
     alpha_slope, elevator_slope, rate_slope : least ones of the slopes of CX [1/rad, 1/rad, -].
+    bias_rad : of the vane [rad].
     late_s : time by which vane and surface are late [s].
     x_m, z_m : position of the accelerometer [m].
     scale : of the accelerometer [-].
@@ -83,6 +87,7 @@ class Tolerance:
     alpha_slope: float = 0.02
     elevator_slope: float = 0.01
     rate_slope: float = 1.0
+    bias_rad: float = 0.002
     late_s: float = 0.005
     x_m: float = 0.05
     z_m: float = 0.02
@@ -90,12 +95,16 @@ class Tolerance:
 
 
 TOLERANCE: Final = Tolerance()
-"""Judgement: wind-tunnel slopes of the axial force to 10 %, a vane or a surface late by a quarter of a sample at 50 Hz, and an
-accelerometer that is surveyed to some centimetres."""
+"""Judgement: wind-tunnel slopes of the axial force to 10 %, an estimated bias of the vane to 0.1 deg, a vane or a surface late by
+a quarter of a sample at 50 Hz, and an accelerometer that is surveyed to some centimetres."""
 
 
 def axial_series(
-    log: FlightLog, records: Sequence[TraceRecord], change: Change, aircraft: Aircraft
+    log: FlightLog,
+    records: Sequence[TraceRecord],
+    own: Sequence[Array],
+    change: Change,
+    aircraft: Aircraft,
 ) -> list[AxialSeries]:
     """The series of those records that the log holds.
 
@@ -103,6 +112,7 @@ def axial_series(
     ----------
     log : with the channel ax.
     records : of a trace with a JSBSim model.
+    own : parameters of each record, see `airtruth.tracing.model.parameters.PerRecord`; biases of vane and gyro count.
     change : the declared errors of the sensors with the accepted effects.
 
     Raises
@@ -110,16 +120,16 @@ def axial_series(
     AircraftError
         If the declared aircraft cannot be probed between the points of its tables.
     """
-    own = _accelerometer(aircraft)
+    sensor = _accelerometer(aircraft)
     taken = Compensation(
         conditions=(),
         states=tuple(
             s for s in change.states if any(s.name in (t.signal, t.behind) for t in change.readings)
         ),
-        sensors=(*change.sensors, *(SensorTerm(CHANNEL, kind, own.value(kind)) for kind in _UNDONE)),
+        sensors=(*change.sensors, *(SensorTerm(CHANNEL, kind, sensor.value(kind)) for kind in _UNDONE)),
         readings=change.readings,
     )
-    by_run = {r.signals.run_id: r for r in records}
+    by_run = {r.signals.run_id: (r, p) for r, p in zip(records, own, strict=True)}
     plants = {id(r.plant): r.plant for r in records}
     between = {key: _between_points(plant) for key, plant in plants.items()}
     found = []
@@ -128,7 +138,9 @@ def axial_series(
         for row, run_id in enumerate(batch.run_ids):
             if run_id in by_run:
                 channels = {name: values[row] for name, values in undone.channels.items()}
-                record = by_run[run_id]
+                record, parameters = by_run[run_id]
+                for name, bias in zip(_BIASED, parameters[PerRecord.bias], strict=False):
+                    channels[name] = channels[name] - bias
                 # the record's own airspeed is low-passed, and lacks the declared errors alone
                 ratio = channels[_SPEED] / batch.channels[_SPEED][row]
                 found.append(_series(channels, record, ratio, between[id(record.plant)], change, aircraft))
@@ -172,6 +184,7 @@ def _series(
         max(t.share * abs(per_alpha), t.alpha_slope) * off_alpha,
         max(t.share * abs(per_elevator), t.elevator_slope) * off_elevator,
         t.rate_slope * q * half,
+        t.bias_rad * _local_slope(plant, shown, elevator, q * half) / c.wing_area_m2,
         t.late_s * per_alpha * smooth_rate(shown, _RATE_S, s.dt_s),
         t.late_s * per_elevator * smooth_rate(elevator, _RATE_S, s.dt_s),
         t.z_m * inertial * q_dot,
@@ -209,6 +222,12 @@ def _looked_up(plant: Plant, alpha: Array, elevator: Array, qhat: Array) -> Arra
     axes = (plant.alpha_rad, plant.elevator_rad, plant.qhat)
     table = RegularGridInterpolator(axes, plant.values[..., 0], bounds_error=False, fill_value=None)
     return np.asarray(table(np.stack([alpha, elevator, qhat], axis=1)))
+
+
+def _local_slope(plant: Plant, alpha: Array, elevator: Array, qhat: Array) -> Array:
+    """(samples,) slope of X over the angle of attack, over the dynamic pressure [m2/rad]."""
+    above, below = (_looked_up(plant, alpha + step, elevator, qhat) for step in (_FINE_RAD, -_FINE_RAD))
+    return np.asarray((above - below) / (2.0 * _FINE_RAD))
 
 
 def _between_points(plant: Plant) -> tuple[Array, Array]:

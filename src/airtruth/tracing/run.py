@@ -107,7 +107,7 @@ def _traced(
     advance("assess every stage on fitted and held-out records")
     stages = assess_stages(case, rounds)
     advance("compare ax with the declared axial force")
-    axial = axial_force(case, checked, declared, rounds[-1].gls) if options.learns else None
+    axial = axial_force(stages, checked, declared, rounds[-1].gls) if options.learns else None
     origin = provenance_of(logs, declared, options)
     if out is None:
         return TraceResult(
