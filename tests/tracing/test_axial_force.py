@@ -122,7 +122,7 @@ def test_readings_that_a_trace_learned_are_undone(clean, term, state):
     case = prepare([log], plane, (), TraceOptions(hold_out=()))
     whole = replace(case.fitted.records[0], signals=read(log)[0])
     change = Change(readings=(term,), states=() if state is None else (state,))
-    (plain,), (undone,) = (axial_series(log, [whole], [STILL], c, plane) for c in (Change(), change))
+    (plain,), (undone,) = (axial_series([log], [whole], [STILL], c, plane) for c in (Change(), change))
     signals = {
         name: log.channels[name][None, :] for name in ("alpha_rad", "elevator_rad", "q_rad_s", "airspeed_m_s")
     }
@@ -140,8 +140,8 @@ def test_an_accepted_error_of_the_airspeed_is_undone(clean):
     high = replace(log, channels=log.channels | {"airspeed_m_s": 1.1 * log.channels["airspeed_m_s"]})
     records = [replace(case.fitted.records[0], signals=read(one)[0]) for one in (log, high)]
     change = Change(sensors=(SensorTerm("airspeed_m_s", "scale", 1.1),))
-    (right,) = axial_series(log, records[:1], [STILL], Change(), plane)
-    (undone,) = axial_series(high, records[1:], [STILL], change, plane)
+    (right,) = axial_series([log], records[:1], [STILL], Change(), plane)
+    (undone,) = axial_series([high], records[1:], [STILL], change, plane)
     np.testing.assert_allclose(undone.y, right.y, rtol=0, atol=1e-9)
     np.testing.assert_allclose(undone.unit_m_s2, right.unit_m_s2, rtol=1e-9)
 

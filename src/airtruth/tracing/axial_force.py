@@ -22,7 +22,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
-from scipy.special import logsumexp
 from scipy.stats import chi2
 
 from airtruth.aircraft import Aircraft
@@ -33,11 +32,11 @@ from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.answer import Z95
 from airtruth.tracing.axial_series import CHANNEL, AxialSeries, axial_series
 from airtruth.tracing.increment_table import table_of
-from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import MEMORY_S, long_run
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.increment_fit import LEAST_ODDS
-from airtruth.tracing.selection.increments import CELLS, log_evidences
+from airtruth.tracing.selection.increments import CELLS, best_prior, covered
 from airtruth.tracing.selection.learn import LEAST_RECORDS
 from airtruth.tracing.selection.score_test import eliminated
 from airtruth.tracing.stage_errors import AxialErrors, AxialRms
@@ -49,10 +48,6 @@ SIGNALS: Final = ("alpha", "elevator", "qhat")
 """Signals over which an increment is learned."""
 _FINER: Final = (12, 16, 24)
 """Further numbers of cells [-]; those of the other increments but for the finest."""
-_QUANTILES: Final = (0.005, 0.995)
-"""Quantiles of a signal between which an increment is learned [-]; those of the other increments."""
-_SCALES: Final = tuple(np.geomspace(1e-3, 1.0, 7).tolist())
-"""Standard deviations of the bends' prior over the largest plausible bend that are tried [-]; those of the other increments."""
 _MATERIAL: Final = 0.1
 """Least swing over that of the declared CX over the flown angles of attack [-] (judgement: an axial force of a wind tunnel is
 known to some per cent)."""
@@ -130,13 +125,10 @@ def axial_force(
     if not usable or not all(CHANNEL in log.channels and _is_steady(log) for log in logs):
         return None
     change = last.hypothesis.change(last.point.sizes)
-
-    def series(problem: TraceProblem | None, own: Sequence[Array]) -> list[AxialSeries]:
-        records = () if problem is None else problem.records
-        return [s for log in logs for s in axial_series(log, records, own, change, aircraft)]
-
-    fitted = series(case.fitted, list(last.point.per_record))
-    held = series(case.held, [a.per_record for a in stages.held.get(stages.best, ())])
+    left_out = () if case.held is None else case.held.records
+    own = [*last.point.per_record, *(a.per_record for a in stages.held.get(stages.best, ()))]
+    series = axial_series(logs, (*case.fitted.records, *left_out), own, change, aircraft)
+    fitted, held = series[: len(case.fitted.records)], series[len(case.fitted.records) :]
     learned = _learned(fitted, _shapes(case, fitted))
     best = max(learned, key=lambda own: own.log_evidence, default=None)
     accepted = [best] if best is not None and _is_accepted(best, case, fitted) else []
@@ -164,10 +156,10 @@ def _shapes(case: Case, fitted: Sequence[AxialSeries]) -> list[Shape]:
     }
     found = []
     for name in SIGNALS:
-        low, high = np.quantile(np.concatenate([s.signals[name] for s in fitted]), _QUANTILES)
+        low, high = covered(np.concatenate([s.signals[name] for s in fitted]))
         if high > low:
             trim = float(np.clip(trims.get(name, 0.0), low, high))
-            found += [Shape("CX", name, float(low), float(high), cells, trim) for cells in (CELLS, *_FINER)]
+            found += [Shape("CX", name, low, high, cells, trim) for cells in (CELLS, *_FINER)]
     return found
 
 
@@ -180,9 +172,7 @@ def _learned(fitted: Sequence[AxialSeries], shapes: Sequence[Shape]) -> list[_Le
         effect = increment(shape)
         bases = _bases(fitted, shape)
         gradient, information = _normal(records, bases, weights)
-        stds = np.array(_SCALES) * effect.parameters[0].high
-        evidence = log_evidences(gradient, information, stds)
-        std = float(stds[int(np.argmax(evidence))])
+        std, evidence = best_prior(effect, gradient, information)
         bends, inverse = _estimate(gradient, information, std)
         excess = _excess(records, bases, weights, bends, inverse)
         gain = 0.0
@@ -196,7 +186,7 @@ def _learned(fitted: Sequence[AxialSeries], shapes: Sequence[Shape]) -> list[_Le
                 effect=effect.with_prior(std),
                 bends=bends,
                 covariance=inverse * excess,
-                log_evidence=float(logsumexp(evidence) - np.log(len(stds))) / excess - np.log(len(shapes)),
+                log_evidence=evidence / excess - float(np.log(len(shapes))),
                 explained=gain / _squares(records, weights),
             )
         )
@@ -230,9 +220,14 @@ def _weights(records: Sequence[_Means]) -> Array:
     found = []
     for s in records:
         design = np.column_stack([np.ones(len(s.y)), s.tolerances])
-        left = s.y - design @ np.linalg.lstsq(design, s.y, rcond=None)[0]
+        left = _residual(design, s.y)
         found.append(1.0 / max(float(left.std()), 1e-12))
     return np.array(found)
+
+
+def _residual(design: Array, x: Array) -> Array:
+    """What a least-squares fit of the columns of a design leaves of x."""
+    return np.asarray(x - design @ np.linalg.lstsq(design, x, rcond=None)[0])
 
 
 def _design(records: Sequence[_Means], bases: Sequence[Array], weights: Array) -> list[Array]:
@@ -282,9 +277,7 @@ def _excess(
     plain = np.zeros_like(inverse)
     for s, basis, weight in zip(records, bases, weights, strict=True):
         design = np.column_stack([np.ones(len(s.y)), s.tolerances])
-        own = basis - design @ np.linalg.lstsq(design, basis, rcond=None)[0]
-        left = s.y - basis @ bends
-        left = left - design @ np.linalg.lstsq(design, left, rcond=None)[0]
+        own, left = _residual(design, basis), _residual(design, s.y - basis @ bends)
         slopes = weight**2 * own * left[:, None]
         middle += long_run(slopes - slopes.mean(axis=0), round(MEMORY_S / _MEAN_S))
         plain += weight**2 * own.T @ own
@@ -307,9 +300,9 @@ def _relative_swing(own: _Learned, case: Case, fitted: Sequence[AxialSeries]) ->
     """Swing over that of the declared CX over the flown angles of attack [-]."""
     shape = own.effect.shape
     swing = float(np.ptp(shape.basis(np.linspace(shape.low, shape.high, 101)) @ own.bends))
-    low, high = np.quantile(np.concatenate([s.signals["alpha"] for s in fitted]), _QUANTILES)
+    low, high = covered(np.concatenate([s.signals["alpha"] for s in fitted]))
     plant = case.fitted.records[0].plant
-    at = np.linspace(float(low), float(high), 101)
+    at = np.linspace(low, high, 101)
     declared = np.interp(at, plant.alpha_rad, plant.over_alpha[:, 0]) / plant.aircraft.constants.wing_area_m2
     return swing / max(float(np.ptp(declared)), 1e-9)
 

@@ -35,12 +35,12 @@ Array = NDArray[np.float64]
 
 CHANNEL: Final = "ax_m_s2"
 """The accelerometer along x."""
+_UNDONE: Final[tuple[Kind, ...]] = ("scale", "bias", "lag", "delay")
+"""Its declared errors that are undone before its position counts."""
 _SPEED: Final = "airspeed_m_s"
 """The airspeed, whose accepted errors are undone too."""
 _BIASED: Final = ("alpha_rad", "q_rad_s")
 """Channels whose estimated biases are undone, in the order of the records' own parameters."""
-_UNDONE: Final[tuple[Kind, ...]] = ("scale", "bias", "lag", "delay")
-"""Its declared errors that are undone before its position counts."""
 _FINE_RAD: Final = 0.1 * DEG
 """Step of the angle of attack between the points of the tables [rad] (judgement: a tenth of theirs)."""
 _RATE_S: Final = 0.1
@@ -100,17 +100,17 @@ a quarter of a sample at 50 Hz, and an accelerometer that is surveyed to some ce
 
 
 def axial_series(
-    log: FlightLog,
+    logs: Sequence[FlightLog],
     records: Sequence[TraceRecord],
     own: Sequence[Array],
     change: Change,
     aircraft: Aircraft,
 ) -> list[AxialSeries]:
-    """The series of those records that the log holds.
+    """The series of records, in their order.
 
     Parameters
     ----------
-    log : with the channel ax.
+    logs : with the channel ax; they hold the records.
     records : of a trace with a JSBSim model.
     own : parameters of each record, see `airtruth.tracing.model.parameters.PerRecord`; biases of vane and gyro count.
     change : the declared errors of the sensors with the accepted effects.
@@ -132,8 +132,8 @@ def axial_series(
     by_run = {r.signals.run_id: (r, p) for r, p in zip(records, own, strict=True)}
     plants = {id(r.plant): r.plant for r in records}
     between = {key: _between_points(plant) for key, plant in plants.items()}
-    found = []
-    for batch in batches(log):
+    found: dict[str, AxialSeries] = {}
+    for batch in (b for log in logs for b in batches(log)):
         undone = compensated_batch(batch, aircraft.constants, taken)
         for row, run_id in enumerate(batch.run_ids):
             if run_id in by_run:
@@ -143,8 +143,8 @@ def axial_series(
                     channels[name] = channels[name] - bias
                 # the record's own airspeed is low-passed, and lacks the declared errors alone
                 ratio = channels[_SPEED] / batch.channels[_SPEED][row]
-                found.append(_series(channels, record, ratio, between[id(record.plant)], change, aircraft))
-    return found
+                found[run_id] = _series(channels, record, ratio, between[id(record.plant)], change, aircraft)
+    return [found[r.signals.run_id] for r in records]
 
 
 def _series(

@@ -169,9 +169,8 @@ def tested_on_left_out(
     """
     for way, before in zip(_ways(problem), reference.left_out, strict=True):
         likelihood, after = way(problem, own)
-        with np.errstate(
-            invalid="ignore"
-        ):  # neither can follow the record: no number, which counts as a loss
+        # where neither can follow a record the difference is no number, which counts as a loss
+        with np.errstate(invalid="ignore"):
             likelihood_gain, unaided = before[0] - likelihood, before[1]
         if not _is_loss(likelihood_gain):
             break

@@ -208,8 +208,7 @@ def flown(record: TraceRecord, signal: str) -> Array:
 
 
 def _range(records: Sequence[TraceRecord], signal: str) -> tuple[float, float]:
-    low, high = np.quantile(np.concatenate([flown(r, signal) for r in records]), _QUANTILES)
-    return float(low), float(high)
+    return covered(np.concatenate([flown(r, signal) for r in records]))
 
 
 def screen(
@@ -226,11 +225,8 @@ def screen(
         g, h = gradient[span], information[span, span]
         if not np.isfinite(h).all() or not np.trace(h) > 0.0:
             continue
-        stds = np.array(_SCALES) * e.parameters[0].high
-        evidence = log_evidences(g, h, stds)
-        best = float(stds[int(np.argmax(evidence))])
+        best, mean = best_prior(e, g, h)
         start = -np.linalg.solve(h + np.eye(e.bends) / best**2, g)
-        mean = float(logsumexp(evidence) - np.log(len(stds)))
         found.append(Screened(e.with_prior(best), mean, np.asarray(start, dtype=np.float64)))
     return sorted(found, key=lambda s: -s.log_evidence)
 
@@ -254,6 +250,25 @@ def sharpened(
     for s in sorted((*leading, *screen(problem, null, whitener, near)), key=lambda s: -s.log_evidence):
         best.setdefault(s.effect.variant, s)
     return list(best.values())
+
+
+def best_prior(effect: Increment, gradient: Array, information: Array) -> tuple[float, float]:
+    """Standard deviation of the bends' prior with the largest evidence, and the log Bayes factor averaged over those tried [-].
+
+    Parameters
+    ----------
+    gradient, information : as of `log_evidences`.
+    """
+    stds = np.array(_SCALES) * effect.parameters[0].high
+    evidence = log_evidences(gradient, information, stds)
+    mean = float(logsumexp(evidence) - np.log(len(stds)))
+    return float(stds[int(np.argmax(evidence))]), mean
+
+
+def covered(x: Array) -> tuple[float, float]:
+    """Range of a flown signal in which an increment is learned [unit of the signal]."""
+    low, high = np.quantile(x, _QUANTILES)
+    return float(low), float(high)
 
 
 def log_evidences(gradient: Array, information: Array, stds: Array) -> Array:
@@ -295,4 +310,14 @@ def _single(e: Increment, name: str, zero: dict[str, float]) -> Effect:
     )
 
 
-__all__ = ["CELLS", "Screened", "flown", "log_evidences", "screen", "shapes", "sharpened"]
+__all__ = [
+    "CELLS",
+    "Screened",
+    "best_prior",
+    "covered",
+    "flown",
+    "log_evidences",
+    "screen",
+    "shapes",
+    "sharpened",
+]
