@@ -14,7 +14,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RegularGridInterpolator
 
 from airtruth.aircraft import Aircraft
 from airtruth.logs.flight_log import FlightLog, batches
@@ -28,6 +27,7 @@ from airtruth.tracing.compensate import Compensation, compensated_batch
 from airtruth.tracing.model.parameters import PerRecord
 from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import FINE, TraceRecord
+from airtruth.tracing.model.remainder import looked_up
 from airtruth.tracing.model.surface import through
 from airtruth.units import DEG
 
@@ -172,8 +172,7 @@ def _series(
     mass = plant.trim.mass_kg if plant.trim is not None else c.mass_kg
     mass = mass * declared_total(change.declared, "mass")
     force = pressure * c.wing_area_m2
-    declared = pressure * _looked_up(plant, alpha, elevator, q * half)
-    declared = declared + np.interp(alpha, plant.alpha_rad, plant.constant[:, 0])
+    declared, _, _ = looked_up(plant, alpha, elevator, q * half, pressure)
     declared = declared + pressure * np.interp(alpha, *between)
     per_alpha, per_elevator = _slopes(plant, c.wing_area_m2)
     t = TOLERANCE
@@ -184,7 +183,7 @@ def _series(
         max(t.share * abs(per_alpha), t.alpha_slope) * off_alpha,
         max(t.share * abs(per_elevator), t.elevator_slope) * off_elevator,
         t.rate_slope * q * half,
-        t.bias_rad * _local_slope(plant, shown, elevator, q * half) / c.wing_area_m2,
+        t.bias_rad * _local_slope(plant, shown, elevator, q * half, pressure) / force,
         t.late_s * per_alpha * smooth_rate(shown, _RATE_S, s.dt_s),
         t.late_s * per_elevator * smooth_rate(elevator, _RATE_S, s.dt_s),
         t.z_m * inertial * q_dot,
@@ -217,16 +216,11 @@ def _accelerometer(aircraft: Aircraft) -> SensorErrors:
     return aircraft.file.sensors[CHANNEL].errors() if CHANNEL in aircraft.file.sensors else SensorErrors()
 
 
-def _looked_up(plant: Plant, alpha: Array, elevator: Array, qhat: Array) -> Array:
-    """(samples,) X of the air over the dynamic pressure [m2]."""
-    axes = (plant.alpha_rad, plant.elevator_rad, plant.qhat)
-    table = RegularGridInterpolator(axes, plant.values[..., 0], bounds_error=False, fill_value=None)
-    return np.asarray(table(np.stack([alpha, elevator, qhat], axis=1)))
-
-
-def _local_slope(plant: Plant, alpha: Array, elevator: Array, qhat: Array) -> Array:
-    """(samples,) slope of X over the angle of attack, over the dynamic pressure [m2/rad]."""
-    above, below = (_looked_up(plant, alpha + step, elevator, qhat) for step in (_FINE_RAD, -_FINE_RAD))
+def _local_slope(plant: Plant, alpha: Array, elevator: Array, qhat: Array, pressure: Array) -> Array:
+    """(samples,) slope of X over the angle of attack [N/rad]."""
+    above, below = (
+        looked_up(plant, alpha + step, elevator, qhat, pressure)[0] for step in (_FINE_RAD, -_FINE_RAD)
+    )
     return np.asarray((above - below) / (2.0 * _FINE_RAD))
 
 
@@ -242,9 +236,8 @@ def _between_points(plant: Plant) -> tuple[Array, Array]:
     words = f"the axial force of {plant.aircraft.name}"
     exact = isolated(words, forces_over_alpha, plant.aircraft, at, alpha, np.ones(1))[0, :, 0]
     pressure = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2
-    elevator = np.full(len(alpha), at.elevator_rad)
-    tables = pressure * _looked_up(plant, alpha, elevator, np.zeros(len(alpha)))
-    tables = tables + np.interp(alpha, plant.alpha_rad, plant.constant[:, 0])
+    still, elevator, everywhere = (np.full(len(alpha), x) for x in (0.0, at.elevator_rad, pressure))
+    tables, _, _ = looked_up(plant, alpha, elevator, still, everywhere)
     return alpha, (exact - tables) / pressure
 
 

@@ -56,7 +56,7 @@ _REFITTED: Final = 3
 _HOPELESS: Final = 8.0
 """Log evidence behind the leading shape from which a shape is not refitted [-] (judgement)."""
 _PROMISING: Final = 0.2
-"""Log evidence of a shape without a refit, over that of names without an anomaly, from which it is refitted in their stead [-]
+"""Log evidence of a shape without a refit, over that of names without an anomaly, from which it is refitted instead [-]
 (judgement: refits have tripled it)."""
 _NAMES_LEAD: Final = 5.0
 """Log evidence by which increments alone have to lead for named effects to be given up [-] (judgement: a name is
@@ -73,7 +73,7 @@ def with_increments(
 ) -> tuple[SearchRound, ...]:
     """The rounds of a search with increments of what its effects leave.
 
-    Where named effects leave an anomaly, increments are learned beside them. In their stead they are learned in any case: names
+    Where named effects leave an anomaly, increments are learned beside them. Instead of them they are learned in any case: names
     that fit may imitate what the library lacks. The names remain unless increments alone have a much larger evidence. Names that
     the increments make unnecessary are given up, and so is the release of the derivatives.
 
@@ -105,7 +105,7 @@ def _learned(
     seed: int,
     advance: Advance,
 ) -> tuple[SearchRound, ...]:
-    """The rounds with increments beside the names, or in their stead."""
+    """The rounds with increments beside the names, or instead of them."""
     learn = _Learning(problem, tuple(effects), seed, advance)
     grown, evidence = learn.grown(rounds)
     named = rounds[-1].null.hypothesis.effects
