@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
@@ -33,12 +34,51 @@ _LEAST_BENDS: Final = 3
 """Least number of bends that are written as a table [-]; a single break is a formula (convention)."""
 _ROUNDING: Final = 1e-9
 """Sum of slopes beyond the last bend, over the largest, that counts as zero [-] (judgement: above rounding)."""
-_UP: Final = {"Z": -1.0, "NORMAL": 1.0}
-"""Axis that carries a force along -z of the body, and its sign."""
-_FORWARD: Final = {"X": 1.0, "AXIAL": -1.0}
-"""Axis that carries a force along x of the body, and its sign: JSBSim counts AXIAL aft."""
 _PARTNER: Final = {"Z": "X", "X": "Z", "NORMAL": "AXIAL", "AXIAL": "NORMAL"}
 """Axis beside which JSBSim accepts another."""
+
+
+@dataclass(frozen=True)
+class _Force:
+    """How a force that a coefficient states reaches the axes of a model.
+
+    Attributes
+    ----------
+    total : last part of the name of its sum.
+    direction : along which axis of the body.
+    body : body axis that carries it -> its sign; JSBSim counts AXIAL aft.
+    wind : axis of lift and drag -> sign, and function of the angle of attack.
+    across : coordinate whose distance from the CG gives it a moment.
+    missing : what the model lacks where neither carries it.
+    """
+
+    total: str
+    direction: str
+    body: Mapping[str, float]
+    wind: Mapping[str, tuple[float, str]]
+    across: str
+    missing: str
+
+
+_FORCES: Final[Mapping[str, _Force]] = {
+    "CL": _Force(
+        "force",
+        "-z",
+        {"Z": -1.0, "NORMAL": 1.0},
+        {"LIFT": (1.0, "cos"), "DRAG": (1.0, "sin")},
+        "x",
+        "LIFT, Z or NORMAL that could carry lift",
+    ),
+    "CX": _Force(
+        "axial",
+        "x",
+        {"X": 1.0, "AXIAL": -1.0},
+        {"LIFT": (1.0, "sin"), "DRAG": (-1.0, "cos")},
+        "z",
+        "DRAG, X or AXIAL that could carry an axial force",
+    ),
+}
+"""Coefficient of a force -> how it reaches the axes."""
 
 
 def write(
@@ -249,20 +289,6 @@ def _memory(state: StateTerm, output: str, source: str) -> Components:
 
 
 def _to_axes(aerodynamics: Element, by_coefficient: dict[str, list[str]], root: str, where: str) -> None:
-    if by_coefficient["CL"]:
-        force = op("product", "aero/qbar-psf", "metrics/Sw-sqft", op("sum", *by_coefficient["CL"], 0.0))
-        total = function(
-            f"{root}force-lbs", "Sum of the increments of CL: force along -z of the body [lbf]", force
-        )
-        first = next((i for i, e in enumerate(aerodynamics) if e.tag == "axis"), len(aerodynamics))
-        aerodynamics.insert(first, total)
-        _force(aerodynamics, root, where)
-    if by_coefficient["CX"]:
-        force = op("product", "aero/qbar-psf", "metrics/Sw-sqft", op("sum", *by_coefficient["CX"], 0.0))
-        words = "Sum of the increments of CX: force along x of the body [lbf]"
-        first = next((i for i, e in enumerate(aerodynamics) if e.tag == "axis"), len(aerodynamics))
-        aerodynamics.insert(first, function(f"{root}axial-lbs", words, force))
-        _axial(aerodynamics, root, where)
     moments: list[Element | float | str] = []
     if by_coefficient["Cm"]:
         moments.append(
@@ -274,13 +300,21 @@ def _to_axes(aerodynamics: Element, by_coefficient: dict[str, list[str]], root: 
                 op("sum", *by_coefficient["Cm"], 0.0),
             )
         )
-    if by_coefficient["CL"]:
+    for coefficient, force in _FORCES.items():
+        if not by_coefficient[coefficient]:
+            continue
+        total = f"{root}{force.total}-lbs"
+        words = f"Sum of the increments of {coefficient}: force along {force.direction} of the body [lbf]"
+        pressure = "aero/qbar-psf", "metrics/Sw-sqft"
+        formula = op("product", *pressure, op("sum", *by_coefficient[coefficient], 0.0))
+        first = next((i for i, e in enumerate(aerodynamics) if e.tag == "axis"), len(aerodynamics))
+        aerodynamics.insert(first, function(total, words, formula))
+        for name, share in _shares(aerodynamics, force, total, where).items():
+            words = f"Increments of {coefficient} [lbf]"
+            _axis(aerodynamics, name).append(function(f"{root}{force.total}-{name}-lbs", words, share))
         # JSBSim applies forces at its reference point; this takes them back to the CG
-        ahead = op("quotient", op("difference", "inertia/cg-x-in", "metrics/aero-rp-x-in"), 12.0)
-        moments.append(op("product", -1.0, ahead, f"{root}force-lbs"))
-    if by_coefficient["CX"]:
-        above = op("quotient", op("difference", "inertia/cg-z-in", "metrics/aero-rp-z-in"), 12.0)
-        moments.append(op("product", -1.0, above, f"{root}axial-lbs"))
+        places = f"inertia/cg-{force.across}-in", f"metrics/aero-rp-{force.across}-in"
+        moments.append(op("product", -1.0, op("quotient", op("difference", *places), 12.0), total))
     if moments:
         _axis(aerodynamics, "PITCH").append(
             function(
@@ -294,64 +328,16 @@ def _axis(aerodynamics: Element, name: str) -> Element:
     return SubElement(aerodynamics, "axis", {"name": name}) if axis is None else axis
 
 
-def _force(aerodynamics: Element, root: str, where: str) -> None:
-    """The force along -z of the body, in the axes of the model."""
-    if not _along_body(aerodynamics, _UP, root, "force", "CL"):
-        wind = {"LIFT": op("cos", "aero/alpha-rad"), "DRAG": op("sin", "aero/alpha-rad")}
-        _along_wind(
-            aerodynamics,
-            wind,
-            root,
-            "force",
-            "CL",
-            f"{where}: its <aerodynamics> have no axis LIFT, Z or NORMAL that could carry lift",
-        )
-
-
-def _axial(aerodynamics: Element, root: str, where: str) -> None:
-    """The force along x of the body, in the axes of the model."""
-    if not _along_body(aerodynamics, _FORWARD, root, "axial", "CX"):
-        wind = {
-            "LIFT": op("sin", "aero/alpha-rad"),
-            "DRAG": op("product", -1.0, op("cos", "aero/alpha-rad")),
-        }
-        _along_wind(
-            aerodynamics,
-            wind,
-            root,
-            "axial",
-            "CX",
-            f"{where}: its <aerodynamics> have no axis DRAG, X or AXIAL that could carry an axial force",
-        )
-
-
-def _along_body(
-    aerodynamics: Element, signs: Mapping[str, float], root: str, force: str, coefficient: str
-) -> bool:
-    """Add a force to the body axis that carries it; False where the model has no body axes."""
+def _shares(aerodynamics: Element, force: _Force, total: str, where: str) -> dict[str, Element]:
+    """Axis of the model -> what it carries of a force whose property is ``total``."""
     names = {a.get("name", "").upper() for a in aerodynamics.findall("axis")}
-    for name, sign in signs.items():
+    for name, sign in force.body.items():
         if name in names or _PARTNER[name] in names:
-            formula = op("product", sign, f"{root}{force}-lbs")
-            words = f"Increments of {coefficient} [lbf]"
-            _axis(aerodynamics, name).append(function(f"{root}{force}-{name}-lbs", words, formula))
-            return True
-    return False
-
-
-def _along_wind(
-    aerodynamics: Element,
-    components: Mapping[str, Element],
-    root: str,
-    force: str,
-    coefficient: str,
-    missing: str,
-) -> None:
-    """Add the components of a force to lift and drag."""
-    names = {a.get("name", "").upper() for a in aerodynamics.findall("axis")}
-    if not names & set(components):
-        raise AircraftError(missing)
-    for name, share in components.items():
-        formula = op("product", f"{root}{force}-lbs", share)
-        words = f"Increments of {coefficient} [lbf]"
-        _axis(aerodynamics, name).append(function(f"{root}{force}-{name}-lbs", words, formula))
+            return {name: op("product", sign, total)}
+    if not names & set(force.wind):
+        raise AircraftError(f"{where}: its <aerodynamics> have no axis {force.missing}")
+    found = {}
+    for name, (sign, component_of) in force.wind.items():
+        share = op(component_of, "aero/alpha-rad")
+        found[name] = op("product", total, share if sign > 0.0 else op("product", sign, share))
+    return found
