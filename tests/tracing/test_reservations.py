@@ -6,7 +6,7 @@ import pytest
 
 from airtruth.tracing.accepted import AcceptedEffect
 from airtruth.tracing.answer import Alternative
-from airtruth.tracing.reservations import MANY, causes, reservations
+from airtruth.tracing.reservations import DOUBT, MANY, causes, reservations
 
 
 def effects(*names):
@@ -87,3 +87,11 @@ def test_names_beside_an_increment_are_provisional():
     two, many = reservations(effects("vane_arm", "cg_shift", "derivatives", "increment"), ())
     assert "what vane_arm, cg_shift, derivatives explain:" in two
     assert "or more" in many
+
+
+def test_an_error_of_the_vane_beside_a_friction_of_the_vane_is_provisional():
+    for name in ("vane_lag", "vane_scale"):
+        (reason,) = reservations(effects(name), (), DOUBT)
+        assert f"beside {name}" in reason
+        assert reservations(effects(name), (), 1.01 * DOUBT) == ()
+    assert reservations(effects("gyro_lag", "cg_shift"), (), 1e-9) == ()

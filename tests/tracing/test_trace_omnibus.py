@@ -15,8 +15,9 @@ from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.records import nodes
 from airtruth.tracing.model.response import External, respond
 from airtruth.tracing.model.surface import play
-from airtruth.tracing.selection.omnibus import FAMILIES, Anomaly, advice, anomalies, chi_square, lines
+from airtruth.tracing.selection.omnibus import FAMILIES, advice, anomalies, chi_square, views
 from airtruth.tracing.selection.rounds import SearchRound
+from airtruth.tracing.selection.spectrum import Anomaly, lines
 from airtruth.units import DEG
 
 pytestmark = pytest.mark.slow
@@ -204,6 +205,33 @@ def test_a_vane_that_sticks_is_seen_as_friction():
         records.append(changed(made, more))
     found = seen(records)
     assert found[VANE].p_value < 1e-6
+
+
+def test_a_vane_that_sticks_is_seen_in_gusts():
+    """A play of 0.3 deg in gusts that move the vane by 1.4 deg: the filter's prediction follows the vane."""
+    rng = np.random.default_rng(13)
+    records = []
+    for made in [
+        tr.fly(rng, amplitude=a * DEG, name=str(a), samples=300, sigma_w=1.0, noise=1e-6 * tr.SETTINGS.noise)
+        for a in (2.0, -2.0, 1.0)
+    ]:
+        more = tr.SETTINGS.noise * rng.standard_normal(made.signals.y.shape)
+        alpha = made.signals.y[:, 0]
+        more[:, 0] += play(alpha, 0.15 * DEG) - alpha
+        records.append(changed(made, more))
+    assert seen(records)[VANE].p_value < 1e-4
+
+
+def test_the_motion_without_the_vane_does_not_contain_it():
+    """A reading of the vane that is 1 mrad larger changes no sample of the motion that the others show."""
+    (made,) = pair(np.random.default_rng(14))[:1]
+    problem = tr.problem([made])
+    null = fit(problem, tr.NOTHING, initial_parameters(problem, tr.NOTHING))
+    more = np.zeros_like(made.signals.y)
+    more[100, 0] = 1e-3
+    (before,), (after,) = views(null, problem), views(null, tr.problem([changed(made, more)]))
+    assert np.ptp(before.unseen_rad) > 0.02
+    np.testing.assert_allclose(after.unseen_rad, before.unseen_rad, rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("drifts", ["moment", "gyro"])

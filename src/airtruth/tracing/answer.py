@@ -168,7 +168,7 @@ class TraceAnswer:
 
     Attributes
     ----------
-    verdict : conclusion; provisional : whether an anomaly remains, or no record was held out.
+    verdict : conclusion; provisional : whether there is a reservation, see docs/trace.md.
     anomaly, remaining : evidence before anything is added, and after.
     effects : accepted effects, in the order in which they were accepted.
     candidates : every candidate, most significant first.

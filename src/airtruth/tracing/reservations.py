@@ -10,8 +10,10 @@ from collections.abc import Sequence
 from typing import Final
 
 from airtruth.effects.increment import NAME
+from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.accepted import AcceptedEffect
 from airtruth.tracing.answer import Alternative
+from airtruth.tracing.model.settings import VANE
 
 MANY: Final = 3
 """Number of separate causes from which their names are provisional [-] (judgement: in the blind trials an effect outside
@@ -20,19 +22,24 @@ LEAST_INCLUSION: Final = 0.5
 """Posterior probability of a named cause below which the names are provisional [-]: the sets without it are more probable."""
 UNNAMED: Final = 0.05
 """Posterior weight of increments without any name from which the names are provisional [-] (convention)."""
+DOUBT: Final = 0.05
+"""Probability of the test of a friction of the vane below which a named error of the vane is provisional [-] (convention)."""
 _AXIAL: Final = "CX"
 """Coefficient whose increments a wrong angle of attack imitates: ax shows them, after the effects of the other channels."""
 _ONE_EVENT: Final = frozenset({"cg_shift", "mass_error", "inertia_error"})
 """Effects that one event brings, and which count as one cause: a load that is not declared, or a lost part."""
 
 
-def reservations(effects: Sequence[AcceptedEffect], sets: Sequence[Alternative]) -> tuple[str, ...]:
+def reservations(
+    effects: Sequence[AcceptedEffect], sets: Sequence[Alternative], friction_p_value: float = 1.0
+) -> tuple[str, ...]:
     """Each reason against relying on the names of an answer, in words.
 
     Parameters
     ----------
     effects : those of the answer, the explanation of its derivatives among them.
     sets : sets of causes with their posterior weights, the leading one first.
+    friction_p_value : of the test of a friction of the vane where the effects have been added [-].
     """
     named = [e for e in effects if e.acts_on is None]
     listed = ", ".join(e.key for e in named)
@@ -65,6 +72,13 @@ def reservations(effects: Sequence[AcceptedEffect], sets: Sequence[Alternative])
             f"learned increments explain the records without {listed}, with a posterior weight of {100.0 * unnamed:.0f} %: the "
             "names are provisional"
         )
+    of_vane = [e.key for e in named if e.key in EFFECTS and EFFECTS[e.key].channels == (VANE,)]
+    if of_vane and friction_p_value <= DOUBT:
+        found.append(
+            f"the vane moves less than the other sensors show where the motion turns (p = {friction_p_value:.2g} beside "
+            f"{', '.join(of_vane)}), and in gusts a friction of the vane looks like a lag: move the vane by hand on the ground "
+            "with the log running"
+        )
     return tuple(found)
 
 
@@ -80,4 +94,4 @@ def causes(named: Sequence[AcceptedEffect]) -> int:
     return len(apart) + (len(apart) < len(named))
 
 
-__all__ = ["LEAST_INCLUSION", "MANY", "UNNAMED", "causes", "reservations"]
+__all__ = ["DOUBT", "LEAST_INCLUSION", "MANY", "UNNAMED", "causes", "reservations"]

@@ -156,8 +156,10 @@ def _checked(logs: Logs, aircraft: Aircraft, force: bool) -> tuple[list[FlightLo
 
 
 def _with_notes(answer: TraceAnswer, kinematics: CheckResult | None) -> TraceAnswer:
-    """The answer with its contradictions to the kinematic check."""
-    return replace(answer, notes=(*answer.notes, *disagreement(kinematics, answer)))
+    """The answer with its contradictions to the kinematic check, which make the effects of an answer provisional."""
+    found = disagreement(kinematics, answer)
+    provisional = answer.provisional or bool(found and answer.effects)
+    return replace(answer, provisional=provisional, notes=(*answer.notes, *found))
 
 
 def _search(

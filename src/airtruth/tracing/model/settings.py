@@ -138,6 +138,14 @@ def settings_of(aircraft: Aircraft, thrust_std: float, *, has_vane: bool = True)
     )
 
 
+def without_vane(settings: Settings) -> Settings:
+    """Settings under which the angle of attack is a state of the filter and no output."""
+    unmeasured = np.where(
+        np.arange(len(CHANNELS)) == CHANNELS.index(VANE), _UNMEASURED_RAD, settings.resolution
+    )
+    return replace(settings, resolution=unmeasured)
+
+
 def resolved(settings: Settings, records: Sequence[TraceRecord]) -> Settings:
     """Settings with a resolution of the model where the noise is not declared.
 
@@ -271,4 +279,5 @@ __all__ = [
     "per_record_prior",
     "resolved",
     "settings_of",
+    "without_vane",
 ]

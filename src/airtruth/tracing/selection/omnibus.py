@@ -1,16 +1,16 @@
 """Omnibus tests: whether the declared aircraft lacks anything, whichever effect it is.
 
-Five families of directions, each a chi-square test with the nuisance parameters eliminated, and a test of the
-spectrum. A direction is a series added to CL, Cm or an output. Series of the motion are functions of predicted
-outputs: a prediction does not contain the noise of its own sample, so that under the null the scores are a martingale.
+Six families of directions, each a chi-square test with the nuisance parameters eliminated, and a test of the spectrum
+(`airtruth.tracing.selection.spectrum`). A direction is a series added to CL, Cm or an output. Series of the motion are
+functions of predicted outputs: a prediction does not contain the noise of its own sample, so that under the null the scores
+are a martingale.
 
-Sources: C. R. Rao's score test as in `airtruth.tracing.selection.score_test`; P. Whittle, J. R. Statist. Soc. B 19
-(1957), for the power in bands of a white series: 2 I/s^2 is chi-square with two degrees of freedom per frequency.
+Source: C. R. Rao's score test as in `airtruth.tracing.selection.score_test`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -24,8 +24,10 @@ from airtruth.tracing.inference.whitening import Whitener
 from airtruth.tracing.model.compile import CHANNELS
 from airtruth.tracing.model.records import TraceRecord, fine, nodes
 from airtruth.tracing.model.response import External, Response, filter_inputs, respond_to
+from airtruth.tracing.model.settings import without_vane
 from airtruth.tracing.model.surface import play
 from airtruth.tracing.selection.score_test import inserted, projected
+from airtruth.tracing.selection.spectrum import Anomaly, lines
 
 Array = NDArray[np.float64]
 
@@ -45,34 +47,13 @@ _TURN: Final = 0.5
 """Share of the rate's standard deviation over which its sign changes [-] (judgement: a smooth sign is less noisy)."""
 _PLAYS: Final = (0.1, 0.25)
 """Half widths of hysteresis over the range of the angle of attack [-] (judgement)."""
-_FRICTIONS: Final = (0.02, 0.06, 0.15)
-"""Half widths of the friction of a vane over the range of the angle of attack [-] (judgement)."""
+_FRICTIONS: Final = (0.01, 0.04, 0.12)
+"""Half widths of the friction of a vane over the same range [-] (judgement)."""
 _DISTINCT: Final = 1e-3
 """Least eigenvalue, over the largest, of directions that count as distinct [-] (judgement: responses to an elevator
 overlap)."""
-_BAND_HZ: Final = 0.5
-"""Width of a band of the spectrum [Hz] (judgement: a mode with 2 % damping at 10 Hz lies in one)."""
-_LOWEST_HZ: Final = 1.0
-"""Lowest frequency of the spectral test [Hz]; gust level, biases and coloured noise are free below (judgement)."""
 _QUANTILES: Final = (0.02, 0.98)
 """Quantiles of the predicted angle of attack that count as its range [-] (judgement)."""
-
-
-@dataclass(frozen=True)
-class Anomaly:
-    """Evidence of a missing effect.
-
-    Attributes
-    ----------
-    where : name of the effect or of the test that shows it.
-    statistic, degrees : chi-square statistic and its degrees of freedom [-].
-    p_value : probability of a larger statistic where nothing is missing [-].
-    """
-
-    where: str
-    statistic: float
-    degrees: int
-    p_value: float
 
 
 @dataclass(frozen=True)
@@ -83,6 +64,7 @@ class View:
     ----------
     elevator_rad : (points,) on the filter's grid, from the record's first value; largest_rad : over all records.
     alpha_rad, rate_rad_s : (samples,) predicted angle of attack, and its rate behind a low-pass.
+    unseen_rad : (samples,) reading of the vane as gyro and accelerometer show it, without the vane.
     low_rad, high_rad, rate_std_rad_s : range and spread over all records.
     dt_s, sub : sample period [s]; cells of the filter's grid per sample.
     """
@@ -91,6 +73,7 @@ class View:
     largest_rad: float
     alpha_rad: Array
     rate_rad_s: Array
+    unseen_rad: Array
     low_rad: float
     high_rad: float
     rate_std_rad_s: float
@@ -109,14 +92,14 @@ def anomalies(null: PosteriorFit, problem: TraceProblem, whitener: Whitener) -> 
     ----------
     null : a fit; whitener : autoregression of its innovations.
     """
-    views = _views(null, problem)
+    seen = views(null, problem)
     measured = problem.settings.measured
     built = [
         {
             name: [s for s in family.series(view) if s[0] < ALPHA or measured[s[0] - ALPHA]]
             for name, family in FAMILIES.items()
         }
-        for view in views
+        for view in seen
     ]
 
     def one(index: int) -> Array:
@@ -152,69 +135,22 @@ def chi_square(gradient: Array, information: Array) -> tuple[float, int, float]:
     return statistic, degrees, float(chi2.sf(statistic, degrees))
 
 
-def lines(residuals: Sequence[Array], dt_s: Sequence[float]) -> Anomaly:
-    """Test the power of the innovations in bands: a lightly damped mode raises it in one.
-
-    Each channel is whitened by an autoregression of first order, which absorbs the colour of a sensor's noise. A
-    higher order or a vector autoregression would absorb a mode as well.
-
-    Parameters
-    ----------
-    residuals : of each record (samples, 3).
-    dt_s : of each record [s].
-    """
-    residuals = _whitened(residuals)
-    top = 0.5 / max(dt_s)
-    edges = np.arange(_LOWEST_HZ, top + 1e-9, _BAND_HZ)
-    bands = max(len(edges) - 1, 0)
-    power, degrees = np.zeros((bands, 3)), np.zeros(bands)
-    square = np.maximum(np.mean(np.concatenate(residuals) ** 2, axis=0), 1e-300)
-    for r, dt in zip(residuals, dt_s, strict=True):
-        f = np.fft.rfftfreq(len(r), dt)
-        ordinates = 2.0 * np.abs(np.fft.rfft(r, axis=0)) ** 2 / (len(r) * square)
-        for b in range(bands):
-            inside = (f > edges[b]) & (f <= edges[b + 1]) & (f < 0.5 / dt * (1.0 - 1e-9))
-            power[b] += ordinates[inside].sum(axis=0)
-            degrees[b] += 2.0 * np.count_nonzero(inside)
-    seen = degrees > 0.0
-    if not seen.any():
-        return Anomaly(CHANNELS[0], 0.0, 1, 1.0)
-    p = np.ones_like(power)
-    p[seen] = chi2.sf(power[seen], degrees[seen][:, None])
-    excess = np.sqrt(2.0 * power) - np.sqrt(2.0 * degrees)[:, None]
-    # among p-values that underflow to zero, the band with the most power
-    b, channel = divmod(int(np.lexsort((-excess.ravel(), p.ravel()))[0]), p.shape[1])
-    where = f"{CHANNELS[channel]} at {edges[b]:.1f} to {edges[b + 1]:.1f} Hz"
-    return Anomaly(
-        where,
-        float(power[b, channel]),
-        int(degrees[b]),
-        min(1.0, 3.0 * int(np.count_nonzero(seen)) * float(p[b, channel])),
-    )
-
-
-def _whitened(residuals: Sequence[Array]) -> list[Array]:
-    """Residuals whitened by a first-order autoregression of each channel, the same for all records."""
-    product = sum((r[1:] * r[:-1]).sum(axis=0) for r in residuals)
-    square = sum((r[:-1] ** 2).sum(axis=0) for r in residuals)
-    pole = product / np.maximum(square, 1e-300)
-    return [
-        np.concatenate([r[:1] * np.sqrt(np.maximum(1.0 - pole**2, 0.0)), r[1:] - pole * r[:-1]])
-        for r in residuals
-    ]
-
-
-def _views(null: PosteriorFit, problem: TraceProblem) -> list[View]:
+def views(null: PosteriorFit, problem: TraceProblem) -> list[View]:
+    """Each record as the families of directions use it, at the optimum of a null hypothesis."""
     change = null.hypothesis.change(null.point.sizes)
     elevators = [nodes(r.signals.elevator_rad) for r in problem.records]
     elevators = [e - e[0] for e in elevators]
     largest = max(float(np.abs(e).max()) for e in elevators)
-    predicted, rates = [], []
-    for record, tangent in zip(problem.records, null.sensitivities, strict=True):
+    blind = without_vane(problem.settings)
+    predicted, rates, unseen = [], [], []
+    for i, (record, tangent) in enumerate(zip(problem.records, null.sensitivities, strict=True)):
         given = filter_inputs(record, change)
         y = given.y[given.lead :]
         predicted.append(y[:, 0] - np.linalg.solve(tangent.white, tangent.r.T)[0])
         rates.append(_rate(predicted[-1], record.signals.dt_s))
+        without = respond_to(given, blind, null.point.common, null.point.per_record[i])
+        lost = not np.isfinite(without.logdet)
+        unseen.append(predicted[-1] if lost else y[:, 0] - without.e[:, 0] + _from_others(without))
     low, high = np.quantile(np.concatenate(predicted), _QUANTILES)
     spread = max(float(np.std(np.concatenate(rates))), 1e-9)
     return [
@@ -223,14 +159,27 @@ def _views(null: PosteriorFit, problem: TraceProblem) -> list[View]:
             largest_rad=max(largest, 1e-9),
             alpha_rad=alpha,
             rate_rad_s=rate,
+            unseen_rad=other,
             low_rad=float(low),
             high_rad=max(float(high), float(low) + 1e-6),
             rate_std_rad_s=spread,
             dt_s=record.signals.dt_s,
             sub=record.signals.sub,
         )
-        for record, elevator, alpha, rate in zip(problem.records, elevators, predicted, rates, strict=True)
+        for record, elevator, alpha, rate, other in zip(
+            problem.records, elevators, predicted, rates, unseen, strict=True
+        )
     ]
+
+
+def _from_others(without: Response) -> Array:
+    """Innovation of the vane that those of gyro and accelerometer lead to expect, (samples,) [rad].
+
+    A reading that rests on the other sensors' current samples, and on all earlier ones, is independent of the current
+    residual of the vane given them, so that its score is a martingale too.
+    """
+    s = without.covariance
+    return np.asarray(without.e[:, 1:] @ np.linalg.solve(s[1:, 1:], s[1:, 0]))
 
 
 def _rate(x: Array, dt_s: float) -> Array:
@@ -291,10 +240,16 @@ def _drift(view: View) -> Series:
 
 
 def _vane(view: View) -> Series:
-    """A vane with friction: the distance to a vane with play, and the sign of the rate."""
+    """A vane with friction: the distance to a vane with play, by the motion that the other sensors show.
+
+    In gusts the filter's own prediction follows the vane, whose play leaves no further play in it.
+    """
     span = view.high_rad - view.low_rad
-    held = [(view.alpha_rad - play(view.alpha_rad, half * span)) / span for half in _FRICTIONS]
-    return [(ALPHA, s) for s in (*held, np.tanh(view.rate_rad_s / view.rate_std_rad_s / _TURN))]
+    return [(ALPHA, (view.unseen_rad - play(view.unseen_rad, half * span)) / span) for half in _FRICTIONS]
+
+
+FRICTION: Final = "friction of the vane"
+"""Name of the family whose evidence makes a named error of the vane doubtful."""
 
 
 @dataclass(frozen=True)
@@ -324,7 +279,7 @@ FAMILIES: Final = {
         "repeat the manoeuvre at the start and at the end of a long record, log the fuel, and compare the sensors at rest "
         "before and after the flight.",
     ),
-    "friction of the vane": Family(
+    FRICTION: Family(
         _vane,
         "repeat the manoeuvre small and large, and move the vane by hand on the ground with the log running.",
     ),
@@ -372,4 +327,4 @@ def _tangents(null: PosteriorFit, problem: TraceProblem, index: int, series: Ser
     return np.array(t)
 
 
-__all__ = ["FAMILIES", "Anomaly", "Family", "View", "advice", "anomalies", "chi_square", "lines"]
+__all__ = ["FAMILIES", "FRICTION", "Family", "View", "advice", "anomalies", "chi_square", "views"]

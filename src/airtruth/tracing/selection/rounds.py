@@ -23,11 +23,12 @@ from airtruth.tracing.selection import score_test
 from airtruth.tracing.selection.acceptance import SUPERSEDED, SURPASSED, UNSUPPORTED, Candidate, has_converged
 from airtruth.tracing.selection.budget import Advance
 from airtruth.tracing.selection.explanation import CauseSet
-from airtruth.tracing.selection.omnibus import Anomaly, anomalies
+from airtruth.tracing.selection.omnibus import anomalies
 from airtruth.tracing.selection.ranking import TIE, rank
 from airtruth.tracing.selection.refit import Refit, better_null, refit_absorbed, refit_known, refit_leaders
 from airtruth.tracing.selection.release import DeclaredCauses, Release, explained, release
 from airtruth.tracing.selection.score_test import Table
+from airtruth.tracing.selection.spectrum import Anomaly
 
 Array = NDArray[np.float64]
 
@@ -179,6 +180,10 @@ class SearchRound:
         # among p-values that underflow to zero, the chi-square farthest out by R. A. Fisher's sqrt(2 x)
         least = min(seen, key=lambda a: (a.p_value, np.sqrt(2.0 * a.degrees) - np.sqrt(2.0 * a.statistic)))
         return replace(least, p_value=min(1.0, len(seen) * least.p_value))
+
+    def p_value_of(self, where: str) -> float:
+        """P-value of an omnibus test, 1 where it was not made [-]."""
+        return next((a.p_value for a in self.omnibus if a.where == where), 1.0)
 
 
 def search_round(
