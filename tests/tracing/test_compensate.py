@@ -16,7 +16,7 @@ from airtruth.loop import identify_without_effects
 from airtruth.physics import short_period
 from airtruth.physics.readings import state_of
 from airtruth.physics.short_period import PARAMETERS
-from airtruth.physics.terms import AeroTerm, SensorTerm, StateTerm, SurfaceTerm
+from airtruth.physics.terms import AeroTerm, Change, SensorTerm, StateTerm, SurfaceTerm
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.compensate import (
     Compensation,
@@ -372,3 +372,11 @@ def test_every_kind_of_effect_has_its_treatment(key, kind):
     found = treatment_of(key, change)
     assert (found.effect, found.kind) == (key, kind)
     assert found.sentence.startswith(f"{key}: ")
+
+
+def test_an_axial_force_is_kept():
+    """CX moves none of alpha, q and az, which a regression reads."""
+    drag = Change(aero=(AeroTerm("CX", "alpha", "linear", -0.2),))
+    assert treatment_of("drag", drag).kind == "kept"
+    with_lift = Change(aero=(*drag.aero, AeroTerm("CL", "alpha", "quadratic", 1.0)))
+    assert treatment_of("separation", with_lift).kind == "subtracted"

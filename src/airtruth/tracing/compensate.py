@@ -170,6 +170,10 @@ def treatment_of(key: str, change: Change) -> Treatment:
                 key, "declared", f"{key}: identified with the updated {' and '.join(sorted(names))}"
             )
         return Treatment(key, "kept", f"{key}: kept, because the estimated derivatives contain it")
+    if change.aero and all(term.coefficient == "CX" for term in change.aero):
+        return Treatment(
+            key, "kept", f"{key}: kept, because an axial force moves none of the channels of a regression"
+        )
     if change.aero and _measurable(change)[0] == change.aero:
         return Treatment(
             key, "subtracted", f"{key}: the response to its increments of CL and Cm is subtracted"
