@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
@@ -91,24 +92,32 @@ def lagged(values: Array, tau_s: float, step_s: float) -> Array:
 
 def rate_limited(values: Array, rate_rad_s: float, step_s: float) -> Array:
     """The signal followed at no more than a rate."""
-    reach = rate_rad_s * step_s
-    y = float(values[0])
-    out = []
-    for x in values.tolist():
-        y += min(max(x - y, -reach), reach)
-        out.append(y)
-    return np.array(out)
+    return np.asarray(_rate_limited(np.ascontiguousarray(values), rate_rad_s * step_s))
 
 
 def played(values: Array, width_rad: float) -> Array:
     """Play of full width ``width_rad``: moves only when pushed; starts in the middle."""
-    half = width_rad / 2.0
-    y = float(values[0])
-    out = []
-    for x in values.tolist():
+    return np.asarray(_played(np.ascontiguousarray(values), width_rad / 2.0))
+
+
+@njit
+def _rate_limited(values: Array, reach: float) -> Array:
+    out = np.empty_like(values)
+    y = values[0]
+    for k, x in enumerate(values):
+        y += min(max(x - y, -reach), reach)
+        out[k] = y
+    return out
+
+
+@njit
+def _played(values: Array, half: float) -> Array:
+    out = np.empty_like(values)
+    y = values[0]
+    for k, x in enumerate(values):
         y = min(max(y, x - half), x + half)
-        out.append(y)
-    return np.array(out)
+        out[k] = y
+    return out
 
 
 def actuate(
