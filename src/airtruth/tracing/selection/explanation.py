@@ -18,7 +18,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood
@@ -292,12 +292,11 @@ def _evidence(
     directions = np.array([c.direction for c in chosen]).reshape(len(chosen), len(PARAMETERS))
     shape = np.array([c.shape for c in chosen])
     sizes = np.tile([c.std for c in chosen], (len(subsets), 1))
+    given = np.column_stack([information, vector])
     for _ in range(2):  # the uncertainty of a direction goes with the size
         about = own + np.einsum("nk,k,ki->ni", sizes**2, shape**2, directions**2)[:, :, None] * np.eye(6)
-        told = np.linalg.solve(np.eye(6) + information @ about, np.broadcast_to(information, about.shape))
-        seen = np.linalg.solve(
-            np.eye(6) + information @ about, np.broadcast_to(vector, (len(subsets), 6))[..., None]
-        )[..., 0]
+        both = np.linalg.solve(np.eye(6) + information @ about, np.broadcast_to(given, (len(subsets), 6, 7)))
+        told, seen = both[..., :6], both[..., 6]
         size_information = np.einsum("ki,nij,lj->nkl", directions, told, directions)
         size_covariance = np.linalg.pinv(size_information, hermitian=True)
         sizes = np.einsum("nkl,li,ni->nk", size_covariance, directions, seen)
@@ -340,8 +339,8 @@ def _in_range(chosen: Sequence[Cause], sizes: Array, std: Array) -> Array:
         np.divide(1.0, std[:, k] ** 2, out=weight, where=std[:, k] > 0.0)
         spread = 1.0 / np.sqrt(weight + c.std**-2)
         middle = weight * sizes[:, k] * spread**2
-        after = norm.cdf((c.high - middle) / spread) - norm.cdf((c.low - middle) / spread)
-        before = norm.cdf(c.high / c.std) - norm.cdf(c.low / c.std)
+        after = ndtr((c.high - middle) / spread) - ndtr((c.low - middle) / spread)
+        before = ndtr(c.high / c.std) - ndtr(c.low / c.std)
         total += np.log(np.maximum(after, _LEAST_SHARE) / before)
     return total
 

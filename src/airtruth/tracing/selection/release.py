@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -92,7 +93,7 @@ class Release:
     refit: PosteriorFit | None = None
     corrections: Mapping[tuple[str, ...], float] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def cost(self) -> float:
         """Cost of the most probable set, comparable with that of a refitted effect."""
         return least_cost(self.sets)
