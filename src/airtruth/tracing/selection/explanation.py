@@ -47,7 +47,7 @@ REFERENCE: Final = 4.0
 factor of 2.0; it makes sets comparable with the refit of an effect, whose size has no prior."""
 _CERTAIN_SHAPE: Final = 0.02
 """Relative uncertainty of a direction that follows from definitions [-] (judgement: second order in the size)."""
-_AS_PROBABLE: Final = 0.1
+AS_PROBABLE: Final = 0.1
 """Posterior weight over that of the most probable effects from which fewer effects are preferred [-] (judgement: a further cause
 is named where the odds for it are strong, from ten to one by H. Jeffreys, Theory of Probability, 3rd ed. (1961), appendix B)."""
 _AS_PROBABLE_IN_EVENT: Final = 0.5
@@ -199,7 +199,7 @@ def simplest_first(sets: Sequence[CauseSet]) -> tuple[CauseSet, ...]:
     weights: dict[tuple[str, ...], float] = {}
     for s in sets:
         weights[s.effects] = weights.get(s.effects, 0.0) + float(np.exp(least - s.cost))
-    enough = _AS_PROBABLE * max(weights.values())
+    enough = AS_PROBABLE * max(weights.values())
     fewest = min(events(n) for n, w in weights.items() if w >= enough)
     among = {n: w for n, w in weights.items() if w >= enough and events(n) == fewest}
     likely = _AS_PROBABLE_IN_EVENT * max(among.values())
@@ -346,6 +346,7 @@ def _in_range(chosen: Sequence[Cause], sizes: Array, std: Array) -> Array:
 
 
 __all__ = [
+    "AS_PROBABLE",
     "DERIVATIVES",
     "EXPLAINING",
     "LOADING",

@@ -17,7 +17,7 @@ from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import OUTDONE, Candidate
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import BETTER, better_set
-from airtruth.tracing.selection.explanation import REFERENCE, events, least_cost
+from airtruth.tracing.selection.explanation import AS_PROBABLE, REFERENCE, events, least_cost
 from airtruth.tracing.selection.refit import losses_without, refit_absorbed
 from airtruth.tracing.selection.release import DeclaredCauses, Release
 from airtruth.tracing.selection.rounds import (
@@ -43,6 +43,8 @@ _FAILED: Final = 1e-6
 [-] (judgement: an anomaly beyond doubt)."""
 _WEAK: Final = 40.0
 """Gain in 2 log L of a single effect below which one that refitted derivatives had absorbed may explain more [-] (judgement)."""
+_STRONG_ODDS: Final = float(np.log(AS_PROBABLE))
+"""Log-posterior, negative, by which a set of fewer effects may be behind."""
 _EFFECT_LEADS: Final = 30.0
 """Gain in 2 log L by which an effect has to lead for the released derivatives not to be followed beside it [-]
 (judgement: what a later effect may still add to them)."""
@@ -171,7 +173,7 @@ class _Search:
     ) -> tuple[SearchRound, ...]:
         """The rounds of a search that accepts these effects first, if they explain more than others.
 
-        As much is enough for fewer effects, and where they alone leave no anomaly.
+        Fewer effects are enough unless the odds against them are strong, and so is as much where they alone leave no anomaly.
         """
         starts: tuple[RoundStart, ...] = (first,)
         again: tuple[SearchRound, ...] = ()
@@ -189,7 +191,7 @@ class _Search:
         again = self.rounds(starts, again)
         simpler = len(_effects_of(again[-1])) < len(_effects_of(rounds[-1]))
         cleaner = again[-1].anomaly.p_value > _CLEAN and rounds[-1].anomaly.p_value < REMAINS
-        lead = 0.0 if simpler or cleaner else BETTER
+        lead = _STRONG_ODDS if simpler else 0.0 if cleaner else BETTER
         return again if total_cost(again[-1]) < total_cost(rounds[-1]) - lead else rounds
 
     def _branches(
@@ -199,7 +201,8 @@ class _Search:
         own: SearchRound,
         release: Release,
     ) -> tuple[SearchRound, ...]:
-        """The better of the rounds after an effect and after the release of the derivatives."""
+        """The better of the rounds after an effect and after the release of the derivatives; the one of fewer effects
+        unless the odds against it are strong."""
         ends = []
         if own.tied:
             ends.append(self._accepting(starts, (*before, replace(own, release=None))))
@@ -218,10 +221,13 @@ class _Search:
         if len(ends) == 1:
             return ends[0]
         costs = np.array([total_cost(rounds[-1]) for rounds in ends])
-        counts = np.array([events([e.key for e in r[-1].null.hypothesis.effects]) for r in ends])
-        both_released = all(rounds[-1].sets for rounds in ends)
-        # An effect beside released derivatives has to be significant.
-        best = int(np.argmin(costs + BETTER * counts if both_released else costs))
+        if all(rounds[-1].sets for rounds in ends):
+            # An effect beside released derivatives has to be significant.
+            handicap = BETTER * np.array([events(_names(r[-1])) for r in ends])
+        else:
+            counts = np.array([events(_effects_of(r[-1])) for r in ends])
+            handicap = -_STRONG_ODDS * (counts > counts.min())
+        best = int(np.argmin(costs + handicap))
         won, lost = ends[best], ends[1 - best]
         rival = rival_of(lost, float(costs[1 - best] - costs[best]))
         at = len(before)
@@ -241,7 +247,7 @@ class _Search:
         ends = self._onwards(starts, rounds, current.settled)
         if current.settled or _is_clean(ends, len(rounds)):
             return ends
-        return self._with_alternative(starts, rounds) or ends
+        return self._with_alternative(starts, rounds, ends)
 
     def _replacing(
         self, starts: tuple[RoundStart, ...], rounds: tuple[SearchRound, ...]
@@ -260,20 +266,28 @@ class _Search:
         return other if len(other) > index and other[index].tied else None
 
     def _with_alternative(
-        self, starts: tuple[RoundStart, ...], rounds: tuple[SearchRound, ...]
-    ) -> tuple[SearchRound, ...] | None:
-        """The first search that explains the records with an effect that ties with the leader, or is its variant."""
+        self,
+        starts: tuple[RoundStart, ...],
+        rounds: tuple[SearchRound, ...],
+        ends: tuple[SearchRound, ...],
+    ) -> tuple[SearchRound, ...]:
+        """The first search that explains the records with an effect that ties with the leader, or is its variant.
+
+        It explains them alone; or it leads the search ``ends`` with the leader by later effects, and leaves no more.
+        """
         own = rounds[-1]
         best = own.tied[0]
         for rival in (*own.tied[1 : 1 + _ALTERNATIVES], *_variants(own)):
             if not may_begin(self.advance, f"{rival.score.effect.key} instead of {best.score.effect.key}"):
-                return None
+                return ends
             rest = (c for c in own.tied if c.score.effect.name != rival.score.effect.name)
             led = at_best_location(self.problem, replace(own, tied=(rival, *rest)), self.advance)
             tried = self._onwards(starts, (*rounds[:-1], led), True)
-            if _is_clean(tried, len(rounds)):
+            leads = total_cost(tried[-1]) < total_cost(ends[-1]) - BETTER
+            leaves_more = tried[-1].anomaly.p_value < min(_CLEAN, ends[-1].anomaly.p_value)
+            if _is_clean(tried, len(rounds)) or (leads and not leaves_more):
                 return tried
-        return None
+        return ends
 
     def _onwards(
         self, starts: tuple[RoundStart, ...], rounds: tuple[SearchRound, ...], settled: bool
@@ -287,10 +301,14 @@ class _Search:
         return self.rounds((*starts, following), rounds)
 
 
+def _names(last: SearchRound) -> tuple[str, ...]:
+    """Names of the accepted effects of a branch that ends with this round."""
+    return tuple(e.name for e in last.null.hypothesis.effects)
+
+
 def _effects_of(last: SearchRound) -> tuple[str, ...]:
-    """Names of the effects of a branch that ends with this round."""
-    explaining = last.sets[0].effects if last.sets else ()
-    return (*(e.name for e in last.null.hypothesis.effects), *explaining)
+    """The same with those that explain its derivatives."""
+    return (*_names(last), *(last.sets[0].effects if last.sets else ()))
 
 
 def total_cost(last: SearchRound) -> float:
