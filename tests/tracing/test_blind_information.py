@@ -141,6 +141,31 @@ def test_a_lag_and_a_delay_are_apart_as_the_fourth_power(calm):
     assert twice < 0.02 * alone_twice
 
 
+def test_beside_other_effects_less_of_an_effect_is_apart(calm):
+    """Least squares by numpy with each rival in turn, what may be refitted and the other effect beside it."""
+    whiten = information.noise_model(calm, "calm")
+    along = information.directions(calm, whiten)
+    lag, scale = Added("gyro_lag", {"tau_s": 0.005}), Added("gyro_scale", {"factor": 1.05})
+
+    def direction(effect):
+        return whiten(information.difference(calm, effect, (), information.COARSE_S)).ravel()
+
+    def left(*columns):
+        rows = along.prior.shape[1]
+        top = np.column_stack([along.free, *columns, along.prior])
+        priors = np.hstack([np.zeros((rows, top.shape[1] - rows)), np.eye(rows)])
+        x, y = np.vstack([top, priors]), np.concatenate([direction(lag), np.zeros(rows)])
+        unit = x / np.linalg.norm(x, axis=0)
+        return float(np.sum((y - unit @ np.linalg.lstsq(unit, y, rcond=1e-10)[0]) ** 2))
+
+    delay = direction(Added("sensor_delay:q_rad_s", {"delay_s": 0.003}))
+    alone = information.apart_beside(replace(calm, effects=(lag,)), lag, whiten, along)
+    assert alone == pytest.approx(left(delay), rel=1e-3)
+    beside = information.apart_beside(replace(calm, effects=(lag, scale)), lag, whiten, along)
+    assert beside == pytest.approx(left(delay, direction(scale)), rel=1e-3)
+    assert beside < alone
+
+
 def test_the_truths_own_error_is_the_noise(tmp_path):
     """A null in calm air: what its own model leaves is white noise of the declared size."""
     numbers = [k for k in range(40) if (t := draw.draw(2, k, "null")).air == "calm" and t.noise == "white"]

@@ -77,7 +77,7 @@ BEYOND: Final = "beyond the library"
 TOGETHER: Final = "together"
 """Key of the noncentrality of all effects of a trial."""
 APART: Final = "beyond its rivals"
-"""The same of a single effect of the library: what the best effect of another name leaves."""
+"""The same of a single effect of the library: what the best effect of another name leaves; the least of the three of a triple."""
 
 
 def held_out(records: int) -> tuple[int, ...]:

@@ -318,6 +318,23 @@ def apart(trial: Trial, effect: Added, d: Array, whiten: Whitener, along: Direct
     return best
 
 
+def apart_beside(trial: Trial, effect: Added, whiten: Whitener, along: Directions) -> float:
+    """What of an effect the best effect of a name outside the trial leaves, beside the trial's other effects at any size.
+
+    To first order, at the sizes of `nearest`.
+    """
+    base = responses(trial, (), COARSE_S)
+
+    def direction(one: Added) -> Array:
+        return whiten(difference(trial, one, (), COARSE_S, base)).ravel()
+
+    others = [direction(e) for e in trial.effects if e is not effect]
+    beside = replace(along, free=np.column_stack([along.free, *others]))
+    taken = {e.name for e in trial.effects}
+    keys = [key for key in LIBRARY if Added(key, {}).name not in taken and key != "airspeed_scale"]
+    return nearest(trial, direction(effect), whiten, beside, keys, base)[0][2]
+
+
 def difference(
     trial: Trial,
     effect: Added,

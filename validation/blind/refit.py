@@ -36,6 +36,7 @@ from validation.blind.information import (
     Directions,
     Whitener,
     apart,
+    apart_beside,
     beyond,
     difference,
     directions,
@@ -87,6 +88,8 @@ def lambdas(trial: Trial) -> dict[str, float]:
             result[key] = min(value, apart(trial, effect, d, whiten, along))
     if trial.composition in COMPOSITIONS and len(trial.effects) > 1:
         result[TOGETHER] = together(trial, whiten, along)
+    if trial.composition == "triple":
+        result[APART] = min(apart_beside(trial, e, whiten, along) for e in trial.effects)
     return result
 
 

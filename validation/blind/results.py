@@ -54,6 +54,7 @@ def _of_sets(mode: str, scores: Mapping[str, Any]) -> str:
         (f"mode {mode}: trials; above lambda {STRONG:g}", f"{scores['trials']}; {scores['strong']}"),
         ("declared model called contradicted", scores["contradicted"]),
         ("right set first", scores["first"]),
+        ("right set first, bound by the nearest set", _averaged(scores["first_bound"])),
         ("right set among the reported", scores["reported"]),
         ("derivatives inside their 95 % interval", scores["derivative_coverage"]),
         ("the same where the right set is first", scores["derivative_coverage_right"]),

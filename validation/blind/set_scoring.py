@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from validation.blind.causes import COMPOSITIONS, TIME_CONSTANT_S
-from validation.blind.figures import ALPHA_TRIM_RAD, CONDITIONS, LOG_STEP_S, STRONG, TOGETHER, held_out
+from validation.blind.figures import ALPHA_TRIM_RAD, APART, CONDITIONS, LOG_STEP_S, STRONG, TOGETHER, held_out
 from validation.blind.scoring import (
     Case,
     accepted,
@@ -20,6 +20,8 @@ from validation.blind.scoring import (
     base,
     contradicted,
     effects,
+    first_bound,
+    mean,
     median,
     named_set,
     noncentrality,
@@ -45,7 +47,7 @@ def strong(case: Case) -> bool:
 
 def _single(case: Case) -> dict[str, float]:
     """Noncentrality of each effect, the others being there."""
-    return {key: value for key, value in case["truth"]["lambda"].items() if key != TOGETHER}
+    return {key: value for key, value in case["truth"]["lambda"].items() if key not in (APART, TOGETHER)}
 
 
 def matches(case: Case, names: set[str]) -> bool:
@@ -176,6 +178,7 @@ def set_scores(cases: Sequence[Case]) -> dict[str, dict[str, Any]]:
                 "strong": len(some),
                 "contradicted": share(contradicted(c) for c in some),
                 "first": share(first(c) for c in some),
+                "first_bound": mean(first_bound(c) for c in some),
                 "reported": share(reported(c) for c in some),
                 "derivative_coverage": share(flag for c in some for flag in derivatives_covered(c)),
                 "derivative_coverage_right": share(flag for c in right for flag in derivatives_covered(c)),
