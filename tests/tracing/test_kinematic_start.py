@@ -1,6 +1,6 @@
 """The kinematic check gives a trace its starting points, and contradictions between the two are stated."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import pytest
@@ -11,7 +11,13 @@ from airtruth.logs.store import iter_logs
 from airtruth.simulation.campaign import run as campaign
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
-from airtruth.tracing.kinematic_start import disagreement, kinematic_check, starts_of, within_kinematics
+from airtruth.tracing.kinematic_start import (
+    disagreement,
+    kinematic_check,
+    starts_of,
+    with_contradictions,
+    within_kinematics,
+)
 
 LAG_S = 0.2
 CAMPAIGN = """
@@ -90,6 +96,19 @@ def test_a_bias_of_the_check_is_compared_with_that_of_the_trace():
     effect = AcceptedEffect("gyro_bias", {"value": own}, 1e-9, 5.0)
     (note,) = disagreement(check, SimpleNamespace(effects=(effect,)))
     assert note == "gyro_bias: the trace estimates -0.05, the kinematic check 0.02 to 0.04"
+    answer = with_contradictions(Answer((effect,)), check)
+    assert (answer.provisional, answer.notes) == (True, (note,))
+    agrees = replace(effect, parameters={"value": replace(own, ci95=(-0.07, 0.025))})
+    assert with_contradictions(Answer((agrees,)), check) == Answer((agrees,))
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The fields of an answer that a contradiction concerns."""
+
+    effects: tuple[AcceptedEffect, ...]
+    provisional: bool = False
+    notes: tuple[str, ...] = ()
 
 
 def allowed(errors=(), p_value=0.5, state="not needed"):

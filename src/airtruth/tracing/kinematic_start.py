@@ -114,8 +114,15 @@ def disagreement(check: CheckResult | None, answer: TraceAnswer) -> list[str]:
     return result
 
 
+def with_contradictions(answer: TraceAnswer, check: CheckResult | None) -> TraceAnswer:
+    """The answer with its contradictions to a check, which make its effects provisional."""
+    found = disagreement(check, answer)
+    provisional = answer.provisional or bool(found and answer.effects)
+    return replace(answer, provisional=provisional, notes=(*answer.notes, *found))
+
+
 def _key(name: str, channel: str | None) -> str:
     return f"{name}:{channel}" if channel else name
 
 
-__all__ = ["disagreement", "kinematic_check", "starts_of", "within_kinematics"]
+__all__ = ["disagreement", "kinematic_check", "starts_of", "with_contradictions", "within_kinematics"]

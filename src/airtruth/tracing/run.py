@@ -13,7 +13,6 @@ from airtruth import __version__
 from airtruth import aircraft as planes
 from airtruth.aircraft import Aircraft
 from airtruth.checks import gate
-from airtruth.checks.result import CheckResult
 from airtruth.effects.effect import Effect
 from airtruth.effects.registry import EFFECTS
 from airtruth.errors import ConfigurationError, LogError, choices
@@ -21,14 +20,14 @@ from airtruth.logs import atomic
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.provenance import Provenance, digests_of
 from airtruth.logs.sources import Logs, named_logs
-from airtruth.tracing.answer import ANOMALY_LEVEL, TraceAnswer
+from airtruth.tracing.answer import ANOMALY_LEVEL
 from airtruth.tracing.axial_force import axial_force
 from airtruth.tracing.conclude import conclude
 from airtruth.tracing.declared_model import declared_p_value
 from airtruth.tracing.kinematic_start import (
-    disagreement,
     kinematic_check,
     starts_of,
+    with_contradictions,
     within_kinematics,
 )
 from airtruth.tracing.model.parameters import Parameters
@@ -111,7 +110,7 @@ def _traced(
     origin = provenance_of(logs, declared, options)
     if out is None:
         return TraceResult(
-            _with_notes(conclude(stages, rounds, forced=forced, axial=axial), kinematics),
+            with_contradictions(conclude(stages, rounds, forced=forced, axial=axial), kinematics),
             rounds,
             stages,
             origin,
@@ -120,7 +119,7 @@ def _traced(
     contradicted = declared_p_value(rounds) <= ANOMALY_LEVEL
     updated = write_update(case, rounds, declared, out, contradicted, axial)
     replay = flown_again(stages, declared, updated)
-    answer = _with_notes(conclude(stages, rounds, updated, replay, forced, axial), kinematics)
+    answer = with_contradictions(conclude(stages, rounds, updated, replay, forced, axial), kinematics)
     result = TraceResult(answer, rounds, stages, origin)
     result.write(out)
     return result
@@ -153,13 +152,6 @@ def _checked(logs: Logs, aircraft: Aircraft, force: bool) -> tuple[list[FlightLo
         forced += [fault.sentence for fault in faults if fault.certain]
         checked.append(log)
     return checked, forced
-
-
-def _with_notes(answer: TraceAnswer, kinematics: CheckResult | None) -> TraceAnswer:
-    """The answer with its contradictions to the kinematic check, which make the effects of an answer provisional."""
-    found = disagreement(kinematics, answer)
-    provisional = answer.provisional or bool(found and answer.effects)
-    return replace(answer, provisional=provisional, notes=(*answer.notes, *found))
 
 
 def _search(
