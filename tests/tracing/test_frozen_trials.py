@@ -283,3 +283,21 @@ def test_slow_noise_takes_no_effect_away(tmp_path):
     runs = read_log(folder / "log.parquet", ()).run_ids
     answer = trace(folder, "gtm", TraceOptions(hold_out=runs[1:])).to_dict()
     assert {e["name"] for e in answer["effects"]} == {"gyro_lag", "elevator_delay"}
+
+
+def test_three_effects_are_reported_where_a_branch_or_a_tie_led_elsewhere(tmp_path):
+    """Two triples whose posterior is within 0.4 of that of five effects, and 14 better than that of two."""
+    from validation.blind import draw
+
+    for number in (2, 16):
+        folder = tmp_path / str(number)
+        answer = answered(20261901, number, "triple", folder)
+        truth = {e.name for e in draw.draw(20261901, number, "triple").effects}
+        assert len(answer["effects"]) == 3
+        assert truth <= set().union(*(names(e) for e in answer["effects"]))
+
+
+@pytest.mark.parametrize("number", [17, 26, 28, 30])
+def test_a_vane_with_friction_in_gusts_is_no_certain_lag(number, tmp_path):
+    """Four frictions of lambda 53 to 136 beyond the library that were a lag of the vane without reservation, or `none`."""
+    assert answered(20261827, number, "unmodelled", tmp_path)["provisional"]
