@@ -141,29 +141,31 @@ def test_a_lag_and_a_delay_are_apart_as_the_fourth_power(calm):
     assert twice < 0.02 * alone_twice
 
 
-def test_beside_other_effects_less_of_an_effect_is_apart(calm):
-    """Least squares by numpy with each rival in turn, what may be refitted and the other effect beside it."""
+def test_beside_another_effect_the_rival_of_a_set_is_apart(calm):
+    """A grid of the delay that comes nearest to a lag, everything else by numpy's least squares."""
     whiten = information.noise_model(calm, "calm")
     along = information.directions(calm, whiten)
-    lag, scale = Added("gyro_lag", {"tau_s": 0.005}), Added("gyro_scale", {"factor": 1.05})
+    lag, scale = Added("gyro_lag", {"tau_s": 0.01}), Added("gyro_scale", {"factor": 1.05})
 
-    def direction(effect):
-        return whiten(information.difference(calm, effect, (), information.COARSE_S)).ravel()
+    def flown(*effects):
+        return information.responses(calm, effects, information.COARSE_S)
 
-    def left(*columns):
-        rows = along.prior.shape[1]
-        top = np.column_stack([along.free, *columns, along.prior])
-        priors = np.hstack([np.zeros((rows, top.shape[1] - rows)), np.eye(rows)])
-        x, y = np.vstack([top, priors]), np.concatenate([direction(lag), np.zeros(rows)])
-        unit = x / np.linalg.norm(x, axis=0)
-        return float(np.sum((y - unit @ np.linalg.lstsq(unit, y, rcond=1e-10)[0]) ** 2))
+    size = whiten(flown(scale) - flown()).ravel()
+    rows = along.prior.shape[1]
+    top = np.column_stack([along.free, size, along.prior])
+    x = np.vstack([top, np.hstack([np.zeros((rows, top.shape[1] - rows)), np.eye(rows)])])
+    x /= np.linalg.norm(x, axis=0)
 
-    delay = direction(Added("sensor_delay:q_rad_s", {"delay_s": 0.003}))
-    alone = information.apart_beside(replace(calm, effects=(lag,)), lag, whiten, along)
-    assert alone == pytest.approx(left(delay), rel=1e-3)
-    beside = information.apart_beside(replace(calm, effects=(lag, scale)), lag, whiten, along)
-    assert beside == pytest.approx(left(delay, direction(scale)), rel=1e-3)
-    assert beside < alone
+    def left(delay_s):
+        delay = Added("sensor_delay:q_rad_s", {"delay_s": float(delay_s)})
+        d = whiten(flown(lag, scale) - flown(delay, scale)).ravel()
+        y = np.concatenate([d, np.zeros(rows)])
+        return float(np.sum((y - x @ np.linalg.lstsq(x, y, rcond=1e-10)[0]) ** 2))
+
+    expected = min(left(t) for t in np.linspace(0.0095, 0.0105, 21))
+    d = whiten(information.difference(calm, lag, (scale,))).ravel()
+    found = information.apart(calm, lag, d, whiten, along, (scale,))
+    assert found == pytest.approx(expected, rel=0.02)
 
 
 def test_the_truths_own_error_is_the_noise(tmp_path):

@@ -16,7 +16,7 @@ it, so in rough air it is a lower bound for effects of the vane.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -256,7 +256,13 @@ def beyond(trial: Trial, d: Array, whiten: Whitener, along: Directions) -> float
 
 
 def nearest(
-    trial: Trial, d: Array, whiten: Whitener, along: Directions, keys: Iterable[str], base: Array
+    trial: Trial,
+    d: Array,
+    whiten: Whitener,
+    along: Directions,
+    keys: Iterable[str],
+    base: Array,
+    others: Sequence[Added] = (),
 ) -> list[tuple[str, float, float]]:
     """What of a whitened difference single effects leave at any size: key, place (0 to 1), rest; the best first.
 
@@ -264,7 +270,7 @@ def nearest(
 
     Parameters
     ----------
-    base : responses without any effect.
+    base : responses with the ``others`` alone.
     """
     own, left = along.projection.left(d), []
     for key in keys:
@@ -272,13 +278,20 @@ def nearest(
         size = min(SIZE16[key][AIRS.index(trial.air)], kind.largest)
         for place in (0.0, 0.5, 0.99) if key.endswith(":break") else (0.5,):
             effect = Added(key, kind.values(size, place))
-            other = along.projection.left(whiten(difference(trial, effect, (), COARSE_S, base)).ravel())
+            other = along.projection.left(whiten(difference(trial, effect, others, COARSE_S, base)).ravel())
             rest = float(own @ own - (own @ other) ** 2 / max(float(other @ other), 1e-12))
             left.append((key, place, rest))
     return sorted(left, key=lambda item: item[2])
 
 
-def apart(trial: Trial, effect: Added, d: Array, whiten: Whitener, along: Directions) -> float:
+def apart(
+    trial: Trial,
+    effect: Added,
+    d: Array,
+    whiten: Whitener,
+    along: Directions,
+    others: Sequence[Added] = (),
+) -> float:
     """What of an effect the best effect of another name leaves, flown at the size that leaves least.
 
     Of the effects that come nearest to first order, if that is near; everything else refitted to first order. Not of
@@ -287,24 +300,28 @@ def apart(trial: Trial, effect: Added, d: Array, whiten: Whitener, along: Direct
     Parameters
     ----------
     d : whitened difference that the effect makes, to first order.
+    others : effects beside it, whose sizes are refitted to first order too; their names are no rivals.
     """
-    target = responses(trial, (effect,), COARSE_S)
+    target = responses(trial, (*others, effect), COARSE_S)
+    base = responses(trial, others, COARSE_S)
+    if others:
+        rest = [tuple(e for e in others if e is not other) for other in others]
+        sizes = [whiten(difference(trial, o, r, COARSE_S)).ravel() for o, r in zip(others, rest, strict=True)]
+        along = replace(along, free=np.column_stack([along.free, *sizes]))
 
     def left(made: Array) -> float:
         return along.projection.rest(whiten(target - made).ravel())
 
-    base = responses(trial, (), COARSE_S)
-
     def rival(key: str, size: float, place: float) -> Array:
         try:
-            return responses(trial, (Added(key, EFFECTS[key].values(float(size), place)),), COARSE_S)
+            return responses(trial, (*others, Added(key, EFFECTS[key].values(float(size), place))), COARSE_S)
         except RuntimeError:  # it cannot be trimmed there
             return base
 
     best = left(base)
-    others = [key for key in LIBRARY if Added(key, {}).name != effect.name and key != "airspeed_scale"]
-    for key, place, rest in nearest(trial, d, whiten, along, others, base)[:_RIVALS]:
-        if rest > STRONG:
+    keys = _rivals({e.name for e in (effect, *others)})
+    for key, place, rest_left in nearest(trial, d, whiten, along, keys, base, others)[:_RIVALS]:
+        if rest_left > STRONG:
             break
         kind = EFFECTS[key]
         ends = (-kind.largest if kind.signed else _NEXT_TO_NONE * kind.largest, kind.largest)
@@ -318,21 +335,9 @@ def apart(trial: Trial, effect: Added, d: Array, whiten: Whitener, along: Direct
     return best
 
 
-def apart_beside(trial: Trial, effect: Added, whiten: Whitener, along: Directions) -> float:
-    """What of an effect the best effect of a name outside the trial leaves, beside the trial's other effects at any size.
-
-    To first order, at the sizes of `nearest`.
-    """
-    base = responses(trial, (), COARSE_S)
-
-    def direction(one: Added) -> Array:
-        return whiten(difference(trial, one, (), COARSE_S, base)).ravel()
-
-    others = [direction(e) for e in trial.effects if e is not effect]
-    beside = replace(along, free=np.column_stack([along.free, *others]))
-    taken = {e.name for e in trial.effects}
-    keys = [key for key in LIBRARY if Added(key, {}).name not in taken and key != "airspeed_scale"]
-    return nearest(trial, direction(effect), whiten, beside, keys, base)[0][2]
+def _rivals(names: Collection[str]) -> list[str]:
+    """Keys of the library's effects of other names; a wrong airspeed moves no output and is none."""
+    return [key for key in LIBRARY if Added(key, {}).name not in names and key != "airspeed_scale"]
 
 
 def difference(

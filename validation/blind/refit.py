@@ -36,7 +36,6 @@ from validation.blind.information import (
     Directions,
     Whitener,
     apart,
-    apart_beside,
     beyond,
     difference,
     directions,
@@ -79,6 +78,9 @@ def lambdas(trial: Trial) -> dict[str, float]:
         if _moves_derivatives(trial, effect) or refit_needed(trial, effect, others, value):
             value = _one(trial, effect, others, whiten)
         result[effect.key] = value
+        if trial.composition == "triple":
+            least = min(value, apart(trial, effect, d, whiten, along, others))
+            result[APART] = min(least, result.get(APART, least))
         if trial.composition in (*COMPOSITIONS, *CONDITIONS):
             continue
         if not EFFECTS[effect.key].library and value > STRONG:
@@ -88,8 +90,6 @@ def lambdas(trial: Trial) -> dict[str, float]:
             result[key] = min(value, apart(trial, effect, d, whiten, along))
     if trial.composition in COMPOSITIONS and len(trial.effects) > 1:
         result[TOGETHER] = together(trial, whiten, along)
-    if trial.composition == "triple":
-        result[APART] = min(apart_beside(trial, e, whiten, along) for e in trial.effects)
     return result
 
 
