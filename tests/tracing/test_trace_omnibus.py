@@ -15,9 +15,10 @@ from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.records import nodes
 from airtruth.tracing.model.response import External, respond
 from airtruth.tracing.model.surface import play
+from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.omnibus import FAMILIES, advice, anomalies, chi_square, views
 from airtruth.tracing.selection.rounds import SearchRound
-from airtruth.tracing.selection.spectrum import Anomaly, lines
+from airtruth.tracing.selection.spectrum import lines
 from airtruth.units import DEG
 
 pytestmark = pytest.mark.slow
@@ -230,8 +231,8 @@ def test_the_motion_without_the_vane_does_not_contain_it():
     more = np.zeros_like(made.signals.y)
     more[100, 0] = 1e-3
     (before,), (after,) = views(null, problem), views(null, tr.problem([changed(made, more)]))
-    assert np.ptp(before.unseen_rad) > 0.02
-    np.testing.assert_allclose(after.unseen_rad, before.unseen_rad, rtol=0.0, atol=1e-9)
+    assert np.ptp(before.without_vane_rad) > 0.02
+    np.testing.assert_allclose(after.without_vane_rad, before.without_vane_rad, rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("drifts", ["moment", "gyro"])

@@ -75,9 +75,9 @@ def reservations(
     of_vane = [e.key for e in named if e.key in EFFECTS and EFFECTS[e.key].channels == (VANE,)]
     if of_vane and friction_p_value <= DOUBT:
         found.append(
-            f"the vane moves less than the other sensors show where the motion turns (p = {friction_p_value:.2g} beside "
-            f"{', '.join(of_vane)}), and in gusts a friction of the vane looks like a lag: move the vane by hand on the ground "
-            "with the log running"
+            f"the vane moves less than gyro and accelerometer show where the motion turns (p = {friction_p_value:.2g} beside "
+            f"{', '.join(of_vane)}), and in gusts a friction of the vane looks like a lag: the name is provisional until the "
+            "vane has been moved by hand on the ground with the log running"
         )
     return tuple(found)
 

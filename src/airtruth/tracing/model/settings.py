@@ -124,7 +124,7 @@ def settings_of(aircraft: Aircraft, thrust_std: float, *, has_vane: bool = True)
         # quantisation and white noise add
         noise[i] = np.hypot(sensor.noise_std.value, sensor.quantum.value / np.sqrt(12.0))
         bias[i] = max(abs(sensor.bias.value) * 2.0, bias[i])
-    return Settings(
+    settings = Settings(
         noise=noise,
         noise_prior=prior,
         bias_std=bias,
@@ -132,10 +132,8 @@ def settings_of(aircraft: Aircraft, thrust_std: float, *, has_vane: bool = True)
         log_gust_std=_LOG_GUST_STD,
         thrust_std=thrust_std,
         trim_std=np.array(_TRIM_STD),
-        resolution=np.array(
-            [0.0 if has_vane or channel != VANE else _UNMEASURED_RAD for channel in CHANNELS]
-        ),
     )
+    return settings if has_vane else without_vane(settings)
 
 
 def without_vane(settings: Settings) -> Settings:

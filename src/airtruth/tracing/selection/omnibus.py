@@ -26,8 +26,9 @@ from airtruth.tracing.model.records import TraceRecord, fine, nodes
 from airtruth.tracing.model.response import External, Response, filter_inputs, respond_to
 from airtruth.tracing.model.settings import without_vane
 from airtruth.tracing.model.surface import play
+from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.score_test import inserted, projected
-from airtruth.tracing.selection.spectrum import Anomaly, lines
+from airtruth.tracing.selection.spectrum import lines
 
 Array = NDArray[np.float64]
 
@@ -64,7 +65,7 @@ class View:
     ----------
     elevator_rad : (points,) on the filter's grid, from the record's first value; largest_rad : over all records.
     alpha_rad, rate_rad_s : (samples,) predicted angle of attack, and its rate behind a low-pass.
-    unseen_rad : (samples,) reading of the vane as gyro and accelerometer show it, without the vane.
+    without_vane_rad : (samples,) reading of the vane as gyro and accelerometer show it.
     low_rad, high_rad, rate_std_rad_s : range and spread over all records.
     dt_s, sub : sample period [s]; cells of the filter's grid per sample.
     """
@@ -73,7 +74,7 @@ class View:
     largest_rad: float
     alpha_rad: Array
     rate_rad_s: Array
-    unseen_rad: Array
+    without_vane_rad: Array
     low_rad: float
     high_rad: float
     rate_std_rad_s: float
@@ -141,16 +142,16 @@ def views(null: PosteriorFit, problem: TraceProblem) -> list[View]:
     elevators = [nodes(r.signals.elevator_rad) for r in problem.records]
     elevators = [e - e[0] for e in elevators]
     largest = max(float(np.abs(e).max()) for e in elevators)
-    blind = without_vane(problem.settings)
-    predicted, rates, unseen = [], [], []
+    settings = without_vane(problem.settings)
+    predicted, rates, others = [], [], []
     for i, (record, tangent) in enumerate(zip(problem.records, null.sensitivities, strict=True)):
         given = filter_inputs(record, change)
         y = given.y[given.lead :]
         predicted.append(y[:, 0] - np.linalg.solve(tangent.white, tangent.r.T)[0])
         rates.append(_rate(predicted[-1], record.signals.dt_s))
-        without = respond_to(given, blind, null.point.common, null.point.per_record[i])
+        without = respond_to(given, settings, null.point.common, null.point.per_record[i])
         lost = not np.isfinite(without.logdet)
-        unseen.append(predicted[-1] if lost else y[:, 0] - without.e[:, 0] + _from_others(without))
+        others.append(predicted[-1] if lost else y[:, 0] - without.e[:, 0] + _from_others(without))
     low, high = np.quantile(np.concatenate(predicted), _QUANTILES)
     spread = max(float(np.std(np.concatenate(rates))), 1e-9)
     return [
@@ -159,7 +160,7 @@ def views(null: PosteriorFit, problem: TraceProblem) -> list[View]:
             largest_rad=max(largest, 1e-9),
             alpha_rad=alpha,
             rate_rad_s=rate,
-            unseen_rad=other,
+            without_vane_rad=other,
             low_rad=float(low),
             high_rad=max(float(high), float(low) + 1e-6),
             rate_std_rad_s=spread,
@@ -167,7 +168,7 @@ def views(null: PosteriorFit, problem: TraceProblem) -> list[View]:
             sub=record.signals.sub,
         )
         for record, elevator, alpha, rate, other in zip(
-            problem.records, elevators, predicted, rates, unseen, strict=True
+            problem.records, elevators, predicted, rates, others, strict=True
         )
     ]
 
@@ -242,10 +243,13 @@ def _drift(view: View) -> Series:
 def _vane(view: View) -> Series:
     """A vane with friction: the distance to a vane with play, by the motion that the other sensors show.
 
-    In gusts the filter's own prediction follows the vane, whose play leaves no further play in it.
+    In gusts the filter's own prediction follows the vane and shows no motion that the vane withholds.
     """
     span = view.high_rad - view.low_rad
-    return [(ALPHA, (view.unseen_rad - play(view.unseen_rad, half * span)) / span) for half in _FRICTIONS]
+    return [
+        (ALPHA, (view.without_vane_rad - play(view.without_vane_rad, half * span)) / span)
+        for half in _FRICTIONS
+    ]
 
 
 FRICTION: Final = "friction of the vane"

@@ -21,6 +21,7 @@ from airtruth.tracing.inference.whitening import Whitener, autoregression
 from airtruth.tracing.model.parameters import Common, Parameters
 from airtruth.tracing.selection import score_test
 from airtruth.tracing.selection.acceptance import SUPERSEDED, SURPASSED, UNSUPPORTED, Candidate, has_converged
+from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.budget import Advance
 from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.omnibus import anomalies
@@ -28,7 +29,6 @@ from airtruth.tracing.selection.ranking import TIE, rank
 from airtruth.tracing.selection.refit import Refit, better_null, refit_absorbed, refit_known, refit_leaders
 from airtruth.tracing.selection.release import DeclaredCauses, Release, explained, release
 from airtruth.tracing.selection.score_test import Table
-from airtruth.tracing.selection.spectrum import Anomaly
 
 Array = NDArray[np.float64]
 

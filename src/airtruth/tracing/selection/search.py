@@ -273,7 +273,7 @@ class _Search:
     ) -> tuple[SearchRound, ...]:
         """The first search that explains the records with an effect that ties with the leader, or is its variant.
 
-        It explains them alone; or it leads the search ``ends`` with the leader by later effects, and leaves no more.
+        It needs no later effect; or with later ones it leads ``ends``, the search with the leader, and leaves no larger anomaly.
         """
         own = rounds[-1]
         best = own.tied[0]

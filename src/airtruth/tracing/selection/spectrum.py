@@ -7,7 +7,6 @@ two degrees of freedom per frequency.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from airtruth.tracing.model.compile import CHANNELS
+from airtruth.tracing.selection.anomaly import Anomaly
 
 Array = NDArray[np.float64]
 
@@ -22,23 +22,6 @@ _BAND_HZ: Final = 0.5
 """Width of a band of the spectrum [Hz] (judgement: a mode with 2 % damping at 10 Hz lies in one)."""
 _LOWEST_HZ: Final = 1.0
 """Lowest frequency of the spectral test [Hz]; gust level, biases and coloured noise are free below (judgement)."""
-
-
-@dataclass(frozen=True)
-class Anomaly:
-    """Evidence of a missing effect.
-
-    Attributes
-    ----------
-    where : name of the effect or of the test that shows it.
-    statistic, degrees : chi-square statistic and its degrees of freedom [-].
-    p_value : probability of a larger statistic where nothing is missing [-].
-    """
-
-    where: str
-    statistic: float
-    degrees: int
-    p_value: float
 
 
 def lines(residuals: Sequence[Array], dt_s: Sequence[float]) -> Anomaly:
@@ -93,4 +76,4 @@ def _whitened(residuals: Sequence[Array]) -> list[Array]:
     ]
 
 
-__all__ = ["Anomaly", "lines"]
+__all__ = ["lines"]
