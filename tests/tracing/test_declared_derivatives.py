@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
+from airtruth.tracing.declared_model import remaining_evidence
 from airtruth.tracing.inference import derivative_likelihood as module
 from airtruth.tracing.inference.derivative_likelihood import contradiction, derivative_likelihood
 from airtruth.tracing.model.parameters import Common
+from airtruth.tracing.selection.anomaly import DERIVATIVES_MOVED, Anomaly
+from airtruth.tracing.selection.omnibus import advice
 
 DECLARED = np.diag([0.24, 9.5, 0.05, 0.09, 6.2, 0.09]) ** 2
 """Covariance of the declared derivatives of aircraft/gtm, independent."""
@@ -23,11 +26,11 @@ def white(monkeypatch):
         monkeypatch.setattr(module, name, lambda problem, fitted: np.ones(Common.size))
 
 
-def fit_of(estimate):
-    """The posterior of a linear problem: prior of zero mean, likelihood about ``estimate``."""
+def fit_of(estimate, spread=None):
+    """The posterior of a linear problem: prior of covariance ``DECLARED + spread`` about zero, likelihood about ``estimate``."""
     prior = np.eye(Common.size)
     own = Common.derivatives
-    prior[own, own] = np.linalg.inv(DECLARED)
+    prior[own, own] = np.linalg.inv(DECLARED if spread is None else DECLARED + spread)
     precision = prior.copy()
     precision[own, own] += TOLD
     covariance = np.linalg.inv(precision)
@@ -39,7 +42,7 @@ def fit_of(estimate):
     fitted = SimpleNamespace(
         point=SimpleNamespace(common=mode),
         covariance=covariance,
-        hypothesis=SimpleNamespace(unconstrained=(), spread=None),
+        hypothesis=SimpleNamespace(unconstrained=(), spread=spread),
         cost=0.5 * float((mode[own] - estimate) @ TOLD @ (mode[own] - estimate))
         + 0.5 * float(mode[own] @ np.linalg.solve(DECLARED, mode[own])),
     )
@@ -80,3 +83,31 @@ def test_derivatives_that_the_records_do_not_show_do_not_count(white, monkeypatc
     told[1, 1] = told[3, 3] = 1e-9
     monkeypatch.setitem(globals(), "TOLD", told)
     assert contradiction(*fit_of(np.zeros(6))).degrees == 4
+
+
+def test_derivatives_along_what_explains_them_are_no_contradiction(white):
+    """A cause of size 1 that moves CLde and Cmde, and the same with Cmde against its direction.
+
+    The mode is an invertible function of the estimate, so that the statistic is the estimate's own about the total covariance."""
+    along = np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.5])
+    spread = np.outer(along, along)
+    assert contradiction(*fit_of(along)).p_value < 1e-9
+    explained = contradiction(*fit_of(along, spread))
+    total = DECLARED + np.linalg.inv(TOLD) + spread
+    assert explained.statistic == pytest.approx(along @ np.linalg.solve(total, along), rel=1e-6)
+    assert explained.p_value > 0.9
+    against = along * np.array([1.0, 1.0, 1.0, 1.0, 1.0, -1.0])
+    assert contradiction(*fit_of(against, spread)).p_value < 1e-9
+
+
+def test_what_an_answer_leaves_is_in_the_remaining_evidence(white):
+    """The anomaly of the last round, or the derivatives with twice the probability of their test (Bonferroni)."""
+    cause = np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.5])
+    problem, fitted = fit_of(cause)
+    anomaly = Anomaly("a drift in time", 3.0, 5, 0.4)
+    left = remaining_evidence(problem, SimpleNamespace(null=fitted, anomaly=anomaly))
+    test = contradiction(problem, fitted)
+    assert left == Anomaly(DERIVATIVES_MOVED, test.statistic, test.degrees, 2.0 * test.p_value)
+    assert advice(left.where).startswith("trace again with `derivatives` among the candidates")
+    problem, fitted = fit_of(cause, np.outer(cause, cause))
+    assert remaining_evidence(problem, SimpleNamespace(null=fitted, anomaly=anomaly)) is anomaly

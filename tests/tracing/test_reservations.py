@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from airtruth.tracing.accepted import AcceptedEffect
+from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.answer import Alternative
 from airtruth.tracing.reservations import DOUBT, MANY, causes, reservations
 
@@ -87,6 +87,33 @@ def test_names_beside_an_increment_are_provisional():
     two, many = reservations(effects("vane_arm", "cg_shift", "derivatives", "increment"), ())
     assert "what vane_arm, cg_shift, derivatives explain:" in two
     assert "or more" in many
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "value", "ci95", "reason"),
+    [
+        (
+            "cg_shift",
+            "dx_mac",
+            0.05,
+            (-0.01, 0.11),
+            "the 95 % interval of cg_shift contains no effect at all",
+        ),
+        ("mass_error", "factor", 1.1, (0.99, 1.21), "the 95 % interval of mass_error contains no effect"),
+        ("mass_error", "factor", 1.31, (1.2, 1.42), "mass_error of such a size is improbable"),
+        ("cg_shift", "dx_mac", 0.05, (0.01, 0.09), ""),
+        ("mass_error", "factor", 1.29, (1.2, 1.38), ""),
+        ("rate_limit", "rate_rad_s", 0.5, (0.4, None), "the 95 % interval of rate_limit contains no effect"),
+        ("rate_limit", "rate_rad_s", 0.5, (0.4, 0.7), ""),
+        ("vane_lag", "tau_s", 3.0, (2.9, 3.1), ""),
+    ],
+)
+def test_a_name_without_a_sure_or_a_usual_size_is_provisional(name, parameter, value, ci95, reason):
+    """The prior of a mass has a standard deviation of 0.1 (explanation.py), so that 31 % is 3.1 of them."""
+    effect = AcceptedEffect(name, {parameter: ParameterEstimate(value, 0.05, ci95)}, 1e-9, 5.0)
+    found = reservations([effect], ())
+    assert len(found) == bool(reason)
+    assert "".join(found).startswith(reason)
 
 
 def test_an_error_of_the_vane_beside_a_friction_of_the_vane_is_provisional():

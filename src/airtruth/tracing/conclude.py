@@ -35,6 +35,7 @@ from airtruth.tracing.declared_model import (
     detectable_causes,
     explaining_effects,
     inclusion,
+    remaining_evidence,
     with_axial_force,
 )
 from airtruth.tracing.increment_table import in_physical_terms, increment_rows, least_certain
@@ -85,7 +86,7 @@ def conclude(
     """
     case, first, last = stages.case, rounds[0], rounds[-1]
     effects = accepted(rounds)
-    anomaly, remaining = first.anomaly, last.anomaly
+    anomaly, remaining = first.anomaly, remaining_evidence(case.fitted, last)
     covariance = robust_covariance(case.fitted, reported(last))
     stated = _with_rivals(
         (

@@ -23,9 +23,10 @@ from airtruth.tracing.answer import (
     DerivativeShift,
     ParameterEstimate,
 )
-from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood
+from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, contradiction
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.model.parameters import Common, size_index
+from airtruth.tracing.selection.anomaly import DERIVATIVES_MOVED, Anomaly
 from airtruth.tracing.selection.explanation import DERIVATIVES, CauseSet, size_of
 from airtruth.tracing.selection.ranking import TIE
 from airtruth.tracing.selection.release import (
@@ -85,7 +86,7 @@ def declared_model(
             )
             for i, name in enumerate(PARAMETERS)
         },
-        where="the derivatives" if by_derivatives else anomaly.where,
+        where=DERIVATIVES_MOVED if by_derivatives else anomaly.where,
     )
 
 
@@ -108,6 +109,19 @@ def with_axial_force(declared: DeclaredModel, along: Sequence[AcceptedEffect]) -
         p_value=2.0 * p_value,
         where="the axial force",
     )
+
+
+def remaining_evidence(problem: TraceProblem, last: SearchRound) -> Anomaly:
+    """The strongest evidence of what the answer lacks: the last round's anomaly, or derivatives that nothing of it explains.
+
+    Parameters
+    ----------
+    problem : fitted records; last : last round of the search.
+    """
+    test = contradiction(problem, last.null)
+    if 2.0 * test.p_value >= last.anomaly.p_value:
+        return last.anomaly
+    return Anomaly(DERIVATIVES_MOVED, test.statistic, test.degrees, 2.0 * test.p_value)
 
 
 def _apparent_shift(last: SearchRound, covariance: Array, causes: DeclaredCauses) -> tuple[Array, Array]:
@@ -303,5 +317,6 @@ __all__ = [
     "detectable_causes",
     "explaining_effects",
     "inclusion",
+    "remaining_evidence",
     "with_axial_force",
 ]

@@ -14,6 +14,7 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.accepted import AcceptedEffect
 from airtruth.tracing.answer import Alternative
 from airtruth.tracing.model.settings import VANE
+from airtruth.tracing.selection.explanation import USUAL_SIZES
 
 MANY: Final = 3
 """Number of separate causes from which their names are provisional [-] (judgement: in the blind trials an effect outside
@@ -24,6 +25,8 @@ UNNAMED: Final = 0.05
 """Posterior weight of increments without any name from which the names are provisional [-] (convention)."""
 DOUBT: Final = 0.05
 """Probability of the test of a friction of the vane below which a named error of the vane is provisional [-] (convention)."""
+UNUSUAL: Final = 3.0
+"""Size of a named cause over the standard deviation of its prior from which the names are provisional [-] (convention)."""
 _AXIAL: Final = "CX"
 """Coefficient whose increments a wrong angle of attack imitates: ax shows them, after the effects of the other channels."""
 _ONE_EVENT: Final = frozenset({"cg_shift", "mass_error", "inertia_error"})
@@ -60,6 +63,18 @@ def reservations(
             f"{listed} are {MANY} causes or more, and one effect that the library lacks can look like as many: the names are "
             "provisional until a flight of their own confirms each"
         )
+    unsure = [e.key for e in named if _contains_neutral(e)]
+    if unsure:
+        found.append(
+            f"the 95 % interval{'s' if len(unsure) > 1 else ''} of {', '.join(unsure)} "
+            f"contain{'' if len(unsure) > 1 else 's'} no effect at all: the names are provisional"
+        )
+    large = [e.key for e in named if _deviation(e) > UNUSUAL]
+    if large:
+        found.append(
+            f"{', '.join(large)} of such a size {'are' if len(large) > 1 else 'is'} improbable before any flight, and a cause "
+            "that the library lacks can look the same: the names are provisional until a measurement on the ground confirms them"
+        )
     doubtful = [e.key for e in named if _probability(e, sets) < LEAST_INCLUSION]
     if sets and doubtful:
         found.append(
@@ -88,10 +103,34 @@ def _probability(effect: AcceptedEffect, sets: Sequence[Alternative]) -> float:
     return sum(s.weight for s in sets if alike & set(s.effects))
 
 
+def _contains_neutral(effect: AcceptedEffect) -> bool:
+    """Whether the interval of the size of an effect of the library contains the value at which it changes nothing."""
+    if effect.key not in EFFECTS:
+        return False
+    first = EFFECTS[effect.key].parameters[0]
+    if first.name not in effect.parameters:
+        return False
+    low, high = effect.parameters[first.name].ci95
+    return (low is None or low <= first.neutral) and (high is None or first.neutral <= high)
+
+
+def _deviation(effect: AcceptedEffect) -> float:
+    """Size of a cause that moves the derivatives, over the standard deviation of its prior; 0 for any other effect [-]."""
+    usual = USUAL_SIZES.get(effect.key)
+    if usual is None:
+        return 0.0
+    first = EFFECTS[effect.key].parameters[0]
+    return (
+        abs(first.size(effect.parameters[first.name].value)) / usual
+        if first.name in effect.parameters
+        else 0.0
+    )
+
+
 def causes(named: Sequence[AcceptedEffect]) -> int:
     """Number of separate causes among named effects; CG, mass and inertia count as one."""
     apart = [e for e in named if e.name not in _ONE_EVENT]
     return len(apart) + (len(apart) < len(named))
 
 
-__all__ = ["DOUBT", "LEAST_INCLUSION", "MANY", "UNNAMED", "causes", "reservations"]
+__all__ = ["DOUBT", "LEAST_INCLUSION", "MANY", "UNNAMED", "UNUSUAL", "causes", "reservations"]

@@ -91,6 +91,8 @@ def contradiction(problem: TraceProblem, fitted: PosteriorFit) -> Contradiction:
     With a true declaration, the mode d_m = C (I d + e) has the covariance C I S I C + C K C: S of the declared
     derivatives d, K of the slope e of the likelihood. Directions that the records do not determine do not count.
 
+    Where the fit holds released derivatives, the declaration is that of what explains them.
+
     Source: G. E. P. Box, J. R. Statist. Soc. A 143 (1980), the prior predictive check.
     """
     mode = fitted.point.common[Common.derivatives]
@@ -100,6 +102,8 @@ def contradiction(problem: TraceProblem, fitted: PosteriorFit) -> Contradiction:
     covariance = np.linalg.inv(prior + information)
     gain = covariance @ information
     declared = problem.declared_covariance
+    if fitted.hypothesis.spread is not None:
+        declared = declared + fitted.hypothesis.spread
     spread = gain @ declared @ gain.T + (covariance @ information @ covariance) * np.outer(ratio, ratio)
     spread, declared = spread[np.ix_(tight, tight)], declared[np.ix_(tight, tight)]
     root = np.linalg.cholesky(declared)

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
+
+DERIVATIVES_MOVED: Final = "the derivatives"
+"""Where evidence shows that the derivatives are not those that are declared, or not those that an answer gives."""
 
 
 @dataclass(frozen=True)
@@ -22,4 +26,4 @@ class Anomaly:
     p_value: float
 
 
-__all__ = ["Anomaly"]
+__all__ = ["DERIVATIVES_MOVED", "Anomaly"]

@@ -150,6 +150,8 @@ errors of declarations, tail and wing that lose lift rather than gain it, and th
 contributions)."""
 EXPLAINING: Final = tuple(_PRIORS)
 """Keys of the physical causes."""
+USUAL_SIZES: Final[Mapping[str, float]] = MappingProxyType({key: p.std for key, p in _PRIORS.items()})
+"""Key of a physical cause -> standard deviation of its size before any record."""
 
 
 def causes_of(directions: Mapping[str, Array]) -> tuple[Cause, ...]:
@@ -352,6 +354,7 @@ __all__ = [
     "LOADING",
     "MOST_CAUSES",
     "REFERENCE",
+    "USUAL_SIZES",
     "WRONG_BY",
     "Cause",
     "CauseSet",

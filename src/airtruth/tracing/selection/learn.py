@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment, Shape
+from airtruth.tracing.inference.derivative_likelihood import contradiction
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import NO_WHITENER
@@ -34,7 +35,7 @@ from airtruth.tracing.selection.increment_fit import (
 from airtruth.tracing.selection.increments import Screened, screen, shapes, sharpened
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.ranking import TIE
-from airtruth.tracing.selection.release import DeclaredCauses, explained
+from airtruth.tracing.selection.release import CONTRADICTED, DeclaredCauses, explained
 from airtruth.tracing.selection.rounds import (
     NOTHING_DECLARED,
     REMAINS,
@@ -74,7 +75,8 @@ def with_increments(
     """The rounds of a search with increments of what its effects leave.
 
     Where named effects leave an anomaly, increments are learned beside them. Instead of them they are learned in any case: names
-    that fit may imitate what the library lacks. The names remain unless increments alone have a much larger evidence. Names that
+    that fit may imitate what the library lacks. Causes of released derivatives have such rivals where they leave the derivatives
+    contradicted. The names remain unless increments alone have a much larger evidence. Names that
     the increments make unnecessary are given up, and so is the release of the derivatives.
 
     Parameters
@@ -109,15 +111,19 @@ def _learned(
     learn = _Learning(problem, tuple(effects), seed, advance)
     grown, evidence = learn.grown(rounds)
     named = rounds[-1].null.hypothesis.effects
-    if not named or rounds[0].release is not None or rounds[-1].null.hypothesis.spread is not None:
+    last = rounds[-1]
+    explains = last.sets[0].effects if last.sets else ()
+    unexplained = bool(explains) and contradiction(problem, last.null).p_value <= CONTRADICTED
+    released = rounds[0].release is not None or last.null.hypothesis.spread is not None
+    if not unexplained and (released or not named):
         return grown
-    bare = (replace(rounds[0], tied=(), profile=None),)
-    gain = bare[0].null.cost - (total_cost(rounds[-1]) - evidence)
-    promising = _PROMISING * gain if rounds[-1].anomaly.p_value > REMAINS else 0.0
+    bare = (replace(rounds[0], tied=(), profile=None, release=None, sets=()),)
+    gain = bare[0].null.cost - (total_cost(last) - evidence)
+    promising = _PROMISING * gain if last.anomaly.p_value > REMAINS else 0.0
     alone, alone_evidence = replace(learn, promising=promising).grown(bare)
     lead = alone_evidence - gain
     if len(alone) > 1 and lead > _NAMES_LEAD:
-        names = tuple(sorted({e.name for e in named}))
+        names = tuple(sorted({*(e.name for e in named), *explains}))
         return (replace(alone[0], rival=Rival({names: -lead})), *alone[1:])
     learned = tuple(c.score.effect for c in _accepted(alone))
     if learned and grown is rounds and _acts_on(learned) != _acts_on(named):

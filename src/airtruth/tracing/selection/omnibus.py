@@ -26,7 +26,7 @@ from airtruth.tracing.model.records import TraceRecord, fine, nodes
 from airtruth.tracing.model.response import External, Response, filter_inputs, respond_to
 from airtruth.tracing.model.settings import without_vane
 from airtruth.tracing.model.surface import play
-from airtruth.tracing.selection.anomaly import Anomaly
+from airtruth.tracing.selection.anomaly import DERIVATIVES_MOVED, Anomaly
 from airtruth.tracing.selection.score_test import inserted, projected
 from airtruth.tracing.selection.spectrum import lines
 
@@ -296,12 +296,18 @@ _LIBRARY: Final = (
     "This effect improves the fit but fails an acceptance test."
 )
 """Advice for an effect of the library that was not accepted."""
+_GROUND: Final = (
+    "trace again with `derivatives` among the candidates, and measure CG, mass and inertia on the ground."
+)
+"""Advice for derivatives that no accepted effect explains."""
 
 
 def advice(where: str) -> str:
     """The flight that shows an anomaly better, by the test that shows it."""
     if where in FAMILIES:
         return FAMILIES[where].advice
+    if where == DERIVATIVES_MOVED:
+        return _GROUND
     return _RINGING if where.startswith(CHANNELS) else _LIBRARY
 
 

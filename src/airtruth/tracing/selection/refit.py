@@ -48,6 +48,9 @@ _AGREES: Final = 0.2
 [-] (judgement: another optimum, in which the derivatives have absorbed the effect, has a fraction of its size)."""
 _USUAL: Final = 0.15
 """Share of its plausible range at which the search for an effect without a score begins [-] (judgement)."""
+_LARGE: Final = 0.5
+"""Share at which a second search begins where either sign is tried [-] (judgement: near the usual share the derivatives may
+keep a large effect in an optimum of their own)."""
 
 
 @dataclass(frozen=True)
@@ -216,7 +219,9 @@ def _usual_sizes(s: Score, either_sign: bool) -> tuple[float, ...]:
     low, high = (_USUAL * end for end in first.reach)
     if first.one_sided:
         return (high,)
-    return (high, low) if either_sign else (0.0,)
+    if not either_sign:
+        return (0.0,)
+    return tuple(share * end for share in (1.0, _LARGE / _USUAL) for end in (high, low))
 
 
 def _leading(
