@@ -116,9 +116,17 @@ def test_a_name_without_a_sure_or_a_usual_size_is_provisional(name, parameter, v
     assert "".join(found).startswith(reason)
 
 
+def test_a_name_of_a_declared_model_that_is_not_contradicted_is_provisional():
+    """`consistent` of the declared model is a probability above 1 %."""
+    (reason,) = reservations(effects("airspeed_scale"), (), declared_p_value=0.013)
+    assert reason.startswith("the evidence against the declared model is weak (p = 0.013)")
+    assert reservations(effects("airspeed_scale"), (), declared_p_value=0.01) == ()
+    assert reservations(effects("increment"), (), declared_p_value=0.013) == ()
+
+
 def test_an_error_of_the_vane_beside_a_friction_of_the_vane_is_provisional():
     for name in ("vane_lag", "vane_scale"):
-        (reason,) = reservations(effects(name), (), DOUBT)
+        (reason,) = reservations(effects(name), (), friction_p_value=DOUBT)
         assert f"beside {name}" in reason
-        assert reservations(effects(name), (), 1.01 * DOUBT) == ()
-    assert reservations(effects("gyro_lag", "cg_shift"), (), 1e-9) == ()
+        assert reservations(effects(name), (), friction_p_value=1.01 * DOUBT) == ()
+    assert reservations(effects("gyro_lag", "cg_shift"), (), friction_p_value=1e-9) == ()

@@ -102,7 +102,7 @@ def conclude(
     sizes = cause_sizes(likelihood, case.declared)
     verdict = _verdict((*stated, *along), declared)
     confirmed = confirmation(stages)
-    reserved = reservations((*stated, *along), sets, rounds[-1].p_value_of(FRICTION))
+    reserved = reservations((*stated, *along), sets, declared.p_value, rounds[-1].p_value_of(FRICTION))
     errors = stage_errors(stages)
     return TraceAnswer(
         verdict=verdict,

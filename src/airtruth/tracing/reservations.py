@@ -12,7 +12,7 @@ from typing import Final
 from airtruth.effects.increment import NAME
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.accepted import AcceptedEffect
-from airtruth.tracing.answer import Alternative
+from airtruth.tracing.answer import ANOMALY_LEVEL, Alternative
 from airtruth.tracing.model.settings import VANE
 from airtruth.tracing.selection.explanation import USUAL_SIZES
 
@@ -34,7 +34,10 @@ _ONE_EVENT: Final = frozenset({"cg_shift", "mass_error", "inertia_error"})
 
 
 def reservations(
-    effects: Sequence[AcceptedEffect], sets: Sequence[Alternative], friction_p_value: float = 1.0
+    effects: Sequence[AcceptedEffect],
+    sets: Sequence[Alternative],
+    declared_p_value: float = 0.0,
+    friction_p_value: float = 1.0,
 ) -> tuple[str, ...]:
     """Each reason against relying on the names of an answer, in words.
 
@@ -42,6 +45,7 @@ def reservations(
     ----------
     effects : those of the answer, the explanation of its derivatives among them.
     sets : sets of causes with their posterior weights, the leading one first.
+    declared_p_value : of the test of the declared model [-].
     friction_p_value : of the test of a friction of the vane where the effects have been added [-].
     """
     named = [e for e in effects if e.acts_on is None]
@@ -62,6 +66,11 @@ def reservations(
         found.append(
             f"{listed} are {MANY} causes or more, and one effect that the library lacks can look like as many: the names are "
             "provisional until a flight of their own confirms each"
+        )
+    if named and declared_p_value > ANOMALY_LEVEL:
+        found.append(
+            f"the evidence against the declared model is weak (p = {declared_p_value:.2g}): the names are provisional until "
+            "another flight shows it again"
         )
     unsure = [e.key for e in named if _contains_neutral(e)]
     if unsure:
