@@ -11,7 +11,7 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import Change
 from airtruth.tracing.inference import assess as assessing
 from airtruth.tracing.inference.assess import assess, noise_floor
-from airtruth.tracing.inference.cross_validate import leave_one_out, one_by_the_other
+from airtruth.tracing.inference.cross_validate import leave_one_out, one_by_the_other, step_without
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.model.compile import compile_change
@@ -53,6 +53,23 @@ def test_leave_one_out_is_the_refit_without_the_record(fitted):
         assert likelihood[i] == pytest.approx(expected.likelihood, abs=0.3)
         np.testing.assert_allclose(assessed[i].free_run, expected.free_run, rtol=0.02)
         assert assessed[i].likelihood == likelihood[i]
+
+
+def test_what_one_record_alone_tells_stays_where_it_is_left_out():
+    """A linear problem in three unknowns, two records: the first alone tells of the third unknown.
+
+    Expected: the solution of the second record's normal equations in the other two unknowns.
+    """
+    rng = np.random.default_rng(20261125)
+    ours, others = rng.standard_normal((8, 3)), rng.standard_normal((9, 3))
+    others[:, 2] = 0.0
+    y, z = rng.standard_normal(8), rng.standard_normal(9)
+    own, total = ours.T @ ours, ours.T @ ours + others.T @ others
+    best = np.linalg.solve(total, ours.T @ y + others.T @ z)
+    step = step_without(ours.T @ (ours @ best - y), own, total)
+    assert others @ (best + step) == pytest.approx(others @ np.linalg.lstsq(others, z)[0], abs=1e-6)
+    # in the measure of the information, the step has no part along what the others do not tell
+    assert (total @ step)[2] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_of_two_records_the_other_is_refitted(fitted):

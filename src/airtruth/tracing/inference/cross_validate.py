@@ -7,8 +7,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
-from airtruth.numerics.normal_equations import scaled_step
 from airtruth.tracing.inference.assess import Assessment, assess
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit
@@ -26,7 +26,10 @@ from airtruth.tracing.model.parameters import Common, Parameters
 Array = NDArray[np.float64]
 
 _RIDGE: Final = 1e-9
-"""Ridge on the scaled information of the other records [-]; they may say nothing of a size (judgement)."""
+"""Ridge on the scaled information of all records [-]; they may say nothing of a size (judgement)."""
+_TOLD: Final = 0.05
+"""Share of the information that the other records have to hold for an estimate to move to theirs [-] (judgement: below it their
+standard error is more than four times that of all records, and its loss would hide what an effect gains)."""
 _MOST_STEP: Final = 1.0
 """Largest step of a common parameter that is no derivative [-]: a factor of e for levels (judgement)."""
 
@@ -41,7 +44,9 @@ class LeftOut(NamedTuple):
 def leave_one_out(problem: TraceProblem, fitted: PosteriorFit) -> LeftOut:
     """Assess each fitted record without its own contribution.
 
-    One step of scoring takes a record out of the fit: exact where the posterior is quadratic.
+    One step of scoring takes a record out of the fit: exact where the posterior is quadratic. Directions in which the other
+    records hold less than `_TOLD` of the information keep their estimate: a break that one record alone flies through has no size
+    in the others.
     """
     hypothesis, point, layout = fitted.hypothesis, fitted.point, fitted.layout
     terms = [likelihood_terms(s, NO_WHITENER, levels=True) for s in fitted.sensitivities]
@@ -56,7 +61,7 @@ def leave_one_out(problem: TraceProblem, fitted: PosteriorFit) -> LeftOut:
         gradient, information, _ = marginal_information(
             alone, there, terms[i : i + 1], levels=True, fixed=fixed
         )
-        move = -scaled_step(gradient, total - information, _RIDGE)
+        move = step_without(gradient, information, total)
         move[Common.nuisance] = np.clip(move[Common.nuisance], -_MOST_STEP, _MOST_STEP)
         sizes = point.sizes + _within_range(hypothesis, point.sizes, move[layout.sizes])
         return assess(problem, i, hypothesis, point.common + move[layout.common], sizes, point.per_record[i])
@@ -81,6 +86,23 @@ def one_by_the_other(problem: TraceProblem, fitted: PosteriorFit) -> LeftOut:
     return LeftOut(np.array([a.likelihood for a in assessed]), assessed)
 
 
+def step_without(gradient: Array, information: Array, total: Array) -> Array:
+    """The step of scoring that takes a record out of a fit.
+
+    Parameters
+    ----------
+    gradient, information : (n,) and (n, n) of the record's cost at the fit; total : (n, n) information of all.
+    """
+    scale = np.sqrt(np.maximum(np.diag(total), np.finfo(float).tiny))
+    root = np.linalg.cholesky(total / np.outer(scale, scale) + _RIDGE * np.eye(len(scale)))
+    half = solve_triangular(root, information / np.outer(scale, scale), lower=True)
+    share, directions = np.linalg.eigh(solve_triangular(root, half.T, lower=True))
+    along = directions.T @ solve_triangular(root, gradient / scale, lower=True)
+    told = share < 1.0 - _TOLD
+    along = np.divide(along, 1.0 - share, out=np.zeros_like(along), where=told)
+    return np.asarray(solve_triangular(root, directions @ along, lower=True, trans="T") / scale)
+
+
 def _within_range(hypothesis: Hypothesis, sizes: Array, step: Array) -> Array:
     """The step, ended where a parameter would leave its range."""
     ended = step.copy()
@@ -90,4 +112,4 @@ def _within_range(hypothesis: Hypothesis, sizes: Array, step: Array) -> Array:
     return ended
 
 
-__all__ = ["LeftOut", "leave_one_out", "one_by_the_other"]
+__all__ = ["LeftOut", "leave_one_out", "one_by_the_other", "step_without"]
