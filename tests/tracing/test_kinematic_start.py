@@ -79,12 +79,12 @@ def test_a_trace_refits_the_cause_and_agrees(logs, gtm):
     assert not any("kinematic check" in note for note in result.answer.notes)
     # without the effect, and with another size, the same answer contradicts the check
     check = kinematic_check(logs, gtm, held=())
-    (note,) = disagreement(check, replace(result.answer, effects=()))
+    (note,) = disagreement(check, replace(result.answer, effects=()), 0.02)
     assert "names" in note
     assert "vane_lag" in note
     other = replace(effect.parameters["tau_s"], value=0.5, ci95=(0.45, 0.55))
     (note,) = disagreement(
-        check, replace(result.answer, effects=(replace(effect, parameters={"tau_s": other}),))
+        check, replace(result.answer, effects=(replace(effect, parameters={"tau_s": other}),)), 0.02
     )
     assert "vane_lag: the trace estimates 0.5" in note
 
@@ -95,12 +95,27 @@ def test_a_bias_of_the_check_is_compared_with_that_of_the_trace():
     check = SimpleNamespace(verdict="errors", possible=(), findings=(found,))
     own = ParameterEstimate(-0.05, 0.01, (-0.07, -0.03))
     effect = AcceptedEffect("gyro_bias", {"value": own}, 1e-9, 5.0)
-    (note,) = disagreement(check, SimpleNamespace(effects=(effect,)))
+    (note,) = disagreement(check, SimpleNamespace(effects=(effect,)), 0.02)
     assert note == "gyro_bias: the trace estimates -0.05, the kinematic check 0.02 to 0.04"
-    answer = with_contradictions(Answer((effect,)), check)
+    answer = with_contradictions(Answer((effect,)), check, 0.02)
     assert (answer.provisional, answer.notes) == (True, (note,))
     agrees = replace(effect, parameters={"value": replace(own, ci95=(-0.07, 0.025))})
-    assert with_contradictions(Answer((agrees,)), check) == Answer((agrees,))
+    assert with_contradictions(Answer((agrees,)), check, 0.02) == Answer((agrees,))
+
+
+def test_half_a_sample_is_no_contradiction():
+    """A gyro late by 13 ms, which the trace does not name: of 20 Hz samples a quarter, of 50 Hz samples two thirds."""
+    found = Finding("gyro_lag", "s", "", 0.013, 0.001, 0.011, 0.015, 0.0, 0.004, "present")
+    check = SimpleNamespace(verdict="errors", possible=(SimpleNamespace(errors=(found,)),), findings=(found,))
+    own = ParameterEstimate(0.08, 0.001, (0.078, 0.082))
+    answer = SimpleNamespace(effects=(AcceptedEffect("vane_lag", {"tau_s": own}, 1e-9, 5.0),))
+    assert disagreement(check, answer, 0.05) == []
+    (note,) = disagreement(check, answer, 0.02)
+    assert "names gyro_lag" in note
+    # an estimate is compared with the same margin: 15 ms and 25 ms against 41 ms
+    late = AcceptedEffect("gyro_lag", {"tau_s": replace(own, ci95=(0.041, 0.045))}, 1e-9, 5.0)
+    assert len(disagreement(check, SimpleNamespace(effects=(late,)), 0.05)) == 1
+    assert disagreement(check, SimpleNamespace(effects=(late,)), 0.06) == []
 
 
 @dataclass(frozen=True)

@@ -77,7 +77,7 @@ class Tolerance:
     ----------
     share : of a declared slope of the axial force, relative [-].
     alpha_slope, elevator_slope, rate_slope : least ones of the slopes of CX [1/rad, 1/rad, -].
-    bias_rad : of the vane [rad].
+    bias_rad : of the vane; an estimated bias that is larger has its own size [rad].
     late_s : time by which vane and surface are late [s].
     x_m, z_m : position of the accelerometer [m].
     scale : of the accelerometer [-].
@@ -95,8 +95,9 @@ class Tolerance:
 
 
 TOLERANCE: Final = Tolerance()
-"""Judgement: wind-tunnel slopes of the axial force to 10 %, an estimated bias of the vane to 0.1 deg, a vane or a surface late by
-a quarter of a sample at 50 Hz, and an accelerometer that is surveyed to some centimetres."""
+"""Judgement: wind-tunnel slopes of the axial force to 10 %, an estimated bias of the vane to 0.1 deg or to its own size, because
+a learned function of the angle of attack and a bias imitate each other, a vane or a surface late by a quarter of a sample at 50
+Hz, and an accelerometer that is surveyed to some centimetres."""
 
 
 def axial_series(
@@ -143,7 +144,10 @@ def axial_series(
                     channels[name] = channels[name] - bias
                 # the record's own airspeed is low-passed, and lacks the declared errors alone
                 ratio = channels[_SPEED] / batch.channels[_SPEED][row]
-                found[run_id] = _series(channels, record, ratio, between[id(record.plant)], change, aircraft)
+                bias_rad = float(parameters[PerRecord.bias][0])
+                found[run_id] = _series(
+                    channels, record, ratio, bias_rad, between[id(record.plant)], change, aircraft
+                )
     return [found[r.signals.run_id] for r in records]
 
 
@@ -151,11 +155,19 @@ def _series(
     channels: Mapping[str, Array],
     record: TraceRecord,
     ratio: Array,
+    bias_rad: float,
     between: tuple[Array, Array],
     change: Change,
     aircraft: Aircraft,
 ) -> AxialSeries:
-    """One series; ``ratio``: airspeed without its accepted error over that with it; ``between``: X between the points."""
+    """One series.
+
+    Parameters
+    ----------
+    ratio : (samples,) airspeed without its accepted error over that with it [-].
+    bias_rad : estimated bias of the vane, which is undone [rad].
+    between : X between the points of the tables, see `_between_points`.
+    """
     s, plant, c = record.signals, record.plant, aircraft.constants
     own = _accelerometer(aircraft)
     factor = declared_total(change.declared, "elevator")
@@ -172,18 +184,24 @@ def _series(
     mass = plant.trim.mass_kg if plant.trim is not None else c.mass_kg
     mass = mass * declared_total(change.declared, "mass")
     force = pressure * c.wing_area_m2
-    declared, _, _ = looked_up(plant, alpha, elevator, q * half, pressure)
-    declared = declared + pressure * np.interp(alpha, *between)
+
+    def along(alpha_rad: Array) -> Array:
+        """X of the declared model (samples,) [N]."""
+        x, _, _ = looked_up(plant, alpha_rad, elevator, q * half, pressure)
+        return np.asarray(x + pressure * np.interp(alpha_rad, *between))
+
+    declared = along(alpha)
     per_alpha, per_elevator = _slopes(plant, c.wing_area_m2)
     t = TOLERANCE
     shown = _without_noise(alpha, (channels["az_m_s2"], q, elevator))
     off_alpha, off_elevator = shown - plant.trim_alpha_rad, elevator - plant.trim_elevator_rad
+    off_bias = bias_rad if abs(bias_rad) > t.bias_rad else t.bias_rad
     inertial = mass / force
     tolerances = [
         max(t.share * abs(per_alpha), t.alpha_slope) * off_alpha,
         max(t.share * abs(per_elevator), t.elevator_slope) * off_elevator,
         t.rate_slope * q * half,
-        t.bias_rad * _local_slope(plant, shown, elevator, q * half, pressure) / force,
+        (along(shown + off_bias) - along(shown)) / force,
         t.late_s * per_alpha * smooth_rate(shown, _RATE_S, s.dt_s),
         t.late_s * per_elevator * smooth_rate(elevator, _RATE_S, s.dt_s),
         t.z_m * inertial * q_dot,
@@ -214,14 +232,6 @@ def _without_noise(alpha: Array, others: Sequence[Array]) -> Array:
 
 def _accelerometer(aircraft: Aircraft) -> SensorErrors:
     return aircraft.file.sensors[CHANNEL].errors() if CHANNEL in aircraft.file.sensors else SensorErrors()
-
-
-def _local_slope(plant: Plant, alpha: Array, elevator: Array, qhat: Array, pressure: Array) -> Array:
-    """(samples,) slope of X over the angle of attack [N/rad]."""
-    above, below = (
-        looked_up(plant, alpha + step, elevator, qhat, pressure)[0] for step in (_FINE_RAD, -_FINE_RAD)
-    )
-    return np.asarray((above - below) / (2.0 * _FINE_RAD))
 
 
 def _between_points(plant: Plant) -> tuple[Array, Array]:

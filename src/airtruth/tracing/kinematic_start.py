@@ -27,6 +27,10 @@ _ERRORS: Final = 5.0
 quite white)."""
 _FITS: Final = 0.05
 """Probability of the check's absolute test from which it fits the records [-] (convention)."""
+_SAMPLES: Final = 0.5
+"""Time over the sample period up to which the check does not contradict a trace [-] (judgement: between two samples it follows
+the motion by a polynomial, and a surface that steps bends it; ideal sensors logged at 20 Hz show a gyro late by a quarter of a
+sample)."""
 
 
 def kinematic_check(
@@ -87,12 +91,20 @@ def _beyond_declared(one: Finding) -> float:
     return one.value / one.declared if is_factor else one.value - one.declared
 
 
-def disagreement(check: CheckResult | None, answer: TraceAnswer) -> list[str]:
-    """Sentences about contradictions between a check and an answer, without a final period."""
+def disagreement(check: CheckResult | None, answer: TraceAnswer, dt_s: float) -> list[str]:
+    """Sentences about contradictions between a check and an answer, without a final period.
+
+    Parameters
+    ----------
+    dt_s : longest sample period of the fitted records [s].
+    """
     if check is None or check.verdict not in ("errors", "one_of"):
         return []
     traced = {name for e in answer.effects for name in (_key(e.name, e.channel), *e.indistinguishable_from)}
-    sets = [{f.name for f in cause.errors} & EFFECTS.keys() for cause in check.possible]
+    sets = [
+        {f.name for f in cause.errors if f.name in EFFECTS and abs(f.value - f.declared) > _margin(f, dt_s)}
+        for cause in check.possible
+    ]
     result = []
     if sets and all(sets) and not any(one & traced for one in sets):
         words = " or ".join(sorted({" with ".join(sorted(one)) for one in sets}))
@@ -107,16 +119,22 @@ def disagreement(check: CheckResult | None, answer: TraceAnswer) -> list[str]:
             continue
         low, high = (_beyond_declared(replace(found, value=x)) for x in (found.lower, found.upper))
         bottom, top = first.ci95
-        if (top is not None and top < low) or (bottom is not None and bottom > high):
+        margin = _margin(found, dt_s)
+        if (top is not None and top < low - margin) or (bottom is not None and bottom > high + margin):
             result.append(
                 f"{found.name}: the trace estimates {first.value:.4g}, the kinematic check {low:.4g} to {high:.4g}"
             )
     return result
 
 
-def with_contradictions(answer: TraceAnswer, check: CheckResult | None) -> TraceAnswer:
-    """The answer with its contradictions to a check, which make its effects provisional."""
-    found = disagreement(check, answer)
+def _margin(one: Finding, dt_s: float) -> float:
+    """Difference that is none: for a time, a share of the sample period [s]."""
+    return _SAMPLES * dt_s if one.unit == "s" else 0.0
+
+
+def with_contradictions(answer: TraceAnswer, check: CheckResult | None, dt_s: float) -> TraceAnswer:
+    """The answer with its contradictions to a check, which make its effects provisional; ``dt_s`` as of `disagreement`."""
+    found = disagreement(check, answer, dt_s)
     provisional = answer.provisional or bool(found and answer.effects)
     return replace(answer, provisional=provisional, notes=(*answer.notes, *found))
 

@@ -108,9 +108,10 @@ def _traced(
     advance("compare ax with the declared axial force")
     axial = axial_force(stages, checked, declared, rounds[-1].gls) if options.learns else None
     origin = provenance_of(logs, declared, options)
+    dt_s = max(r.signals.dt_s for r in case.fitted.records)
     if out is None:
         return TraceResult(
-            with_contradictions(conclude(stages, rounds, forced=forced, axial=axial), kinematics),
+            with_contradictions(conclude(stages, rounds, forced=forced, axial=axial), kinematics, dt_s),
             rounds,
             stages,
             origin,
@@ -119,7 +120,7 @@ def _traced(
     contradicted = declared_p_value(rounds) <= ANOMALY_LEVEL
     updated = write_update(case, rounds, declared, out, contradicted, axial)
     replay = flown_again(stages, declared, updated)
-    answer = with_contradictions(conclude(stages, rounds, updated, replay, forced, axial), kinematics)
+    answer = with_contradictions(conclude(stages, rounds, updated, replay, forced, axial), kinematics, dt_s)
     result = TraceResult(answer, rounds, stages, origin)
     result.write(out)
     return result
