@@ -8,10 +8,11 @@ import trace_records as tr
 from scipy.linalg import solve_continuous_lyapunov
 
 from airtruth.effects.registry import EFFECTS
+from airtruth.numerics.normal_equations import step_without
 from airtruth.physics.terms import Change
 from airtruth.tracing.inference import assess as assessing
 from airtruth.tracing.inference.assess import assess, noise_floor
-from airtruth.tracing.inference.cross_validate import leave_one_out, one_by_the_other, step_without
+from airtruth.tracing.inference.cross_validate import leave_one_out, one_by_the_other
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.model.compile import compile_change
@@ -66,7 +67,7 @@ def test_what_one_record_alone_tells_stays_where_it_is_left_out():
     y, z = rng.standard_normal(8), rng.standard_normal(9)
     own, total = ours.T @ ours, ours.T @ ours + others.T @ others
     best = np.linalg.solve(total, ours.T @ y + others.T @ z)
-    step = step_without(ours.T @ (ours @ best - y), own, total)
+    step = step_without(ours.T @ (ours @ best - y), own, total, 1e-9, 0.05)
     assert others @ (best + step) == pytest.approx(others @ np.linalg.lstsq(others, z)[0], abs=1e-6)
     # in the measure of the information, the step has no part along what the others do not tell
     assert (total @ step)[2] == pytest.approx(0.0, abs=1e-6)

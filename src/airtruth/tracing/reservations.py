@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+from airtruth.effects.effect import Parameter
 from airtruth.effects.increment import NAME
 from airtruth.effects.registry import EFFECTS
-from airtruth.tracing.accepted import AcceptedEffect
+from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.answer import ANOMALY_LEVEL, Alternative
 from airtruth.tracing.model.settings import VANE
 from airtruth.tracing.selection.explanation import USUAL_SIZES
@@ -76,12 +77,12 @@ def reservations(
     if unsure:
         found.append(
             f"the 95 % interval{'s' if len(unsure) > 1 else ''} of {', '.join(unsure)} "
-            f"contain{'' if len(unsure) > 1 else 's'} no effect at all: the names are provisional"
+            f"contain{'' if len(unsure) > 1 else 's'} the value without any effect: the names are provisional"
         )
     large = [e.key for e in named if _deviation(e) > UNUSUAL]
     if large:
         found.append(
-            f"{', '.join(large)} of such a size {'are' if len(large) > 1 else 'is'} improbable before any flight, and a cause "
+            f"{', '.join(large)} of such a size {'are' if len(large) > 1 else 'is'} improbable a priori, and a cause "
             "that the library lacks can look the same: the names are provisional until a measurement on the ground confirms them"
         )
     doubtful = [e.key for e in named if _probability(e, sets) < LEAST_INCLUSION]
@@ -114,26 +115,30 @@ def _probability(effect: AcceptedEffect, sets: Sequence[Alternative]) -> float:
 
 def _contains_neutral(effect: AcceptedEffect) -> bool:
     """Whether the interval of the size of an effect of the library contains the value at which it changes nothing."""
-    if effect.key not in EFFECTS:
+    stated = _size(effect)
+    if stated is None:
         return False
-    first = EFFECTS[effect.key].parameters[0]
-    if first.name not in effect.parameters:
-        return False
-    low, high = effect.parameters[first.name].ci95
+    first, estimate = stated
+    low, high = estimate.ci95
     return (low is None or low <= first.neutral) and (high is None or first.neutral <= high)
 
 
 def _deviation(effect: AcceptedEffect) -> float:
     """Size of a cause that moves the derivatives, over the standard deviation of its prior; 0 for any other effect [-]."""
-    usual = USUAL_SIZES.get(effect.key)
-    if usual is None:
+    stated = _size(effect)
+    if stated is None or effect.key not in USUAL_SIZES:
         return 0.0
+    first, estimate = stated
+    return abs(first.size(estimate.value)) / USUAL_SIZES[effect.key]
+
+
+def _size(effect: AcceptedEffect) -> tuple[Parameter, ParameterEstimate] | None:
+    """First parameter of an effect of the library, and its estimate; None of any other effect."""
+    if effect.key not in EFFECTS:
+        return None
     first = EFFECTS[effect.key].parameters[0]
-    return (
-        abs(first.size(effect.parameters[first.name].value)) / usual
-        if first.name in effect.parameters
-        else 0.0
-    )
+    estimate = effect.parameters.get(first.name)
+    return None if estimate is None else (first, estimate)
 
 
 def causes(named: Sequence[AcceptedEffect]) -> int:

@@ -7,8 +7,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
+from airtruth.numerics.normal_equations import step_without
 from airtruth.tracing.inference.assess import Assessment, assess
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit
@@ -61,7 +61,7 @@ def leave_one_out(problem: TraceProblem, fitted: PosteriorFit) -> LeftOut:
         gradient, information, _ = marginal_information(
             alone, there, terms[i : i + 1], levels=True, fixed=fixed
         )
-        move = step_without(gradient, information, total)
+        move = step_without(gradient, information, total, _RIDGE, _TOLD)
         move[Common.nuisance] = np.clip(move[Common.nuisance], -_MOST_STEP, _MOST_STEP)
         sizes = point.sizes + _within_range(hypothesis, point.sizes, move[layout.sizes])
         return assess(problem, i, hypothesis, point.common + move[layout.common], sizes, point.per_record[i])
@@ -86,23 +86,6 @@ def one_by_the_other(problem: TraceProblem, fitted: PosteriorFit) -> LeftOut:
     return LeftOut(np.array([a.likelihood for a in assessed]), assessed)
 
 
-def step_without(gradient: Array, information: Array, total: Array) -> Array:
-    """The step of scoring that takes a record out of a fit.
-
-    Parameters
-    ----------
-    gradient, information : (n,) and (n, n) of the record's cost at the fit; total : (n, n) information of all.
-    """
-    scale = np.sqrt(np.maximum(np.diag(total), np.finfo(float).tiny))
-    root = np.linalg.cholesky(total / np.outer(scale, scale) + _RIDGE * np.eye(len(scale)))
-    half = solve_triangular(root, information / np.outer(scale, scale), lower=True)
-    share, directions = np.linalg.eigh(solve_triangular(root, half.T, lower=True))
-    along = directions.T @ solve_triangular(root, gradient / scale, lower=True)
-    told = share < 1.0 - _TOLD
-    along = np.divide(along, 1.0 - share, out=np.zeros_like(along), where=told)
-    return np.asarray(solve_triangular(root, directions @ along, lower=True, trans="T") / scale)
-
-
 def _within_range(hypothesis: Hypothesis, sizes: Array, step: Array) -> Array:
     """The step, ended where a parameter would leave its range."""
     ended = step.copy()
@@ -112,4 +95,4 @@ def _within_range(hypothesis: Hypothesis, sizes: Array, step: Array) -> Array:
     return ended
 
 
-__all__ = ["LeftOut", "leave_one_out", "one_by_the_other", "step_without"]
+__all__ = ["LeftOut", "leave_one_out", "one_by_the_other"]

@@ -216,12 +216,12 @@ def refit_known(
 def _usual_sizes(s: Score, either_sign: bool) -> tuple[float, ...]:
     """Sizes at which the search for an effect without a score begins."""
     first = s.effect.parameters[0]
-    low, high = (_USUAL * end for end in first.reach)
+    low, high = first.reach
     if first.one_sided:
-        return (high,)
+        return (_USUAL * high,)
     if not either_sign:
         return (0.0,)
-    return tuple(share * end for share in (1.0, _LARGE / _USUAL) for end in (high, low))
+    return tuple(share * end for share in (_USUAL, _LARGE) for end in (high, low))
 
 
 def _leading(
