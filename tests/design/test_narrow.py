@@ -63,8 +63,8 @@ def flown(bench):
 
 
 def accepted(std=0.004):
-    """A learned break of Cm over alpha: three bends, of which the last is known least."""
-    bends, stds = np.array([0.01, 0.0, -0.02]), std * np.array([1.0, 1.0, 3.0])
+    """A learned break of Cm over alpha: three bends, of which the last is known least, and no slope at the trim."""
+    bends, stds = np.array([0.01, 0.0, -0.02, 0.0]), std * np.array([1.0, 1.0, 3.0, 0.0])
     at_rad = np.linspace(SHAPE.low, SHAPE.high, SHAPE.cells + 1)
     basis = SHAPE.basis(at_rad)
     value, half = basis @ bends, Z95 * np.sqrt(basis**2 @ stds**2)
@@ -72,8 +72,8 @@ def accepted(std=0.004):
         name="increment",
         variant=SHAPE.variant,
         parameters={
-            f"bend_{k + 1}": ParameterEstimate(b, s, (None, None))
-            for k, (b, s) in enumerate(zip(bends.tolist(), stds.tolist(), strict=True))
+            name: ParameterEstimate(b, s, (None, None))
+            for name, b, s in zip(SHAPE.coefficients, bends.tolist(), stds.tolist(), strict=True)
         },
         p_value=1e-9,
         separation_sigma=9.0,
@@ -139,7 +139,7 @@ def test_a_band_is_that_of_the_tracers_fit(bench, campaign, flown):
 
 
 def test_a_band_and_a_flight_are_combined_by_their_inverse_variances(bench, campaign, flown):
-    """One draw, by hand; the points in the cell of the trim are zero by definition and do not count."""
+    """One draw, by hand; points of no band, in the cell of the trim without a slope, do not count."""
     band = BandQuestion((accepted(),)).at(bench, campaign, 3, 0)
     band = replace(band, draws=((1.0, np.zeros(Common.size)),))
     (own,) = band.learned
@@ -157,6 +157,10 @@ def test_an_increment_of_an_answer_is_the_one_that_was_learned(bench, campaign):
     (own,) = BandQuestion((accepted(),)).at(bench, campaign, 3, 0).learned
     assert own.effect.shape == replace(SHAPE, trim=own.effect.shape.trim)
     np.testing.assert_allclose(own.basis @ own.sizes, own.value, atol=1e-15)
+    whole = accepted()
+    before = replace(whole, parameters={k: v for k, v in whole.parameters.items() if k != "slope"})
+    (same,) = BandQuestion((before,)).at(bench, campaign, 3, 0).learned  # of a version without slopes
+    np.testing.assert_array_equal(same.sizes, own.sizes)
     linear = AcceptedEffect(
         name="increment",
         variant="Cm over a lag of elevator_rad",

@@ -15,20 +15,22 @@ from airtruth.physics.terms import Change, shape_of
 
 SHAPE = Shape("Cm", "alpha", 0.02, 0.18, 8, trim=0.07)
 BENDS = [0.002, -0.001, 0.003, -0.004, 0.002, 0.001, -0.002]
+SLOPE = 0.0015
 
 
-def values_of(shape, bends, **times):
-    return {f"bend_{k + 1}": float(b) for k, b in enumerate(bends)} | times
+def values_of(shape, bends, slope=SLOPE):
+    return {f"bend_{k + 1}": float(b) for k, b in enumerate(bends)} | {"slope": slope}
 
 
 def total(change, signal):
     return sum(t.amplitude * shape_of(t, signal) for t in change.aero)
 
 
-def by_hand(shape, bends, x):
+def by_hand(shape, bends, x, slope=0.0):
     """Slope changes summed from the trim outwards, the definition in the module's head."""
-    y, width = 0.0, (shape.high - shape.low) / shape.cells
+    width = (shape.high - shape.low) / shape.cells
     inside = min(max(x, shape.low), shape.high)
+    y = slope / width * (inside - shape.trim)
     for k, b in enumerate(bends):
         knot = shape.low + (k + 1) * width
         if knot > shape.trim and inside > knot:
@@ -38,17 +40,46 @@ def by_hand(shape, bends, x):
     return y
 
 
-@given(x=st.floats(-0.5, 0.5), bends=st.lists(st.floats(-0.01, 0.01), min_size=7, max_size=7))
-def test_terms_are_the_spline_flat_at_the_trim_and_constant_outside(x, bends):
-    change = increment(SHAPE).change(values_of(SHAPE, bends))
-    np.testing.assert_allclose(total(change, x), by_hand(SHAPE, bends, x), atol=1e-14)
-    np.testing.assert_allclose(SHAPE.basis(np.array([x]))[0] @ bends, by_hand(SHAPE, bends, x), atol=1e-14)
+@given(
+    x=st.floats(-0.5, 0.5),
+    bends=st.lists(st.floats(-0.01, 0.01), min_size=7, max_size=7),
+    slope=st.floats(-0.01, 0.01),
+)
+def test_terms_are_the_spline_through_zero_at_the_trim_and_constant_outside(x, bends, slope):
+    change = increment(SHAPE).change(values_of(SHAPE, bends, slope))
+    expected = by_hand(SHAPE, bends, x, slope)
+    np.testing.assert_allclose(total(change, x), expected, atol=1e-14)
+    np.testing.assert_allclose(SHAPE.basis(np.array([x]))[0] @ [*bends, slope], expected, atol=1e-14)
 
 
-def test_it_is_zero_in_the_cell_of_the_trim():
+def test_it_is_its_slope_in_the_cell_of_the_trim():
     change = increment(SHAPE).change(values_of(SHAPE, BENDS))
-    cell = np.linspace(0.06, 0.08, 5)  # the third cell of eight from 0.02 to 0.18
-    np.testing.assert_allclose(total(change, cell), 0.0, atol=1e-16)
+    cell = np.linspace(0.06, 0.08, 5)  # the third cell of eight from 0.02 to 0.18, 0.02 rad wide
+    np.testing.assert_allclose(total(change, cell), SLOPE / 0.02 * (cell - 0.07), atol=1e-16)
+
+
+@pytest.mark.parametrize(
+    ("shape", "has_slope"),
+    [
+        (Shape("CL", "elevator", -0.1, 0.1, 4, 0.0), True),
+        (Shape("Cm", "qhat", -0.01, 0.01, 4, 0.0), True),
+        (Shape("Cm", "alpha_dot_hat", -0.01, 0.01, 4, 0.0), False),
+        (Shape("CX", "alpha", 0.0, 0.2, 4, 0.05), False),
+        (Shape("alpha_rad", "alpha", 0.0, 0.2, 4, 0.05), False),
+        (Shape("Cm", "alpha", 0.0, 0.2, 4, 0.05, Memory("lag", 0.2)), False),
+        (Shape("Cm", "alpha", 0.0, 0.2, 4, 0.05, None, "elevator", 0.0), False),
+    ],
+)
+def test_a_function_has_a_slope_where_the_declaration_has_its_derivative(shape, has_slope):
+    names = [p.name for p in increment(shape).parameters]
+    assert ("slope" in names) == has_slope
+    assert increment(shape).bends == 3 + has_slope
+
+
+def test_a_held_slope_has_next_to_no_prior_deviation():
+    held = increment(SHAPE, prior_std=0.01).with_slope_held()
+    assert [p.prior_std for p in held.parameters[:-1]] == [0.01] * 7
+    assert held.parameters[-1].prior_std < 1e-5 * held.parameters[-1].high
 
 
 def test_a_linear_part_behind_a_lag_vanishes_at_rest():
@@ -68,7 +99,7 @@ def test_a_prior_applies_to_the_bends_and_not_to_the_times():
 
 
 def test_the_written_table_is_the_increment_and_flags_its_range(tmp_path):
-    """JSBSim interpolates the written table; the expected values are those of the terms."""
+    """JSBSim interpolates the written table, slope and all; the expected values are those of the terms."""
     change = increment(SHAPE).change(values_of(SHAPE, BENDS))
     folder = write_aircraft("gtm", change, tmp_path / "learned")
     text = (folder / "learned.xml").read_text()
@@ -116,6 +147,15 @@ def test_closed_forms_recover_what_made_the_table(name, truth, expected):
     assert best.is_as_good
     for key, value in expected.items():
         assert best.values[key] == pytest.approx(value, rel=2e-3)
+
+
+def test_a_break_below_the_trim_is_recovered_from_its_difference_from_the_trim():
+    """The table of a break at 0.04 is a line through zero at the trim, 0.06, and flat below 0.04."""
+    x = np.linspace(0.0, 0.2, 41)
+    table = -0.4 * (np.maximum(x - 0.04, 0.0) - 0.02)
+    best = closed_forms(x, table, np.full(41, 1e-4), 0.06)[0]
+    assert best.name == "break above"
+    assert best.values == pytest.approx({"slope": -0.4, "at": 0.04}, rel=1e-6)
 
 
 def test_no_closed_form_is_as_good_as_a_table_that_oscillates():

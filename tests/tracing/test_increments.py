@@ -57,17 +57,17 @@ def test_the_prior_of_a_size_enters_cost_gradient_and_information():
     shape = Shape("Cm", "alpha", 0.02, 0.12, 4, trim=0.06)
     free, held = (Hypothesis(Change(), (increment(shape, std),)) for std in (np.inf, 0.02))
     problem = tr.problem([tr.fly(np.random.default_rng(1), samples=120)])
-    point = replace(tr.point(problem.records, [0.0]), sizes=np.array([0.01, -0.02, 0.03]))
+    point = replace(tr.point(problem.records, [0.0]), sizes=np.array([0.01, -0.02, 0.03, 0.01]))
     assert prior_cost(problem.priors(held), point) - prior_cost(problem.priors(free), point) == pytest.approx(
-        0.5 * (0.01**2 + 0.02**2 + 0.03**2) / 0.02**2
+        0.5 * (0.01**2 + 0.02**2 + 0.03**2 + 0.01**2) / 0.02**2
     )
     terms = [likelihood_terms(sensitivities_of(problem, 0, held, point), NO_WHITENER, levels=True)]
     with_prior, without = (
         marginal_information(problem.priors(h), point, terms, levels=True) for h in (held, free)
     )
-    sizes = [size_index(k) for k in range(3)]
+    sizes = [size_index(k) for k in range(4)]
     np.testing.assert_allclose(
-        (with_prior.information - without.information)[np.ix_(sizes, sizes)], np.eye(3) / 0.02**2, rtol=1e-6
+        (with_prior.information - without.information)[np.ix_(sizes, sizes)], np.eye(4) / 0.02**2, rtol=1e-6
     )
     np.testing.assert_allclose(
         (with_prior.gradient - without.gradient)[sizes], point.sizes / 0.02**2, rtol=1e-6
@@ -116,13 +116,27 @@ def test_the_written_module_holds_the_closed_form():
     assert effect.change({"slope": -0.4, "at": 0.1}).aero[0].shape == "above"
 
 
-def test_the_written_module_scales_a_table_without_a_closed_form():
+@pytest.mark.parametrize("trim", [0.05, 0.06, 0.075])
+def test_the_written_module_scales_a_table_without_a_closed_form(trim):
+    """The trim at either end of the flat cell, and in it."""
     value = [0.004, -0.003, 0.0, 0.0, 0.005, -0.012, 0.014, -0.015, 0.018]
-    (effect,) = executed(effect_module(Answer(an_effect(value))))
+    learned = an_effect(value)
+    (effect,) = executed(effect_module(Answer(replace(learned, table=replace(learned.table, trim=trim)))))
     change = effect.change({"factor": 2.0})
     at = np.linspace(0.0, 0.2, 9)
     flown = sum(t.amplitude * shape_of(t, at) for t in change.aero)
     np.testing.assert_allclose(flown, 2.0 * np.array(value), atol=1e-12)
+
+
+def test_the_written_module_of_a_table_with_a_slope_at_the_trim_is_that_table():
+    """The trim halves the cell from 0.05 to 0.075; the slope there is that of the cell."""
+    value = [0.004, 0.006, 0.001, -0.001, 0.005, -0.012, 0.014, -0.015, 0.018]
+    learned = an_effect(value)
+    (effect,) = executed(effect_module(Answer(replace(learned, table=replace(learned.table, trim=0.0625)))))
+    change = effect.change({"factor": 1.0})
+    at = np.linspace(-0.02, 0.22, 49)
+    flown = sum(t.amplitude * shape_of(t, at) for t in change.aero)
+    np.testing.assert_allclose(flown, np.interp(at, np.linspace(0.0, 0.2, 9), value), atol=1e-12)
 
 
 def test_the_written_module_of_a_reading_changes_the_sensor():

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from airtruth.tracing.selection.acceptance import IMMATERIAL, OUTDONE
 from airtruth.tracing.selection.weights import alike_in_rivals, rival_of, weights
 
 
@@ -18,13 +19,21 @@ def null(*names, spread=None, z=100.0):
     )
 
 
-def tied(z=100.0, **gains):
-    """A round that accepted the first of these effects; the others tied with it."""
+def candidate(name, gain, *reasons, converged=True):
     return SimpleNamespace(
-        tied=[
-            SimpleNamespace(score=SimpleNamespace(effect=SimpleNamespace(name=name, key=name)), gain=gain)
-            for name, gain in gains.items()
-        ],
+        score=SimpleNamespace(effect=SimpleNamespace(name=name, key=name)),
+        fit=SimpleNamespace(converged=converged, shortfall=1.0),
+        gain=gain,
+        reasons=reasons,
+    )
+
+
+def tied(z=100.0, outdone=(), **gains):
+    """A round that accepted the first of these effects; the others tied with it."""
+    leading = [candidate(name, gain) for name, gain in gains.items()]
+    return SimpleNamespace(
+        candidates=[*leading, *outdone],
+        tied=leading,
         release=None,
         rival=None,
         null=null(z=z),
@@ -35,6 +44,7 @@ def released(rival=None, carried=(), spread=None, **costs):
     """A round whose released derivatives have these explanations, the first that of the answer."""
     sets = [SimpleNamespace(effects=(name,), cost=cost) for name, cost in costs.items()]
     return SimpleNamespace(
+        candidates=[],
         tied=[],
         release=SimpleNamespace(sets=sets, cost=sets[0].cost),
         rival=rival,
@@ -53,6 +63,20 @@ def test_ties_weigh_by_half_their_difference_in_2_log_l():
         },
         rel=1e-12,
         abs=0.0,
+    )
+
+
+def test_an_outdone_effect_has_the_weight_of_its_gain():
+    """8 behind in 2 log L; not so where it fails a test, has not converged, or is within the ties that are listed already."""
+    outdone = (
+        candidate("accelerometer_delay", 52.0, OUTDONE),
+        candidate("gyro_lag", 52.0, OUTDONE, IMMATERIAL),
+        candidate("gyro_scale", 52.0, OUTDONE, converged=False),
+        candidate("vane_scale", 56.0, OUTDONE),
+    )
+    found = weights([tied(accelerometer_lag=60.0, outdone=outdone)])
+    assert found == pytest.approx(
+        {("accelerometer_lag",): 1.0, ("accelerometer_delay",): math.exp(-4.0)}, rel=1e-12
     )
 
 

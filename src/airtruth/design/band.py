@@ -3,7 +3,8 @@
 A flight determines the bends of an increment with the information that remains once derivatives, trim, biases, initial
 state, air and times of the increment are refitted. Its band and that of the trace are combined at each point by their
 inverse variances. Both estimates as vectors give no wider band, so that the result is an upper bound. The derivatives
-and the bends have next to no prior in the flight to come, because the band of the trace has used it.
+and the bends have next to no prior in the flight to come, because the band of the trace has used it. A slope in the cell
+of the trim is held: it adds to a derivative, and the flight determines their sum.
 
 Source: V. V. Fedorov, Theory of Optimal Experiments (1972), section 2.3 (the mean variance of a response over a range).
 """
@@ -20,7 +21,7 @@ from airtruth.design.bench import Bench, Flown
 from airtruth.design.flight import fitted_of, model_of
 from airtruth.design.narrow_result import Quantity
 from airtruth.design.separation import Model, beyond, flown_by, refitted
-from airtruth.effects.increment import SIGNAL_NAMES, Increment, Memory, Shape, increment
+from airtruth.effects.increment import SIGNAL_NAMES, SLOPE, Increment, Memory, Shape, increment
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.physics.terms import Change
 from airtruth.simulation.campaign.file import Campaign
@@ -91,19 +92,22 @@ def learned(accepted: AcceptedEffect, plant: Plant) -> Learned:
         low=low,
         high=high,
         cells=0 if table is None else len(table.at) - 1,
-        trim=trims.get(signal, 0.0) if table is None else table.trim,
+        trim=trims.get(signal, 0.0) if table is None else table.origin,
         memory=memory,
         factor=factor,
         factor_trim=accepted.by_at,
     )
     effect = increment(shape)
-    effect = effect.with_prior(effect.parameters[0].high)
-    sizes = np.array([p.size(accepted.parameters[p.name].value) for p in effect.parameters])
+    effect = effect.with_prior(effect.parameters[0].high).with_slope_held()
+    stated = {name: estimate.value for name, estimate in accepted.parameters.items()}
+    if SLOPE not in stated:  # learned by a version without slopes
+        stated[SLOPE] = 0.0
+    sizes = np.array([p.size(stated[p.name]) for p in effect.parameters])
     if table is None:
         share = accepted.parameters[effect.parameters[0].name]
         return Learned(effect, sizes, np.zeros(0), np.array([share.value]), np.array([share.std]))
     known = (np.array(table.high) - np.array(table.low)) / (2.0 * Z95)
-    counts = known > 0.0  # about the trim the increment is zero by definition
+    counts = known > 0.0  # without a slope, the increment is zero in the cell of the trim
     return Learned(effect, sizes, np.array(table.at)[counts], np.array(table.value)[counts], known[counts])
 
 

@@ -1,7 +1,8 @@
 """Short closed forms of a learned increment: a break, a step, a curve, or a part behind a state.
 
 A form is as good as the table if its weighted residual is no larger than the band allows: chi-square over the points
-that have samples, the standard deviations those of the band.
+that have samples, the standard deviations those of the band. Forms are compared with the table by their difference from
+the trim: a constant belongs to the trim coefficients.
 
 Sources: break and curve, as `airtruth.effects.aerodynamics`; a step behind a lag is the separation state of J. Fischenberg
 and R. V. Jategaonkar, AIAA 95-3438 (1995), with a ramp in place of the hyperbolic tangent.
@@ -69,7 +70,7 @@ def closed_forms(
     x, y, s = x[counted], y[counted], s[counted]
     found = []
     for name, (names, form) in _forms(trim).items():
-        fitted = _fitted(x, y, s, form, len(names))
+        fitted = _fitted(x, y, s, _from_trim(form, trim), len(names), min(at), max(at))
         if fitted is not None:
             p, statistic = fitted
             values = dict(zip(names, p.tolist(), strict=True))
@@ -96,16 +97,29 @@ def _forms(trim: float) -> dict[str, tuple[tuple[str, ...], _Form]]:
     }
 
 
-def _fitted(x: Array, y: Array, s: Array, form: _Form, count: int) -> tuple[Array, float] | None:
-    """Parameters of least squares from several starts, and the weighted sum of squares; None for too few points."""
+def _from_trim(form: _Form, trim: float) -> _Form:
+    """A form less its value at the trim."""
+    at = np.array([trim])
+    return lambda x, p: form(x, p) - form(at, p)
+
+
+def _fitted(
+    x: Array, y: Array, s: Array, form: _Form, count: int, low: float, high: float
+) -> tuple[Array, float] | None:
+    """Parameters of least squares from several starts, and the weighted sum of squares; None for too few points.
+
+    ``low`` and ``high`` are the ends of the table.
+    """
     if len(x) <= count:
         return None
     best: tuple[Array, float] | None = None
     span = float(np.ptp(x))
+    # a form that bends outside the table has lost its location
+    bounds = (np.array([-np.inf, low, 0.0])[:count], np.array([np.inf, high, np.inf])[:count])
     for location in np.quantile(x, (0.2, 0.5, 0.8)):
         start = np.array([float(y[np.argmax(np.abs(y))]), float(location), 0.3 * span])[:count]
         scale = np.array([max(float(np.abs(y).max()), 1e-12), span, span])[:count]
-        solved = least_squares(lambda p: (form(x, p) - y) / s, start, x_scale=scale)
+        solved = least_squares(lambda p: (form(x, p) - y) / s, start, x_scale=scale, bounds=bounds)
         if best is None or 2.0 * solved.cost < best[1]:
             best = solved.x, 2.0 * float(solved.cost)
     return best

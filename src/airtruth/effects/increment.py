@@ -1,14 +1,16 @@
 """Increments of a coefficient or of a reading that have no name: piecewise linear functions of a signal, with memory or
 without.
 
-    dC = sum_k b_k/w h_k(s) [(p - p0)]  [+ a (x - s)],   h_k = max(0, s - s_k) above the trim, min(0, s - s_k) below it
+    dC = sum_k b_k/w h_k(s) [(p - p0)]  [+ c/w (s - s0)]  [+ a (x - s)],
+    h_k = max(0, s - s_k) above the trim s0, min(0, s - s_k) below it
 
 s is the signal, or the state x of a first-order lag, of a mode or of a play that the signal drives; w is the width of a
 cell. With a factor p, which counts from p0, the function is an increment of the derivative of p. With the factor x - p, x
 the lag of p with the time constant tau, it is the change of a lag's time constant over tau, small against one. The
 function is zero in the cell that holds the trim, where the derivatives describe the aircraft, and constant outside the
-range in which it was learned. The bends b_k have independent normal priors, which is the prior of an integrated random
-walk: a penalised linear spline.
+range in which it was learned. A function of a signal that has a declared derivative has a slope c in that cell: a bend
+within the cell moves the mean slope away from the derivative. The bends b_k and the slope have independent normal
+priors, which is the prior of an integrated random walk: a penalised linear spline.
 
 Source: S. N. Wood, Generalized Additive Models, 2nd ed., 2017, sections 5.3 and 5.8 (splines as normal priors);
 D. Ruppert, M. P. Wand and R. J. Carroll, Semiparametric Regression, 2003, section 3.5 (truncated lines).
@@ -66,6 +68,12 @@ _DERIVATIVE: Final[Mapping[str, float]] = {"": 1.0, "alpha": 7.0, "elevator": 7.
 Cmq of 60)."""
 _ACTS: Final = {"CL": "lift", "Cm": "pitching moment", "CX": "axial force"}
 """Coefficient in words."""
+SLOPE: Final = "slope"
+"""Name of the slope in the cell of the trim."""
+_HELD: Final = 1e-6
+"""Standard deviation over its largest value of a slope that is held [-]: none but for rounding."""
+_DECLARED: Final = frozenset({"alpha", "elevator", "qhat"})
+"""Signals over which lift and moment have a declared derivative."""
 _REACH_OF_MEMORY: Final = 3.0
 """Largest ratio by which a refit may change a time constant or a half width [-] (judgement: the grid's steps are smaller)."""
 
@@ -143,6 +151,13 @@ class Shape:
         return tuple(np.linspace(self.low, self.high, self.cells + 1)[1:-1].tolist()) if self.cells else ()
 
     @property
+    def coefficients(self) -> tuple[str, ...]:
+        """Names of the coefficients of the function: of its bends, and of the slope where it has one."""
+        bends = tuple(_bend(k) for k in range(len(self.knots)))
+        slope = self.acts_on in ("CL", "Cm") and self.signal in _DECLARED and not (self.memory or self.factor)
+        return (*bends, SLOPE) if bends and slope else bends
+
+    @property
     def state(self) -> str:
         """Name of the state; one for each coefficient, signal and kind."""
         kind = self.memory.kind if self.memory is not None else ""
@@ -206,15 +221,25 @@ class Shape:
         below = [(at, values[_bend(k)] / self.width) for k, at in enumerate(self.knots) if at <= self.trim]
         above.append((self.high, -sum(slope for _, slope in above)))
         below.append((self.low, -sum(slope for _, slope in below)))
-        return tuple(
+        pieces = tuple(
             Piece(signal, shape, slope, at)
             for shape, rows in zip(sides, (below, above), strict=True)
             for at, slope in rows
             if len(rows) > 1
         )
+        return pieces + (self._slope(values[SLOPE] / self.width) if SLOPE in self.coefficients else ())
+
+    def _slope(self, slope: float) -> tuple[Piece, ...]:
+        """A straight line through zero at the trim, constant outside the range."""
+        return (
+            Piece(self.signal, "above", slope, self.trim),
+            Piece(self.signal, "above", -slope, self.high),
+            Piece(self.signal, "below", slope, self.trim),
+            Piece(self.signal, "below", -slope, self.low),
+        )
 
     def basis(self, signal: ArrayLike) -> Array:
-        """Increments by a unit of each bend, without the factor.
+        """Increments by a unit of each coefficient, without the factor.
 
         Parameters
         ----------
@@ -222,13 +247,12 @@ class Shape:
 
         Returns
         -------
-        (points, bends) [-].
+        (points, coefficients) [-].
         """
         at = np.asarray(signal, dtype=np.float64)
-        names = [_bend(k) for k in range(len(self.knots))]
         columns = []
-        for name in names:
-            unit = dict.fromkeys(names, 0.0) | {name: 1.0}
+        for name in self.coefficients:
+            unit = dict.fromkeys(self.coefficients, 0.0) | {name: 1.0}
             terms = self._bends(unit, self.signal)
             columns.append(
                 sum((t.amplitude * shape_of(AeroTerm("CL", *t), at) for t in terms), np.zeros(at.shape))
@@ -242,7 +266,7 @@ def _bend(k: int) -> str:
 
 @dataclass(frozen=True)
 class Increment(Effect):
-    """A learned increment as an effect; its parameters are the bends, or the share of a linear one, and its times.
+    """A learned increment as an effect; its parameters are those of its function, or the share of a linear one, and its times.
 
     Attributes
     ----------
@@ -253,13 +277,18 @@ class Increment(Effect):
 
     @property
     def bends(self) -> int:
-        """Number of bends; 1 for a linear increment."""
-        return max(len(self.shape.knots), 1)
+        """Number of bends, the slope among them; 1 for a linear increment."""
+        return max(len(self.shape.coefficients), 1)
 
     def with_prior(self, std: float) -> Increment:
-        """The effect with another standard deviation of its bends' prior [-]."""
+        """The effect with another standard deviation of the prior of its bends and slope [-]."""
         first = tuple(replace(p, prior_std=std) for p in self.parameters[: self.bends])
         return replace(self, parameters=first + self.parameters[self.bends :])
+
+    def with_slope_held(self) -> Increment:
+        """The effect with a slope that the records do not change."""
+        held = (replace(p, prior_std=_HELD * p.high) if p.name == SLOPE else p for p in self.parameters)
+        return replace(self, parameters=tuple(held))
 
 
 def increment(shape: Shape, prior_std: float = math.inf) -> Increment:
@@ -268,18 +297,31 @@ def increment(shape: Shape, prior_std: float = math.inf) -> Increment:
     Parameters
     ----------
     shape : where it acts, and by which functions.
-    prior_std : standard deviation of the prior of its bends [-].
+    prior_std : standard deviation of the prior of its bends and slope [-].
     """
     size = "share" if not shape.cells else ""
-    names = [size] if size else [_bend(k) for k in range(len(shape.knots))]
+    names = [size] if size else list(shape.coefficients)
     scale = _DERIVATIVE[shape.factor]
     reach, step = scale * _REACH[shape.acts_on], scale * _STEP[shape.acts_on]
     if size:
         rate = _QHAT if shape.of_reading and shape.signal == "qhat" else 1.0
         reach, step = 20.0 * rate * reach, 100.0 * rate * step
-    meaning = "part that acts through the state [1/unit of the signal]" if size else "bend over one cell"
+    meanings = {
+        "share": "part that acts through the state [1/unit of the signal]",
+        SLOPE: "rise over the cell of the trim",
+    }
     parameters = [
-        Parameter(name, "-", meaning, -reach, reach, 0.0, step=step, prior_std=prior_std) for name in names
+        Parameter(
+            name,
+            "-",
+            meanings.get(name, "bend over one cell"),
+            -reach,
+            reach,
+            0.0,
+            step=step,
+            prior_std=prior_std,
+        )
+        for name in names
     ]
     if shape.memory is not None and not shape.factor:
         parameters += [_of_memory(name, value, shape.memory) for name, value in shape.memory.values.items()]
@@ -308,4 +350,4 @@ def _of_memory(name: str, value: float, memory: Memory) -> Parameter:
     return Parameter(name, "s", meaning, low, high, 0.0, is_location=True, step=value)
 
 
-__all__ = ["NAME", "SIGNAL_NAMES", "Increment", "Memory", "Shape", "increment"]
+__all__ = ["NAME", "SIGNAL_NAMES", "SLOPE", "Increment", "Memory", "Shape", "increment"]

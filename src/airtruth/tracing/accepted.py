@@ -15,6 +15,7 @@ class IncrementTable:
     at : (points,) of the signal, or of the state that it drives [unit of the signal].
     value, low, high : increment of the coefficient, and its 95 % band [-].
     samples : number of samples of the fitted records nearest to each point [-].
+    trim : where the increment is zero by definition [unit of the signal]; None in an answer of an earlier version.
     """
 
     at: tuple[float, ...]
@@ -22,10 +23,13 @@ class IncrementTable:
     low: tuple[float, ...]
     high: tuple[float, ...]
     samples: tuple[int, ...]
+    trim: float | None = None
 
     @property
-    def trim(self) -> float:
-        """Middle of the points where the increment is zero by definition [unit of the signal]."""
+    def origin(self) -> float:
+        """The trim; without one, the middle of the points where the band vanishes [unit of the signal]."""
+        if self.trim is not None:
+            return self.trim
         zero = [x for x, low, high in zip(self.at, self.low, self.high, strict=True) if low == high]
         return sum(zero) / len(zero) if zero else 0.0
 
@@ -34,9 +38,13 @@ class IncrementTable:
         """Points below and above the trim from which the band excludes zero; None where it contains zero to the end."""
         sure = [x for x, low, high in zip(self.at, self.low, self.high, strict=True) if low * high > 0.0]
         return (
-            max((x for x in sure if x < self.trim), default=None),
-            min((x for x in sure if x > self.trim), default=None),
+            max((x for x in sure if x < self.origin), default=None),
+            min((x for x in sure if x > self.origin), default=None),
         )
+
+    def to_dict(self) -> dict[str, list[float] | float | None]:
+        """Keys of contract 3."""
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
 
 
 @dataclass(frozen=True)
@@ -155,7 +163,7 @@ class AcceptedEffect:
             "over": self.over,
             **({} if self.by is None else {"by": self.by, "by_at": self.by_at}),
             "relative_size": self.relative_size,
-            "table": None if self.table is None else {k: list(v) for k, v in asdict(self.table).items()},
+            "table": None if self.table is None else self.table.to_dict(),
             "states": [asdict(state) for state in self.states],
         }
 

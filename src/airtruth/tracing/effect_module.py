@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -113,7 +114,7 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
     over, factor = _SIGNALS[e.over or ""], _SIGNALS[e.by] if e.by else ""
     driver = factor if e.states and factor else over
     signal = "learned-state" if e.states and not factor else over
-    trim = e.table.trim if e.table is not None else 0.0
+    trim = e.table.origin if e.table is not None else 0.0
     by = ', behind="learned-state"' if e.states else f', "{factor}", {e.by_at!r}'
     by = by if factor else ""
     field, term = ("readings", "ReadingTerm") if e.acts_on in READINGS else ("aero", "AeroTerm")
@@ -162,22 +163,28 @@ def _form(e: AcceptedEffect) -> ClosedForm | None:
     t = e.table
     rows = zip(t.low, t.high, t.samples, strict=True)
     std = [(high - low) / (2.0 * Z95) if n else math.inf for low, high, n in rows]
-    return next((f for f in closed_forms(t.at, t.value, std, t.trim) if f.is_as_good), None)
+    return next((f for f in closed_forms(t.at, t.value, std, t.origin) if f.is_as_good), None)
 
 
 def _of_table(term: str, table: IncrementTable, signal: str, by: str) -> str:
-    """Terms of a table with a common factor: its bends, on either side of the trim, where it is flat.
+    """Terms of a table with a common factor: its slope at the trim and its bends on either side of it.
 
     ``term`` is how each term begins, ``by`` how it ends.
     """
-    points, trim = list(table.at), table.trim
+    points, trim = list(table.at), table.origin
     pieces = zip(pairwise(points), pairwise(table.value), strict=True)
     slopes = [(b - a) / (y - x) for (x, y), (a, b) in pieces]
     bends = [after - before for before, after in zip([0.0, *slopes], [*slopes, 0.0], strict=True)]
-    rows = "".join(
-        f'            {term}, "{signal}", "{"above" if x > trim else "below"}", '
-        f'{bend if x > trim else -bend!r} * values["factor"], {x!r}{by}),\n'
+    own = slopes[min(max(bisect_right(points, trim) - 1, 0), len(slopes) - 1)]
+    hinges = [
+        ("above" if x > trim else "below", bend if x > trim else -bend, x)
         for x, bend in zip(points, bends, strict=True)
+    ]
+    if points[0] < trim < points[-1]:
+        hinges += [("above", own, trim), ("below", own, trim)]
+    rows = "".join(
+        f'            {term}, "{signal}", "{side}", {slope!r} * values["factor"], {x!r}{by}),\n'
+        for side, slope, x in hinges
     )
     return f"(\n{rows}        )"
 

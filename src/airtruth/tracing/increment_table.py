@@ -74,6 +74,7 @@ def table_of(shape: Shape, bends: Array, spread: Array, signal: Array) -> Increm
         low=tuple((value - half).tolist()),
         high=tuple((value + half).tolist()),
         samples=tuple(int(n) for n in samples),
+        trim=shape.trim,
     )
 
 

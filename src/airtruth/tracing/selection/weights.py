@@ -7,6 +7,7 @@ import math
 from collections.abc import Collection, Iterator, Sequence
 from typing import Final
 
+from airtruth.tracing.selection.acceptance import OUTDONE, has_converged
 from airtruth.tracing.selection.explanation import REFERENCE
 from airtruth.tracing.selection.ranking import TIE
 from airtruth.tracing.selection.rounds import Rival, SearchRound
@@ -22,9 +23,9 @@ _LEAST_LOG: Final = -700.0
 def weights(rounds: Sequence[SearchRound]) -> dict[tuple[str, ...], float]:
     """Names of each set -> its weight beside the set that the search accepted.
 
-    The sets combine the tied effects of every round with the sets that explain the derivatives, and contain those of the
-    branches that lost, and those without one of the accepted effects. An effect is accepted by a test, so that no set is
-    empty for want of the only one.
+    The sets combine the effects that could lead each round with the sets that explain the derivatives, and contain those of
+    the branches that lost, and those without one of the accepted effects. An effect is accepted by a test, so that no set
+    is empty for want of the only one.
     """
     found: dict[tuple[str, ...], float] = {}
 
@@ -32,11 +33,9 @@ def weights(rounds: Sequence[SearchRound]) -> dict[tuple[str, ...], float]:
         key = tuple(sorted(set(names)))
         found[key] = found.get(key, 0.0) + math.exp(max(_LEAST_LOG, min(0.0, log_weight)))
 
-    tied = [
-        [(c.score.effect.name, 0.5 * (c.gain - r.tied[0].gain)) for c in r.tied] for r in rounds if r.tied
-    ]
+    leading = [list(_leading(r)) for r in rounds if r.tied]
     carried = _carried(rounds)
-    for added in itertools.product(*tied):
+    for added in itertools.product(*leading):
         for explaining, log_weight in _explanations(rounds):
             every = [*(name for name, _ in added), *explaining, *carried]
             add(every, log_weight + sum(gain for _, gain in added))
@@ -48,6 +47,17 @@ def weights(rounds: Sequence[SearchRound]) -> dict[tuple[str, ...], float]:
         for names, log_weight in () if r.rival is None else r.rival.sets.items():
             add(names, log_weight)
     return found
+
+
+def _leading(own: SearchRound) -> Iterator[tuple[str, float]]:
+    """Names of the accepted effect of a round and of its rivals, each with the logarithm of its weight.
+
+    Rivals tie with it, or are outdone by it alone: a smaller gain is evidence of its size, and no proof.
+    """
+    first = own.tied[0]
+    outdone = (c for c in own.candidates if c.reasons == (OUTDONE,) and has_converged(c.fit, c.gain))
+    for c in (*own.tied, *(c for c in outdone if c.gain < first.gain - TIE)):
+        yield c.score.effect.name, 0.5 * (c.gain - first.gain)
 
 
 def _carried(rounds: Sequence[SearchRound]) -> set[str]:
