@@ -17,6 +17,9 @@ ANSWER: Final = "trace.json"
 ANOMALY_LEVEL: Final = 0.01
 """Probability below which an anomaly counts although no effect was accepted [-] (judgement: one clean flight test in a
 hundred is called unexplained, or its verdict provisional)."""
+DECLARED_LEVEL: Final = 0.005
+"""Probability below which the declared model is contradicted [-] (judgement: at most one true declaration in a hundred may be;
+at a level of 0.01 it was 6 of 450)."""
 Z95: Final = 1.959964
 """Quantile 0.975 of the standard normal distribution, the half width of the intervals [standard deviations]."""
 
@@ -302,6 +305,7 @@ def _is_row(value: Any) -> TypeGuard[Any]:
 __all__ = [
     "ANOMALY_LEVEL",
     "ANSWER",
+    "DECLARED_LEVEL",
     "Z95",
     "AcceptedEffect",
     "Alternative",

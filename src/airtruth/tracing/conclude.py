@@ -334,7 +334,7 @@ def _next_flight(
                 f"To separate {', '.join(names)}: {split} `airtruth plan --from` computes the input that separates them most."
             )
     lines += learned
-    if remaining.p_value <= ANOMALY_LEVEL:
+    if verdict != "none" and remaining.p_value <= ANOMALY_LEVEL:
         lines.append(f"The remaining residual shows in {remaining.where}: {advice(remaining.where)}")
     return " ".join(lines) or "Repeat the manoeuvre with the largest residual, with opposite elevator sign."
 

@@ -14,7 +14,7 @@ from scipy.stats import chi2
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.tracing.answer import (
-    ANOMALY_LEVEL,
+    DECLARED_LEVEL,
     Z95,
     AcceptedEffect,
     Alternative,
@@ -68,7 +68,7 @@ def declared_model(
     declared_std = np.sqrt(np.diag(problem.declared_covariance))
     shift, std = _apparent_shift(last, covariance, causes)
     return DeclaredModel(
-        consistent=p_value > ANOMALY_LEVEL,
+        consistent=p_value > DECLARED_LEVEL,
         statistic=statistic,
         degrees=test.degrees if by_derivatives else anomaly.degrees,
         p_value=p_value,
@@ -103,7 +103,7 @@ def with_axial_force(declared: DeclaredModel, along: Sequence[AcceptedEffect]) -
     gain = next(e.gain_2_log_likelihood or 0.0 for e in along if e.p_value == p_value)
     return replace(
         declared,
-        consistent=2.0 * p_value > ANOMALY_LEVEL,
+        consistent=2.0 * p_value > DECLARED_LEVEL,
         statistic=gain,
         degrees=1,
         p_value=2.0 * p_value,

@@ -13,7 +13,7 @@ from airtruth.effects.effect import Parameter
 from airtruth.effects.increment import NAME
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
-from airtruth.tracing.answer import ANOMALY_LEVEL, Alternative
+from airtruth.tracing.answer import DECLARED_LEVEL, Alternative
 from airtruth.tracing.model.settings import VANE
 from airtruth.tracing.selection.explanation import USUAL_SIZES
 
@@ -68,7 +68,7 @@ def reservations(
             f"{listed} are {MANY} causes or more, and one effect that the library lacks can look like as many: the names are "
             "provisional until a flight of their own confirms each"
         )
-    if named and declared_p_value > ANOMALY_LEVEL:
+    if named and declared_p_value > DECLARED_LEVEL:
         found.append(
             f"the evidence against the declared model is weak (p = {declared_p_value:.2g}): the names are provisional until "
             "another flight shows it again"
