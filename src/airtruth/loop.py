@@ -100,7 +100,12 @@ class LoopResult:
         answer = self.trace.answer
         lines = [verdict(answer), *(effect_line(e) for e in answer.effects), ""]
         if not self.treatments:
-            lines += ["No effect was accepted, so the estimates after are those before.", ""]
+            why = (
+                "The accepted effects change no channel of a regression"
+                if answer.effects
+                else "No effect was accepted"
+            )
+            lines += [f"{why}, so the estimates after are those before.", ""]
         return "\n".join([*lines, as_text(self.table())])
 
     def to_frame(self) -> pd.DataFrame:

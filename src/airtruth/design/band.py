@@ -2,9 +2,10 @@
 
 A flight determines the bends of an increment with the information that remains once derivatives, trim, biases, initial
 state, air and times of the increment are refitted. Its band and that of the trace are combined at each point by their
-inverse variances. Both estimates as vectors give no wider band, so that the result is an upper bound. The derivatives
-and the bends have next to no prior in the flight to come, because the band of the trace has used it. A slope in the cell
-of the trim is held: it adds to a derivative, and the flight determines their sum.
+inverse variances. Both estimates as vectors give no wider band, so that the result is an upper bound for an increment
+without a slope at the trim. The derivatives and the bends have next to no prior in the flight to come, because the band
+of the trace has used it. A slope in the cell of the trim is held: it adds to a derivative, and the flight determines
+their sum.
 
 Source: V. V. Fedorov, Theory of Optimal Experiments (1972), section 2.3 (the mean variance of a response over a range).
 """
@@ -56,7 +57,8 @@ class Learned:
     ----------
     effect : the increment, its bends nearly without a prior.
     sizes : (parameters,) its bends or its share, and its times.
-    at : (points,) of the signal where its band counts; empty for a linear one, whose share counts.
+    at : (points,) of the signal where its band counts, outside the cell of the trim; empty for a linear one, whose share
+        counts.
     value, known : (points,) or (1,) increment of the coefficient, or the share, and its standard deviation [-].
     """
 
@@ -82,7 +84,7 @@ def learned(accepted: AcceptedEffect, plant: Plant) -> Learned:
     """
     signal = next(name for name, stated in SIGNAL_NAMES.items() if stated == accepted.over)
     factor = next((name for name, stated in SIGNAL_NAMES.items() if stated == accepted.by), "")
-    memory = next((Memory(s.kind, s.time_s, s.damping) for s in accepted.states), None)
+    memory = next((Memory(s.kind, s.time_s, s.damping, s.half_width) for s in accepted.states), None)
     table = accepted.table
     trims = {"alpha": plant.trim_alpha_rad, "elevator": plant.trim_elevator_rad}
     low, high = (0.0, 0.0) if table is None else (table.at[0], table.at[-1])
@@ -107,7 +109,7 @@ def learned(accepted: AcceptedEffect, plant: Plant) -> Learned:
         share = accepted.parameters[effect.parameters[0].name]
         return Learned(effect, sizes, np.zeros(0), np.array([share.value]), np.array([share.std]))
     known = (np.array(table.high) - np.array(table.low)) / (2.0 * Z95)
-    counts = known > 0.0  # without a slope, the increment is zero in the cell of the trim
+    counts = (known > 0.0) & (shape.basis(table.at)[:, : len(shape.knots)] != 0.0).any(axis=1)
     return Learned(effect, sizes, np.array(table.at)[counts], np.array(table.value)[counts], known[counts])
 
 

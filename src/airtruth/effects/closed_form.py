@@ -54,23 +54,29 @@ class ClosedForm:
 
 
 def closed_forms(
-    at: Sequence[float], value: Sequence[float], std: Sequence[float], trim: float
+    at: Sequence[float],
+    value: Sequence[float],
+    std: Sequence[float],
+    trim: float,
+    *,
+    of_pair: bool = False,
 ) -> list[ClosedForm]:
     """Every closed form fitted to a table, the best first by the statistic with two for each parameter (AIC).
 
     Parameters
     ----------
     at, value, std : (points,) of the signal, of the increment, and its standard deviation; points whose standard
-        deviation is zero are those about the trim, where the increment is zero by definition, and do not count; nor do
-        those of infinite standard deviation, which have no samples.
+        deviation is zero are those where the increment is zero by definition, and do not count; nor do those of infinite
+        standard deviation, which have no samples.
     trim : value of the signal at the trim, about which a curve is measured [unit of the signal].
+    of_pair : whether another signal multiplies the table; a constant is then a derivative, and no form may add one.
     """
     x, y, s = (np.asarray(v, dtype=np.float64) for v in (at, value, std))
     counted = (s > 0.0) & np.isfinite(s)
     x, y, s = x[counted], y[counted], s[counted]
     found = []
     for name, (names, form) in _forms(trim).items():
-        fitted = _fitted(x, y, s, _from_trim(form, trim), len(names), min(at), max(at))
+        fitted = _fitted(x, y, s, form if of_pair else _from_trim(form, trim), len(names), min(at), max(at))
         if fitted is not None:
             p, statistic = fitted
             values = dict(zip(names, p.tolist(), strict=True))

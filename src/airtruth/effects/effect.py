@@ -150,7 +150,8 @@ class Effect:
     def channels(self) -> tuple[str, ...]:
         """Columns of a log on which it acts as an error of an instrument, sorted."""
         middle = {p.name: 0.5 * (p.low + p.high) for p in self.parameters}
-        return tuple(sorted({term.channel for term in self.describe(middle).sensors}))
+        change = self.describe(middle)
+        return tuple(sorted({t.channel for t in change.sensors} | {t.channel for t in change.readings}))
 
     def change(self, values: Mapping[str, float]) -> Change:
         """Return the terms that the effect changes at these values.

@@ -7,10 +7,10 @@ without.
 s is the signal, or the state x of a first-order lag, of a mode or of a play that the signal drives; w is the width of a
 cell. With a factor p, which counts from p0, the function is an increment of the derivative of p. With the factor x - p, x
 the lag of p with the time constant tau, it is the change of a lag's time constant over tau, small against one. The
-function is zero in the cell that holds the trim, where the derivatives describe the aircraft, and constant outside the
-range in which it was learned. A function of a signal that has a declared derivative has a slope c in that cell: a bend
-within the cell moves the mean slope away from the derivative. The bends b_k and the slope have independent normal
-priors, which is the prior of an integrated random walk: a penalised linear spline.
+function is zero at the trim and constant outside the range in which it was learned. In the cell that holds the trim the
+derivatives describe the aircraft, and the function is zero. A function of a signal that has a declared derivative has a
+slope c there: a bend within the cell moves the mean slope away from the derivative. The bends b_k and the slope have
+independent normal priors, which is the prior of an integrated random walk: a penalised linear spline.
 
 Source: S. N. Wood, Generalized Additive Models, 2nd ed., 2017, sections 5.3 and 5.8 (splines as normal priors);
 D. Ruppert, M. P. Wand and R. J. Carroll, Semiparametric Regression, 2003, section 3.5 (truncated lines).
@@ -227,15 +227,17 @@ class Shape:
             for at, slope in rows
             if len(rows) > 1
         )
-        return pieces + (self._slope(values[SLOPE] / self.width) if SLOPE in self.coefficients else ())
+        return pieces + (
+            self._slope(values[SLOPE] / self.width, signal) if SLOPE in self.coefficients else ()
+        )
 
-    def _slope(self, slope: float) -> tuple[Piece, ...]:
+    def _slope(self, slope: float, signal: str) -> tuple[Piece, ...]:
         """A straight line through zero at the trim, constant outside the range."""
         return (
-            Piece(self.signal, "above", slope, self.trim),
-            Piece(self.signal, "above", -slope, self.high),
-            Piece(self.signal, "below", slope, self.trim),
-            Piece(self.signal, "below", -slope, self.low),
+            Piece(signal, "above", slope, self.trim),
+            Piece(signal, "above", -slope, self.high),
+            Piece(signal, "below", slope, self.trim),
+            Piece(signal, "below", -slope, self.low),
         )
 
     def basis(self, signal: ArrayLike) -> Array:

@@ -13,7 +13,8 @@ class IncrementTable:
     Attributes
     ----------
     at : (points,) of the signal, or of the state that it drives [unit of the signal].
-    value, low, high : increment of the coefficient, and its 95 % band [-].
+    value, low, high : increment of the coefficient [-], of a derivative [1/rad, -] or of a reading [its unit], and its 95 %
+        band.
     samples : number of samples of the fitted records nearest to each point [-].
     trim : where the increment is zero by definition [unit of the signal]; None in an answer of an earlier version.
     """

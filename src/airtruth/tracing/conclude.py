@@ -48,7 +48,7 @@ from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.notes import notes
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.reservations import reservations
-from airtruth.tracing.selection.acceptance import Candidate
+from airtruth.tracing.selection.acceptance import SURPASSED, Candidate
 from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.omnibus import FRICTION, advice
 from airtruth.tracing.selection.release import CONTRADICTED
@@ -110,7 +110,7 @@ def conclude(
         or confirmed is False
         or bool(case.left_out)
         or bool(reserved)
-        or (bool(stated) and remaining.p_value <= ANOMALY_LEVEL),
+        or (bool(stated or along) and remaining.p_value <= ANOMALY_LEVEL),
         anomaly=_evidence(anomaly),
         remaining=_evidence(remaining),
         effects=(*stated, *along),
@@ -237,7 +237,7 @@ def _candidates(
         if s.effect.key in tied:
             why = ""
         elif known is not None:
-            why = "; ".join(known.reasons)
+            why = "; ".join(known.reasons) or SURPASSED
         elif any(step.startswith(f"refit {s.effect.key}") for step in case.left_out):
             why = "the time budget ended before its refit"
         else:
@@ -334,7 +334,7 @@ def _next_flight(
                 f"To separate {', '.join(names)}: {split} `airtruth plan --from` computes the input that separates them most."
             )
     lines += learned
-    if verdict != "none" and remaining.p_value <= ANOMALY_LEVEL:
+    if remaining.p_value <= ANOMALY_LEVEL:
         lines.append(f"The remaining residual shows in {remaining.where}: {advice(remaining.where)}")
     return " ".join(lines) or "Repeat the manoeuvre with the largest residual, with opposite elevator sign."
 

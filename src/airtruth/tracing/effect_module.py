@@ -163,7 +163,10 @@ def _form(e: AcceptedEffect) -> ClosedForm | None:
     t = e.table
     rows = zip(t.low, t.high, t.samples, strict=True)
     std = [(high - low) / (2.0 * Z95) if n else math.inf for low, high, n in rows]
-    return next((f for f in closed_forms(t.at, t.value, std, t.origin) if f.is_as_good), None)
+    return next(
+        (f for f in closed_forms(t.at, t.value, std, t.origin, of_pair=e.by is not None) if f.is_as_good),
+        None,
+    )
 
 
 def _of_table(term: str, table: IncrementTable, signal: str, by: str) -> str:
@@ -180,7 +183,7 @@ def _of_table(term: str, table: IncrementTable, signal: str, by: str) -> str:
         ("above" if x > trim else "below", bend if x > trim else -bend, x)
         for x, bend in zip(points, bends, strict=True)
     ]
-    if points[0] < trim < points[-1]:
+    if points[0] <= trim < points[-1]:
         hinges += [("above", own, trim), ("below", own, trim)]
     rows = "".join(
         f'            {term}, "{signal}", "{side}", {slope!r} * values["factor"], {x!r}{by}),\n'
@@ -199,7 +202,7 @@ def _size(name: str, value: float) -> str:
 
 def _location(name: str, value: float, table: IncrementTable) -> str:
     span = table.at[-1] - table.at[0]
-    low, high = (table.at[0], table.at[-1]) if name == "at" else (0.05 * span, span)
+    low, high = (table.at[0], table.at[-1]) if name == "at" else (min(0.05 * span, value), max(span, value))
     return (
         f'Parameter("{name}", "-", "learned: {value:.4g}", low={low!r}, high={high!r}, material=0.0, '
         f"is_location=True, step={0.05 * span!r}, default={value!r})"

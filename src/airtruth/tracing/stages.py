@@ -94,7 +94,8 @@ def assess_stages(case: Case, rounds: Sequence[SearchRound]) -> Stages:
     if last.hypothesis.effects or last.hypothesis.spread is not None:
         models["after"] = _model(last)
         first = rounds[0]
-        others = [c for c in first.candidates if c not in first.tied]
+        tied = {c.score.effect.key for c in first.tied}
+        others = [c for c in first.candidates if c.score.effect.key not in tied]
         if others:
             models["control"] = _model(others[0].fit)
     fitted = {name: _assess_all(case.fitted, m, fitted=True) for name, m in models.items()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final, TypeVar
@@ -113,10 +113,11 @@ def write_update(
     fit = rounds[-1].gls
     plants = [record.plant for record in case.fitted.records]
     shift = float(np.mean([p.alpha_shift_rad for p in plants]))
+    of_alpha = {"alpha", *(s.name for s in change.states if s.signal == "alpha")}
     change = replace(
         change,
-        aero=tuple(_factor_from_zero_alpha(_from_zero_alpha(t, shift), shift) for t in change.aero),
-        readings=tuple(_from_zero_alpha(t, shift) for t in change.readings),
+        aero=tuple(_factor_from_zero_alpha(_from_zero_alpha(t, of_alpha, shift), shift) for t in change.aero),
+        readings=tuple(_from_zero_alpha(t, of_alpha, shift) for t in change.readings),
     )
     increments = dict(zip(PARAMETERS, fit.point.common[Common.derivatives].tolist(), strict=True))
     release = rounds[-1].release
@@ -156,9 +157,12 @@ def _line(key: str, table: IncrementTable) -> str:
     return f"95 % band of {key}: {band}."
 
 
-def _from_zero_alpha(term: _Term, shift_rad: float) -> _Term:
-    """A term that counts alpha from zero, as an aircraft does; the linear model counts it from the record's trim."""
-    return replace(term, at=term.at + shift_rad) if term.signal == "alpha" else term
+def _from_zero_alpha(term: _Term, of_alpha: Collection[str], shift_rad: float) -> _Term:
+    """A term that counts alpha from zero, as an aircraft does; the linear model counts it from the record's trim.
+
+    ``of_alpha`` are the signals that count so: alpha, and the states that it drives.
+    """
+    return replace(term, at=term.at + shift_rad) if term.signal in of_alpha else term
 
 
 def _factor_from_zero_alpha(term: AeroTerm, shift_rad: float) -> AeroTerm:

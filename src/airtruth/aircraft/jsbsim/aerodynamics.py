@@ -160,9 +160,16 @@ def _grouped(terms: Sequence[AeroTerm]) -> tuple[list[list[AeroTerm]], list[Aero
         if term.shape in ("above", "below"):
             same = (term.coefficient, term.signal, term.factor, term.factor_at)
             bends.setdefault(same, []).append(term)
-    learned = [group for group in bends.values() if len(group) >= _LEAST_BENDS and _is_constant_beyond(group)]
+    balanced = (_balanced(group) for group in bends.values())
+    learned = [group for group in balanced if len(group) >= _LEAST_BENDS]
     taken = {id(term) for group in learned for term in group}
     return learned, [term for term in terms if id(term) not in taken]
+
+
+def _balanced(group: list[AeroTerm]) -> list[AeroTerm]:
+    """The group, without the one term that does not belong to its table: a break of its own; empty for no table."""
+    without_one = ([t for t in group if t is not term] for term in group)
+    return next((g for g in (group, *without_one) if _is_constant_beyond(g)), [])
 
 
 def _is_constant_beyond(group: Sequence[AeroTerm]) -> bool:

@@ -283,8 +283,10 @@ def declared_covariance(aircraft: Aircraft, derivatives: Array) -> Array:
     std = np.empty(6)
     for i, name in enumerate(PARAMETERS):
         quantity = stated.get(name)
-        relative = quantity.std / abs(quantity.value) if quantity and quantity.std > 0.0 else RELATIVE_STD[i]
-        std[i] = max(relative * abs(derivatives[i]), _LEAST_STD[i])
+        own = RELATIVE_STD[i] * abs(derivatives[i])
+        if quantity and quantity.std > 0.0:
+            own = quantity.std * (abs(derivatives[i] / quantity.value) if quantity.value else 1.0)
+        std[i] = max(own, _LEAST_STD[i])
     covariance = np.diag(std**2)
     mass = aircraft.file.mass
     if mass is not None:

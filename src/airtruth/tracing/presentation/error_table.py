@@ -42,7 +42,8 @@ def error_table(answer: TraceAnswer) -> Table:
         for kind, title in KINDS
     ]
     if answer.replay is not None:
-        groups.append(Group("Flown again in JSBSim, held-out records", tuple(_replayed(answer, names))))
+        flown = f"Flown again in JSBSim, {SET_NAMES[_flown_again(answer)]}"
+        groups.append(Group(flown, tuple(_replayed(answer, names))))
     return Table(
         title="Root mean square of the error",
         columns=("", "signal", *names),
@@ -75,8 +76,13 @@ def error_csv(answer: TraceAnswer) -> str:
                 rms = _of_kind(answer.error.stages[stage].on(records), kind)
                 rows += [(records, kind, channel, stage, value) for channel, value in rms.items()]
     for aircraft, rms in ({} if answer.replay is None else answer.replay.to_dict()).items():
-        rows += [("held_out", "replay", channel, aircraft, value) for channel, value in rms.items()]
+        rows += [(_flown_again(answer), "replay", channel, aircraft, value) for channel, value in rms.items()]
     return as_csv(flat("Root mean square of the error", CSV_COLUMNS, rows))
+
+
+def _flown_again(answer: TraceAnswer) -> str:
+    """One of `SETS`: the records that are flown again, the held-out ones where there are any."""
+    return "held_out" if answer.records.held_out else "fit"
 
 
 def _of_kind(rms: Rms | None, kind: str) -> PerChannel:

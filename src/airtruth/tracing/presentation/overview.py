@@ -8,7 +8,7 @@ from typing import Final
 
 from airtruth.table import MISSING, Cell, Group, Number, Row, Table, as_text, flat, significant, write_table
 from airtruth.tracing.answer import AcceptedEffect, TraceAnswer
-from airtruth.tracing.presentation.text import interval, unit_of
+from airtruth.tracing.presentation.text import increment_words, interval, unit_of
 
 NAME: Final = "traces"
 """Name of the files."""
@@ -72,7 +72,10 @@ def _rows(name: str, answer: TraceAnswer) -> Iterator[Row]:
 
 
 def _lines(effect: AcceptedEffect) -> Iterator[tuple[str, str]]:
-    for number, (parameter, estimate) in enumerate(effect.parameters.items()):
+    if effect.table is not None:
+        yield effect.key, increment_words(effect)
+    stated = effect.parameters if effect.table is None else {}
+    for number, (parameter, estimate) in enumerate(stated.items()):
         size = f"{parameter} {significant(estimate.value)} {unit_of(effect.key, parameter)}".rstrip()
         yield effect.key if number == 0 else "", f"{size} ({interval(estimate)})"
     if effect.indistinguishable_from:

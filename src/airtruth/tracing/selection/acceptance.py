@@ -136,8 +136,7 @@ def assess_candidate(
     reasons = [
         *_fit_reasons(s, own, gain, least, excess),
         *left_out.reasons,
-        *size_reasons(s, size, max(r.plant.aircraft.constants.span_m for r in problem.records)),
-        *shape_reasons(s.effect, own.point.sizes[_first_size(s, own) :]),
+        *implausibility(problem, s, own),
     ]
     return Candidate(
         s, own, gain, left_out.likelihood_gain, left_out.free_run_gain, size, std, tuple(reasons)
@@ -214,6 +213,14 @@ def _fit_reasons(s: Score, own: PosteriorFit, gain: float, least: float, excess:
         yield "after its refit it explains nothing significant"
     if not s.effect.parameters[0].one_sided and abs(size) < _ERRORS * std * excess:
         yield "after its refit its size is no larger than its uncertainty"
+
+
+def implausibility(problem: TraceProblem, s: Score, own: PosteriorFit) -> Iterator[str]:
+    """Why the estimates of a refitted effect are not accepted, whatever it gains, in words."""
+    yield from size_reasons(
+        s, _size(s, own)[0], max(r.plant.aircraft.constants.span_m for r in problem.records)
+    )
+    yield from shape_reasons(s.effect, own.point.sizes[_first_size(s, own) :])
 
 
 def size_reasons(s: Score, size: float, span_m: float) -> Iterator[str]:

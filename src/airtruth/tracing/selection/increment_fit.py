@@ -51,6 +51,8 @@ material size of the named effects)."""
 _MATERIAL_READING: Final = 0.005
 """Least standard deviation of an increment of a reading over that of its channel [-] (judgement: half of the material
 error of a gyro's scale)."""
+_LEAST_DECLARED: Final = 1e-3
+"""Least declared derivative with which an increment is compared [-] (judgement: one that is declared as zero)."""
 _FLOWN: Final = (0.02, 0.98)
 """Quantiles of the flown signal between which the swing counts [-] (judgement)."""
 _DERIVATIVE: Final[Mapping[str, str]] = {
@@ -193,7 +195,7 @@ def relative_swing(problem: TraceProblem, own: PosteriorFit, effect: Increment) 
         return _share_of_channel(problem.records, own, effect)
     bends, _ = fitted_bends(own, effect, own.covariance)
     index = PARAMETERS.index(f"{shape.acts_on}{_DERIVATIVE[shape.factor or shape.signal]}")
-    declared = abs(float(problem.declared_derivatives[index]))
+    declared = max(abs(float(problem.declared_derivatives[index])), _LEAST_DECLARED)
     if not shape.cells:
         return abs(float(bends[0])) / declared
     low, high = _flown_range(problem.records, shape.signal)

@@ -19,6 +19,7 @@ from airtruth.tracing.selection.acceptance import (
     UNCONVERGED,
     Candidate,
     assess_candidate,
+    implausibility,
     reference_of,
     untested,
 )
@@ -66,7 +67,8 @@ def rank(
             candidates.append(untested(r.score, r.fit, gain, SUPERSEDED, f"that is {replacement[1]}"))
             continue
         if gain < accepted - TIE and r.score.effect.name != leading:
-            candidates.append(untested(r.score, r.fit, gain, OUTDONE))
+            implausible = implausibility(problem, r.score, r.fit)
+            candidates.append(untested(r.score, r.fit, gain, OUTDONE, *implausible))
             continue
         candidate = assess_candidate(problem, r.score, r.fit, gain, reference, least)
         if gain < accepted - TIE:

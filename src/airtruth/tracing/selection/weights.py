@@ -7,6 +7,7 @@ import math
 from collections.abc import Collection, Iterator, Sequence
 from typing import Final
 
+from airtruth.effects.increment import Increment
 from airtruth.tracing.selection.acceptance import OUTDONE, has_converged
 from airtruth.tracing.selection.explanation import REFERENCE
 from airtruth.tracing.selection.ranking import TIE
@@ -33,7 +34,8 @@ def weights(rounds: Sequence[SearchRound]) -> dict[tuple[str, ...], float]:
         key = tuple(sorted(set(names)))
         found[key] = found.get(key, 0.0) + math.exp(max(_LEAST_LOG, min(0.0, log_weight)))
 
-    leading = [list(_leading(r)) for r in rounds if r.tied]
+    accepted = {r.tied[0].score.effect.name for r in rounds if r.tied}
+    leading = [list(_leading(r, accepted)) for r in rounds if r.tied]
     carried = _carried(rounds)
     for added in itertools.product(*leading):
         for explaining, log_weight in _explanations(rounds):
@@ -49,15 +51,17 @@ def weights(rounds: Sequence[SearchRound]) -> dict[tuple[str, ...], float]:
     return found
 
 
-def _leading(own: SearchRound) -> Iterator[tuple[str, float]]:
+def _leading(own: SearchRound, accepted: Collection[str]) -> Iterator[tuple[str, float]]:
     """Names of the accepted effect of a round and of its rivals, each with the logarithm of its weight.
 
-    Rivals tie with it, or are outdone by it alone: a smaller gain is evidence of its size, and no proof.
+    Rivals tie with it or gain less. An effect that another round accepts is no rival: what it gains here it gains there too.
     """
     first = own.tied[0]
+    yield first.score.effect.name, 0.0
     outdone = (c for c in own.candidates if c.reasons == (OUTDONE,) and has_converged(c.fit, c.gain))
-    for c in (*own.tied, *(c for c in outdone if c.gain < first.gain - TIE)):
-        yield c.score.effect.name, 0.5 * (c.gain - first.gain)
+    for c in (*own.tied[1:], *(c for c in outdone if c.gain < first.gain - TIE)):
+        if c.score.effect.name not in accepted:
+            yield c.score.effect.name, 0.5 * (c.gain - first.gain)
 
 
 def _carried(rounds: Sequence[SearchRound]) -> set[str]:
@@ -76,15 +80,17 @@ def _without_one(rounds: Sequence[SearchRound]) -> Iterator[tuple[list[str], flo
     """The accepted effects without each one of them, and the logarithm of the weight of that set.
 
     What is lost is the smaller of its gain when it was accepted and of A. Wald's statistic of its size at the end (Trans. Am.
-    Math. Soc. 54 (1943) 426-482).
+    Math. Soc. 54 (1943) 426-482). Of an increment, which has many sizes, it is the gain.
     """
     last = rounds[-1].null
     leaders = [r.tied[0] for r in rounds if r.tied]
     for leader in leaders:
-        at = last.hypothesis.span(leader.score.effect.key).start
-        wald = (float(last.point.sizes[at]) / max(last.size_std(at), _LEAST_STD)) ** 2
+        lost = leader.gain
+        if not isinstance(leader.score.effect, Increment):
+            at = last.hypothesis.span(leader.score.effect.key).start
+            lost = min(lost, (float(last.point.sizes[at]) / max(last.size_std(at), _LEAST_STD)) ** 2)
         others = [c.score.effect.name for c in leaders if c is not leader]
-        yield others, REFERENCE + 1.0 - 0.5 * min(leader.gain, wald)
+        yield others, REFERENCE + 1.0 - 0.5 * lost
 
 
 def rival_of(lost: Sequence[SearchRound], excess: float) -> Rival:
