@@ -153,6 +153,41 @@ def test_a_band_and_a_flight_are_combined_by_their_inverse_variances(bench, camp
     )
 
 
+def test_points_in_the_cell_of_the_trim_do_not_count(bench, campaign):
+    """There the band is that of the slope, which the flight cannot tell from a derivative."""
+    whole = accepted()
+    half = 0.002
+    table = replace(
+        whole.table,
+        low=tuple(v - half for v in whole.table.value),
+        high=tuple(v + half for v in whole.table.value),
+        trim=SHAPE.trim,
+    )
+    (own,) = BandQuestion((replace(whole, table=table),)).at(bench, campaign, 3, 0).learned
+    assert own.at == pytest.approx([0.03, 0.065, 0.17])
+
+
+def test_a_learned_play_keeps_its_half_width(bench, campaign):
+    """A play without a half width leaves the flight no sensitivity to it."""
+    play = AcceptedEffect(
+        name="increment",
+        variant="Cm over a play of alpha_rad",
+        parameters={
+            "share": ParameterEstimate(0.3, 0.1, (None, None)),
+            "half_width": ParameterEstimate(0.01, 0.002, (None, None)),
+        },
+        p_value=1e-9,
+        separation_sigma=9.0,
+        acts_on="Cm",
+        over="alpha_rad",
+        states=(IncrementState("play", "alpha_rad", 0.0, 0.0, 0.01),),
+    )
+    (own,) = BandQuestion((play,)).at(bench, campaign, 3, 0).learned
+    width = own.effect.parameters[1]
+    assert (width.low, width.high) == (pytest.approx(0.01 / 3.0), pytest.approx(0.03))
+    np.testing.assert_allclose(own.sizes, [0.3, width.size(0.01)])
+
+
 def test_an_increment_of_an_answer_is_the_one_that_was_learned(bench, campaign):
     (own,) = BandQuestion((accepted(),)).at(bench, campaign, 3, 0).learned
     assert own.effect.shape == replace(SHAPE, trim=own.effect.shape.trim)

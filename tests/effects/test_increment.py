@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from airtruth.aircraft.write import write_aircraft
 from airtruth.effects.closed_form import closed_forms
 from airtruth.effects.increment import Memory, Shape, increment
-from airtruth.physics.terms import Change, shape_of
+from airtruth.physics.terms import AeroTerm, Change, shape_of
 
 SHAPE = Shape("Cm", "alpha", 0.02, 0.18, 8, trim=0.07)
 BENDS = [0.002, -0.001, 0.003, -0.004, 0.002, 0.001, -0.002]
@@ -117,9 +117,17 @@ def test_the_written_table_is_the_increment_and_flags_its_range(tmp_path):
         assert fdm["aero/effects/Cm-table-1-outside"] == float(outside)
 
 
-def test_a_single_break_is_still_written_as_a_formula(tmp_path):
-    from airtruth.physics.terms import AeroTerm
+def test_a_break_beside_an_increment_leaves_its_table(tmp_path):
+    """Both act on Cm over alpha; the break is a formula of its own."""
+    broken = AeroTerm("Cm", "alpha", "above", -0.4, 0.1)
+    change = increment(SHAPE).change(values_of(SHAPE, BENDS)) + Change(aero=(broken,))
+    folder = write_aircraft("gtm", change, tmp_path / "both")
+    text = (folder / "both.xml").read_text()
+    assert "aero/effects/Cm-table-1-outside" in text
+    assert "aero/effects/Cm-1" in text
 
+
+def test_a_single_break_is_still_written_as_a_formula(tmp_path):
     folder = write_aircraft(
         "gtm", Change(aero=(AeroTerm("Cm", "alpha", "above", -0.4, 0.1),)), tmp_path / "one"
     )

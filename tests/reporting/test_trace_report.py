@@ -213,6 +213,8 @@ def test_replay_is_told_where_there_is_one(answer):
     assert str(row[grid.columns.index("declared")]) == "1.15"
     assert str(row[grid.columns.index("after")]) == "0.573"
     assert "held_out,replay,q_rad_s,updated,0.01" in error_csv(answer)
+    alone = replace(answer, records=replace(answer.records, held_out=()))
+    assert "fit,replay,q_rad_s,updated,0.01" in error_csv(alone)
 
 
 def test_free_runs_stand_beside_their_tolerances(answer):

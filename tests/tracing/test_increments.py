@@ -13,7 +13,7 @@ from scipy.stats import multivariate_normal
 from airtruth import aircraft as planes
 from airtruth import report
 from airtruth.aircraft import write as writing
-from airtruth.effects.increment import Shape, increment
+from airtruth.effects.increment import Memory, Shape, increment
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import AeroTerm, Change, shape_of, term_value
 from airtruth.tracing import TraceOptions, trace
@@ -37,6 +37,7 @@ from airtruth.tracing.selection.increments import flown, log_evidences, shapes
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.release import Release
 from airtruth.tracing.selection.rounds import RoundStart, search_round
+from airtruth.tracing.update import from_zero_alpha
 from airtruth.units import DEG
 
 
@@ -128,15 +129,56 @@ def test_the_written_module_scales_a_table_without_a_closed_form(trim):
     np.testing.assert_allclose(flown, 2.0 * np.array(value), atol=1e-12)
 
 
-def test_the_written_module_of_a_table_with_a_slope_at_the_trim_is_that_table():
-    """The trim halves the cell from 0.05 to 0.075; the slope there is that of the cell."""
-    value = [0.004, 0.006, 0.001, -0.001, 0.005, -0.012, 0.014, -0.015, 0.018]
-    learned = an_effect(value)
-    (effect,) = executed(effect_module(Answer(replace(learned, table=replace(learned.table, trim=0.0625)))))
+@pytest.mark.parametrize("trim", [0.0, 0.0625, 0.2])
+def test_the_written_module_of_a_table_with_a_slope_at_the_trim_is_that_table(trim):
+    """The trim is an end of the table, or halves the cell from 0.05 to 0.075; the slope there is that of the cell."""
+    value = np.array([0.004, 0.006, 0.001, -0.001, 0.005, -0.012, 0.014, -0.015, 0.018])
+    value -= np.interp(trim, np.linspace(0.0, 0.2, 9), value)
+    learned = an_effect(value.tolist())
+    (effect,) = executed(effect_module(Answer(replace(learned, table=replace(learned.table, trim=trim)))))
     change = effect.change({"factor": 1.0})
     at = np.linspace(-0.02, 0.22, 49)
     flown = sum(t.amplitude * shape_of(t, at) for t in change.aero)
     np.testing.assert_allclose(flown, np.interp(at, np.linspace(0.0, 0.2, 9), value), atol=1e-12)
+
+
+def test_the_width_of_a_written_step_is_within_its_range():
+    """A step of -0.03 at 0.13 within less than a cell of 24: the width is not determined, and its default is allowed."""
+    at = np.linspace(0.0, 0.2, 25)
+    value = -0.03 * (at > 0.13)
+    table = IncrementTable(
+        tuple(at.tolist()),
+        tuple(value.tolist()),
+        tuple((value - 1e-4).tolist()),
+        tuple((value + 1e-4).tolist()),
+        (20,) * 25,
+        0.05,
+    )
+    (effect,) = executed(effect_module(Answer(replace(an_effect([0.0] * 9), table=table))))
+    width = next(p for p in effect.parameters if p.name == "width")
+    assert width.low <= width.default <= width.high
+
+
+def test_a_form_of_a_pair_adds_no_derivative_at_the_trim():
+    """A break at 0.05 below the trim 0.1 is not recovered: it would be -0.02 at the trim, where the derivative is declared."""
+    at = np.linspace(0.0, 0.2, 9)
+    value = -0.4 * (np.maximum(at - 0.05, 0.0) - 0.05)
+    whole = an_effect(value.tolist())
+    moved = replace(whole, table=replace(whole.table, trim=0.1), by="elevator_rad", by_at=0.0)
+    (pair,) = executed(effect_module(Answer(moved)))
+    (alone,) = executed(effect_module(Answer(replace(moved, by=None))))
+    assert [p.name for p in alone.parameters] == ["slope", "at"]
+    assert [p.name for p in pair.parameters] == ["factor"]
+
+
+def test_terms_over_alpha_and_over_what_it_drives_count_from_zero():
+    """A linear part behind a lag of alpha, counted from the trim 0.05, vanishes at rest in an aircraft too."""
+    shape = Shape("CL", "alpha", -0.1, 0.1, 0, trim=0.0, memory=Memory("lag", 0.3))
+    change = from_zero_alpha(increment(shape).change({"share": 0.8, "time_s": 0.3}), 0.05)
+    assert [(t.amplitude, t.at) for t in change.aero] == [(0.8, 0.05), (-0.8, 0.05)]
+    pair = AeroTerm("Cm", "elevator", "linear", 1.0, 0.02, "alpha", 0.01)
+    (moved,) = from_zero_alpha(Change(aero=(pair,)), 0.05).aero
+    assert (moved.at, moved.factor_at) == (0.02, pytest.approx(0.06))
 
 
 def test_the_written_module_of_a_reading_changes_the_sensor():

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from airtruth.effects.increment import Shape, increment
 from airtruth.tracing.selection.acceptance import IMMATERIAL, OUTDONE
 from airtruth.tracing.selection.weights import alike_in_rivals, rival_of, weights
 
@@ -78,6 +79,30 @@ def test_an_outdone_effect_has_the_weight_of_its_gain():
     assert found == pytest.approx(
         {("accelerometer_lag",): 1.0, ("accelerometer_delay",): math.exp(-4.0)}, rel=1e-12
     )
+
+
+def test_an_effect_that_a_later_round_accepts_is_no_rival_of_an_earlier_one():
+    """It was outdone by 7 in 2 log L and then accepted beside the leader; neither explains the records alone."""
+    found = weights(
+        [tied(vane_arm=60.0, outdone=[candidate("gyro_lag", 53.0, OUTDONE)]), tied(gyro_lag=50.0)]
+    )
+    assert found == pytest.approx(
+        {
+            ("gyro_lag", "vane_arm"): 1.0,
+            ("vane_arm",): math.exp(5.0 - 25.0),
+            ("gyro_lag",): math.exp(5.0 - 30.0),
+        },
+        rel=1e-12,
+    )
+
+
+def test_an_increment_is_absent_by_its_evidence_and_not_by_its_first_bend():
+    """Its lowest bend is 0.3 standard deviations."""
+    effect = increment(Shape("Cm", "alpha", 0.0, 0.2, 4, 0.05))
+    learned = tied(z=0.3, increment=80.0)
+    learned.tied[0].score.effect = effect
+    found = weights([tied(vane_arm=60.0), learned])
+    assert found[("vane_arm",)] == pytest.approx(math.exp(5.0 - 40.0))
 
 
 def test_an_effect_of_little_evidence_may_be_absent():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final, TypeVar
@@ -113,12 +113,7 @@ def write_update(
     fit = rounds[-1].gls
     plants = [record.plant for record in case.fitted.records]
     shift = float(np.mean([p.alpha_shift_rad for p in plants]))
-    of_alpha = {"alpha", *(s.name for s in change.states if s.signal == "alpha")}
-    change = replace(
-        change,
-        aero=tuple(_factor_from_zero_alpha(_from_zero_alpha(t, of_alpha, shift), shift) for t in change.aero),
-        readings=tuple(_from_zero_alpha(t, of_alpha, shift) for t in change.readings),
-    )
+    change = from_zero_alpha(change, shift)
     increments = dict(zip(PARAMETERS, fit.point.common[Common.derivatives].tolist(), strict=True))
     release = rounds[-1].release
     causes = release.sets[0].effects if released and release is not None else ()
@@ -157,16 +152,26 @@ def _line(key: str, table: IncrementTable) -> str:
     return f"95 % band of {key}: {band}."
 
 
-def _from_zero_alpha(term: _Term, of_alpha: Collection[str], shift_rad: float) -> _Term:
-    """A term that counts alpha from zero, as an aircraft does; the linear model counts it from the record's trim.
+def from_zero_alpha(change: Change, shift_rad: float) -> Change:
+    """Terms that count alpha from zero, as an aircraft does; the linear model counts it from the trim of a record.
 
-    ``of_alpha`` are the signals that count so: alpha, and the states that it drives.
+    Parameters
+    ----------
+    change : as the filter has it; shift_rad : angle of attack of the trim [rad].
     """
-    return replace(term, at=term.at + shift_rad) if term.signal in of_alpha else term
+    of_alpha = {"alpha", *(s.name for s in change.states if s.signal == "alpha")}
+
+    def moved(term: _Term) -> _Term:
+        return replace(term, at=term.at + shift_rad) if term.signal in of_alpha else term
+
+    return replace(
+        change,
+        aero=tuple(
+            replace(moved(t), factor_at=t.factor_at + (shift_rad if t.factor == "alpha" else 0.0))
+            for t in change.aero
+        ),
+        readings=tuple(moved(t) for t in change.readings),
+    )
 
 
-def _factor_from_zero_alpha(term: AeroTerm, shift_rad: float) -> AeroTerm:
-    return replace(term, factor_at=term.factor_at + shift_rad) if term.factor == "alpha" else term
-
-
-__all__ = ["accepted_change", "updated_folder", "write_update"]
+__all__ = ["accepted_change", "from_zero_alpha", "updated_folder", "write_update"]
