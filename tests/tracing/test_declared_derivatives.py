@@ -10,6 +10,7 @@ from airtruth.tracing.declared_model import remaining_evidence
 from airtruth.tracing.inference import derivative_likelihood as module
 from airtruth.tracing.inference.derivative_likelihood import contradiction, derivative_likelihood
 from airtruth.tracing.model.parameters import Common
+from airtruth.tracing.model.plant import declared_covariance
 from airtruth.tracing.selection.anomaly import DERIVATIVES_MOVED, Anomaly
 from airtruth.tracing.selection.omnibus import advice
 
@@ -24,6 +25,19 @@ def white(monkeypatch):
     """Innovations that are white: plain and robust covariance are equal."""
     for name in ("inflation", "scatter"):
         monkeypatch.setattr(module, name, lambda problem, fitted: np.ones(Common.size))
+
+
+def test_a_derivative_declared_as_zero_has_its_stated_deviation(gtm):
+    """The others scale with the value at the trim: CLalpha 4.787 +- 0.24 stated, 5.0 at the trim."""
+    stated = {
+        name: q.model_copy(update={"value": 0.0, "std": 2.0}) for name, q in gtm.file.derivatives.items()
+    }
+    stated |= {"CLalpha": gtm.file.derivatives["CLalpha"]}
+    file = gtm.file.model_copy(update={"derivatives": stated, "mass": None})
+    values = np.array([5.0, 30.0, 0.4, 0.0, 0.0, -1.8])
+    covariance = declared_covariance(gtm.model_copy(update={"file": file}), values)
+    expected = np.array([0.24 * 5.0 / 4.787, *[2.0] * 5])
+    np.testing.assert_allclose(covariance, np.diag(expected**2), rtol=1e-12)
 
 
 def fit_of(estimate, spread=None):
