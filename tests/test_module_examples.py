@@ -11,11 +11,11 @@ import pytest
 import airtruth
 
 SOURCE = Path(airtruth.__file__).parent
-ROOMS = ("aircraft", "effects", "physics", "simulation")
+LAYERS = ("aircraft", "effects", "physics", "simulation")
 MODULES = sorted(
     "airtruth." + ".".join(path.relative_to(SOURCE).with_suffix("").parts)
-    for room in ROOMS
-    for path in (SOURCE / room).rglob("*.py")
+    for layer in LAYERS
+    for path in (SOURCE / layer).rglob("*.py")
     if ">>> " in path.read_text(encoding="utf-8")
 )
 

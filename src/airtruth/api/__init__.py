@@ -1,6 +1,6 @@
 """The public functions of ``import airtruth as at``.
 
-Each function loads the rooms that it needs when it is called. Wherever ``logs`` is an argument, it is a log file,
+Each function loads the modules that it needs when it is called. Wherever ``logs`` is an argument, it is a log file,
 a campaign folder, a folder of logs, a `FlightLog`, or a sequence of these; wherever ``aircraft`` is an argument, it
 is a folder with aircraft.toml, that file, the name of a shipped aircraft, or a loaded `Aircraft`. Quantities are in
 SI and radians.

@@ -65,7 +65,7 @@ def report(
 
 
 # The pages are imported where they are needed: the tracer and matplotlib take seconds, and `airtruth tables`, which
-# imports this room as well, needs neither.
+# imports this module as well, needs neither.
 
 
 def _report(source: Source, logs: Logs | None, aircraft: Aircraft | None) -> Report:
