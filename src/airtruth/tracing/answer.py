@@ -82,7 +82,10 @@ class CandidateScore:
 @dataclass(frozen=True)
 class Derivatives:
     """Derivatives at the trim [1/rad, rates as q c/(2V)], name -> value: declared, refitted without and with the
-    effects, and the standard deviation of the last."""
+    effects, and the standard deviation of the last.
+
+    The slope of a learned increment at the trim adds to them; it belongs to the table of the increment.
+    """
 
     declared: dict[str, float]
     before: dict[str, float]
