@@ -10,6 +10,7 @@ from airtruth.errors import LogError
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.reporting import loop, loop_figures
 from airtruth.reporting.campaign import Campaign, MethodEstimates
+from airtruth.tracing.accepted import IncrementTable
 from airtruth.tracing.answer import (
     AcceptedEffect,
     Derivatives,
@@ -161,3 +162,26 @@ def test_table_of_traces(tmp_path):
         ("a", "delay_s", "0.0205"),
         ("f", "", ""),
     ]
+
+
+def test_a_learned_table_is_one_row_of_the_traces(tmp_path):
+    """Its coefficients are rows of the CSV file alone."""
+    estimates = {f"bend_{k}": ParameterEstimate(0.01 * k, 0.001, (None, None)) for k in range(1, 4)}
+    at = (0.0, 0.05, 0.1, 0.15, 0.2)
+    value = (-0.02, 0.0, 0.0, 0.01, 0.03)
+    learned = AcceptedEffect(
+        name="increment",
+        variant="Cm over alpha_rad",
+        parameters=estimates,
+        p_value=1e-9,
+        separation_sigma=5.0,
+        acts_on="Cm",
+        over="alpha_rad",
+        relative_size=0.2,
+        table=IncrementTable(at, value, value, value, (9,) * 5, 0.07),
+    )
+    text, paths = traces.write_traces({"a": answer((learned,), "learned")}, tmp_path)
+    assert "bend_1" not in text
+    assert "0.030 at alpha_rad = 0.200 (95 %: 0.030 to 0.030)" in text
+    rows = list(csv.DictReader(io.StringIO(paths[1].read_text())))
+    assert [r["parameter"] for r in rows] == list(estimates)

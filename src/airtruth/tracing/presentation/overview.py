@@ -8,7 +8,7 @@ from typing import Final
 
 from airtruth.table import MISSING, Cell, Group, Number, Row, Table, as_text, flat, significant, write_table
 from airtruth.tracing.answer import AcceptedEffect, TraceAnswer
-from airtruth.tracing.presentation.text import increment_words, interval, unit_of
+from airtruth.tracing.presentation.text import interval, largest_words, unit_of
 
 NAME: Final = "traces"
 """Name of the files."""
@@ -73,7 +73,7 @@ def _rows(name: str, answer: TraceAnswer) -> Iterator[Row]:
 
 def _lines(effect: AcceptedEffect) -> Iterator[tuple[str, str]]:
     if effect.table is not None:
-        yield effect.key, increment_words(effect)
+        yield effect.key, largest_words(effect.table, effect.over or "")
     stated = effect.parameters if effect.table is None else {}
     for number, (parameter, estimate) in enumerate(stated.items()):
         size = f"{parameter} {significant(estimate.value)} {unit_of(effect.key, parameter)}".rstrip()

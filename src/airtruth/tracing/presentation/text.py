@@ -177,19 +177,21 @@ def _through(state: IncrementState) -> str:
     )
 
 
+def largest_words(table: IncrementTable, over: str) -> str:
+    """Largest value of a learned table, where it is, and its band."""
+    i = max(range(len(table.at)), key=lambda k: abs(table.value[k]))
+    low, high = significant(table.low[i], 2), significant(table.high[i], 2)
+    return f"{significant(table.value[i], 2)} at {over} = {significant(table.at[i])} (95 %: {low} to {high})"
+
+
 def increment_words(effect: AcceptedEffect) -> str:
     """A learned increment in words: largest value, onset, memory, and size relative to the declared model."""
     over, table = effect.over or "", effect.table
     parts = []
     if table is not None:
-        i = max(range(len(table.at)), key=lambda k: abs(table.value[k]))
-        low, high = significant(table.low[i], 2), significant(table.high[i], 2)
-        parts.append(
-            f"{effect.subject} {significant(table.value[i], 2)} at {over} = {significant(table.at[i])} "
-            f"(95 %: {low} to {high})"
-        )
+        parts.append(f"{effect.subject} {largest_words(table, over)}")
         if effect.by and effect.states:
-            change_s = table.value[i] * effect.states[0].time_s
+            change_s = max(table.value, key=abs) * effect.states[0].time_s
             parts.append(f"the time constant changes by {significant(change_s, 2)} s there")
         parts.append(_onset(table, over))
     parts += [_through(s) for s in effect.states if not effect.by]
@@ -292,7 +294,9 @@ __all__ = [
     "detectable",
     "effect_details",
     "effect_line",
+    "increment_words",
     "interval",
+    "largest_words",
     "unit_of",
     "verdict",
 ]
