@@ -167,6 +167,27 @@ def test_points_in_the_cell_of_the_trim_do_not_count(bench, campaign):
     assert own.at == pytest.approx([0.03, 0.065, 0.17])
 
 
+def test_a_table_of_many_cells_is_planned_for_with_eight(bench, campaign):
+    """A straight line above the trim, in 24 cells: nine points of it, and a bend in the cell beside the trim alone."""
+    at = np.linspace(0.03, 0.17, 25)
+    value = -0.4 * np.maximum(at - 0.1, 0.0)
+    whole = accepted()
+    table = IncrementTable(
+        tuple(at.tolist()),
+        tuple(value.tolist()),
+        tuple((value - 0.002).tolist()),
+        tuple((value + 0.002).tolist()),
+        (9,) * 25,
+        0.0925,
+    )
+    (own,) = BandQuestion((replace(whole, table=table),)).at(bench, campaign, 3, 0).learned
+    assert own.effect.shape.cells == 8
+    np.testing.assert_allclose(own.at, [0.03, 0.0475, 0.065, 0.1175, 0.135, 0.1525, 0.17], atol=1e-12)
+    np.testing.assert_allclose(own.value, -0.4 * np.maximum(own.at - 0.1, 0.0), atol=1e-12)
+    np.testing.assert_allclose(own.basis @ own.sizes, own.value, atol=1e-12)
+    np.testing.assert_allclose(own.known, 0.002 / Z95)
+
+
 def test_a_learned_play_keeps_its_half_width(bench, campaign):
     """A play without a half width leaves the flight no sensitivity to it."""
     play = AcceptedEffect(
@@ -195,7 +216,7 @@ def test_an_increment_of_an_answer_is_the_one_that_was_learned(bench, campaign):
     whole = accepted()
     before = replace(whole, parameters={k: v for k, v in whole.parameters.items() if k != "slope"})
     (same,) = BandQuestion((before,)).at(bench, campaign, 3, 0).learned  # of a version without slopes
-    np.testing.assert_array_equal(same.sizes, own.sizes)
+    np.testing.assert_allclose(same.sizes, own.sizes, atol=1e-15)
     linear = AcceptedEffect(
         name="increment",
         variant="Cm over a lag of elevator_rad",

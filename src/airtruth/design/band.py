@@ -5,7 +5,7 @@ state, air and times of the increment are refitted. Its band and that of the tra
 inverse variances. Both estimates as vectors give no wider band, so that the result is an upper bound for an increment
 without a slope at the trim. The derivatives and the bends have next to no prior in the flight to come, because the band
 of the trace has used it. A slope in the cell of the trim is held: it adds to a derivative, and the flight determines
-their sum.
+their sum. A function of many cells is planned for with the fewest over its range.
 
 Source: V. V. Fedorov, Theory of Optimal Experiments (1972), section 2.3 (the mean variance of a response over a range).
 """
@@ -22,16 +22,18 @@ from airtruth.design.bench import Bench, Flown
 from airtruth.design.flight import fitted_of, model_of
 from airtruth.design.narrow_result import Quantity
 from airtruth.design.separation import Model, beyond, flown_by, refitted
-from airtruth.effects.increment import SIGNAL_NAMES, SLOPE, Increment, Memory, Shape, increment
+from airtruth.effects.increment import SIGNAL_NAMES, Increment, Memory, Shape, increment
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.physics.terms import Change
 from airtruth.simulation.campaign.file import Campaign
+from airtruth.tracing.accepted import IncrementTable
 from airtruth.tracing.answer import Z95, AcceptedEffect
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem, sensitivities_of
 from airtruth.tracing.model.parameters import Common, Parameters, size_index
 from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import TraceRecord
+from airtruth.tracing.selection.increments import CELLS
 
 Array = NDArray[np.float64]
 
@@ -87,13 +89,13 @@ def learned(accepted: AcceptedEffect, plant: Plant) -> Learned:
     memory = next((Memory(s.kind, s.time_s, s.damping, s.half_width) for s in accepted.states), None)
     table = accepted.table
     trims = {"alpha": plant.trim_alpha_rad, "elevator": plant.trim_elevator_rad}
-    low, high = (0.0, 0.0) if table is None else (table.at[0], table.at[-1])
+    at = np.zeros(1) if table is None else _points(table)
     shape = Shape(
         acts_on="Cm" if accepted.acts_on == "Cm" else "CL",
         signal=signal,
-        low=low,
-        high=high,
-        cells=0 if table is None else len(table.at) - 1,
+        low=float(at[0]),
+        high=float(at[-1]),
+        cells=len(at) - 1,
         trim=trims.get(signal, 0.0) if table is None else table.origin,
         memory=memory,
         factor=factor,
@@ -101,16 +103,25 @@ def learned(accepted: AcceptedEffect, plant: Plant) -> Learned:
     )
     effect = increment(shape)
     effect = effect.with_prior(effect.parameters[0].high).with_slope_held()
-    stated = {name: estimate.value for name, estimate in accepted.parameters.items()}
-    if SLOPE not in stated:  # learned by a version without slopes
-        stated[SLOPE] = 0.0
-    sizes = np.array([p.size(stated[p.name]) for p in effect.parameters])
+    others = effect.parameters[len(shape.coefficients) :]
+    sizes = np.array([p.size(accepted.parameters[p.name].value) for p in others])
     if table is None:
         share = accepted.parameters[effect.parameters[0].name]
         return Learned(effect, sizes, np.zeros(0), np.array([share.value]), np.array([share.std]))
-    known = (np.array(table.high) - np.array(table.low)) / (2.0 * Z95)
-    counts = (known > 0.0) & (shape.basis(table.at)[:, : len(shape.knots)] != 0.0).any(axis=1)
-    return Learned(effect, sizes, np.array(table.at)[counts], np.array(table.value)[counts], known[counts])
+    value, low, high = (np.interp(at, table.at, x) for x in (table.value, table.low, table.high))
+    known = (high - low) / (2.0 * Z95)
+    basis = shape.basis(at)
+    counts = (known > 0.0) & (basis[:, : len(shape.knots)] != 0.0).any(axis=1)
+    sizes = np.concatenate([np.linalg.lstsq(basis, value, rcond=None)[0], sizes])
+    return Learned(effect, sizes, at[counts], value[counts], known[counts])
+
+
+def _points(table: IncrementTable) -> Array:
+    """Ends of the cells that a flight is planned for: those of the table, or of the coarsest one over its range.
+
+    Finer cells locate a break. Without the prior of the trace a flight would determine none of them.
+    """
+    return np.linspace(table.at[0], table.at[-1], min(len(table.at) - 1, CELLS) + 1)
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,7 @@ _DERIVATIVE: Final[Mapping[str, float]] = {"": 1.0, "alpha": 7.0, "elevator": 7.
 Cmq of 60)."""
 _ACTS: Final = {"CL": "lift", "Cm": "pitching moment", "CX": "axial force"}
 """Coefficient in words."""
-SLOPE: Final = "slope"
+_SLOPE: Final = "slope"
 """Name of the slope in the cell of the trim."""
 _HELD: Final = 1e-6
 """Standard deviation over its largest value of a slope that is held [-]: none but for rounding."""
@@ -155,7 +155,7 @@ class Shape:
         """Names of the coefficients of the function: of its bends, and of the slope where it has one."""
         bends = tuple(_bend(k) for k in range(len(self.knots)))
         slope = self.acts_on in ("CL", "Cm") and self.signal in _DECLARED and not (self.memory or self.factor)
-        return (*bends, SLOPE) if bends and slope else bends
+        return (*bends, _SLOPE) if bends and slope else bends
 
     @property
     def state(self) -> str:
@@ -228,7 +228,7 @@ class Shape:
             if len(rows) > 1
         )
         return pieces + (
-            self._slope(values[SLOPE] / self.width, signal) if SLOPE in self.coefficients else ()
+            self._slope(values[_SLOPE] / self.width, signal) if _SLOPE in self.coefficients else ()
         )
 
     def _slope(self, slope: float, signal: str) -> tuple[Piece, ...]:
@@ -289,7 +289,7 @@ class Increment(Effect):
 
     def with_slope_held(self) -> Increment:
         """The effect with a slope that the records do not change."""
-        held = (replace(p, prior_std=_HELD * p.high) if p.name == SLOPE else p for p in self.parameters)
+        held = (replace(p, prior_std=_HELD * p.high) if p.name == _SLOPE else p for p in self.parameters)
         return replace(self, parameters=tuple(held))
 
 
@@ -310,7 +310,7 @@ def increment(shape: Shape, prior_std: float = math.inf) -> Increment:
         reach, step = 20.0 * rate * reach, 100.0 * rate * step
     meanings = {
         "share": "part that acts through the state [1/unit of the signal]",
-        SLOPE: "rise over the cell of the trim",
+        _SLOPE: "rise over the cell of the trim",
     }
     parameters = [
         Parameter(
@@ -352,4 +352,4 @@ def _of_memory(name: str, value: float, memory: Memory) -> Parameter:
     return Parameter(name, "s", meaning, low, high, 0.0, is_location=True, step=value)
 
 
-__all__ = ["NAME", "SIGNAL_NAMES", "SLOPE", "Increment", "Memory", "Shape", "increment"]
+__all__ = ["NAME", "SIGNAL_NAMES", "Increment", "Memory", "Shape", "increment"]
