@@ -157,11 +157,12 @@ def test_closed_forms_recover_what_made_the_table(name, truth, expected):
         assert best.values[key] == pytest.approx(value, rel=2e-3)
 
 
-def test_a_break_below_the_trim_is_recovered_from_its_difference_from_the_trim():
-    """The table of a break at 0.04 is a line through zero at the trim, 0.06, and flat below 0.04."""
+@pytest.mark.parametrize("trim", [0.06, 0.0425])
+def test_a_break_below_the_trim_is_recovered_from_its_difference_from_the_trim(trim):
+    """The table of a break at 0.04 is a line through zero at the trim, and flat below 0.04; the trim may be next to it."""
     x = np.linspace(0.0, 0.2, 41)
-    table = -0.4 * (np.maximum(x - 0.04, 0.0) - 0.02)
-    best = closed_forms(x, table, np.full(41, 1e-4), 0.06)[0]
+    table = -0.4 * (np.maximum(x - 0.04, 0.0) - (trim - 0.04))
+    best = closed_forms(x, table, np.full(41, 1e-4), trim)[0]
     assert best.name == "break above"
     assert best.values == pytest.approx({"slope": -0.4, "at": 0.04}, rel=1e-6)
 

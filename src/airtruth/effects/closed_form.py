@@ -10,6 +10,7 @@ and R. V. Jategaonkar, AIAA 95-3438 (1995), with a ramp in place of the hyperbol
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -21,6 +22,10 @@ from scipy.stats import chi2
 
 Array = NDArray[np.float64]
 
+_LOCATIONS: Final = 49
+"""Number of locations that are tried [-] (judgement: finer than the finest table)."""
+_WIDTHS: Final = 9
+"""Number of widths that are tried [-] (judgement: each 1.6 times the one before)."""
 _LEVEL: Final = 0.05
 """Probability of the residual from which a form is as good as the table [-] (convention)."""
 
@@ -81,7 +86,13 @@ def closed_forms(
             p, statistic = fitted
             values = dict(zip(names, p.tolist(), strict=True))
             found.append(ClosedForm(name, values, statistic, len(x) - len(p)))
-    return sorted(found, key=lambda f: f.statistic + 2.0 * len(f.values))
+    return sorted(found, key=lambda f: (round(f.statistic + 2.0 * len(f.values), 6), _is_beyond(f, trim)))
+
+
+def _is_beyond(form: ClosedForm, trim: float) -> bool:
+    """Whether a form has its location on the other side of the trim: a step up above is a step down below, and a constant."""
+    above = form.name.endswith("above")
+    return form.values.get("at", trim) < trim if above else form.values.get("at", trim) > trim
 
 
 _Form = Callable[[Array, Array], Array]
@@ -112,23 +123,30 @@ def _from_trim(form: _Form, trim: float) -> _Form:
 def _fitted(
     x: Array, y: Array, s: Array, form: _Form, count: int, low: float, high: float
 ) -> tuple[Array, float] | None:
-    """Parameters of least squares from several starts, and the weighted sum of squares; None for too few points.
+    """Parameters of least squares, and the weighted sum of squares; None for too few points.
 
-    ``low`` and ``high`` are the ends of the table.
+    Every form is linear in its first parameter. The search begins at the best of a grid of the others, because a form that is
+    compared by its difference from the trim has a kink where its location passes the trim.
+
+    Parameters
+    ----------
+    low, high : ends of the table, between which a location lies.
     """
     if len(x) <= count:
         return None
-    best: tuple[Array, float] | None = None
-    span = float(np.ptp(x))
-    # a form that bends outside the table has lost its location
+    span = high - low
+    grids = (np.linspace(low, high, _LOCATIONS), span * np.geomspace(1.0 / _LOCATIONS, 1.0, _WIDTHS))
+    starts = []
+    for others in itertools.product(*grids[: count - 1]):
+        unit = form(x, np.array([1.0, *others])) / s
+        power = float(unit @ unit)
+        size = float(unit @ (y / s)) / power if power > 0.0 else 0.0
+        starts.append((float(np.sum((size * unit - y / s) ** 2)), np.array([size, *others])))
+    start = min(starts, key=lambda found: found[0])[1]
     bounds = (np.array([-np.inf, low, 0.0])[:count], np.array([np.inf, high, np.inf])[:count])
-    for location in np.quantile(x, (0.2, 0.5, 0.8)):
-        start = np.array([float(y[np.argmax(np.abs(y))]), float(location), 0.3 * span])[:count]
-        scale = np.array([max(float(np.abs(y).max()), 1e-12), span, span])[:count]
-        solved = least_squares(lambda p: (form(x, p) - y) / s, start, x_scale=scale, bounds=bounds)
-        if best is None or 2.0 * solved.cost < best[1]:
-            best = solved.x, 2.0 * float(solved.cost)
-    return best
+    scale = np.array([max(abs(start[0]), 1e-12), span, span])[:count]
+    solved = least_squares(lambda p: (form(x, p) - y) / s, start, x_scale=scale, bounds=bounds)
+    return solved.x, 2.0 * float(solved.cost)
 
 
 __all__ = ["ClosedForm", "closed_forms"]
