@@ -15,8 +15,8 @@ from airtruth.tracing.stage_errors import AxialErrors, Errors, Replay, Tolerance
 ANSWER: Final = "trace.json"
 """Name of the file in the folder of a trace."""
 ANOMALY_LEVEL: Final = 0.01
-"""Probability below which an anomaly counts although no effect was accepted [-] (judgement: one clean flight test in a
-hundred is called unexplained, or its verdict provisional)."""
+"""Probability below which an anomaly that accepted effects leave makes the answer provisional [-] (judgement: one right answer
+in a hundred)."""
 DECLARED_LEVEL: Final = 0.005
 """Probability below which the declared model is contradicted [-] (judgement: at most one true declaration in a hundred may be;
 at a level of 0.01 it was 6 of 450)."""
