@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from tiers import sampled
 
-from airtruth.errors import FAILED_RUNS, INTERRUPTED, USAGE
+from airtruth.errors import FAILED_RUNS, INTERRUPTED, TERMINATED, USAGE
 from validation.fuzz.logs import CAMPAIGN
 
 FULL = Path("/dev/full")
@@ -164,6 +164,28 @@ def interrupted(name, delay, home):
     os.killpg(process.pid, signal.SIGINT)
     _, error = process.communicate(timeout=60)
     return process.returncode, error.decode("utf-8")
+
+
+CALLED = """
+import ctypes, signal, time
+from airtruth.cli import entry
+ring = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.{signal}))
+def app(prog_name):
+    ring()
+    time.sleep(30.0)
+entry.app = app
+entry.main()
+"""
+"""The program, whose command gets a signal while C calls back into Python, as the compiled kernels do."""
+
+
+@pytest.mark.parametrize(("name", "code"), [("SIGINT", INTERRUPTED), ("SIGTERM", TERMINATED)])
+def test_a_signal_in_a_callback_from_c_is_not_lost(name, code):
+    call = [sys.executable, "-P", "-c", CALLED.format(signal=name)]
+    done = subprocess.run(call, capture_output=True, timeout=25, text=True)
+    assert done.returncode == code
+    assert "the same command starts again" in done.stderr
+    assert "Exception ignored" not in done.stderr
 
 
 def check_interrupt(name, delay, home):

@@ -6,6 +6,7 @@ import errno
 import os
 import signal
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +22,10 @@ ENDINGS: Final = {INTERRUPTED: "interrupted", TERMINATED: "terminated"}
 """Words for an exit code that a signal caused."""
 FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Error numbers of a stream that takes no more bytes."""
+
+
+_AGAIN_S: Final = 0.05
+"""Time after which a signal is sent again whose exception a callback swallowed [s] (judgement: longer than the callback)."""
 
 
 def main() -> None:
@@ -79,6 +84,8 @@ def _stopped(code: int) -> NoReturn:
 def _caught(signals: list[int]) -> Iterator[None]:
     """Let SIGTERM end the program as Ctrl-C does: workers stop and temporary folders are removed.
 
+    A signal that arrives in a callback from C raises an exception that Python ignores there. It is sent again.
+
     Parameters
     ----------
     signals : receives the exit code of the first signal.
@@ -93,6 +100,18 @@ def _caught(signals: list[int]) -> Iterator[None]:
         signals.append(INTERRUPTED)
         raise KeyboardInterrupt
 
+    def swallowed(lost: sys.UnraisableHookArgs) -> None:
+        if not (signals and issubclass(lost.exc_type, KeyboardInterrupt | SystemExit)):
+            hook(lost)
+            return
+        number = signal.SIGINT if signals[-1] == INTERRUPTED else signal.SIGTERM
+        if number == signal.SIGTERM:
+            signal.signal(number, terminate)
+        again = threading.Timer(_AGAIN_S, os.kill, (os.getpid(), number))
+        again.daemon = True
+        again.start()
+
+    hook, sys.unraisablehook = sys.unraisablehook, swallowed
     before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)}
     signal.signal(signal.SIGTERM, terminate)
     if before[signal.SIGINT] is not signal.SIG_IGN:  # a shell's background job ignores it
@@ -100,5 +119,6 @@ def _caught(signals: list[int]) -> Iterator[None]:
     try:
         yield
     finally:
+        sys.unraisablehook = hook
         for number, handler in before.items():
             signal.signal(number, handler)
