@@ -85,6 +85,20 @@ def accepted(std=0.004):
     )
 
 
+def behind(state, **of_memory):
+    """A learned linear increment of Cm, a share of 0.3 behind a state."""
+    return AcceptedEffect(
+        name="increment",
+        variant=f"Cm over a {state.kind} of {state.signal}",
+        parameters={"share": ParameterEstimate(0.3, 0.1, (None, None)), **of_memory},
+        p_value=1e-9,
+        separation_sigma=9.0,
+        acts_on="Cm",
+        over=state.signal,
+        states=(state,),
+    )
+
+
 def test_standard_errors_are_those_of_a_dense_fisher_information(gtm, bench, flown):
     """Output error of the linear equations, differenced in derivatives, initial state and biases; scipy flies them."""
     channels, noise = flown.channels, {"alpha_rad": 0.002, "q_rad_s": 0.005, "az_m_s2": 0.1}
@@ -190,19 +204,8 @@ def test_a_table_of_many_cells_is_planned_for_with_eight(bench, campaign):
 
 def test_a_learned_play_keeps_its_half_width(bench, campaign):
     """A play without a half width leaves the flight no sensitivity to it."""
-    play = AcceptedEffect(
-        name="increment",
-        variant="Cm over a play of alpha_rad",
-        parameters={
-            "share": ParameterEstimate(0.3, 0.1, (None, None)),
-            "half_width": ParameterEstimate(0.01, 0.002, (None, None)),
-        },
-        p_value=1e-9,
-        separation_sigma=9.0,
-        acts_on="Cm",
-        over="alpha_rad",
-        states=(IncrementState("play", "alpha_rad", 0.0, 0.0, 0.01),),
-    )
+    state = IncrementState("play", "alpha_rad", 0.0, 0.0, 0.01)
+    play = behind(state, half_width=ParameterEstimate(0.01, 0.002, (None, None)))
     (own,) = BandQuestion((play,)).at(bench, campaign, 3, 0).learned
     width = own.effect.parameters[1]
     assert (width.low, width.high) == (pytest.approx(0.01 / 3.0), pytest.approx(0.03))
@@ -217,19 +220,8 @@ def test_an_increment_of_an_answer_is_the_one_that_was_learned(bench, campaign):
     before = replace(whole, parameters={k: v for k, v in whole.parameters.items() if k != "slope"})
     (same,) = BandQuestion((before,)).at(bench, campaign, 3, 0).learned  # of a version without slopes
     np.testing.assert_allclose(same.sizes, own.sizes, atol=1e-15)
-    linear = AcceptedEffect(
-        name="increment",
-        variant="Cm over a lag of elevator_rad",
-        parameters={
-            "share": ParameterEstimate(0.3, 0.1, (None, None)),
-            "time_s": ParameterEstimate(0.1, 0.02, (None, None)),
-        },
-        p_value=1e-9,
-        separation_sigma=9.0,
-        acts_on="Cm",
-        over="elevator_rad",
-        states=(IncrementState("lag", "elevator_rad", 0.1),),
-    )
+    state = IncrementState("lag", "elevator_rad", 0.1)
+    linear = behind(state, time_s=ParameterEstimate(0.1, 0.02, (None, None)))
     band = BandQuestion((linear,)).at(bench, campaign, 3, 0)
     (own,) = band.learned
     assert own.effect.shape.trim == pytest.approx(bench.plant.trim_elevator_rad)

@@ -129,7 +129,7 @@ def test_a_name_without_a_sure_or_a_usual_size_is_provisional(name, parameter, v
 
 
 def test_a_name_of_a_declared_model_that_is_not_contradicted_is_provisional():
-    """`consistent` of the declared model is a probability above 1 %."""
+    """`consistent` of the declared model is a p-value above 0.5 %."""
     (reason,) = reservations(effects("airspeed_scale"), (), declared_p_value=0.0051)
     assert reason.startswith("the evidence against the declared model is weak (p = 0.0051)")
     assert reservations(effects("airspeed_scale"), (), declared_p_value=0.005) == ()

@@ -22,8 +22,6 @@ ENDINGS: Final = {INTERRUPTED: "interrupted", TERMINATED: "terminated"}
 """Words for an exit code that a signal caused."""
 FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Error numbers of a stream that takes no more bytes."""
-
-
 _AGAIN_S: Final = 0.05
 """Time after which a signal is sent again whose exception a callback swallowed [s] (judgement: longer than the callback)."""
 

@@ -90,7 +90,10 @@ def closed_forms(
 
 
 def _is_beyond(form: ClosedForm, trim: float) -> bool:
-    """Whether a form has its location on the other side of the trim: a step up above is a step down below, and a constant."""
+    """Whether a form has its location on the other side of the trim.
+
+    A step above and a step below differ by a constant alone; the one on its own side of the trim is preferred.
+    """
     above = form.name.endswith("above")
     return form.values.get("at", trim) < trim if above else form.values.get("at", trim) > trim
 
@@ -136,12 +139,12 @@ def _fitted(
         return None
     span = high - low
     grids = (np.linspace(low, high, _LOCATIONS), span * np.geomspace(1.0 / _LOCATIONS, 1.0, _WIDTHS))
-    starts = []
+    starts, aim = [], y / s
     for others in itertools.product(*grids[: count - 1]):
         unit = form(x, np.array([1.0, *others])) / s
         power = float(unit @ unit)
-        size = float(unit @ (y / s)) / power if power > 0.0 else 0.0
-        starts.append((float(np.sum((size * unit - y / s) ** 2)), np.array([size, *others])))
+        size = float(unit @ aim) / power if power > 0.0 else 0.0
+        starts.append((float(np.sum((size * unit - aim) ** 2)), np.array([size, *others])))
     start = min(starts, key=lambda found: found[0])[1]
     bounds = (np.array([-np.inf, low, 0.0])[:count], np.array([np.inf, high, np.inf])[:count])
     scale = np.array([max(abs(start[0]), 1e-12), span, span])[:count]

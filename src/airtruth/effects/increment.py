@@ -7,10 +7,10 @@ without.
 s is the signal, or the state x of a first-order lag, of a mode or of a play that the signal drives; w is the width of a
 cell. With a factor p, which counts from p0, the function is an increment of the derivative of p. With the factor x - p, x
 the lag of p with the time constant tau, it is the change of a lag's time constant over tau, small against one. The
-function is zero at the trim and constant outside the range in which it was learned. In the cell that holds the trim the
-derivatives describe the aircraft, and the function is zero. A function of a signal that has a declared derivative has a
-slope c there: a bend within the cell moves the mean slope away from the derivative. The bends b_k and the slope have
-independent normal priors, which is the prior of an integrated random walk: a penalised linear spline.
+function is zero at the trim and constant outside the range in which it was learned. In the cell that holds the trim it
+is a straight line: of slope c/w over a signal that has a declared derivative, because a bend within the cell moves the
+mean slope away from the derivative, and zero over any other signal. The bends b_k and c have independent normal priors,
+which is the prior of an integrated random walk: a penalised linear spline.
 
 Source: S. N. Wood, Generalized Additive Models, 2nd ed., 2017, sections 5.3 and 5.8 (splines as normal priors);
 D. Ruppert, M. P. Wand and R. J. Carroll, Semiparametric Regression, 2003, section 3.5 (truncated lines).
@@ -69,7 +69,7 @@ Cmq of 60)."""
 _ACTS: Final = {"CL": "lift", "Cm": "pitching moment", "CX": "axial force"}
 """Coefficient in words."""
 _SLOPE: Final = "slope"
-"""Name of the slope in the cell of the trim."""
+"""Name of the rise c over the cell of the trim."""
 _HELD: Final = 1e-6
 """Standard deviation over its largest value of a slope that is held [-]: none but for rounding."""
 _DECLARED: Final = frozenset({"alpha", "elevator", "qhat"})
@@ -227,9 +227,7 @@ class Shape:
             for at, slope in rows
             if len(rows) > 1
         )
-        return pieces + (
-            self._slope(values[_SLOPE] / self.width, signal) if _SLOPE in self.coefficients else ()
-        )
+        return pieces + (self._slope(values[_SLOPE] / self.width, signal) if _SLOPE in values else ())
 
     def _slope(self, slope: float, signal: str) -> tuple[Piece, ...]:
         """A straight line through zero at the trim, constant outside the range."""

@@ -40,7 +40,7 @@ def in_physical_terms(
         acts_on=shape.acts_on,
         over=SIGNAL_NAMES[shape.signal],
         by=SIGNAL_NAMES[shape.factor] if shape.factor else None,
-        by_at=shape.factor_trim + _shift_rad(problem, shape.factor),
+        by_at=shape.factor_trim + (problem.alpha_shift_rad if shape.factor == "alpha" else 0.0),
         relative_size=relative_swing(problem, fitted, effect),
         table=increment_table(problem, fitted, covariance, effect) if shape.cells else None,
         states=states,
@@ -57,14 +57,9 @@ def increment_table(
     shape = effect.shape
     signal = np.concatenate([flown(r, shape.signal) for r in problem.records])
     table = table_of(shape, *fitted_bends(fitted, effect, covariance), signal)
-    shift_rad = _shift_rad(problem, shape.signal)
+    shift_rad = problem.alpha_shift_rad if shape.signal == "alpha" else 0.0
     at, trim = tuple(x + shift_rad for x in table.at), shape.trim + shift_rad
     return replace(table, at=at, trim=trim) if shift_rad else table
-
-
-def _shift_rad(problem: TraceProblem, signal: str) -> float:
-    """What a signal as the filter counts it lacks: the linear model counts alpha from the trim of a record [rad]."""
-    return float(np.mean([r.plant.alpha_shift_rad for r in problem.records])) if signal == "alpha" else 0.0
 
 
 def table_of(shape: Shape, bends: Array, spread: Array, signal: Array) -> IncrementTable:

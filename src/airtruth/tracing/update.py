@@ -112,7 +112,7 @@ def write_update(
         return None
     fit = rounds[-1].gls
     plants = [record.plant for record in case.fitted.records]
-    shift = float(np.mean([p.alpha_shift_rad for p in plants]))
+    shift = case.fitted.alpha_shift_rad
     change = from_zero_alpha(change, shift)
     increments = dict(zip(PARAMETERS, fit.point.common[Common.derivatives].tolist(), strict=True))
     release = rounds[-1].release

@@ -90,6 +90,11 @@ class TraceProblem:
         """(6, 6) covariance of the increments of the derivatives, averaged likewise [-]."""
         return declared_covariance_of(self.records)
 
+    @property
+    def alpha_shift_rad(self) -> float:
+        """Mean angle of attack from which the filter counts alpha; zero but for the linear model [rad]."""
+        return float(np.mean([r.plant.alpha_shift_rad for r in self.records]))
+
     def each(self, function: Callable[[T], R], arguments: Sequence[T]) -> list[R]:
         """Apply a function to each argument, in order."""
         if self.threads <= 1 or len(arguments) <= 1:
