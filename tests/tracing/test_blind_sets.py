@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import chi2, poisson
 
 from validation.blind import causes, draw, information, refit, results, scoring, set_scoring, trials
 from validation.blind.aircraft_xml import Body
@@ -152,6 +153,18 @@ def test_a_set_is_as_strong_as_what_imitates_it(calm):
     assert least < found["inertia_error"] < (0.25 / 0.03) ** 2
     assert found[TOGETHER] == pytest.approx(found["inertia_error"], rel=0.02)
     assert found["cg_shift"] < 0.1
+
+
+def test_the_expected_share_of_contradictions_is_the_power_of_the_chi_square_test():
+    """A noncentral chi-square variable is a Poisson mixture of central ones (Johnson, Kotz and Balakrishnan, Continuous
+    Univariate Distributions 2, 2nd ed., 1995, eq. 29.3)."""
+    shifted = {"truth": {"trial": {"effects": [{"key": "derivatives"}]}, "lambda": {"derivatives": 32.0}}}
+    j = np.arange(200)
+    critical = chi2.isf(0.0025, 6)
+    mixture = float(poisson.pmf(j, 16.0) @ chi2.sf(critical, 6 + 2 * j))
+    assert set_scoring.contradiction_power(shifted) == pytest.approx(mixture, rel=1e-10)
+    lost = {"truth": {"trial": {"effects": [{"key": "tail_effectiveness"}]}, "lambda": {}}}
+    assert set_scoring.contradiction_power(lost) is None
 
 
 def test_the_truths_derivatives_are_its_draw_and_its_causes():

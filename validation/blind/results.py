@@ -53,6 +53,10 @@ def _of_sets(mode: str, scores: Mapping[str, Any]) -> str:
     summary: list[tuple[str, object]] = [
         (f"mode {mode}: trials; above lambda {STRONG:g}", f"{scores['trials']}; {scores['strong']}"),
         ("declared model called contradicted", scores["contradicted"]),
+        (
+            "the same, expected of a chi-square test with six degrees of freedom",
+            _averaged(scores["contradiction_power"]),
+        ),
         ("right set first", scores["first"]),
         ("right set first, bound by the nearest set", _averaged(scores["first_bound"])),
         ("right set among the reported", scores["reported"]),

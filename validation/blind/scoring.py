@@ -67,9 +67,10 @@ def share(flags: Iterable[bool]) -> Share:
     return Share(sum(listed), len(listed))
 
 
-def bound(noncentrality: float, level: float = LEVEL) -> float:
-    """Power of a chi-square test of one degree of freedom at a level: no score does better."""
-    return float(ncx2.sf(chi2.isf(level, 1), 1, noncentrality)) if noncentrality > 0.0 else level
+def bound(noncentrality: float, level: float = LEVEL, degrees: int = 1) -> float:
+    """Power of a chi-square test at a level; of one degree of freedom no score does better."""
+    critical = chi2.isf(level, degrees)
+    return float(ncx2.sf(critical, degrees, noncentrality)) if noncentrality > 0.0 else level
 
 
 def effects(case: Case) -> list[Mapping[str, Any]]:

@@ -12,12 +12,22 @@ from typing import Any, Final
 import numpy as np
 
 from validation.blind.causes import COMPOSITIONS, TIME_CONSTANT_S
-from validation.blind.figures import ALPHA_TRIM_RAD, APART, CONDITIONS, LOG_STEP_S, STRONG, TOGETHER, held_out
+from validation.blind.figures import (
+    ALPHA_TRIM_RAD,
+    APART,
+    CONDITIONS,
+    DERIVATIVES,
+    LOG_STEP_S,
+    STRONG,
+    TOGETHER,
+    held_out,
+)
 from validation.blind.scoring import (
     Case,
     accepted,
     actual,
     base,
+    bound,
     contradicted,
     effects,
     first_bound,
@@ -34,8 +44,17 @@ _OWN_FORMULA: Final = ("tail_effectiveness", "wing_effectiveness", "icing")
 """Effects whose parameter in the truth is not that of the library."""
 _LOADING: Final = ("cg_shift", "mass_error", "inertia_error")
 _CURVED: Final = {"CLalpha2": "CLalpha", "Cmalpha2": "Cmalpha"}
+_DERIVATIVES_LEVEL: Final = 0.0025
+"""Level of the tracer's test of the six declared derivatives: half of 0.005, the other half is for everything else."""
 _QUANTILE: Final = 1.96
 _ERRORS: Final = 2.0
+
+
+def contradiction_power(case: Case) -> float | None:
+    """Power of the chi-square test of the six derivatives; None where the truth has other effects."""
+    if any(effect["key"] != "derivatives" for effect in effects(case)):
+        return None
+    return bound(noncentrality(case), _DERIVATIVES_LEVEL, len(DERIVATIVES))
 
 
 def strong(case: Case) -> bool:
@@ -177,6 +196,7 @@ def set_scores(cases: Sequence[Case]) -> dict[str, dict[str, Any]]:
                 "trials": len(every),
                 "strong": len(some),
                 "contradicted": share(contradicted(c) for c in some),
+                "contradiction_power": mean(contradiction_power(c) for c in some),
                 "first": share(first(c) for c in some),
                 "first_bound": mean(first_bound(c) for c in some),
                 "reported": share(reported(c) for c in some),

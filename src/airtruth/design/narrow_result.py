@@ -8,10 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.design.limits import Extremes, Limits
 from airtruth.design.planned_campaign import PlannedCampaign, draw_elevator
-from airtruth.simulation.campaign.file import Campaign
-from airtruth.simulation.simulator import Condition
 from airtruth.table import Table, as_html, as_text, flat
 from airtruth.table.model import Number, Row, significant
 from airtruth.tracing.answer import Z95
@@ -86,38 +83,24 @@ class Histories:
     alpha_rad: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class NarrowResult(PlannedCampaign):
-    """A planned flight; satisfies `airtruth.result.Result`.
+    """A planned flight that determines quantities; satisfies `airtruth.result.Result`.
 
     Attributes
     ----------
-    aircraft : name.
-    campaign : the campaign that flies it; reference_campaign : the same with the 3-2-1-1.
     targets : derivatives, or variants of learned increments.
     known : (targets,) standard deviation before the flight, of an increment the root mean square over its points [-].
     quantities : the derivatives, or the points of the increments.
-    limits, reached : limits, and what the aircraft reaches in still air, with the changes that are allowed for.
-    condition : flight condition.
-    gust_m_s : vertical gust that is expected [m/s].
     rows : the best input of each family, best first, then the 3-2-1-1 of equal length and limits, ``reference``.
-    tried : inputs that were flown.
     histories : the flight.
     """
 
-    aircraft: str
-    campaign: Campaign
-    reference_campaign: Campaign
     targets: tuple[str, ...]
     known: tuple[float, ...]
     quantities: tuple[Quantity, ...]
-    limits: Limits
-    reached: Extremes
-    condition: Condition
-    gust_m_s: float
     rows: tuple[NarrowRow, ...]
     reference: NarrowRow
-    tried: int
     histories: Histories
 
     @property
@@ -221,18 +204,12 @@ class NarrowResult(PlannedCampaign):
     def to_dict(self) -> dict[str, Any]:
         """Quantities with their standard errors, limits, what is reached, and the rows of `to_frame`."""
         return {
-            "aircraft": self.aircraft,
-            "campaign": self.campaign.name,
+            **self._flight_dict(),
             "targets": list(self.targets),
             "expected_std": dict(zip(self.targets, self.best.std, strict=True)),
             "reference_std": dict(zip(self.targets, self.reference.std, strict=True)),
             "known_std": dict(zip(self.targets, self.known, strict=True)),
             "quantities": [_without_nan(asdict(q)) for q in self.quantities],
-            "records": self.campaign.runs,
-            "condition": asdict(self.condition),
-            "gust_m_s": self.gust_m_s,
-            "limits": self.limits.to_dict(),
-            "reached": asdict(self.reached),
             "inputs": [self._row(row) for row in self.rows],
         }
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.design.limits import Extremes, Limits
 from airtruth.logs.atomic import write_text
 from airtruth.simulation.campaign.file import Campaign
 from airtruth.simulation.campaign.write import as_toml
+from airtruth.simulation.simulator import Condition
 from airtruth.units import DEG
 
 if TYPE_CHECKING:
@@ -20,19 +23,44 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True, kw_only=True)
 class PlannedCampaign(ABC):
     """What every result of `airtruth plan` that computes an input has.
 
     Attributes
     ----------
-    campaign : flies the computed input.
+    aircraft : name.
+    campaign : flies the computed input; reference_campaign : the same with the 3-2-1-1.
+    limits, reached : limits, and what the aircraft reaches in still air, as declared and with the changes allowed for.
+    condition : flight condition.
+    gust_m_s : vertical gust that is expected [m/s].
+    tried : inputs that were flown.
     """
 
+    aircraft: str
     campaign: Campaign
+    reference_campaign: Campaign
+    limits: Limits
+    reached: Extremes
+    condition: Condition
+    gust_m_s: float
+    tried: int
 
     @abstractmethod
     def _notes(self) -> tuple[str, ...]:
         """Sentences on the input, for the head of the file."""
+
+    def _flight_dict(self) -> dict[str, Any]:
+        """Aircraft, campaign, flight condition, gust, limits, and what is reached."""
+        return {
+            "aircraft": self.aircraft,
+            "campaign": self.campaign.name,
+            "records": self.campaign.runs,
+            "condition": asdict(self.condition),
+            "gust_m_s": self.gust_m_s,
+            "limits": self.limits.to_dict(),
+            "reached": asdict(self.reached),
+        }
 
     def to_toml(self) -> str:
         """Text of the campaign file."""

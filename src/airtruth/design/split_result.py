@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from airtruth.design.limits import Extremes, Limits
 from airtruth.design.planned_campaign import PlannedCampaign, draw_elevator
 from airtruth.design.separation import Member
-from airtruth.simulation.campaign.file import Campaign
-from airtruth.simulation.simulator import Condition
 from airtruth.table import Table, as_html, as_text, flat
 from airtruth.table.model import Number, Row, significant
 from airtruth.tracing.model.compile import CHANNELS
@@ -90,36 +87,22 @@ def split_probability(sigma: float) -> float:
     return float(norm.sf((TIE - sigma**2) / (2.0 * sigma))) if sigma > 0.0 else 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SplitResult(PlannedCampaign):
-    """A planned flight; satisfies `airtruth.result.Result`.
+    """A planned flight that separates effects; satisfies `airtruth.result.Result`.
 
     Attributes
     ----------
-    aircraft : name.
-    campaign : the campaign that flies it; reference_campaign : the same with the 3-2-1-1.
     hypotheses : the effects at the sizes that are planned for.
-    limits, reached : limits, and what the aircraft reaches in still air, as declared and with each hypothesis.
-    condition : flight condition.
-    gust_m_s : vertical gust that is expected [m/s].
     fitted : records that count: those that a trace does not hold out.
     rows : the best input of each family, best first, then the 3-2-1-1 of equal length and limits, ``reference``.
-    tried : inputs that were flown.
     prediction : time histories.
     """
 
-    aircraft: str
-    campaign: Campaign
-    reference_campaign: Campaign
     hypotheses: tuple[Member, ...]
-    limits: Limits
-    reached: Extremes
-    condition: Condition
-    gust_m_s: float
     fitted: int
     rows: tuple[InputRow, ...]
     reference: InputRow
-    tried: int
     prediction: Prediction
 
     @property
@@ -194,18 +177,12 @@ class SplitResult(PlannedCampaign):
     def to_dict(self) -> dict[str, Any]:
         """Hypotheses with their sizes, limits, what is reached, and the rows of `to_frame`."""
         return {
-            "aircraft": self.aircraft,
-            "campaign": self.campaign.name,
+            **self._flight_dict(),
             "hypotheses": [{"name": m.effect.key, "parameters": m.values} for m in self.hypotheses],
             "separation_sigma": self.best.least,
             "reference_sigma": self.reference.least,
             "probability_of_one_name": split_probability(self.best.least),
-            "records": self.campaign.runs,
             "fitted": self.fitted,
-            "condition": asdict(self.condition),
-            "gust_m_s": self.gust_m_s,
-            "limits": self.limits.to_dict(),
-            "reached": asdict(self.reached),
             "inputs": [self._row(row) for row in self.rows],
         }
 

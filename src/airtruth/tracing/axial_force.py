@@ -22,7 +22,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
-from scipy.stats import chi2
 
 from airtruth.aircraft import Aircraft
 from airtruth.effects.increment import SIGNAL_NAMES, Increment, Shape, increment
@@ -35,7 +34,7 @@ from airtruth.tracing.increment_table import table_of
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import MEMORY_S, long_run
 from airtruth.tracing.prepare import Case
-from airtruth.tracing.selection.increment_fit import LEAST_ODDS
+from airtruth.tracing.selection.increment_fit import LEAST_ODDS, is_apart_from_zero
 from airtruth.tracing.selection.increments import CELLS, best_prior, covered
 from airtruth.tracing.selection.learn import LEAST_RECORDS
 from airtruth.tracing.selection.score_test import eliminated
@@ -54,8 +53,6 @@ known to some per cent)."""
 _EXPLAINED: Final = 0.25
 """Least share of ax beyond the model, in squares, that an increment explains on records left out [-] (judgement: engines that
 follow the motion leave a fifth in one propeller aircraft of ten; undeclared drags and wrong effects, three quarters)."""
-_TWO_DEVIATIONS: Final = 0.0455
-"""Probability beyond two standard deviations [-] (convention)."""
 _THROTTLE_STD: Final = 0.01
 """Standard deviation of a logged throttle from which a record is passed over [-] (judgement): the declared engines are taken at
 their mean."""
@@ -287,10 +284,9 @@ def _excess(
 
 def _is_accepted(own: _Learned, case: Case, fitted: Sequence[AxialSeries]) -> bool:
     """Whether it has evidence, exceeds two standard deviations, explains records left out and is material."""
-    wald = float(own.bends @ np.linalg.solve(own.covariance, own.bends))
     return (
         own.log_evidence >= LEAST_ODDS
-        and float(chi2.sf(wald, len(own.bends))) < _TWO_DEVIATIONS
+        and is_apart_from_zero(own.bends, own.covariance)
         and own.explained >= _EXPLAINED
         and _relative_swing(own, case, fitted) >= _MATERIAL
     )

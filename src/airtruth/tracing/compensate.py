@@ -40,6 +40,7 @@ from airtruth.physics.terms import (
     declared_total,
 )
 from airtruth.tracing.increment_response import increments, response
+from airtruth.tracing.model.records import head_samples
 from airtruth.tracing.model.surface import through
 from airtruth.tracing.result import TraceResult
 
@@ -47,10 +48,6 @@ Array = NDArray[np.float64]
 
 OUTPUTS: Final = ("alpha_rad", "q_rad_s", "az_m_s2")
 """Channels that the response to increments changes."""
-_HEAD_S: Final = 0.1
-"""Start of a record whose mean is its trim [s]; that of a trace with the linear model."""
-_HEAD_SAMPLES: Final = 3
-"""Least number of samples of that start [-]."""
 _FINE: Final = 8
 """Points between two samples on which the surface moves [-] (judgement: 2.5 ms at 50 Hz, below any traced delay)."""
 _CUTOFF_HZ: Final = 5.0
@@ -250,7 +247,7 @@ def _increment_response(
     }
     signals |= {s.name: state_of(s, signals[s.signal], dt_s) for s in taken.states}
     more = increments(taken.aero, signals)
-    more -= more[..., : _head(dt_s)].mean(axis=2, keepdims=True)
+    more -= more[..., : head_samples(dt_s)].mean(axis=2, keepdims=True)
     conditions = np.array([c.airspeed_m_s for c in taken.conditions])
     nearest = np.abs(airspeed[:, None] - conditions).argmin(axis=1)
     derivatives = np.array([c.derivatives for c in taken.conditions])[nearest]
@@ -275,11 +272,7 @@ def _origin(alpha: Array, dt_s: float, taken: Compensation) -> Array:
 
 def trim_alpha(alpha: Array, dt_s: float) -> Array:
     """(runs,) angle of attack [rad] that a trace with the linear model counts from."""
-    return np.asarray(alpha[:, : _head(dt_s)].mean(axis=1))
-
-
-def _head(dt_s: float) -> int:
-    return max(_HEAD_SAMPLES, int(_HEAD_S / dt_s))
+    return np.asarray(alpha[:, : head_samples(dt_s)].mean(axis=1))
 
 
 def _undo_sensors(channels: dict[str, Array], terms: Sequence[SensorTerm], dt_s: float) -> None:

@@ -41,7 +41,7 @@ from airtruth.tracing.declared_model import (
 from airtruth.tracing.increment_table import in_physical_terms, increment_rows, least_certain
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, derivative_likelihood
 from airtruth.tracing.inference.hypothesis import unconstrained_by
-from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.inference.robust import robust_covariance
 from airtruth.tracing.intervals import estimates, widened_by_profile, widened_by_rejected
 from airtruth.tracing.model.parameters import Common
@@ -87,7 +87,7 @@ def conclude(
     case, first, last = stages.case, rounds[0], rounds[-1]
     effects = accepted(rounds)
     anomaly, remaining = first.anomaly, remaining_evidence(case.fitted, last)
-    covariance = robust_covariance(case.fitted, reported(last))
+    covariance = robust_covariance(case.fitted, last.reported)
     stated = _with_rivals(
         (
             *(_effect(case.fitted, rounds, number, covariance) for number in range(len(effects))),
@@ -150,16 +150,10 @@ def _evidence(anomaly: Anomaly) -> Evidence:
     return Evidence(anomaly.statistic, anomaly.p_value, anomaly.where)
 
 
-def reported(last: SearchRound) -> PosteriorFit:
-    """The fit whose sizes are reported: that under the autoregression, where it moved away from the null."""
-    stayed = np.array_equal(last.gls.point.common, last.null.point.common)
-    return last.null if stayed else last.gls
-
-
 def _effect(
     problem: TraceProblem, rounds: Sequence[SearchRound], number: int, covariance: Array
 ) -> AcceptedEffect:
-    own, final = [r for r in rounds if r.tied][number], reported(rounds[-1])
+    own, final = [r for r in rounds if r.tied][number], rounds[-1].reported
     best, others = own.tied[0], own.tied[1:]
     effect = best.score.effect
     span = final.hypothesis.span(effect.key)
@@ -339,4 +333,4 @@ def _next_flight(
     return " ".join(lines) or "Repeat the manoeuvre with the largest residual, with opposite elevator sign."
 
 
-__all__ = ["conclude", "detectability", "estimates", "reported"]
+__all__ = ["conclude", "detectability", "estimates"]

@@ -31,7 +31,7 @@ from airtruth.tracing.model.plant import (
     trim_of,
     with_throttle,
 )
-from airtruth.tracing.model.records import FINE, Signals, TraceRecord, read
+from airtruth.tracing.model.records import FINE, Signals, TraceRecord, head_samples, read
 from airtruth.tracing.model.remainder import remainder
 from airtruth.tracing.model.settings import VANE, declared_change, resolved, settings_of
 from airtruth.tracing.options import TraceOptions
@@ -58,10 +58,6 @@ _CLIMB_RAD: Final = 1.0 * DEG
 """Flight-path angle below which a record starts in level flight [rad] (judgement: the noise of theta - alpha)."""
 _CLIMB_SAMPLES: Final = 10
 """Number of samples at the start of a record whose mean is its flight-path angle [-] (judgement)."""
-_HEAD_S: Final = 0.1
-"""Start of a record whose mean is its trim with the linear model [s] (judgement: before the manoeuvre moves it)."""
-_HEAD_SAMPLES: Final = 3
-"""Least number of samples of that start [-] (judgement)."""
 _LEAD_S: Final = 3.0
 """Time before the second half of a record from which the filter runs [s] (judgement: several short periods, and time
 constants of slow sensors)."""
@@ -235,7 +231,7 @@ def _check(signals: Sequence[Signals], held: Sequence[str]) -> None:
 
 def _hold_out(runs: Sequence[str], options: TraceOptions) -> tuple[str, ...]:
     if options.hold_out is None:
-        return tuple(runs[2::3]) if len(runs) > 1 and len(runs) >= 3 else ()
+        return tuple(runs[2::3]) if len(runs) >= 3 else ()
     for run in options.hold_out:
         if run not in runs:
             raise ConfigurationError(f"--hold-out {run!r}: no such run; {choices(run, runs)}")
@@ -307,7 +303,7 @@ def _remainder(s: Signals, plant: Plant) -> Array | None:
 
 def _start_of(s: Signals) -> tuple[float, float]:
     """Mean angle of attack and elevator [rad] over the start of a run."""
-    head = max(_HEAD_SAMPLES, int(_HEAD_S / s.dt_s))
+    head = head_samples(s.dt_s)
     return float(s.y[:head, 0].mean()), float(s.elevator_rad[: head * s.sub * FINE].mean())
 
 

@@ -34,7 +34,7 @@ _Term = TypeVar("_Term", AeroTerm, ReadingTerm)
 
 def accepted_change(case: Case, rounds: Sequence[SearchRound], chord_m: float) -> Change:
     """The accepted effects at their estimated sizes, with sensors that a shift of the CG has moved relative to it."""
-    final = rounds[-1].gls
+    final = rounds[-1].reported
     change = final.hypothesis.added(final.point.sizes)
     shift = declared_total(change.declared, "cg")
     if shift == DECLARED["cg"]:
@@ -110,7 +110,7 @@ def write_update(
     if (change == Change() and not refits) or (aircraft.file.jsbsim is None and change.in_aircraft):
         atomic.remove_folder(folder)
         return None
-    fit = rounds[-1].gls
+    fit = rounds[-1].reported
     plants = [record.plant for record in case.fitted.records]
     shift = case.fitted.alpha_shift_rad
     change = from_zero_alpha(change, shift)

@@ -24,13 +24,16 @@ Array = NDArray[np.float64]
 
 FINE: Final = 8
 """Cells of the surface's own grid per cell of the filter's."""
+_HEAD_S: Final = 0.1
+"""Start of a record whose mean is its trim with the linear model [s] (judgement: before the manoeuvre moves it)."""
+_HEAD_SAMPLES: Final = 3
+"""Least number of samples of that start [-] (judgement)."""
 _QUIET_S: Final = 0.2
 """Width of the median that replaces an elevator at rest [s] (judgement)."""
 _QUIET_STD: Final = 3.0
 """Distance from that median up to which the elevator is at rest, in standard deviations of its noise [-] (convention)."""
 _CONSTANT_STD: Final = 3.0
 """Standard deviations of von Neumann's ratio below 1 up to which an elevator at rest is constant [-] (convention)."""
-
 
 _SERIES: Final = (
     "y",
@@ -42,6 +45,11 @@ _SERIES: Final = (
     "corner_rad2",
 )
 """Attributes of `Signals` that are series in time."""
+
+
+def head_samples(dt_s: float) -> int:
+    """Samples at the start of a record whose mean is its trim with the linear model; ``dt_s`` is the sample period [s]."""
+    return max(_HEAD_SAMPLES, int(_HEAD_S / dt_s))
 
 
 @dataclass(frozen=True)

@@ -159,10 +159,11 @@ def assessed(problem: TraceProblem, own: FittedIncrement, reference: Reference) 
     excess = float(np.mean(ratios[first : first + own.effect.bends] ** 2))
     left_out = tested_on_left_out(problem, own.fit, reference, gain)
     swing = relative_swing(problem, own.fit, own.effect)
+    bends, covariance = fitted_bends(own.fit, own.effect, robust_covariance(problem, own.fit))
     reasons = (
         *([] if has_converged(own.fit, gain) else [UNCONVERGED]),
         *(["its evidence is not significant"] if own.log_evidence < LEAST_ODDS * excess else []),
-        *([] if _is_apart_from_zero(problem, own) else [WITHIN_ERROR]),
+        *([] if is_apart_from_zero(bends, covariance) else [WITHIN_ERROR]),
         *left_out.reasons,
         *([IMMATERIAL] if swing < (_MATERIAL_READING if own.effect.shape.of_reading else _MATERIAL) else []),
     )
@@ -178,9 +179,13 @@ def assessed(problem: TraceProblem, own: FittedIncrement, reference: Reference) 
     )
 
 
-def _is_apart_from_zero(problem: TraceProblem, own: FittedIncrement) -> bool:
-    """Whether the bends exceed two standard deviations (Wald), the scatter between records in the covariance."""
-    bends, covariance = fitted_bends(own.fit, own.effect, robust_covariance(problem, own.fit))
+def is_apart_from_zero(bends: Array, covariance: Array) -> bool:
+    """Whether bends exceed two standard deviations (Wald).
+
+    Parameters
+    ----------
+    bends : (bends,) estimates; covariance : (bends, bends) of their errors.
+    """
     return bool(chi2.sf(bends @ np.linalg.solve(covariance, bends), len(bends)) < _TWO_DEVIATIONS)
 
 

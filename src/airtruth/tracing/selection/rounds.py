@@ -152,6 +152,12 @@ class SearchRound:
     exchanged: tuple[PosteriorFit, ...] = ()
 
     @property
+    def reported(self) -> PosteriorFit:
+        """The fit whose sizes are reported: that under the autoregression, where it moved away from the null."""
+        stayed = np.array_equal(self.gls.point.common, self.null.point.common)
+        return self.null if stayed else self.gls
+
+    @property
     def release_gain(self) -> float:
         """Gain in 2 log L of the released derivatives over the null, comparable with `Candidate.gain`."""
         return -np.inf if self.release is None else 2.0 * (self.null.cost + 1.0 - self.release.cost)
