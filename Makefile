@@ -72,7 +72,7 @@ study: $(DEVELOP) ## every cause behind docs/paper.md and docs/closed_loop.md, o
 fleet: $(READY) ## 35 aircraft of the JSBSim package surveyed, flown and traced (hours; continues after an interruption)
 	$(BIN)/python -m studies.foreign_fleet --out $(OUT)/fleet
 
-planned: $(DEVELOP) ## planned flights of eight pairs of effects, flown and traced (about an hour; continues after an interruption)
+planned: $(DEVELOP) ## planned flights of six pairs of effects, flown and traced (about an hour; continues after an interruption)
 	$(BIN)/python -m studies.planned_flights --out $(OUT)/planned
 
 check-study: $(DEVELOP) ## 500 records with none to three sensor errors through `airtruth check` (about ten minutes)

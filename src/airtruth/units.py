@@ -48,6 +48,21 @@ UNITS: Final[dict[str, dict[str, float]]] = {
 }
 """Dimension -> suffix of a unit -> factor to SI."""
 
+_PRINTED: Final = {
+    "-": "",
+    "1": "",
+    "hz": "Hz",
+    "rad_s": "rad/s",
+    "m_s": "m/s",
+    "m_s2": "m/s2",
+    "kg_m2": "kg m2",
+}
+
+
+def printed(unit: str) -> str:
+    """Printed form of a unit: "rad/s" for "rad_s", "" without a dimension; others as they are."""
+    return _PRINTED.get(unit, unit)
+
 
 def factor(dimension: str, unit: str) -> float:
     """Return the factor from a unit to SI.

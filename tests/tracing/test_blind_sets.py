@@ -8,7 +8,17 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, poisson
 
-from validation.blind import causes, draw, information, refit, results, scoring, set_scoring, trials
+from validation.blind import (
+    causes,
+    declaration,
+    draw,
+    information,
+    refit,
+    results,
+    scoring,
+    set_scoring,
+    trials,
+)
 from validation.blind.aircraft_xml import Body
 from validation.blind.figures import DERIVATIVES, TOGETHER, held_out
 from validation.blind.flight import LeftRangeError
@@ -165,6 +175,37 @@ def test_the_expected_share_of_contradictions_is_the_power_of_the_chi_square_tes
     assert set_scoring.contradiction_power(shifted) == pytest.approx(mixture, rel=1e-10)
     lost = {"truth": {"trial": {"effects": [{"key": "tail_effectiveness"}]}, "lambda": {}}}
     assert set_scoring.contradiction_power(lost) is None
+
+
+def test_derivatives_outside_their_declared_uncertainty():
+    """One error at a time. The covariance is d + u u', so that a shift s u has the square s^2 u'u / (1 + u'u), u and the
+    shift in units of the derivatives' own standard deviations (Sherman and Morrison, Ann. Math. Stat. 21, 1950)."""
+    body = {"mass": 1.0, "inertia": 1.0, "cg": 0.0}
+    declared = causes.DECLARED
+    assert declaration.on_declared_body(declared, body) == pytest.approx(declared)
+    assert declaration.p_value(declared, declared) == 1.0
+    light = declaration.on_declared_body(declared, body | {"mass": 1.0 / 1.05})
+    # 5 % more lift; the derivatives' own 5, 30 and 10 % and the 1 % of the mass
+    own = sum((0.01 / std) ** 2 for std in (0.05, 0.30, 0.10))
+    square = 25.0 * own / (1.0 + own)
+    assert declaration.p_value(light, declared) == pytest.approx(chi2.sf(square, 6), rel=1e-9)
+    aft = declaration.on_declared_body(declared, body | {"cg": 0.1})
+    assert aft["Cmalpha"] == pytest.approx(declared["Cmalpha"] + 0.1 * declared["CLalpha"])
+    assert aft["CLalpha"] == declared["CLalpha"]
+
+
+def test_a_null_outside_its_declared_uncertainty_counts_apart():
+    answer = {"derivatives": {"declared": dict(causes.DECLARED)}}
+    cases = [case("null", {}, {}, **CONTRADICTED, **answer) for _ in range(3)]
+    for one, share in zip(cases, (0.0, 0.1, 0.3), strict=True):
+        one["truth"] = one["truth"] | {
+            "increments": {name: share * value for name, value in causes.DECLARED.items()},
+        }
+        one["truth"]["trial"]["body"] = {"mass": 1.0, "inertia": 1.0, "cg": 0.0}
+    found = scoring.score(cases)
+    assert found["false_contradiction"]["calm"].count == 3
+    # 10 % of all six: squares 4 + 0.11 + 1 + 4 + 0.44 + 4 at most, far from 20.2 at 0.0025; 30 %: 9 times as much
+    assert found["false_contradiction_inside"]["calm"].count == 2
 
 
 def test_the_truths_derivatives_are_its_draw_and_its_causes():

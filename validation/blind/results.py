@@ -57,6 +57,10 @@ def _of_sets(mode: str, scores: Mapping[str, Any]) -> str:
             "the same, expected of a chi-square test with six degrees of freedom",
             _averaged(scores["contradiction_power"]),
         ),
+        (
+            "the same, of aircraft that fly outside their declared uncertainty",
+            scores["contradicted_outside"],
+        ),
         ("right set first", scores["first"]),
         ("right set first, bound by the nearest set", _averaged(scores["first_bound"])),
         ("right set among the reported", scores["reported"]),
@@ -97,6 +101,10 @@ def _of_single_effects(scores: Mapping[str, Any]) -> str:
         *(
             (f"declared model falsely contradicted, {air}", s)
             for air, s in scores["false_contradiction"].items()
+        ),
+        *(
+            (f"the same, of aircraft that fly within their declared uncertainty, {air}", s)
+            for air, s in scores["false_contradiction_inside"].items()
         ),
         (f"single effects above lambda {STRONG:g}: something named", strong["detected"]),
         ("name in the reported set", strong["in_set"]),

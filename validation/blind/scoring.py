@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from scipy.stats import beta, chi2, ncx2, norm
 
+from validation.blind import declaration
 from validation.blind.figures import APART, BEYOND, LEAVE_ONE_OUT, STRONG
 
 Case = Mapping[str, Any]
@@ -27,7 +28,7 @@ LEVEL: Final = 0.01
 HOLM: Final = 0.05 / 33
 """The same where the smallest of the library's p-values starts Holm's procedure."""
 INCREMENT: Final = "increment"
-"""Name of every learned increment in an answer (contract 3)."""
+"""Name of every learned increment in an answer (trace.json)."""
 CURVES: Final = ("elevator_asymmetry", "cm_alpha_nonlinear", "cl_alpha_nonlinear", "downwash_lag")
 """Effects of the library that increments can express: a coefficient over a signal."""
 WORSE: Final = 1.02
@@ -245,6 +246,16 @@ def contradicted(case: Case) -> bool:
     return not case["answer"].get("declared_model", {}).get("consistent", True)
 
 
+def is_outside_declaration(case: Case) -> bool:
+    """Whether the derivatives as flown lie outside their declared uncertainty, at the level of the tracer's test."""
+    truth, declared = case["truth"], case["answer"].get("derivatives", {}).get("declared")
+    if declared is None:
+        return False
+    total = {name: value + truth["increments"][name] for name, value in declared.items()}
+    flown = declaration.on_declared_body(total, truth["trial"]["body"])
+    return declaration.p_value(flown, declared) <= declaration.LEVEL
+
+
 def detection(cases: Sequence[Case]) -> list[dict[str, Any]]:
     """Per class of noncentrality: score detections, their bound, acceptances; single effects."""
     rows = []
@@ -341,6 +352,10 @@ def score(cases: Sequence[Case]) -> dict[str, Any]:
         "failed": [c["answer"]["failed"] for c in cases if "failed" in c["answer"]],
         "false_trace": {name: share(bool(accepted(c)) for c in some) for name, some in air.items()},
         "false_contradiction": {name: share(contradicted(c) for c in some) for name, some in air.items()},
+        "false_contradiction_inside": {
+            name: share(contradicted(c) for c in some if not is_outside_declaration(c))
+            for name, some in air.items()
+        },
         "false_trace_all": share(bool(accepted(c)) for c in nulls),
         "null_anomaly": share(c["answer"]["verdict"] == "unexplained" for c in nulls),
         "null_increment": share(bool(learned(c)) for c in nulls),

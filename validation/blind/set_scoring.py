@@ -11,6 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from validation.blind import declaration
 from validation.blind.causes import COMPOSITIONS, TIME_CONSTANT_S
 from validation.blind.figures import (
     ALPHA_TRIM_RAD,
@@ -31,6 +32,7 @@ from validation.blind.scoring import (
     contradicted,
     effects,
     first_bound,
+    is_outside_declaration,
     mean,
     median,
     named_set,
@@ -44,8 +46,6 @@ _OWN_FORMULA: Final = ("tail_effectiveness", "wing_effectiveness", "icing")
 """Effects whose parameter in the truth is not that of the library."""
 _LOADING: Final = ("cg_shift", "mass_error", "inertia_error")
 _CURVED: Final = {"CLalpha2": "CLalpha", "Cmalpha2": "Cmalpha"}
-_DERIVATIVES_LEVEL: Final = 0.0025
-"""Level of the tracer's test of the six declared derivatives: half of 0.005, the other half is for everything else."""
 _QUANTILE: Final = 1.96
 _ERRORS: Final = 2.0
 
@@ -54,7 +54,7 @@ def contradiction_power(case: Case) -> float | None:
     """Power of the chi-square test of the six derivatives; None where the truth has other effects."""
     if any(effect["key"] != "derivatives" for effect in effects(case)):
         return None
-    return bound(noncentrality(case), _DERIVATIVES_LEVEL, len(DERIVATIVES))
+    return bound(noncentrality(case), declaration.LEVEL, len(DERIVATIVES))
 
 
 def strong(case: Case) -> bool:
@@ -95,7 +95,6 @@ def true_derivatives(case: Case) -> dict[str, float]:
     A curvature of the truth counts from `ALPHA_TRIM_RAD`, and adds its slope where the answer counts it from.
     """
     truth, declared = case["truth"], case["answer"]["derivatives"]["declared"]
-    body = truth["trial"]["body"]
     total = {name: value + truth["increments"][name] for name, value in declared.items()}
     for effect in effects(case):
         stated = (e for e in case["answer"]["effects"] if e["name"] == base(effect["key"]))
@@ -103,11 +102,7 @@ def true_derivatives(case: Case) -> dict[str, float]:
         for name, slope in _CURVED.items():
             if about is not None and name in effect["values"]:
                 total[slope] += 2.0 * effect["values"][name] * (about - ALPHA_TRIM_RAD)
-    result = {name: value / body["mass"] for name, value in total.items() if name.startswith("CL")}
-    for name in ("alpha", "q", "de"):
-        moment = total[f"Cm{name}"] + body["cg"] * total[f"CL{name}"]
-        result[f"Cm{name}"] = moment / body["inertia"]
-    return result
+    return declaration.on_declared_body(total, truth["trial"]["body"])
 
 
 def derivatives_covered(case: Case) -> list[bool]:
@@ -197,6 +192,11 @@ def set_scores(cases: Sequence[Case]) -> dict[str, dict[str, Any]]:
                 "strong": len(some),
                 "contradicted": share(contradicted(c) for c in some),
                 "contradiction_power": mean(contradiction_power(c) for c in some),
+                "contradicted_outside": share(
+                    contradicted(c)
+                    for c in some
+                    if contradiction_power(c) is not None and is_outside_declaration(c)
+                ),
                 "first": share(first(c) for c in some),
                 "first_bound": mean(first_bound(c) for c in some),
                 "reported": share(reported(c) for c in some),

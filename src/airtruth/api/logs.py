@@ -58,7 +58,7 @@ def import_log(
     manoeuvres: FilePath | None = None,
     force: bool = False,
 ) -> Imported:
-    """Convert measured logs of another format: .csv, .txt, .mat, .parquet, .ulg, .bin, .mf4 or .h5.
+    """Convert measured logs of other formats: .csv, .txt, .dat, .asc, .mat, .parquet, .ulg, .bin, .mf4, .mdf, .h5, .hdf5, .hdf.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def check(
 
     Parameters
     ----------
-    logs : logs of one instrumentation; all their runs are judged together, with noise of their own.
+    logs : logs of one instrumentation; all their runs are assessed together, with noise of their own.
     aircraft : aircraft whose declared sensor errors are taken as known; None assumes ideal sensors.
     run_ids : runs to use; None for all.
     force : continue although a log contradicts physics; the result lists the faults.

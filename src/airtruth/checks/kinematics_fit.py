@@ -115,7 +115,7 @@ def problem_of(
     Parameters
     ----------
     records, equations, known, limits : see `Problem`.
-    errors : errors at which the noise is judged; None for those declared.
+    errors : errors at which the noise is assessed; None for those declared.
     lines : lines of the records; None makes them.
     """
     lines = tuple(lines or (lines_of(r) for r in records))

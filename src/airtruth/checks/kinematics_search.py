@@ -2,7 +2,7 @@
 
 A set of errors costs its statistic (`airtruth.checks.kinematics_fit`), the improbability of its sizes and a price for
 each error (`price`). The sets within a margin of the cheapest one explain the records as well. The same weight serves every set:
-it is judged at the cheapest set of the round before, until that set stays the same.
+it is assessed at the cheapest set of the round before, until that set stays the same.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class Search:
     enlargement : factor on variances, common to all sets, for motion that no set explains; at least 1.
     margin : difference in cost up to which sets are equal.
     statistic, degrees, p_value : absolute test of the best explanation, each record and equation by itself.
-    stable : whether the weight was judged at the best explanation itself.
+    stable : whether the weight was assessed at the best explanation itself.
     """
 
     problem: Problem

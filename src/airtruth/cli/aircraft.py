@@ -13,7 +13,7 @@ from airtruth.cli.output import print_result
 
 @aircraft_app.command(
     "new",
-    epilog="Example: airtruth aircraft new attas --estimates estimates.parquet --log a.parquet --out attas_jsb",
+    epilog="Example: airtruth aircraft new my_aircraft --estimates estimates.parquet --log a.parquet --out my_model",
 )
 def new(
     aircraft: Annotated[

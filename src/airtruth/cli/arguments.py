@@ -85,11 +85,17 @@ HeldOut = Annotated[
     typer.Option(
         "--hold-out",
         metavar="RUN_ID",
-        help="Run to hold out of the fit; may be repeated. Default: every third run.",
+        help="Run to hold out of the fit; may be repeated. Default: every third run, none of one or two.",
     ),
 ]
 Threads = Annotated[
-    int, typer.Option("--jobs", min=1, help="Number of threads; the result does not depend on it.")
+    int,
+    typer.Option(
+        "--jobs",
+        min=1,
+        help="Number of threads; the result does not depend on it.",
+        show_default="number of processors",
+    ),
 ]
 TraceSeed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the draws behind the p-values.")]
 Increments = Annotated[

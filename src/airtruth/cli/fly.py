@@ -27,7 +27,12 @@ def fly(
         ),
     ],
     jobs: Annotated[
-        int, typer.Option(min=1, help="Number of processes; the logs do not depend on it.")
+        int,
+        typer.Option(
+            min=1,
+            help="Number of processes; the logs do not depend on it.",
+            show_default="number of processors",
+        ),
     ] = PROCESSORS,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed, instead of the file's.")] = None,
     runs: Annotated[int | None, typer.Option(min=1, help="Number of runs, instead of the file's.")] = None,

@@ -21,7 +21,8 @@ def import_(
         list[Path],
         typer.Argument(
             metavar="FILE...",
-            help=".csv, .txt, .mat, .parquet, .ulg, .bin, .mf4 or .h5; several files are one log.",
+            help=".csv, .txt (.dat, .asc), .mat, .parquet, .ulg, .bin, .mf4 (.mdf) or .h5 (.hdf5, .hdf); "
+            "several files are one log.",
         ),
     ],
     mapping: Annotated[

@@ -13,7 +13,7 @@ from airtruth.cli.output import notice, print_result
 from airtruth.cli.progress import progress_bar
 
 
-@app.command(epilog="Example: airtruth check flight7.parquet --aircraft totter")
+@app.command(epilog="Example: airtruth check data/undeclared/a.parquet --aircraft gtm")
 def check(
     log: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Flight logs, or folders of logs.")],
     aircraft: Annotated[

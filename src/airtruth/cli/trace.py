@@ -73,7 +73,7 @@ def trace(
 
 
 @app.command(
-    epilog="Example: airtruth loop out/twelve --aircraft gtm --out out/loop --method ls --method iv-f1"
+    epilog="Example: airtruth loop data/undeclared/a.parquet --aircraft gtm --out out/loop --method ls --method iv-f1"
 )
 def loop(
     context: typer.Context,

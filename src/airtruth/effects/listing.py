@@ -10,6 +10,7 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from airtruth.effects.effect import Effect, Parameter
+from airtruth.units import printed
 
 _WIDTH: Final = 100
 """Width of a line of text [characters]."""
@@ -40,7 +41,7 @@ def _paragraph(effect: Effect) -> str:
 
 
 def _parameter(p: Parameter) -> str:
-    unit = "" if p.unit == "-" else f" {p.unit}"
+    unit = _unit(p)
     parts = [f"{p.low:g} to {p.high:g}{unit}"]
     if not p.is_location:
         parts += [f"neutral {p.neutral:g}", f"matters from {_material(p)}"]
@@ -53,9 +54,14 @@ def _parameter(p: Parameter) -> str:
     return f"{p.name}: {p.meaning}; {', '.join(parts)}"
 
 
+def _unit(p: Parameter) -> str:
+    """A space and the printed unit, or nothing."""
+    return f" {printed(p.unit)}" if printed(p.unit) else ""
+
+
 def _material(p: Parameter) -> str:
     """The smallest material value in the parameter's unit: below a limit, or away from neutral."""
-    unit = "" if p.unit == "-" else f" {p.unit}"
+    unit = _unit(p)
     if p.reciprocal:
         return f"{p.value(p.material):.3g}{unit} down"
     return f"{'' if p.one_sided else '+-'}{p.material:.3g}{unit}"

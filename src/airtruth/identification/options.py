@@ -59,7 +59,8 @@ class Options:
         measured one.
     pressure : dynamic pressure and airspeed in the regressors: "constant" over the record, as the paper
         has it, or "measured" at each sample (`airtruth.identification.condition`); "method" is the default
-        of the method: constant for ls and the IV methods of the paper, measured for the others.
+        of the method: measured for iv-refined, frequency, iv-frequency, filter-error and output-error,
+        constant for the others.
     band_hz : lower and upper end of the frequencies that "frequency" uses [Hz]; None leaves the choice to
         the data (`airtruth.identification.regression.frequency.band_of`).
     confidence : probability of the intervals [-].

@@ -44,7 +44,7 @@ class IncrementTable:
         )
 
     def to_dict(self) -> dict[str, list[float] | float | None]:
-        """Keys of contract 3."""
+        """Keys of trace.json."""
         return {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
 
 
@@ -140,7 +140,7 @@ class AcceptedEffect:
         return self.acts_on or ""
 
     def to_dict(self) -> dict[str, Any]:
-        """Keys of contract 3; those that do not apply are left out."""
+        """Keys of trace.json; those that do not apply are left out."""
         row: dict[str, Any] = {
             "name": self.name,
             "variant": self.variant,

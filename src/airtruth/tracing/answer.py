@@ -74,7 +74,7 @@ class CandidateScore:
         return effect_key(self.name, self.variant)
 
     def to_dict(self) -> dict[str, Any]:
-        """Keys of contract 3."""
+        """Keys of trace.json."""
         order = ("name", "variant", "score", "z", "p_value", "p_value_alone", "testable", "why_not")
         return {name: getattr(self, name) for name in order}
 
@@ -116,7 +116,7 @@ class DerivativeShift:
     sigma: float
 
     def to_dict(self) -> dict[str, Any]:
-        """Keys of contract 3."""
+        """Keys of trace.json."""
         return {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
 
 
@@ -140,7 +140,7 @@ class DeclaredModel:
     where: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """Keys of contract 3."""
+        """Keys of trace.json."""
         return {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
 
 
@@ -152,7 +152,7 @@ class Alternative:
     weight: float
 
     def to_dict(self) -> dict[str, Any]:
-        """Keys of contract 3."""
+        """Keys of trace.json."""
         return {"effects": list(self.effects), "weight": self.weight}
 
 
@@ -218,7 +218,7 @@ class TraceAnswer:
     axial_force: AxialErrors | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """Contract 3: what trace.json holds."""
+        """What trace.json holds."""
         found = {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
         found["shown_by"] = {"anomaly": self.anomaly.where, "remaining": self.remaining.where}
         optional = {name for name in ("tolerances", "replay", "axial_force") if getattr(self, name) is None}

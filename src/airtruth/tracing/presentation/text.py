@@ -16,21 +16,12 @@ from airtruth.tracing.presentation.derivative_table import derivative_table
 from airtruth.tracing.presentation.error_table import axial_words, error_table
 from airtruth.tracing.presentation.tolerances import tolerance_table
 from airtruth.tracing.selection.explanation import DERIVATIVES, EXPLAINING
+from airtruth.units import printed
 
 MOST_CANDIDATES: Final = 8
 """Number of candidates in the text [-] (judgement: as many as a round refits)."""
 _FAR_SIGMA: Final = 2.0
 """Declared standard deviations beyond which the verdict names a derivative [-] (convention)."""
-_PRINTED: Final = {
-    "-": "",
-    "1": "",
-    "hz": "Hz",
-    "rad_s": "rad/s",
-    "m_s": "m/s",
-    "m_s2": "m/s2",
-    "kg_m2": "kg m2",
-}
-"""Unit of a parameter -> its printed form; others are printed as they are."""
 
 
 def as_trace_text(answer: TraceAnswer) -> str:
@@ -147,7 +138,7 @@ def unit_of(key: str, parameter: str) -> str:
     if effect is None:
         return ""
     unit = {p.name: p.unit for p in effect.parameters}.get(parameter, "")
-    return _PRINTED.get(unit, unit)
+    return printed(unit)
 
 
 def interval(estimate: ParameterEstimate) -> str:
