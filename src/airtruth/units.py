@@ -57,6 +57,7 @@ _PRINTED: Final = {
     "m_s2": "m/s2",
     "kg_m2": "kg m2",
 }
+"""Unit -> its printed form; others are printed as they are."""
 
 
 def printed(unit: str) -> str:

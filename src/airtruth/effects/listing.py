@@ -26,6 +26,22 @@ def as_json(effects: Iterable[Effect]) -> str:
     return json.dumps([_entry(effect) for effect in effects], indent=1)
 
 
+def as_markdown(effects: Iterable[Effect]) -> str:
+    """A table with one row per parameter: meaning, range, and the smallest material value."""
+    rows = ["| effect | parameter | meaning | range | material from |", "|---|---|---|---|---|"]
+    for effect in effects:
+        for number, p in enumerate(effect.parameters):
+            cells = (
+                "" if number else f"`{effect.key}`",
+                f"`{p.name}`",
+                p.meaning,
+                f"{p.low:g} to {p.high:g}{_unit(p)}",
+                "" if p.is_location else _material(p),
+            )
+            rows.append(f"| {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
 def _paragraph(effect: Effect) -> str:
     lines = [f"{effect.key}  ({effect.where})"]
     lines += [f"  {_parameter(p)}" for p in effect.parameters]
