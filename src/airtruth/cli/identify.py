@@ -36,7 +36,10 @@ def identify(
     method: Methods = None,
     joint: Annotated[bool, typer.Option("--joint", help="One estimate for all runs together.")] = False,
     out: Annotated[
-        Path | None, typer.Option(help="Parquet file of the estimates; DIR/estimates.parquet for one DIR.")
+        Path | None,
+        typer.Option(
+            help="Parquet file of the estimates. Default: DIR/estimates.parquet for one DIR, none for logs."
+        ),
     ] = None,
     trim: Annotated[
         Trim,
@@ -74,7 +77,7 @@ def identify(
     json_: Annotated[bool, typer.Option("--json", help="Print the rows as JSON.")] = False,
     quiet: Quiet = False,
 ) -> None:
-    """Estimate the six short-period derivatives of every run."""
+    """Estimate the six short-period derivatives of every run (default: iv-f1)."""
     methods = method or ["iv-f1"]
     compile_identification(context, methods, cluster)
     from airtruth import identification
