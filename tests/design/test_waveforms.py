@@ -31,6 +31,15 @@ def test_a_ramp_has_the_area_of_its_edge_and_the_stated_rate():
     assert np.abs(np.diff(sample(ramped, T))).max() / DT == pytest.approx(2.0 / 0.1, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("length", "shortest", "rise"), [(8.0, 0.1, 0.0), (4.0, 0.1, 1.0), (1.0, 0.2, 0.0), (2.0, 0.5, 0.3)]
+)
+def test_no_pattern_is_longer_than_the_input_may_be(length, shortest, rise):
+    made = [m for _, m in waveforms.patterns(length, shortest, rise, DT, 6)]
+    assert made
+    assert all(sum(m.segments_s) <= length + len(m.segments_s) * DT for m in made)
+
+
 def test_repetition_joins_segments_of_one_sign():
     assert waveforms.repeated("3-2-1-1", 2) == (3.0, 2.0, 1.0, 1.0, 3.0, 2.0, 1.0, 1.0)
     assert waveforms.repeated("1-2-1", 3) == (1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 1.0)

@@ -92,6 +92,15 @@ def test_effect_in_the_air_multiplies_its_levels(tmp_path, name, levels):
         np.testing.assert_array_equal(rough[column], factor * plain[column])
 
 
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_factors_on_one_gust_multiply_in_any_order(tmp_path, order):
+    both = [{"name": "horizontal_gust", "factor": 0.0}, {"name": "gust_level", "factor": 2.0}]
+    plain = plan.make(campaigns.write(tmp_path / "p.toml")).table
+    made = plan.make(campaigns.write(tmp_path / "c.toml", effect=[both[k] for k in order])).table
+    np.testing.assert_array_equal(made["sigma_u_m_s"], 0.0)
+    np.testing.assert_array_equal(made["sigma_w_m_s"], 2.0 * plain["sigma_w_m_s"])
+
+
 def test_dry_run_names_the_effects_and_the_copy_goes_with_its_plan(tmp_path):
     made = plan.make(campaigns.write(tmp_path / "c.toml", effect=[LATE]))
     assert "elevator_delay delay_s = 0.06" in plan.describe(made)
@@ -130,6 +139,9 @@ def test_dry_run_names_the_effects_and_the_copy_goes_with_its_plan(tmp_path):
         ({"name": "cm_alpha_nonlinear", "variant": "brake", "dCmalpha": 1}, "did you mean 'break'"),
         ({"name": "backlash", "variant": "x", "width_deg": 1}, "has no variants"),
         ({"variant": "x"}, "effect.0.name"),
+        ({"name": "elevator_delay", "parameters": {"delay_s": -0.5}}, "outside its range of 0 to 0.2 s"),
+        ({"name": "cg_shift", "parameters": {"dx_mac": 0.9}}, "outside its range"),
+        ({"name": "cg_shift", "parameters": 0.9}, "parameters"),
     ],
 )
 def test_bad_effect_is_one_clear_message(tmp_path, effect, said):

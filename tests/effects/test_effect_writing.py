@@ -75,6 +75,31 @@ def test_derivatives_of_a_foreign_aircraft_move_by_what_is_written(foreign, tmp_
         np.testing.assert_allclose(moved, share * np.array(list(amounts.values())), rtol=1.2e-2, atol=2e-4)
 
 
+def test_lift_acts_at_the_cg_of_a_model_that_shifts_its_reference_point(tmp_path):
+    """Concorde's model has a shift of half a chord; without it in the written moment Cmalpha would change by -0.5."""
+    folder = tmp_path / "gtm"
+    shutil.copytree(aircraft.load("gtm").folder, folder)
+    model = folder / "gtm.xml"
+    shift = """<aerodynamics>
+    <aero_ref_pt_shift_x>
+      <function name="aero/function/shift">
+        <description>Shift of the reference point [chords]</description>
+        <table name="aero/function/shift-table">
+          <independentVar>aero/alpha-rad</independentVar>
+          <tableData>-1.0 0.5
+          1.0 0.5</tableData>
+        </table>
+      </function>
+    </aero_ref_pt_shift_x>"""
+    model.write_text(model.read_text(encoding="utf-8").replace("<aerodynamics>", shift, 1), encoding="utf-8")
+    plane = aircraft.load(str(folder))
+    start = trim(plane, Condition(75.0 * KT, 7000.0 * FT))
+    before = linearise(plane, start).central
+    lift = Change(aero=(AeroTerm("CL", "alpha", "linear", 1.0, start.alpha_rad),))
+    moved = linearise(flights.changed(plane, lift, tmp_path / "lift"), start).central - before
+    np.testing.assert_allclose(moved[[0, 3]], [np.cos(start.alpha_rad), 0.0], atol=2e-3)
+
+
 @pytest.mark.slow
 def test_declared_values_of_a_foreign_aircraft(foreign, tmp_path):
     plane, at, _, _, _ = foreign

@@ -39,6 +39,11 @@ def test_gtm_condition() -> None:
     assert 0.5 * rho * tas**2 == pytest.approx(911.8, abs=0.05)
 
 
+def test_geometric_altitude_is_the_inverse() -> None:
+    for height in (-1000.0, 0.0, 2133.6, 19900.0):
+        assert atmosphere.geometric_m(atmosphere.geopotential_m(height)) == pytest.approx(height, abs=1e-9)
+
+
 def test_geopotential_altitude() -> None:
     """U.S. Standard Atmosphere 1976, table I by geometric altitude: Z 5000 m is H 4996 m, 10 km 9984 m."""
     np.testing.assert_allclose(atmosphere.geopotential_m([0.0, 5000.0, 10000.0]), [0, 4996, 9984], atol=0.5)

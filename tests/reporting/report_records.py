@@ -8,10 +8,10 @@ import numpy as np
 
 from airtruth.charts import Line, Panel
 from airtruth.logs.histories import FILE, Histories, History, write_histories
-from airtruth.logs.provenance import Provenance
+from airtruth.logs.provenance import PROVENANCE, Provenance
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.tracing.answer import TraceAnswer
-from airtruth.tracing.presentation.trace_histories import PANEL, PROVENANCE
+from airtruth.tracing.presentation.trace_histories import PANEL
 from validation.linear_flight import GTM, as_log, fly
 
 SAMPLE = json.loads((Path(__file__).parent / "trace_sample.json").read_text())

@@ -47,6 +47,25 @@ BAD = {
         {"manoeuvre": [DOUBLET | {"kind": "dublet"}]},
         ["manoeuvre.0.kind", "did you mean 'doublet'"],
     ),
+    "one bracket": ({"manoeuvre": DOUBLET}, ["write [[manoeuvre]] with two brackets"]),
+    "no amplitude": ({"manoeuvre": [{"kind": "doublet"}]}, ["manoeuvre.0", "amplitude is missing"]),
+    "limits of a sensor": (
+        {
+            "sensors": {
+                "channel": {
+                    "alpha_rad": {
+                        "minimum": {"value": 5, "unit": "deg"},
+                        "maximum": {"value": -5, "unit": "deg"},
+                    }
+                }
+            }
+        },
+        ["alpha_rad", "minimum has to be below maximum"],
+    ),
+    "strong tailwind": (
+        {"wind": {"along_track_kt": 90.0, "keeps": "ground_speed"}},
+        ["wind.along_track", "leaves an airspeed of -"],
+    ),
     "no manoeuvre": ({"manoeuvre": []}, ["at least one [[manoeuvre]] is needed"]),
     "unknown level": ({"gust": {"level": "ligth"}}, ["gust.level", "did you mean 'light'"]),
     "unknown figures": ({"gust": GUST | {"figures": "nasa"}}, ["gust.figures", "'nasa' is not known", "gtm"]),

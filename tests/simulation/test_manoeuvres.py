@@ -83,6 +83,10 @@ def test_unknown_kind_names_the_known_ones():
         sample(Manoeuvre("dublet"), T)
 
 
+def test_a_step_ends_where_it_starts():
+    assert end_s(Manoeuvre("step", 1.0, start_s=1.5)) == 1.5
+
+
 @pytest.mark.parametrize("kind", sorted(set(KINDS) - {"step", "replay"}))
 def test_command_is_back_at_trim_after_its_end(kind):
     shapes = {

@@ -15,6 +15,7 @@ from airtruth import report
 from airtruth.aircraft import write as writing
 from airtruth.effects.increment import Memory, Shape, increment
 from airtruth.effects.registry import EFFECTS
+from airtruth.errors import ConfigurationError
 from airtruth.physics.terms import AeroTerm, Change, shape_of, term_value
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable, ParameterEstimate
@@ -28,6 +29,7 @@ from airtruth.tracing.inference.posterior import (
     sensitivities_of,
 )
 from airtruth.tracing.inference.whitening import NO_WHITENER
+from airtruth.tracing.model.compile import compile_change
 from airtruth.tracing.model.parameters import Parameters, size_index
 from airtruth.tracing.presentation.text import increment_words
 from airtruth.tracing.selection.acceptance import SUPERSEDED, Candidate
@@ -115,6 +117,23 @@ def test_the_written_module_holds_the_closed_form():
     (effect,) = executed(effect_module(Answer(an_effect(value))))
     assert [p.name for p in effect.parameters] == ["slope", "at"]
     assert effect.change({"slope": -0.4, "at": 0.1}).aero[0].shape == "above"
+
+
+def behind_a_lag(acts_on, time_s):
+    value = [0.0, 0.0, 0.0, 0.0, 0.0, -0.01, -0.02, -0.03, -0.04]
+    state = IncrementState("lag", "alpha_rad", time_s)
+    return replace(an_effect(value, acts_on), variant=f"{acts_on} over a lag of alpha_rad", states=(state,))
+
+
+def test_two_written_effects_with_memory_have_states_of_their_own():
+    moment, lift = executed(effect_module(Answer(behind_a_lag("Cm", 0.08), behind_a_lag("CL", 0.04))))
+    change = moment.change({"slope": -0.4, "at": 0.1}) + lift.change({"slope": 0.4, "at": 0.1})
+    compiled = compile_change(change)
+    np.testing.assert_array_equal(compiled.effects.time_s, [0.08, 0.04])
+    # the term of CL follows the second state
+    np.testing.assert_array_equal(compiled.effects.term_index[:, 3], compiled.effect_states)
+    with pytest.raises(ConfigurationError, match="two states are named 'learned-Cm-alpha-lag'"):
+        compile_change(moment.change({"slope": -0.4, "at": 0.1}) + moment.change({"slope": 0.1, "at": 0.1}))
 
 
 @pytest.mark.parametrize("trim", [0.05, 0.06, 0.075])

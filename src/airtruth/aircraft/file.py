@@ -53,6 +53,13 @@ class Sensor(Strict):
             raise ValueError(f"must not be negative (is {value.value:g} in SI)")
         return value
 
+    @model_validator(mode="after")
+    def _ordered(self) -> Sensor:
+        low, high = self.minimum, self.maximum
+        if low is not None and high is not None and low.value >= high.value:
+            raise ValueError(f"minimum has to be below maximum (are {low.value:g} and {high.value:g} in SI)")
+        return self
+
     def errors(self) -> SensorErrors:
         """The errors as numbers in SI, without their uncertainties and sources."""
         stated = {kind.field: getattr(self, kind.key) for kind in KINDS.values()}

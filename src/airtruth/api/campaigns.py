@@ -131,9 +131,9 @@ def list_effects(*names: str) -> tuple[Effect, ...]:
     >>> [(p.name, p.unit) for p in delay.parameters]
     [('delay_s', 's')]
     """
-    from airtruth.effects.registry import EFFECTS, named
+    from airtruth.effects.registry import EFFECTS, listed
 
-    return tuple(effect for name in names for effect in named(name)) or tuple(EFFECTS.values())
+    return tuple(effect for name in names for effect in listed(name)) or tuple(EFFECTS.values())
 
 
 def campaign_of(campaign: FilePath | Campaign) -> Path | Campaign:

@@ -127,6 +127,10 @@ def plan(
             raise ConfigurationError(
                 "plan: nothing to plan; give a campaign, effects to split, derivatives, or a trace"
             )
+        if aircraft is not None or out is not None or limits is not None or sizes:
+            raise ConfigurationError(
+                "plan: aircraft, limits, sizes and out apply to a computed input: state split, derivatives or trace"
+            )
         return forecast(campaign_of(campaign), records, pressure)
     from airtruth.design import PlanOptions
     from airtruth.design.from_files import Stated, planned_from

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -14,11 +14,11 @@ from airtruth.cluster import Cluster
 from airtruth.errors import ConfigurationError, LogError, StoreError
 from airtruth.logs.histories import FILE, read_histories
 from airtruth.logs.outputs import writing
+from airtruth.logs.provenance import PROVENANCE, Provenance
 from airtruth.table import Table, as_html, as_text, flat, to_frame, write_table
 from airtruth.tracing.answer import ANSWER, TraceAnswer
 from airtruth.tracing.presentation.files import ERRORS
 from airtruth.tracing.presentation.text import effect_line
-from airtruth.tracing.presentation.trace_histories import PROVENANCE
 from airtruth.tracing.run import provenance_of
 
 if TYPE_CHECKING:
@@ -180,8 +180,9 @@ def _earlier(task: TraceTask) -> TracedSet | None:
     if task.force or not all((task.out / name).is_file() for name in (ANSWER, FILE, ERRORS)):
         return None
     try:
-        stated = read_histories(task.out / FILE, "airtruth trace").facts.get(PROVENANCE)
-        if stated != provenance_of(task.logs, task.aircraft, task.options).to_dict():
+        stated = Provenance.read(read_histories(task.out / FILE, "airtruth trace").facts.get(PROVENANCE))
+        now = provenance_of(task.logs, task.aircraft, task.options)
+        if replace(stated, folder=now.folder) != now:  # the same bytes in another folder
             return None
         return TracedSet(task.out.name, TraceAnswer.read(task.answer))
     except (StoreError, LogError):

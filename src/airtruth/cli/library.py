@@ -19,7 +19,7 @@ def effects(
     from_: Annotated[
         Path | None,
         typer.Option(
-            "--from", metavar="TRACE.JSON", help="Write the increments that a trace learned as effects."
+            "--from", metavar="DIR|trace.json", help="Write the increments that a trace learned as effects."
         ),
     ] = None,
     out: Annotated[
@@ -31,23 +31,26 @@ def effects(
 ) -> None:
     """List and explain the effects that can be flown and traced, or write those that a trace learned."""
     if from_ is not None:
+        if name or json_:
+            raise ConfigurationError("--from writes what a trace learned; leave the names and --json out")
         _write(from_, out or Path("learned_effects"), force)
         return
     if out is not None:
-        raise ConfigurationError("--out needs --from TRACE.JSON: only learned increments are written")
+        raise ConfigurationError("--out needs --from DIR: only learned increments are written")
     from airtruth.effects import listing
     from airtruth.effects import registry as library
 
-    chosen = [e for n in name for e in library.named(n)] if name else list(library.EFFECTS.values())
+    chosen = [e for n in name for e in library.listed(n)] if name else list(library.EFFECTS.values())
     print_result(listing.as_json(chosen) if json_ else listing.as_text(chosen))
 
 
 def _write(answer: Path, out: Path, force: bool) -> None:
     from airtruth.logs.outputs import writing
-    from airtruth.tracing.answer import TraceAnswer
+    from airtruth.tracing.answer import ANSWER, TraceAnswer
     from airtruth.tracing.effect_module import MODULE, write_effect_package
 
     names = (f"{MODULE}.py", "pyproject.toml")
+    answer = answer / ANSWER if answer.is_dir() else answer
     with writing("effects", [answer], force=force) as outputs:
         outputs.require(*(out / name for name in names))
         write_effect_package(TraceAnswer.read(answer), out)

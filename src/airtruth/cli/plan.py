@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -19,11 +19,29 @@ from airtruth.units import DEG
 if TYPE_CHECKING:
     from airtruth.design import Limits
 
+_OF_INPUT: Final = (
+    "size",
+    "aircraft",
+    "amplitude_deg",
+    "rate_deg_s",
+    "alpha_deg",
+    "load_factor",
+    "airspeed_percent",
+    "length_s",
+    "seed",
+    "out",
+    "force",
+)
+"""Parameters that apply to a computed input alone."""
+_OF_PREDICTION: Final = ("pressure",)
+"""Those that apply to a predicted accuracy alone."""
+
 
 @app.command(
     epilog="Example: airtruth plan --split elevator_delay,actuator_lag --aircraft gtm --out next.toml"
 )
 def plan(
+    context: typer.Context,
     campaign: Annotated[
         Path | None,
         typer.Argument(
@@ -103,7 +121,9 @@ def plan(
     from airtruth.design.from_files import Stated, planned_from
 
     result: ForecastResult | SplitResult | NarrowResult
-    if split is None and derivative is None and trace is None:
+    predicts = split is None and derivative is None and trace is None
+    _require_of(context, predicts)
+    if predicts:
         if campaign is None:
             raise ConfigurationError(
                 "plan: state a CAMPAIGN.toml, --split A,B, --derivative NAME or --from DIR"
@@ -118,6 +138,21 @@ def plan(
             base = base_campaign(campaign, trace is not None, aircraft)
             result = planned_from(base, stated, aircraft, options, out, force=force, step=step)
     print_result(json.dumps(result.to_dict(), indent=1) if json_ else result.summary())
+
+
+def _require_of(context: typer.Context, predicts: bool) -> None:
+    """Refuse options that do not apply to a prediction, or to a computed input."""
+    others = _OF_INPUT if predicts else _OF_PREDICTION
+    stated = [
+        f"--{name.replace('_', '-')}"
+        for name in others
+        if getattr(context.get_parameter_source(name), "name", "") == "COMMANDLINE"
+    ]
+    if stated:
+        needs = (
+            "a computed input: state --split, --derivative or --from" if predicts else "a predicted accuracy"
+        )
+        raise ConfigurationError(f"plan: {', '.join(stated)} applies to {needs}; or leave it out")
 
 
 def _listed(text: str | None) -> list[str]:

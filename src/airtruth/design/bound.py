@@ -61,10 +61,11 @@ class ForecastResult:
     pressure : whether the dynamic pressure is held "constant" or "measured".
     records : number of records that ``together`` is for.
     kinds : number of kinds of runs that were evaluated.
-    theta : (6,) declared derivatives, mean over the kinds [-].
+    theta : (6,) derivatives of the campaign's aircraft, with its effects, mean over the kinds [-].
     single, together : (6,) least standard error of one record, and of all records jointly [-].
     noise : channel -> standard deviation of the noise of its sensor [SI].
     sigma_u_m_s, sigma_w_m_s : least and largest standard deviations of the gusts [m/s].
+    with_effects : whether the campaign has effects, so that ``theta`` is not what the aircraft declares.
     """
 
     campaign: str
@@ -78,10 +79,11 @@ class ForecastResult:
     noise: Mapping[str, float]
     sigma_u_m_s: tuple[float, float]
     sigma_w_m_s: tuple[float, float]
+    with_effects: bool = False
 
     @property
     def percent(self) -> Array:
-        """(2, 6) standard errors of one record and of all records, relative to the declared derivative [%]."""
+        """(2, 6) standard errors of one record and of all records, relative to the derivative [%]."""
         return 100.0 * np.stack([self.single, self.together]) / np.abs(self.theta)
 
     def table(self) -> Table:
@@ -96,7 +98,7 @@ class ForecastResult:
             title=f"Least standard errors to expect of {self.campaign} ({self.aircraft}, {self.pressure} pressure)",
             columns=(
                 "parameter",
-                "declared",
+                "with effects" if self.with_effects else "declared",
                 "std of a record",
                 "percent",
                 f"std of {self.records} records",
@@ -115,7 +117,7 @@ class ForecastResult:
         return as_text(self.table())
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per derivative: parameter, declared, std, percent, std_together, percent_together."""
+        """One row per derivative: parameter, declared (with effects), std, percent, std_together, percent_together."""
         import pandas as pd
 
         single, together = self.percent
@@ -229,6 +231,7 @@ def forecast(
         noise=noise,
         sigma_u_m_s=(float(kinds["sigma_u_m_s"].min()), float(kinds["sigma_u_m_s"].max())),
         sigma_w_m_s=(float(kinds["sigma_w_m_s"].min()), float(kinds["sigma_w_m_s"].max())),
+        with_effects=bool(plan.campaign.effect),
     )
 
 

@@ -23,6 +23,7 @@ from airtruth.design.verdict import Asked, asked_by
 from airtruth.errors import ConfigurationError
 from airtruth.logs.histories import FILE, Histories, read_histories
 from airtruth.logs.outputs import writing
+from airtruth.logs.provenance import PROVENANCE, Provenance, aircraft_digests
 from airtruth.physics.atmosphere import RHO0_KG_M3
 from airtruth.simulation.campaign import file as campaign_file
 from airtruth.simulation.campaign.file import Campaign
@@ -128,18 +129,35 @@ def _base(
         near = campaign.parent if isinstance(campaign, Path) else None
         declared = planes.load(aircraft or read.aircraft, near=near)
         own = name or read.name
-        return declared, read.model_copy(
-            update={"name": own, "aircraft": _stated(aircraft or read.aircraft, declared)}
-        )
-    facts = {} if records is None else dict(records.facts.get("provenance", {}))
-    source = aircraft or str(facts.get("aircraft", ""))
-    if not source:
+        return declared, read.model_copy(update={"name": own, "aircraft": _stated(declared)})
+    declared = _traced(records) if aircraft is None else planes.load(aircraft)
+    raw = _default(declared, records) | {"name": name or _NAME, "aircraft": _stated(declared)}
+    return declared, Campaign.model_validate(raw)
+
+
+def _traced(records: Histories | None) -> Aircraft:
+    """The aircraft of a trace, as it was then.
+
+    Raises
+    ------
+    ConfigurationError
+        If no trace states it, or a file of it has changed since.
+    """
+    origin = Provenance.read({} if records is None else records.facts.get(PROVENANCE))
+    if not origin.aircraft:
         raise ConfigurationError(
             "plan: state --aircraft, or a CAMPAIGN.toml with the aircraft and its condition"
         )
-    declared = planes.load(source)
-    raw = _default(declared, records) | {"name": name or _NAME, "aircraft": _stated(source, declared)}
-    return declared, Campaign.model_validate(raw)
+    traced = Path(origin.folder)
+    declared = planes.load(str(traced) if origin.folder and traced.is_dir() else origin.aircraft)
+    now = aircraft_digests(declared.folder)
+    changed = [name for name, digest in now.items() if origin.digests.get(name, digest) != digest]
+    if changed:
+        raise ConfigurationError(
+            f"plan: {declared.folder / changed[0]} is not the file of the trace; state --aircraft to plan for the aircraft "
+            "as it is now, or trace the records again"
+        )
+    return declared
 
 
 def _default(declared: Aircraft, records: Histories | None) -> dict[str, object]:
@@ -153,22 +171,23 @@ def _default(declared: Aircraft, records: Histories | None) -> dict[str, object]
     speed = np.array([c["airspeed_m_s"] for c in known])
     density = np.array([c["density_kg_m3"] for c in known])
     eas = float(np.mean(speed * np.sqrt(density / RHO0_KG_M3)))
-    rate = float(known[0].get("sample_rate_hz", _LOG_HZ))
+    rate = round(float(known[0].get("sample_rate_hz", _LOG_HZ)), 3)
     return {
         "runs": 1,
-        "duration_s": 1.0,
-        "log_hz": round(rate, 3),
-        "simulation_hz": round(rate, 3) * max(1, round(200.0 / rate)),
+        "duration_s": max(1, round(rate)) / rate,  # whole samples; the planned input replaces it
+        "log_hz": rate,
+        "simulation_hz": rate * max(1, round(200.0 / rate)),
         "condition": {"eas_m_s": eas, "altitude_m": float(np.mean([c["altitude_m"] for c in known]))},
         "manoeuvre": [{"kind": "doublet", "amplitude_deg": 1.0, "step_ms": 100.0, "start_s": 0.0}],
         "gust": {"figures": "mil-f-8785c", "level": "light"},
     }
 
 
-def _stated(name: str, declared: Aircraft) -> str:
-    """A shipped name as it is; any other aircraft by its folder, which does not depend on the folder of the file."""
-    shipped = any((root / name).is_dir() for root in planes.shipped_roots())
-    return name if shipped else str(declared.folder.resolve())
+def _stated(declared: Aircraft) -> str:
+    """Name of a shipped aircraft; any other one by its folder, which does not depend on the folder of the file."""
+    folder = declared.folder.resolve()
+    shipped = any(folder.parent == root.resolve() for root in planes.shipped_roots())
+    return folder.name if shipped else str(folder)
 
 
 __all__ = ["Stated", "planned_from"]

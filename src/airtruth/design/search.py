@@ -118,9 +118,21 @@ class Search(Generic[C]):
         return self.rate(rated.family, rated.flown.manoeuvre, rated.share, final=True)
 
     def reference(self) -> Manoeuvre:
-        """The 3-2-1-1 whose segments fill the length."""
+        """The 3-2-1-1 whose segments fill the length.
+
+        Raises
+        ------
+        ConfigurationError
+            If its shortest segment is shorter than the surface needs from one level to the next.
+        """
         length, dt = self.bench.limits.length_s, self.bench.dt_s
         units = waveforms.PATTERNS["3-2-1-1"]
+        if length / sum(units) < max(self.rise_s, dt):
+            raise ConfigurationError(
+                f"plan: a 3-2-1-1 of {length:g} s has segments of {length / sum(units):.3g} s, and the surface needs "
+                f"{max(self.rise_s, dt):.3g} s from one level to the next; lengthen the input, lower the amplitude, or "
+                "allow a larger rate"
+            )
         return waveforms.multistep(units, length / sum(units), self.rise_s, dt)
 
     @property

@@ -85,7 +85,7 @@ def repeated(name: str, times: int) -> tuple[float, ...]:
 def patterns(
     length_s: float, shortest_s: float, rise_s: float, dt_s: float, count: int
 ) -> Iterator[tuple[str, Manoeuvre]]:
-    """Each pattern once and repeated to the length, over units from the shortest to the length.
+    """Each pattern once and repeated to the length, over units from the shortest to the length; none that is longer.
 
     Parameters
     ----------
@@ -94,8 +94,11 @@ def patterns(
     rise_s, dt_s : as in `multistep`.
     count : units per pattern.
     """
+    least = max(shortest_s, rise_s)
     for name, units in PATTERNS.items():
-        for unit in np.geomspace(max(shortest_s, rise_s), length_s / sum(units), count):
+        if (longest := length_s / sum(units)) < least:
+            continue
+        for unit in np.geomspace(least, longest, count):
             times = int((length_s + 1e-9) / (sum(units) * unit))
             yield name, multistep(units, float(unit), rise_s, dt_s)
             if times > 1:

@@ -64,6 +64,17 @@ EFFECTS: Final[dict[str, Effect]] = merged(OWN, entry_points(group=GROUP))
 """Every effect by its key, NAME or NAME:VARIANT."""
 
 
+def listed(name: str) -> list[Effect]:
+    """Return the effect of a key, or the variants of a name.
+
+    Raises
+    ------
+    ConfigurationError
+        If no effect has this key or name.
+    """
+    return [EFFECTS[name]] if name in EFFECTS else named(name)
+
+
 def named(name: str) -> list[Effect]:
     """Return the variants of an effect.
 

@@ -62,6 +62,12 @@ def geopotential_m(geometric_m: ArrayLike) -> Array:
     return EARTH_RADIUS_M * z / (EARTH_RADIUS_M + z)
 
 
+def geometric_m(geopotential_m: ArrayLike) -> Array:
+    """Geometric altitude above sea level [m] of a geopotential altitude [m]; the inverse of eq. (18)."""
+    h = np.asarray(geopotential_m, dtype=np.float64)
+    return EARTH_RADIUS_M * h / (EARTH_RADIUS_M - h)
+
+
 def temperature_k(altitude_m: ArrayLike) -> Array:
     """Temperature [K] at pressure altitude [m], eq. (23); any shape."""
     h = _inside(altitude_m)
@@ -155,6 +161,7 @@ __all__ = [
     "altitude_of_density_m",
     "density_kg_m3",
     "equivalent_airspeed_m_s",
+    "geometric_m",
     "geopotential_m",
     "pressure_pa",
     "temperature_k",

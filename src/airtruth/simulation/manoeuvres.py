@@ -98,7 +98,7 @@ def sample(manoeuvre: Manoeuvre, t_s: Array) -> Array:
 
 def end_s(manoeuvre: Manoeuvre) -> float:
     """Time at which the command has returned to trim [s]; a step never does and ends where it starts."""
-    units = sum(length for length, _ in _STEPS.get(manoeuvre.kind, ()))
+    units = sum(length for length, _ in _STEPS.get(manoeuvre.kind, ()) if np.isfinite(length))
     if manoeuvre.kind == "replay":
         return manoeuvre.start_s + float(manoeuvre.times_s[-1] - manoeuvre.times_s[0])
     if manoeuvre.kind == "multistep":

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from airtruth.aircraft import Aircraft, load
 from airtruth.aircraft.create import TrimPoint, from_estimates, trim_point, write_new
-from airtruth.errors import ConfigurationError, choices
+from airtruth.errors import ConfigurationError, TrimError, choices
+from airtruth.logs.atomic import remove_folder
 from airtruth.logs.store import read_log, read_table
 from airtruth.logs.tables import Kind, require_kinds
 from airtruth.logs.validate import validate
@@ -20,7 +21,7 @@ from airtruth.simulation.linearise import Linearisation
 from airtruth.simulation.resolution import trimmed_and_linear
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim
-from airtruth.units import DEG
+from airtruth.units import DEG, G0
 
 
 @dataclass(frozen=True)
@@ -82,9 +83,13 @@ def new_aircraft(
     values = {**source.file.derivatives, **(derivatives or {})}
     note = f"Trim: {at.airspeed_m_s:.6g} m/s, {at.density_kg_m3:.6g} kg/m3, alpha {at.alpha_rad:.6g} rad."
     written = write_new(source, values, at, out, note)
-    altitude = float(atmosphere.altitude_of_density_m(at.density_kg_m3))
+    altitude = float(atmosphere.geometric_m(atmosphere.altitude_of_density_m(at.density_kg_m3)))
     eas = float(atmosphere.equivalent_airspeed_m_s(at.airspeed_m_s, at.density_kg_m3))
-    level, linear = trimmed_and_linear(written, Condition(eas, altitude, 0.0))
+    try:
+        level, linear = trimmed_and_linear(written, Condition(eas, altitude, 0.0))
+    except TrimError:
+        remove_folder(out)  # new, and of no use
+        raise
     return NewAircraft(written, values, level, linear)
 
 
@@ -168,7 +173,8 @@ def stated_trim(
         raise ConfigurationError(
             f"--altitude-m {altitude_m:g}: has to be between {atmosphere.LOWEST_M:.0f} and {atmosphere.HIGHEST_M:.0f}"
         )
-    return TrimPoint(airspeed_m_s, density, alpha_deg * DEG, elevator_deg * DEG)
+    alpha = alpha_deg * DEG
+    return TrimPoint(airspeed_m_s, density, alpha, elevator_deg * DEG, -G0 * math.cos(alpha))
 
 
 __all__ = [

@@ -113,9 +113,12 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
     form = _form(e)
     over, factor = _SIGNALS[e.over or ""], _SIGNALS[e.by] if e.by else ""
     driver = factor if e.states and factor else over
-    signal = "learned-state" if e.states and not factor else over
+    state = "-".join(
+        ("learned", *(e.acts_on or "").split("_"), *driver.split("_"), *(s.kind for s in e.states))
+    )
+    signal = state if e.states and not factor else over
     trim = e.table.origin if e.table is not None else 0.0
-    by = ', behind="learned-state"' if e.states else f', "{factor}", {e.by_at!r}'
+    by = f', behind="{state}"' if e.states else f', "{factor}", {e.by_at!r}'
     by = by if factor else ""
     field, term = ("readings", "ReadingTerm") if e.acts_on in READINGS else ("aero", "AeroTerm")
     values = {name: p.value for name, p in e.parameters.items()} if form is None else form.values
@@ -134,7 +137,7 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
         sizes, values = {"factor": 1.0}, {"factor": 1.0}
         sentence = "No closed form is as good as the learned table, so the effect scales the table."
     states = "".join(
-        f'StateTerm("learned-state", "{s.kind}", "{driver}", {s.time_s!r}, {s.damping!r}, {s.half_width!r}),'
+        f'StateTerm("{state}", "{s.kind}", "{driver}", {s.time_s!r}, {s.damping!r}, {s.half_width!r}),'
         for s in e.states
     )
     yield (

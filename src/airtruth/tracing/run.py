@@ -138,7 +138,8 @@ def provenance_of(logs: Logs, aircraft: Aircraft, options: TraceOptions) -> Prov
         name: value for name, value in asdict(options).items() if name != "threads"
     }  # which changes nothing
     words = {name: "default" if value is None else _words(value) for name, value in stated.items()}
-    return Provenance(__version__, aircraft.name, words, digests_of(logs, aircraft.folder))
+    digests = digests_of(logs, aircraft.folder)
+    return Provenance(__version__, aircraft.name, words, digests, str(aircraft.folder.resolve()))
 
 
 def _words(value: object) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
@@ -320,14 +321,26 @@ def _to_axes(aerodynamics: Element, by_coefficient: dict[str, list[str]], root: 
             words = f"Increments of {coefficient} [lbf]"
             _axis(aerodynamics, name).append(function(f"{root}{force.total}-{name}-lbs", words, share))
         # JSBSim applies forces at its reference point; this takes them back to the CG
-        places = f"inertia/cg-{force.across}-in", f"metrics/aero-rp-{force.across}-in"
-        moments.append(op("product", -1.0, op("quotient", op("difference", *places), 12.0), total))
+        moments.append(op("product", -1.0, _arm(aerodynamics, force.across), total))
     if moments:
         _axis(aerodynamics, "PITCH").append(
             function(
                 f"{root}moment-lbsft", "Increments of Cm about the CG [lbf ft]", op("sum", *moments, 0.0)
             )
         )
+
+
+def _arm(aerodynamics: Element, across: str) -> Element:
+    """Distance along a structural axis from JSBSim's reference point of the forces to the CG [ft]."""
+    ends = f"inertia/cg-{across}-in", f"metrics/aero-rp-{across}-in"
+    arm = op("quotient", op("difference", *ends), 12.0)
+    shift = aerodynamics.find("aero_ref_pt_shift_x/function")
+    if across != "x" or shift is None:
+        return arm
+    chords = deepcopy(next(e for e in shift if e.tag not in ("description", "documentation")))
+    for element in chords.iter():
+        element.attrib.pop("name", None)  # a property is bound once
+    return op("difference", arm, op("product", chords, "metrics/cbarw-ft"))
 
 
 def _axis(aerodynamics: Element, name: str) -> Element:

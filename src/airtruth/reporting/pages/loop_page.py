@@ -14,8 +14,9 @@ from airtruth.errors import StoreError
 from airtruth.identification.charts import intervals_chart
 from airtruth.identification.stored import read_stored
 from airtruth.logs.histories import Histories
+from airtruth.logs.provenance import PROVENANCE, Provenance
 from airtruth.loop import NAME, DerivativeChange, LoopResult, loop_chart, loop_table
-from airtruth.reporting.pages.origin import of_trace, origin_section, provenance_of
+from airtruth.reporting.pages.origin import of_trace, origin_section
 from airtruth.reporting.pages.page import Report, Section, data_table, page_of
 from airtruth.reporting.pages.trace_page import closing, read_records, trace_sections
 from airtruth.reporting.paper.published import SYMBOLS
@@ -24,7 +25,6 @@ from airtruth.tracing.answer import TraceAnswer
 from airtruth.tracing.compensate import Treatment
 from airtruth.tracing.presentation.charts import trace_charts
 from airtruth.tracing.presentation.html import verdict_html
-from airtruth.tracing.presentation.trace_histories import PROVENANCE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -105,7 +105,7 @@ def _report(
         for stage, frame in frames.items()
         for drawn in [intervals_chart(frame)]
     ]
-    origin = of_trace(provenance_of(histories.facts if histories else {}, PROVENANCE))
+    origin = of_trace(Provenance.read(histories.facts.get(PROVENANCE) if histories else None))
     sections = [
         Section("Derivatives before and after", NAME, data_table(table, NAME)),
         Section("Intervals of all methods", "intervals", "".join(map(chart_html, intervals))),

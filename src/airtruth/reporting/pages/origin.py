@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any, Final
-
-from pydantic import TypeAdapter, ValidationError
+from typing import Final
 
 from airtruth.identification.stored import Record
 from airtruth.logs.histories import Histories
@@ -49,14 +47,6 @@ def origin_section(
     return Section("Conditions, units and provenance", "origin", "\n".join(parts))
 
 
-def provenance_of(facts: Mapping[str, Any], key: str) -> Provenance:
-    """Provenance that a file of records holds; empty where it holds none."""
-    try:
-        return TypeAdapter(Provenance).validate_python(facts.get(key))
-    except ValidationError:
-        return Provenance()
-
-
 def of_trace(provenance: Provenance) -> tuple[Group, ...]:
     """Version, options and digests of a trace as rows."""
     known = {"airtruth": provenance.version, "aircraft": provenance.aircraft}
@@ -96,4 +86,4 @@ def of_methods(records: Mapping[str, Record]) -> tuple[Group, ...]:
     )
 
 
-__all__ = ["UNITS", "of_methods", "of_trace", "origin_section", "provenance_of"]
+__all__ = ["UNITS", "of_methods", "of_trace", "origin_section"]

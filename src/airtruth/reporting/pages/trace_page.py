@@ -10,7 +10,8 @@ from typing import Final
 from airtruth.charts import as_html as chart_html
 from airtruth.errors import StoreError
 from airtruth.logs.histories import FILE, Histories, read_histories
-from airtruth.reporting.pages.origin import of_trace, origin_section, provenance_of
+from airtruth.logs.provenance import PROVENANCE, Provenance
+from airtruth.reporting.pages.origin import of_trace, origin_section
 from airtruth.reporting.pages.page import Report, Section, data_table, page_of
 from airtruth.reporting.pages.records import records_section, records_tables
 from airtruth.table import Number, Row, Table, as_latex, flat
@@ -29,7 +30,6 @@ from airtruth.tracing.presentation.error_table import axial_words, error_csv, er
 from airtruth.tracing.presentation.html import verdict_html
 from airtruth.tracing.presentation.text import detectable
 from airtruth.tracing.presentation.tolerances import tolerance_table
-from airtruth.tracing.presentation.trace_histories import PROVENANCE
 
 CURE: Final = "run `airtruth trace` again to write it"
 """What writes the files of a trace again."""
@@ -49,7 +49,7 @@ def trace_report(answer: TraceAnswer, histories: Histories | None = None) -> Rep
     histories : records of the trace; None in the folder of an old trace.
     """
     charts = tuple(trace_charts(answer, histories))
-    origin = of_trace(provenance_of(histories.facts if histories else {}, PROVENANCE))
+    origin = of_trace(Provenance.read(histories.facts.get(PROVENANCE) if histories else None))
     picture = trace_chart(answer, histories) if histories else scores_chart(answer)
     sections = [*trace_sections(answer, histories), origin_section(histories, origin, closing(answer))]
     latex = "\n".join(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import tempfile
 import weakref
 from dataclasses import replace
@@ -87,9 +88,9 @@ def in_the_air(table: pd.DataFrame, change: Change) -> pd.DataFrame:
     declared = {name: table[f"{name}_m_s"].to_numpy() for name in ("sigma_u", "sigma_w")}
     other = {"sigma_u": declared["sigma_w"], "sigma_w": declared["sigma_u"]}
     flown = dict(declared)
-    for term in change.air:
-        unit = np.where(flown[term.level] > 0.0, flown[term.level], other[term.level])
-        flown[term.level] = term.factor * unit
+    for level in {term.level for term in change.air}:
+        factor = math.prod(term.factor for term in change.air if term.level == level)
+        flown[level] = factor * np.where(declared[level] > 0.0, declared[level], other[level])
     return table.assign(**{f"{name}_m_s": values for name, values in flown.items()})
 
 

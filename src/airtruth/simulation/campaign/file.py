@@ -14,6 +14,7 @@ from pydantic import (
     ConfigDict,
     Field,
     ValidationError,
+    ValidationInfo,
     field_serializer,
     field_validator,
     model_validator,
@@ -220,6 +221,10 @@ class ManoeuvreTable(Table):
     def _complete(self) -> ManoeuvreTable:
         if (self.kind == "replay") != bool(self.file):
             raise ValueError("kind = 'replay' and file = '...' go together")
+        if self.kind != "replay" and "amplitude" not in self.model_fields_set:
+            raise ValueError(
+                "amplitude is missing: without it the elevator stays at its trim; write amplitude_deg"
+            )
         if self.highest <= self.lowest:
             raise ValueError("highest_hz must be above lowest_hz")
         if self.part >= self.parts:
@@ -260,6 +265,10 @@ class AugmentationTable(Table):
     attitude_gain: float = 0.0
 
 
+_INFINITE: Final = ("inf", "-inf")
+"""Infinite values as `EffectTable` writes them to JSON."""
+
+
 class EffectTable(Strict):
     """An effect that is flown: name, variant and the values of its parameters, in the effect's own units."""
 
@@ -273,12 +282,19 @@ class EffectTable(Strict):
     @model_validator(mode="before")
     @classmethod
     def _gather(cls, raw: Any) -> Any:
-        if not isinstance(raw, Mapping) or not isinstance(raw.get("name"), str) or "parameters" in raw:
+        if not isinstance(raw, Mapping) or not isinstance(raw.get("name"), str):
             return raw
         from airtruth.effects import registry as library
 
+        stated = dict(raw)
+        if "parameters" in raw:
+            gathered = stated.pop("parameters")
+            if not isinstance(gathered, Mapping):
+                return raw
+            # campaign.json has infinity as text
+            stated |= {k: float(v) if v in _INFINITE else v for k, v in gathered.items()}
         try:
-            effect, values = library.stated(raw)
+            effect, values = library.stated(stated)
         except ConfigurationError as error:
             raise ValueError(str(error)) from None
         return {"name": effect.name, "variant": effect.variant, "parameters": values}
@@ -332,6 +348,13 @@ class Campaign(Table):
             raise ConfigurationError(
                 f"campaign {self.name}: {'; '.join(qt.explain(error, Campaign))}"
             ) from None
+
+    @field_validator("manoeuvre", "effect", mode="before")
+    @classmethod
+    def _several(cls, raw: Any, info: ValidationInfo) -> Any:
+        if isinstance(raw, Mapping):
+            raise ValueError(f"write [[{info.field_name}]] with two brackets, because several may follow")
+        return raw
 
     @field_validator("manoeuvre", mode="before")
     @classmethod

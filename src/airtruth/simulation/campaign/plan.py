@@ -203,6 +203,11 @@ def _run_table(campaign: Campaign, seed: int) -> pd.DataFrame:
     if campaign.wind.keeps == "ground_speed":
         density = atmosphere.density_kg_m3(atmosphere.geopotential_m(altitude))
         eas = eas - wind * np.sqrt(density / atmosphere.RHO0_KG_M3)
+        if eas.min() <= 0.0:
+            raise ConfigurationError(
+                f"wind.along_track: a tailwind of {wind.max():g} m/s at a kept ground speed leaves an airspeed of "
+                f"{eas.min() / KT:.3g} kt; lower the wind, or set keeps = 'true_airspeed'"
+            )
     kind = number % len(campaign.manoeuvre)
     amplitudes = np.stack([draw(f"amplitude {k}", m.amplitude) for k, m in enumerate(campaign.manoeuvre)])
     gusts = _gust_columns(campaign, altitude, factor)

@@ -76,7 +76,7 @@ def compile_change(change: Change) -> CompiledChange:
     Raises
     ------
     ConfigurationError
-        If a term names a signal, shape or channel that the filter does not have.
+        If a term names a signal, shape or channel that the filter does not have, or two states have one name.
     """
     if change.derivatives:
         raise ConfigurationError(
@@ -112,6 +112,10 @@ def compile_change(change: Change) -> CompiledChange:
 def _effects(change: Change, first: Ints) -> EffectArrays:
     """Terms of coefficients and readings, and states, by numbers; ``first``: first state of each effect with states."""
     names = [s.name for s in change.states]
+    if twice := {name for name in names if names.count(name) > 1}:
+        raise ConfigurationError(
+            f"effect: two states are named {twice.pop()!r}; an effect with a state can be added once"
+        )
     # the airspeed is measured, so that an axial force moves no output of the filter
     every: list[AeroTerm | ReadingTerm] = [t for t in change.aero if t.coefficient != "CX"]
     every += change.readings

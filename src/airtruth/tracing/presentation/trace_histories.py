@@ -12,7 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from airtruth.charts import Panel
 from airtruth.logs.histories import Histories, History
-from airtruth.logs.provenance import Provenance
+from airtruth.logs.provenance import PROVENANCE, Provenance
 from airtruth.tracing.answer import TraceAnswer
 from airtruth.tracing.inference.assess import Assessment
 from airtruth.tracing.inference.posterior import TraceProblem
@@ -26,8 +26,6 @@ MODELS: Final = ("declared", "before", "after")
 """Stages whose simulations are kept; the control is a number in the table of errors."""
 PANEL: Final = "effect"
 """Entry of the facts that holds the panel of the effect."""
-PROVENANCE: Final = "provenance"
-"""Entry of the facts that holds version, options and digests."""
 
 
 def trace_histories(answer: TraceAnswer, stages: Stages, provenance: Provenance) -> Histories:
@@ -113,4 +111,4 @@ def _conditions(record: TraceRecord) -> dict[str, float]:
     }
 
 
-__all__ = ["MODELS", "PANEL", "PROVENANCE", "panel_of", "trace_histories"]
+__all__ = ["MODELS", "PANEL", "panel_of", "trace_histories"]

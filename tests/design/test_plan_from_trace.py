@@ -1,0 +1,93 @@
+"""The aircraft and the flight condition that `airtruth plan --from` takes from a trace."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from airtruth import aircraft
+from airtruth.design import from_files
+from airtruth.design.flight import PlanOptions
+from airtruth.errors import ConfigurationError
+from airtruth.logs.histories import FILE, Histories, History, write_histories
+from airtruth.logs.provenance import PROVENANCE, Provenance, aircraft_digests
+from airtruth.tracing.answer import ANSWER
+
+CHANNELS = ("alpha_rad", "q_rad_s", "az_m_s2")
+
+
+def traced(folder, plane, rate_hz=50.0):
+    """A folder as a trace leaves it, with one record of a second."""
+    t = np.arange(round(rate_hz)) / rate_hz
+    series = {name: np.zeros(len(t)) for name in CHANNELS}
+    conditions = {
+        "airspeed_m_s": 42.85,
+        "density_kg_m3": 0.9931,
+        "altitude_m": 2133.6,
+        "sample_rate_hz": rate_hz,
+    }
+    record = History("r1", "fitted", t, np.zeros(len(t)), series, {"before": series}, conditions=conditions)
+    origin = Provenance("1", plane.name, {}, aircraft_digests(plane.folder), str(plane.folder.resolve()))
+    folder.mkdir()
+    write_histories(folder / FILE, Histories((record,), ("before",), "r1", 1, {PROVENANCE: origin.to_dict()}))
+    (folder / ANSWER).write_text("{}")
+    return folder
+
+
+@pytest.fixture
+def planned(monkeypatch):
+    """What the planner would be given."""
+    given = []
+
+    def narrow(base, question, options, declared, step):
+        given.append((base, declared))
+        raise ConfigurationError("no search in this test")
+
+    monkeypatch.setattr(from_files, "narrow", narrow)
+
+    def ask(folder):
+        with pytest.raises(ConfigurationError, match="no search"):
+            from_files.planned_from(
+                None, from_files.Stated(derivatives=("Cmq",), trace=folder), None, PlanOptions()
+            )
+        return given[-1]
+
+    return ask
+
+
+@pytest.fixture
+def own(tmp_path):
+    """A copy of a shipped aircraft, under the name of its source."""
+    folder = tmp_path / "own" / "gtm"
+    shutil.copytree(aircraft.load("gtm").folder, folder)
+    return aircraft.load(str(folder))
+
+
+def test_a_trace_of_a_copy_plans_for_the_copy(tmp_path, own, planned):
+    base, declared = planned(traced(tmp_path / "t", own))
+    assert declared.folder.resolve() == own.folder.resolve()
+    assert base.aircraft == str(own.folder.resolve())
+
+
+def test_a_shipped_aircraft_is_stated_by_its_name(tmp_path, planned):
+    base, _ = planned(traced(tmp_path / "t", aircraft.load("gtm")))
+    assert base.aircraft == "gtm"
+
+
+def test_an_aircraft_that_changed_since_is_refused(tmp_path, own):
+    folder = traced(tmp_path / "t", own)
+    file = own.folder / "aircraft.toml"
+    file.write_text(file.read_text() + "\n# heavier\n")
+    with pytest.raises(
+        ConfigurationError, match=r"aircraft\.toml is not the file of the trace; state --aircraft"
+    ):
+        from_files.planned_from(
+            None, from_files.Stated(derivatives=("Cmq",), trace=folder), None, PlanOptions()
+        )
+
+
+@pytest.mark.parametrize("rate", [62.5, 33.333, 12.5, 49.98, 100.0])
+def test_a_trace_at_any_rate_gives_a_campaign(tmp_path, planned, rate):
+    base, _ = planned(traced(tmp_path / "t", aircraft.load("gtm"), rate))
+    assert base.log_hz == rate
+    assert base.simulation_hz >= 150.0
