@@ -1,6 +1,8 @@
 """A file of estimates that airtruth did not write as it is, is refused by name before a merge, and replaced by force."""
 
 import json
+import threading
+from dataclasses import replace
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -8,6 +10,8 @@ import pytest
 
 from airtruth.errors import ConfigurationError, StoreError
 from airtruth.identification import identify, write_estimates
+from airtruth.identification.stored import read_stored
+from airtruth.logs.store import write_log
 from airtruth.simulation.new_aircraft import estimated_derivatives
 from validation.linear_flight import GTM, as_log, fly
 
@@ -47,6 +51,42 @@ DAMAGES = [
     ),
     (record(lambda r: r.update(sources=7)), r"the record of its options is damaged \(ls.sources"),
 ]
+
+
+def test_estimates_of_all_runs_jointly_are_not_mixed_with_those_of_each(tmp_path):
+    log, path = as_log(fly(runs=2, noise=0.1)), tmp_path / "estimates.parquet"
+    write_estimates(path, identify(log, GTM, ["ls"], joint=True))
+    each = identify(log, GTM, ["iv-f1"])
+    with pytest.raises(
+        StoreError, match="holds estimates of ls of all runs jointly, and these are run by run"
+    ):
+        write_estimates(path, each)
+    write_estimates(path, each, force=True)
+    assert set(read_stored(path)[1]) == {"iv-f1"}
+
+
+def test_logs_of_one_name_are_both_sources(tmp_path):
+    path = tmp_path / "estimates.parquet"
+    for number, folder in enumerate(("a", "b")):
+        (tmp_path / folder).mkdir()
+        log = as_log(fly(runs=1, noise=0.1, seed=number))
+        write_log(tmp_path / folder / "log.parquet", replace(log, run_ids=(folder,)))
+        write_estimates(path, identify(tmp_path / folder / "log.parquet", GTM, ["ls"]))
+    frame, records = read_stored(path)
+    assert list(frame["run_id"]) == ["a", "b"]
+    assert [name for name, _, _ in records["ls"]["sources"]] == ["log.parquet", "log.parquet"]
+
+
+def test_two_commands_merge_into_one_file(tmp_path):
+    """Each waits for the other between reading the file and replacing it."""
+    log, path = as_log(fly(runs=2, noise=0.1)), tmp_path / "estimates.parquet"
+    found = [identify(log, GTM, [method]) for method in ("ls", "iv-f1", "iv-f2", "frequency")]
+    threads = [threading.Thread(target=write_estimates, args=(path, one)) for one in found]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert set(read_stored(path)[1]) == {"ls", "iv-f1", "iv-f2", "frequency"}
 
 
 @pytest.mark.parametrize(("damage", "words"), DAMAGES)

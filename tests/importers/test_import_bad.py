@@ -138,7 +138,9 @@ def test_rates_that_are_mixed(tmp_path):
     table = columns()
     table["AOA_nose"] = np.where(np.arange(N) % 5 == 0, table["AOA_nose"], np.nan)
     found = message(LogError, tmp_path, table=table)
-    assert "alpha_rad is empty or NaN in 48 of 60 rows, the first at 0.02 s; state [resample]" in found
+    assert (
+        "alpha_rad is empty, NaN or infinite in 48 of 60 rows, the first at 0.02 s; state [resample]" in found
+    )
 
 
 def test_clocks_that_differ_without_resampling(tmp_path):

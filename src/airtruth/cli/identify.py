@@ -128,6 +128,8 @@ def identify(
                 )
             if out is not None:
                 identification.write_estimates(out, result, force=force)
+            elif not quiet and any(log.is_dir() for log in logs):
+                notice("the estimates are printed and not written; --out FILE.parquet writes them")
         for sentence in (*result.forced, *result.notes) if json_ and not quiet else ():
             notice(sentence)
         for piece in identification.json_of(result.frames()) if json_ else (result.summary() + "\n",):

@@ -43,6 +43,8 @@ def _parquet(path: Path, layout: TextFormat) -> Source:
     from airtruth.logs.tables import read_table
 
     frame = read_table(path)
+    if any(name is not None for name in frame.index.names):  # pandas writes a named index as columns
+        frame = frame.reset_index()
     if frame.empty:
         raise StoreError(f"{path}: holds no rows; export it again")
     return Source(path, {str(name): frame.iloc[:, i].to_numpy() for i, name in enumerate(frame.columns)})

@@ -48,13 +48,23 @@ def read_mdf(path: Path) -> Source:
     for group, signals in groups:
         for signal in signals:
             name = signal.name if counts[signal.name] == 1 else f"{group}.{signal.name}"
-            arrays[name] = signal.samples
+            arrays[name] = _valid(signal)
             clocks[name] = times.setdefault(group, np.asarray(signal.timestamps, dtype=np.float64))
             if signal.unit:
                 units[name] = signal.unit
     if not arrays:
         raise StoreError(f"{path}: holds no channel of numbers; export it again")
     return Source(path, arrays, clocks, units=units, ordered=False)
+
+
+def _valid(signal: Any) -> NDArray[Any]:
+    """Samples of a channel, NaN where the recorder has flagged them as invalid."""
+    flagged = signal.invalidation_bits
+    if flagged is None or not np.any(flagged):
+        return np.asarray(signal.samples)
+    samples = np.array(signal.samples, dtype=np.float64)
+    samples[np.asarray(flagged, dtype=bool)] = np.nan
+    return samples
 
 
 def _groups(mdf: Any) -> list[tuple[str, list[Any]]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -54,17 +56,20 @@ def read_text(path: Path, layout: TextFormat) -> Source:
     if header is None:
         cells = lines[first].split(None if layout.delimiter == WHITESPACE else layout.delimiter)
         header = not any(_is_number(cell, layout.decimal) for cell in cells)
+    rows = [line for line in lines[first:] if not line.lstrip().startswith(("#", "%"))]
+    plain = len(rows) == len(lines) - first
+    _require_names(path, rows, layout.delimiter, header)
     try:
         frame = pd.read_csv(
-            path,
+            path if plain else io.StringIO("\n".join(rows)),
             sep=layout.delimiter,
             decimal=layout.decimal,
             header=0 if header else None,
-            skiprows=first,
+            skiprows=first if plain else 0,
+            index_col=False,
             skip_blank_lines=False,
             skipinitialspace=True,
             encoding="utf-8-sig",
-            comment="#" if any("#" in line for line in lines[first + 1 :]) else None,
         )
     except (ValueError, pd.errors.ParserError) as error:
         raise StoreError(f"{path}: is not a table ({reason(error)}); check [source] delimiter") from None
@@ -75,6 +80,18 @@ def read_text(path: Path, layout: TextFormat) -> Source:
         for i, name in enumerate(frame.columns, 1)
     }
     return Source(path, arrays, first_line=first + 1 + header)
+
+
+def _require_names(path: Path, rows: list[str], delimiter: str, header: bool) -> None:
+    """Refuse values without a name: a row of more cells than the header, but for empty ones at its end."""
+    if delimiter == WHITESPACE or not header or len(rows) < 2:
+        return
+    names, cells = (next(csv.reader([row], delimiter=delimiter), []) for row in rows[:2])
+    if any(cell.strip() for cell in cells[len(names) :]):
+        raise StoreError(
+            f"{path}: the first row has {len(cells)} values and the header {len(names)} names; check [source] delimiter and "
+            "skip_rows"
+        )
 
 
 def _is_number(text: str, decimal: str) -> bool:

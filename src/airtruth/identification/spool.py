@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import pickle
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -80,6 +81,8 @@ class Spool:
 
     def _error(self, error: OSError) -> StoreError:
         where = self._folder or tempfile.gettempdir()
+        if error.errno == errno.ENOENT:
+            return StoreError(f"{where}: does not exist; create the folder, or choose another --out")
         return StoreError(
             f"{where}: a temporary file of the estimates cannot be written ({reason(error)}); free space there and run again"
         )

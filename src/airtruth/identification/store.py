@@ -17,6 +17,7 @@ import pyarrow as pa
 from airtruth.errors import LogError, StoreError
 from airtruth.identification.result import IdentificationResult, Settings, SpooledResult
 from airtruth.identification.stored import KEY, KEYS, Stored, open_stored
+from airtruth.logs import ledger
 from airtruth.logs.remote import location
 from airtruth.logs.tables import write_parts
 
@@ -77,7 +78,14 @@ def write_estimates(
         "notes": list(result.notes),
         "forced": list(result.forced),
     }
-    old = _kept(path, result.methods, settings, force) if merge else _NOTHING
+    with ledger.locked(path.parent):  # from the reading to the replacement
+        _write(path, result, record, _kept(path, result.methods, settings, force) if merge else _NOTHING)
+
+
+def _write(
+    path: Path, result: IdentificationResult | SpooledResult, record: Mapping[str, Any], old: Stored
+) -> None:
+    """Write estimates together with those of the file that they do not replace."""
     known = old.records
     records = {**known, **{m: _joined(known[m], record) if m in known else record for m in result.methods}}
     metadata = {"schema": 1, KEY: records}
@@ -152,7 +160,7 @@ def _kept(path: Path, methods: Sequence[str], settings: Mapping[str, Any], force
         if force:
             return _NOTHING
         raise
-    other = _other_aircraft(old.records, settings)
+    other = other_constants(old.records, settings["constants"])
     if other and not force:
         raise StoreError(
             f"{path}: holds estimates of another aircraft ({other}); choose another --out, or replace the whole "
@@ -169,6 +177,14 @@ def _kept(path: Path, methods: Sequence[str], settings: Mapping[str, Any], force
             )
         if difference:
             replaced.add(name)
+    for name, record in old.records.items():
+        if name not in methods and name in old.methods and record["joint"] != settings["joint"]:
+            if not force:
+                raise StoreError(
+                    f"{path}: holds estimates of {name} {_of_runs(not settings['joint'])}, and these are "
+                    f"{_of_runs(settings['joint'])}; choose another --out, or replace them with --force"
+                )
+            replaced.add(name)
     return Stored(
         tuple(name for name in old.methods if name not in replaced),
         {name: record for name, record in old.records.items() if name not in replaced},
@@ -176,9 +192,13 @@ def _kept(path: Path, methods: Sequence[str], settings: Mapping[str, Any], force
     )
 
 
-def _other_aircraft(known: Mapping[str, Any], settings: Mapping[str, Any]) -> str:
-    """The first constant in which the file's aircraft differs, in words; "" if none does."""
-    own = settings["constants"]
+def other_constants(known: Mapping[str, Mapping[str, Any]], own: Mapping[str, float]) -> str:
+    """The first constant in which the aircraft of a file of estimates differs, in words; "" if none does.
+
+    Parameters
+    ----------
+    known : method -> its record in the file; own : constants of an aircraft.
+    """
     for record in known.values():
         for name, value in record["constants"].items():
             if value != own.get(name):
@@ -191,7 +211,7 @@ def _difference(record: Mapping[str, Any] | None, settings: Mapping[str, Any]) -
     if record is None:
         return "without a record of their options"
     if record["joint"] != settings["joint"]:
-        return "run by run" if settings["joint"] else "of all runs jointly"
+        return _of_runs(not settings["joint"])
     different = [
         f"{name} {record['options'].get(name)!r} in the file, {value!r} now"
         for name, value in settings["options"].items()
@@ -200,12 +220,16 @@ def _difference(record: Mapping[str, Any] | None, settings: Mapping[str, Any]) -
     return f"with other options ({'; '.join(different)})" if different else ""
 
 
+def _of_runs(joint: bool) -> str:
+    return "of all runs jointly" if joint else "run by run"
+
+
 def _joined(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
     """Record of a method whose rows are kept in part: sources, notes and faults of both."""
-    names = {source[0] for source in new["sources"]}
-    sources = [source for source in old["sources"] if source[0] not in names]
+    again = {tuple(source[:2]) for source in new["sources"]}
+    sources = [source for source in old["sources"] if tuple(source[:2]) not in again]
     both = {key: list(dict.fromkeys([*old[key], *new[key]])) for key in ("notes", "forced")}
     return {**new, "sources": [*sources, *new["sources"]], **both}
 
 
-__all__ = ["FILE", "require_mergeable", "write_estimates"]
+__all__ = ["FILE", "other_constants", "require_mergeable", "write_estimates"]

@@ -149,17 +149,18 @@ def comparison(estimates: Sequence[Estimates], run_id: str | None = None) -> Tab
     )
 
 
-def overview(estimates: pd.DataFrame) -> Table:
+def overview(estimates: pd.DataFrame, confidence: float = 0.95) -> Table:
     """Estimates of contract 2, a column per method: one run with its intervals, or mean and standard deviation.
 
     Parameters
     ----------
     estimates : rows of estimates.parquet, see `airtruth.identification.result.IdentificationResult.to_frame`.
+    confidence : probability of their intervals [-].
     """
     names = [*PARAMETERS, *MODAL]
     by_method = {str(name): rows for name, rows in estimates.groupby("method", sort=False)}
     if all(len(rows) == 1 for rows in by_method.values()):
-        return _single({name: rows.iloc[0] for name, rows in by_method.items()})
+        return _single({name: rows.iloc[0] for name, rows in by_method.items()}, confidence)
     return _spread(
         lambda: (
             {
@@ -176,14 +177,16 @@ def overview_of(parts: Parts) -> Table:
     for part in parts():
         runs, first = runs + len(part[0].run_ids), part if first is None else first
     if first is not None and runs == 1:
-        return _single({e.method: estimates_table(e).iloc[0] for e in first})
+        return _single({e.method: estimates_table(e).iloc[0] for e in first}, first[0].confidence)
     return _spread(lambda: ({e.method: (point_values(e), e.converged) for e in part} for part in parts()))
 
 
-def _single(by_method: Mapping[str, pd.Series]) -> Table:
+def _single(by_method: Mapping[str, pd.Series], confidence: float) -> Table:
     cells = {name: _intervals(run) for name, run in by_method.items()}
     converged = {name: int(run["converged"]) for name, run in by_method.items()}
-    return _overview("Estimates with 95 % intervals", cells, converged, dict.fromkeys(by_method, 1))
+    return _overview(
+        f"Estimates with {100.0 * confidence:g} % intervals", cells, converged, dict.fromkeys(by_method, 1)
+    )
 
 
 def _spread(parts: Callable[[], Iterable[Mapping[str, tuple[Array, NDArray[np.bool_]]]]]) -> Table:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +18,18 @@ from airtruth.importers.derived import airspeed_from_pressure, with_alpha
 from airtruth.importers.manoeuvre_result import ManoeuvreResult
 from airtruth.importers.manoeuvres import find, read_table
 from airtruth.importers.mapping import CONSTANTS, MappingFile, Place, Resample, read_mapping, unit_factor
+from airtruth.importers.runs import require_rows, runs_of
 from airtruth.importers.series import Series, base_clock, read_series
-from airtruth.importers.sources import Source, column, numbers, open_source
-from airtruth.importers.uniform import uniform
+from airtruth.importers.sources import Source, numbers, open_source
+from airtruth.importers.uniform import shortened, uniform
 from airtruth.logs.flight_log import RECORD_CONSTANTS, FlightLog
 from airtruth.units import DEG
 
 Array = NDArray[np.float64]
+
+
+_SHORTENED: Final = "shortened"
+"""Key of the metadata that lists what records have lost at their ends."""
 
 
 @dataclass(frozen=True)
@@ -107,14 +113,22 @@ def import_log(
     if len(mappings) == 1:
         logs = [_recorded(one, mappings[0], single=len(paths) == 1) for one in paths]
         log = logs[0] if len(logs) == 1 else FlightLog.concat(logs)
+        notes = tuple(sentence for one in logs for sentence in _lost(one))
     else:
         parts = _opened(paths, mappings)
-        log, notes = built(parts), parts.notes
+        log = built(parts)
+        notes = (*parts.notes, *_lost(log))
     faults = require(log, source=", ".join(map(str, paths)), force=force)
     forced = [fault.sentence for fault in faults if fault.certain]
     if forced:
         log = replace(log, metadata={**log.metadata, "forced": forced})
     return Imported(log, faults, notes)
+
+
+def _lost(log: FlightLog) -> Sequence[str]:
+    """What records have lost at their ends, in words."""
+    stated = log.metadata.get(_SHORTENED, ())
+    return [str(sentence) for sentence in stated] if isinstance(stated, Sequence) else []
 
 
 def find_manoeuvres(
@@ -254,11 +268,14 @@ def built(merged: Merged) -> FlightLog:
         As `import_log`.
     """
     source, mapping = merged.pieces[0].source, merged.pieces[0].mapping
-    ids, times, blocks, facts, drifts = [], [], [], {}, []
-    for run_id, start, end, rows in _runs(source, mapping, merged.series):
+    ids, times, blocks, facts, drifts, lost = [], [], [], {}, [], []
+    for run_id, start, end, rows in runs_of(source, mapping, merged.series):
         where = f"{source.path}, run {run_id!r}"
+        if rows is not None:
+            require_rows(where, merged.series, len(rows))
         cut = {name: one.between(start, end, rows) for name, one in merged.series.items()}
         t, values = uniform(where, cut, merged.resample)
+        lost += [f"run {run_id!r}: {sentence}" for sentence in shortened(cut)]
         values = airspeed_from_pressure(where, values)
         if mapping.reconstruct.alpha:
             values, drift = with_alpha(where, values, (t[-1] - t[0]) / (len(t) - 1), mapping.reconstruct)
@@ -273,6 +290,8 @@ def built(merged: Merged) -> FlightLog:
     metadata = _metadata(merged, times)
     if facts:
         metadata[RECORD_CONSTANTS] = facts
+    if lost:
+        metadata[_SHORTENED] = lost
     if drifts:
         metadata["reconstructed"] = {"alpha_rad": {"drift_std_deg": float(np.median(drifts)) / DEG}}
     return FlightLog(
@@ -314,30 +333,6 @@ def record_constants(log: FlightLog, run_id: str) -> Mapping[str, float]:
     """Mass, inertia and reference lengths that the mapping stated for a run, in SI; {} if none."""
     facts = log.metadata.get(RECORD_CONSTANTS, {})
     return dict(facts.get(run_id, {})) if isinstance(facts, Mapping) else {}
-
-
-def _runs(
-    source: Source, mapping: MappingFile, series: Mapping[str, Series]
-) -> list[tuple[str, float, float, NDArray[np.bool_] | None]]:
-    """Name, start and end on the first file's clock, and rows (where a column names them) of each run."""
-    if mapping.time.run is not None:
-        place = Place(column=mapping.time.run, variable=mapping.time.variable)
-        names = np.array([str(x) for x in column(source, place, mapping.source.variable)[0]])
-        return [(str(n), -np.inf, np.inf, names == n) for n in dict.fromkeys(names.tolist())]
-    finite = [one.t_s[np.isfinite(one.t_s)] for one in series.values()]
-    edges = [(t.min(), t.max()) for t in finite if len(t)]
-    if not edges:
-        raise LogError(f"{source.path}: no time is finite; state [time] column and unit")
-    low, high = min(e[0] for e in edges), max(e[1] for e in edges)
-    if not mapping.manoeuvre:
-        return [(mapping.run_id or source.path.stem, -np.inf, np.inf, None)]
-    for one in mapping.manoeuvre:
-        if one.end_s <= low or one.start_s >= high:
-            raise LogError(
-                f"{source.path}: manoeuvre {one.run_id!r} from {one.start_s:g} to {one.end_s:g} s lies outside "
-                f"the file, whose clock runs from {low:g} to {high:g} s"
-            )
-    return [(one.run_id, one.start_s, one.end_s, None) for one in mapping.manoeuvre]
 
 
 def _constants(piece: Piece, start: float, end: float, rows: NDArray[np.bool_] | None) -> dict[str, float]:

@@ -7,7 +7,7 @@ import io
 import math
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +56,10 @@ class Candidate:
     reason: str = ""
 
 
+_LARGEST: Final = 1e4
+"""Value from which ten digits may not resolve a microsecond."""
+
+
 @dataclass(frozen=True)
 class ManoeuvreResult:
     """Manoeuvres of a flight, with what their picture shows.
@@ -87,7 +91,7 @@ class ManoeuvreResult:
         writer.writerow(names)
         for one in self.candidates:
             cells = [getattr(one, name) for name in names]
-            writer.writerow([f"{c:.10g}" if isinstance(c, float) else c for c in cells])
+            writer.writerow([_as_text(c) if isinstance(c, float) else c for c in cells])
         return text.getvalue()
 
     def summary(self) -> str:
@@ -127,6 +131,11 @@ class ManoeuvreResult:
         columns = tuple(f.name for f in fields(Candidate))
         shown: Table = flat(self.summary().partition("\n")[0], columns, rows)
         return shown._repr_html_()
+
+
+def _as_text(value: float) -> str:
+    """Ten digits, and microseconds of a time since 1970."""
+    return f"{value:.10g}" if abs(value) < _LARGEST else f"{value:.6f}"
 
 
 def _cell(value: str | float) -> Cell:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -240,9 +241,13 @@ def read_table(path: Path | str) -> tuple[Manoeuvre, ...]:
             raise ConfigurationError(
                 f"{path}, line {line}: start_s {row['start_s']!r} and end_s {row['end_s']!r} must be numbers [s]"
             ) from None
+        if not (math.isfinite(start) and math.isfinite(end)):
+            raise ConfigurationError(
+                f"{path}, line {line}: start_s {start:g} and end_s {end:g} must be finite [s]"
+            )
         if not end > start:
             raise ConfigurationError(f"{path}, line {line}: end_s {end:g} is not after start_s {start:g}")
-        name = (row.get("run_id") or f"m{line - 1:02d}").strip()
+        name = (row.get("run_id") or "").strip() or f"m{line - 1:02d}"
         result.append(Manoeuvre(run_id=name, start_s=start, end_s=end))
     if not result:
         raise ConfigurationError(f"{path}: accepts no manoeuvre; write yes under accept in a row")

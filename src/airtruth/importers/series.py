@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,10 @@ from airtruth.importers.sources import Source, numbers
 from airtruth.logs.validate import JITTER, single_precision_s
 
 Array = NDArray[np.float64]
+
+
+_EDGE: Final = 0.1
+"""Part of a step by which a sample may lie outside the stated times [-] (judgement: rounding of what was stated)."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +45,10 @@ class Series:
         """Samples between two times, or of some rows."""
         if self.constant:
             return self
-        small = 1e-9 * max(1.0, float(np.nanmax(np.abs(self.t_s), initial=0.0)))
+        # a time is stated with ten digits, and on a clock since 1970 these are longer than a sample
+        stated = 1e-9 * max(1.0, float(np.nanmax(np.abs(self.t_s), initial=0.0)))
+        step = float(np.nanmedian(np.abs(np.diff(self.t_s)))) if len(self.t_s) > 1 else np.inf
+        small = min(stated, _EDGE * step)
         # a time that is no number stays, to be refused by name
         keep = rows if rows is not None else ~((self.t_s < start_s - small) | (self.t_s > end_s + small))
         return replace(self, t_s=self.t_s[keep], values=self.values[keep])

@@ -26,6 +26,8 @@ RIPPLE_DB: Final = 80.0
 """Attenuation beyond half the new rate, and ripple below `PASS` [dB] (judgement: 0.01 % of a channel)."""
 GAP: Final = (10.0, 0.5)
 """Usual steps and time [s] that a pause must both exceed to be a gap (judgement: jitter and single lost samples do not)."""
+LOST_S: Final = 0.5
+"""Time at either end of a record from which the loss is stated [s] (judgement: recorders start within half a second)."""
 SNAP: Final = 0.75
 """Largest distance of a time in single precision from an even grid [resolutions]: a half is rounding, the rest the error
 of the fitted grid."""
@@ -55,7 +57,7 @@ def uniform(
     full = {
         name: Series(even_times(o.t_s, o.rounding_s)[ok], o.values[ok])
         for name, o in moving.items()
-        if (ok := ~np.isnan(o.values)).sum() > 3
+        if (ok := np.isfinite(o.values)).sum() > 3
     }
     for name in moving:
         if name not in full:
@@ -83,6 +85,30 @@ def uniform(
     return t, {n: values[n] if n in values else np.full(count, s.values[0]) for n, s in series.items()}
 
 
+def shortened(series: Mapping[str, Series]) -> list[str]:
+    """What a record loses at its ends because one channel has no value there while others have, in words.
+
+    Parameters
+    ----------
+    series : channels of a run, with times of their own.
+    """
+    spans = {
+        name: (float(one.t_s[ok][0]), float(one.t_s[ok][-1]))
+        for name, one in series.items()
+        if not one.constant and (ok := np.isfinite(one.values)).any()
+    }
+    if not spans:
+        return []
+    last = max(spans, key=lambda name: spans[name][0])
+    first = min(spans, key=lambda name: spans[name][1])
+    head = spans[last][0] - min(start for start, _ in spans.values())
+    tail = max(end for _, end in spans.values()) - spans[first][1]
+    sentences = [f"its first {head:.3g} s are left out, where {last} has no value"] if head > LOST_S else []
+    return sentences + (
+        [f"its last {tail:.3g} s are left out, where {first} has no value"] if tail > LOST_S else []
+    )
+
+
 def _phase(full: Mapping[str, Series], start: float, end: float, rate_hz: float) -> float:
     """Start of the new times: a sample of a channel that has the new rate already, which is then not interpolated."""
     for one in full.values():
@@ -102,30 +128,32 @@ def _shared(where: str, moving: Mapping[str, Series]) -> Array:
                 f"{where}: {first_name} ({_rate(first)}) and {name} ({_rate(one)}) are sampled at other times; "
                 "state [resample] rate_hz and method"
             )
-        gaps = int(np.isnan(one.values).sum())
-        if gaps:
+        empty = ~np.isfinite(one.values)
+        if empty.any():
             raise LogError(
-                f"{where}: {name} is empty or NaN in {gaps} of {len(one.values)} rows, the first at "
-                f"{one.t_s[np.isnan(one.values)][0]:g} s; state [resample] to interpolate, or cut a [[manoeuvre]]"
+                f"{where}: {name} is empty, NaN or infinite in {int(empty.sum())} of {len(one.values)} rows, the first at "
+                f"{one.t_s[empty][0]:g} s; state [resample] to interpolate, or cut a [[manoeuvre]]"
             )
     t = even_times(first.t_s, first.rounding_s)
     return np.asarray(t - t[0])
 
 
 def even_times(t_s: Array, rounding_s: float = 0.0) -> Array:
-    """The even grid behind rounded times; the times themselves where rounding does not explain their steps.
+    """The even grid behind rounded times; the times themselves where rounding does not explain them.
+
+    Steps and times have to be on the grid: steps that differ by little can add up, as those of a clock that drifts.
 
     Parameters
     ----------
     t_s : increasing times [s].
-    rounding_s : resolution of times in single precision [s]; 0 for others, whose steps may differ by `JITTER`.
+    rounding_s : resolution of times in single precision [s]; 0 for others, which may differ by `JITTER` of a step.
     """
     if len(t_s) < 2:
         return t_s
     index = np.arange(len(t_s))
     period = (t_s[-1] - t_s[0]) / (len(t_s) - 1)
     even = t_s[0] + index * period
-    if np.abs(np.diff(t_s) - period).max() <= JITTER * period:
+    if max(np.abs(np.diff(t_s) - period).max(), np.abs(t_s - even).max()) <= JITTER * period:
         return np.asarray(even, dtype=np.float64)
     if 0.0 < rounding_s <= 0.5 * period:
         slope, origin = np.polyfit(index - index.mean(), t_s, 1)
@@ -229,4 +257,4 @@ def _rate(one: Series) -> str:
     return f"{(len(one.t_s) - 1) / (one.t_s[-1] - one.t_s[0]):.4g} Hz"
 
 
-__all__ = ["MOST_SAMPLES", "even_times", "gaps", "low_passed", "resampled", "uniform"]
+__all__ = ["MOST_SAMPLES", "even_times", "gaps", "low_passed", "resampled", "shortened", "uniform"]

@@ -12,6 +12,7 @@ import json
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
@@ -23,6 +24,9 @@ from airtruth.logs.remote import RemotePath
 
 LEDGER: Final = ".airtruth.json"
 """Name of the ledger in a folder."""
+
+_held: ContextVar[frozenset[Path]] = ContextVar("held", default=frozenset())
+"""Folders of which this command holds the lock."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +88,7 @@ def add(path: Path, command: str, written: Path, *, force: bool = False) -> None
     digest = sha256_of(written)
     assert digest is not None
     before = sha256_of(path)
-    with _locked(path.parent):
+    with locked(path.parent):
         entries = _entries(path.parent, force)
         there = entries.get(path.name)
         if there is not None and (there.command, there.sha256) == (command, digest) and before == digest:
@@ -131,13 +135,18 @@ def _text(entries: Mapping[str, Entry]) -> str:
 
 
 @contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder, so that two commands do not lose each other's entries.
+def locked(folder: Path) -> Iterator[None]:
+    """Hold the lock of a folder, so that two commands do not lose each other's entries; it may be held already.
 
     A folder of a store has none: of two commands that write into it at the same time, one may lose an entry, and its
     next run then asks for --force.
+
+    Raises
+    ------
+    StoreError
+        If the folder does not exist.
     """
-    if isinstance(folder, RemotePath):
+    if isinstance(folder, RemotePath) or folder.resolve() in _held.get():
         yield
         return
     try:
@@ -146,9 +155,13 @@ def _locked(folder: Path) -> Iterator[None]:
         raise write_error(folder / LEDGER, error) from None
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield
+        before = _held.set(_held.get() | {folder.resolve()})
+        try:
+            yield
+        finally:
+            _held.reset(before)
     finally:
         os.close(descriptor)
 
 
-__all__ = ["LEDGER", "Entry", "add", "add_folder", "read"]
+__all__ = ["LEDGER", "Entry", "add", "add_folder", "locked", "read"]

@@ -121,7 +121,7 @@ def _of_path(path: Path, logs: Logs | None, aircraft: Aircraft | None) -> Report
         return estimates_report(title, identified)
     raise StoreError(
         f"{path}: nothing to report; expected trace.json (`airtruth trace ... --out {path}`) or {ESTIMATES} "
-        f"(`airtruth identify {path} --aircraft A`)"
+        f"(`airtruth identify {path} --aircraft A --out {path}/{ESTIMATES}`)"
     )
 
 

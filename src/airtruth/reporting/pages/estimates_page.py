@@ -14,8 +14,9 @@ from airtruth.identification import overview
 from airtruth.identification.charts import intervals_chart
 from airtruth.identification.result import IdentificationResult
 from airtruth.identification.simulated import simulated_records
+from airtruth.identification.stored import Record
 from airtruth.physics.short_period import MODAL, PARAMETERS
-from airtruth.reporting.pages.identified import SIMULATED, Identified, answer_of
+from airtruth.reporting.pages.identified import SIMULATED, Identified, answer_of, require_same_aircraft
 from airtruth.reporting.pages.origin import of_methods, origin_section
 from airtruth.reporting.pages.page import Report, Section, answer_html, data_table, page_of
 from airtruth.reporting.pages.records import records_section, records_tables
@@ -38,7 +39,7 @@ def estimates_report(title: str, identified: Identified) -> Report:
     """
     frame, histories = identified.frame, identified.histories
     with np.errstate(over="ignore", invalid="ignore"):  # diverged estimates overflow in means
-        table = overview(frame)
+        table = overview(frame, identified.confidence)
     declared = identified.declared
     references = {"declared": declared.values} if declared else None
     chart = intervals_chart(frame, references, confidence=identified.confidence)
@@ -88,17 +89,19 @@ def identification_report(result: IdentificationResult, aircraft: Aircraft | Non
         for name in ("version", "options", "joint", "aircraft", "constants", "notes", "forced")
     }
     sources = [(s.name, s.sha256, s.runs) for s in result.sources]
-    records = {method: {**record, "sources": sources} for method in result.methods}
+    made: Record = {**record, "sources": sources}  # type: ignore[typeddict-item]  # to_dict gives its keys
+    records = dict.fromkeys(result.methods, made)
     histories, declared = result.histories(), None
     if aircraft is not None and histories is not None and result.logs is not None:
         from airtruth.reporting.pages.declared import declared_at
 
+        require_same_aircraft(records, aircraft)
         declared = declared_at(aircraft, histories)
         rows = declared.before(result.to_frame())
         histories = simulated_records(result.logs, rows, result.settings.constants)
     identified = Identified(
         frame=result.to_frame(),
-        records=records,  # type: ignore[arg-type]  # to_dict gives the keys of Record
+        records=records,
         histories=histories,
         reason="The result holds no logs, so the records are not shown.",
         declared=declared,

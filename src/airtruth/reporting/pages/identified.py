@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from airtruth.aircraft import Aircraft
-from airtruth.errors import AirtruthError, StoreError
+from airtruth.errors import AirtruthError, ConfigurationError, StoreError
 from airtruth.identification.estimates import JOINT
-from airtruth.identification.record_constants import Constants
+from airtruth.identification.record_constants import Constants, values_of
 from airtruth.identification.simulated import simulated_records, spaced
+from airtruth.identification.store import other_constants
 from airtruth.identification.stored import Record, read_stored
 from airtruth.logs.digest import sha256_of
 from airtruth.logs.histories import Histories
@@ -102,11 +103,28 @@ def read_identified(
         histories = _simulated(logs, frame, records, runs)
     if aircraft is None:
         return Identified(frame, records, histories)
+    require_same_aircraft(records, aircraft)
     from airtruth.reporting.pages.declared import declared_at  # the tracer takes seconds
 
     declared = declared_at(aircraft, histories)
     histories = _simulated(logs, declared.before(frame), records, runs)
     return Identified(frame, records, histories, declared=declared)
+
+
+def require_same_aircraft(records: Mapping[str, Record], aircraft: Aircraft) -> None:
+    """Refuse an aircraft with other constants than the estimates have: its derivatives are those of another scale.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the first constant that differs.
+    """
+    other = other_constants(records, asdict(values_of(aircraft)))
+    if other:
+        raise ConfigurationError(
+            f"--aircraft {aircraft.name}: the estimates are of another aircraft ({other}); identify the logs with this "
+            "aircraft first"
+        )
 
 
 def _simulated(logs: Logs, frame: pd.DataFrame, records: Mapping[str, Record], runs: int | None) -> Histories:
@@ -118,21 +136,24 @@ def _simulated(logs: Logs, frame: pd.DataFrame, records: Mapping[str, Record], r
 
 def _beside(folder: Path, records: Mapping[str, Record]) -> tuple[list[str], str]:
     """The logs of estimates beside their file, or a sentence that says why they cannot be used."""
-    sources = {name: digest for record in records.values() for name, digest, _ in record["sources"]}
+    sources: dict[str, set[str]] = {}
+    for record in records.values():
+        for name, digest, _ in record["sources"]:
+            sources.setdefault(name, set()).add(digest)
     if not sources:
         return (
             [],
             "The estimates do not state their logs, so the records are not shown; name them with --log.",
         )
     found = []
-    for name, digest in sources.items():
+    for name, digests in sources.items():
         path = next((p for p in (folder / "logs" / name, folder / name) if p.is_file()), None)
         if path is None:
             return (
                 [],
                 f"The log {name} is not beside the estimates, so the records are not shown; name it with --log.",
             )
-        if sha256_of(path) != digest:
+        if digests != {sha256_of(path)}:
             return (
                 [],
                 f"The log {name} has changed since the estimates were made, so the records are not shown.",
