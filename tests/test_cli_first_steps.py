@@ -238,7 +238,8 @@ def test_the_schema_knows_every_effect_and_the_names_that_validators_test():
     for (model, field), names in NAMES.items():
         required = {"kind": "replay", "file": "f"} if field == "kind" else {}
         for name in names:
-            given = {field: name} | ({"file": "f"} if name == "replay" else {})
+            moved = {"file": "f"} if name == "replay" else {"amplitude_deg": 1.0}
+            given = {field: name} | (moved if field == "kind" else {})
             model.model_validate(given)
         with pytest.raises(ValueError, match="is not known"):
             model.model_validate(required | {field: "bogus"})

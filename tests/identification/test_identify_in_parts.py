@@ -153,5 +153,7 @@ def test_a_full_disk_is_one_sentence(whole, tmp_path):
             StoreError, match=r"temporary file of the estimates cannot be written .*free space"
         ):
             list(estimates.parts())
-    with pytest.raises(StoreError, match="temporary file of the estimates"):
+    with pytest.raises(
+        StoreError, match="absent: does not exist; create the folder, or choose another --out"
+    ):
         Spool(tmp_path / "absent")

@@ -28,9 +28,9 @@ from airtruth.physics.gust_figures import FIGURES, LEVELS
 from airtruth.physics.sensor_errors import KINDS as ERROR_KINDS
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.quantity import FromTable
+from airtruth.simulation.campaign.effect_table import EffectTable
 from airtruth.simulation.campaign.file import (
     NO_GUST,
-    EffectTable,
     GustTable,
     ManoeuvreTable,
     SensorTable,

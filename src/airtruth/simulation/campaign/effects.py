@@ -19,7 +19,8 @@ from airtruth.errors import ConfigurationError
 from airtruth.logs.atomic import write_error
 from airtruth.logs.temporary import private_folder, remove
 from airtruth.physics.terms import Change
-from airtruth.simulation.campaign.file import NO_GUST, Campaign, EffectTable
+from airtruth.simulation.campaign.effect_table import EffectTable
+from airtruth.simulation.campaign.file import NO_GUST, Campaign
 from airtruth.simulation.resolution import at_condition
 from airtruth.simulation.simulator import Condition
 

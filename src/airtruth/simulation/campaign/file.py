@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal
@@ -11,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import (
     BeforeValidator,
-    ConfigDict,
     Field,
     ValidationError,
     ValidationInfo,
-    field_serializer,
     field_validator,
     model_validator,
 )
@@ -25,8 +22,8 @@ from airtruth.aircraft import Sensor, sensor_tables
 from airtruth.documents import read_toml
 from airtruth.errors import ConfigurationError, choices
 from airtruth.physics.gust_figures import FIGURES, LEVELS
-from airtruth.physics.terms import Change
 from airtruth.quantity import Strict
+from airtruth.simulation.campaign.effect_table import EffectTable
 from airtruth.simulation.manoeuvres import KINDS
 
 Array = NDArray[np.float64]
@@ -263,52 +260,6 @@ class AugmentationTable(Table):
 
     damper_gain_s: float = 0.0
     attitude_gain: float = 0.0
-
-
-_INFINITE: Final = ("inf", "-inf")
-"""Infinite values as `EffectTable` writes them to JSON."""
-
-
-class EffectTable(Strict):
-    """An effect that is flown: name, variant and the values of its parameters, in the effect's own units."""
-
-    model_config = ConfigDict(
-        allow_inf_nan=True, ser_json_inf_nan="strings"
-    )  # a neutral bandwidth is infinite
-    name: str
-    variant: str = ""
-    parameters: dict[str, float] = Field(default_factory=dict)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _gather(cls, raw: Any) -> Any:
-        if not isinstance(raw, Mapping) or not isinstance(raw.get("name"), str):
-            return raw
-        from airtruth.effects import registry as library
-
-        stated = dict(raw)
-        if "parameters" in raw:
-            gathered = stated.pop("parameters")
-            if not isinstance(gathered, Mapping):
-                return raw
-            # campaign.json has infinity as text
-            stated |= {k: float(v) if v in _INFINITE else v for k, v in gathered.items()}
-        try:
-            effect, values = library.stated(stated)
-        except ConfigurationError as error:
-            raise ValueError(str(error)) from None
-        return {"name": effect.name, "variant": effect.variant, "parameters": values}
-
-    @field_serializer("parameters", when_used="json")
-    def _finite(self, values: dict[str, float]) -> dict[str, float | str]:
-        """JSON has no infinity."""
-        return {name: value if math.isfinite(value) else str(value) for name, value in values.items()}
-
-    def change(self) -> Change:
-        """Return the terms that it changes."""
-        from airtruth.effects import registry as library
-
-        return library.chosen(self.name, self.variant).change(self.parameters)
 
 
 class Campaign(Table):

@@ -7,7 +7,8 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from airtruth.simulation.campaign.file import Campaign, Constant, Distribution, EffectTable, Table
+from airtruth.simulation.campaign.effect_table import EffectTable
+from airtruth.simulation.campaign.file import Campaign, Constant, Distribution, Table
 from airtruth.toml_values import toml_value
 from airtruth.units import UNITS
 
