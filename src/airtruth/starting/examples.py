@@ -32,7 +32,7 @@ class Example:
 _ALL: Final = (
     Example(
         "paper",
-        "the campaign of M. Brunot's paper in light turbulence: 300 runs of a doublet",
+        "doublets in light turbulence as in M. Brunot's paper: 300 runs of 5 s",
         ("data/campaigns/light.toml",),
         (
             "airtruth fly data/campaigns/light.toml --runs 30 --out out/light",
