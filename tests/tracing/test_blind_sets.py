@@ -173,8 +173,8 @@ def test_the_expected_share_of_contradictions_is_the_power_of_the_chi_square_tes
     critical = chi2.isf(0.0025, 6)
     mixture = float(poisson.pmf(j, 16.0) @ chi2.sf(critical, 6 + 2 * j))
     assert set_scoring.contradiction_power(shifted) == pytest.approx(mixture, rel=1e-10)
-    lost = {"truth": {"trial": {"effects": [{"key": "tail_effectiveness"}]}, "lambda": {}}}
-    assert set_scoring.contradiction_power(lost) is None
+    loaded = {"truth": {"trial": {"effects": [{"key": "cg_shift"}]}, "lambda": {}}}
+    assert set_scoring.contradiction_power(loaded) is None
 
 
 def test_derivatives_outside_their_declared_uncertainty():

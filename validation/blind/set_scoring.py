@@ -51,8 +51,8 @@ _ERRORS: Final = 2.0
 
 
 def contradiction_power(case: Case) -> float | None:
-    """Power of the chi-square test of the six derivatives; None where the truth has other effects."""
-    if any(effect["key"] != "derivatives" for effect in effects(case)):
+    """Power of the chi-square test of the six derivatives; None where the truth has effects that they do not show."""
+    if any(effect["key"] not in ("derivatives", *_OWN_FORMULA) for effect in effects(case)):
         return None
     return bound(noncentrality(case), declaration.LEVEL, len(DERIVATIVES))
 
