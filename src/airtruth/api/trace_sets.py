@@ -165,7 +165,7 @@ def _named(sets: Sequence[Path]) -> dict[str, Path]:
     """Name of each set, that of its file or folder."""
     found: dict[str, Path] = {}
     for path in sets:
-        name = path.name if path.is_dir() else path.stem
+        name = path.resolve().name if path.is_dir() else path.stem
         if name in found:
             raise ConfigurationError(
                 f"--each: {found[name]} and {path} have the same name {name!r}, which names their folder; rename one, or "

@@ -152,6 +152,20 @@ def new_folder(path: Path) -> Iterator[Path]:
         raise write_error(path, error) from None
 
 
+def remove_file(path: Path) -> None:
+    """Remove a file if it exists.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be removed.
+    """
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise write_error(path, error) from None
+
+
 def remove_folder(path: Path) -> None:
     """Remove a folder if it exists; whoever looks sees all of it or nothing.
 
@@ -212,6 +226,7 @@ __all__ = [
     "guard",
     "make_folder",
     "new_folder",
+    "remove_file",
     "remove_folder",
     "sync_folder",
     "write_error",

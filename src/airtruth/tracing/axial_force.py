@@ -115,16 +115,20 @@ def axial_force(
 
     Returns
     -------
-    None where ax, a vane or a JSBSim model is missing, the throttle moves, or there are fewer than three fitted records.
+    None where a vane or a JSBSim model is missing, a fitted record has no ax or a throttle that moves, or there are fewer
+    than three of them. A held-out record of this kind has no part in the errors.
     """
     case = stages.case
     usable = case.model == "aircraft" and case.has_vane and len(case.fitted.records) >= LEAST_RECORDS
-    if not usable or not all(CHANNEL in log.channels and _is_steady(log) for log in logs):
+    steady = _steady_runs(logs)
+    if not usable or not all(r.signals.run_id in steady for r in case.fitted.records):
         return None
     change = last.hypothesis.change(last.point.sizes)
-    left_out = () if case.held is None else case.held.records
-    own = [*last.point.per_record, *(a.per_record for a in stages.held.get(stages.best, ()))]
-    series = axial_series(logs, (*case.fitted.records, *left_out), own, change, aircraft)
+    assessed = () if case.held is None else zip(case.held.records, stages.held[stages.best], strict=True)
+    left_out = [(r, a.per_record) for r, a in assessed if r.signals.run_id in steady]
+    own = [*last.point.per_record, *(per_record for _, per_record in left_out)]
+    records = (*case.fitted.records, *(r for r, _ in left_out))
+    series = axial_series([log for log in logs if CHANNEL in log.channels], records, own, change, aircraft)
     fitted, held = series[: len(case.fitted.records)], series[len(case.fitted.records) :]
     learned = _learned(fitted, _shapes(case, fitted))
     best = max(learned, key=lambda own: own.log_evidence, default=None)
@@ -137,12 +141,16 @@ def axial_force(
     )
 
 
-def _is_steady(log: FlightLog) -> bool:
-    """Whether the throttle rests in every record; where it is not logged, the records' constants have to suffice."""
-    lever = log.channels.get("throttle")
-    return lever is None or all(
-        float(np.std(lever[log.rows(run)])) < _THROTTLE_STD for run in range(len(log.run_ids))
-    )
+def _steady_runs(logs: Sequence[FlightLog]) -> set[str]:
+    """Runs with ax in which the throttle rests; where it is not logged, the records' constants have to suffice."""
+    return {
+        name
+        for log in logs
+        if CHANNEL in log.channels
+        for run, name in enumerate(log.run_ids)
+        if (lever := log.channels.get("throttle")) is None
+        or float(np.std(lever[log.rows(run)])) < _THROTTLE_STD
+    }
 
 
 def _shapes(case: Case, fitted: Sequence[AxialSeries]) -> list[Shape]:

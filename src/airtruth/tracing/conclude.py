@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -40,10 +40,10 @@ from airtruth.tracing.declared_model import (
 )
 from airtruth.tracing.increment_table import in_physical_terms, increment_rows, least_certain
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, derivative_likelihood
-from airtruth.tracing.inference.hypothesis import unconstrained_by
+from airtruth.tracing.inference.hypothesis import is_curvature, unconstrained_by
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.inference.robust import robust_covariance
-from airtruth.tracing.intervals import estimates, widened_by_profile, widened_by_rejected
+from airtruth.tracing.intervals import at_measured_alpha, estimates, widened_by_profile, widened_by_rejected
 from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.notes import notes
 from airtruth.tracing.prepare import Case
@@ -122,10 +122,14 @@ def conclude(
         next_flight=_next_flight(effects, verdict, remaining, list(least_certain((*stated, *along)))),
         model=case.model,
         records=RecordNames(
-            tuple(r.signals.run_id for r in case.fitted.records),
-            tuple(r.signals.run_id for r in case.held.records) if case.held else (),
+            tuple(dict.fromkeys(r.signals.record for r in case.fitted.records)),
+            tuple(r.signals.record for r in case.held.records) if case.held else (),
         ),
-        notes=(*reserved, *notes(stages, last, errors, replay, forced)),
+        notes=(
+            *reserved,
+            *notes(stages, last, replay, forced),
+            *_unwritten(case, stated, updated_aircraft, replay),
+        ),
         tolerances=tolerances(stages),
         replay=replay,
         forced=tuple(forced),
@@ -136,6 +140,17 @@ def conclude(
         credit=credit(stated, stages),
         axial_force=None if axial is None else axial.errors,
     )
+
+
+def _unwritten(
+    case: Case, effects: Sequence[AcceptedEffect], updated: str | None, replay: Replay | None
+) -> Iterator[str]:
+    """Why a trace that writes files has accepted effects and no updated aircraft."""
+    if effects and updated is None and replay is not None:
+        name = case.fitted.records[0].plant.aircraft.name
+        yield (
+            f"no updated aircraft is written: {name} has no JSBSim model that could hold {', '.join(e.key for e in effects)}"
+        )
 
 
 def _verdict(effects: Sequence[AcceptedEffect], declared: DeclaredModel) -> VerdictName:
@@ -167,7 +182,12 @@ def _effect(
     if own.profile is not None:
         stated = widened_by_profile(effect, stated, own.profile)
     stated = widened_by_rejected(effect, stated, rounds[-1], np.sqrt(np.diag(own_covariance)))
-    is_curvature = bool(unconstrained_by(effect, final.hypothesis.trim_alpha_rad))
+    about = (
+        final.hypothesis.trim_alpha_rad if unconstrained_by(effect, final.hypothesis.trim_alpha_rad) else None
+    )
+    if problem.alpha_shift_rad != 0.0:  # the linear model counts from the trim
+        stated = at_measured_alpha(effect, stated, problem.alpha_shift_rad)
+        about = problem.alpha_shift_rad if is_curvature(effect) else None
     accepted = AcceptedEffect(
         name=effect.name,
         variant=effect.variant,
@@ -180,7 +200,7 @@ def _effect(
             sorted(c.score.effect.variant for c in others if c.score.effect.name == effect.name)
         ),
         channel=effect.variant if effect.name == "sensor_delay" else None,
-        about_alpha_rad=final.hypothesis.trim_alpha_rad if is_curvature else None,
+        about_alpha_rad=about,
     )
     if isinstance(effect, Increment):
         return in_physical_terms(problem, final, covariance, effect, accepted)
@@ -319,7 +339,7 @@ def _next_flight(
         )
     lines = []
     if verdict == "unexplained":
-        lines.append("The declared aircraft lacks something that no effect of the library explains.")
+        lines.append("The declared aircraft lacks something that no candidate explains.")
     for best, others in effects:
         names = {c.score.effect.key: c.score.effect for c in (best, *others)}
         if len({e.name for e in names.values()}) > 1:

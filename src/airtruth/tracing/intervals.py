@@ -36,6 +36,24 @@ def estimates(effect: Effect, sizes: Array, covariance: Array) -> dict[str, Para
     return found
 
 
+def at_measured_alpha(
+    effect: Effect, stated: dict[str, ParameterEstimate], shift_rad: float
+) -> dict[str, ParameterEstimate]:
+    """Estimates whose angles of attack count from zero; the linear model counts them from the trim.
+
+    Parameters
+    ----------
+    stated : estimates of an effect; shift_rad : angle of attack of the trim [rad].
+    """
+    angles = {p.name for p in effect.parameters if p.is_location and p.name.endswith("alpha_rad")}
+    return {name: _moved(e, shift_rad) if name in angles else e for name, e in stated.items()}
+
+
+def _moved(stated: ParameterEstimate, by: float) -> ParameterEstimate:
+    low, high = (None if end is None else end + by for end in stated.ci95)
+    return replace(stated, value=stated.value + by, ci95=(low, high))
+
+
 def _finite(end: float) -> float | None:
     return max(end, -1e300) if math.isfinite(end) else None
 
@@ -100,4 +118,4 @@ def _containing(stated: ParameterEstimate, ends: Iterable[float]) -> ParameterEs
     return replace(stated, ci95=(_finite(bottom), _finite(top)))
 
 
-__all__ = ["estimates", "widened_by_profile", "widened_by_rejected"]
+__all__ = ["at_measured_alpha", "estimates", "widened_by_profile", "widened_by_rejected"]

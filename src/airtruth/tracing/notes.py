@@ -13,7 +13,7 @@ from airtruth.tracing.model.compile import CHANNELS
 from airtruth.tracing.model.parameters import COLOUR_TIME_S, Common
 from airtruth.tracing.replay import disagreement
 from airtruth.tracing.selection.rounds import SearchRound
-from airtruth.tracing.stage_errors import Errors, Replay
+from airtruth.tracing.stage_errors import Replay
 from airtruth.tracing.stages import Stages, in_closed_loop
 
 Array = NDArray[np.float64]
@@ -28,15 +28,13 @@ _IN_LOOP: Final = (
 """Note of a trace in closed loop."""
 
 
-def notes(
-    stages: Stages, last: SearchRound, errors: Errors, replay: Replay | None, forced: Sequence[str]
-) -> Iterator[str]:
+def notes(stages: Stages, last: SearchRound, replay: Replay | None, forced: Sequence[str]) -> Iterator[str]:
     """Each note, in words.
 
     Parameters
     ----------
     stages, last : assessed stages, and the last round of the search.
-    errors : errors of every stage; replay : records flown again in JSBSim, None where nothing was flown again.
+    replay : records flown again in JSBSim, None where nothing was flown again.
     forced : faults of the logs that the caller overruled.
     """
     yield from stages.case.notes
@@ -49,7 +47,7 @@ def notes(
             + "; ".join(stages.case.left_out)
         )
     if replay is not None:
-        yield from disagreement(replay, errors)
+        yield from disagreement(replay, stages)
     if forced:
         yield "the logs contradict physics and were traced all the same (--force): " + "; ".join(forced)
 

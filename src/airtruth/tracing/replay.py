@@ -21,13 +21,11 @@ from airtruth.tracing.inference.assess import noise_floor
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.model.compile import CHANNELS, compile_change
 from airtruth.tracing.model.records import FINE, TraceRecord
-from airtruth.tracing.stage_errors import Errors, PerChannel, Replay
+from airtruth.tracing.stage_errors import MOST_RECORDS, PerChannel, Replay
 from airtruth.tracing.stages import Stages
 
 Array = NDArray[np.float64]
 
-MOST_RECORDS: Final = 6
-"""Largest number of records that are flown again [-] (judgement: each costs about a second)."""
 _APART: Final = 0.25
 """Logarithm of the ratio of two errors of one free run, in JSBSim and in the filter, from which they disagree [-]
 (judgement: they agree within 0.05 for the shipped aircraft)."""
@@ -65,20 +63,20 @@ def flown_again(stages: Stages, aircraft: Aircraft, updated: str | Path | None) 
         return Replay()
 
 
-def disagreement(replay: Replay, errors: Errors) -> list[str]:
+def disagreement(replay: Replay, stages: Stages) -> list[str]:
     """A sentence where JSBSim and the filter disagree on the motion of the declared aircraft.
 
     The filter is built from forces at rest, so it lacks the servos, lags and alpha-dot terms of a JSBSim model.
 
     Parameters
     ----------
-    replay : errors in JSBSim; errors : those of the filter.
+    replay : errors in JSBSim; stages : the assessed stages, with the errors of the filter on the same records.
     """
-    stage = errors.stages["declared"]
-    filtered = stage.held_out or stage.fit
-    if replay.declared is None or filtered is None:
+    if replay.declared is None:
         return []
-    ratios = {c: rms / max(filtered.free_run[c], 1e-12) for c, rms in replay.declared.items()}
+    same = np.stack([a.free_run for a in stages.reported[1]["declared"][:MOST_RECORDS]])
+    filtered = dict(zip(CHANNELS, np.sqrt(np.mean(same**2, axis=0)).tolist(), strict=True))
+    ratios = {c: rms / max(filtered[c], 1e-12) for c, rms in replay.declared.items()}
     apart = [f"{channel} {ratio:.2f}" for channel, ratio in ratios.items() if abs(np.log(ratio)) > _APART]
     if not apart:
         return []
@@ -166,4 +164,4 @@ def track(record: TraceRecord, aircraft: Aircraft, weight: Array) -> Track:
     )
 
 
-__all__ = ["MOST_RECORDS", "disagreement", "flown_again", "track"]
+__all__ = ["disagreement", "flown_again", "track"]

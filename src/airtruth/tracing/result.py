@@ -73,7 +73,7 @@ class TraceResult:
         return as_figure(trace_chart(self.answer, self.histories))
 
     def write(self, out: Path) -> None:
-        """Write trace.json, the figures, the records and the errors into the folder of the trace.
+        """Write the figures, the records and the errors into the folder of the trace, and trace.json at the end.
 
         Raises
         ------
@@ -82,8 +82,8 @@ class TraceResult:
         """
         from airtruth.tracing.presentation.files import write_evidence
 
-        write_text(out / ANSWER, self.answer.to_json())
         write_evidence(self.answer, self.histories, out)
+        write_text(out / ANSWER, self.answer.to_json())
 
     def _repr_html_(self) -> str:
         return as_trace_html(self.answer)

@@ -20,7 +20,7 @@ from airtruth.logs import atomic
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.provenance import Provenance, digests_of
 from airtruth.logs.sources import Logs, named_logs
-from airtruth.tracing.answer import DECLARED_LEVEL
+from airtruth.tracing.answer import ANSWER, DECLARED_LEVEL
 from airtruth.tracing.axial_force import axial_force
 from airtruth.tracing.conclude import conclude
 from airtruth.tracing.declared_model import declared_p_value
@@ -117,6 +117,7 @@ def _traced(
             origin,
         )
     advance("write the updated aircraft")
+    atomic.remove_file(out / ANSWER)  # an interrupted trace has no answer, not one of another trace
     contradicted = declared_p_value(rounds) <= DECLARED_LEVEL
     updated = write_update(case, rounds, declared, out, contradicted, axial)
     replay = flown_again(stages, declared, updated)

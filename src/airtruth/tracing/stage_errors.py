@@ -143,6 +143,10 @@ class Tolerances:
         return {"source": self.source, "limits": dict(self.limits), **rows}
 
 
+MOST_RECORDS: Final = 6
+"""Largest number of records that are flown again [-] (judgement: each costs about a second)."""
+
+
 @dataclass(frozen=True)
 class Replay:
     """Root mean square errors of records flown again in JSBSim, by the declared and by the updated aircraft.

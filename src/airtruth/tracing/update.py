@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final, TypeVar
@@ -106,7 +106,7 @@ def write_update(
     along = () if axial is None else axial.increments
     change += Change() if axial is None else axial.change
     released = rounds[-1].null.hypothesis.spread is not None
-    refits = (released or contradicted) and aircraft.file.jsbsim is not None
+    refits = released or contradicted
     if (change == Change() and not refits) or (aircraft.file.jsbsim is None and change.in_aircraft):
         atomic.remove_folder(folder)
         return None
@@ -121,15 +121,32 @@ def write_update(
     found = ", ".join(names) or "no effect of the library explains the residual"
     note = f"Traced from measured records: {found}."
     corrections = None
-    if aircraft.file.jsbsim is not None and np.isfinite(list(increments.values())).all():
+    refitted = bool(np.isfinite(list(increments.values())).all())
+    if aircraft.file.jsbsim is None and refitted:
+        aircraft = _with_derivatives(aircraft, increments)
+    if aircraft.file.jsbsim is not None and refitted:
         alpha = float(np.mean([p.trim_alpha_rad for p in plants]))
         elevator = float(np.mean([p.trim_elevator_rad for p in plants]))
         corrections = Corrections(increments, alpha + shift, elevator)
+    if refitted:
         note += " Derivatives refitted: " + ", ".join(f"{k} {v:+.4g}" for k, v in increments.items()) + "."
     note += "".join(f"\n{line}" for line in (*_bands(case, fit), *map(_band, along)))
     with atomic.new_folder(folder) as new:
         write_aircraft(aircraft, change, new, note, corrections)
     return str(folder)
+
+
+def _with_derivatives(aircraft: Aircraft, increments: Mapping[str, float]) -> Aircraft:
+    """The aircraft with other [derivatives], which are all that one without a JSBSim model has."""
+    declared = aircraft.file.derivatives
+    moved = {
+        name: q.model_copy(
+            update={"value": q.value + increments.get(name, 0.0), "source": "refitted by a trace"}
+        )
+        for name, q in declared.items()
+    }
+    file = aircraft.file.model_copy(update={"derivatives": moved})
+    return aircraft.model_copy(update={"file": file})
 
 
 def _bands(case: Case, fit: PosteriorFit) -> Iterator[str]:

@@ -85,7 +85,7 @@ class Hypothesis:
         return replace(total, aero=tuple(self._about_trim(t) for t in total.aero))
 
     def _about_trim(self, term: AeroTerm) -> AeroTerm:
-        return replace(term, at=self.trim_alpha_rad) if _is_curvature(term) else term
+        return replace(term, at=self.trim_alpha_rad) if _is_quadratic(term) else term
 
     @cached_property
     def fixed(self) -> tuple[int, ...]:
@@ -110,13 +110,18 @@ def unconstrained_by(effect: Effect, trim_alpha_rad: float) -> tuple[int, ...]:
     cannot be declared and present in addition, so that the records have to determine them.
     """
     change = effect.change({p.name: p.high for p in effect.parameters})
-    bent = {t.coefficient for t in change.aero if _is_curvature(t) and t.at != trim_alpha_rad}
+    bent = {t.coefficient for t in change.aero if _is_quadratic(t) and t.at != trim_alpha_rad}
     slopes = ((Common.CLalpha, "CL"), (Common.Cmalpha, "Cm"))
     return tuple(i for i, coefficient in slopes if coefficient in bent)
 
 
-def _is_curvature(term: AeroTerm) -> bool:
+def is_curvature(effect: Effect) -> bool:
+    """Whether an effect is a quadratic function of the angle of attack."""
+    return any(_is_quadratic(t) for t in effect.change({p.name: p.high for p in effect.parameters}).aero)
+
+
+def _is_quadratic(term: AeroTerm) -> bool:
     return term.signal == "alpha" and term.shape == "quadratic" and not term.factor
 
 
-__all__ = ["Hypothesis", "unconstrained_by"]
+__all__ = ["Hypothesis", "is_curvature", "unconstrained_by"]

@@ -77,17 +77,25 @@ class Plant:
 
     @property
     def over_alpha(self) -> Array:
-        """(alpha, 3) of the tables, at the elevator's point next to its trim and no pitch rate."""
-        return np.asarray(self._steady[:, int(np.argmin(np.abs(self.elevator_rad - self.trim_elevator_rad)))])
+        """(alpha, 3) of the tables, at the elevator's point next to its trim and no pitch rate; on a line at the trim."""
+        return self._nearest(np.moveaxis(self._steady, 1, 0), self.elevator_rad, self.trim_elevator_rad)
 
     @property
     def over_elevator(self) -> Array:
-        """(elevator, 3) of the tables, at the angle of attack's point next to its trim and no pitch rate."""
-        return np.asarray(self._steady[int(np.argmin(np.abs(self.alpha_rad - self.trim_alpha_rad)))])
+        """(elevator, 3) of the tables, at the angle of attack's point next to its trim and no pitch rate; on a line at the
+        trim."""
+        return self._nearest(self._steady, self.alpha_rad, self.trim_alpha_rad)
 
     @property
     def _steady(self) -> Array:
-        return self.values[:, :, int(np.argmin(np.abs(self.qhat)))]
+        return self._nearest(np.moveaxis(self.values, 2, 0), self.qhat, 0.0)
+
+    def _nearest(self, rows: Array, points: Array, at: float) -> Array:
+        """The row of the point next to ``at``; of the linear model, which has two points, the row between them."""
+        if self.trim is not None:
+            return np.asarray(rows[int(np.argmin(np.abs(points - at)))])
+        share = (at - points[0]) / (points[-1] - points[0])
+        return np.asarray(rows[0] + share * (rows[-1] - rows[0]))
 
 
 def trim_of(

@@ -52,6 +52,10 @@ def head_samples(dt_s: float) -> int:
     return max(_HEAD_SAMPLES, int(_HEAD_S / dt_s))
 
 
+_PART: Final = ", part: "
+"""Between the name of a record and that of its part."""
+
+
 @dataclass(frozen=True)
 class Signals:
     """One run of a log, before any model.
@@ -112,7 +116,13 @@ class Signals:
             lead = self._cut(slice(start, first), points, cells)
         points, cells = slice(first * self.sub, end * self.sub + 1), slice(first * fine, end * fine + 1)
         own = self._cut(slice(first, last), points, cells)
-        return replace(own, run_id=f"{self.run_id}, {name}", lead=lead)
+        return replace(own, run_id=f"{self.run_id}{_PART}{name}", lead=lead)
+
+    @property
+    def record(self) -> str:
+        """Name of the record, also of a part of one."""
+        name, _, _ = self.run_id.partition(_PART)
+        return name
 
     def _cut(self, samples: slice, points: slice, fine: slice) -> Signals:
         return replace(

@@ -87,7 +87,10 @@ def _curve(shown_: ShownRecord, terms: tuple[AeroTerm, ...]) -> Panel:
     plant = record.plant
     over = plant.alpha_rad if first.signal == "alpha" else plant.elevator_rad
     at = plant.trim_alpha_rad if first.signal == "alpha" else plant.trim_elevator_rad
-    fine = np.linspace(over[0], over[-1], 201)
+    shift = plant.alpha_shift_rad if first.signal == "alpha" else 0.0
+    flown = record.signals.y[:, 0] - shift if first.signal == "alpha" else record.signals.elevator_rad
+    ends = over if plant.trim is not None else (flown.min(), flown.max())  # the linear model holds everywhere
+    fine = np.linspace(ends[0], ends[-1], 201)
     declared = np.interp(fine, over, _declared_curve(plant, first))
     derivative = (3 if first.coefficient == "Cm" else 0) + (0 if first.signal == "alpha" else 2)
     models = shown_.stages.models
@@ -96,21 +99,24 @@ def _curve(shown_: ShownRecord, terms: tuple[AeroTerm, ...]) -> Panel:
     for term in terms:
         if term.signal == first.signal and term.coefficient == first.coefficient:
             after = after + term.amplitude * shape_of(term, fine)
-    flown = (
-        record.signals.y[:, 0] - plant.alpha_shift_rad
-        if first.signal == "alpha"
-        else record.signals.elevator_rad
-    )
+    angle = (fine + shift) / DEG
     return Panel(
         title=f"the effect: {first.coefficient}",
         x_label=f"{first.signal} [deg]",
         y_label=first.coefficient,
         lines=(
-            replace(line(fine / DEG, declared), label="declared", colour="grey"),
-            replace(line(fine / DEG, before), label="before", stroke="dotted"),
-            replace(line(fine / DEG, after), label="after", colour="vermillion", stroke="dashed"),
+            replace(line(angle, declared), label="declared", colour="grey"),
+            replace(line(angle, before), label="before", stroke="dotted"),
+            replace(line(angle, after), label="after", colour="vermillion", stroke="dashed"),
         ),
-        bands=(Band(float(flown.min() / DEG), float(flown.max() / DEG), axis="x", label="flown"),),
+        bands=(
+            Band(
+                float((flown.min() + shift) / DEG),
+                float((flown.max() + shift) / DEG),
+                axis="x",
+                label="flown",
+            ),
+        ),
     )
 
 

@@ -8,7 +8,7 @@ from typing import Final
 from airtruth.channels import shown
 from airtruth.table import MISSING, Group, Number, Row, Table, as_csv, flat, significant
 from airtruth.tracing.answer import TraceAnswer
-from airtruth.tracing.stage_errors import SETS, STAGES, AxialErrors, PerChannel, Rms
+from airtruth.tracing.stage_errors import MOST_RECORDS, SETS, STAGES, AxialErrors, PerChannel, Rms
 
 SET_NAMES: Final = {"held_out": "held-out records", "fit": "fitted records"}
 """One of `SETS` -> its name in a heading."""
@@ -24,8 +24,8 @@ _MEANING: Final = {
     "floor": "floor: gusts and sensor noise alone",
 }
 """Stage -> its meaning in a note."""
-_REPLAY_STAGE: Final = {"declared": "declared", "updated": "after"}
-"""Aircraft flown again in JSBSim -> column of the table."""
+_REPLAY_STAGES: Final = {"declared": ("declared",), "updated": ("after", "before")}
+"""Aircraft flown again in JSBSim -> column of the table, the first that there is."""
 
 
 def stages_of(answer: TraceAnswer) -> list[str]:
@@ -42,7 +42,7 @@ def error_table(answer: TraceAnswer) -> Table:
         for kind, title in KINDS
     ]
     if answer.replay is not None:
-        flown = f"Flown again in JSBSim, {SET_NAMES[_flown_again(answer)]}"
+        flown = f"Flown again in JSBSim, {_counted(answer)}"
         groups.append(Group(flown, tuple(_replayed(answer, names))))
     return Table(
         title="Root mean square of the error",
@@ -85,6 +85,13 @@ def _flown_again(answer: TraceAnswer) -> str:
     return "held_out" if answer.records.held_out else "fit"
 
 
+def _counted(answer: TraceAnswer) -> str:
+    """The records that are flown again in words; of many the first ones."""
+    kind = _flown_again(answer)
+    count = len(answer.records.held_out if kind == "held_out" else answer.records.fitted)
+    return SET_NAMES[kind] if count <= MOST_RECORDS else f"{MOST_RECORDS} of {count} {SET_NAMES[kind]}"
+
+
 def _of_kind(rms: Rms | None, kind: str) -> PerChannel:
     if rms is None:
         return {}
@@ -101,7 +108,7 @@ def _rows(answer: TraceAnswer, names: list[str], records: str, kind: str) -> Ite
 
 def _replayed(answer: TraceAnswer, names: list[str]) -> Iterator[Row]:
     replay = {} if answer.replay is None else answer.replay.to_dict()
-    by_stage = {_REPLAY_STAGE[aircraft]: rms for aircraft, rms in replay.items()}
+    by_stage = {next(s for s in _REPLAY_STAGES[plane] if s in names): rms for plane, rms in replay.items()}
     for channel, signal in answer.error.channels.items():
         cells = [by_stage.get(name, {}).get(channel) for name in names]
         if any(cell is not None for cell in cells):

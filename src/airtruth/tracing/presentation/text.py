@@ -70,8 +70,8 @@ def _conclusion(answer: TraceAnswer) -> str:
         )
     if answer.verdict == "unexplained":
         return (
-            f"Unexplained: the declared aircraft lacks something ({_evidence(answer.anomaly)}), and no effect of the "
-            "library passes every acceptance test."
+            f"Unexplained: the declared aircraft lacks something ({_evidence(answer.anomaly)}), and no candidate "
+            "passes every acceptance test."
         )
     alike = sorted({name for e in answer.effects for name in e.indistinguishable_from})
     kind = "Learned" if answer.verdict == "learned" else "One of several" if alike else "Traced"
@@ -273,7 +273,9 @@ def _records(answer: TraceAnswer) -> str:
     records = answer.records
     held = ", ".join(records.held_out) or "none"
     model = "forces probed in JSBSim" if answer.model == "aircraft" else "linear short-period model"
-    return f"{len(records.fitted)} records fitted, held out: {held}; {model}."
+    count = len(records.fitted)
+    fitted = "1 record fitted, in two parts" if count == 1 else f"{count} records fitted"
+    return f"{fitted}, held out: {held}; {model}."
 
 
 def _wrapped(heading: str, words: str) -> list[str]:

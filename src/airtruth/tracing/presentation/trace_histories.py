@@ -102,7 +102,7 @@ def _conditions(record: TraceRecord) -> dict[str, float]:
         "airspeed_m_s": float(s.airspeed_m_s.mean()),
         "density_kg_m3": float(s.density_kg_m3.mean()),
         "altitude_m": float(s.altitude_m),
-        "trim_alpha_rad": float(plant.trim_alpha_rad),
+        "trim_alpha_rad": float(plant.trim_alpha_rad + plant.alpha_shift_rad),
         "trim_elevator_rad": float(plant.trim_elevator_rad),
         "mass_kg": float(constants.mass_kg),
         "inertia_yy_kg_m2": float(constants.inertia_yy_kg_m2),

@@ -293,7 +293,7 @@ _RINGING: Final = "sample this channel faster, and shake or excite the aircraft 
 """Advice for an anomaly of the spectrum."""
 _LIBRARY: Final = (
     "repeat the manoeuvre in both signs and two amplitudes. "
-    "This effect improves the fit but fails an acceptance test."
+    "This effect has a significant score and was not accepted; the list of candidates states the reason."
 )
 """Advice for an effect of the library that was not accepted."""
 _GROUND: Final = (
