@@ -23,6 +23,13 @@ def test_edge_of_the_papers_filter_is_scipys_default():
     assert edge_samples(butterworth(5.0, 4, 0.02)) == 15
 
 
+@pytest.mark.parametrize("rate", [50, 100, 200, 400, 800])
+def test_an_extension_is_a_time_at_any_rate(rate):
+    """The slowest mode of the fourth order decays at the rate 2 pi 5 sin(pi/8) = 12.0 1/s: to 0.04 in 0.27 s."""
+    seconds = edge_samples(butterworth(5.0, 4, 1.0 / rate)) / rate
+    assert 0.26 < seconds <= 0.3
+
+
 def test_gain_is_the_square_of_one_pass_without_lag():
     """A sinusoid at f comes out times 1/(1 + (tan(pi f/fs)/tan(pi fc/fs))^8), in phase (order 4)."""
     dt, cutoff = 0.02, 5.0

@@ -21,6 +21,7 @@ from airtruth.reporting.pages.trace_page import trace_report
 from airtruth.result import Result
 from airtruth.simulation.campaign import plan
 from airtruth.simulation.campaign import run as campaign
+from airtruth.table import MISSING
 from airtruth.tracing import TraceAnswer, TraceOptions, trace
 from airtruth.tracing.answer import Evidence, ParameterEstimate
 from airtruth.tracing.presentation.candidates import candidate_table, probability, ranked
@@ -93,6 +94,14 @@ def test_text_states_effect_errors_candidates_and_next_flight(answer):
         assert words in text
     assert answer.next_flight.split()[0] in text
     assert max(len(line) for line in text.splitlines()) <= 130
+
+
+def test_the_updated_aircraft_of_no_effect_is_beside_the_refitted_derivatives(answer):
+    stages = {name: stage for name, stage in answer.error.stages.items() if name in ("declared", "before")}
+    errors = dict.fromkeys(answer.error.channels, 0.25)
+    flown = replace(answer, error=replace(answer.error, stages=stages), replay=Replay(errors, errors))
+    group = next(g for g in error_table(flown).groups if g.heading.startswith("Flown again in JSBSim"))
+    assert all(len([cell for cell in row if cell is not MISSING]) == 4 for row in group.rows)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,9 @@ filter run forward and backward, which has no lag.
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
+from typing import Final
 
 import numpy as np
 from numba import njit
@@ -16,6 +18,10 @@ from scipy.signal import butter
 from airtruth.numerics.compiled import inner
 
 Array = NDArray[np.float64]
+
+
+LEFT: Final = 0.04
+"""Part of the slowest mode of the filter that remains at the end of an extension [-] (judgement: 0.3 s at 5 Hz)."""
 
 
 @lru_cache(maxsize=32)
@@ -36,10 +42,14 @@ def butterworth(cutoff_hz: float, order: int, dt_s: float) -> Array:
 def edge_samples(sos: Array) -> int:
     """Samples by which each end is extended; a record must be longer than this.
 
-    Three times the number of coefficients of the filter, as scipy's ``sosfiltfilt`` has it.
+    Three times the number of coefficients of the filter, as scipy's ``sosfiltfilt`` has it, or, if that is longer, the time
+    in which the slowest mode of the filter decays to `LEFT`: a number of samples alone is no time at a high rate.
     """
     taps = 2 * int(sos.shape[0]) + 1 - min(int(np.sum(sos[:, 2] == 0.0)), int(np.sum(sos[:, 5] == 0.0)))
-    return 3 * taps
+    a1, a2 = sos[:, 4], sos[:, 5]
+    real = np.sqrt(np.maximum(a1**2 - 4.0 * a2, 0.0))
+    radius = float(np.maximum(np.sqrt(np.maximum(a2, 0.0)), 0.5 * (np.abs(a1) + real)).max())
+    return max(3 * taps, math.ceil(math.log(LEFT) / math.log(radius)))
 
 
 @inner

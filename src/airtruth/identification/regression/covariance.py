@@ -192,6 +192,40 @@ def corrected(p: Projected, factors: Array, samples: int) -> Parts:
     w, u = rfft(weights, s.transform), rfft(columns, s.transform)
     by_lift = correction(weights, w, u, s.lift, s.transform)
     by_moment = correction(weights, w, u, s.moment, s.transform)
+    return _with_corrections(p, factors, s, by_lift, by_moment)
+
+
+def block_products(p: Projected, factors: Array) -> Array:
+    """(2, 3, 3) Z'X of the lift and of the moment block, summed over the runs: what a joint fit inverts."""
+    d = _weights(factors)
+    zx = np.matmul(p.z, np.swapaxes(p.x, 1, 2)) * d[:, :, None] * d[:, None, :]
+    return np.stack([(zx * k[:, None, None]).sum(axis=0) for k in _block_weights(factors)])
+
+
+def corrected_jointly(p: Projected, factors: Array, products: Array) -> Parts:
+    """As `corrected`, of runs that one fit has in common: it removes its degrees of freedom from all of them once.
+
+    Parameters
+    ----------
+    products : (2, 3, 3) sum of `block_products` over all runs of the fit.
+    """
+    s, d = _spectra(p, factors), _weights(factors)
+    columns = np.concatenate([p.x * d[:, :, None], p.trim[:, None]], axis=1)
+    u = rfft(columns, s.transform)
+    by_block = []
+    for product, k, spectrum in zip(products, _block_weights(factors), (s.lift, s.moment), strict=True):
+        own = np.linalg.inv(product) @ (p.z * d[:, :, None] * k[:, None, None])
+        weights = np.concatenate([own, p.trim[:, None]], axis=1)
+        by_block.append(correction(weights, rfft(weights, s.transform), u, spectrum, s.transform))
+    return _with_corrections(p, factors, s, *by_block)
+
+
+def _block_weights(factors: Array) -> tuple[Array, Array]:
+    """(runs,) weights of Z'X in the lift and in the moment block."""
+    return factors[:, LIFT] ** 2 + factors[:, NORMAL] ** 2, factors[:, MOMENT] ** 2
+
+
+def _with_corrections(p: Projected, factors: Array, s: _Spectra, by_lift: Array, by_moment: Array) -> Parts:
     return _parts(
         p,
         factors,

@@ -18,10 +18,15 @@ from airtruth.identification.condition import (
 )
 from airtruth.identification.estimates import JOINT, Estimates, Status, joined, mean_scale
 from airtruth.identification.options import Options
-from airtruth.identification.regression.covariance import COVARIANCES, sandwich
+from airtruth.identification.regression.covariance import (
+    COVARIANCES,
+    block_products,
+    corrected_jointly,
+    sandwich,
+)
 from airtruth.identification.regression.iterate import Outcome, iterate, least_squares
 from airtruth.identification.regression.lowpass import ls_problem
-from airtruth.identification.regression.rows import Equations, Problem, project
+from airtruth.identification.regression.rows import Equations, Problem, Projected, project
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.short_period import Scale
 
@@ -186,14 +191,24 @@ def _joint_covariance(
     intercept: bool,
     options: Options,
 ) -> Array:
+    def projected() -> Iterator[tuple[Projected, Array]]:
+        """Of each observation, computed again for each pass: all of them together need too much memory."""
+        for problem, observation in zip(problems, observations, strict=True):
+            runs = observation.factors.shape[0]
+            every = np.repeat(theta, runs, axis=0)
+            rows = problem.rows(every, np.arange(runs))
+            yield project(rows, every, observation.factors, intercept), observation.factors
+
     samples = sum(o.signals.shape[0] * o.signals.shape[2] for o in observations)
     bread, meat = np.zeros((1, 6, 6)), np.zeros((1, 6, 6))
-    for problem, observation in zip(problems, observations, strict=True):
-        runs = observation.factors.shape[0]
-        every = np.repeat(theta, runs, axis=0)
-        rows = problem.rows(every, np.arange(runs))
-        projected = project(rows, every, observation.factors, intercept)
-        b, m = COVARIANCES[options.covariance](projected, observation.factors, samples)
+    products = None
+    if options.covariance == "corrected":
+        products = np.sum([block_products(p, factors) for p, factors in projected()], axis=0)
+    for p, factors in projected():
+        if products is None:
+            b, m = COVARIANCES[options.covariance](p, factors, samples)
+        else:
+            b, m = corrected_jointly(p, factors, products)
         bread += b.sum(axis=0)
         meat += m.sum(axis=0)
     return sandwich((bread, meat))
