@@ -47,8 +47,8 @@ class Series:
             return self
         # a time is stated with ten digits, and on a clock since 1970 these are longer than a sample
         stated = 1e-9 * max(1.0, float(np.nanmax(np.abs(self.t_s), initial=0.0)))
-        step = float(np.nanmedian(np.abs(np.diff(self.t_s)))) if len(self.t_s) > 1 else np.inf
-        small = min(stated, _EDGE * step)
+        steps = np.abs(np.diff(self.t_s[np.isfinite(self.t_s)]))
+        small = min(stated, _EDGE * float(np.median(steps))) if len(steps) else stated
         # a time that is no number stays, to be refused by name
         keep = rows if rows is not None else ~((self.t_s < start_s - small) | (self.t_s > end_s + small))
         return replace(self, t_s=self.t_s[keep], values=self.values[keep])
