@@ -168,6 +168,7 @@ def interrupted(name, delay, home):
 
 CALLED = """
 import ctypes, signal, time
+signal.signal(signal.{signal}, signal.SIG_DFL)  # a job in the background of a shell ignores Ctrl-C
 from airtruth.cli import entry
 ring = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.{signal}))
 def app(prog_name):
