@@ -46,11 +46,11 @@ def effects(
 
 def _write(answer: Path, out: Path, force: bool) -> None:
     from airtruth.logs.outputs import writing
-    from airtruth.tracing.answer import ANSWER, TraceAnswer
+    from airtruth.tracing.answer import TraceAnswer, answer_path
     from airtruth.tracing.effect_module import MODULE, write_effect_package
 
     names = (f"{MODULE}.py", "pyproject.toml")
-    answer = answer / ANSWER if answer.is_dir() else answer
+    answer = answer_path(answer)
     with writing("effects", [answer], force=force) as outputs:
         outputs.require(*(out / name for name in names))
         write_effect_package(TraceAnswer.read(answer), out)

@@ -27,7 +27,7 @@ from airtruth.logs.provenance import PROVENANCE, Provenance, aircraft_digests
 from airtruth.physics.atmosphere import RHO0_KG_M3
 from airtruth.simulation.campaign import file as campaign_file
 from airtruth.simulation.campaign.file import Campaign
-from airtruth.tracing.answer import ANSWER, TraceAnswer
+from airtruth.tracing.answer import TraceAnswer, answer_path
 
 Step = Callable[[str], None]
 
@@ -83,7 +83,7 @@ def planned_from(
         Naming what is wrong, where, and what to do.
     """
     trace = stated.trace
-    answer_file = None if trace is None else (trace / ANSWER if trace.is_dir() else trace)
+    answer_file = None if trace is None else answer_path(trace)
     question = _question(stated, answer_file)
     records = _records(answer_file)
     declared, base = _base(campaign, aircraft, records, "" if out is None else out.stem)

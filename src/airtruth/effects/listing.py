@@ -72,7 +72,8 @@ def _parameter(p: Parameter) -> str:
 
 def _unit(p: Parameter) -> str:
     """A space and the printed unit, or nothing."""
-    return f" {printed(p.unit)}" if printed(p.unit) else ""
+    unit = printed(p.unit)
+    return f" {unit}" if unit else ""
 
 
 def _material(p: Parameter) -> str:

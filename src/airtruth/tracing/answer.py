@@ -26,6 +26,11 @@ Z95: Final = 1.959964
 VerdictName = Literal["none", "traced", "one_of", "learned", "unexplained"]
 
 
+def answer_path(trace: Path) -> Path:
+    """The trace.json of a trace that is stated by its folder or by that file."""
+    return trace / ANSWER if trace.is_dir() else trace
+
+
 @dataclass(frozen=True)
 class Evidence:
     """The strongest evidence of a missing effect.
@@ -321,5 +326,6 @@ __all__ = [
     "RecordNames",
     "TraceAnswer",
     "VerdictName",
+    "answer_path",
     "effect_key",
 ]

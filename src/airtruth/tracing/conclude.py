@@ -40,7 +40,7 @@ from airtruth.tracing.declared_model import (
 )
 from airtruth.tracing.increment_table import in_physical_terms, increment_rows, least_certain
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, derivative_likelihood
-from airtruth.tracing.inference.hypothesis import is_curvature, unconstrained_by
+from airtruth.tracing.inference.hypothesis import is_curvature
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.inference.robust import robust_covariance
 from airtruth.tracing.intervals import at_measured_alpha, estimates, widened_by_profile, widened_by_rejected
@@ -182,12 +182,8 @@ def _effect(
     if own.profile is not None:
         stated = widened_by_profile(effect, stated, own.profile)
     stated = widened_by_rejected(effect, stated, rounds[-1], np.sqrt(np.diag(own_covariance)))
-    about = (
-        final.hypothesis.trim_alpha_rad if unconstrained_by(effect, final.hypothesis.trim_alpha_rad) else None
-    )
-    if problem.alpha_shift_rad != 0.0:  # the linear model counts from the trim
-        stated = at_measured_alpha(effect, stated, problem.alpha_shift_rad)
-        about = problem.alpha_shift_rad if is_curvature(effect) else None
+    shift = problem.alpha_shift_rad
+    stated = at_measured_alpha(effect, stated, shift)
     accepted = AcceptedEffect(
         name=effect.name,
         variant=effect.variant,
@@ -200,7 +196,7 @@ def _effect(
             sorted(c.score.effect.variant for c in others if c.score.effect.name == effect.name)
         ),
         channel=effect.variant if effect.name == "sensor_delay" else None,
-        about_alpha_rad=about,
+        about_alpha_rad=final.hypothesis.trim_alpha_rad + shift if is_curvature(effect) else None,
     )
     if isinstance(effect, Increment):
         return in_physical_terms(problem, final, covariance, effect, accepted)

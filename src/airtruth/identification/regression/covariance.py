@@ -161,10 +161,15 @@ def _parts(p: Projected, factors: Array, s: _Spectra) -> Parts:
     _spectral_sum(s.z, s.lift, s.cross, s.moment, s.transform, sums)
     d = _weights(factors)
     sums *= d[:, None, :, None] * d[:, None, None, :]
+    return products(p, factors), _blocks(sums[:, 0], sums[:, 1], sums[:, 2])
+
+
+def products(p: Projected, factors: Array) -> Array:
+    """(runs, 6, 6) Z'X, B of the covariances but for "paper" and "white"."""
+    d = _weights(factors)
     zx = np.matmul(p.z, np.swapaxes(p.x, 1, 2)) * d[:, :, None] * d[:, None, :]
-    lift = (factors[:, LIFT] ** 2 + factors[:, NORMAL] ** 2)[:, None, None] * zx
-    bread = _blocks(lift, np.zeros_like(lift), factors[:, MOMENT, None, None] ** 2 * zx)
-    return bread, _blocks(sums[:, 0], sums[:, 1], sums[:, 2])
+    lift, moment = (k[:, None, None] * zx for k in _block_weights(factors))
+    return _blocks(lift, np.zeros_like(lift), moment)
 
 
 def coloured(p: Projected, factors: Array, samples: int) -> Parts:
@@ -195,26 +200,20 @@ def corrected(p: Projected, factors: Array, samples: int) -> Parts:
     return _with_corrections(p, factors, s, by_lift, by_moment)
 
 
-def block_products(p: Projected, factors: Array) -> Array:
-    """(2, 3, 3) Z'X of the lift and of the moment block, summed over the runs: what a joint fit inverts."""
-    d = _weights(factors)
-    zx = np.matmul(p.z, np.swapaxes(p.x, 1, 2)) * d[:, :, None] * d[:, None, :]
-    return np.stack([(zx * k[:, None, None]).sum(axis=0) for k in _block_weights(factors)])
-
-
-def corrected_jointly(p: Projected, factors: Array, products: Array) -> Parts:
+def corrected_jointly(p: Projected, factors: Array, total: Array) -> Parts:
     """As `corrected`, of runs that one fit has in common: it removes its degrees of freedom from all of them once.
 
     Parameters
     ----------
-    products : (2, 3, 3) sum of `block_products` over all runs of the fit.
+    total : (6, 6) sum of `products` over all runs of the fit.
     """
     s, d = _spectra(p, factors), _weights(factors)
     columns = np.concatenate([p.x * d[:, :, None], p.trim[:, None]], axis=1)
     u = rfft(columns, s.transform)
     by_block = []
-    for product, k, spectrum in zip(products, _block_weights(factors), (s.lift, s.moment), strict=True):
-        own = np.linalg.inv(product) @ (p.z * d[:, :, None] * k[:, None, None])
+    blocks = total[:3, :3], total[3:, 3:]
+    for block, k, spectrum in zip(blocks, _block_weights(factors), (s.lift, s.moment), strict=True):
+        own = np.linalg.inv(block) @ (p.z * d[:, :, None] * k[:, None, None])
         weights = np.concatenate([own, p.trim[:, None]], axis=1)
         by_block.append(correction(weights, rfft(weights, s.transform), u, spectrum, s.transform))
     return _with_corrections(p, factors, s, *by_block)

@@ -20,8 +20,8 @@ from airtruth.identification.estimates import JOINT, Estimates, Status, joined, 
 from airtruth.identification.options import Options
 from airtruth.identification.regression.covariance import (
     COVARIANCES,
-    block_products,
     corrected_jointly,
+    products,
     sandwich,
 )
 from airtruth.identification.regression.iterate import Outcome, iterate, least_squares
@@ -201,14 +201,14 @@ def _joint_covariance(
 
     samples = sum(o.signals.shape[0] * o.signals.shape[2] for o in observations)
     bread, meat = np.zeros((1, 6, 6)), np.zeros((1, 6, 6))
-    products = None
+    total = None
     if options.covariance == "corrected":
-        products = np.sum([block_products(p, factors) for p, factors in projected()], axis=0)
+        total = np.sum([products(p, factors).sum(axis=0) for p, factors in projected()], axis=0)
     for p, factors in projected():
-        if products is None:
+        if total is None:
             b, m = COVARIANCES[options.covariance](p, factors, samples)
         else:
-            b, m = corrected_jointly(p, factors, products)
+            b, m = corrected_jointly(p, factors, total)
         bread += b.sum(axis=0)
         meat += m.sum(axis=0)
     return sandwich((bread, meat))

@@ -109,15 +109,20 @@ def unconstrained_by(effect: Effect, trim_alpha_rad: float) -> tuple[int, ...]:
     A curvature about an angle of attack other than the trim's is a slope and a constant at the trim besides. They
     cannot be declared and present in addition, so that the records have to determine them.
     """
-    change = effect.change({p.name: p.high for p in effect.parameters})
-    bent = {t.coefficient for t in change.aero if _is_quadratic(t) and t.at != trim_alpha_rad}
+    bent = {t.coefficient for t in _curved(effect) if t.at != trim_alpha_rad}
     slopes = ((Common.CLalpha, "CL"), (Common.Cmalpha, "Cm"))
     return tuple(i for i, coefficient in slopes if coefficient in bent)
 
 
 def is_curvature(effect: Effect) -> bool:
     """Whether an effect is a quadratic function of the angle of attack."""
-    return any(_is_quadratic(t) for t in effect.change({p.name: p.high for p in effect.parameters}).aero)
+    return bool(_curved(effect))
+
+
+def _curved(effect: Effect) -> list[AeroTerm]:
+    """Its terms that are quadratic in the angle of attack."""
+    change = effect.change({p.name: p.high for p in effect.parameters})
+    return [t for t in change.aero if _is_quadratic(t)]
 
 
 def _is_quadratic(term: AeroTerm) -> bool:

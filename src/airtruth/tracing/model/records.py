@@ -52,10 +52,6 @@ def head_samples(dt_s: float) -> int:
     return max(_HEAD_SAMPLES, int(_HEAD_S / dt_s))
 
 
-_PART: Final = ", part: "
-"""Between the name of a record and that of its part."""
-
-
 @dataclass(frozen=True)
 class Signals:
     """One run of a log, before any model.
@@ -75,6 +71,7 @@ class Signals:
     corner_rad2 : (samples,) variance of the elevator's mean over the cell that ends at each sample, about that of
         ``elevator_rad``; empty where the samples show its motion.
     lead : what comes before a part of a run; None for a whole run. The filter starts there.
+    part_of : name of the run of which it is a part; empty for a whole run.
     """
 
     run_id: str
@@ -91,6 +88,7 @@ class Signals:
     elevator_std_rad: float = 0.0
     corner_rad2: Array = field(default_factory=lambda: np.zeros(0))
     lead: Signals | None = None
+    part_of: str = ""
 
     @property
     def sampled_elevator_rad(self) -> Array:
@@ -116,13 +114,12 @@ class Signals:
             lead = self._cut(slice(start, first), points, cells)
         points, cells = slice(first * self.sub, end * self.sub + 1), slice(first * fine, end * fine + 1)
         own = self._cut(slice(first, last), points, cells)
-        return replace(own, run_id=f"{self.run_id}{_PART}{name}", lead=lead)
+        return replace(own, run_id=f"{self.run_id}, {name}", part_of=self.record, lead=lead)
 
     @property
     def record(self) -> str:
         """Name of the record, also of a part of one."""
-        name, _, _ = self.run_id.partition(_PART)
-        return name
+        return self.part_of or self.run_id
 
     def _cut(self, samples: slice, points: slice, fine: slice) -> Signals:
         return replace(

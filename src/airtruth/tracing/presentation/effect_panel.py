@@ -88,8 +88,11 @@ def _curve(shown_: ShownRecord, terms: tuple[AeroTerm, ...]) -> Panel:
     over = plant.alpha_rad if first.signal == "alpha" else plant.elevator_rad
     at = plant.trim_alpha_rad if first.signal == "alpha" else plant.trim_elevator_rad
     shift = plant.alpha_shift_rad if first.signal == "alpha" else 0.0
-    flown = record.signals.y[:, 0] - shift if first.signal == "alpha" else record.signals.elevator_rad
-    ends = over if plant.trim is not None else (flown.min(), flown.max())  # the linear model holds everywhere
+    measured = record.signals.y[:, 0] if first.signal == "alpha" else record.signals.elevator_rad
+    low, high = float(measured.min()), float(measured.max())
+    ends = (
+        over if plant.trim is not None else (low - shift, high - shift)
+    )  # the linear model holds everywhere
     fine = np.linspace(ends[0], ends[-1], 201)
     declared = np.interp(fine, over, _declared_curve(plant, first))
     derivative = (3 if first.coefficient == "Cm" else 0) + (0 if first.signal == "alpha" else 2)
@@ -109,14 +112,7 @@ def _curve(shown_: ShownRecord, terms: tuple[AeroTerm, ...]) -> Panel:
             replace(line(angle, before), label="before", stroke="dotted"),
             replace(line(angle, after), label="after", colour="vermillion", stroke="dashed"),
         ),
-        bands=(
-            Band(
-                float((flown.min() + shift) / DEG),
-                float((flown.max() + shift) / DEG),
-                axis="x",
-                label="flown",
-            ),
-        ),
+        bands=(Band(low / DEG, high / DEG, axis="x", label="flown"),),
     )
 
 
