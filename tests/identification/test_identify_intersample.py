@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtruth.numerics.intersample import servo_bend
+from airtruth.numerics.intersample import servo_bend, servo_decay
 from validation.linear_flight import DEG, SERVO_RAD_S, doublet, fly
 
 
@@ -81,3 +81,40 @@ def test_an_increment_within_the_noise_is_no_servo(noise_deg, is_servo):
     de[100:] = 3.3
     de[101:] += 0.07
     assert servo_bend(de[None] * DEG, noise_deg * DEG).any() == is_servo
+
+
+STEPS = ((1.013, 2.0), (1.513, -4.0), (2.013, 2.0))
+"""Times [s] and sizes [deg] of the command's steps."""
+
+
+def increments(bandwidth_hz, rate_hz, noise_deg=0.0, runs=1):
+    """Increments of a doublet through a first-order servo, in closed form."""
+    t = np.arange(round(4.0 * rate_hz)) / rate_hz
+    de = sum(size * -np.expm1(-2.0 * np.pi * bandwidth_hz * np.maximum(t - at, 0.0)) for at, size in STEPS)
+    noise = np.random.default_rng(8).standard_normal((runs, t.size))
+    return np.diff((de + noise_deg * noise) * DEG, axis=1)
+
+
+@pytest.mark.parametrize(("bandwidth_hz", "rate_hz"), [(5.0, 50.0), (10.0, 50.0), (5.0, 20.0), (10.0, 40.0)])
+def test_the_decay_is_that_of_a_servo_that_settles_within_two_or_three_samples(bandwidth_hz, rate_hz):
+    """The ratio behind a step within a cell has the larger weight; its command moves in more cells."""
+    decay = np.exp(-2.0 * np.pi * bandwidth_hz / rate_hz)
+    assert servo_decay(increments(bandwidth_hz, rate_hz), 0.0) == pytest.approx([decay], rel=1e-6)
+
+
+def test_a_declared_servo_is_preferred_where_it_settles_within_three_samples():
+    """5 Hz at 20 Hz with 0.01 deg of noise: by the samples alone nearly twice its decay."""
+    decay = np.exp(-2.0 * np.pi * 5.0 / 20.0)
+    moves = increments(5.0, 20.0, noise_deg=0.01, runs=50)
+    np.testing.assert_array_equal(servo_decay(moves, 0.0, decay), decay)
+    slow = np.exp(-2.0 * np.pi * 5.0 / 50.0)
+    moves = increments(5.0, 50.0, noise_deg=0.01, runs=50)
+    np.testing.assert_array_equal(servo_decay(moves, 0.0, slow), servo_decay(moves, 0.0))
+
+
+def test_a_declared_servo_that_the_samples_contradict_is_not_taken():
+    """Steps at samples and rest between them: a servo of 5 Hz would need a second step after each."""
+    moves = np.zeros((1, 80))
+    moves[0, [20, 30, 40]] = np.array([2.0, -4.0, 2.0]) * DEG
+    assert servo_decay(moves, 0.0, 0.2)[0] != 0.2
+    assert not np.isfinite(servo_decay(np.zeros((1, 80)), 0.0, 0.2)).any()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -267,6 +268,12 @@ class Aircraft(Strict):
     def inertia_yy_kg_m2(self) -> float:
         """Pitch inertia about the CG [kg m2]."""
         return self.constants.inertia_yy_kg_m2
+
+    @property
+    def servo_time_s(self) -> float:
+        """Time constant of the elevator's servo [s]; 0 where none is declared."""
+        servo = self.file.elevator_actuator
+        return 0.0 if servo is None else 1.0 / (2.0 * math.pi * servo.bandwidth.value)
 
 
 def find(name: str | Path, near: Path | None = None) -> Path:

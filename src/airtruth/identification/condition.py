@@ -82,6 +82,7 @@ class Observation:
     factors : (runs, 4) from `airtruth.identification.regression.rows.row_factors`.
     window : samples at the start of the record whose mean is the trim; 0 for a free intercept, with signals
         relative to their first sample.
+    servo_s : declared time constant of the elevator's servo [s]; 0 for none.
     """
 
     dt_s: float
@@ -93,6 +94,7 @@ class Observation:
     scale: Scale
     factors: Array
     window: int
+    servo_s: float
 
 
 def flight_condition(
@@ -218,6 +220,7 @@ def observe(batch: Batch, constants: AircraftConstants, options: Options) -> Obs
         scale=condition,
         factors=row_factors(condition),
         window=window_samples(options, batch.dt_s) if options.trim == "mean" else 0,
+        servo_s=batch.servo_s,
     )
 
 

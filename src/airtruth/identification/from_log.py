@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from airtruth.aircraft import Aircraft
@@ -112,7 +112,8 @@ def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made
     try:
         for run_id, name, own, declared in differing(log.metadata, log.run_ids, task.plane):
             found.stated.setdefault(name, []).append((run_id, own, declared))
-        parts = list(with_constants(log, task.plane))
+        servo_s = task.plane.servo_time_s if isinstance(task.plane, Aircraft) else 0.0
+        parts = [replace(p, batch=replace(p.batch, servo_s=servo_s)) for p in with_constants(log, task.plane)]
         for part in parts:
             check_batch(part.batch, task.options)
     except LogError as error:

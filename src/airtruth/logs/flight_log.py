@@ -271,12 +271,14 @@ class Batch:
     dt_s : sample period [s].
     t_s : (runs, samples) time [s].
     channels : column name -> (runs, samples) values in SI, C-contiguous.
+    servo_s : time constant of the elevator's servo, where the aircraft declares it [s]; 0 for none.
     """
 
     run_ids: tuple[str, ...]
     dt_s: float
     t_s: Array
     channels: Mapping[str, Array]
+    servo_s: float = 0.0
 
 
 def batches(log: FlightLog) -> Iterator[Batch]:

@@ -24,6 +24,26 @@ _DENSE: Final = 8
 """Cells per step below which the command is not held [-]; judgement."""
 _MOVING: Final = 0.1
 """Least increment over the largest one that determines rho [-]; judgement."""
+_QUANTILES: Final = (0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5)
+"""Weighted quantiles of the ratios that are tried [-]; judgement."""
+_QUARTER, _MEDIAN = _QUANTILES.index(0.25), _QUANTILES.index(0.5)
+_NONE, _DECLARED = len(_QUANTILES), len(_QUANTILES) + 1
+"""Numbers of the surface without a servo and of the declared servo among what is tried."""
+_SETTLES: Final = 0.4
+"""Decay below which a declared servo is preferred [-]; judgement: it settles within three samples."""
+_FEWER: Final = 0.85
+"""Share of the moving cells below which a lower quantile replaces the median [-]; judgement."""
+_LIKE_STEPS: Final = 1.4
+"""Moving cells with a declared decay, over those of the surface itself, up to which it is taken [-]; judgement: they are twice
+as many where the surface steps at the samples."""
+_LIKE_OTHERS: Final = 2.2
+"""The same over those with another decay [-]; judgement: a step within a cell moves the command in two cells, and another
+decay can explain one of them."""
+_NOISE: Final = 6.0
+"""Move of the command that counts by half, in medians of the surface's increments [-]; judgement, four standard deviations of
+its noise where the surface rests in most cells."""
+_STILL: Final = 0.005
+"""The same over the largest increment [-]; judgement, for a surface without noise."""
 _AGREEING: Final = 0.5
 """Least lower quartile of the ratios over their median that shows a servo [-]; judgement."""
 _SURE: Final = 3.0
@@ -34,37 +54,73 @@ _FASTEST: Final = 0.02
 """Least rho of a servo [-]; judgement: below it the servo settles within a cell."""
 
 
-def servo_decay(increments: Array, noise_std_rad: float) -> Array:
+def decay_of(time_s: float, dt_s: float) -> float:
+    """Decay over a sample period of a time constant [s]; 0 for none."""
+    return math.exp(-dt_s / time_s) if time_s > 0.0 else 0.0
+
+
+def servo_decay(increments: Array, noise_std_rad: float, declared: float = 0.0) -> Array:
     """Decay rho of a servo over a sample period, by neighbouring increments of the surface.
 
-    It is the weighted median of their ratio.
+    It is the weighted median of their ratio, or a lower quantile with which the command moves in far fewer cells.
 
-    A step within a cell gives ratios above that of the servo, so that the least ones agree. A surface that stops within a
-    cell gives ratios about zero: the increment of the median has to exceed the noise.
+    A step within a cell gives ratios above that of the servo. The median is among them where the servo settles within two or
+    three samples. A declared decay of such a servo is taken, unless the command moves in far fewer cells with another one. A
+    surface that stops within a cell gives ratios about zero: the increment of the median has to exceed the noise.
 
     Parameters
     ----------
     increments : (runs, samples - 1) [rad]; noise_std_rad : standard deviation of the surface's noise [rad].
+    declared : decay of the declared servo [-]; 0 for none.
 
     Returns
     -------
     (runs,) [-]; NaN if nothing moves or the ratios show no servo.
     """
+    runs = increments.shape[0]
     if increments.shape[1] < 2:
-        return np.full(increments.shape[0], np.nan)
+        return np.full(runs, np.nan)
+    ratios, weights = _ratios(increments)
+    total = np.cumsum(weights, axis=1)
+    at = np.stack([np.argmax(total >= share * total[:, -1:], axis=1) for share in _QUANTILES], axis=1)
+    decays = np.take_along_axis(ratios, at, axis=1)
+    tried = np.concatenate([np.nan_to_num(decays), np.zeros((runs, 1)), np.full((runs, 1), declared)], axis=1)
+    moving = np.stack([_moving_cells(increments, rho) for rho in tried.T], axis=1)
+    best = np.argmin(moving[:, : len(_QUANTILES)], axis=1)
+    row = np.arange(runs)
+    is_fewer = moving[row, best] < _FEWER * np.minimum(moving[:, _MEDIAN], moving[:, _NONE])
+    best = np.where(is_fewer, best, _MEDIAN)
+    own = decays[row, best]
+    is_sure = own * weights[row, at[row, best]] >= _SURE * math.sqrt(2.0) * noise_std_rad
+    agree = is_fewer | (decays[:, _QUARTER] > _AGREEING * decays[:, _MEDIAN])
+    own = np.where(agree & is_sure, own, np.nan)
+    if not 0.0 < declared < _SETTLES:
+        return own
+    others = np.minimum(
+        _LIKE_STEPS * moving[:, _NONE], _LIKE_OTHERS * moving[:, : len(_QUANTILES)].min(axis=1)
+    )
+    is_declared = moving[:, _DECLARED] <= others
+    return np.where(is_declared & (total[:, -1] > 0.0), declared, own)
+
+
+def _ratios(increments: Array) -> tuple[Array, Array]:
+    """Ratios of neighbouring increments (runs, samples - 2), least first, and their weights; both zero where none counts."""
     weights = np.abs(increments[:, :-1])
     used = weights > _MOVING * np.abs(increments).max(axis=1, keepdims=True)
     weights = np.where(used, weights, 0.0)
     ratios = np.divide(increments[:, 1:], increments[:, :-1], out=np.full_like(weights, np.nan), where=used)
     order = np.argsort(ratios, axis=1, kind="stable")
-    ranked = np.take_along_axis(ratios, order, axis=1)
-    total = np.cumsum(np.take_along_axis(weights, order, axis=1), axis=1)
-    whole = np.cumsum(weights, axis=1)[:, -1:]
-    at_quarter, at_median = (np.argmax(total >= share * whole, axis=1)[:, None] for share in (0.25, 0.5))
-    quarter, median = (np.take_along_axis(ranked, at, axis=1)[:, 0] for at in (at_quarter, at_median))
-    first = np.take_along_axis(np.take_along_axis(weights, order, axis=1), at_median, axis=1)[:, 0]
-    is_sure = median * first >= _SURE * math.sqrt(2.0) * noise_std_rad
-    return np.where((quarter > _AGREEING * median) & is_sure, median, np.nan)
+    return np.take_along_axis(ratios, order, axis=1), np.take_along_axis(weights, order, axis=1)
+
+
+def _moving_cells(increments: Array, decay: Array) -> Array:
+    """(runs,) number of cells in which the command moves behind a servo of a decay (runs,); a small move counts in part."""
+    moves = increments[:, 1:] - decay[:, None] * increments[:, :-1]
+    noise = np.median(np.abs(increments), axis=1, keepdims=True)
+    least = np.maximum(_NOISE * noise, _STILL * np.abs(increments).max(axis=1, keepdims=True))
+    size = moves**4  # the noise of the many cells at rest adds little
+    share = np.divide(size, size + least**4, out=np.zeros_like(size), where=least > 0.0)
+    return np.asarray(share.sum(axis=1))
 
 
 @njit(cache=True, error_model="numpy")
@@ -106,7 +162,7 @@ def _bends(elevator: Array, decay: Array, command: Array, bend: Array) -> None:
             out[k + 1] = mean - (13.0 * (start + end) - before - after) / 24.0
 
 
-def servo_bend(elevator: Array, noise_std_rad: float = 0.0) -> Array:
+def servo_bend(elevator: Array, noise_std_rad: float = 0.0, declared_decay: float = 0.0) -> Array:
     """Mean over the cell that ends at each sample: reconstructed servo motion minus the smooth hold.
 
     The smooth hold has the area of the cubic through the four nearest samples,
@@ -116,6 +172,7 @@ def servo_bend(elevator: Array, noise_std_rad: float = 0.0) -> Array:
     ----------
     elevator : (runs, samples) measured surface [rad].
     noise_std_rad : standard deviation of its noise, where it is known [rad].
+    declared_decay : decay of the declared servo over a sample period [-]; 0 for none.
 
     Returns
     -------
@@ -123,7 +180,6 @@ def servo_bend(elevator: Array, noise_std_rad: float = 0.0) -> Array:
     """
     elevator = np.ascontiguousarray(elevator)  # one layout, so that the kernel compiles once
     bend = np.zeros_like(elevator)
-    _bends(
-        elevator, servo_decay(np.diff(elevator, axis=1), noise_std_rad), np.empty(elevator.shape[1] - 1), bend
-    )
+    decay = servo_decay(np.diff(elevator, axis=1), noise_std_rad, declared_decay)
+    _bends(elevator, decay, np.empty(elevator.shape[1] - 1), bend)
     return bend

@@ -27,7 +27,7 @@ from airtruth.identification.likelihood.pressure import products, with_pressure,
 from airtruth.identification.likelihood.scoring import Maxima, Scored, maximise
 from airtruth.identification.options import Options
 from airtruth.logs.flight_log import Batch
-from airtruth.numerics.intersample import servo_bend
+from airtruth.numerics.intersample import decay_of, servo_bend
 from airtruth.physics.short_period import PARAMETERS, Scale
 
 Array = NDArray[np.float64]
@@ -70,7 +70,7 @@ def records(batch: Batch, constants: AircraftConstants, options: FilterOptions) 
     y = np.stack([batch.channels[CHANNELS[name]] for name in options.outputs], axis=2)
     elevator = batch.channels["elevator_rad"]
     u = elevator - elevator[:, :1]
-    bend = servo_bend(u)
+    bend = servo_bend(u, declared_decay=decay_of(batch.servo_s, batch.dt_s))
     predictor = short_period(scale, options.length_u_m, options.length_w_m, options.outputs)
     u, bend = u[:, :, None], bend[:, :, None]
     if options.pressure == "measured":

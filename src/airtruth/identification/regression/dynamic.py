@@ -18,7 +18,7 @@ from airtruth.identification.regression.auxiliary import bounded
 from airtruth.identification.regression.dynamic_kernel import Model, Records, filtered_moments, filtered_rows
 from airtruth.identification.regression.rows import NO_INSTRUMENTS, Problem, made_by
 from airtruth.identification.signals import ELEVATOR
-from airtruth.numerics.intersample import servo_bend
+from airtruth.numerics.intersample import decay_of, servo_bend
 from airtruth.physics.short_period import CL_ALPHA, CL_DE, CM_ALPHA, CM_DE
 
 Array = NDArray[np.float64]
@@ -70,7 +70,7 @@ def dynamic_problem(
     origin = origin_of(signals, observation.window)
     records = Records(
         signals=signals,
-        bend=servo_bend(signals[:, ELEVATOR]),
+        bend=servo_bend(signals[:, ELEVATOR], declared_decay=decay_of(observation.servo_s, dt_s)),
         origin=origin,
         left=relative(observation.left, observation.window),
         factors=factors,

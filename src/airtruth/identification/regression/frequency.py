@@ -42,7 +42,7 @@ from airtruth.identification.regression.rows import HALF_CHORD, LIFT, MOMENT, so
 from airtruth.identification.regression.solve import chunks, regress_batch, regress_joint
 from airtruth.identification.signals import ALPHA, AZ, ELEVATOR, Q
 from airtruth.logs.flight_log import Batch
-from airtruth.numerics.intersample import servo_bend
+from airtruth.numerics.intersample import decay_of, servo_bend
 from airtruth.physics.short_period import CL_ALPHA, CL_Q, CM_ALPHA, CM_Q, Scale
 
 Array = NDArray[np.float64]
@@ -115,7 +115,7 @@ def spectra(batch: Batch, constants: AircraftConstants, options: Options) -> Spe
     omega = 2.0 * np.pi * np.arange(whole.shape[2]) / ((samples - 1) * dt_s)
     # alpha_dot and q_dot have the corners of the elevator, so that its integral must be exact;
     # the normal force follows sample by sample
-    bend = servo_bend(observation.signals[:, ELEVATOR])
+    bend = servo_bend(observation.signals[:, ELEVATOR], declared_decay=decay_of(batch.servo_s, dt_s))
     bend[:, 0] = 2.0 * bend[:, -1]  # a cell belongs to the sample at its end, and the record is folded
     elevator = whole[:, ELEVATOR] + transform(bend, dt_s) * np.exp(0.5j * omega * dt_s)
     slope = 1j * omega * transform(rate, dt_s) + (rate[:, -1] - rate[:, 0])[:, None]

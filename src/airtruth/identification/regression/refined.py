@@ -50,7 +50,7 @@ from airtruth.identification.regression.rows import solve
 from airtruth.identification.regression.solve import assembled, chunks, regress_batch, regress_joint
 from airtruth.identification.signals import ALPHA, AZ, ELEVATOR, Q
 from airtruth.logs.flight_log import Batch
-from airtruth.numerics.intersample import servo_bend
+from airtruth.numerics.intersample import decay_of, servo_bend
 from airtruth.physics.short_period import Scale
 
 Array = NDArray[np.float64]
@@ -82,7 +82,7 @@ def records(batch: Batch, constants: AircraftConstants, options: Options) -> Rec
     smooth = (
         observation.smooth[:, ALPHA] - origin_of(observation.smooth[:, ALPHA], observation.window)[:, None]
     )
-    bend = servo_bend(signals[:, ELEVATOR])
+    bend = servo_bend(signals[:, ELEVATOR], declared_decay=decay_of(batch.servo_s, batch.dt_s))
     signals = signals - origin_of(signals, observation.window)[:, :, None]
     runs = tuple(
         Record(signals[r], smooth[r], bend[r], v[r], p[r], observation.factors[r], batch.dt_s)

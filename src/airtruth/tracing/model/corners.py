@@ -9,6 +9,7 @@ Source: B. D. O. Anderson and J. B. Moore, *Optimal Filtering* (1979), section 3
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -61,6 +62,30 @@ class Corners(NamedTuple):
     covariance: Array
     root: Array
     logdet: float
+
+
+class CornerNodes(NamedTuple):
+    """`Corners` of each flight condition of a record, stacked: (nodes, ...); the variance is that of all."""
+
+    phi: Array
+    noise: Array
+    spread: Array
+    steady: Array
+    c: Array
+    variance: Array
+    covariance: Array
+    root: Array
+    logdet: Array
+
+
+def stacked(corners: Sequence[Corners]) -> CornerNodes:
+    """Corners of several flight conditions with the same sensors."""
+    return CornerNodes(
+        *(
+            corners[0].variance if name == "variance" else np.array([getattr(own, name) for own in corners])
+            for name in Corners._fields
+        )
+    )
 
 
 @inner
@@ -137,20 +162,20 @@ def corrected(p: Array, k_gain: Array, c: Array) -> Array:
 
 
 @allocating
-def predicted(p: Array, corners: Corners, corner_rad2: float) -> Array:
+def predicted(p: Array, corners: CornerNodes, node: int, corner_rad2: float) -> Array:
     """Covariance of the next prediction, with the corner of the cell in between."""
     n = p.shape[0]
     work, out = np.empty((n, n)), np.empty((n, n))
-    congruence(corners.phi, p, work, out)
+    congruence(corners.phi[node], p, work, out)
     for i in range(n):
         for j in range(n):
-            out[i, j] += corners.noise[i, j] + corner_rad2 * corners.spread[i, j]
+            out[i, j] += corners.noise[node, i, j] + corner_rad2 * corners.spread[node, i, j]
     return out
 
 
 @allocating
 def gain_at(
-    p: Array, corners: Corners, k_gain: Array, first: FirstUpdate, scale: Array
+    p: Array, corners: CornerNodes, node: int, k_gain: Array, first: FirstUpdate, scale: Array
 ) -> tuple[float, float]:
     """Gain of a prediction's covariance, the update by alpha and q, and the matrix that scales to the steady covariance.
 
@@ -159,16 +184,16 @@ def gain_at(
     log|S| less the steady one (nan where S is no covariance), and the largest relative distance of S from it.
     """
     pc, s = np.empty((p.shape[0], OUTPUTS)), np.empty((OUTPUTS, OUTPUTS))
-    covariance_of(p, corners.c, corners.variance, pc, s)
+    covariance_of(p, corners.c[node], corners.variance, pc, s)
     away = 0.0
     for i in range(OUTPUTS):
-        away = max(away, abs(s[i, i] / corners.covariance[i, i] - 1.0))
+        away = max(away, abs(s[i, i] / corners.covariance[node, i, i] - 1.0))
     white = np.zeros((OUTPUTS, OUTPUTS))
     logdet = whitener(s, white)
     update_gain(pc, white, k_gain)
     first_update(pc, s, first)
-    multiply(corners.root, white, scale)
-    return logdet - corners.logdet, away
+    multiply(corners.root[node], white, scale)
+    return logdet - corners.logdet[node], away
 
 
 @inner
@@ -178,6 +203,7 @@ def settled(away: float) -> bool:
 
 
 __all__ = [
+    "CornerNodes",
     "Corners",
     "corrected",
     "gain_at",
@@ -185,4 +211,5 @@ __all__ = [
     "predicted",
     "settled",
     "spread_of",
+    "stacked",
 ]

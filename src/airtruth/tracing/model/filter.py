@@ -1,4 +1,5 @@
-"""Innovations of a record: the nonlinear motion, corrected with the steady gain of its linearisation.
+"""Innovations of a record: the nonlinear motion, corrected with the steady gain of its linearisation, or with gains that
+follow the airspeed.
 
 Between samples the motion is integrated by the classical Runge-Kutta method, whose weights are Simpson's: the middle
 value of an input carries its area. The low-passed copies of the gust, the lags and the delays of sensors are
@@ -36,6 +37,7 @@ from airtruth.tracing.model.equations import (
     rates,
     settle_effects,
 )
+from airtruth.tracing.model.gains import Gains, interpolate, scaled
 from airtruth.tracing.model.kernel_input import AirPoint, FilterModel, GridSignals, KernelInput
 from airtruth.tracing.model.linearise import (
     FirstUpdate,
@@ -258,7 +260,8 @@ def _innovation(
     at: AirPoint,
     given: KernelInput,
     first: FirstUpdate,
-    steady: SteadyFilter,
+    direct: Array,
+    shown: float,
     work: Work,
     raw: Array,
 ) -> None:
@@ -283,13 +286,13 @@ def _innovation(
         _read(x, at, given.model, work)
         bend = -work.out[AZ]
         for i in range(x.size):
-            bend -= steady.direct[i] * (work.tried[i] - x[i])
+            bend -= direct[i] * (work.tried[i] - x[i])
     _read(work.tried, at, given.model, work)
     raw[AZ] = _residual(work.tried, AZ, k, given, work) + first.share[0] * raw[0] + first.share[1] * raw[1]
     if late:
         bend += work.out[AZ]
         in_reading = 1.0 if given.model.states.lag[AZ] < 0 else 0.0
-        raw[AZ] += (in_reading - steady.shown) * bend
+        raw[AZ] += (in_reading - shown) * bend
 
 
 @awaited
@@ -298,39 +301,46 @@ def _innovations(
     given: KernelInput, steps: Steps, work: Work, x: Array, steady: SteadyFilter, e: Array
 ) -> tuple[bool, float]:
     """`innovations` from a state ``x``, which moves along the record."""
-    model, grid, states, corners = given.model, given.grid, given.model.states, steady.corners
+    model, grid, states = given.model, given.grid, given.model.states
     n, samples = states.size, given.y.shape[0]
-    uncertain, more_logdet, away, p = False, 0.0, 0.0, corners.steady
+    scheduled, node, corners = steady.lower.size > 0, 0, steady.corners
+    uncertain, is_steady, more_logdet, away, p = False, True, 0.0, 0.0, corners.steady[0].copy()
+    first = FirstUpdate(steady.first.gain[0].copy(), steady.first.share[0].copy())
+    settled_gains = Gains(steady.k_gain[0].copy(), first, steady.direct[0].copy(), steady.scale[:1].copy())
     own_gain, own_first = (
-        steady.k_gain.copy(),
-        FirstUpdate(steady.first.gain.copy(), steady.first.share.copy()),
+        settled_gains.k_gain.copy(),
+        FirstUpdate(first.gain.copy(), first.share.copy()),
     )
-    scale, raw = np.empty((OUTPUTS, OUTPUTS)), np.empty(OUTPUTS)
+    scale, raw, turned = np.empty((OUTPUTS, OUTPUTS)), np.empty(OUTPUTS), np.empty(OUTPUTS)
     for k in range(samples):
         at = air_at(grid, k * given.sub)
+        if scheduled:
+            interpolate(steady, k, settled_gains)
+            node = steady.lower[k] + (1 if steady.share[k] > 0.5 else 0)
         if uncertain:
-            more, away = gain_at(p, corners, own_gain, own_first, scale)
+            more, away = gain_at(p, corners, node, own_gain, own_first, scale)
             if not math.isfinite(more):
                 return False, 0.0
-            more_logdet += more
-            _innovation(x, k, at, given, own_first, steady, work, raw)
+            _innovation(x, k, at, given, own_first, settled_gains.direct, steady.shown, work, raw)
             for i in range(OUTPUTS):
-                e[k, i] = 0.0
+                turned[i] = 0.0
                 for m in range(OUTPUTS):
-                    e[k, i] += scale[i, m] * raw[m]
-            uncertain = not settled(away)
+                    turned[i] += scale[i, m] * raw[m]
+            more_logdet += more + scaled(steady.scale, node, turned, e, k)
+            uncertain, is_steady = not settled(away), False
             now = own_gain
         else:
-            _innovation(x, k, at, given, steady.first, steady, work, raw)
-            for i in range(OUTPUTS):
-                e[k, i] = raw[i]
-            now, p = steady.k_gain, corners.steady
+            _innovation(x, k, at, given, settled_gains.first, settled_gains.direct, steady.shown, work, raw)
+            more_logdet += scaled(settled_gains.scale, 0, raw, e, k)
+            now, is_steady = settled_gains.k_gain, True
         if k + 1 == samples:
             break
         if not _update(x, now, raw):
             return False, 0.0
         if given.corner_rad2.size > 0 and (uncertain or given.corner_rad2[k + 1] > 0.0):
-            p = predicted(corrected(p, now, corners.c), corners, given.corner_rad2[k + 1])
+            if is_steady:
+                p = corners.steady[node].copy()
+            p = predicted(corrected(p, now, corners.c[node]), corners, node, given.corner_rad2[k + 1])
             uncertain = True
         if states.noise >= 0:
             for i in range(states.noise, n):
@@ -346,12 +356,12 @@ def _innovations(
 def innovations(given: KernelInput, steady: SteadyFilter, e: Array) -> tuple[bool, float]:
     """Innovations of one record into ``e`` (samples, outputs).
 
-    Where the surface is uncertain, they are scaled to the steady covariance. The kernels are few and flat, because numba
-    optimises what a kernel calls again with it.
+    Where the surface is uncertain or the airspeed is another one, they are scaled to the common covariance. The
+    kernels are few and flat, because numba optimises what a kernel calls again with it.
 
     Returns
     -------
-    Whether the motion keeps its bounds, and the sum of log|S| beyond the steady one.
+    Whether the motion keeps its bounds, and the sum of log|S| beyond the common one.
     """
     n = given.model.states.size
     steps = _steps(given.model, given.dt_s, given.sub)

@@ -169,7 +169,7 @@ class KernelInput(NamedTuple):
         grid [rad2]; empty if the surface is known between the samples.
     dt_s : sample period [s].
     start : (4,) initial alpha [rad], q [rad/s] and gust states [-].
-    reference_alpha_rad, reference : state and inputs at which the gain is made.
+    reference_alpha_rad, reference : means of the record, about which it is linearised.
     model : see there.
     """
 

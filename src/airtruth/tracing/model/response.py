@@ -24,6 +24,7 @@ from airtruth.tracing.model.kernel_input import (
 from airtruth.tracing.model.parameters import COLOUR_TIME_S, OUTPUTS, Common, PerRecord
 from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, nodes
+from airtruth.tracing.model.schedule import Schedule, schedule
 from airtruth.tracing.model.settings import Settings
 from airtruth.tracing.model.steady import SteadyFilter, steady_filter
 from airtruth.tracing.model.surface import through
@@ -77,7 +78,7 @@ class FilterInputs:
     lead : number of samples before the part.
     grid : inputs on the filter's grid, the errors of their sensors undone.
     corner_rad2 : see `KernelInput`; 0 in the lead, whose innovations do not count.
-    reference_alpha_rad, reference : means at which the gain is made.
+    reference_alpha_rad, reference : means of the record; along : flight conditions at which the gain is made.
     """
 
     record: TraceRecord
@@ -88,6 +89,7 @@ class FilterInputs:
     corner_rad2: Array
     reference_alpha_rad: float
     reference: AirPoint
+    along: Schedule
 
 
 def filter_inputs(record: TraceRecord, change: Change | CompiledChange) -> FilterInputs:
@@ -126,7 +128,8 @@ def filter_inputs(record: TraceRecord, change: Change | CompiledChange) -> Filte
     lead = len(y) - record.samples
     if lead and corner.size:
         corner = np.concatenate([np.zeros(lead), corner[lead:]])
-    return FilterInputs(record, compiled, y, lead, grid, corner, float(y[:, 0].mean()), reference)
+    along = schedule(y[:, 0], grid, s.sub)
+    return FilterInputs(record, compiled, y, lead, grid, corner, float(y[:, 0].mean()), reference, along)
 
 
 def _corners(s: Signals, compiled: CompiledChange) -> Array:
@@ -197,7 +200,7 @@ def respond_to(
     if free_run:
         sound = record_filter.free_run(kernel, e)
         return Response(e[given.lead :], none, none, 0.0 if sound else math.nan)
-    used = steady or steady_filter(kernel)
+    used = steady or steady_filter(kernel, given.along)
     if used is None:
         return Response(e[given.lead :], none, none, math.nan)
     sound, more = record_filter.innovations(kernel, used, e)

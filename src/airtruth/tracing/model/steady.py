@@ -1,4 +1,4 @@
-"""The steady filter of a record: its linearisation at the record's mean, its gain, and the innovations that it expects.
+"""The steady filter of a record: its linearisations, their gains, and the innovations that it expects.
 
 Source: R. E. Maine and K. W. Iliff, NASA RP-1138 (1985), for the filter.
 """
@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.tracing.model.corners import Corners, input_column, spread_of
+from airtruth.tracing.model.corners import CornerNodes, Corners, input_column, spread_of, stacked
 from airtruth.tracing.model.equations import settle_effects
-from airtruth.tracing.model.kernel_input import FilterModel, KernelInput
+from airtruth.tracing.model.kernel_input import AirPoint, FilterModel, KernelInput
 from airtruth.tracing.model.linearise import (
     FirstUpdate,
     discrete,
@@ -22,21 +22,43 @@ from airtruth.tracing.model.linearise import (
     process_intensity,
 )
 from airtruth.tracing.model.parameters import AZ, OUTPUTS
+from airtruth.tracing.model.schedule import UNSCHEDULED, Schedule
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 class SteadyFilter(NamedTuple):
-    """Gain of the filter at the record's mean, and the innovations that it expects.
+    """Gains of the filter along a record, and the innovations that it expects.
 
     Attributes
     ----------
-    k_gain : (states, outputs) of the update; first : the part of it that alpha and q have alone.
-    white, covariance : (outputs, outputs) whitener W with W S W' = I, and S; logdet : log|S|.
+    k_gain : (nodes, states, outputs) of the update at each flight condition; first : the part of it that alpha and q have
+        alone, stacked likewise.
+    scale : (nodes, outputs, outputs) lower triangular, from the innovations of a condition to those of the common one, whose
+        airspeed is nearest to the mean.
+    white, covariance : (outputs, outputs) whitener W with W S W' = I, and S, of the common condition; logdet : log|S|.
     corners : recursion where the surface is uncertain.
-    direct : (states,) slope of az at the CG's accelerometer before its lag and delay.
+    direct : (nodes, states) slope of az at the CG's accelerometer before its lag and delay.
     shown : share of a change of az since the last sample that its reading shows [-].
+    lower, share : see `airtruth.tracing.model.schedule.Schedule`; empty with a single node.
     """
+
+    k_gain: Array
+    first: FirstUpdate
+    scale: Array
+    white: Array
+    covariance: Array
+    logdet: float
+    corners: CornerNodes
+    direct: Array
+    shown: float
+    lower: Ints
+    share: Array
+
+
+class _Condition(NamedTuple):
+    """The filter at one flight condition; attributes as of `SteadyFilter`, without nodes."""
 
     k_gain: Array
     first: FirstUpdate
@@ -45,30 +67,55 @@ class SteadyFilter(NamedTuple):
     logdet: float
     corners: Corners
     direct: Array
-    shown: float
 
 
-def steady_filter(given: KernelInput) -> SteadyFilter | None:
+def steady_filter(given: KernelInput, along: Schedule) -> SteadyFilter | None:
     """The steady filter of a record; None where its innovations have no covariance.
 
     It depends on neither the initial state, nor the biases, nor the trim.
     """
+    points = list(zip(along.alpha_rad, along.air, strict=True))
+    nodes = [_at(given, *point) for point in points or [(given.reference_alpha_rad, given.reference)]]
+    sound = [node for node in nodes if node is not None]
+    if len(sound) < len(nodes):
+        return None
+    speeds = [air.airspeed_m_s for air in along.air or [given.reference]]
+    common = sound[int(np.argmin(np.abs(np.array(speeds) - given.reference.airspeed_m_s)))]
+    root = np.linalg.inv(common.white)
+    scale = np.array([np.eye(OUTPUTS) if node is common else np.tril(root @ node.white) for node in sound])
+    lag_s, delay_s = (float(x[AZ]) for x in (given.model.sensors.lag_s, given.model.sensors.delay_s))
+    return SteadyFilter(
+        k_gain=np.array([node.k_gain for node in sound]),
+        first=FirstUpdate(*(np.array(parts) for parts in zip(*(node.first for node in sound), strict=True))),
+        scale=scale,
+        white=common.white,
+        covariance=common.covariance,
+        logdet=common.logdet,
+        corners=stacked([node.corners for node in sound]),
+        direct=np.array([node.direct for node in sound]),
+        shown=_shown(lag_s, delay_s, given.dt_s),
+        lower=along.lower,
+        share=along.share,
+    )
+
+
+def _at(given: KernelInput, alpha_rad: float, air: AirPoint) -> _Condition | None:
+    """The filter at one flight condition; None where its innovations have no covariance."""
     model = given.model
     n = model.states.size
     a, c = np.empty((n, n)), np.empty((OUTPUTS, n))
-    direct = linearise_at_reference(given, a, c)
-    process = process_intensity(given.reference.airspeed_m_s, model)
-    phi, noise = discrete(a, process, given.dt_s)
+    x = _equilibrium(alpha_rad, air, model)
+    direct = linearise(x, air, model, a, c)
+    phi, noise = discrete(a, process_intensity(air.airspeed_m_s, model), given.dt_s)
     k_gain, white, covariance, logdet, p, first = gain_of(phi, c, noise, model.sensors.variance)
     if not math.isfinite(logdet):
         return None
     corners = _certain(model)
     if given.corner_rad2.size > 0:
-        spread = spread_of(a, input_column(_reference_state(given), given.reference, model), given.dt_s)
+        spread = spread_of(a, input_column(x, air, model), given.dt_s)
         root = np.asarray(np.linalg.inv(white))
         corners = Corners(phi, noise, spread, p, c, model.sensors.variance, covariance, root, logdet)
-    shown = _shown(float(model.sensors.lag_s[AZ]), float(model.sensors.delay_s[AZ]), given.dt_s)
-    return SteadyFilter(k_gain, first, white, covariance, logdet, corners, direct, shown)
+    return _Condition(k_gain, first, white, covariance, logdet, corners, direct)
 
 
 def _shown(lag_s: float, delay_s: float, dt_s: float) -> float:
@@ -87,21 +134,33 @@ def _certain(model: FilterModel) -> Corners:
 def without_update(model: FilterModel) -> SteadyFilter:
     """The filter of a free run, whose state no measurement corrects."""
     n, square = model.states.size, np.eye(OUTPUTS)
-    first = FirstUpdate(np.zeros((n, 2)), np.zeros(2))
-    return SteadyFilter(np.zeros((n, OUTPUTS)), first, square, square, 0.0, _certain(model), np.zeros(n), 1.0)
+    return SteadyFilter(
+        k_gain=np.zeros((1, n, OUTPUTS)),
+        first=FirstUpdate(np.zeros((1, n, 2)), np.zeros((1, 2))),
+        scale=square[None],
+        white=square,
+        covariance=square,
+        logdet=0.0,
+        corners=stacked([_certain(model)]),
+        direct=np.zeros((1, n)),
+        shown=1.0,
+        lower=UNSCHEDULED.lower,
+        share=UNSCHEDULED.share,
+    )
 
 
-def _reference_state(given: KernelInput) -> Array:
-    """The record's mean, effects' states in equilibrium with it."""
-    x = np.zeros(given.model.states.size)
-    x[0] = given.reference_alpha_rad
-    settle_effects(x, x[0], given.reference.elevator_rad, given.model)
+def _equilibrium(alpha_rad: float, air: AirPoint, model: FilterModel) -> Array:
+    """(states,) at an angle of attack, effects' states in equilibrium with it."""
+    x = np.zeros(model.states.size)
+    x[0] = alpha_rad
+    settle_effects(x, alpha_rad, air.elevator_rad, model)
     return x
 
 
 def linearise_at_reference(given: KernelInput, a: Array, c: Array) -> Array:
     """`linearise` at the record's mean, effects' states in equilibrium with it."""
-    return linearise(_reference_state(given), given.reference, given.model, a, c)
+    x = _equilibrium(given.reference_alpha_rad, given.reference, given.model)
+    return linearise(x, given.reference, given.model, a, c)
 
 
 __all__ = ["SteadyFilter", "linearise_at_reference", "steady_filter", "without_update"]

@@ -1,0 +1,84 @@
+"""The flight conditions along a record at which the filter's gain is made.
+
+A gust w moves the angle of attack by w/V. The gain of one mean condition expects half of that where the airspeed falls to
+half of it. The gain therefore follows the airspeed of a record that slows down or speeds up by much, and is interpolated
+between a few airspeeds.
+
+Source: W. J. Rugh and J. S. Shamma, Automatica 36 (2000) 1401-1425, section 2 (gain scheduling by linearisations).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.tracing.model.kernel_input import AirPoint, GridSignals
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+RATIO: Final = 1.25
+"""Ratio of the largest airspeed of a record to its least up to which one gain serves [-] (judgement: w/V within 12 % of its
+mean)."""
+_SPACING: Final = 1.5
+"""Largest ratio of two airspeeds between which gains are interpolated [-] (judgement: 1/V is within 2 % of linear in log V)."""
+
+
+class Schedule(NamedTuple):
+    """Flight conditions at which the gain is made.
+
+    Attributes
+    ----------
+    alpha_rad : (nodes,) angle of attack at each airspeed [rad]; empty where the mean of the record serves.
+    air : (nodes,) the other inputs there.
+    lower : (samples,) number of the node below the airspeed of each sample.
+    share : (samples,) of the next node in the interpolation, linear in log V [-].
+    """
+
+    alpha_rad: tuple[float, ...]
+    air: tuple[AirPoint, ...]
+    lower: Ints
+    share: Array
+
+
+UNSCHEDULED: Final = Schedule((), (), np.zeros(0, dtype=np.int64), np.zeros(0))
+"""The mean of the record serves."""
+
+
+def schedule(alpha_rad: Array, grid: GridSignals, sub: int) -> Schedule:
+    """The flight conditions of a record, by its airspeed.
+
+    Parameters
+    ----------
+    alpha_rad : (samples,) measured angle of attack [rad].
+    grid : inputs on the filter's grid, ``sub`` cells to a sample.
+    """
+    log_v = np.log(grid.airspeed_m_s[::sub])
+    low, high = float(log_v.min()), float(log_v.max())
+    if not high - low > math.log(RATIO):
+        return UNSCHEDULED
+    cells = math.ceil((high - low) / math.log(_SPACING))
+    at = (log_v - low) * (cells / (high - low))
+    lower = np.minimum(at.astype(np.int64), cells - 1)
+    share = at - lower
+    weights = np.maximum(1.0 - np.abs(at[:, None] - np.arange(cells + 1)), 0.0)
+    nodes = {name: _nodes(weights, x[::sub]) for name, x in grid._asdict().items()}
+    v = np.exp(np.linspace(low, high, cells + 1))
+    density = _nodes(weights, 2.0 * grid.qbar_pa[::sub] / grid.airspeed_m_s[::sub] ** 2)
+    none = np.zeros(cells + 1)
+    nodes |= {"airspeed_m_s": v, "qbar_pa": 0.5 * density * v * v, "lift": none, "moment": none}
+    points = zip(*(nodes[name].tolist() for name in AirPoint._fields), strict=True)
+    air = tuple(AirPoint(*point) for point in points)
+    return Schedule(tuple(_nodes(weights, alpha_rad).tolist()), air, lower, share)
+
+
+def _nodes(weights: Array, x: Array) -> Array:
+    """Values at the nodes whose interpolation is nearest to samples (least squares); their mean at a node that none is near."""
+    mean = float(x.mean())
+    return np.asarray(mean + np.linalg.lstsq(weights, x - mean, rcond=1e-3)[0])
+
+
+__all__ = ["RATIO", "UNSCHEDULED", "Schedule", "schedule"]
