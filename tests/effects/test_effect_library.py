@@ -7,7 +7,10 @@ from importlib.metadata import EntryPoint
 import fly_campaigns as campaigns
 import pytest
 
+from airtruth import aircraft
 from airtruth.effects import registry as library
+from airtruth.effects.effect import GTM
+from airtruth.effects.registry import EFFECTS
 from airtruth.errors import ConfigurationError
 
 CONTRACT = {
@@ -126,3 +129,19 @@ def test_command_lists_all_or_some():
     wrong = campaigns.command("effects", "backlsh")
     assert wrong.code == 2
     assert "did you mean 'backlash'" in wrong.err
+
+
+def test_material_sizes_scale_with_the_derivatives_of_a_smaller_aircraft():
+    """A T-38 has 13 % of the GTM's Cmalpha; a larger derivative or one near zero does not scale in proportion."""
+    effect = EFFECTS["cm_alpha_nonlinear:break"]
+    size, at = effect.for_aircraft({"Cmalpha": -0.236}).parameters
+    assert size.material == pytest.approx(0.1 * 0.236 / 1.785, rel=1e-12)
+    assert at == effect.parameters[1]
+    assert effect.for_aircraft({"Cmalpha": -3.0}).parameters[0].material == 0.1
+    assert effect.for_aircraft({"Cmalpha": 0.0}).parameters[0].material == pytest.approx(0.01, rel=1e-12)
+    assert EFFECTS["elevator_delay"].for_aircraft({}) == EFFECTS["elevator_delay"]
+
+
+def test_the_reference_of_material_sizes_is_the_declared_gtm():
+    stated = aircraft.load("gtm").file.derivatives
+    assert {name: abs(stated[name].value) for name in GTM} == pytest.approx(GTM, rel=1e-12)

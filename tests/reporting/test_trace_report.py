@@ -108,6 +108,8 @@ def test_the_updated_aircraft_of_no_effect_is_beside_the_refitted_derivatives(an
     ("changes", "sentence"),
     [
         ({"verdict": "none", "effects": ()}, "None: the declared aircraft explains these records"),
+        ({"verdict": "none", "effects": ()}, " for a missing effect; "),
+        ({"verdict": "none", "effects": ()}, " for the declared model); they show no missing effect."),
         ({"verdict": "unexplained", "effects": ()}, "Unexplained: the declared aircraft lacks something"),
         ({"verdict": "one_of"}, "One of several: the declared aircraft lacks elevator_delay, or an effect"),
         (

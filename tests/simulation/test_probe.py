@@ -11,7 +11,7 @@ from airtruth.physics.longitudinal import simulate
 from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.linearise import linearise
 from airtruth.simulation.manoeuvres import Manoeuvre, sample
-from airtruth.simulation.probe import Grid, grid_about, probe, with_breaks, with_breaks_of
+from airtruth.simulation.probe import Grid, alpha_dot_terms, grid_about, probe, with_breaks, with_breaks_of
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import trim
 from airtruth.tracing.model.plant import probed, with_throttle
@@ -201,3 +201,25 @@ def test_the_breaks_of_a_model_whose_tables_are_in_radians():
 def test_tables_in_whole_degrees_add_no_point(gtm, paper_trim):
     grid = grid_about(paper_trim)
     np.testing.assert_allclose(with_breaks(gtm, paper_trim, grid).alpha_rad, grid.alpha_rad, rtol=0, atol=0)
+
+
+ALPHA_DOT = """<axis name="{axis}"><function name="aero/by-alpha-dot-{axis}"><product>
+<property>aero/qbar-psf</property><property>metrics/Sw-sqft</property>{arm}<property>aero/ci2vel</property>
+<property>aero/alphadot-rad_sec</property><value>{value}</value></product></function>"""
+"""A term in alpha_dot at the start of an axis."""
+
+
+def test_terms_in_alpha_dot_are_those_of_the_model(gtm, paper_trim, tmp_path):
+    """The GTM has none; with a term in its file, that one. The rate derivatives contain it, so that they do not tell."""
+    assert alpha_dot_terms(gtm, paper_trim) == pytest.approx([0.0, 0.0], abs=1e-8)
+    folder = tmp_path / "gtm"
+    shutil.copytree(gtm.folder, folder)
+    model = folder / "gtm.xml"
+    arm = "<property>metrics/cbarw-ft</property>"
+    lagging = model.read_text().replace(
+        '<axis name="PITCH">', ALPHA_DOT.format(axis="PITCH", arm=arm, value=-16.0)
+    )
+    model.write_text(lagging)
+    assert alpha_dot_terms(aircraft.load(folder), paper_trim) == pytest.approx(
+        [0.0, -16.0], rel=1e-3, abs=1e-6
+    )

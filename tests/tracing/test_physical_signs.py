@@ -12,8 +12,8 @@ class _Score:
         self.effect = EFFECTS[key]
 
 
-def reasons(key, size, span_m=2.0):
-    return set(acceptance.size_reasons(_Score(key), size, span_m))
+def reasons(key, size, span_m=2.0, declared=0.0):
+    return set(acceptance.size_reasons(_Score(key), size, span_m, declared))
 
 
 @pytest.mark.parametrize(
@@ -24,6 +24,14 @@ def test_a_reversed_sign(key, real, reversed_):
     """Etkin and Reid, Dynamics of Flight, ch. 5: the downwash reaches the tail late, lifts it and damps."""
     assert reasons(key, real) == set()
     assert reasons(key, reversed_) == {"its size has a sign that no aircraft has"}
+
+
+@pytest.mark.parametrize(("key", "declared"), [("downwash_lag", -16.0), ("lift_alpha_dot", 8.0)])
+def test_a_sign_that_takes_a_declared_term_away(key, declared):
+    """A JSBSim model with too much damping by alpha_dot: what counts is the sign of the sum."""
+    assert reasons(key, -declared, declared=declared) == set()
+    assert reasons(key, -0.5 * declared, declared=declared) == set()
+    assert reasons(key, -1.5 * declared, declared=declared) == {"its size has a sign that no aircraft has"}
 
 
 @pytest.mark.parametrize(("key", "real", "beyond"), [("vane_arm", 2.5, -3.5), ("thrust_moment", 0.4, -0.99)])

@@ -3,9 +3,13 @@
 from dataclasses import replace
 
 import pytest
+from scipy.stats import norm
 
+from airtruth.quantity import Ratio
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
-from airtruth.tracing.answer import Alternative
+from airtruth.tracing.answer import Alternative, DeclaredModel, DerivativeShift
+from airtruth.tracing.declared_model import traceable_errors
+from airtruth.tracing.notes import within_assumed_uncertainty
 from airtruth.tracing.reservations import DOUBT, MANY, causes, reservations
 
 
@@ -142,3 +146,25 @@ def test_an_error_of_the_vane_beside_a_friction_of_the_vane_is_provisional():
         assert f"beside {name}" in reason
         assert reservations(effects(name), (), friction_p_value=1.01 * DOUBT) == ()
     assert reservations(effects("gyro_lag", "cg_shift"), (), friction_p_value=1e-9) == ()
+
+
+def shift(declared, declared_std, estimate, std):
+    return DerivativeShift(
+        declared, declared_std, estimate, std, (estimate - 2.0 * std, estimate + 2.0 * std), 0.0
+    )
+
+
+def test_a_shift_within_an_uncertainty_that_is_assumed_is_a_note():
+    """Cmq of -31.4 +- 0.2 for -43: within the 15 % that the tracer assumes, and 58 standard errors away."""
+    shifts = {"Cmalpha": shift(-1.0, 0.05, -1.01, 0.01), "Cmq": shift(-43.0, 6.45, -31.4, 0.2)}
+    declared = DeclaredModel(True, 1.0, 6, 0.9, shifts, "derivatives")
+    (note,) = within_assumed_uncertainty(declared, {})
+    assert "the records give Cmq -31.4 +- 0.20 for -43.0 +- 6.5;" in note
+    assert not list(within_assumed_uncertainty(declared, {"Cmq": Ratio(value=-43.0, std=6.45)}))
+    assert list(within_assumed_uncertainty(declared, {"Cmq": Ratio(value=-43.0)}))
+
+
+def test_a_traceable_cause_contradicts_the_declared_model_in_four_of_five_flights():
+    """One degree of freedom: the normal quantiles of half of the level 0.0025 and of the power."""
+    assert traceable_errors(1) == pytest.approx(norm.isf(0.00125) + norm.isf(0.2), abs=1e-4)
+    assert traceable_errors(5) > traceable_errors(4) > 4.0

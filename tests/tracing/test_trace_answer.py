@@ -112,6 +112,9 @@ def test_contract_3(name, flown, traced):
         assert set(a["derivatives"][which]) == set(PARAMETERS)
     if declared["consistent"]:
         assert set(a["detectability"]) >= {c["name"] for c in a["candidates"] if c["testable"]}
+        for key, value in a["detectability"].items():
+            if (effect := EFFECTS.get(key)) is not None and not effect.parameters[0].reciprocal:
+                assert value > 0.99 * effect.parameters[0].material, key
     assert a["next_flight"].endswith(".")
 
 

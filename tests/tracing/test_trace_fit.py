@@ -8,12 +8,13 @@ import trace_records as tr
 
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import AeroTerm, Change
+from airtruth.tracing.inference import posterior
 from airtruth.tracing.inference.hypothesis import Hypothesis, unconstrained_by
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import Sensitivities, likelihood_terms, sensitivities_of
 from airtruth.tracing.inference.whitening import NO_WHITENER, Whitener, autoregression
 from airtruth.tracing.model.parameters import COMMON_STEP, PER_RECORD_STEP, Common, Parameters, PerRecord
-from airtruth.tracing.model.response import respond
+from airtruth.tracing.model.response import respond, respond_to
 from airtruth.tracing.model.settings import common_prior, per_record_prior
 from airtruth.units import DEG
 
@@ -363,3 +364,18 @@ def test_white_records_know_no_slow_noise():
     found = fit(problem, tr.NOTHING, initial_parameters(problem, tr.NOTHING))
     np.testing.assert_array_equal(found.point.common[Common.colour], 0.0)
     np.testing.assert_array_equal(found.sensitivities[0].t[Common.colour], 0.0)
+
+
+def test_a_step_from_which_the_motion_diverges_has_no_derivative(monkeypatch):
+    """Innovations of 1e9 after a small step in Cmalpha. Such derivatives gave an information of 1e31, which has no inverse."""
+    one = tr.fly(np.random.default_rng(2), sigma_w=0.0)
+    problem, point = tr.problem([one]), tr.point([one])
+    cmalpha = 3
+    assert sensitivities_of(problem, 0, tr.NOTHING, point) is not None
+
+    def diverging(given, settings, common, per_record, **options):
+        made = respond_to(given, settings, common, per_record, **options)
+        return made if common[cmalpha] == 0.0 else replace(made, e=made.e + 1e9)
+
+    monkeypatch.setattr(posterior, "respond_to", diverging)
+    assert sensitivities_of(problem, 0, tr.NOTHING, point) is None

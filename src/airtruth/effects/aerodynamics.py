@@ -76,16 +76,35 @@ _AT_ALPHA: Final = Parameter(
 
 
 def _slope(
-    name: str, meaning: str, reach: float, material: float, step: float, sign: Literal[-1, 0, 1] = 0
+    name: str,
+    meaning: str,
+    reach: float,
+    material: float,
+    step: float,
+    of: str,
+    sign: Literal[-1, 0, 1] = 0,
 ) -> Parameter:
-    return Parameter(name, "-", meaning, low=-reach, high=reach, material=material, step=step, sign=sign)
+    """A change of a derivative; ``of`` is the declared one with which its material size scales."""
+    return Parameter(
+        name,
+        "-",
+        meaning,
+        low=-reach,
+        high=reach,
+        material=material,
+        step=step,
+        sign=sign,
+        scales_with=of,
+    )
 
 
 EFFECTS: Final = (
     Effect(
         name="elevator_asymmetry",
         where="dynamics",
-        parameters=(_slope("dCmde", "change of Cmde at deflections below zero [1/rad]", 1.5, 0.05, 0.05),),
+        parameters=(
+            _slope("dCmde", "change of Cmde at deflections below zero [1/rad]", 1.5, 0.05, 0.05, "Cmde"),
+        ),
         describe=_asymmetry,
         explanation="The effectiveness of the elevator differs between trailing edge up and trailing edge down.",
         source="Cm += dCmde min(0, elevator). Material: 3 % of the GTM's Cmde of -1.8.",
@@ -96,7 +115,7 @@ EFFECTS: Final = (
         variant="break",
         where="dynamics",
         parameters=(
-            _slope("dCmalpha", "change of Cmalpha above the break [1/rad]", 4.0, 0.1, 0.1),
+            _slope("dCmalpha", "change of Cmalpha above the break [1/rad]", 4.0, 0.1, 0.1, "Cmalpha"),
             _AT_ALPHA,
         ),
         describe=_cm_break,
@@ -109,7 +128,7 @@ EFFECTS: Final = (
         name="cm_alpha_nonlinear",
         variant="quadratic",
         where="dynamics",
-        parameters=(_slope("Cmalpha2", "curvature of Cm over alpha [1/rad2]", 20.0, 0.5, 0.5),),
+        parameters=(_slope("Cmalpha2", "curvature of Cm over alpha [1/rad2]", 20.0, 0.5, 0.5, "Cmalpha"),),
         describe=_cm_quadratic,
         explanation="Pitch stiffness changes gradually with the angle of attack.",
         source="Cm += Cmalpha2 alpha^2; near a trim its linear part adds to Cmalpha. Material: Cmalpha changes by 0.1 "
@@ -121,7 +140,7 @@ EFFECTS: Final = (
         variant="break",
         where="dynamics",
         parameters=(
-            _slope("dCLalpha", "change of CLalpha above the break [1/rad]", 5.0, 0.25, 0.25),
+            _slope("dCLalpha", "change of CLalpha above the break [1/rad]", 5.0, 0.25, 0.25, "CLalpha"),
             _AT_ALPHA,
         ),
         describe=_cl_break,
@@ -134,7 +153,7 @@ EFFECTS: Final = (
         name="cl_alpha_nonlinear",
         variant="quadratic",
         where="dynamics",
-        parameters=(_slope("CLalpha2", "curvature of CL over alpha [1/rad2]", 40.0, 1.25, 1.0),),
+        parameters=(_slope("CLalpha2", "curvature of CL over alpha [1/rad2]", 40.0, 1.25, 1.0, "CLalpha"),),
         describe=_cl_quadratic,
         explanation="The lift slope changes gradually with the angle of attack.",
         source="CL += CLalpha2 alpha^2, a force along -z of the body through the CG. Material: CLalpha changes by 0.25 "
@@ -146,7 +165,13 @@ EFFECTS: Final = (
         where="dynamics",
         parameters=(
             _slope(
-                "Cmalphadot", "moment per alpha_dot c/(2V), alpha_dot over ground [-]", 40.0, 2.5, 1.0, -1
+                "Cmalphadot",
+                "moment per alpha_dot c/(2V), alpha_dot over ground [-]",
+                40.0,
+                2.5,
+                1.0,
+                "Cmq",
+                -1,
             ),
         ),
         describe=_downwash,
@@ -160,7 +185,9 @@ EFFECTS: Final = (
         name="lift_alpha_dot",
         where="dynamics",
         parameters=(
-            _slope("CLalphadot", "lift per alpha_dot c/(2V), alpha_dot over ground [-]", 20.0, 2.0, 0.5, 1),
+            _slope(
+                "CLalphadot", "lift per alpha_dot c/(2V), alpha_dot over ground [-]", 20.0, 2.0, 0.5, "CLq", 1
+            ),
         ),
         describe=_plunge_lift,
         explanation="Lift depends on alpha_dot: the downwash reaches the tail late, and the wing accelerates air.",
@@ -171,7 +198,7 @@ EFFECTS: Final = (
         name="lift_lag",
         where="dynamics",
         parameters=(
-            _slope("dCLalpha", "lagging part of the lift slope [1/rad]", 3.0, 0.25, 0.1, 1),
+            _slope("dCLalpha", "lagging part of the lift slope [1/rad]", 3.0, 0.25, 0.1, "CLalpha", 1),
             Parameter(
                 "tau_s",
                 "s",
@@ -193,7 +220,9 @@ EFFECTS: Final = (
         name="elastic_mode",
         where="dynamics",
         parameters=(
-            _slope("dCmalpha", "part of Cmalpha that acts through the mode [1/rad]", 2.0, 0.1, 0.05),
+            _slope(
+                "dCmalpha", "part of Cmalpha that acts through the mode [1/rad]", 2.0, 0.1, 0.05, "Cmalpha"
+            ),
             Parameter(
                 "frequency_hz",
                 "hz",

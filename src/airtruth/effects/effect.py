@@ -4,12 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal
 
 from airtruth.errors import ConfigurationError, choices
 from airtruth.physics.terms import Change
 from airtruth.units import UNITS
+
+GTM: Final[Mapping[str, float]] = {
+    "CLalpha": 4.787,
+    "CLq": 31.7,
+    "Cmalpha": 1.785,
+    "Cmq": 41.2,
+    "Cmde": 1.787,
+}
+"""Magnitudes of the derivatives for which material sizes are stated (aircraft/gtm/aircraft.toml) [-]."""
+_LEAST_RATIO: Final = 0.1
+"""Least ratio of a derivative to that of the GTM by which a material size scales [-] (judgement: a derivative near zero is no
+measure of what matters)."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +46,7 @@ class Parameter:
         accept it.
     spans : largest size in wing spans of a real aircraft; a trace accepts no larger one.
     prior_std : standard deviation of a normal prior of the size about zero; infinite for none.
+    scales_with : derivative with which ``material`` scales, which is that of the GTM; empty for none.
     """
 
     name: str
@@ -52,6 +65,21 @@ class Parameter:
     sign: Literal[-1, 0, 1] = 0
     spans: float = math.inf
     prior_std: float = math.inf
+    scales_with: str = ""
+
+    def for_aircraft(self, derivatives: Mapping[str, float]) -> Parameter:
+        """The parameter with the material size of an aircraft, by its derivatives; at most that of the GTM.
+
+        Examples
+        --------
+        >>> change = Parameter("dCmalpha", "-", "change of Cmalpha", -4.0, 4.0, 0.1, scales_with="Cmalpha")
+        >>> change.for_aircraft({"Cmalpha": -0.357}).material
+        0.02
+        """
+        if not self.scales_with:
+            return self
+        ratio = abs(derivatives[self.scales_with]) / GTM[self.scales_with]
+        return replace(self, material=self.material * min(1.0, max(ratio, _LEAST_RATIO)))
 
     @property
     def is_limit(self) -> bool:
@@ -140,6 +168,10 @@ class Effect:
     variant: str = ""
     distinguished_by: str = ""
     in_derivatives: bool = False
+
+    def for_aircraft(self, derivatives: Mapping[str, float]) -> Effect:
+        """The effect with the material sizes of an aircraft, see `Parameter.for_aircraft`."""
+        return replace(self, parameters=tuple(p.for_aircraft(derivatives) for p in self.parameters))
 
     @property
     def key(self) -> str:

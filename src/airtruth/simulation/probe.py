@@ -15,7 +15,7 @@ from airtruth.errors import AircraftError
 from airtruth.physics.longitudinal import ForceTables, Longitudinal
 from airtruth.simulation.simulator import Condition, Controls, Executive, Response
 from airtruth.simulation.trim import Trim
-from airtruth.units import DEG, FT, LBF
+from airtruth.units import DEG, FT, G0, LBF
 
 Array = NDArray[np.float64]
 
@@ -39,6 +39,9 @@ _NEAR: Final = 0.02
 breaks, far above rounding)."""
 _DIVISIONS: Final = 3
 """Number of times that the cells of an axis are searched for breaks [-] (judgement: a degree with three breaks is rare)."""
+
+_DIVE_RAD: Final = 60.0 * DEG
+"""Flight-path angle below that of the trim at which a term in alpha_dot shows [rad]; judgement: half of the weight's lift."""
 
 
 @dataclass(frozen=True)
@@ -221,6 +224,30 @@ def forces_at_speeds(aircraft: Aircraft, trim: Trim, ratios: Array, dt_s: float 
         x, z = (node.get_double_value() * LBF for node in total)
         rows.append([x, z, moment, x - air.get_double_value() * LBF])
     return np.array(rows)
+
+
+def alpha_dot_terms(aircraft: Aircraft, trim: Trim) -> Array:
+    """CL and Cm per alpha_dot c/(2V) of the JSBSim model.
+
+    In a dive at the attitude of the air of the trim, alpha_dot is g (cos(gamma) - cos(gamma of the trim))/V larger, and
+    nothing else that the air feels differs.
+
+    Parameters
+    ----------
+    aircraft, trim : the aircraft and its equilibrium.
+
+    Returns
+    -------
+    (2,) [-].
+    """
+    level = trim.condition.gamma_rad
+    dive = replace(trim, condition=replace(trim.condition, gamma_rad=level - _DIVE_RAD))
+    change = np.subtract(*(forces_at_speeds(aircraft, at, np.ones(1))[0] for at in (dive, trim)))
+    c, v = aircraft.constants, trim.airspeed_m_s
+    rate = G0 * (np.cos(level - _DIVE_RAD) - np.cos(level)) / v * 0.5 * c.chord_m / v
+    force = 0.5 * trim.density_kg_m3 * v**2 * c.wing_area_m2
+    terms: Array = np.array([-change[1], change[2] / c.chord_m]) / (force * rate)
+    return terms
 
 
 def forces_over_alpha(

@@ -127,7 +127,7 @@ def conclude(
         ),
         notes=(
             *reserved,
-            *notes(stages, last, replay, forced),
+            *notes(stages, last, declared, replay, forced),
             *_unwritten(case, stated, updated_aircraft, replay),
         ),
         tolerances=tolerances(stages),
@@ -298,14 +298,13 @@ def _detectability(
 ) -> dict[str, float]:
     """Smallest traceable sizes at a null that is probable; none where no round has one."""
     if rounds[0].declared_test.p_value > CONTRADICTED:
-        return detectability(rounds[0].table) | detectable_causes(
-            likelihood, sizes, case.declared, _TRACEABLE
-        )
+        degrees = rounds[0].declared_test.degrees
+        return detectability(rounds[0].table) | detectable_causes(likelihood, sizes, case.declared, degrees)
     return detectability(rounds[-1].table) if rounds[-1].anomaly.p_value > ANOMALY_LEVEL else {}
 
 
 def detectability(table: Table) -> dict[str, float]:
-    """Smallest size of each effect that the records can trace (noncentrality 16), in its own unit.
+    """Smallest size of each effect that the records can trace (noncentrality 16) and that is material, in its own unit.
 
     A bandwidth or a rate limit is stated as its value. An effect with several variants is listed under its name with
     the size of the variant that the records show best, and under the key of each variant.
@@ -313,7 +312,7 @@ def detectability(table: Table) -> dict[str, float]:
     found: dict[str, float] = {}
     for s in table.scores:
         p = s.effect.parameters[0]
-        size = _TRACEABLE / math.sqrt(s.information)
+        size = max(_TRACEABLE / math.sqrt(s.information), p.material)
         value = p.value(size) if p.reciprocal else size
         if s.effect.variant:
             found[s.effect.key] = value

@@ -9,7 +9,8 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.optimize import brentq
+from scipy.stats import chi2, ncx2
 
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.short_period import PARAMETERS
@@ -42,6 +43,8 @@ from airtruth.tracing.selection.weights import weights
 
 Array = NDArray[np.float64]
 
+_POWER: Final = 0.8
+"""Share of flights in which a traceable cause is traced [-] (convention)."""
 _LEAST_WEIGHT: Final = 1e-3
 """Posterior weight below which a set of causes is not listed [-] (judgement: one in a thousand)."""
 
@@ -223,20 +226,36 @@ def detectable_causes(
     likelihood: DerivativeLikelihood,
     sizes: Mapping[str, tuple[float, float]],
     declared: DeclaredCauses,
-    errors: float,
+    degrees: int,
 ) -> dict[str, float]:
-    """Smallest size of each cause that the records can trace, in the unit of its first parameter.
+    """Smallest size of each cause that the records can trace and that is material, in the unit of its first parameter.
 
     Parameters
     ----------
     likelihood : at the first null; sizes : see `cause_sizes`; declared : the candidates.
-    errors : standard deviations from which a size counts as traceable [-].
+    degrees : degrees of freedom of the test of the declared derivatives [-].
     """
-    found = {key: errors * std for key, (_, std) in sizes.items()}
+    errors = traceable_errors(degrees)
+    found = {
+        key: max(errors * std, EFFECTS[key].parameters[0].material)
+        for key, (_, std) in sizes.items()
+        if 0.0 < std < np.inf
+    }
     if declared.wrong_allowed:
         own = np.linalg.inv(likelihood.information + np.linalg.inv(likelihood.declared))
         found[DERIVATIVES] = errors * float(np.sqrt(likelihood.declared[0, 0] + own[0, 0]))
     return {key: size for key, size in found.items() if size > 0.0 and np.isfinite(size)}
+
+
+def traceable_errors(degrees: int) -> float:
+    """Standard deviations of a cause that contradict the declared model in four of five flights [-].
+
+    The test has ``degrees`` degrees of freedom, half of the level of the declared model (`declared_p_value`), and a noncentral
+    chi-square statistic.
+    """
+    threshold = chi2.isf(0.5 * DECLARED_LEVEL, degrees)
+    power = brentq(lambda noncentrality: ncx2.sf(threshold, degrees, noncentrality) - _POWER, 1.0, 1e3)
+    return math.sqrt(float(power))
 
 
 def _row(
@@ -318,5 +337,6 @@ __all__ = [
     "explaining_effects",
     "inclusion",
     "remaining_evidence",
+    "traceable_errors",
     "with_axial_force",
 ]

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.quantity import Quantity
+from airtruth.table import significant
+from airtruth.tracing.answer import DeclaredModel
 from airtruth.tracing.model.compile import CHANNELS
 from airtruth.tracing.model.parameters import COLOUR_TIME_S, Common
 from airtruth.tracing.replay import disagreement
@@ -21,6 +24,9 @@ Array = NDArray[np.float64]
 _WORTH_A_NOTE: Final = 0.02
 """Share of slow noise in a sensor's variance from which a note mentions it [-] (judgement: a smaller share
 is of no use to a reader)."""
+_FAR: Final = 5.0
+"""Distance of an estimate from a declared derivative from which a note states it, in standard deviations of the estimate [-]
+(judgement: no chance over six derivatives)."""
 _IN_LOOP: Final = (
     "the elevator responds to the motion (a damper, an autopilot or a pilot): gusts move it too, so that the free run of a "
     "false model may come closer than that of the true one; the innovations remain a valid test"
@@ -28,17 +34,24 @@ _IN_LOOP: Final = (
 """Note of a trace in closed loop."""
 
 
-def notes(stages: Stages, last: SearchRound, replay: Replay | None, forced: Sequence[str]) -> Iterator[str]:
+def notes(
+    stages: Stages, last: SearchRound, declared: DeclaredModel, replay: Replay | None, forced: Sequence[str]
+) -> Iterator[str]:
     """Each note, in words.
 
     Parameters
     ----------
     stages, last : assessed stages, and the last round of the search.
+    declared : test of the declared model.
     replay : records flown again in JSBSim, None where nothing was flown again.
     forced : faults of the logs that the caller overruled.
     """
     yield from stages.case.notes
     yield from _slow_noise(last.null.point.common)
+    if declared.consistent:
+        yield from within_assumed_uncertainty(
+            declared, stages.case.fitted.records[0].plant.aircraft.file.derivatives
+        )
     if in_closed_loop(stages):
         yield _IN_LOOP
     if stages.case.left_out:
@@ -50,6 +63,21 @@ def notes(stages: Stages, last: SearchRound, replay: Replay | None, forced: Sequ
         yield from disagreement(replay, stages)
     if forced:
         yield "the logs contradict physics and were traced all the same (--force): " + "; ".join(forced)
+
+
+def within_assumed_uncertainty(declared: DeclaredModel, stated: Mapping[str, Quantity]) -> Iterator[str]:
+    """Derivatives that the records determine elsewhere, within an uncertainty that the aircraft does not state."""
+    far = [
+        f"{name} {significant(s.estimate)} +- {significant(s.std, 2)} for {significant(s.declared)} +- "
+        f"{significant(s.declared_std, 2)}"
+        for name, s in declared.shifts.items()
+        if abs(s.estimate - s.declared) > _FAR * s.std and not (name in stated and stated[name].std > 0.0)
+    ]
+    if far:
+        yield (
+            f"within an uncertainty that airtruth assumes, because aircraft.toml states none, the records give {', '.join(far)}; "
+            "state the std of [derivatives] there for a stricter test"
+        )
 
 
 def _slow_noise(common: Array) -> Iterator[str]:
@@ -67,4 +95,4 @@ def _slow_noise(common: Array) -> Iterator[str]:
         )
 
 
-__all__ = ["notes"]
+__all__ = ["notes", "within_assumed_uncertainty"]

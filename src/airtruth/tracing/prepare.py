@@ -19,6 +19,7 @@ from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.composition import directions
 from airtruth.physics.gust_figures import gust_scales
 from airtruth.physics.reconstruction import is_reconstructed
+from airtruth.physics.short_period import PARAMETERS
 from airtruth.simulation.trim import Trim
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem
@@ -147,6 +148,10 @@ def prepare(
         notes.append("nothing is held out: the verdict is provisional")
     if not has_vane:
         notes.append(_NO_VANE)
+    slopes = dict(
+        zip(PARAMETERS, np.mean([r.plant.derivatives for r in fitted], axis=0).tolist(), strict=True)
+    )
+    effects = [effect.for_aircraft(slopes) for effect in effects]
     columns = set.intersection(*(set(log.channels) for log in logs))
     reasons = {effect.key: _why_not(effect, columns, has_vane) for effect in effects}
     first = fitted[0].plant.trim_alpha_rad

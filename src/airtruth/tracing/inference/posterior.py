@@ -45,6 +45,8 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 R = TypeVar("R")
 
+_DIVERGED: Final = 1e6
+"""Whitened change of an innovation by one step of a difference from which the motion diverges [-] (judgement)."""
 _LOCATION_STEP: Final = 0.02
 """Step of the differences in a size over `airtruth.effects.effect.Parameter.step`, where the effect is present or the
 parameter is a location [-]; judgement: as `COMMON_STEP`."""
@@ -255,7 +257,8 @@ class _Differences:
 
     def put(self, index: int, moved: Response, h: float) -> None:
         white, base = self.base.white, self.base
-        self.t[index] = (moved.e - base.e) @ white.T / h
+        change = (moved.e - base.e) @ white.T
+        self.t[index] = change / h if np.abs(change).max() < _DIVERGED else np.nan
         self.w[index] = white @ ((moved.covariance - base.covariance) / h) @ white.T
         self.more[index] = (moved.more_logdet - base.more_logdet) / h
 

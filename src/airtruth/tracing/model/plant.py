@@ -14,7 +14,14 @@ from airtruth.errors import AircraftError, TrimError
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.simulation.disposable import isolated
 from airtruth.simulation.linearise import Linearisation, linearise
-from airtruth.simulation.probe import Grid, forces_at_speeds, forces_over_alpha, probe, with_breaks
+from airtruth.simulation.probe import (
+    Grid,
+    alpha_dot_terms,
+    forces_at_speeds,
+    forces_over_alpha,
+    probe,
+    with_breaks,
+)
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim, trim
 from airtruth.units import DEG, G0
@@ -207,6 +214,14 @@ def engines(aircraft: Aircraft, at: Trim) -> Engines:
     return Engines(np.ascontiguousarray(fitted[0, :3]), np.ascontiguousarray(fitted[:, 3]))
 
 
+def alpha_dot(plant: Plant) -> Array:
+    """(2,) CL and Cm per alpha_dot c/(2V) of the declared JSBSim model, which its rate derivatives contain; 0 without one."""
+    if plant.trim is None:
+        return np.zeros(2)
+    aircraft = plant.aircraft
+    return isolated(f"the terms in alpha_dot of {aircraft.name}", alpha_dot_terms, aircraft, plant.trim)
+
+
 def _linearised(aircraft: Aircraft, at: Trim) -> Linearisation:
     return isolated(f"the derivatives of {aircraft.name}", linearise, aircraft, at)
 
@@ -317,6 +332,7 @@ def inertia_std(aircraft: Aircraft) -> float:
 
 __all__ = [
     "Plant",
+    "alpha_dot",
     "declared_covariance",
     "declared_derivatives",
     "inertia_std",

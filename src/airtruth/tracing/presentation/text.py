@@ -64,9 +64,11 @@ def verdict(answer: TraceAnswer) -> str:
 
 def _conclusion(answer: TraceAnswer) -> str:
     if answer.verdict == "none":
+        declared = answer.declared_model
+        own = "" if declared is None else f"; {probability(declared.p_value)} for the declared model"
         return (
-            f"None: the declared aircraft explains these records ({probability(answer.anomaly.p_value)}); they show "
-            "no missing effect."
+            f"None: the declared aircraft explains these records ({probability(answer.anomaly.p_value)} for a missing "
+            f"effect{own}); they show no missing effect."
         )
     if answer.verdict == "unexplained":
         return (

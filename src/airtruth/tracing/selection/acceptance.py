@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from airtruth.aircraft.dynamics import declared_dynamics
 from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.assess import Assessment, noise_floor
 from airtruth.tracing.inference.cross_validate import LeftOut, leave_one_out, one_by_the_other
@@ -19,6 +20,7 @@ from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import MEMORY_S, inflation, long_run
 from airtruth.tracing.model.compile import compile_change
 from airtruth.tracing.model.parameters import OUTPUTS, Common, PerRecord, size_index
+from airtruth.tracing.model.plant import alpha_dot
 from airtruth.tracing.selection.score_test import Score
 
 Array = NDArray[np.float64]
@@ -37,6 +39,11 @@ IMMATERIAL: Final = "its size is immaterial"
 """Reason of a candidate that is too small to matter."""
 IMPROBABLE: Final = 0.001
 """Probability below which refitted derivatives contradict the declared ones [-] (convention: three standard errors)."""
+_ALPHA_DOT: Final = "alpha_dot_hat"
+"""Signal of a term in alpha_dot c/(2V)."""
+_SLIGHT: Final = 0.25
+"""Share of a declared size by which an effect may exceed the removal of all of it [-] (judgement: a flight tells a term in
+alpha_dot to about that)."""
 _ERRORS: Final = 2.0
 """Standard errors that count as a difference [-] (convention)."""
 _FREE_ERRORS: Final = 3.0
@@ -217,16 +224,35 @@ def _fit_reasons(s: Score, own: PosteriorFit, gain: float, least: float, excess:
 
 def implausibility(problem: TraceProblem, s: Score, own: PosteriorFit) -> Iterator[str]:
     """Why the estimates of a refitted effect are not accepted, whatever it gains, in words."""
-    yield from size_reasons(
-        s, _size(s, own)[0], max(r.plant.aircraft.constants.span_m for r in problem.records)
-    )
+    span_m = max(r.plant.aircraft.constants.span_m for r in problem.records)
+    size = _size(s, own)[0]
+    is_reversed = s.effect.parameters[0].sign * size < 0.0
+    declared = declared_part(problem, s.effect) if is_reversed else 0.0
+    yield from size_reasons(s, size, span_m, declared)
     yield from shape_reasons(s.effect, own.point.sizes[_first_size(s, own) :])
 
 
-def size_reasons(s: Score, size: float, span_m: float) -> Iterator[str]:
-    """Why the size of an effect is not accepted, in words; ``span_m`` is the wing span of the aircraft [m]."""
+def declared_part(problem: TraceProblem, effect: Effect) -> float:
+    """Size that the declared aircraft has of an effect of alpha_dot, in its JSBSim model and in [dynamics]; 0 for others."""
+    plant = problem.records[0].plant
+    stated = declared_dynamics(plant.aircraft.file.dynamics).aero
+    for term in effect.change({p.name: 1.0 for p in effect.parameters}).aero:
+        if term.signal == _ALPHA_DOT:
+            like = (term.coefficient, term.signal)
+            own = sum(t.amplitude for t in stated if (t.coefficient, t.signal) == like)
+            return own + float(alpha_dot(plant)[("CL", "Cm").index(term.coefficient)])
+    return 0.0
+
+
+def size_reasons(s: Score, size: float, span_m: float, declared: float = 0.0) -> Iterator[str]:
+    """Why the size of an effect is not accepted, in words.
+
+    Parameters
+    ----------
+    span_m : wing span of the aircraft [m]; declared : size that the declared aircraft has already.
+    """
     first = s.effect.parameters[0]
-    if first.sign * size < 0.0:
+    if first.sign * size < 0.0 and first.sign * (declared + size) < -_SLIGHT * abs(declared):
         yield "its size has a sign that no aircraft has"
     if abs(size) > first.spans * span_m:
         yield "its size is beyond the ends of the aircraft"
