@@ -244,3 +244,16 @@ def test_the_contract_is_not_waived_by_force(tmp_path):
     start = text.index("[channels.q_rad_s]")
     text = text[:start] + text[text.index("[channels.ax_m_s2]") :]
     assert "q_rad_s: required channel is missing" in message(LogError, tmp_path, mapping=text)
+
+
+def test_the_name_of_a_run_is_utf8(tmp_path):
+    (tmp_path / "map.toml").write_text(mapping_by_name().replace('run_id = "flight"\n', ""))
+    file = tmp_path / "gr\udcf6\udcdfe.csv"
+    write_csv(file, columns())
+    for files in (file, [file, file]):
+        with pytest.raises(
+            LogError, match="is not UTF-8, .* state run_id in the mapping, or rename the file"
+        ):
+            import_log(files, tmp_path / "map.toml", force=True)
+    (tmp_path / "map.toml").write_text(mapping_by_name())
+    assert import_log(file, tmp_path / "map.toml", force=True).log.run_ids == ("flight",)
