@@ -57,6 +57,12 @@ def test_a_table_and_a_key_with_the_same_unit_agree(value, data):
     assert table.value == key["x"] == value * units.factor(dimension, unit)
 
 
+@pytest.mark.parametrize("key", ["value", "std"])
+def test_true_is_no_quantity(key):
+    with pytest.raises(ValidationError, match=r"write a number \(got True\)"):
+        qt.table_in("mass", {"value": 1.0, "unit": "kg", key: True})
+
+
 def test_std_and_source_go_with_the_value():
     read = qt.table_in("mass", {"value": 2.0, "std": 0.5, "unit": "lb", "source": "scales"})
     assert (read.value, read.std, read.source) == (2 * units.LB, 0.5 * units.LB, "scales")
