@@ -77,6 +77,11 @@ def test_the_base_is_good(tmp_path):
             'constants = { mass_kg = { value = 3, unit = "ft" }, weight = { value = 3, unit = "kg" } }',
             ["mass_kg", "a unit of length", "'weight' is no constant", "mass_kg"],
         ),
+        (
+            'run_id = "flight"',
+            'constants = { mass_kg = { value = 0, unit = "kg" } }',
+            ["constants.mass_kg.value", "greater than 0 (got 0)"],
+        ),
     ],
 )
 def test_a_mapping_that_cannot_be_used(old, new, parts, tmp_path):
