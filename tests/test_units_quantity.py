@@ -59,7 +59,7 @@ def test_a_table_and_a_key_with_the_same_unit_agree(value, data):
 
 
 def test_an_integer_beyond_any_float_is_refused():
-    words = r"a number of 401 digits; write a number between -1e\+15 and 1e\+15"
+    words = r"is too large; write a number between -1e\+15 and 1e\+15"
     with pytest.raises(ValueError, match=words):
         qt.table_in("mass", {"value": 10**400, "unit": "lb"})
     with pytest.raises(ValueError, match=words):

@@ -95,12 +95,8 @@ def _problem(document: object, deepest: int) -> str:
     """What no reader of a document expects, a deep nesting or an integer beyond 64 bits; "" if there is none."""
     level = [document]
     for _ in range(deepest + 1):
-        large = next((e for e in level if isinstance(e, int) and not -(2**63) <= e < 2**63), None)
-        if large is not None:
-            digits = str(abs(large))
-            return (
-                f"an integer of {len(digits)} digits ({digits[:6]}...) is beyond 64 bits, write a smaller one"
-            )
+        if any(isinstance(entry, int) and not -(2**63) <= entry < 2**63 for entry in level):
+            return "an integer is beyond 64 bits, write a smaller one"
         level = [
             child
             for entry in level

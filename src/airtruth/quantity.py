@@ -272,9 +272,7 @@ def _scaled(value: Any, factor: float) -> Any:
     if isinstance(value, bool):
         return value
     if isinstance(value, int) and abs(value) > LARGEST:  # it may be too large for a float
-        raise ValueError(
-            f"a number of {len(str(abs(value)))} digits; write a number between -{LARGEST:g} and {LARGEST:g}"
-        )
+        raise ValueError(f"is too large; write a number between -{LARGEST:g} and {LARGEST:g}")
     if isinstance(value, int | float):
         return value * factor
     if isinstance(value, list):
