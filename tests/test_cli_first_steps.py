@@ -60,7 +60,7 @@ def airtruth(tmp_path):
 def test_a_new_campaign_works_as_written(airtruth, tmp_path):
     code, out, _ = airtruth("new", "campaign", "--out", "first test.toml")
     assert code == 0
-    assert "airtruth fly first test.toml --out out/first-test" in out
+    assert "airtruth fly 'first test.toml' --out out/first-test" in out
     campaign = read(tmp_path / "first test.toml")
     assert (campaign.name, campaign.aircraft, campaign.runs) == ("first-test", "gtm", 6)
     code, out, err = airtruth("fly", "first test.toml", "--out", "flown", "--dry-run")
@@ -73,6 +73,29 @@ def test_a_new_campaign_has_the_condition_of_the_shipped_aircraft(aircraft, tmp_
     file.write_text(campaign_text("c", aircraft))
     eas_kt = CONDITIONS[aircraft][0]
     assert read(file).condition.eas.value == pytest.approx(eas_kt * KT)
+
+
+@pytest.mark.parametrize("option", ["eas_kt", "altitude_ft"])
+@pytest.mark.parametrize("value", [float("inf"), float("nan")])
+def test_a_new_campaign_has_a_finite_condition(option, value):
+    with pytest.raises(
+        ConfigurationError, match=f"--{option.replace('_', '-')} {value}: state a finite number"
+    ):
+        campaign_text("c", **{option: value})
+
+
+def test_printed_commands_are_quoted(airtruth, tmp_path):
+    name = "flight 7;x.csv"
+    (tmp_path / name).write_text("t,q\n0,1\n0.02,2\n")
+    code, out, _ = airtruth("new", "mapping", name, "--out", "my map.toml")
+    assert code == 0
+    assert "airtruth import 'flight 7;x.csv' --mapping 'my map.toml' --out 'flight 7;x.parquet'" in out
+    code, out, _ = airtruth("new", "aircraft", "--out", "my plane")
+    assert (code, "airtruth check LOG.parquet --aircraft 'my plane'" in out) == (0, True)
+    code, _, err = airtruth("import", name)
+    assert (code, f"`airtruth import --guess '{name}'` prints" in err) == (2, True)
+    code, _, err = airtruth("report", "my out", "--out", "r.html")
+    assert (code, "--out 'my out/estimates.parquet'`" in err) == (2, True)
 
 
 def test_a_new_campaign_of_another_aircraft_needs_a_condition(tmp_path):

@@ -26,6 +26,8 @@ def test_a_file_with_and_without_a_mark_of_byte_order(tmp_path):
         (b"x = = 1", "not valid TOML: Invalid value (at line 1, column 5)"),
         (b"x = 1\nx = 2", "not valid TOML: Cannot overwrite a value"),
         (b"x = " + b"9" * 5000, "not valid TOML: Exceeds the limit"),
+        (b"x = [{ y = -1" + b"0" * 400 + b" }]", "an integer is beyond 64 bits"),
+        (b"x = 0x" + b"f" * 9000, "an integer is beyond 64 bits"),
         (b"x = " + b"[" * 5000, "not valid TOML: nested too deeply"),
         (b"x = " + b"[" * 60 + b"]" * 60, "not valid TOML: nested more than 50 levels deep"),
         (b"a." * 70 + b"b = 1", "not valid TOML: nested more than 50 levels deep"),

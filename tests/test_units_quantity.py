@@ -9,7 +9,8 @@ from pydantic import ValidationError
 
 from airtruth import quantity as qt
 from airtruth import units
-from airtruth.errors import choices
+from airtruth.effects.registry import EFFECTS
+from airtruth.errors import ConfigurationError, choices
 
 # International yard and pound agreement of 1959; nautical mile of 1929; CGPM 1901; NIST SP 811, appendix B.8.
 PUBLISHED = [
@@ -55,6 +56,22 @@ def test_a_table_and_a_key_with_the_same_unit_agree(value, data):
     table = qt.table_in(dimension, {"value": value, "unit": unit})
     key = qt.keys_to_si({f"x_{unit}": value}, {"x": dimension})
     assert table.value == key["x"] == value * units.factor(dimension, unit)
+
+
+def test_an_integer_beyond_any_float_is_refused():
+    words = r"is too large; write a number between -1e\+15 and 1e\+15"
+    with pytest.raises(ValueError, match=words):
+        qt.table_in("mass", {"value": 10**400, "unit": "lb"})
+    with pytest.raises(ValueError, match=words):
+        qt.keys_to_si({"eas_kt": {"mean": -(10**400), "std": 1}}, {"eas": "speed"})
+    with pytest.raises(ConfigurationError, match="delay_ms has to be between"):
+        EFFECTS["elevator_delay"].read({"delay_ms": 10**400})
+
+
+@pytest.mark.parametrize("key", ["value", "std"])
+def test_true_is_no_quantity(key):
+    with pytest.raises(ValidationError, match=r"write a number \(got True\)"):
+        qt.table_in("mass", {"value": 1.0, "unit": "kg", key: True})
 
 
 def test_std_and_source_go_with_the_value():

@@ -85,14 +85,18 @@ def _parsed(
         raise failure(f"{path}: not valid {kind}: nested too deeply; {step}") from None
     except ValueError as error:  # also a number of more than 4300 digits
         raise failure(f"{path}: not valid {kind}: {reason(error)}; {step}") from None
-    if _depth_exceeds(document, DEEPEST):
-        raise failure(f"{path}: not valid {kind}: nested more than {DEEPEST} levels deep; {step}")
+    problem = _problem(document, DEEPEST)
+    if problem:
+        raise failure(f"{path}: not valid {kind}: {problem}; {step}")
     return document
 
 
-def _depth_exceeds(document: object, deepest: int) -> bool:
+def _problem(document: object, deepest: int) -> str:
+    """What no reader of a document expects, a deep nesting or an integer beyond 64 bits; "" if there is none."""
     level = [document]
     for _ in range(deepest + 1):
+        if any(isinstance(entry, int) and not -(2**63) <= entry < 2**63 for entry in level):
+            return "an integer is beyond 64 bits, write a smaller one"
         level = [
             child
             for entry in level
@@ -105,8 +109,8 @@ def _depth_exceeds(document: object, deepest: int) -> bool:
             )
         ]
         if not level:
-            return False
-    return True
+            return ""
+    return f"nested more than {deepest} levels deep"
 
 
 __all__ = ["DEEPEST", "read_json", "read_plain", "read_toml"]

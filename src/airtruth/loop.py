@@ -20,7 +20,7 @@ from airtruth.identification.store import write_estimates
 from airtruth.logs.atomic import make_folder, write_text
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.sources import Logs, named_logs
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.short_period import PARAMETERS, UNITS
 from airtruth.table import MISSING, Cell, Group, Number, Pair, Row, Table, as_html, as_text, write_table
 from airtruth.tracing import TraceOptions, TraceResult, trace
 from airtruth.tracing.compensate import (
@@ -201,7 +201,9 @@ def loop_chart(changes: Sequence[DerivativeChange]) -> Chart:
                 words = f"{label}, two standard errors"
                 marks.append(Mark(row + shift, value, value - error, value + error, None, words, colour))
         rules = tuple(Rule(c.declared, label="declared") for c in own[:1])
-        panels.append(Panel(x_label=f"{name} [1/rad]", rows=tuple(methods), marks=tuple(marks), rules=rules))
+        panels.append(
+            Panel(x_label=f"{name} [{UNITS[name]}]", rows=tuple(methods), marks=tuple(marks), rules=rules)
+        )
     title = "Derivatives before and after the traced effects are taken out"
     return Chart(NAME, title, tuple(panels), columns=3)
 

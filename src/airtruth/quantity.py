@@ -7,9 +7,10 @@ std = 0.3, source = "..." }``. In a campaign the unit ends the key, ``eas_kt = 7
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
-from typing import Annotated, Any, Final, Self, get_args
+from types import NoneType
+from typing import Annotated, Any, Final, Literal, Self, get_args, get_origin
 
 from pydantic import (
     BaseModel,
@@ -41,8 +42,7 @@ class Strict(BaseModel):
         """pydantic would read "5" and true as numbers, and 1 as true; JSON may hold an infinity as text."""
         if cls.model_config.get("allow_inf_nan"):
             return value
-        annotation = cls.model_fields[info.field_name or ""].annotation
-        wanted = {annotation, *get_args(annotation)}
+        wanted = set(_leaves(cls.model_fields[info.field_name or ""].annotation))
         entries = (
             value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else [value]
         )
@@ -50,7 +50,12 @@ class Strict(BaseModel):
             for entry in entries:
                 if isinstance(entry, bool | str):
                     raise ValueError(f"write a number (got {entry!r})")
-        if annotation is bool and not isinstance(value, bool):
+        if {int, str} <= wanted and any(isinstance(entry, bool) for entry in entries):
+            raise ValueError(f"write a number or a name (got {value!r})")
+        numbers = [leaf for leaf in wanted if isinstance(leaf, int)]
+        if numbers and isinstance(value, bool):
+            raise ValueError(f"write {' or '.join(map(str, sorted(numbers)))} (got {value!r})")
+        if bool in wanted and wanted <= {bool, NoneType} and not isinstance(value, bool | None):
             raise ValueError(f"write true or false (got {value!r})")
         return value
 
@@ -63,6 +68,18 @@ class Strict(BaseModel):
                         f"{name} is {number:g}; write a number between -{LARGEST:g} and {LARGEST:g}"
                     )
         return self
+
+
+def _leaves(annotation: Any) -> Iterator[Any]:
+    """The types of a field without their containers and constraints, and the values of a literal."""
+    origin, parts = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        yield from _leaves(parts[0])
+    elif parts and origin is not Literal:
+        for part in parts:
+            yield from _leaves(part)
+    else:
+        yield from parts or (annotation,)
 
 
 def _numbers(value: object) -> Iterator[float]:
@@ -121,8 +138,8 @@ class FromTable:
                 f"unit {unit!r} is not a unit of {_plain(self.dimension)}; {_units(self.dimension)}"
             )
         for key in ("value", "std"):
-            if isinstance(table.get(key), int | float):
-                table[key] = table[key] * units[unit]
+            if key in table:
+                table[key] = _scaled(table[key], units[unit])
         return table
 
 
@@ -165,6 +182,45 @@ def table_in(dimension: str, raw: Any) -> Quantity:
     """
     converted = FromTable(dimension)(raw)
     return converted if isinstance(converted, Quantity) else Quantity.model_validate(converted)
+
+
+def not_negative(value: Quantity) -> Quantity:
+    """Return a quantity of a file that may be zero and not below it.
+
+    Raises
+    ------
+    ValueError
+        If it is negative.
+    """
+    if value.value < 0.0:
+        raise ValueError(f"must not be negative (is {value.value:g} in SI)")
+    return value
+
+
+def require_positive(table: BaseModel, names: Iterable[str]) -> None:
+    """Refuse quantities of a table that are not above 0, of those that are stated.
+
+    Raises
+    ------
+    ValueError
+        Naming the first.
+    """
+    for name in names:
+        entry: Quantity | None = getattr(table, name)
+        if entry is not None and not entry.value > 0.0:
+            raise ValueError(f"{name} has to be above 0 (is {entry.value:g} in SI)")
+
+
+def require_order(low: Quantity | None, high: Quantity | None) -> None:
+    """Refuse a minimum that is not below the maximum, where both are stated.
+
+    Raises
+    ------
+    ValueError
+        With both.
+    """
+    if low is not None and high is not None and low.value >= high.value:
+        raise ValueError(f"minimum has to be below maximum (are {low.value:g} and {high.value:g} in SI)")
 
 
 def keys_to_si(raw: Mapping[str, object], dimensions: Mapping[str, str]) -> dict[str, object]:
@@ -215,6 +271,8 @@ def _longest_name(key: str, dimensions: Mapping[str, str]) -> str | None:
 def _scaled(value: Any, factor: float) -> Any:
     if isinstance(value, bool):
         return value
+    if isinstance(value, int) and abs(value) > LARGEST:  # it may be too large for a float
+        raise ValueError(f"is too large; write a number between -{LARGEST:g} and {LARGEST:g}")
     if isinstance(value, int | float):
         return value * factor
     if isinstance(value, list):

@@ -127,6 +127,26 @@ SPOILT_TOML = {
         "delay = { value = -40.0",
         ["theta_rad", "delay", "must not be negative"],
     ),
+    "bandwidth of zero": (
+        "bandwidth = { value = 5.0",
+        "bandwidth = { value = 0.0",
+        ["elevator_actuator: bandwidth has to be above 0 (is 0 in SI)"],
+    ),
+    "negative rate limit": (
+        "rate_limit = { value = ",
+        "rate_limit = { value = -",
+        ["elevator_actuator: rate_limit has to be above 0 (is -5.23599 in SI)"],
+    ),
+    "negative delay of the actuator": (
+        "delay = { value = 15.0",
+        "delay = { value = -15.0",
+        ["elevator_actuator.delay: must not be negative (is -0.015 in SI)"],
+    ),
+    "stops": (
+        "maximum = { value = 20.0",
+        "maximum = { value = -30.0",
+        ["elevator_actuator", "minimum has to be below maximum"],
+    ),
     "channel": (
         "[sensors.q_rad_s]",
         "[sensors.q_rads]",

@@ -77,6 +77,11 @@ def test_the_base_is_good(tmp_path):
             'constants = { mass_kg = { value = 3, unit = "ft" }, weight = { value = 3, unit = "kg" } }',
             ["mass_kg", "a unit of length", "'weight' is no constant", "mass_kg"],
         ),
+        (
+            'run_id = "flight"',
+            'constants = { mass_kg = { value = 0, unit = "kg" } }',
+            ["constants.mass_kg.value", "greater than 0 (got 0)"],
+        ),
     ],
 )
 def test_a_mapping_that_cannot_be_used(old, new, parts, tmp_path):
@@ -244,3 +249,31 @@ def test_the_contract_is_not_waived_by_force(tmp_path):
     start = text.index("[channels.q_rad_s]")
     text = text[:start] + text[text.index("[channels.ax_m_s2]") :]
     assert "q_rad_s: required channel is missing" in message(LogError, tmp_path, mapping=text)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("run_id", "schema = true\nrun_id", "schema: write 1 (got True)"),
+        ("sign = -1", "sign = true", "sign: write -1 or 1 (got True)"),
+        ('column = "Ax"', "column = true", "column: write a number or a name (got True)"),
+        ('columns = ["ELEV_L"', "columns = [true", "columns: write a number or a name (got [True"),
+        ("[source]", "[source]\nheader = 1", "source.header: write true or false (got 1)"),
+    ],
+)
+def test_true_is_no_number(tmp_path, old, new, words):
+    assert old in mapping_by_name()
+    assert words in message(ConfigurationError, tmp_path, mapping=mapping_by_name().replace(old, new, 1))
+
+
+def test_the_name_of_a_run_is_utf8(tmp_path):
+    (tmp_path / "map.toml").write_text(mapping_by_name().replace('run_id = "flight"\n', ""))
+    file = tmp_path / "gr\udcf6\udcdfe.csv"
+    write_csv(file, columns())
+    for files in (file, [file, file]):
+        with pytest.raises(
+            LogError, match=r"is not UTF-8, .* state run_id in the mapping, or rename the file"
+        ):
+            import_log(files, tmp_path / "map.toml", force=True)
+    (tmp_path / "map.toml").write_text(mapping_by_name())
+    assert import_log(file, tmp_path / "map.toml", force=True).log.run_ids == ("flight",)

@@ -7,7 +7,7 @@ import pytest
 import scipy.io
 from import_flight import DEG, FOOT, flown, write_csv
 
-from airtruth.errors import ConfigurationError
+from airtruth.errors import ConfigurationError, LogError, StoreError
 from airtruth.importers import guess_mapping, import_log, open_source, read_dictionary
 from airtruth.importers.mapping import MappingFile
 from validation import recorders
@@ -229,3 +229,93 @@ def test_a_clock_whose_rate_no_recorder_has(step, log, tmp_path):
     recorders.hdf5(tmp_path / "f.h5", topics)
     _, mapping = guessed(tmp_path / "f.h5")
     assert mapping.resample.rate_hz == 50.0
+
+
+def german(log):
+    c = log.channels
+    return {
+        "Time [s]": log.t_s,
+        "TAS [kt]": c["airspeed_m_s"] / (1852.0 / 3600.0),
+        "Alpha [deg]": c["alpha_rad"] / DEG,
+        "Theta [deg]": c["theta_rad"] / DEG,
+        "q [deg/s]": c["q_rad_s"] / DEG,
+        "nx [g]": c["ax_m_s2"] / 9.80665,
+        "nz [g]": -c["az_m_s2"] / 9.80665,
+        "Elevator [deg]": c["elevator_rad"] / DEG,
+        "Altitude [ft]": c["altitude_m"] / FOOT,
+    }
+
+
+@pytest.mark.parametrize(
+    ("suffix", "delimiter", "source"),
+    [
+        ("csv", ";", {"delimiter": ";", "decimal": ","}),
+        ("csv", "\t", {"delimiter": "\t", "decimal": ","}),
+        ("txt", ";", {"format": "csv", "delimiter": ";", "decimal": ","}),
+    ],
+)
+def test_a_table_with_decimal_commas(log, tmp_path, suffix, delimiter, source):
+    """A spreadsheet of a German desk writes them, with a mark of byte order."""
+    file = tmp_path / f"f.{suffix}"
+    write_csv(file, german(log), "|")
+    file.write_text("\ufeff" + file.read_text().replace(".", ",").replace("|", delimiter))
+    text, mapping = guessed(file)
+    assert tomllib.loads(text)["source"] == source
+    assert "do not contradict" in text
+    (tmp_path / "m.toml").write_text(text)
+    back = import_log(file, tmp_path / "m.toml").log
+    np.testing.assert_allclose(back.channels["elevator_rad"], log.channels["elevator_rad"], atol=1e-12)
+    assert mapping.source.skip_rows == 0
+
+
+def test_the_layout_of_other_tables(tmp_path):
+    for name, row, stated in (
+        ("a.csv", "1.5;2.5;3", {"delimiter": ";"}),
+        ("b.csv", "1.5\t2.5\t3", {"delimiter": "\t"}),
+        ("c.csv", "1,2,3", {}),
+        ("d.dat", "1,5   2,5  3", {"decimal": ","}),
+        ("e.dat", "1.5, 2.5, 3.5", {"format": "csv"}),
+        ("f.dat", "1.5 2.5 3.5", {}),
+    ):
+        (tmp_path / name).write_text("# made by hand\n" + f"{row}\n" * 9)
+        text = guess_mapping(tmp_path / name)
+        assert tomllib.loads(text).get("source", {}) == stated, name
+        assert "#   3: 3" in text
+
+
+@pytest.mark.parametrize(
+    ("encoding", "words"),
+    [
+        ("cp1252", "probably in Windows-1252 or Latin-1 (byte 13 is '\u00b0' there); save it as UTF-8"),
+        ("utf-16", "probably in UTF-16; save it as UTF-8"),
+        ("utf-16-le", "probably in UTF-16; save it as UTF-8"),
+    ],
+)
+def test_other_encodings(tmp_path, encoding, words):
+    (tmp_path / "f.csv").write_text("Zeit;Alpha [\u00b0]\n0,0;1,5\n0,1;1,6\n", encoding=encoding)
+    with pytest.raises(StoreError) as caught:
+        guess_mapping(tmp_path / "f.csv")
+    assert words in str(caught.value)
+
+
+def test_a_name_of_two_columns(log, tmp_path):
+    write_csv(tmp_path / "f.csv", german(log) | {"Q2 [deg/s]": 0.0 * log.t_s})
+    text = (tmp_path / "f.csv").read_text().replace("Q2 [deg/s]", "q [deg/s]")
+    (tmp_path / "f.csv").write_text(text)
+    guess, mapping = guessed(tmp_path / "f.csv")
+    assert mapping.channels["q_rad_s"].column == 5
+    assert "\n#   10 (q): 0, 0; 0, 0\n" in guess
+    (tmp_path / "m.toml").write_text(guess)
+    assert len(import_log(tmp_path / "f.csv", tmp_path / "m.toml").log.t_s) == len(log.t_s)
+    for stated, words in (
+        (
+            '"q [deg/s]"',
+            "2 columns are named 'q [deg/s]'; state the number of the one that is meant, column = 5 or 10",
+        ),
+        ('"q"', "Theta [deg], Time [s], nx [g], nz [g], q [deg/s]"),
+    ):
+        (tmp_path / "m.toml").write_text(guess.replace("column = 5", f"column = {stated}"))
+        with pytest.raises(LogError) as caught:
+            import_log(tmp_path / "f.csv", tmp_path / "m.toml")
+        assert words in str(caught.value)
+        assert "q [deg/s].1" not in str(caught.value)

@@ -39,6 +39,21 @@ def test_a_command_replaces_its_own_files(tmp_path: Path) -> None:
     assert verify(tmp_path).intact
 
 
+def test_a_name_that_is_not_utf8(tmp_path: Path) -> None:
+    path = tmp_path / "gr\udcf6\udcdfe.txt"
+    write(path, f"of {path.name}")
+    assert path.read_bytes() == rb"of gr\udcf6\udcdfe.txt"
+    assert verify(tmp_path).intact
+
+
+def test_a_temporary_name_divides_no_character() -> None:
+    for name in ("\u20ac" * 80, "a" + "\u20ac" * 80, "\udcf6" * 300, "\u20ac" * 59 + "a\udcf6" * 9):
+        short = temporary_name(name)[1:].rpartition(".tmp")[0].rsplit(".", 1)[0]
+        assert name.startswith(short)
+        assert 177 < len(os.fsencode(short)) <= 180
+        assert is_temporary(temporary_name(name))
+
+
 def test_nothing_else_is_replaced_without_force(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("mine")

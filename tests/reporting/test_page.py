@@ -27,7 +27,14 @@ from airtruth.reporting.pages import campaign_page, estimates_page
 from airtruth.reporting.pages.assets import DIGESTS, own, uplot
 from airtruth.reporting.pages.declared import declared_at, shifts_table
 from airtruth.reporting.pages.page import data_table
-from airtruth.reporting.pages.records import BUDGET, MOST, extract, record_errors, records_section
+from airtruth.reporting.pages.records import (
+    BUDGET,
+    MOST,
+    conditions_table,
+    extract,
+    record_errors,
+    records_section,
+)
 from airtruth.table import Group, Table, flat
 from scripts.vendor_uplot import unpacked
 
@@ -125,6 +132,16 @@ def test_a_model_without_numbers_leaves_a_gap():
     data = data_of(records_section(own).body)
     assert np.isnan(numbers(data["records"][0]["models"][0][0])).all()
     assert {str(row[3]) for row in record_errors(own).rows} == {"-"}
+
+
+def test_groups_are_shown_where_a_record_has_one():
+    for groups, heading in ((("", ""), ()), (("", "fitted"), ("group",))):
+        records = tuple(replace(record(f"r{k}"), group=group) for k, group in enumerate(groups))
+        own = Histories(records, ("declared", "before", "after"), "r0", 2)
+        errors = record_errors(own)
+        assert errors.columns[: errors.keys] == ("record", *heading, "channel")
+        assert conditions_table(own).columns[: 1 + len(heading)] == ("record", *heading)
+        assert {len(row) for row in errors.rows} == {len(errors.columns)}
 
 
 def test_names_cannot_end_a_script():

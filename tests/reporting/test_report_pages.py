@@ -98,6 +98,11 @@ def test_estimates_without_a_truth(light, tmp_path):
     assert float(rows["Cmq"]["ls"]) == pytest.approx(cmq.mean(), rel=1e-14)
     assert float(rows["Cmq"]["ls (in brackets)"]) == pytest.approx(cmq.std(), rel=1e-14)
     assert rows["converged"]["ls"] == "40"
+    units = [rows[name]["unit"] for name in ("CLalpha", "CLq", "Cmde", "Cmq", "wn_rad_s", "zeta")]
+    assert units == ["1/rad", "-", "1/rad", "-", "rad/s", "-"]
+    for label in ("CLalpha [1/rad]", "CLq [-]", "wn [rad/s]"):
+        assert label in of_file[0].read_text()
+    assert r"$\omega_n$ & rad/s &" in of_file[2].read_text()
 
 
 @pytest.mark.parametrize("name", ["report.gif", "report", "page.txt"])

@@ -47,6 +47,10 @@ BAD = {
         {"manoeuvre": [DOUBLET | {"kind": "dublet"}]},
         ["manoeuvre.0.kind", "did you mean 'doublet'"],
     ),
+    "parts": (
+        {"manoeuvre": [DOUBLET | {"kind": "multisine", "parts": 501}]},
+        ["manoeuvre.0.parts", "less than or equal to 500"],
+    ),
     "one bracket": ({"manoeuvre": DOUBLET}, ["write [[manoeuvre]] with two brackets"]),
     "no amplitude": ({"manoeuvre": [{"kind": "doublet"}]}, ["manoeuvre.0", "amplitude is missing"]),
     "limits of a sensor": (

@@ -113,6 +113,29 @@ def test_verify_of_other_folders(tmp_path):
         assert (ended.code, words in ended.err) == (2, True)
 
 
+def test_a_parent_of_campaigns(whole, tmp_path):
+    """Each manifest belongs to its own folder, at any depth."""
+    parent = tmp_path / "out"
+    folders = [parent / "light", parent / "paper" / "moderate"]
+    for folder in folders:
+        shutil.copytree(whole, folder)
+    result = verify(parent)
+    assert (result.findings, result.checked) == ((), 2 * verify(whole).checked)
+    (folders[0] / "logs" / "00001.parquet").unlink()
+    (folders[1] / "logs" / "00002.parquet").write_bytes(b"")
+    (folders[1] / "manifest-parts").mkdir()
+    (folders[1] / "manifest-parts" / "0").write_bytes(b"")
+    (folders[1] / "notes.txt").write_text("mine")
+    states = {f.file: f.state for f in verify(parent).findings}
+    assert states == {
+        "light/logs/00001.parquet": MISSING,
+        "paper/moderate/logs/00002.parquet": DAMAGED,
+        "paper/moderate/notes.txt": EXTRA,
+    }
+    (folders[0] / "manifest.jsonl").unlink()
+    assert ("light/manifest.jsonl", MISSING) in [(f.file, f.state) for f in verify(parent).findings]
+
+
 def test_verify_names_a_manifest_that_is_missing(whole, tmp_path):
     out = damaged(whole, tmp_path)
     (out / "manifest.jsonl").unlink()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from airtruth import aircraft
-from airtruth.errors import AircraftError
+from airtruth.errors import AircraftError, StoreError
 from airtruth.logs.verify import verify
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.simulation.campaign import plan
@@ -68,6 +68,24 @@ def test_a_model_of_a_stranger_is_confined(tmp_path):
     with pytest.raises(AircraftError, match="lets JSBSim open files"):
         new_from_jsbsim(folder, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_force_replaces_an_aircraft_and_nothing_else(tmp_path):
+    source, out = tmp_path / "gtm", tmp_path / "mine"
+    shutil.copytree(ROOT / "aircraft" / "gtm", source)
+    out.mkdir()
+    (out / "notes.txt").write_text("mine")
+    with pytest.raises(StoreError, match=r"mine: is not empty; choose a new folder"):
+        new_from_jsbsim(source, out)
+    with pytest.raises(StoreError, match=r"holds no aircraft\.toml, so --force does not replace it"):
+        new_from_jsbsim(source, out, force=True)
+    with pytest.raises(StoreError, match=r"gtm: holds the model that is read"):
+        new_from_jsbsim(source, source, force=True)
+    (out / "aircraft.toml").write_text("")
+    assert new_from_jsbsim(source, out, force=True).aircraft.name == "mine"
+    assert verify(out).intact
+    assert not (out / "notes.txt").exists()
+    assert (source / "gtm.xml").is_file()
 
 
 def test_a_wrong_name_lists_the_models(tmp_path):

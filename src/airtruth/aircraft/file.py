@@ -47,18 +47,13 @@ class Sensor(Strict):
     x: Quantity = Quantity(value=0.0)
     z: Quantity = Quantity(value=0.0)
 
-    @field_validator(*(kind.key for kind in KINDS.values() if not kind.may_be_negative))
-    @classmethod
-    def _not_negative(cls, value: Quantity) -> Quantity:
-        if value.value < 0.0:
-            raise ValueError(f"must not be negative (is {value.value:g} in SI)")
-        return value
+    _checked = field_validator(*(kind.key for kind in KINDS.values() if not kind.may_be_negative))(
+        qt.not_negative
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> Sensor:
-        low, high = self.minimum, self.maximum
-        if low is not None and high is not None and low.value >= high.value:
-            raise ValueError(f"minimum has to be below maximum (are {low.value:g} and {high.value:g} in SI)")
+        qt.require_order(self.minimum, self.maximum)
         return self
 
     def errors(self) -> SensorErrors:
@@ -75,6 +70,14 @@ class Actuator(Strict):
     minimum: qt.Angle
     maximum: qt.Angle
     delay: qt.Time = Quantity(value=0.0)
+
+    _checked = field_validator("delay")(qt.not_negative)
+
+    @model_validator(mode="after")
+    def _possible(self) -> Actuator:
+        qt.require_positive(self, ("bandwidth", "rate_limit"))
+        qt.require_order(self.minimum, self.maximum)
+        return self
 
 
 class Geometry(Strict):
@@ -107,10 +110,7 @@ class Tail(Strict):
 
     @model_validator(mode="after")
     def _complete(self) -> Tail:
-        for name in type(self).model_fields:
-            entry = getattr(self, name)
-            if entry is not None and not entry.value > 0.0:
-                raise ValueError(f"{name} has to be above 0 (is {entry.value:g} in SI)")
+        qt.require_positive(self, type(self).model_fields)
         if (self.area is None) != (self.lift_slope is None):
             raise ValueError("area and lift_slope give the lift of the tail together; state both or neither")
         return self

@@ -128,8 +128,8 @@ def changed(
     return planes.load(out_folder)
 
 
-def require_new(folder: Path) -> None:
-    """Refuse a folder for an aircraft that is not new or empty.
+def require_new(folder: Path, *, force: bool = False) -> None:
+    """Refuse a folder for an aircraft that is not new or empty; with ``force`` it may be that of an aircraft.
 
     Raises
     ------
@@ -139,8 +139,14 @@ def require_new(folder: Path) -> None:
     if not re.fullmatch(r"[A-Za-z0-9_.-]+", folder.name):
         raise StoreError(f"{folder}: the folder's name is the model's; use letters, digits, '_', '.' and '-'")
     try:
-        if folder.exists() and any(folder.iterdir()):
-            raise StoreError(f"{folder}: is not empty; choose a new folder for the changed aircraft")
+        if not folder.exists() or not any(folder.iterdir()):
+            return
+        if not force:
+            raise StoreError(f"{folder}: is not empty; choose a new folder for the aircraft")
+        if not (folder / planes.FILE).is_file():
+            raise StoreError(
+                f"{folder}: is not empty and holds no {planes.FILE}, so --force does not replace it; choose a new folder"
+            )
     except OSError as error:
         raise StoreError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
 

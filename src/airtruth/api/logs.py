@@ -25,8 +25,8 @@ def read_log(
     Parameters
     ----------
     logs : files, folders or logs; several are joined.
-    channels : channels to read; None for all.
-    run_ids : runs to read; None for all.
+    channels : channels to read, a string is one of them; None for all.
+    run_ids : runs to read, a string is one of them; None for all.
 
     Returns
     -------
@@ -167,7 +167,7 @@ def check(
     ----------
     logs : logs of one instrumentation; all their runs are assessed together, with noise of their own.
     aircraft : aircraft whose declared sensor errors are taken as known; None assumes ideal sensors.
-    run_ids : runs to use; None for all.
+    run_ids : runs to use, a string is one of them; None for all.
     force : continue although a log contradicts physics; the result lists the faults.
 
     Raises

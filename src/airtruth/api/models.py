@@ -34,7 +34,7 @@ def identify(
     ----------
     logs : logs of one aircraft.
     aircraft : aircraft, for its mass, inertia and reference lengths.
-    methods : names of estimators, see docs/methods.md.
+    methods : names of estimators, a string is one of them; see docs/methods.md.
     options : choices of the estimators; None for the defaults.
     joint : whether all runs share one estimate per method.
     force : continue although a log contradicts physics; the result records the faults.
@@ -128,7 +128,7 @@ def close_loop(
     ----------
     logs : logs of one aircraft.
     aircraft : the declared aircraft.
-    methods : names of estimators, see docs/methods.md.
+    methods : names of estimators, a string is one of them; see docs/methods.md.
     options : choices of the trace; None for the defaults.
     out : folder of the trace, the estimates, loop.json and the table; None to write nothing.
     force : use logs that contradict physics; the result lists the faults.
@@ -203,9 +203,15 @@ def report(
     ['light-intervals.svg']
     """
     from airtruth import reporting
+    from airtruth.errors import ConfigurationError
     from airtruth.logs.outputs import writing
     from airtruth.logs.sources import log_files
+    from airtruth.result import Result
 
+    if not isinstance(result, str | os.PathLike | Result):
+        raise ConfigurationError(
+            f"report: {type(result).__name__} is no result; give what a function returned, a folder or a file of estimates"
+        )
     source = Path(result) if isinstance(result, str | os.PathLike) else result
     inputs = [source] if isinstance(source, Path) else []
     inputs += [] if logs is None else log_files(logs)

@@ -91,7 +91,7 @@ def plan(
         for derivatives and increments.
     pressure : "constant", the airspeed is not an output of the filter, or "measured", it is one.
     split : keys of two or more effects to separate.
-    derivatives : names of derivatives to determine with the smallest standard errors.
+    derivatives : names of derivatives to determine with the smallest standard errors; a string is one of them.
     trace : folder of a trace, or its trace.json. Without ``split`` and ``derivatives`` its answer asks: tied effects are
         separated, the band of a learned increment is narrowed.
     sizes : EFFECT.PARAMETER -> value [its unit]; an effect without sizes imitates the first.
@@ -119,9 +119,11 @@ def plan(
     >>> forecast.theta.shape, forecast.together.shape
     ((6,), (6,))
     """
+    from airtruth.arguments import names
     from airtruth.design import forecast
     from airtruth.errors import ConfigurationError
 
+    split, derivatives = names("split", split, "elevator_delay"), names("derivatives", derivatives, "Cmq")
     if not split and not derivatives and trace is None:
         if campaign is None:
             raise ConfigurationError(

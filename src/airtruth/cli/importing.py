@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -78,7 +79,7 @@ def import_(
     if mapping is None or out is None:
         raise ConfigurationError(
             "import needs --mapping MAP.toml and --out LOG.parquet; "
-            f"`airtruth import --guess {files[0]}` prints a mapping to start from"
+            f"`airtruth import --guess {quote(str(files[0]))}` prints a mapping to start from"
         )
     if find_manoeuvres:
         _find(files, mapping, out, force=force, quiet=quiet)
@@ -104,7 +105,7 @@ def _find(files: list[Path], mapping: list[Path], out: Path, *, force: bool, qui
     with working("import", quiet):
         found = find_manoeuvres(files, mapping, out=out, force=force)
     print_result(
-        f"{found.summary()}\n{out} and {out.with_suffix('.png')}: edit the table, then import with --manoeuvres {out}"
+        f"{found.summary()}\n{out} and {out.with_suffix('.png')}: edit the table, then import with --manoeuvres {quote(str(out))}"
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -39,7 +40,8 @@ def campaign(
     from airtruth.starting import campaign_text
 
     text = campaign_text(_name(out), aircraft, eas_kt, altitude_ft)
-    _write(out, text, [f"airtruth plan {out}", f"airtruth fly {out} --out out/{_name(out)}"], force)
+    file = quote(str(out))
+    _write(out, text, [f"airtruth plan {file}", f"airtruth fly {file} --out out/{_name(out)}"], force)
 
 
 @new_app.command("mapping", epilog="Example: airtruth new mapping flight7.csv --out flight7.toml")
@@ -62,7 +64,8 @@ def mapping(
     measured = "data/foreign/flight7.csv" if file is None else file
     log = Path(measured).with_suffix(".parquet").name
     steps = [] if file is not None else ["airtruth example csv"]
-    _write(out, text, [*steps, f"airtruth import {measured} --mapping {out} --out {log}"], force)
+    command = f"airtruth import {quote(str(measured))} --mapping {quote(str(out))} --out {quote(log)}"
+    _write(out, text, [*steps, command], force)
 
 
 @new_app.command("aircraft", epilog="Example: airtruth new aircraft --jsbsim c182 --out aircraft/mine")
@@ -82,15 +85,15 @@ def aircraft(
     if jsbsim is not None:
         from airtruth.simulation.foreign_aircraft import new_from_jsbsim
 
-        print_result(new_from_jsbsim(jsbsim, out).summary())
+        print_result(new_from_jsbsim(jsbsim, out, force=force).summary())
         return
     from airtruth.starting import aircraft_text
 
     folder = out.parent if out.suffix == ".toml" else out
     file = folder / "aircraft.toml"
     steps = [
-        f"airtruth identify LOG.parquet --aircraft {folder}",
-        f"airtruth check LOG.parquet --aircraft {folder}",
+        f"airtruth identify LOG.parquet --aircraft {quote(str(folder))}",
+        f"airtruth check LOG.parquet --aircraft {quote(str(folder))}",
     ]
     _write(file, aircraft_text(_name(folder.absolute())), steps, force)
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.arguments import require_whole
 from airtruth.design.information import LinearExperiment, sensor_noise
 from airtruth.errors import ConfigurationError, choices
 from airtruth.identification.likelihood.options import PRESSURES
@@ -196,6 +197,8 @@ def forecast(
     """
     if pressure not in PRESSURES:
         raise ConfigurationError(f"plan: pressure = {pressure!r}: {choices(pressure, PRESSURES)}")
+    if records is not None:
+        require_whole("records", records, 1)
     plan = campaign if isinstance(campaign, Plan) else make(campaign)
     noise = sensor_noise(plan.sensors, plan.aircraft, pressure)
     groups = plan.table.groupby(list(_KIND), sort=False)

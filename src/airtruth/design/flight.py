@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from airtruth.aircraft import Aircraft
 from airtruth.aircraft import load as load_aircraft
+from airtruth.arguments import require_whole
 from airtruth.design.bench import Bench
 from airtruth.design.limits import Limits
 from airtruth.design.separation import Model
@@ -72,8 +73,9 @@ class PlanOptions:
         ConfigurationError
             Naming the option, its value and what is allowed.
         """
-        if self.records is not None and self.records < 1:
-            raise ConfigurationError(f"plan: {self.records} records; state 1 or more")
+        if self.records is not None:
+            require_whole("records", self.records, 1)
+        require_whole("seed", self.seed, 0)
 
 
 def fitted_of(records: int) -> int:

@@ -9,6 +9,7 @@ from typing import Any, Final, Literal
 
 from airtruth.errors import ConfigurationError, choices
 from airtruth.physics.terms import Change
+from airtruth.quantity import LARGEST
 from airtruth.units import UNITS
 
 GTM: Final[Mapping[str, float]] = {
@@ -236,6 +237,10 @@ class Effect:
             name, factor = keys[key]
             if isinstance(value, bool) or not isinstance(value, int | float):
                 raise ConfigurationError(f"effect {self.key}: {key} has to be a number (is {value!r})")
+            if isinstance(value, int) and abs(value) > LARGEST:
+                raise ConfigurationError(
+                    f"effect {self.key}: {key} has to be between -{LARGEST:g} and {LARGEST:g}"
+                )
             if name in values:
                 raise ConfigurationError(f"effect {self.key}: {key}: {name} is given twice")
             values[name] = value * factor

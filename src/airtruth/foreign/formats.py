@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from airtruth.errors import StoreError
-from airtruth.foreign.source import Source, packed
+from airtruth.foreign.source import Source, packed, table_source
 from airtruth.foreign.text import WHITESPACE, TextFormat, read_text
 from airtruth.isolation.protocol import Reply
 
@@ -47,7 +47,8 @@ def _parquet(path: Path, layout: TextFormat) -> Source:
         frame = frame.reset_index()
     if frame.empty:
         raise StoreError(f"{path}: holds no rows; export it again")
-    return Source(path, {str(name): frame.iloc[:, i].to_numpy() for i, name in enumerate(frame.columns)})
+    columns = [frame.iloc[:, i].to_numpy() for i in range(frame.shape[1])]
+    return table_source(path, [str(name) for name in frame.columns], columns)
 
 
 def _mat(path: Path, layout: TextFormat) -> Source:

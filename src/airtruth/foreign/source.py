@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -31,6 +31,8 @@ class Source:
     ordered : whether the arrays are the columns of one table, so that a number means one of them.
     first_line : line of the first row in a text file, 0 if it is none.
     units : name -> unit as the file states it.
+    repeated : name that several columns of a table have -> their numbers; in ``arrays`` further ones have the name of
+        `further_name`.
     """
 
     path: Path
@@ -40,6 +42,42 @@ class Source:
     ordered: bool = True
     first_line: int = 0
     units: Mapping[str, str] = field(default_factory=dict)
+    repeated: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names as the file has them, each once."""
+        further = {further_name(name, n) for name, numbers in self.repeated.items() for n in numbers[1:]}
+        return tuple(name for name in self.arrays if name not in further)
+
+
+def further_name(name: str, number: int) -> str:
+    """Key of a column whose name an earlier one has."""
+    return f"{name} (column {number})"
+
+
+def table_source(
+    path: Path, names: Sequence[str], columns: Sequence[NDArray[Any]], first_line: int = 0
+) -> Source:
+    """The columns of one table.
+
+    Parameters
+    ----------
+    path : the file.
+    names : one for each column, of which several may be equal; none if the columns are numbered.
+    columns : their values.
+    first_line : as of `Source`.
+    """
+    if not names:
+        return Source(path, {f"{i}": one for i, one in enumerate(columns, 1)}, first_line=first_line)
+    numbers: dict[str, tuple[int, ...]] = {}
+    arrays: dict[str, NDArray[Any]] = {}
+    for number, (stated, values) in enumerate(zip(names, columns, strict=True), 1):
+        name = stated.strip()
+        arrays[further_name(name, number) if name in numbers else name] = values
+        numbers[name] = (*numbers.get(name, ()), number)
+    repeated = {name: several for name, several in numbers.items() if len(several) > 1}
+    return Source(path, arrays, first_line=first_line, repeated=repeated)
 
 
 def packed(source: Source) -> Reply:
@@ -63,6 +101,7 @@ def packed(source: Source) -> Reply:
         "ordered": source.ordered,
         "first_line": source.first_line,
         "units": dict(source.units),
+        "repeated": [[name, list(numbers)] for name, numbers in source.repeated.items()],
     }
     return Reply(facts, tuple(arrays))
 
@@ -89,7 +128,8 @@ def unpacked(path: Path, reply: Reply) -> Source:
         facts["ordered"],
         facts["first_line"],
         facts["units"],
+        {name: tuple(numbers) for name, numbers in facts["repeated"]},
     )
 
 
-__all__ = ["Source", "packed", "unpacked"]
+__all__ = ["Source", "further_name", "packed", "table_source", "unpacked"]

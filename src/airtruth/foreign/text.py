@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from airtruth.errors import ConfigurationError, StoreError, reason
-from airtruth.foreign.source import Source
+from airtruth.foreign.source import Source, table_source
 
 WHITESPACE = r"\s+"
 """Delimiter of columns that any number of blanks separate."""
+_UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+"""Marks of byte order that UTF-16 begins with."""
 
 
 @dataclass(frozen=True)
@@ -40,23 +43,23 @@ def read_text(path: Path, layout: TextFormat) -> Source:
         with path.open(encoding="utf-8-sig") as file:
             lines = file.read().splitlines()
     except UnicodeDecodeError as error:
-        raise StoreError(
-            f"{path}: is not text in UTF-8 ({error.reason} at byte {error.start}); save it as UTF-8"
-        ) from None
+        raise StoreError(f"{path}: {_encoding(error.object, error.start)}") from None
+    if "\0" in "".join(lines[:1]):
+        raise StoreError(f"{path}: {_encoding(lines[0].encode(), lines[0].index(chr(0)))}")
     if layout.delimiter == layout.decimal:
         raise ConfigurationError(
             f"{path}: {layout.decimal!r} is both [source] delimiter and decimal; state another delimiter"
         )
     first = layout.skip_rows
-    while first < len(lines) and (not lines[first].strip() or lines[first].lstrip()[0] in "#%"):
+    while first < len(lines) and (not lines[first].strip() or names_a_comment(lines[first])):
         first += 1
     if first >= len(lines):
         raise StoreError(f"{path}: holds no rows; export it again, or lower [source] skip_rows")
     header = layout.header
     if header is None:
         cells = lines[first].split(None if layout.delimiter == WHITESPACE else layout.delimiter)
-        header = not any(_is_number(cell, layout.decimal) for cell in cells)
-    rows = [line for line in lines[first:] if not line.lstrip().startswith(("#", "%"))]
+        header = not any(is_number(cell, layout.decimal) for cell in cells)
+    rows = [line for line in lines[first:] if not names_a_comment(line)]
     plain = len(rows) == len(lines) - first
     _require_names(path, rows, layout.delimiter, header)
     try:
@@ -75,11 +78,41 @@ def read_text(path: Path, layout: TextFormat) -> Source:
         raise StoreError(f"{path}: is not a table ({reason(error)}); check [source] delimiter") from None
     if frame.empty:
         raise StoreError(f"{path}: holds a header and no rows; export it again")
-    arrays = {
-        str(name).strip() if header else f"{i}": frame.iloc[:, i - 1].to_numpy()
-        for i, name in enumerate(frame.columns, 1)
-    }
-    return Source(path, arrays, first_line=first + 1 + header)
+    names = _own_names([str(name) for name in frame.columns], rows, layout.delimiter) if header else ()
+    columns = [frame.iloc[:, i].to_numpy() for i in range(frame.shape[1])]
+    return table_source(path, names, columns, first_line=first + 1 + header)
+
+
+def names_a_comment(line: str) -> bool:
+    """Whether a line begins with # or %."""
+    return line.lstrip().startswith(("#", "%"))
+
+
+def _own_names(names: list[str], rows: list[str], delimiter: str) -> list[str]:
+    """Names of the header; pandas adds .1, .2 to one that is there again."""
+    if delimiter == WHITESPACE:
+        stated = rows[0].split()
+    else:
+        stated = next(csv.reader(rows, delimiter=delimiter, skipinitialspace=True), [])
+    if len(stated) < len(names):
+        return names
+    return [
+        own if own in stated[:i] and re.fullmatch(re.escape(own) + r"\.\d+", name) else name
+        for i, (own, name) in enumerate(zip(stated, names, strict=False))
+    ]
+
+
+def _encoding(content: bytes, at: int) -> str:
+    """What the encoding of a file that is not UTF-8 seems to be, and what to do."""
+    if content[:2] in _UTF16_MARKS or content.count(0) > len(content) / 4:
+        return "is not text in UTF-8 but probably in UTF-16; save it as UTF-8 (a spreadsheet: CSV UTF-8)"
+    if re.search(rb"[\x00-\x08\x0b\x0e-\x1f]", content):
+        return f"is not text in UTF-8 (byte {at + 1}); export it as text"
+    sign = content[at : at + 1].decode("cp1252", "replace")
+    return (
+        f"is not text in UTF-8 but probably in Windows-1252 or Latin-1 (byte {at + 1} is {sign!r} there); save it as UTF-8 "
+        "(a spreadsheet: CSV UTF-8)"
+    )
 
 
 def _require_names(path: Path, rows: list[str], delimiter: str, header: bool) -> None:
@@ -94,7 +127,8 @@ def _require_names(path: Path, rows: list[str], delimiter: str, header: bool) ->
         )
 
 
-def _is_number(text: str, decimal: str) -> bool:
+def is_number(text: str, decimal: str) -> bool:
+    """Whether a cell holds a number with this decimal sign."""
     try:
         float(text.strip().strip('"').replace(decimal, "."))
     except ValueError:
@@ -102,4 +136,4 @@ def _is_number(text: str, decimal: str) -> bool:
     return True
 
 
-__all__ = ["WHITESPACE", "TextFormat", "read_text"]
+__all__ = ["WHITESPACE", "TextFormat", "is_number", "names_a_comment", "read_text"]

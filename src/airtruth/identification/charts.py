@@ -10,15 +10,13 @@ from numpy.typing import NDArray
 
 from airtruth.charts import Chart, Mark, Panel, Rule
 from airtruth.numerics.order_statistics import quantiles
-from airtruth.physics.short_period import MODAL, PARAMETERS
+from airtruth.physics.short_period import MODAL, PARAMETERS, UNITS
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
 
-LABELS: Final = {"wn_rad_s": "wn [rad/s]", "zeta": "zeta [-]"}
-"""Labels of the modal parameters; a derivative's is its name and [1/rad]."""
 _MIDDLE: Final = (0.025, 0.975)
 """Quantiles between which 95 % of the runs lie [-]."""
 _NAMES: Final = (*PARAMETERS, *MODAL)
@@ -55,7 +53,7 @@ def intervals_chart(
     marks = _marks(frames, list(methods), single=runs == 1)
     panels = tuple(
         Panel(
-            x_label=LABELS.get(name, f"{name} [1/rad]"),
+            x_label=f"{name.removesuffix('_rad_s')} [{UNITS[name]}]",
             rows=tuple(methods),
             marks=tuple(row[name] for row in marks if name in row),
             rules=tuple(
@@ -116,4 +114,4 @@ def _values(frame: pd.DataFrame, method: str, end: str = "") -> Array:
     return np.asarray(own[[name + end for name in _NAMES]], dtype=np.float64)
 
 
-__all__ = ["LABELS", "Frames", "intervals_chart"]
+__all__ = ["Frames", "intervals_chart"]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.arguments import require_whole
 from airtruth.errors import ConfigurationError, choices
 from airtruth.physics.short_period import Scale
 
@@ -116,9 +118,13 @@ class Options:
             ("airspeed_m_s", 0.0, np.inf),
         ):
             value = getattr(self, name)
-            if value is not None and not low < value < high:
-                raise ConfigurationError(f"option {name} = {value!r}: must lie between {low:g} and {high:g}")
-        if self.band_hz is not None and not 0.0 < self.band_hz[0] < self.band_hz[1] < np.inf:
+            if value is None and getattr(type(self), name) is None:
+                continue
+            if not _is_number(value) or not low < value < high:
+                raise ConfigurationError(
+                    f"option {name} = {value!r}: must be a number between {low:g} and {high:g}"
+                )
+        if self.band_hz is not None and not _is_band(self.band_hz):
             raise ConfigurationError(
                 f"option band_hz = {self.band_hz!r}: must be a lower and a higher frequency, both above 0"
             )
@@ -128,5 +134,14 @@ class Options:
                 "pressure = 'measured' needs: leave one of them out"
             )
         for name in ("order", "maximum_iterations"):
-            if getattr(self, name) < 1:
-                raise ConfigurationError(f"option {name} = {getattr(self, name)!r}: must be at least 1")
+            require_whole(f"option {name}", getattr(self, name), 1)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _is_band(value: object) -> bool:
+    if not isinstance(value, Sequence) or len(value) != 2 or not all(map(_is_number, value)):
+        return False
+    return bool(0.0 < value[0] < value[1] < np.inf)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from airtruth import __version__
 from airtruth import aircraft as planes
+from airtruth.arguments import names
 from airtruth.cluster import Cluster
 from airtruth.errors import ConfigurationError
 from airtruth.identification.batch import identify_batch, identify_joint
@@ -62,7 +63,7 @@ def identify(
     logs : a file, a folder, a log in memory, or several of these; runs may differ in length and rate.
     aircraft : folder or file of an aircraft, the name of a shipped one, or any object with wing_area_m2,
         chord_m, mass_kg, inertia_yy_kg_m2.
-    methods : names of methods, keys of `airtruth.identification.METHODS`.
+    methods : names of methods, a string is one of them; keys of `airtruth.identification.METHODS`.
     options : choices; None for the defaults.
     joint : whether all runs share one estimate.
     force : continue although a log contradicts physics; the result records the faults in ``forced``.
@@ -87,7 +88,7 @@ def identify(
     >>> result.to_frame().loc[0, ["run_id", "method", "converged"]].tolist()
     ['r1', 'ls', True]
     """
-    chosen = [method(name) for name in dict.fromkeys(methods)]
+    chosen = [method(name) for name in dict.fromkeys(names("methods", methods, "ls"))]
     made: list[Sequence[Estimates]] = []
     work = _worked(
         made.append, _Request(logs, aircraft, chosen, options or Options(), joint, force), advance, cluster
@@ -146,7 +147,7 @@ def identified(
             logs, aircraft, methods, options, joint=True, force=force, advance=advance, cluster=cluster
         )
         return
-    chosen = [method(name) for name in dict.fromkeys(methods)]
+    chosen = [method(name) for name in dict.fromkeys(names("methods", methods, "ls"))]
     with Spool(folder) as spool:
         request = _Request(logs, aircraft, chosen, options or Options(), False, force)
         work = _worked(spool.add, request, advance, cluster)

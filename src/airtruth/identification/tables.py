@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,16 +21,13 @@ from airtruth.identification.estimates import (
     quantities,
 )
 from airtruth.identification.methods import METHODS
-from airtruth.physics.short_period import MODAL, PARAMETERS
+from airtruth.physics.short_period import MODAL, PARAMETERS, UNITS
 from airtruth.table import Cell, Group, Interval, Number, Pair, Table, flat
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
-
-UNITS: Final = {"wn_rad_s": "rad/s"}
-"""Units of the parameters that have one."""
 
 
 def details(estimates: Estimates, run_id: str | None = None) -> Table:
@@ -58,7 +55,7 @@ def details(estimates: Estimates, run_id: str | None = None) -> Table:
     rows: list[tuple[Cell, ...]] = [
         (
             name,
-            UNITS.get(name, "-"),
+            UNITS[name],
             float(q.value[run, i]),
             float(q.std[run, i]),
             float(q.lower[run, i]),
@@ -93,7 +90,7 @@ def _distribution(estimates: Estimates) -> Table:
         std = std[np.isfinite(std)]
         stated = float(np.sqrt(np.mean(std**2))) if std.size else math.nan
         error = spread / math.sqrt(value.size) if value.size > 1 else math.nan
-        rows.append((name, UNITS.get(name, "-"), mean, error, spread, stated))
+        rows.append((name, UNITS[name], mean, error, spread, stated))
     return flat(
         title=f"{METHODS[estimates.method].title}, {count} of {len(estimates.run_ids)} runs converged",
         columns=("parameter", "unit", "mean", "standard error", "spread over runs", "stated std (rms)"),
@@ -232,7 +229,7 @@ def _overview(
         groups=(
             Group(
                 "",
-                tuple((n, UNITS.get(n, "-"), *(c[n] for c in cells.values())) for n in (*PARAMETERS, *MODAL)),
+                tuple((n, UNITS[n], *(c[n] for c in cells.values())) for n in (*PARAMETERS, *MODAL)),
             ),
             Group(
                 "Runs",

@@ -18,7 +18,7 @@ from airtruth.importers.derived import airspeed_from_pressure, with_alpha
 from airtruth.importers.manoeuvre_result import ManoeuvreResult
 from airtruth.importers.manoeuvres import find, read_table
 from airtruth.importers.mapping import CONSTANTS, MappingFile, Place, Resample, read_mapping, unit_factor
-from airtruth.importers.runs import require_rows, runs_of
+from airtruth.importers.runs import require_rows, run_of_file, runs_of
 from airtruth.importers.series import Series, base_clock, read_series
 from airtruth.importers.sources import Source, numbers, open_source
 from airtruth.importers.uniform import shortened, uniform
@@ -193,12 +193,12 @@ def _recorded(path: Path | str, mapping: MappingFile, *, single: bool) -> Flight
     if single:
         return convert(source, mapping)
     if not mapping.manoeuvre and mapping.time.run is None:
-        return convert(source, mapping.model_copy(update={"run_id": source.path.stem}))
-    named = convert(source, mapping)
+        return convert(source, mapping.model_copy(update={"run_id": run_of_file(source)}))
+    named, stem = convert(source, mapping), run_of_file(source)
     return replace(
         named,
-        run_ids=tuple(f"{source.path.stem}:{run}" for run in named.run_ids),
-        metadata={**named.metadata, **_renamed(named, source.path.stem)},
+        run_ids=tuple(f"{stem}:{run}" for run in named.run_ids),
+        metadata={**named.metadata, **_renamed(named, stem)},
     )
 
 

@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from airtruth.channels import REQUIRED, SIGNALS
 from airtruth.checks.gate import inspect
 from airtruth.errors import AirtruthError
+from airtruth.foreign.source import further_name
 from airtruth.importers.convert import convert
 from airtruth.importers.derived import PRESSURE
 from airtruth.importers.dictionary import NAMES, SHORT, TIME, Unit, Words, plain_name
+from airtruth.importers.layout import guess_layout
 from airtruth.importers.mapping import DERIVED, TIME_UNITS, MappingFile, SourceSection
 from airtruth.importers.sources import Source, open_source
 from airtruth.importers.uniform import even_times
@@ -67,7 +69,7 @@ def guess_mapping(
     Parameters
     ----------
     path : file of any supported format.
-    section : how it is read; None for the defaults.
+    section : how it is read; None guesses delimiter and decimal sign of text.
     words : names and units of the user's own (`airtruth.importers.dictionary.read_dictionary`).
 
     Raises
@@ -75,12 +77,13 @@ def guess_mapping(
     StoreError, ConfigurationError
         If the file cannot be read.
     """
+    section = section or guess_layout(path)
     source = open_source(path, section)
     words = words or Words()
     with np.errstate(invalid="ignore", over="ignore"):  # a signalling NaN
         columns = list(_columns(source, words))
     chosen, zero = _chosen(columns, words)
-    body = "\n".join(_body(source, chosen, columns))
+    body = "\n".join(_body(source, section, chosen, columns))
     lines = [f"# A guess from {source.path.name}: check every unit and sign before use."]
     lines += [f"# {name}: column {key!r} is zero throughout and is not mapped" for name, key in zero]
     lines += [f"# {text}" for text in _judgement(source, body, chosen)]
@@ -89,7 +92,7 @@ def guess_mapping(
         finite = c.values[np.isfinite(c.values)]
         if len(finite):
             where = f"{c.variable} column {c.key}" if c.variable else repr(c.key)
-            label = f" ({c.name})" if c.variable and c.name else ""
+            label = f" ({c.name})" if isinstance(c.key, int) and c.name and not c.name.isdigit() else ""
             lines.append(
                 f"#   {where}{label}: {finite[0]:.6g}, {finite[-1]:.6g}; {finite.min():.6g}, {finite.max():.6g}"
             )
@@ -98,6 +101,11 @@ def guess_mapping(
 
 def _columns(source: Source, words: Words) -> Iterator[_Column]:
     numbered = source.ordered and list(source.arrays) == [str(i) for i in range(1, len(source.arrays) + 1)]
+    repeated = {
+        further_name(name, n) if n > numbers[0] else name: (name, n)
+        for name, numbers in source.repeated.items()
+        for n in numbers
+    }
     for name, values in source.arrays.items():
         if values.dtype.kind not in "biuf" or len(values) < 2:
             continue
@@ -107,9 +115,10 @@ def _columns(source: Source, words: Words) -> Iterator[_Column]:
                 plain, unit = _split(label, words)
                 yield _Column(i + 1, name, plain, unit, values[:, i].astype(np.float64))
         else:
-            plain, unit = _split(name.rsplit(".", 1)[-1], words)
+            own, number = repeated.get(name, (name, name))
+            plain, unit = _split(own.rsplit(".", 1)[-1], words)
             stated = words.unit(source.units[name]) if name in source.units else None
-            key: str | int = int(name) if numbered else name
+            key: str | int = int(name) if numbered else number
             yield _Column(key, None, plain, unit or stated, values.astype(np.float64))
 
 
@@ -257,9 +266,21 @@ def _clock_of(column: _Column, base: _Column | None, columns: Sequence[_Column])
     return near[0] if near else None
 
 
-def _body(source: Source, chosen: dict[str, _Column], columns: Sequence[_Column]) -> Iterator[str]:
+def _source_table(section: SourceSection) -> Iterator[str]:
+    """[source] where the file is not read by the defaults of its suffix."""
+    stated = {name: value for name, value in section if value != type(section).model_fields[name].default}
+    if stated:
+        yield "\n[source]"
+    for name, value in stated.items():
+        yield f"{name} = {json.dumps(value)}"
+
+
+def _body(
+    source: Source, section: SourceSection, chosen: dict[str, _Column], columns: Sequence[_Column]
+) -> Iterator[str]:
     yield "schema = 1"
     yield f"# run_id = {json.dumps(source.path.stem)} # the name of the file, unless stated"
+    yield from _source_table(section)
     time = None if source.clocks else chosen.get(TIME)
     yield "\n[time]"
     if source.clocks:

@@ -129,11 +129,11 @@ class Channel(Strict):
 
 
 class Constant(Strict):
-    """A fact of a record: a number, or a column whose mean over the run is taken."""
+    """A fact of a record: a number above 0, or a column whose mean over the run is taken."""
 
     column: ColumnKey | None = None
     variable: str | None = None
-    value: float | None = None
+    value: float | None = Field(default=None, gt=0.0)
     unit: Unit
 
     @model_validator(mode="after")

@@ -42,7 +42,7 @@ def runs_of(
         raise LogError(f"{source.path}: no time is finite; state [time] column and unit")
     low, high = min(e[0] for e in edges), max(e[1] for e in edges)
     if not mapping.manoeuvre:
-        return [(mapping.run_id or source.path.stem, -np.inf, np.inf, None)]
+        return [(mapping.run_id or run_of_file(source), -np.inf, np.inf, None)]
     for one in mapping.manoeuvre:
         if one.end_s <= low or one.start_s >= high:
             raise LogError(
@@ -50,6 +50,23 @@ def runs_of(
                 f"the file, whose clock runs from {low:g} to {high:g} s"
             )
     return [(one.run_id, one.start_s, one.end_s, None) for one in mapping.manoeuvre]
+
+
+def run_of_file(source: Source) -> str:
+    """Name of the file without its suffix, as the name of its run.
+
+    Raises
+    ------
+    LogError
+        If it is not UTF-8, which a log cannot hold.
+    """
+    name = source.path.stem
+    if any("\ud800" <= character <= "\udfff" for character in name):
+        raise LogError(
+            f"{source.path}: the name of the file is not UTF-8, so it cannot be that of a run; state run_id in the mapping, "
+            "or rename the file"
+        )
+    return name
 
 
 def _run_name(cell: object) -> str:
@@ -81,4 +98,4 @@ def require_rows(where: str, series: Mapping[str, Series], rows: int) -> None:
             )
 
 
-__all__ = ["require_rows", "runs_of"]
+__all__ = ["require_rows", "run_of_file", "runs_of"]

@@ -98,6 +98,12 @@ def column(source: Source, place: Place, variable: str | None = None) -> tuple[N
             )
         name = list(source.arrays)[key - 1]
         return source.arrays[name], name
+    if isinstance(key, str) and key in source.repeated and place.variable is None:
+        numbers = source.repeated[key]
+        raise LogError(
+            f"{source.path}: {len(numbers)} columns are named {key!r}; state the number of the one that is meant, column = "
+            f"{' or '.join(map(str, numbers))}"
+        )
     if isinstance(key, str) and key in source.arrays and place.variable is None:
         values = source.arrays[key]
         if values.ndim == 2:
@@ -108,7 +114,7 @@ def column(source: Source, place: Place, variable: str | None = None) -> tuple[N
         return values, key
     if variable is None:
         what = repr(key) if isinstance(key, str) else f"{key} (of which matrix? state variable)"
-        raise LogError(f"{source.path}: no column {what}; {choices(str(key), source.arrays)}")
+        raise LogError(f"{source.path}: no column {what}; {choices(str(key), source.names)}")
     if variable not in source.arrays:
         raise LogError(f"{source.path}: no variable {variable!r}; {choices(variable, source.arrays)}")
     matrix = source.arrays[variable]

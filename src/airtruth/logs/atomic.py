@@ -117,7 +117,7 @@ def _record(active: Guard | None, path: Path, written: Path) -> None:
 
 
 def write_text(path: Path | str, text: str) -> None:
-    """Write a text file (UTF-8) atomically.
+    r"""Write a text file (UTF-8) atomically; a byte of a name that is not UTF-8 is written as \udcXX.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def write_text(path: Path | str, text: str) -> None:
         If the file cannot be written.
     """
     with atomic_file(path) as file:
-        file.write(text.encode())
+        file.write(text.encode("utf-8", "backslashreplace"))
 
 
 @contextmanager

@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import TypeAlias
 
+from airtruth.arguments import names
 from airtruth.errors import ConfigurationError, LogError
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.store import log_paths, read_log
@@ -77,6 +78,8 @@ def named_logs(
     ConfigurationError, StoreError, LogError
         As `sources` and `airtruth.logs.store.read_log`; or a run occurs in two logs, or in none.
     """
+    columns = None if columns is None else names("channels", columns, "alpha_rad")
+    run_ids = None if run_ids is None else names("run_ids", run_ids, "light-00001")
     owner: dict[str, str] = {}
     remaining = None if run_ids is None else set(run_ids)
     for source in sources(logs):

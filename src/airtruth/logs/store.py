@@ -15,8 +15,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from airtruth.arguments import require_whole
 from airtruth.channels import RUN_ID, SIGNALS, TIME
-from airtruth.errors import LogError, StoreError, choices
+from airtruth.errors import ConfigurationError, LogError, StoreError, choices
 from airtruth.logs.atomic import atomic_file, write_text
 from airtruth.logs.flight_log import FlightLog, unknown_runs
 from airtruth.logs.remote import location
@@ -37,6 +38,8 @@ SCHEMA: Final = 1
 RUNS_PER_GROUP: Final = 25
 """Runs per row group [-]. Measured with runs of 250 samples: a group per run takes seven times as long to write
 and nine times as long to read."""
+_TYPES: Final = ("float32", "float64")
+"""Types of channels in a file."""
 STATED_UNITS: Final = "stated_units"
 """Key of a log's metadata: column -> unit in the file's metadata, where it is not the unit of the channel."""
 CAMPAIGN_TABLES: Final = ("plan.parquet", "truth.parquet", "estimates.parquet")
@@ -56,11 +59,13 @@ def write_log(
     ----------
     path : file to write; its folder must exist.
     log : the log; its metadata must be JSON.
-    dtype : type of the channels; time is always float64.
+    dtype : type of the channels, "float32" or "float64"; time is always float64.
     runs_per_group : runs per row group, the unit of random access.
 
     Raises
     ------
+    ConfigurationError
+        If ``dtype`` is another type.
     StoreError
         If the file cannot be written.
 
@@ -71,6 +76,9 @@ def write_log(
     >>> at.read_log("first.parquet")
     FlightLog(1 run of 5 s at 50 Hz, 11 channels: airspeed_m_s, alpha_rad, theta_rad, q_rad_s, ...)
     """
+    if dtype not in _TYPES:
+        raise ConfigurationError(f"{path}: dtype = {dtype!r}: {choices(str(dtype), _TYPES)}")
+    require_whole("runs_per_group", runs_per_group, 1)
     fields = [pa.field(RUN_ID, pa.string()), _field(TIME, "float64")]
     fields += [_field(name, dtype) for name in log.channels]
     document = json.dumps({"schema": SCHEMA, **log.metadata}, allow_nan=False).encode()

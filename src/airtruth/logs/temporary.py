@@ -27,7 +27,9 @@ _START_FIELD: Final = 19
 
 def temporary_name(name: str) -> str:
     """Return a hidden name for a temporary file of ``name`` that states this process as its owner."""
-    short = name.encode()[:LONGEST_NAME].decode(errors="ignore")
+    short = name[:LONGEST_NAME]
+    while len(os.fsencode(short)) > LONGEST_NAME:  # a cut of the bytes could divide a character
+        short = short[:-1]
     pid = os.getpid()
     return f".{short}.{pid}-{started(pid) or 0}-{secrets.token_hex(4)}.tmp"
 

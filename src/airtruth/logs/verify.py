@@ -1,11 +1,11 @@
-"""Compare the files of a folder with the digests that its manifest and its ledgers hold."""
+"""Compare the files of a folder with the digests that manifests and ledgers in it hold, at any depth."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Final
 
 from airtruth.errors import StoreError
@@ -91,11 +91,11 @@ class Verification:
 
 
 def verify(folder: Path | str) -> Verification:
-    """Compare every file of a folder with the digests in its manifest and in the ledgers of its subfolders.
+    """Compare every file of a folder with the digests in the manifests and ledgers at any depth.
 
     Parameters
     ----------
-    folder : folder of a campaign, or any folder into which a command wrote.
+    folder : folder of a campaign, any folder into which a command wrote, or a parent of such folders.
 
     Raises
     ------
@@ -106,39 +106,53 @@ def verify(folder: Path | str) -> Verification:
     if not folder.is_dir():
         raise StoreError(f"{folder}: is no folder; give the folder of a campaign or another --out")
     files = {p.relative_to(folder).as_posix(): p for p in files_below(folder)}
-    listing = {name for name in files if name == MANIFEST or Path(name).name == LEDGER}
-    campaign = MANIFEST in files or _SETTINGS in files
-    if not listing and not campaign:
+    ledgers = {name for name in files if PurePosixPath(name).name == LEDGER}
+    campaigns = _campaigns(files.keys())
+    if not ledgers and not campaigns:
         raise StoreError(
             f"{folder}: holds neither {MANIFEST} nor {LEDGER}, so there is nothing to compare its files with"
         )
     findings: list[Finding] = []
     recorded: dict[str, str] = {}
-    if campaign:
-        digests, faults = _of_manifest(folder)
-        recorded |= digests
-        findings += faults
-    for name in sorted(listing - {MANIFEST}):
+    known = {*ledgers, LOCK}
+    for at in campaigns:
+        digests, faults = _of_manifest(folder / at)
+        recorded |= {(at / name).as_posix(): digest for name, digest in digests.items()}
+        findings += [replace(fault, file=(at / fault.file).as_posix()) for fault in faults]
+        known |= _own_files(files.keys(), at, complete=not faults)
+    for name in sorted(ledgers):
         try:
             entries = ledger.read(files[name].parent)
         except StoreError as error:
             findings.append(Finding(name, DAMAGED, str(error).partition(": ")[2]))
             continue
-        parent = files[name].parent.relative_to(folder)
+        parent = PurePosixPath(name).parent
         recorded |= {(parent / file).as_posix(): entry.sha256 for file, entry in entries.items()}
     findings += _compared(folder, recorded)
-    known = {
-        *recorded,
-        *listing,
-        LOCK,
-        *(n for n in files if n.startswith((f"{LEASES}/", f"{MANIFEST_PARTS}/"))),
-    }
-    if any(f.file == MANIFEST for f in findings):  # it no longer lists every file of the campaign
-        known |= {name for name in files if _CAMPAIGN_FILE.fullmatch(name)}
+    known |= recorded.keys()
     findings += [
         Finding(name, EXTRA, "no manifest or ledger lists it") for name in sorted(files.keys() - known)
     ]
     return Verification(folder, len(recorded), tuple(sorted(findings, key=lambda f: f.file)))
+
+
+def _campaigns(names: Iterable[str]) -> list[PurePosixPath]:
+    """Folders of the campaigns, relative to the folder; a campaign without a manifest still has its settings."""
+    paths = map(PurePosixPath, names)
+    return sorted({path.parent for path in paths if path.name in (MANIFEST, _SETTINGS)})
+
+
+def _own_files(names: Iterable[str], at: PurePosixPath, *, complete: bool) -> set[str]:
+    """Files of a campaign that its manifest does not list; with an incomplete manifest, every file that it writes."""
+    prefix = "" if at == PurePosixPath() else f"{at}/"
+    inside = (name.removeprefix(prefix) for name in names if name.startswith(prefix))
+    return {
+        prefix + name
+        for name in inside
+        if name in (MANIFEST, LOCK)
+        or name.startswith((f"{LEASES}/", f"{MANIFEST_PARTS}/"))
+        or (not complete and _CAMPAIGN_FILE.fullmatch(name))
+    }
 
 
 def _of_manifest(folder: Path) -> tuple[dict[str, str], list[Finding]]:

@@ -30,6 +30,17 @@ CM_DE: Final = 5
 """Index of Cmde in `PARAMETERS`."""
 MODAL: Final = ("wn_rad_s", "zeta")
 """Names of the modal parameters: natural frequency [rad/s] and damping ratio [-]."""
+UNITS: Final = {
+    "CLalpha": "1/rad",
+    "CLq": "-",
+    "CLde": "1/rad",
+    "Cmalpha": "1/rad",
+    "Cmq": "-",
+    "Cmde": "1/rad",
+    "wn_rad_s": "rad/s",
+    "zeta": "-",
+}
+"""Derivative or modal parameter -> its unit; rate derivatives are those to q c/(2V), which has none."""
 
 
 @dataclass(frozen=True)

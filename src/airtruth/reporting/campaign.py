@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 from typing import Final, Protocol
 
 import numpy as np
@@ -212,7 +213,8 @@ def read_campaign(folder: Path) -> Campaign:
 
 def writers(folder: Path) -> tuple[str, str]:
     """The commands that write the truth and the estimates of a folder, for messages."""
-    return f"`airtruth fly CAMPAIGN.toml --out {folder}`", f"`airtruth identify {folder} --aircraft AIRCRAFT`"
+    shown = quote(str(folder))
+    return f"`airtruth fly CAMPAIGN.toml --out {shown}`", f"`airtruth identify {shown} --aircraft AIRCRAFT`"
 
 
 def read_estimates(path: Path, writer: str) -> pa.Table:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from airtruth.errors import ConfigurationError, StoreError
@@ -119,9 +120,10 @@ def _of_path(path: Path, logs: Logs | None, aircraft: Aircraft | None) -> Report
         name = next((record["aircraft"] for record in identified.records.values()), "")
         title = f"Identification of {name}" if name else estimates.stem
         return estimates_report(title, identified)
+    shown = quote(str(path))
     raise StoreError(
-        f"{path}: nothing to report; expected trace.json (`airtruth trace ... --out {path}`) or {ESTIMATES} "
-        f"(`airtruth identify {path} --aircraft A --out {path}/{ESTIMATES}`)"
+        f"{path}: nothing to report; expected trace.json (`airtruth trace ... --out {shown}`) or {ESTIMATES} "
+        f"(`airtruth identify {shown} --aircraft A --out {quote(str(path / ESTIMATES))}`)"
     )
 
 

@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from shlex import quote
 from tempfile import TemporaryDirectory
 from typing import Any, Final, Literal
 
@@ -17,7 +18,7 @@ from airtruth.aircraft.jsbsim.confine import model_files
 from airtruth.aircraft.model import ElevatorProperties, LateralProperties, ThrottleProperties
 from airtruth.aircraft.probe import Constants, wheel_root
 from airtruth.aircraft.write import require_new
-from airtruth.errors import AircraftError, choices
+from airtruth.errors import AircraftError, StoreError, choices
 from airtruth.isolation.client import call
 from airtruth.isolation.limits import Limits
 from airtruth.isolation.protocol import IsolatedError, Task
@@ -95,20 +96,21 @@ class ForeignAircraft:
             lines += [
                 "",
                 "next:",
-                f"  airtruth fly {folder / CAMPAIGN} --out out/{name}",
-                f"  airtruth identify out/{name} --aircraft {folder}",
-                f"  airtruth trace out/{name} --aircraft {folder} --out out/{name}-trace",
+                f"  airtruth fly {quote(str(folder / CAMPAIGN))} --out out/{name}",
+                f"  airtruth identify out/{name} --aircraft {quote(str(folder))}",
+                f"  airtruth trace out/{name} --aircraft {quote(str(folder))} --out out/{name}-trace",
             ]
         return "\n".join(lines)
 
 
-def new_from_jsbsim(source: str | Path, out: Path) -> ForeignAircraft:
+def new_from_jsbsim(source: str | Path, out: Path, *, force: bool = False) -> ForeignAircraft:
     """Survey a JSBSim model and write an aircraft for it.
 
     Parameters
     ----------
     source : name of a model that the JSBSim package ships; a model's XML file; or a folder that holds one.
     out : folder to write, new or empty.
+    force : replace the aircraft that the folder holds, with all of its files.
 
     Raises
     ------
@@ -116,10 +118,12 @@ def new_from_jsbsim(source: str | Path, out: Path) -> ForeignAircraft:
         If the model does not exist, may not be loaded (`airtruth.aircraft.jsbsim.confine`), JSBSim refuses it or dies
         on it, or no elevator is found.
     StoreError
-        If the folder is not empty or cannot be written.
+        If the folder is not empty, holds the model or cannot be written.
     """
-    require_new(out)
+    require_new(out, force=force)
     folder, model, root = _located(source)
+    if out.resolve() == folder or out.resolve() in folder.parents:
+        raise StoreError(f"{out}: holds the model that is read; choose another --out")
     model_files(folder / f"{model}.xml", wheel_root())
     facts = _survey(folder, model, root)
     if "integrating" not in facts:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from importlib import resources
 from typing import Final
 
@@ -31,8 +32,11 @@ def campaign_text(
     Raises
     ------
     ConfigurationError
-        If the aircraft is none of those with defaults, and airspeed or altitude is missing.
+        If the aircraft is none of those with defaults, and airspeed or altitude is missing; or one is not finite.
     """
+    for option, value in (("--eas-kt", eas_kt), ("--altitude-ft", altitude_ft)):
+        if value is not None and not math.isfinite(value):
+            raise ConfigurationError(f"{option} {value}: state a finite number")
     if aircraft not in CONDITIONS and (eas_kt is None or altitude_ft is None):
         raise ConfigurationError(
             f"aircraft {aircraft!r} has no default condition; state --eas-kt and --altitude-ft, or use a shipped aircraft "

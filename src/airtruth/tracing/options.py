@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+from airtruth.arguments import names, require_whole
 from airtruth.errors import ConfigurationError, choices
 
 MODELS: Final = ("aircraft", "linear")
@@ -20,10 +21,11 @@ class TraceOptions:
     ----------
     model : "aircraft" probes the forces of the declared JSBSim aircraft; "linear" uses the linear short-period
         model of its derivatives. An aircraft without a JSBSim model is always linear.
-    hold_out : runs that serve the report alone; None holds out every third, never the only one.
+    hold_out : runs that serve the report alone, a string is one of them; None holds out every third, never the only one.
     threads : number of records processed at a time; the answer does not depend on it.
-    seed : seed of the random draws behind p-values.
-    effects : keys of the candidates; a name without a variant selects all of its variants; None for the library.
+    seed : seed of the random draws behind p-values, 0 or more.
+    effects : keys of the candidates, a string is one of them; a name without a variant selects all of its variants; None
+        for the library.
     time_budget_s : time after which the search starts nothing new [s]; None for no limit. The answer then depends on the
         machine, is provisional, and lists what was left out.
     increments : whether increments are learned from what no named effect explains; None where the whole library is
@@ -55,6 +57,11 @@ class TraceOptions:
             raise ConfigurationError(f"--model {self.model!r}: {choices(self.model, MODELS)}")
         if self.threads < 1:
             raise ConfigurationError(f"--jobs {self.threads}: must be at least 1")
+        require_whole("seed", self.seed, 0)
+        for name, example in (("hold_out", "light-00001"), ("effects", "elevator_delay")):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, names(name, value, example))
         if self.time_budget_s is not None and not 0.0 <= self.time_budget_s < math.inf:
             raise ConfigurationError(
                 f"--time-budget {self.time_budget_s}: must be a number of seconds, 0 or more"

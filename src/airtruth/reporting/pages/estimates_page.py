@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
     from airtruth.reporting.pages.declared import Declared
 
+_SYMBOLS: Final = {**SYMBOLS, "wn_rad_s": r"$\omega_n$"}
+"""Symbols of a table that has a column of units."""
+
 
 def estimates_report(title: str, identified: Identified) -> Report:
     """Return the report of estimates.
@@ -59,7 +62,7 @@ def estimates_report(title: str, identified: Identified) -> Report:
     return Report(
         page=page_of(title, answer_html(*answer_of(frame)), chart, sections),
         csv=as_csv(table),
-        latex=as_latex(table, "estimates", SYMBOLS),
+        latex=as_latex(table, "estimates", _SYMBOLS),
         charts=(chart, *shifts),
     )
 

@@ -177,9 +177,7 @@ def write_files(report: Report, out: Path, kind: str) -> tuple[Path, ...]:
     make_folder(out.parent)
     if kind == PAGE:
         for path, content in zip(paths, (report.page, report.csv, report.latex), strict=True):
-            write_text(
-                path, content.encode("utf-8", "backslashreplace").decode("utf-8")
-            )  # JSON allows lone surrogates
+            write_text(path, content)
         return paths
     from airtruth import style
 

@@ -197,9 +197,21 @@ def record_errors(histories: Histories) -> Table:
             cells = [Number(record.rms(m, channel) * factor, digits=3) for m in histories.models]
             if floors:
                 cells.append(Number(record.floor.get(channel, math.nan) * factor, digits=3))
-            rows.append((record.run_id, record.group or MISSING, name, *cells))
-    columns = ("record", "group", "channel", *histories.models, *(("floor (shaded)",) if floors else ()))
-    return replace(flat("Root mean square of measured less simulated, per record", columns, rows), keys=3)
+            rows.append((record.run_id, *_group(histories, record), name, *cells))
+    keys = ("record", *_group_column(histories), "channel")
+    columns = (*keys, *histories.models, *(("floor (shaded)",) if floors else ()))
+    return replace(
+        flat("Root mean square of measured less simulated, per record", columns, rows), keys=len(keys)
+    )
+
+
+def _group_column(histories: Histories) -> tuple[str, ...]:
+    """Heading of the groups; none where no record has one."""
+    return ("group",) if any(record.group for record in histories.records) else ()
+
+
+def _group(histories: Histories, record: History) -> tuple[str, ...]:
+    return (record.group or MISSING,) if _group_column(histories) else ()
 
 
 def conditions_table(histories: Histories) -> Table:
@@ -208,7 +220,7 @@ def conditions_table(histories: Histories) -> Table:
     rows: list[Row] = [
         (
             record.run_id,
-            record.group or MISSING,
+            *_group(histories, record),
             *(
                 Number(record.conditions.get(key, math.nan) / unit, decimals=decimals)
                 for key, _, unit, decimals in known
@@ -216,7 +228,9 @@ def conditions_table(histories: Histories) -> Table:
         )
         for record in histories.records
     ]
-    return flat("Conditions of the records", ("record", "group", *(q[1] for q in known)), rows)
+    return flat(
+        "Conditions of the records", ("record", *_group_column(histories), *(q[1] for q in known)), rows
+    )
 
 
 def records_tables(histories: Histories) -> str:

@@ -34,7 +34,7 @@ SYMBOLS: Final[Mapping[str, str]] = {
     "wn_rad_s": r"$\omega_n$ [rad/s]",
     "zeta": r"$\zeta$",
 }
-"""Symbols of the parameters, for LaTeX and matplotlib."""
+"""Symbols of the parameters, for LaTeX and matplotlib; that of wn has its unit."""
 
 
 @dataclass(frozen=True)

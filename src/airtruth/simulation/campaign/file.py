@@ -24,7 +24,7 @@ from airtruth.errors import ConfigurationError, choices
 from airtruth.physics.gust_figures import FIGURES, LEVELS
 from airtruth.quantity import Strict
 from airtruth.simulation.campaign.effect_table import EffectTable
-from airtruth.simulation.manoeuvres import KINDS
+from airtruth.simulation.manoeuvres import KINDS, MOST_HARMONICS
 
 Array = NDArray[np.float64]
 
@@ -200,7 +200,7 @@ class ManoeuvreTable(Table):
     lowest: float = Field(default=0.2, gt=0.0)
     highest: float = Field(default=3.0, gt=0.0)
     part: int = Field(default=0, ge=0)
-    parts: int = Field(default=1, ge=1)
+    parts: int = Field(default=1, ge=1, le=MOST_HARMONICS)
     segments: tuple[float, ...] = ()
     levels: tuple[float, ...] = ()
     rise: float = Field(default=0.0, ge=0.0)

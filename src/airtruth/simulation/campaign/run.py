@@ -7,6 +7,7 @@ from contextlib import closing
 from functools import partial
 from pathlib import Path
 
+from airtruth.arguments import require_whole
 from airtruth.cluster import Cluster
 from airtruth.errors import ConfigurationError
 from airtruth.logs.remote import location
@@ -68,6 +69,7 @@ def fly(
     KeyboardInterrupt
         On Ctrl-C, after the workers have been stopped; the same call resumes.
     """
+    require_whole("jobs", jobs, 1)
     if isinstance(campaign, Plan):
         if seed is not None or runs is not None:
             raise ConfigurationError("fly: a plan has drawn its runs; state seed and runs when it is made")
