@@ -31,7 +31,7 @@ class Finding:
     ----------
     name, unit, meaning : which error.
     value, std, lower, upper : estimate, standard error, 95 % interval [unit].
-    declared : value in the aircraft file, or that without an error.
+    declared : value in the aircraft file, or that without an error; of a bias the sum that all declared biases make.
     smallest : smallest change from the declared value that these records show [unit].
     state : see `State`.
     """
