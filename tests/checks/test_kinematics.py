@@ -333,6 +333,16 @@ def test_a_lag_beyond_the_range_is_a_failed_check(true):
     assert "The check failed" in result.sentences[0]
 
 
+def test_a_failed_check_names_no_error(true):
+    """A lag of 2 s: the best set holds another error, of which nothing may be said."""
+    result = check_kinematics(as_log(noisy(measured(true, {"vane_lag": 2.0}), 2, 0.3)), None, 0.5)
+    assert result.verdict == "failed"
+    assert result.possible[0].errors
+    states = {f.name: f.state for f in result.findings}
+    assert not {"present", "one of"} & set(states.values())
+    assert {states[f.name] for f in result.possible[0].errors} == {"not judged"}
+
+
 def test_a_weak_manoeuvre_cannot_tell(true):
     small = {n: v[:1] + 0.02 * (v - v[:1]) for n, v in true.items()}
     result = check_kinematics(as_log(noisy(small, 3)))
@@ -359,6 +369,16 @@ def test_what_is_declared_is_not_found_again(true):
     delay = result.finding("sensor_delay:theta_rad")
     assert delay.declared == 0.04
     assert delay.lower < 0.04 < delay.upper
+
+
+def test_a_declared_delay_that_is_absent_is_found(true):
+    """The delay ends at zero, which no search limits."""
+    result = check_kinematics(as_log(noisy(true, 2)), {"sensor_delay:theta_rad": 0.04})
+    assert result.verdict == "errors"
+    delay = result.finding("sensor_delay:theta_rad")
+    assert (delay.state, delay.declared, delay.lower) == ("present", 0.04, 0.0)
+    assert delay.upper < 0.005
+    assert ", where 0.04 s is declared" in result.sentences[0]
 
 
 def test_channels_that_are_absent_are_said_so(true):

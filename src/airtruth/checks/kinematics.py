@@ -40,6 +40,8 @@ AIRSPEED_DELAY: Final = "sensor_delay:airspeed_m_s"
 """The error that the equation of airspeed shows."""
 ATTITUDE: Final = ("gyro_lag", "attitude_lag", "sensor_delay:theta_rad", "sensor_delay:q_rad_s", "gyro_scale")
 """Errors that need theta, because without it nothing predicts q but alpha, whose own errors are the same."""
+NAMED: Final = ("present", "one of")
+"""States of an error that an explanation has; a check that failed names none."""
 
 
 def check_log(
@@ -111,6 +113,8 @@ def check_kinematics(
     findings = (*_errors(found, usual), *_airspeed(found), *_biases(found, biases or {}))
     findings = _scale_or_bias(findings)
     verdict = verdict_of(found, findings)
+    if verdict == "failed":
+        findings = tuple(replace(f, state="not judged") if f.state in NAMED else f for f in findings)
     causes = tuple(_cause(found, i, findings) for i in range(len(found.tried)))
     if chord is None:
         remarks.append(

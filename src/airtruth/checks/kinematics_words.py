@@ -66,7 +66,7 @@ def _headline(
         return [
             f"The check failed: the fit of {', '.join(limiting(found))} ended at a limit of its range or did not converge, "
             "and explains more than every other set. No size below may be used; inspect the channels, cut the record to one "
-            "manoeuvre, or declare what is known of the sensors with --aircraft."
+            "manoeuvre, or declare what is known of the sensors in the aircraft.toml of --aircraft."
         ]
     if verdict == "agrees":
         limits = ", ".join(
