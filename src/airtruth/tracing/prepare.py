@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft, Sensor
 from airtruth.aircraft.tail import tail_geometry
+from airtruth.checks.excitation import LEAST_ELEVATOR_RAD
 from airtruth.effects.effect import Effect
 from airtruth.errors import ConfigurationError, FlightError, LogError, TrimError, choices
 from airtruth.logs.flight_log import FlightLog
@@ -48,8 +49,6 @@ _SAME_ALTITUDE_M: Final = 200.0
 """Difference in altitude within which records share a plant [m] (judgement: 2 % in density)."""
 _LEAST_SAMPLES: Final = 40
 """Least number of samples of a record [-] (judgement: fewer do not show a short period at 20 to 50 Hz)."""
-_LEAST_ELEVATOR_RAD: Final = 0.1 * DEG
-"""Least movement of the elevator in the fitted records [rad] (judgement: above the noise of a surface sensor)."""
 _THRUST_STD: Final = 0.05
 """Prior standard deviation of the thrust over its trimmed value, throttle logged [-] (judgement)."""
 _THRUST_UNKNOWN_STD: Final = 0.25
@@ -221,7 +220,7 @@ def _check(signals: Sequence[Signals], held: Sequence[str]) -> None:
                 f"run {s.run_id}: {s.y.shape[0]} samples; a record needs at least {_LEAST_SAMPLES} to be traced"
             )
     moved = max(float(np.ptp(s.elevator_rad)) for s in signals if s.run_id not in held)
-    if moved < _LEAST_ELEVATOR_RAD:
+    if moved < LEAST_ELEVATOR_RAD:
         which = "record that is not held out" if held else "record"
         raise LogError(
             f"no {which} moves the elevator by more than {moved / DEG:.3g} deg: without an input no effect can be "
