@@ -126,7 +126,7 @@ def prepare(
     signals = [undo_input_sensors(s, aircraft) for log in logs for s in read(log, noise, servo_s)]
     signals.sort(key=lambda s: s.run_id)  # the answer does not depend on the order of the logs
     chosen = _hold_out([s.run_id for s in signals], options)
-    _check(signals, chosen)
+    _check(signals, chosen, logs)
     model = options.model if aircraft.file.jsbsim is not None else "linear"
     notes = []
     if model != options.model:
@@ -213,7 +213,7 @@ def undo_input_sensors(s: Signals, aircraft: Aircraft) -> Signals:
     )
 
 
-def _check(signals: Sequence[Signals], held: Sequence[str]) -> None:
+def _check(signals: Sequence[Signals], held: Sequence[str], logs: Sequence[FlightLog]) -> None:
     for s in signals:
         if s.y.shape[0] < _LEAST_SAMPLES:
             raise LogError(
@@ -223,9 +223,20 @@ def _check(signals: Sequence[Signals], held: Sequence[str]) -> None:
     if moved < LEAST_ELEVATOR_RAD:
         which = "record that is not held out" if held else "record"
         raise LogError(
-            f"no {which} moves the elevator by more than {moved / DEG:.3g} deg: without an input no effect can be "
-            "separated from another; fly doublets or 3-2-1-1 of at least 1 deg"
+            f"no {which} moves the elevator by {LEAST_ELEVATOR_RAD / DEG:g} deg: {_range_of(logs, held, moved)}; without an "
+            "input no effect can be separated from another; fly doublets or 3-2-1-1 of at least 1 deg"
         )
+
+
+def _range_of(logs: Sequence[FlightLog], held: Sequence[str], moved_rad: float) -> str:
+    """The range of the elevator's column in words, and the part of it that is no noise."""
+    runs = ((log, i) for log in logs for i, run_id in enumerate(log.run_ids) if run_id not in held)
+    raw = max(float(np.ptp(log.channels["elevator_rad"][log.rows(i)])) for log, i in runs)
+    column = f"elevator_rad has a range of {raw / DEG:.2g} deg"
+    if moved_rad >= raw:
+        return column
+    rest = "all of it" if moved_rad == 0.0 else f"all but {moved_rad / DEG:.2g} deg of it"
+    return f"{column}, {rest} noise of its sensor"
 
 
 def _hold_out(runs: Sequence[str], options: TraceOptions) -> tuple[str, ...]:
