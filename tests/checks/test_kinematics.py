@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from airtruth.checks.kinematics import check_kinematics, declared_errors
+from airtruth.checks.kinematics import check_kinematics, declared_biases, declared_errors
 from airtruth.checks.kinematics_fit import fit, limits_of, problem_of
 from airtruth.checks.kinematics_lines import lines_of
 from airtruth.checks.kinematics_model import ERRORS, Record, compare
@@ -274,6 +274,28 @@ def test_biases(true):
         assert found[name].upper - found[name].lower < 2.0 * most, name
 
 
+def test_declared_biases_are_not_found_again(true):
+    """Biases of every channel: each row states the sum that they make there, and only a further one is named."""
+    biases = {"q_rad_s": 0.004, "az_m_s2": 0.2, "ax_m_s2": 0.3, "theta_rad": -0.02, "airspeed_m_s": 0.5}
+    shifted = {n: v + biases.get(n, 0.0) for n, v in true.items()}
+    log = as_log(*(noisy(shifted, i) for i in range(3)))
+    result = check_kinematics(log, biases=biases)
+    assert result.verdict == "agrees"
+    names = ("gyro_bias", "accelerometer_bias", "forward_bias")
+    assert [result.finding(n).state for n in names] == ["not needed"] * 3
+    # to first order at 0.06 rad: az less the share of ax; ax with the shares of az and theta
+    sums = (0.004, 0.2 - 0.3 * 0.06, 0.3 + 0.2 * 0.06 + G0 * 0.02)
+    assert [result.finding(n).declared for n in names] == pytest.approx(sums, abs=0.02)
+    further = check_kinematics(log, biases={**biases, "q_rad_s": 0.01})
+    assert further.verdict == "errors"
+    assert [f.name for f in further.findings if f.state == "present"] == ["gyro_bias"]
+    assert ", where 0.01 rad/s is declared" in further.sentences[0]
+    plain = check_kinematics(log)
+    assert [plain.finding(n).state for n in names if n != "accelerometer_bias"] == ["present"] * 2
+    assert [plain.finding(n).declared for n in names] == [0.0] * 3
+    assert [plain.finding(n).value for n in names] == [result.finding(n).value for n in names]
+
+
 def test_an_arm_is_found_and_its_twin_named(true):
     result = check_kinematics(as_log(noisy(measured(true, {"vane_arm": 4.0}), 2)))
     names = {c.name for c in result.possible}
@@ -311,6 +333,16 @@ def test_a_lag_beyond_the_range_is_a_failed_check(true):
     assert "The check failed" in result.sentences[0]
 
 
+def test_a_failed_check_names_no_error(true):
+    """A lag of 2 s: the best set holds another error, of which nothing may be said."""
+    result = check_kinematics(as_log(noisy(measured(true, {"vane_lag": 2.0}), 2, 0.3)), None, 0.5)
+    assert result.verdict == "failed"
+    assert result.possible[0].errors
+    states = {f.name: f.state for f in result.findings}
+    assert not {"present", "one of"} & set(states.values())
+    assert {states[f.name] for f in result.possible[0].errors} == {"not judged"}
+
+
 def test_a_weak_manoeuvre_cannot_tell(true):
     small = {n: v[:1] + 0.02 * (v - v[:1]) for n, v in true.items()}
     result = check_kinematics(as_log(noisy(small, 3)))
@@ -337,6 +369,16 @@ def test_what_is_declared_is_not_found_again(true):
     delay = result.finding("sensor_delay:theta_rad")
     assert delay.declared == 0.04
     assert delay.lower < 0.04 < delay.upper
+
+
+def test_a_declared_delay_that_is_absent_is_found(true):
+    """The delay ends at zero, which no search limits."""
+    result = check_kinematics(as_log(noisy(true, 2)), {"sensor_delay:theta_rad": 0.04})
+    assert result.verdict == "errors"
+    delay = result.finding("sensor_delay:theta_rad")
+    assert (delay.state, delay.declared, delay.lower) == ("present", 0.04, 0.0)
+    assert delay.upper < 0.005
+    assert ", where 0.04 s is declared" in result.sentences[0]
 
 
 def test_channels_that_are_absent_are_said_so(true):
@@ -371,3 +413,6 @@ def test_tables_and_json(true):
 
 def test_declared_sensors_of_the_gtm(gtm):
     assert declared_errors(gtm) == {"sensor_delay:theta_rad": pytest.approx(0.04)}
+    biases = declared_biases(gtm)
+    assert set(biases) == {"airspeed_m_s", "theta_rad", "q_rad_s", "ax_m_s2", "az_m_s2"}
+    assert (biases["q_rad_s"], biases["ax_m_s2"]) == pytest.approx((0.0027, 0.0162 * G0), abs=1e-6)

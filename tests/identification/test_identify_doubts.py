@@ -1,13 +1,19 @@
 """Sentences about estimates that a reader should not trust."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from airtruth.identification import doubts as module
-from airtruth.identification.estimates import Estimates, Status
+from airtruth.identification import identify
+from airtruth.identification.estimates import Estimates, Status, point_values
+from airtruth.identification.methods import METHODS
+from airtruth.logs.store import read_log
 from airtruth.physics.short_period import PARAMETERS, Scale
+
+ROOT = Path(__file__).resolve().parents[2]
 
 THETA = np.array([4.5, 31.0, 0.5, -1.8, -45.0, -1.9])
 STD = np.array([0.1, 3.0, 0.05, 0.03, 1.0, 0.03])
@@ -65,6 +71,22 @@ def test_an_undetermined_direction_is_named_in_physical_terms():
     assert set(signs) == {"+", "-"}
 
 
+def test_coarse_differences_are_named():
+    """1 - sin(wn dt)/(wn dt) of wn = 6.6 rad/s: 1.8 % at 20 Hz, 0.3 % at 50 Hz."""
+    wn = point_values(estimates())[0, len(PARAMETERS)]
+    (sentence,) = module.doubts(lambda: [[estimates(method="ls"), estimates()]], 0.05)
+    share = 100.0 * (1.0 - np.sin(wn * 0.05) / (wn * 0.05))
+    assert sentence.startswith(f"ls: central differences at 20 Hz lose {share:.2g} % of the motion")
+    assert "use iv-f1" in sentence
+    assert module.doubts(lambda: [[estimates(method="ls"), estimates()]], 0.02) == []
+
+
+def test_differencing_methods_are_those_of_the_low_pass():
+    posed = {m.name for m in METHODS.values() if m.pose is not None}
+    assert posed - set(module.DIFFERENCING) == {"iv-f1", "iv-f2"}
+    assert set(module.DIFFERENCING) < posed
+
+
 def test_every_missing_number_has_its_reason():
     none = replace(
         estimates(runs=2), theta=np.full((2, 6), np.nan), status=np.full(2, Status.SINGULAR, dtype=np.int8)
@@ -84,3 +106,19 @@ def test_methods_that_contradict_each_other_are_named():
     (sentence,) = [s for s in doubts([estimates(), estimates(other, method="ls")]) if s.startswith("CLq")]
     assert "31 by iv-f1" in sentence
     assert "223 by ls" in sentence
+
+
+def test_a_slow_log_is_named_by_identify():
+    """Each third sample of a log at 50 Hz."""
+    log = read_log(ROOT / "data" / "undeclared" / "a.parquet").select(run_ids=["r1"])
+    slow = replace(
+        log,
+        metadata={},
+        offsets=np.array([0, len(log.t_s[::3])]),
+        t_s=log.t_s[::3],
+        channels={n: v[::3] for n, v in log.channels.items()},
+    )
+    for joint in (False, True):
+        notes = identify(slow, "gtm", ["ls"], joint=joint).notes
+        assert any(n.startswith("ls: central differences at 16.7 Hz") for n in notes)
+        assert not any("differences" in n for n in identify(log, "gtm", ["ls"], joint=joint).notes)

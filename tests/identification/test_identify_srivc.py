@@ -6,6 +6,7 @@ from scipy.signal import TransferFunction, lsim
 
 from airtruth.errors import ConfigurationError
 from airtruth.identification import identify_actuator
+from airtruth.identification.regression.lowpass import estimated_elevator
 from airtruth.numerics.srivc import filter_states, simulate, srivc
 from validation.linear_flight import DEG, SERVO_RAD_S, fly
 
@@ -72,6 +73,21 @@ def test_the_servo_of_a_flight_log():
     )
     assert found.a[0, 0] == pytest.approx(SERVO_RAD_S, rel=1e-5)
     assert found.b[0, 0] == pytest.approx(SERVO_RAD_S, rel=1e-5)
+
+
+@pytest.mark.parametrize("late", [0, 15])
+def test_a_step_between_slow_samples_has_a_servo(late):
+    """Steps 10 ms after a sample at 20 Hz: the surface leads any servo behind a command that is held from the next sample."""
+    fine, every = 0.001, 50
+    t = np.arange(8000) * fine
+    command = 3.0 * DEG * np.sign((t >= 1.01) * 1.0 - 2.0 * (t >= 1.51) + (t >= 2.01))
+    reached = np.concatenate([np.zeros(late), command[: command.size - late]])
+    surface = response(([SERVO_RAD_S], [1.0, SERVO_RAD_S]), reached, fine)[::every]
+    logged = command[::every]
+    assert not identify_actuator(logged[None], surface[None], 0.05).converged.any()
+    found, failed = estimated_elevator(logged[None], surface[None], 0.05)
+    assert not failed.any()
+    assert np.abs(found[0] - surface).max() < 0.1 * np.abs(surface).max()
 
 
 def test_a_linear_input_hold():

@@ -21,6 +21,7 @@ from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing import run as tracing
 from airtruth.tracing.model import records
 from airtruth.tracing.prepare import prepare
+from airtruth.units import DEG
 
 FEW = ("elevator_delay", "gyro_scale")
 
@@ -339,4 +340,17 @@ def test_an_elevator_that_only_held_out_records_move(command, log, tmp_path):
     less = without(log, "elevator_command_rad")  # a command that moves shows a sensor that does not
     path = stored(tmp_path, with_channel(less, "elevator_rad", elevator))
     message = refused(command, path, tmp_path, "--hold-out", log.run_ids[2])
-    assert "no record that is not held out moves the elevator" in message
+    assert (
+        "no record that is not held out moves the elevator by 0.1 deg: elevator_rad has a range of 0 deg;"
+        in message
+    )
+
+
+def test_an_elevator_that_is_noise(log, gtm):
+    """The column has a range that the smoothed elevator has not, and the sentence states both."""
+    noise = 0.01 * DEG * np.random.default_rng(1).standard_normal(log.t_s.size)
+    still = without(with_channel(log, "elevator_rad", noise), "elevator_command_rad")
+    with pytest.raises(
+        LogError, match=r"range of 0\.0[5-9]\d* deg, all( but \S+ deg)? of it noise of its sensor; without"
+    ):
+        prepare([still], gtm, (), TraceOptions(effects=FEW))

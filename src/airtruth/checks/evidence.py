@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.channels import SIGNALS
+from airtruth.checks.excitation import moves
 from airtruth.checks.relation import ATMOSPHERE_M, Relation, finite
 from airtruth.checks.slopes import slopes_near_trim
 from airtruth.checks.spectra import Factors, instruments, integral, regress, spectrum
@@ -231,7 +232,19 @@ def motion(c: Channels, dt_s: float, aircraft: Aircraft | None) -> list[Relation
     result += slopes_near_trim(c, dt_s, aircraft)
     if "elevator_command_rad" in c:
         result.append(_command_test(c, dt_s))
-    return result
+    moving = moves(elevator, dt_s)
+    return [_of_moving(test, moving) if test.name in OF_ELEVATOR else test for test in result]
+
+
+OF_ELEVATOR: Final = ("elevator", "Cmde")
+"""Tests of what the elevator does, to which a record counts only if its elevator moves."""
+
+
+def _of_moving(test: Relation, moving: NDArray[np.bool_]) -> Relation:
+    """A test without the runs in which nothing moves but the noise of a sensor, which agrees with any motion by chance."""
+    counts = np.append(moving, moving.any())
+    informed = test.informed and bool(moving.any())
+    return replace(test, distance=np.where(counts, test.distance, 0.0), informed=informed)
 
 
 INFORMED: Final = 0.5

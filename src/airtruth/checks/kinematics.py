@@ -13,7 +13,7 @@ from airtruth.aircraft import Aircraft
 from airtruth.channels import REQUIRED
 from airtruth.checks.gate import require
 from airtruth.checks.kinematics_average import averaged
-from airtruth.checks.kinematics_bias import mean_of, ramps, rms
+from airtruth.checks.kinematics_bias import FIELDS, mean_of, ramps, ramps_of, rms
 from airtruth.checks.kinematics_fit import limits_of, problem_of
 from airtruth.checks.kinematics_model import ERRORS, Record, thinned
 from airtruth.checks.kinematics_search import Search, completed, price, search
@@ -40,6 +40,8 @@ AIRSPEED_DELAY: Final = "sensor_delay:airspeed_m_s"
 """The error that the equation of airspeed shows."""
 ATTITUDE: Final = ("gyro_lag", "attitude_lag", "sensor_delay:theta_rad", "sensor_delay:q_rad_s", "gyro_scale")
 """Errors that need theta, because without it nothing predicts q but alpha, whose own errors are the same."""
+NAMED: Final = ("present", "one of")
+"""States of an error that an explanation has; a check that failed names none."""
 
 
 def check_log(
@@ -66,8 +68,12 @@ def check_logs(
         As `airtruth.checks.gate.require` and `check_kinematics`.
     """
     faults = [fault for name, log in logs for fault in require(log, aircraft, source=name, force=force)]
-    known = None if aircraft is None else declared_errors(aircraft)
-    result = check_kinematics([log for _, log in logs], known, None if aircraft is None else aircraft.chord_m)
+    parts = [log for _, log in logs]
+    result = (
+        check_kinematics(parts)
+        if aircraft is None
+        else check_kinematics(parts, declared_errors(aircraft), aircraft.chord_m, declared_biases(aircraft))
+    )
     return replace(result, forced=tuple(fault.sentence for fault in faults if fault.certain))
 
 
@@ -75,6 +81,7 @@ def check_kinematics(
     log: FlightLog | Sequence[FlightLog],
     declared: Mapping[str, float] | None = None,
     chord_m: float | None = None,
+    biases: Mapping[str, float] | None = None,
 ) -> CheckResult:
     """Estimate the errors of instruments from all runs together; the gate is not passed.
 
@@ -86,6 +93,7 @@ def check_kinematics(
     declared : instrument errors that are known, names of
         `airtruth.checks.kinematics_model.ERRORS` in SI; see `declared_errors`.
     chord_m : mean aerodynamic chord, which limits arms to `LONGEST_ARM_CHORDS` [m]; None takes that of the log.
+    biases : channel -> bias that is known [unit of the channel]; see `declared_biases`.
 
     Raises
     ------
@@ -102,9 +110,11 @@ def check_kinematics(
     known = {n: v for n, v in (declared or {}).items() if n in ERRORS}
     equations = ("alpha",) if records[0].theta is None else ("theta", "alpha")
     found = completed(search(problem_of(records, equations, known, limits), usual), usual)
-    findings = (*_errors(found, usual), *_airspeed(found), *_biases(found))
+    findings = (*_errors(found, usual), *_airspeed(found), *_biases(found, biases or {}))
     findings = _scale_or_bias(findings)
     verdict = verdict_of(found, findings)
+    if verdict == "failed":
+        findings = tuple(replace(f, state="not judged") if f.state in NAMED else f for f in findings)
     causes = tuple(_cause(found, i, findings) for i in range(len(found.tried)))
     if chord is None:
         remarks.append(
@@ -133,6 +143,13 @@ def declared_errors(aircraft: Aircraft) -> dict[str, float]:
         if value != error.neutral:
             result[error.name] = value
     return result
+
+
+def declared_biases(aircraft: Aircraft) -> dict[str, float]:
+    """Biases that aircraft.toml declares, channel -> SI, as `check_kinematics` takes them."""
+    sensors = aircraft.file.sensors
+    biases = {channel: sensors[channel].errors().bias for channel in FIELDS if channel in sensors}
+    return {channel: bias for channel, bias in biases.items() if bias != 0.0}
 
 
 def _records(logs: Sequence[FlightLog]) -> tuple[list[Record], list[str]]:
@@ -234,16 +251,16 @@ def _airspeed(found: Search) -> list[Finding]:
     return _errors(completed(search(alone, usual), usual), usual)
 
 
-def _biases(found: Search) -> list[Finding]:
-    """Biases of gyro, az and ax from the ramps of the equations."""
+def _biases(found: Search, known: Mapping[str, float]) -> list[Finding]:
+    """Biases of gyro, az and ax from the ramps of the equations, beside the sums that known ones make there."""
     problem, one = found.problem, found.best.fit
     scale = dict(zip(one.names, one.value, strict=True)).get("vane_scale", problem.start("vane_scale"))
-    ramp, std = mean_of(*ramps(problem, one, "alpha", found.enlargement))
+    ramp, std = _drift(found, "alpha", known)
     ramp, std = -ramp / scale, std / scale
     if "theta" not in problem.equations:
         meaning = "constants in q and az, which theta would separate"
         return [_bias(found, "gyro_bias + accelerometer_bias/V", "rad/s", meaning, ramp, std)]
-    turn, turn_std = mean_of(*ramps(problem, one, "theta", found.enlargement))
+    turn, turn_std = _drift(found, "theta", known)
     meaning = "constant in q, by the drift of its integral from theta"
     result = [_bias(found, "gyro_bias", "rad/s", meaning, -turn, turn_std)]
     airspeed = float(np.mean([r.airspeed.mean() for r in problem.records]))
@@ -254,16 +271,26 @@ def _biases(found: Search) -> list[Finding]:
         meaning = (
             "constant in ax + az alpha - g (theta - alpha): biases that airspeed alone does not separate"
         )
-        slope, slope_std = mean_of(*ramps(problem, one, "airspeed", found.enlargement))
+        slope, slope_std = _drift(found, "airspeed", known)
         result.append(_bias(found, "forward_bias", "m/s2", meaning, -slope, slope_std))
     return result
 
 
-def _bias(found: Search, name: str, unit: str, meaning: str, value: float, std: float) -> Finding:
+def _drift(found: Search, equation: str, known: Mapping[str, float]) -> tuple[Array, float]:
+    """Ramp of an equation and the one that known biases make, (2,), and the standard error of the first."""
+    slopes, stds = ramps(found.problem, found.best.fit, equation, found.enlargement)
+    mean, std = mean_of(slopes, stds)
+    expected, _ = mean_of(ramps_of(known, found.problem, found.best.fit, equation), stds)
+    return np.array([mean, expected]), std
+
+
+def _bias(found: Search, name: str, unit: str, meaning: str, sizes: Array, std: float) -> Finding:
+    """Finding of a bias; ``sizes`` are the estimated and the declared one."""
+    value, declared = float(sizes[0]), float(sizes[1]) or 0.0  # not -0.0
     smallest = float(np.sqrt(price(found.problem))) * std
-    state: State = "present" if abs(value) > smallest else "not needed"
+    state: State = "present" if abs(value - declared) > smallest else "not needed"
     half = 1.96 * std
-    return Finding(name, unit, meaning, value, std, value - half, value + half, 0.0, smallest, state)
+    return Finding(name, unit, meaning, value, std, value - half, value + half, declared, smallest, state)
 
 
 def _scale_or_bias(findings: tuple[Finding, ...]) -> tuple[Finding, ...]:
@@ -272,7 +299,7 @@ def _scale_or_bias(findings: tuple[Finding, ...]) -> tuple[Finding, ...]:
     bias, scale = by_name.get("accelerometer_bias"), by_name.get("accelerometer_scale")
     if bias is None or scale is None or bias.state != "present" or scale.state == "present":
         return findings
-    needed, std = scale.declared * (1.0 - bias.value / G0), scale.declared * bias.std / G0
+    needed, std = scale.declared * (1.0 - (bias.value - bias.declared) / G0), scale.declared * bias.std / G0
     if abs(needed - scale.value) > 3.0 * float(np.hypot(scale.std, std)):
         return findings
     if scale.state != "one of":
@@ -305,4 +332,4 @@ def _cause(found: Search, place: int, findings: Sequence[Finding]) -> Cause:
     )
 
 
-__all__ = ["check_kinematics", "check_log", "check_logs", "declared_errors"]
+__all__ = ["check_kinematics", "check_log", "check_logs", "declared_biases", "declared_errors"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -19,6 +20,15 @@ SHARE: Final = 8
 
 CHANNELS: Final = {"theta": "theta_rad", "alpha": "alpha_rad", "airspeed": "airspeed_m_s"}
 """Channel that an equation predicts."""
+FIELDS: Final = {
+    "airspeed_m_s": "airspeed",
+    "alpha_rad": "alpha",
+    "theta_rad": "theta",
+    "q_rad_s": "q",
+    "ax_m_s2": "ax",
+    "az_m_s2": "az",
+}
+"""Field of a record that holds a channel whose bias the equations show."""
 
 
 def ramps(problem: Problem, one: Fit, equation: str, enlargement: float = 1.0) -> tuple[Array, Array]:
@@ -38,8 +48,7 @@ def ramps(problem: Problem, one: Fit, equation: str, enlargement: float = 1.0) -
     for record in problem.records:
         e = _difference(problem, record, errors, equation)
         n = len(e)
-        t = np.arange(n) - 0.5 * (n - 1)
-        weights = t / (t @ t) / record.dt_s
+        weights = _weights(n, record.dt_s)
         steps = np.diff(e)
         # sum_t w(t) e(t) = sum_s W(s) step(s), W(s) the weights after s
         reach = np.cumsum(weights[::-1])[::-1][1:]
@@ -53,6 +62,35 @@ def ramps(problem: Problem, one: Fit, equation: str, enlargement: float = 1.0) -
         slopes.append(weights @ e)
         stds.append(np.sqrt(max(own, 0.0) + enlargement * float(share @ one.covariance @ share)))
     return np.array(slopes), np.array(stds)
+
+
+def ramps_of(biases: Mapping[str, float], problem: Problem, one: Fit, equation: str) -> Array:
+    """(records,) ramp that known biases leave in a difference [unit of the channel over s].
+
+    Parameters
+    ----------
+    biases : channel -> bias of its reading [unit of the channel].
+    problem, one, equation : as in `ramps`.
+    """
+    errors = dict(zip(one.names, one.value, strict=True))
+    slopes = []
+    for record in problem.records:
+        left = _difference(problem, record, errors, equation) - _difference(
+            problem, _unbiased(record, biases), errors, equation
+        )
+        slopes.append(_weights(len(left), record.dt_s) @ left)
+    return np.array(slopes)
+
+
+def _unbiased(record: Record, biases: Mapping[str, float]) -> Record:
+    readings = {n: getattr(record, FIELDS[n]) for n in biases}
+    return replace(record, **{FIELDS[n]: x - biases[n] for n, x in readings.items() if x is not None})
+
+
+def _weights(samples: int, dt_s: float) -> Array:
+    """(samples,) weights of the slope of the least-squares line [1/s]."""
+    t = np.arange(samples) - 0.5 * (samples - 1)
+    return np.asarray(t / (t @ t) / dt_s)
 
 
 def _difference(problem: Problem, record: Record, errors: Mapping[str, float], equation: str) -> Array:
@@ -87,4 +125,4 @@ def rms(problem: Problem, one: Fit) -> dict[str, float]:
     return {channel: float(np.sqrt(np.mean(np.concatenate(p) ** 2))) for channel, p in parts.items()}
 
 
-__all__ = ["mean_of", "ramps", "rms"]
+__all__ = ["FIELDS", "mean_of", "ramps", "ramps_of", "rms"]

@@ -37,7 +37,7 @@ class Fit:
     free : (k,) least value of the statistic to first order without the limits.
     statistic : energy of the elevator's motion that is left, chi-square where the errors explain all.
     converged : whether the search ended.
-    at_limit : errors whose estimate is at an end of its range.
+    at_limit : errors whose estimate is at an end of its range; a lag or a delay of zero is none, because none is shorter.
     """
 
     names: tuple[str, ...]
@@ -170,7 +170,8 @@ def fit(problem: Problem, names: Sequence[str], start: Mapping[str, float] | Non
             slopes = _slopes(problem, names, value, moments)
     slopes = _slopes(problem, names, value, moments)
     edge = EDGE * (high - low)
-    at = ((value <= low + edge) | (value >= high - edge)) & (
+    least = np.array([ERRORS[n].kind in ("lag", "delay") for n in names])
+    at = ((value <= low + edge) & ~least | (value >= high - edge)) & (
         np.abs(value - np.array([problem.start(n) for n in names])) > edge
     )
     covariance = _inverse(slopes @ slopes.T)

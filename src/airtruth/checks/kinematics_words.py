@@ -66,7 +66,7 @@ def _headline(
         return [
             f"The check failed: the fit of {', '.join(limiting(found))} ended at a limit of its range or did not converge, "
             "and explains more than every other set. No size below may be used; inspect the channels, cut the record to one "
-            "manoeuvre, or declare what is known of the sensors with --aircraft."
+            "manoeuvre, or declare what is known of the sensors in the aircraft.toml of --aircraft."
         ]
     if verdict == "agrees":
         limits = ", ".join(
@@ -99,8 +99,8 @@ def _named(findings: Sequence[Finding], causes: Sequence[Cause]) -> list[str]:
     possible = [c for c in causes if c.possible]
     for one in findings:
         if one.state == "present":
-            declared = f"{one.declared:g}{'' if one.unit == '-' else ' ' + one.unit}"
-            note = f", where {declared} is declared" if "bias" not in one.name else ""
+            declared = f"{one.declared:.4g}{'' if one.unit == '-' else ' ' + one.unit}"
+            note = f", where {declared} is declared" if "bias" not in one.name or one.declared else ""
             result.append(f"{one.name} is {shown(one)}{note}.")
     common = (
         frozenset.intersection(*(frozenset(f.name for f in c.errors) for c in possible))
@@ -120,7 +120,7 @@ def _named(findings: Sequence[Finding], causes: Sequence[Cause]) -> list[str]:
         )
     bias, scale = by_name.get("accelerometer_bias"), by_name.get("accelerometer_scale")
     if bias is not None and scale is not None and bias.state == "one of":
-        factor = scale.declared * (1.0 - bias.value / G0)
+        factor = scale.declared * (1.0 - (bias.value - bias.declared) / G0)
         result.append(
             f"accelerometer_bias is {shown(bias)}, or accelerometer_scale is {factor:.3f}: "
             "gravity alone does not tell them apart."

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 Verdict = Literal["agrees", "errors", "one_of", "cannot_tell", "failed"]
 """Answers of a check: the channels agree; errors of instruments are present; one of several sets of errors is; the
 records cannot tell; the check itself failed."""
-State = Literal["present", "one of", "not needed", "not shown"]
+State = Literal["present", "one of", "not needed", "not shown", "not judged"]
 """An error is in every explanation, in some, in none although the records would show it, or the records would not
-show it."""
+show it; or an explanation has it and the check failed."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Finding:
     ----------
     name, unit, meaning : which error.
     value, std, lower, upper : estimate, standard error, 95 % interval [unit].
-    declared : value in the aircraft file, or that without an error.
+    declared : value in the aircraft file, or that without an error; of a bias the sum that all declared biases make.
     smallest : smallest change from the declared value that these records show [unit].
     state : see `State`.
     """

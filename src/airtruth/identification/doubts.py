@@ -1,4 +1,6 @@
-"""Sentences about estimates that a reader should not trust: undetermined parameters, missing numbers, wrong signs."""
+"""Sentences about estimates that a reader should not trust: undetermined parameters, missing numbers, wrong signs, coarse
+differences.
+"""
 
 from __future__ import annotations
 
@@ -39,6 +41,21 @@ SHARE: Final = 0.3
 """Least part of a direction that its sentence names [-]: judgement."""
 APART: Final = 3.0
 """Standard deviations between methods above which they contradict each other [-]: judgement."""
+DIFFERENCING: Final = (
+    "ls",
+    "iv-lowpass",
+    "iv-reference",
+    "iv-reference-regressor",
+    "iv-actuator",
+    "iv-actuator-regressor",
+    "iv-kalman",
+)
+"""Methods whose derivatives of alpha and q are central differences."""
+CONSISTENT: Final = "iv-f1 or output-error"
+"""Methods for the same records that take no differences."""
+DULLED: Final = 0.01
+"""Share of the motion at the natural frequency that central differences may lose [-] (judgement: steps move an aircraft above
+that frequency, and in a doublet of the GTM at 20 or 25 Hz Cmq, Cmde and Cmalpha err by 5, 4 and 1.5 times the share)."""
 LIKELY: Final = (
     "likely causes: a sensor that lags (`airtruth check` shows it), feedback from the motion to the elevator, a record "
     "too short for the motion, or an aircraft that is unstable by design"
@@ -46,12 +63,13 @@ LIKELY: Final = (
 """Causes of a damping or stiffness of the wrong sign."""
 
 
-def doubts(parts: Parts) -> list[str]:
+def doubts(parts: Parts, dt_s: float = 0.0) -> list[str]:
     """Sentences about the estimates of one or more methods, none where nothing is in doubt.
 
     Parameters
     ----------
     parts : estimates of the runs, each run in one part; a part has one entry for each method.
+    dt_s : longest sample period of the records [s]; with 0 no differences are in doubt.
     """
     own: list[_Method] = []
     contradictions: list[_Contradiction] = [_Contradiction(name) for name in PARAMETERS]
@@ -66,6 +84,7 @@ def doubts(parts: Parts) -> list[str]:
         result += method.missing()
         result += method.undetermined(_variances(parts, i))
         result += method.wrong_signs()
+        result += method.dulled(dt_s)
     return result + [sentence for one in contradictions for sentence in one.sentences()]
 
 
@@ -100,6 +119,7 @@ class _Method:
         self.name, self.covariance_name = first.method, first.covariance_name
         self.runs = self.bare = self.aperiodic = self.known = self.open = 0
         self.absent: Counter[int] = Counter()
+        self.periodic, self.summed_rad_s = 0, 0.0
         self.open_ones = np.zeros(len(PARAMETERS))
         self.relative = np.zeros((len(PARAMETERS),) * 2)
         self.wrong = dict.fromkeys((name for name, _ in _SIGNS), 0)
@@ -110,7 +130,12 @@ class _Method:
         self.runs += len(one.run_ids)
         absent = ~np.isfinite(one.theta).all(axis=1)
         self.absent.update(int(s) for s in one.status[absent])
-        self.aperiodic += int((~absent & ~np.isfinite(point_values(one)[:, len(PARAMETERS)])).sum())
+        frequency = point_values(one)[:, len(PARAMETERS)]
+        periodic = np.isfinite(frequency)
+        self.aperiodic += int((~absent & ~periodic).sum())
+        sound = periodic & one.converged
+        self.periodic += int(sound.sum())
+        self.summed_rad_s += float(frequency[sound].sum())
         self.bare += int((~absent & ~np.isfinite(deviations(one)).all(axis=1)).sum())
         known = _known(one)
         self.known += int(known.sum())
@@ -181,6 +206,19 @@ class _Method:
                     f"{LIKELY}."
                 )
 
+    def dulled(self, dt_s: float) -> Iterator[str]:
+        """Share of the motion that central differences lose, where it is more than `DULLED`."""
+        if self.name not in DIFFERENCING or not self.periodic:
+            return
+        wn_rad_s = self.summed_rad_s / self.periodic
+        share = 1.0 - float(np.sinc(wn_rad_s * dt_s / np.pi))
+        if share > DULLED:
+            yield (
+                f"{self.name}: central differences at {1.0 / dt_s:.3g} Hz lose {100.0 * share:.2g} % of the motion at the "
+                f"natural frequency of {wn_rad_s:.3g} rad/s and more above it. Cmalpha, Cmq and Cmde are too small, by up to "
+                f"several times that, and their intervals do not allow for it; use {CONSISTENT}, or records of a higher rate."
+            )
+
 
 class _Contradiction:
     """Runs whose methods contradict each other on a derivative by more than the magnitude of the derivative."""
@@ -221,4 +259,4 @@ class _Contradiction:
             )
 
 
-__all__ = ["SIZES", "doubts"]
+__all__ = ["DIFFERENCING", "SIZES", "doubts"]

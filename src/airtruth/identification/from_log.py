@@ -45,9 +45,13 @@ class LogTask:
 
 @dataclass
 class FromLog:
-    """What one log gives: its runs and notes, the estimates of each method, or the parts of a joint estimate."""
+    """What one log gives: its runs and notes, the estimates of each method, or the parts of a joint estimate.
+
+    ``dt_s`` is its longest sample period [s].
+    """
 
     run_ids: tuple[str, ...]
+    dt_s: float = 0.0
     origin: Source | None = None
     parts: list[Part] = field(default_factory=list)
     estimates: dict[str, Estimates] = field(default_factory=dict)
@@ -116,6 +120,7 @@ def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made
         parts = [replace(p, batch=replace(p.batch, servo_s=servo_s)) for p in with_constants(log, task.plane)]
         for part in parts:
             check_batch(part.batch, task.options)
+            found.dt_s = max(found.dt_s, part.batch.dt_s)
     except LogError as error:
         raise LogError(f"{task.source}: {error}" if isinstance(entry, Path) else str(error)) from None
     if isinstance(entry, Path):

@@ -104,7 +104,7 @@ def identify(
     return IdentificationResult(
         estimates=estimates,
         settings=work.settings,
-        notes=(*work.noted, *doubts(lambda: [estimates])),
+        notes=(*work.noted, *doubts(lambda: [estimates], work.dt_s)),
         forced=tuple(work.forced),
         version=__version__,
         sources=tuple(work.sources),
@@ -155,7 +155,7 @@ def identified(
             parts=spool.parts,
             methods=tuple(one.name for one in chosen),
             settings=work.settings,
-            notes=(*work.noted, *doubts(spool.parts)),
+            notes=(*work.noted, *doubts(spool.parts, work.dt_s)),
             forced=tuple(work.forced),
             version=__version__,
             sources=tuple(work.sources),
@@ -215,6 +215,7 @@ class _Work:
     forced: list[str] = field(default_factory=list)
     sources: list[Source] = field(default_factory=list)
     failed: int = 0
+    dt_s: float = 0.0
 
     def estimated(self, made: Estimates) -> None:
         """Count the estimates of a method from one log."""
@@ -237,6 +238,7 @@ class _Work:
         self.parts += found.parts
         self.notes += found.notes
         self.forced += found.forced
+        self.dt_s = max(self.dt_s, found.dt_s)
         if found.origin is not None:
             self.sources.append(found.origin)
 

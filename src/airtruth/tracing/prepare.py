@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft, Sensor
 from airtruth.aircraft.tail import tail_geometry
+from airtruth.checks.excitation import LEAST_ELEVATOR_RAD
 from airtruth.effects.effect import Effect
 from airtruth.errors import ConfigurationError, FlightError, LogError, TrimError, choices
 from airtruth.logs.flight_log import FlightLog
@@ -49,8 +50,6 @@ _SAME_ALTITUDE_M: Final = 200.0
 """Difference in altitude within which records share a plant [m] (judgement: 2 % in density)."""
 _LEAST_SAMPLES: Final = 40
 """Least number of samples of a record [-] (judgement: fewer do not show a short period at 20 to 50 Hz)."""
-_LEAST_ELEVATOR_RAD: Final = 0.1 * DEG
-"""Least movement of the elevator in the fitted records [rad] (judgement: above the noise of a surface sensor)."""
 _THRUST_STD: Final = 0.05
 """Prior standard deviation of the thrust over its trimmed value, throttle logged [-] (judgement)."""
 _THRUST_UNKNOWN_STD: Final = 0.25
@@ -128,7 +127,7 @@ def prepare(
     ]
     signals.sort(key=lambda s: s.run_id)  # the answer does not depend on the order of the logs
     chosen = _hold_out([s.run_id for s in signals], options)
-    _check(signals, chosen)
+    _check(signals, chosen, logs)
     model = options.model if aircraft.file.jsbsim is not None else "linear"
     notes = []
     if model != options.model:
@@ -219,19 +218,30 @@ def undo_input_sensors(s: Signals, aircraft: Aircraft) -> Signals:
     )
 
 
-def _check(signals: Sequence[Signals], held: Sequence[str]) -> None:
+def _check(signals: Sequence[Signals], held: Sequence[str], logs: Sequence[FlightLog]) -> None:
     for s in signals:
         if s.y.shape[0] < _LEAST_SAMPLES:
             raise LogError(
                 f"run {s.run_id}: {s.y.shape[0]} samples; a record needs at least {_LEAST_SAMPLES} to be traced"
             )
     moved = max(float(np.ptp(s.elevator_rad)) for s in signals if s.run_id not in held)
-    if moved < _LEAST_ELEVATOR_RAD:
+    if moved < LEAST_ELEVATOR_RAD:
         which = "record that is not held out" if held else "record"
         raise LogError(
-            f"no {which} moves the elevator by more than {moved / DEG:.3g} deg: without an input no effect can be "
-            "separated from another; fly doublets or 3-2-1-1 of at least 1 deg"
+            f"no {which} moves the elevator by {LEAST_ELEVATOR_RAD / DEG:g} deg: {_range_of(logs, held, moved)}; without an "
+            "input no effect can be separated from another; fly doublets or 3-2-1-1 of at least 1 deg"
         )
+
+
+def _range_of(logs: Sequence[FlightLog], held: Sequence[str], moved_rad: float) -> str:
+    """The range of the elevator's column in words, and the part of it that is no noise."""
+    runs = ((log, i) for log in logs for i, run_id in enumerate(log.run_ids) if run_id not in held)
+    raw = max(float(np.ptp(log.channels["elevator_rad"][log.rows(i)])) for log, i in runs)
+    column = f"elevator_rad has a range of {raw / DEG:.2g} deg"
+    if moved_rad >= raw:
+        return column
+    rest = "all of it" if moved_rad == 0.0 else f"all but {moved_rad / DEG:.2g} deg of it"
+    return f"{column}, {rest} noise of its sensor"
 
 
 def _hold_out(runs: Sequence[str], options: TraceOptions) -> tuple[str, ...]:

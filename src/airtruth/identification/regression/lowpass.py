@@ -19,7 +19,7 @@ from airtruth.identification.regression.auxiliary import bounded, short_period
 from airtruth.identification.regression.rows import Problem, made_by
 from airtruth.identification.signals import ALPHA, AZ, ELEVATOR, Q
 from airtruth.numerics.prefilter import butterworth, zero_phase
-from airtruth.numerics.srivc import TransferFunctions, simulate, srivc
+from airtruth.numerics.srivc import HOLDS, TransferFunctions, simulate, srivc
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -126,28 +126,32 @@ def iv_problem(
     )
 
 
-def identify_actuator(command: Array, elevator: Array, dt_s: float) -> TransferFunctions:
-    """First-order actuator b/(p + a) of each run; the command is held between samples.
+def identify_actuator(command: Array, elevator: Array, dt_s: float, hold: str = "zoh") -> TransferFunctions:
+    """First-order actuator b/(p + a) of each run.
 
     Parameters
     ----------
     command, elevator : (runs, samples) [rad].
     dt_s : sample period [s].
+    hold : of the command between samples, one of `airtruth.numerics.srivc.HOLDS`.
     """
-    return srivc(command, elevator, dt_s, na=1, nb=1, start_rad_s=START_RAD_S)
+    return srivc(command, elevator, dt_s, na=1, nb=1, start_rad_s=START_RAD_S, hold=hold)
 
 
 def estimated_elevator(command: Array, elevator: Array, dt_s: float) -> tuple[Array, Bools]:
     """Noise-free elevator (runs, samples), relative to its start [rad], and the runs that have none.
 
-    A run without a stable actuator model has none; its row is zero.
+    The command is held between samples. Where no servo fits that, it is linear: in a slow log the surface follows a step
+    faster than a servo behind a held command does. A run without a stable actuator model has no elevator; its row is zero.
     """
-    model = identify_actuator(command, elevator, dt_s)
-    failed = ~model.converged
-    usable = TransferFunctions(
-        np.where(failed[:, None], 1.0, model.a),
-        np.where(failed[:, None], 0.0, model.b),
-        model.converged,
-        model.iterations,
-    )
-    return simulate(usable, command - command[:, :1], dt_s), failed
+    result = np.zeros_like(command)
+    failed = np.ones(command.shape[0], dtype=np.bool_)
+    for hold in HOLDS:
+        tried = np.flatnonzero(failed)
+        model = identify_actuator(command[tried], elevator[tried], dt_s, hold)
+        fits = model.converged
+        stable = TransferFunctions(model.a[fits], model.b[fits], fits[fits], model.iterations[fits])
+        inputs = command[tried[fits]]
+        result[tried[fits]] = simulate(stable, inputs - inputs[:, :1], dt_s, hold)
+        failed[tried[fits]] = False
+    return result, failed
