@@ -196,7 +196,7 @@ def test_an_unknown_method_lists_those_that_exist():
         ("cutoff_hz", -1.0, "between 0 and inf"),
         ("tolerance", 2.0, "between 0 and 1"),
         ("airspeed_m_s", 0.0, "between 0 and inf"),
-        ("order", 0, "at least 1"),
+        ("order", 0, "1 or more"),
     ],
 )
 def test_options_refuse_what_means_nothing(field, value, message):

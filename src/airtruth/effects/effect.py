@@ -74,8 +74,8 @@ class Parameter:
         Examples
         --------
         >>> change = Parameter("dCmalpha", "-", "change of Cmalpha", -4.0, 4.0, 0.1, scales_with="Cmalpha")
-        >>> change.for_aircraft({"Cmalpha": -0.357}).material
-        0.02
+        >>> change.for_aircraft({"Cmalpha": -0.8925}).material
+        0.05
         """
         if not self.scales_with:
             return self
