@@ -26,7 +26,7 @@ from airtruth.reporting import read_campaign, report, stored_campaign
 from airtruth.reporting.pages import campaign_page, estimates_page
 from airtruth.reporting.pages.assets import DIGESTS, own, uplot
 from airtruth.reporting.pages.declared import declared_at, shifts_table
-from airtruth.reporting.pages.page import data_table
+from airtruth.reporting.pages.page import data_table, page_of
 from airtruth.reporting.pages.records import (
     BUDGET,
     MOST,
@@ -374,3 +374,9 @@ def test_both_dark_themes_are_one():
     ]
     assert len(dark) == 2
     assert dark[0] == dark[1]
+
+
+def test_a_language_without_a_valid_tag_is_replaced_before_plots_are_drawn():
+    """uPlot formats numbers when it is read, and `en-US@posix` raises a RangeError there."""
+    page = page_of("A page", "<p>answer</p>", None, [])
+    assert page.index("Intl.NumberFormat(navigator.language)") < page.index("var uPlot=")

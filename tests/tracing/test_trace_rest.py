@@ -5,7 +5,7 @@ import pytest
 import trace_records as tr
 
 from airtruth.logs.flight_log import FlightLog
-from airtruth.tracing.model.records import is_constant, read
+from airtruth.tracing.model.records import read
 from airtruth.units import DEG
 
 STD = 0.02 * DEG
@@ -66,14 +66,3 @@ def test_a_single_outlier_is_no_motion():
 def test_without_a_declared_noise_every_sample_is_kept():
     elevator = STD * np.random.default_rng(3).standard_normal(500)
     assert restored(elevator, 0.0) == pytest.approx(elevator, abs=1e-15)
-
-
-def test_the_ratio_of_von_neumann():
-    """White noise has a ratio of 1, coloured one 1 less its first correlation, a line 6/n^2."""
-    rng = np.random.default_rng(4)
-    white = rng.standard_normal((400, 100))
-    assert np.mean([is_constant(row) for row in white]) > 0.99
-    coloured = np.array([np.convolve(row, np.exp(-np.arange(30) / 8.0), "valid") for row in white])
-    assert np.mean([is_constant(row) for row in coloured]) < 0.01
-    assert not is_constant(np.arange(12.0))
-    assert is_constant(np.ones(12))

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.numerics.whiteness import is_white
 from airtruth.units import DEG
 
 Array = NDArray[np.float64]
@@ -15,8 +16,6 @@ LEAST_ELEVATOR_RAD: Final = 0.1 * DEG
 """Least movement of the elevator that excites a record [rad] (judgement: above the noise of a surface sensor)."""
 SMOOTH_S: Final = 0.2
 """Width of the mean that smooths an elevator [s] (judgement: shorter than the steps of a manoeuvre)."""
-WHITE_STD: Final = 3.0
-"""Standard deviations of von Neumann's ratio below 1 up to which samples are white noise [-] (convention)."""
 
 
 def moves(elevator: Array, dt_s: float) -> NDArray[np.bool_]:
@@ -33,22 +32,15 @@ def moves(elevator: Array, dt_s: float) -> NDArray[np.bool_]:
     width = min(max(round(SMOOTH_S / dt_s), 1), elevator.shape[1])
     sums = np.cumsum(np.pad(elevator - elevator[:, :1], ((0, 0), (1, 0))), axis=1)
     smooth = (sums[:, width:] - sums[:, :-width]) / width
-    return np.asarray((np.ptp(smooth, axis=1) >= LEAST_ELEVATOR_RAD) | ~_white(elevator))
+    return np.asarray((np.ptp(smooth, axis=1) >= LEAST_ELEVATOR_RAD) | ~is_white(_without_line(elevator)))
 
 
-def _white(x: Array) -> NDArray[np.bool_]:
-    """(runs,) whether samples are a line and white noise, by the mean square of their differences.
-
-    Source: J. von Neumann, Ann. Math. Statist. 12 (1941) 367-395: of white noise its ratio to twice the variance has a mean of
-    about 1 and a standard deviation of about 1/sqrt(samples).
-    """
-    samples = x.shape[1]
-    line = np.linspace(-1.0, 1.0, samples)
+def _without_line(x: Array) -> Array:
+    """Rows (runs, samples) less their least-squares lines."""
+    line = np.linspace(-1.0, 1.0, x.shape[1])
     x = x - x[:, :1]  # so that a constant is exactly zero
     rest = x - x.mean(axis=1, keepdims=True)
-    rest = rest - np.outer(rest @ line / (line @ line), line)
-    differences = 0.5 * (np.diff(rest, axis=1) ** 2).mean(axis=1)
-    return np.asarray(differences >= (1.0 - WHITE_STD / np.sqrt(samples)) * rest.var(axis=1))
+    return np.asarray(rest - np.outer(rest @ line / (line @ line), line))
 
 
 __all__ = ["LEAST_ELEVATOR_RAD", "moves"]

@@ -61,6 +61,13 @@ class Report:
         return [*(chart.name for chart in self.charts), *self.figures]
 
 
+_LANGUAGE: Final = (
+    "try { new Intl.NumberFormat(navigator.language); } "
+    "catch { Object.defineProperty(navigator, 'language', { value: 'en' }); }"
+)
+"""Script before uPlot, which formats numbers in the browser's language and draws nothing where that has no valid tag."""
+
+
 def page_of(title: str, answer: str, picture: Chart | None, sections: Iterable[Section]) -> str:
     """Return an HTML page: the answer, one picture, and the sections with links to them.
 
@@ -84,7 +91,8 @@ def page_of(title: str, answer: str, picture: Chart | None, sections: Iterable[S
         f'<header><h1>{name}</h1><button type="button" id="theme" title="light or dark">theme</button></header>\n'
         f"{answer}\n{drawn}<nav>{links}</nav>\n" + "\n".join(parts) + "\n"
         "<noscript><p class='note'>Sorting, downloads and the plots of the records need JavaScript.</p></noscript>\n"
-        f"<script>/* {licence} */\n{uplot('uPlot.iife.min.js')}</script>\n<script>{own('page.js')}</script>\n"
+        f"<script>{_LANGUAGE}</script>\n<script>/* {licence} */\n{uplot('uPlot.iife.min.js')}</script>\n"
+        f"<script>{own('page.js')}</script>\n"
         "</body></html>\n"
     )
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
+from airtruth.numerics.whiteness import is_white
 from airtruth.physics.atmosphere import air_density, altitude_of_density_m
 from airtruth.tracing.model.airspeed import ground_speed, gust_cutoff_hz, low_passed
 from airtruth.tracing.model.compile import CHANNELS
@@ -32,8 +33,6 @@ _QUIET_S: Final = 0.2
 """Width of the median that replaces an elevator at rest [s] (judgement)."""
 _QUIET_STD: Final = 3.0
 """Distance from that median up to which the elevator is at rest, in standard deviations of its noise [-] (convention)."""
-_CONSTANT_STD: Final = 3.0
-"""Standard deviations of von Neumann's ratio below 1 up to which an elevator at rest is constant [-] (convention)."""
 
 _SERIES: Final = (
     "y",
@@ -254,7 +253,7 @@ def _quiet(elevator: Array, dt_s: float, std: float) -> Array:
     quiet = np.where(at_rest, middle, raw)
     ends = np.flatnonzero(np.diff(at_rest) | jumps) + 1
     for start, end in itertools.pairwise([0, *ends.tolist(), len(raw)]):
-        if at_rest[start] and end - start >= width and is_constant(raw[start:end]):
+        if at_rest[start] and end - start >= width and is_white(raw[start:end]):
             quiet[start:end] = raw[start:end].mean()
     return quiet
 
@@ -274,16 +273,6 @@ def _settled(jumps: NDArray[np.bool_]) -> NDArray[np.bool_]:
     for start, end in edges.reshape(-1, 2).tolist():
         settled[start : 2 * end - start + 1] = False
     return settled
-
-
-def is_constant(x: Array) -> bool:
-    """Whether samples show nothing but a constant and white noise, by the mean square of their differences.
-
-    Source: J. von Neumann, Ann. Math. Statist. 12 (1941) 367-395: of white noise its ratio to twice the variance has a mean of
-    about 1 and a standard deviation of about 1/sqrt(samples).
-    """
-    differences = 0.5 * float((np.diff(x) ** 2).mean())
-    return differences >= (1.0 - _CONSTANT_STD / math.sqrt(x.size)) * float(x.var(ddof=1))
 
 
 def fine(x: Array, sub: int) -> Array:
