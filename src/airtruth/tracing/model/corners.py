@@ -78,13 +78,23 @@ class CornerNodes(NamedTuple):
     logdet: Array
 
 
+def stack(arrays: Sequence[Array]) -> Array:
+    """Arrays of equal shape with a leading axis; a single one is not copied."""
+    return arrays[0][None] if len(arrays) == 1 else np.array(arrays)
+
+
 def stacked(corners: Sequence[Corners]) -> CornerNodes:
     """Corners of several flight conditions with the same sensors."""
     return CornerNodes(
-        *(
-            corners[0].variance if name == "variance" else np.array([getattr(own, name) for own in corners])
-            for name in Corners._fields
-        )
+        phi=stack([own.phi for own in corners]),
+        noise=stack([own.noise for own in corners]),
+        spread=stack([own.spread for own in corners]),
+        steady=stack([own.steady for own in corners]),
+        c=stack([own.c for own in corners]),
+        variance=corners[0].variance,
+        covariance=stack([own.covariance for own in corners]),
+        root=stack([own.root for own in corners]),
+        logdet=np.array([own.logdet for own in corners]),
     )
 
 
@@ -211,5 +221,6 @@ __all__ = [
     "predicted",
     "settled",
     "spread_of",
+    "stack",
     "stacked",
 ]

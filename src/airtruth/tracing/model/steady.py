@@ -6,12 +6,13 @@ Source: R. E. Maine and K. W. Iliff, NASA RP-1138 (1985), for the filter.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.tracing.model.corners import CornerNodes, Corners, input_column, spread_of, stacked
+from airtruth.tracing.model.corners import CornerNodes, Corners, input_column, spread_of, stack, stacked
 from airtruth.tracing.model.equations import settle_effects
 from airtruth.tracing.model.kernel_input import AirPoint, FilterModel, KernelInput
 from airtruth.tracing.model.linearise import (
@@ -26,6 +27,14 @@ from airtruth.tracing.model.schedule import UNSCHEDULED, Schedule
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+
+_NONE: Final = np.zeros((0, 0))
+"""A matrix that is not used."""
+_CERTAIN: Final = stacked([Corners(_NONE, _NONE, _NONE, _NONE, _NONE, np.zeros(OUTPUTS), _NONE, _NONE, 0.0)])
+"""The recursion of a surface that is known everywhere."""
+_UNIT: Final = np.eye(OUTPUTS)[None]
+"""Scale of a single flight condition."""
 
 
 class SteadyFilter(NamedTuple):
@@ -58,14 +67,17 @@ class SteadyFilter(NamedTuple):
 
 
 class _Condition(NamedTuple):
-    """The filter at one flight condition; attributes as of `SteadyFilter`, without nodes."""
+    """The filter at one flight condition; attributes as of `SteadyFilter`, without nodes.
+
+    It has no corners where the surface is known.
+    """
 
     k_gain: Array
     first: FirstUpdate
     white: Array
     covariance: Array
     logdet: float
-    corners: Corners
+    corners: Corners | None
     direct: Array
 
 
@@ -74,26 +86,38 @@ def steady_filter(given: KernelInput, along: Schedule) -> SteadyFilter | None:
 
     It depends on neither the initial state, nor the biases, nor the trim.
     """
-    points = list(zip(along.alpha_rad, along.air, strict=True))
-    nodes = [_at(given, *point) for point in points or [(given.reference_alpha_rad, given.reference)]]
+    if not along.alpha_rad:
+        mean = _at(given, given.reference_alpha_rad, given.reference)
+        return None if mean is None else _joined(given, [mean], mean, _UNIT, along)
+    nodes = [_at(given, *point) for point in zip(along.alpha_rad, along.air, strict=True)]
     sound = [node for node in nodes if node is not None]
     if len(sound) < len(nodes):
         return None
-    speeds = [air.airspeed_m_s for air in along.air or [given.reference]]
-    common = sound[int(np.argmin(np.abs(np.array(speeds) - given.reference.airspeed_m_s)))]
+    away = [abs(air.airspeed_m_s - given.reference.airspeed_m_s) for air in along.air]
+    common = sound[away.index(min(away))]
     root = np.linalg.inv(common.white)
-    scale = np.array([np.eye(OUTPUTS) if node is common else np.tril(root @ node.white) for node in sound])
-    lag_s, delay_s = (float(x[AZ]) for x in (given.model.sensors.lag_s, given.model.sensors.delay_s))
+    scale = np.array([_UNIT[0] if node is common else np.tril(root @ node.white) for node in sound])
+    return _joined(given, sound, common, scale, along)
+
+
+def _joined(
+    given: KernelInput, nodes: Sequence[_Condition], common: _Condition, scale: Array, along: Schedule
+) -> SteadyFilter:
+    """The filters of the flight conditions as one; ``common`` is one of them."""
+    sensors = given.model.sensors
+    corners = [node.corners for node in nodes if node.corners is not None]
     return SteadyFilter(
-        k_gain=np.array([node.k_gain for node in sound]),
-        first=FirstUpdate(*(np.array(parts) for parts in zip(*(node.first for node in sound), strict=True))),
+        k_gain=stack([node.k_gain for node in nodes]),
+        first=FirstUpdate(
+            stack([node.first.gain for node in nodes]), stack([node.first.share for node in nodes])
+        ),
         scale=scale,
         white=common.white,
         covariance=common.covariance,
         logdet=common.logdet,
-        corners=stacked([node.corners for node in sound]),
-        direct=np.array([node.direct for node in sound]),
-        shown=_shown(lag_s, delay_s, given.dt_s),
+        corners=stacked(corners) if corners else _CERTAIN,
+        direct=stack([node.direct for node in nodes]),
+        shown=_shown(float(sensors.lag_s[AZ]), float(sensors.delay_s[AZ]), given.dt_s),
         lower=along.lower,
         share=along.share,
     )
@@ -110,7 +134,7 @@ def _at(given: KernelInput, alpha_rad: float, air: AirPoint) -> _Condition | Non
     k_gain, white, covariance, logdet, p, first = gain_of(phi, c, noise, model.sensors.variance)
     if not math.isfinite(logdet):
         return None
-    corners = _certain(model)
+    corners = None
     if given.corner_rad2.size > 0:
         spread = spread_of(a, input_column(x, air, model), given.dt_s)
         root = np.asarray(np.linalg.inv(white))
@@ -125,23 +149,17 @@ def _shown(lag_s: float, delay_s: float, dt_s: float) -> float:
     return (1.0 - behind) * max(0.0, 1.0 - delay_s / dt_s)
 
 
-def _certain(model: FilterModel) -> Corners:
-    """The recursion of a surface that is known everywhere."""
-    none = np.zeros((0, 0))
-    return Corners(none, none, none, none, none, model.sensors.variance, none, none, 0.0)
-
-
 def without_update(model: FilterModel) -> SteadyFilter:
     """The filter of a free run, whose state no measurement corrects."""
-    n, square = model.states.size, np.eye(OUTPUTS)
+    n, square = model.states.size, _UNIT[0]
     return SteadyFilter(
         k_gain=np.zeros((1, n, OUTPUTS)),
         first=FirstUpdate(np.zeros((1, n, 2)), np.zeros((1, 2))),
-        scale=square[None],
+        scale=_UNIT,
         white=square,
         covariance=square,
         logdet=0.0,
-        corners=stacked([_certain(model)]),
+        corners=_CERTAIN,
         direct=np.zeros((1, n)),
         shown=1.0,
         lower=UNSCHEDULED.lower,
