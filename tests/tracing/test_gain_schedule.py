@@ -90,6 +90,16 @@ def test_a_node_that_the_airspeed_jumps_over_has_the_mean():
     assert along.alpha_rad == pytest.approx([0.1, alpha.mean(), 0.05], rel=1e-9)
 
 
+def test_an_airspeed_of_zero_has_the_gain_of_a_quarter_of_the_largest():
+    grid = filter_inputs(slowing(np.random.default_rng(1), 0.3), Change()).grid
+    v = grid.airspeed_m_s.copy()
+    v[-20:] = 0.0
+    along = schedule(np.full(SAMPLES, 0.05), grid._replace(airspeed_m_s=v), 2)
+    assert along.air[0].airspeed_m_s == pytest.approx(FAST / 4.0, rel=1e-12)
+    assert along.lower[-1] == 0
+    assert along.share[-1] == 0.0
+
+
 def test_equal_conditions_are_as_one():
     made = slowing(np.random.default_rng(2), 0.3)
     given = filter_inputs(made, Change())

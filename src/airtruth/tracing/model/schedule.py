@@ -26,6 +26,10 @@ mean)."""
 _SPACING: Final = 1.5
 """Largest ratio of two airspeeds between which gains are interpolated [-] (judgement: 1/V is within 2 % of linear in log V)."""
 
+_WIDEST: Final = 4.0
+"""Ratio of the largest airspeed to the least that has a gain of its own [-] (judgement: below a quarter of it nothing flies; an
+airspeed of zero is a dropout or a take-off)."""
+
 
 class Schedule(NamedTuple):
     """Flight conditions at which the gain is made.
@@ -56,7 +60,11 @@ def schedule(alpha_rad: Array, grid: GridSignals, sub: int) -> Schedule:
     alpha_rad : (samples,) measured angle of attack [rad].
     grid : inputs on the filter's grid, ``sub`` cells to a sample.
     """
-    log_v = np.log(grid.airspeed_m_s[::sub])
+    airspeed = grid.airspeed_m_s[::sub]
+    fastest = float(airspeed.max())
+    if not fastest > 0.0:
+        return UNSCHEDULED
+    log_v = np.log(np.maximum(airspeed, fastest / _WIDEST))
     low, high = float(log_v.min()), float(log_v.max())
     if not high - low > math.log(RATIO):
         return UNSCHEDULED
@@ -67,7 +75,7 @@ def schedule(alpha_rad: Array, grid: GridSignals, sub: int) -> Schedule:
     weights = np.maximum(1.0 - np.abs(at[:, None] - np.arange(cells + 1)), 0.0)
     nodes = {name: _nodes(weights, x[::sub]) for name, x in grid._asdict().items()}
     v = np.exp(np.linspace(low, high, cells + 1))
-    density = _nodes(weights, 2.0 * grid.qbar_pa[::sub] / grid.airspeed_m_s[::sub] ** 2)
+    density = 2.0 * float(grid.qbar_pa[::sub].sum() / (airspeed**2).sum())
     none = np.zeros(cells + 1)
     nodes |= {"airspeed_m_s": v, "qbar_pa": 0.5 * density * v * v, "lift": none, "moment": none}
     points = zip(*(nodes[name].tolist() for name in AirPoint._fields), strict=True)
