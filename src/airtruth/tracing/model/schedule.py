@@ -21,11 +21,8 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 RATIO: Final = 1.25
-"""Ratio of the largest airspeed of a record to its least up to which one gain serves [-] (judgement: w/V within 12 % of its
-mean)."""
-_SPACING: Final = 1.5
-"""Largest ratio of two airspeeds between which gains are interpolated [-] (judgement: 1/V is within 2 % of linear in log V)."""
-
+"""Ratio of the largest airspeed of a record to its least up to which one gain serves, and largest ratio of two airspeeds between
+which gains are interpolated [-] (judgement: w/V within 12 % of its mean)."""
 _WIDEST: Final = 4.0
 """Ratio of the largest airspeed to the least that has a gain of its own [-] (judgement: below a quarter of it nothing flies; an
 airspeed of zero is a dropout or a take-off)."""
@@ -36,8 +33,8 @@ class Schedule(NamedTuple):
 
     Attributes
     ----------
-    alpha_rad : (nodes,) angle of attack at each airspeed [rad]; empty where the mean of the record serves.
-    air : (nodes,) the other inputs there.
+    alpha_rad : (nodes,) mean angle of attack near each airspeed [rad]; empty where the mean of the record serves.
+    air : (nodes,) means of the other inputs there.
     lower : (samples,) number of the node below the airspeed of each sample.
     share : (samples,) of the next node in the interpolation, linear in log V [-].
     """
@@ -60,22 +57,23 @@ def schedule(alpha_rad: Array, grid: GridSignals, sub: int) -> Schedule:
     alpha_rad : (samples,) measured angle of attack [rad].
     grid : inputs on the filter's grid, ``sub`` cells to a sample.
     """
-    airspeed = grid.airspeed_m_s[::sub]
-    fastest = float(airspeed.max())
+    measured = grid.airspeed_m_s[::sub]
+    fastest = float(measured.max())
     if not fastest > 0.0:
         return UNSCHEDULED
-    log_v = np.log(np.maximum(airspeed, fastest / _WIDEST))
+    airspeed = np.maximum(measured, fastest / _WIDEST)
+    log_v = np.log(airspeed)
     low, high = float(log_v.min()), float(log_v.max())
     if not high - low > math.log(RATIO):
         return UNSCHEDULED
-    cells = math.ceil((high - low) / math.log(_SPACING))
+    cells = math.ceil((high - low) / math.log(RATIO))
     at = (log_v - low) * (cells / (high - low))
     lower = np.minimum(at.astype(np.int64), cells - 1)
     share = at - lower
     weights = np.maximum(1.0 - np.abs(at[:, None] - np.arange(cells + 1)), 0.0)
     nodes = {name: _nodes(weights, x[::sub]) for name, x in grid._asdict().items()}
-    v = np.exp(np.linspace(low, high, cells + 1))
-    density = 2.0 * float(grid.qbar_pa[::sub].sum() / (airspeed**2).sum())
+    v = _nodes(weights, airspeed)
+    density = 2.0 * float(grid.qbar_pa[::sub].sum() / (measured**2).sum())
     none = np.zeros(cells + 1)
     nodes |= {"airspeed_m_s": v, "qbar_pa": 0.5 * density * v * v, "lift": none, "moment": none}
     points = zip(*(nodes[name].tolist() for name in AirPoint._fields), strict=True)
@@ -84,9 +82,9 @@ def schedule(alpha_rad: Array, grid: GridSignals, sub: int) -> Schedule:
 
 
 def _nodes(weights: Array, x: Array) -> Array:
-    """Values at the nodes whose interpolation is nearest to samples (least squares); their mean at a node that none is near."""
-    mean = float(x.mean())
-    return np.asarray(mean + np.linalg.lstsq(weights, x - mean, rcond=1e-3)[0])
+    """Means of samples near each node, which no single angle of attack decides; at a node that none is near, of all samples."""
+    near = weights + 1e-9
+    return np.asarray((near * x[:, None]).sum(axis=0) / near.sum(axis=0))
 
 
 __all__ = ["RATIO", "UNSCHEDULED", "Schedule", "schedule"]
