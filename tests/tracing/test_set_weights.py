@@ -15,9 +15,13 @@ def null(*names, spread=None, z=100.0):
     effects = [SimpleNamespace(name=name, key=name) for name in names]
     return SimpleNamespace(
         hypothesis=SimpleNamespace(spread=spread, effects=effects, span=lambda key: slice(0, 1)),
-        point=SimpleNamespace(sizes=[z]),
+        point=SimpleNamespace(sizes=[z] * len(names) or [z]),
         size_std=lambda number: 1.0,
+        cost=0.0,
     )
+
+
+NO_SCORES = SimpleNamespace(scores=())
 
 
 def candidate(name, gain, *reasons, converged=True):
@@ -38,6 +42,9 @@ def tied(z=100.0, outdone=(), **gains):
         release=None,
         rival=None,
         null=null(z=z),
+        sets=(),
+        exchanged=(),
+        table=NO_SCORES,
     )
 
 
@@ -50,6 +57,9 @@ def released(rival=None, carried=(), spread=None, **costs):
         release=SimpleNamespace(sets=sets, cost=sets[0].cost),
         rival=rival,
         null=null(*carried, spread=spread),
+        sets=(),
+        exchanged=(),
+        table=NO_SCORES,
     )
 
 
@@ -164,3 +174,39 @@ def test_effects_of_an_earlier_release_are_in_every_set_of_a_later_one():
     assert weights([released(cg_shift=5.0), later, end]) == pytest.approx(
         {("cg_shift", "inertia_error"): 1.0, ("cg_shift", "icing"): math.exp(-1.0)}
     )
+
+
+def exchanged(cost, *names, converged=True):
+    """A fit that the search has tried in place of the last one, which costs 0 and 1 for each size."""
+    fit = null(*names)
+    fit.cost, fit.converged = cost, converged
+    return fit
+
+
+def test_sets_that_the_search_has_tried_weigh_by_their_cost():
+    """3 behind the last set of two effects; a set that other rounds list, or that has not converged, is not listed again."""
+    end = tied()
+    end.tied, end.null = [], null("gyro_lag", "cg_shift")
+    end.exchanged = (
+        exchanged(3.0, "gyro_lag", "inertia_error"),
+        exchanged(1.0, "gyro_lag", "cg_shift"),
+        exchanged(1.0, "gyro_lag", "mass_error", converged=False),
+    )
+    found = weights([tied(gyro_lag=80.0), released(cg_shift=5.0), end])
+    assert found[("gyro_lag", "inertia_error")] == pytest.approx(math.exp(-3.0))
+    assert found[("cg_shift", "gyro_lag")] == pytest.approx(1.0)
+    assert ("gyro_lag", "mass_error") not in found
+
+
+def test_one_effect_more_weighs_by_its_score():
+    """A score of 3 gains 9 in 2 log L; prior odds and Occam's factor cost 4, the parameter 1. A score of 1 points to nothing."""
+    end = tied()
+    end.tied, end.null = [], null("gyro_lag")
+    end.table = SimpleNamespace(
+        scores=[
+            SimpleNamespace(effect=SimpleNamespace(name=name, parameters=("size",)), z=z)
+            for name, z in (("vane_lag", -3.0), ("vane_scale", 1.0))
+        ]
+    )
+    found = weights([tied(gyro_lag=80.0), end])
+    assert found == pytest.approx({("gyro_lag",): 1.0, ("gyro_lag", "vane_lag"): math.exp(4.5 - 5.0)})

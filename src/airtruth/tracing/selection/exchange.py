@@ -2,8 +2,9 @@
 
 A search accepts one effect after another. Two causes that are alike at first may lead it to a set of three that together
 imitate them: the delay of a gyro in place of its lag, then a lag of the surface in place of its delay, then the lag of the
-gyro for what remains. An exchange of one member for its rival, and the removal of what becomes redundant, leads back. So does
-an effect to which what remains points: it is added, and what it makes redundant is removed.
+gyro for what remains. An exchange of one member for its rival, and the removal of what becomes redundant, leads back. The
+rivals of a member are the best candidate of its round and those to which the residual of the others points. So does an effect
+to which what remains points: it is added, and what it makes redundant is removed.
 
 Source: P. Pudil, J. Novovicova and J. Kittler, Pattern Recognition Letters 15 (1994) 1119-1125 (floating search).
 """
@@ -22,16 +23,22 @@ from numpy.typing import NDArray
 from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.parameters import Parameters
+from airtruth.tracing.selection import score_test
 from airtruth.tracing.selection.acceptance import Candidate
 from airtruth.tracing.selection.budget import Advance, may_begin
-from airtruth.tracing.selection.refit import losses_without, refit_scored
+from airtruth.tracing.selection.refit import losses_without, refit_scored, refit_without
 from airtruth.tracing.selection.rounds import MOST_EFFECTS, REMAINS, SearchRound
 
 BETTER: Final = 5.0
 """Log-posterior by which another set has to lead [-] (judgement: a gain of 10 in 2 log L, as that of a first effect)."""
+AHEAD: Final = 1.0
+"""Log-posterior by which another set of no more parameters has to lead [-] (judgement: odds of 2.7)."""
 _ADDED: Final = 2
 """Number of effects that are added for what remains [-] (judgement: each costs a refit)."""
+_SUGGESTED: Final = 2
+"""Number of rivals of each member that scores suggest [-] (judgement: each costs a refit)."""
 _LATE: Final = ("delay", "lag")
 """Kinds of terms that delay a signal."""
 
@@ -42,27 +49,30 @@ def better_set(
     last: PosteriorFit,
     effects: Sequence[Effect],
     least: float,
+    seed: int,
     advance: Advance,
 ) -> tuple[tuple[Effect, ...] | None, tuple[PosteriorFit, ...]]:
     """The effects of a better set, the one that explains most first, and the fit of every exchange.
 
-    There is no better set where no exchange leads by `BETTER`.
+    There is no better set where none leads by `AHEAD`, with more parameters by `BETTER`.
 
     Parameters
     ----------
     rounds : a finished search that accepted effects; last : fit of these under the declaration of the derivatives.
     effects : candidates of the search.
     least : gain in 2 log L below which a member of the new set is removed.
+    seed : seed of the draws behind p-values.
     """
     best: PosteriorFit | None = None
     fits: list[PosteriorFit] = []
-    for phrase, refit in _tries(problem, rounds, last, effects):
+    for phrase, refit in _tries(problem, rounds, last, effects, seed):
         if not may_begin(advance, phrase):
             return None, tuple(fits)
         tried = refit()
         if tried is not None:
             fits.append(tried)
-            if _cost(tried) < _cost(best or last) - (0.0 if best else BETTER):
+            lead = BETTER if len(tried.point.sizes) > len(last.point.sizes) else AHEAD
+            if _cost(tried) < min(_cost(last) - lead, np.inf if best is None else _cost(best)):
                 best = tried
     needed = () if best is None else _needed(problem, best, least)
     kept = {e.key for e in needed} != {e.key for e in last.hypothesis.effects}
@@ -70,9 +80,14 @@ def better_set(
 
 
 def _tries(
-    problem: TraceProblem, rounds: Sequence[SearchRound], last: PosteriorFit, effects: Sequence[Effect]
+    problem: TraceProblem,
+    rounds: Sequence[SearchRound],
+    last: PosteriorFit,
+    effects: Sequence[Effect],
+    seed: int,
 ) -> Iterator[tuple[str, Callable[[], PosteriorFit | None]]]:
     """Each exchange as a phrase for the progress line, and the function that refits it."""
+    yield from suggested(problem, last, effects, seed)
     for index, effect in enumerate(last.hypothesis.effects):
         own = next((r for r in rounds if r.tied and r.tied[0].score.effect.key == effect.key), None)
         rival = None if own is None else best_rival(own, last, effect)
@@ -88,6 +103,28 @@ def _tries(
         if scored.adjusted[i] < REMAINS:
             phrase = f"{scored.table.scores[i].effect.key} beside the other effects"
             yield phrase, partial(refit_scored, problem, last, scored.table, int(i))
+
+
+def suggested(
+    problem: TraceProblem, last: PosteriorFit, effects: Sequence[Effect], seed: int
+) -> Iterator[tuple[str, Callable[[], PosteriorFit | None]]]:
+    """For each member the effects that score highest at the fit without it, as `_tries`.
+
+    A candidate of the member's own round had to gain beside fewer effects. What delays the same signal is tried by
+    `other_kinds` and among the look-alikes.
+    """
+    for member in last.hypothesis.effects:
+        less = refit_without(problem, last, member)
+        if less is None:
+            continue
+        taken = {e.name for e in last.hypothesis.effects}
+        late = late_signal(member)
+        others = [e for e in effects if e.name not in taken and not (late and late_signal(e) == late)]
+        table = score_test.table(less, problem, others, NO_WHITENER, seed)
+        for i in np.argsort(-np.array(table.white), kind="stable")[:_SUGGESTED]:
+            rival = table.scores[i].effect.key
+            phrase = f"{rival} in place of {member.key} beside the other effects"
+            yield phrase, partial(refit_scored, problem, less, table, int(i), last.cost)
 
 
 def _scored(rounds: Sequence[SearchRound], last: PosteriorFit) -> SearchRound:

@@ -43,7 +43,7 @@ from airtruth.tracing.selection.rounds import (
     SearchRound,
     scored_round,
 )
-from airtruth.tracing.selection.search import settled, total_cost
+from airtruth.tracing.selection.settled import settled, total_cost
 
 Array = NDArray[np.float64]
 

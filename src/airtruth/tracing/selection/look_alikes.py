@@ -59,14 +59,14 @@ def _beside_the_others(
     own, last = rounds[at], rounds[-1].null
     leader, member = own.tied[0], own.tied[0].score.effect
     fits = [Refit(leader.score, last, 0.0)]
-    for effect, starts in _rivals(own, last, effects):
+    for effect, starts in _rivals(own, rounds[-1], effects):
         if not may_begin(advance, f"{effect.key} in place of {member.key} beside the other effects"):
             return own
         score = next((s for s in own.table.scores if s.effect.key == effect.key), None)
         exchanged = tuple(effect if e.key == member.key else e for e in last.hypothesis.effects)
         hypothesis = replace(last.hypothesis, effects=exchanged)
         ends: list[PosteriorFit | None] = [
-            f for f in rounds[-1].exchanged if f.hypothesis == hypothesis and f.converged
+            f for f in rounds[-1].exchanged if _keys(f) == {e.key for e in exchanged} and f.converged
         ]
         ends = ends or [converged_fit(problem, hypothesis, start, last.cost) for start in starts]
         tried = min((end for end in ends if end is not None), key=lambda end: end.cost, default=None)
@@ -87,14 +87,19 @@ def _beside_the_others(
     return replace(own, candidates=tuple((known | tested).values()), tied=(leader, *alike))
 
 
+def _keys(fitted: PosteriorFit) -> set[str]:
+    return {e.key for e in fitted.hypothesis.effects}
+
+
 def _rivals(
-    own: SearchRound, last: PosteriorFit, effects: Sequence[Effect]
+    own: SearchRound, end: SearchRound, effects: Sequence[Effect]
 ) -> Iterator[tuple[Effect, list[Parameters]]]:
-    """Rivals of a round's effect, and where their refits begin: what is as late, the ties, and the best rival.
+    """Rivals of a round's effect, and where their refits begin: what is as late, the ties, the best rival, and what the
+    search has exchanged with the effect.
 
     A delay and a lag of one signal have the same size, a time.
     """
-    member = own.tied[0].score.effect
+    last, member = end.null, own.tied[0].score.effect
     taken = {e.key for e in last.hypothesis.effects}
     late = late_signal(member)
     for effect in effects:
@@ -108,6 +113,12 @@ def _rivals(
         if key not in taken:
             taken.add(key)
             yield c.score.effect, starts_in_place_of(last, member, c)
+    rest = _keys(last) - {member.key}
+    for f in end.exchanged:
+        others = [e for e in f.hypothesis.effects if e.key not in rest]
+        if f.converged and rest <= _keys(f) and len(others) == 1 and others[0].key not in taken:
+            taken.add(others[0].key)
+            yield others[0], []
 
 
 __all__ = ["with_look_alikes"]

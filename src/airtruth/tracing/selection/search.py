@@ -16,25 +16,27 @@ from airtruth.tracing.inference.profile import relocated
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import OUTDONE, Candidate
 from airtruth.tracing.selection.budget import Advance, may_begin
-from airtruth.tracing.selection.exchange import BETTER, better_set
-from airtruth.tracing.selection.explanation import AS_PROBABLE, REFERENCE, events, least_cost
+from airtruth.tracing.selection.exchange import AHEAD, BETTER, better_set
+from airtruth.tracing.selection.explanation import AS_PROBABLE, events
 from airtruth.tracing.selection.refit import losses_without, refit_absorbed
 from airtruth.tracing.selection.release import DeclaredCauses, Release
 from airtruth.tracing.selection.rounds import (
     NOTHING_DECLARED,
     NOTHING_KNOWN,
     REMAINS,
-    Rival,
     RoundStart,
     SearchRound,
     at_best_location,
     search_round,
     significant_gain,
 )
+from airtruth.tracing.selection.settled import settled, total_cost
 from airtruth.tracing.selection.weights import rival_of
 
 _ALTERNATIVES: Final = 2
 """Number of tied effects to try instead of the leader [-] (judgement: each costs the rounds that follow)."""
+_EXCHANGES: Final = 2
+"""Number of better sets that a search follows, one after another [-] (judgement: each costs the rounds that lead to it)."""
 _CLEAN: Final = 0.05
 """Probability of the remaining anomaly from which a search explains the records, so that no tied effect is tried
 instead [-] (convention)."""
@@ -122,15 +124,21 @@ class _Search:
             rounds[-1].null.hypothesis.effects
         ) < 2:
             rounds = self._with_absorbed(first, rounds, beside=not any(weak))
-        if len(rounds[-1].null.hypothesis.effects) + len(rounds[-1].sets[:1]) < 2:
-            return rounds
-        last = self._declared(rounds[-1].null)
-        if last is None:
-            return rounds
-        least = significant_gain(first.tested, later=True)
-        better, exchanged = better_set(self.problem, rounds, last, first.effects, least, self.advance)
-        if better is not None:
-            return self.led(first, better, rounds)
+        for count in range(_EXCHANGES + 1):
+            if len(rounds[-1].null.hypothesis.effects) + len(rounds[-1].sets[:1]) < 2:
+                return rounds
+            last = self._declared(rounds[-1].null)
+            if last is None:
+                return rounds
+            least = significant_gain(first.tested, later=True)
+            better, exchanged = better_set(
+                self.problem, rounds, last, first.effects, least, self.seed, self.advance
+            )
+            follow = better is not None and count < _EXCHANGES
+            again = self.led(first, better or (), rounds, 0.5 * AHEAD) if follow else rounds
+            if again is rounds:
+                break
+            rounds = again
         if last is rounds[-1].null:
             rounds = (*rounds[:-1], replace(rounds[-1], exchanged=exchanged))
         return rounds
@@ -169,9 +177,13 @@ class _Search:
         return fit(self.problem, replace(last.hypothesis, spread=None), last.point, near=last)
 
     def led(
-        self, first: RoundStart, effects: Sequence[Effect], rounds: tuple[SearchRound, ...]
+        self,
+        first: RoundStart,
+        effects: Sequence[Effect],
+        rounds: tuple[SearchRound, ...],
+        lead: float = BETTER,
     ) -> tuple[SearchRound, ...]:
-        """The rounds of a search that accepts these effects first, if they explain more than others.
+        """The rounds of a search that accepts these effects first, if they lead others by a log-posterior.
 
         Fewer effects are enough unless the odds against them are strong, and so is as much where they alone leave no anomaly.
         """
@@ -191,8 +203,8 @@ class _Search:
         again = self.rounds(starts, again)
         simpler = len(_effects_of(again[-1])) < len(_effects_of(rounds[-1]))
         cleaner = again[-1].anomaly.p_value > _CLEAN and rounds[-1].anomaly.p_value < REMAINS
-        lead = _STRONG_ODDS if simpler else 0.0 if cleaner else BETTER
-        return again if total_cost(again[-1]) < total_cost(rounds[-1]) - lead else rounds
+        needed = _STRONG_ODDS if simpler else 0.0 if cleaner else lead
+        return again if total_cost(again[-1]) < total_cost(rounds[-1]) - needed else rounds
 
     def _branches(
         self,
@@ -311,50 +323,6 @@ def _effects_of(last: SearchRound) -> tuple[str, ...]:
     return (*_names(last), *(last.sets[0].effects if last.sets else ()))
 
 
-def total_cost(last: SearchRound) -> float:
-    """Negative log-posterior at the end of a search, with one for each parameter of an effect."""
-    if last.null.hypothesis.spread is None:
-        own = last.null.cost if last.release is None else last.release.cost
-    else:
-        own = least_cost(last.sets) if last.sets else np.inf
-    return own + len(last.null.point.sizes)
-
-
-def settled(problem: TraceProblem, rounds: tuple[SearchRound, ...]) -> tuple[SearchRound, ...]:
-    """The rounds with the last fit under the best explanation of the derivatives, where they were released.
-
-    Parameters
-    ----------
-    rounds : a finished search, with what explains the derivatives at its last null.
-    """
-    if not rounds or not rounds[-1].sets:
-        return rounds
-    last = rounds[-1]
-    spread = last.sets[0].covariance - problem.declared_covariance
-    hypothesis = replace(last.null.hypothesis, spread=spread)
-    null = fit(problem, hypothesis, last.null.point, near=last.null) or last.null
-    gls = fit(
-        problem, hypothesis, last.gls.point, last.whitener, free_levels=last.whitener.order == 0, iterations=6
-    )
-    first = next(r.release for r in rounds if r.release is not None)
-    end = replace(last, null=null, gls=gls or null, release=replace(first, fit=last.null, sets=last.sets))
-    return (*rounds[:-1], _with_declared(problem, end, last))
-
-
-def _with_declared(problem: TraceProblem, end: SearchRound, last: SearchRound) -> SearchRound:
-    """The last round with the set of its effects under the declaration, where derivatives are released beside effects."""
-    effects = last.null.hypothesis.effects
-    if not effects:
-        return end
-    declared = fit(problem, replace(last.null.hypothesis, spread=None), last.null.point, near=last.null)
-    if declared is None:
-        return end
-    names = tuple(sorted({e.name for e in effects}))
-    excess = declared.cost + len(declared.point.sizes) - total_cost(last)
-    log_weight = min(0.0, REFERENCE - max(0.0, excess))
-    return replace(end, rival=Rival({**(end.rival.sets if end.rival else {}), names: log_weight}))
-
-
 def _variants(own: SearchRound) -> tuple[Candidate, ...]:
     """Other variants of the leader that pass every test but gain less.
 
@@ -391,4 +359,4 @@ def redundant_effect(problem: TraceProblem, fitted: PosteriorFit, least: float) 
     return None
 
 
-__all__ = ["redundant_effect", "search", "settled", "total_cost"]
+__all__ = ["redundant_effect", "search"]

@@ -13,6 +13,8 @@ from airtruth.tracing.selection.explanation import REFERENCE
 from airtruth.tracing.selection.ranking import TIE
 from airtruth.tracing.selection.rounds import Rival, SearchRound
 
+_POINTS: Final = 2.0
+"""Score in standard deviations from which the residual points to one more effect [-] (convention)."""
 _MOST_SETS: Final = 400
 """Number of sets that explain the derivatives and enter the weights [-] (judgement: the others weigh nothing)."""
 _LEAST_STD: Final = 1e-12
@@ -25,8 +27,8 @@ def weights(rounds: Sequence[SearchRound]) -> dict[tuple[str, ...], float]:
     """Names of each set -> its weight beside the set that the search accepted.
 
     The sets combine the effects that could lead each round with the sets that explain the derivatives, and contain those of
-    the branches that lost, and those without one of the accepted effects. An effect is accepted by a test, so that no set
-    is empty for want of the only one.
+    the branches that lost, those without one of the accepted effects, those that the search has tried instead, and those with
+    one effect more. An effect is accepted by a test, so that no set is empty for want of the only one.
     """
     found: dict[tuple[str, ...], float] = {}
 
@@ -48,7 +50,32 @@ def weights(rounds: Sequence[SearchRound]) -> dict[tuple[str, ...], float]:
     for r in rounds:
         for names, log_weight in () if r.rival is None else r.rival.sets.items():
             add(names, log_weight)
+    known = set(found)
+    for every, log_weight in (*_exchanged(rounds[-1]), *_with_one_more(rounds[-1])):
+        if tuple(sorted(set(every))) not in known:
+            add(every, log_weight)
     return found
+
+
+def _exchanged(last: SearchRound) -> Iterator[tuple[list[str], float]]:
+    """The sets that the search has tried in place of the last one, and the logarithm of the weight of each."""
+    own = last.null.cost + len(last.null.point.sizes)
+    for f in last.exchanged:
+        if f.converged:
+            yield [e.name for e in f.hypothesis.effects], own - f.cost - len(f.point.sizes)
+
+
+def _with_one_more(last: SearchRound) -> Iterator[tuple[list[str], float]]:
+    """The last set with one effect that its residual points to, and the logarithm of the weight of each.
+
+    A score squared is the gain in 2 log L that a refit reaches to first order.
+    """
+    accepted = [e.name for e in last.null.hypothesis.effects]
+    explaining = last.sets[0].effects if last.sets else ()
+    for s in last.table.scores if accepted or explaining else ():
+        if abs(s.z) > _POINTS and s.effect.name not in (*accepted, *explaining):
+            lost = REFERENCE + len(s.effect.parameters)
+            yield [*accepted, *explaining, s.effect.name], 0.5 * s.z**2 - lost
 
 
 def _leading(own: SearchRound, accepted: Collection[str]) -> Iterator[tuple[str, float]]:
