@@ -22,6 +22,8 @@ from airtruth.tracing.selection.score_test import Score, Table
 
 LEADING: Final = 8
 """Largest number of candidates that a round refits [-] (judgement: a refit costs seconds to a minute)."""
+LED: Final = 3
+"""The same of a round whose leader is known beforehand [-] (judgement: its rivals are refitted at the end of the search)."""
 _BY_SCORE: Final = 2
 """Refits reserved for candidates that lead by their score under the autoregression [-] (judgement)."""
 _VISIBLE: Final = 2.0
@@ -93,6 +95,7 @@ def refit_leaders(
     wanted: Collection[str] = (),
     skip: Collection[str] = (),
     rival: float = np.inf,
+    most: int = LEADING,
 ) -> list[Refit]:
     """Refit the leading candidates, best first; none where no score is significant and none is wanted.
 
@@ -101,12 +104,13 @@ def refit_leaders(
     table : scores at the null; significant : (scores,) which of them pass the level.
     wanted : keys of effects that have to be among the refitted ones; skip : keys of those that are not.
     rival : cost of another explanation; refits that stay far behind end early.
+    most : number of candidates that are refitted.
     """
     if not significant.any() and not wanted:
         return []
     fits: list[Refit] = []
     freedom = Freedom(problem, null)
-    for i in _leading(problem, null, table, significant, wanted):
+    for i in _leading(problem, null, table, significant, wanted)[:most]:
         s = table.scores[i]
         if s.effect.key in skip:
             continue
@@ -338,6 +342,7 @@ def _ordered_shares(
 
 __all__ = [
     "LEADING",
+    "LED",
     "Refit",
     "better_null",
     "losses_without",

@@ -26,7 +26,15 @@ from airtruth.tracing.selection.budget import Advance
 from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.omnibus import anomalies
 from airtruth.tracing.selection.ranking import TIE, rank
-from airtruth.tracing.selection.refit import Refit, better_null, refit_absorbed, refit_known, refit_leaders
+from airtruth.tracing.selection.refit import (
+    LEADING,
+    LED,
+    Refit,
+    better_null,
+    refit_absorbed,
+    refit_known,
+    refit_leaders,
+)
 from airtruth.tracing.selection.release import DeclaredCauses, Release, explained, release
 from airtruth.tracing.selection.score_test import Table
 
@@ -235,7 +243,8 @@ def search_round(
             rival = free.cost if free is not None and free.strain < _STRAINED else np.inf
             passing = adjusted <= level
             wanted = begin.replacement or ((begin.leader,) if begin.leader else ())
-            fits = refit_leaders(problem, null, table, passing, advance, wanted, skip, rival)
+            most = LED if begin.leader else LEADING
+            fits = refit_leaders(problem, null, table, passing, advance, wanted, skip, rival, most)
             if free is not None and _may_hide_effects(free, fits):
                 fits = refit_absorbed(problem, null, table, fits, advance, skip)
             if known:

@@ -193,7 +193,8 @@ class _Search:
             if not may_begin(self.advance, f"search led by {effect.key}"):
                 return rounds
             begin = replace(starts[-1], leader=effect.key, settled=True)
-            own = search_round(self.problem, begin, len(again), self.seed, self.advance, known=self.known)
+            known = {key: value for key, value in self.known.items() if key == effect.key}
+            own = search_round(self.problem, begin, len(again), self.seed, self.advance, known=known)
             if own is None or not own.tied:
                 return rounds
             fitted = relocated(self.problem, own.tied[0].fit, placed=effect.key)
