@@ -199,14 +199,30 @@ def test_sets_that_the_search_has_tried_weigh_by_their_cost():
 
 
 def test_one_effect_more_weighs_by_its_score():
-    """A score of 3 gains 9 in 2 log L; prior odds and Occam's factor cost 4, the parameter 1. A score of 1 points to nothing."""
+    """A score of 2.9 gains 8.4 in 2 log L; prior odds and Occam's factor cost 4, the parameter 1. A score of 1 points to nothing.
+
+    The search refused a score of 6, so that its set weighs half as much as the answer; the fourth score is not listed.
+    """
     end = tied()
     end.tied, end.null = [], null("gyro_lag")
     end.table = SimpleNamespace(
         scores=[
             SimpleNamespace(effect=SimpleNamespace(name=name, parameters=("size",)), z=z)
-            for name, z in (("vane_lag", -3.0), ("vane_scale", 1.0))
+            for name, z in (
+                ("vane_lag", -2.9),
+                ("vane_scale", 1.0),
+                ("backlash", 6.0),
+                ("gyro_scale", 2.8),
+                ("vane_arm", 2.7),
+            )
         ]
     )
     found = weights([tied(gyro_lag=80.0), end])
-    assert found == pytest.approx({("gyro_lag",): 1.0, ("gyro_lag", "vane_lag"): math.exp(4.5 - 5.0)})
+    assert found == pytest.approx(
+        {
+            ("gyro_lag",): 1.0,
+            ("backlash", "gyro_lag"): 0.5,
+            ("gyro_lag", "vane_lag"): math.exp(0.5 * 2.9**2 - 5.0),
+            ("gyro_lag", "gyro_scale"): math.exp(0.5 * 2.8**2 - 5.0),
+        }
+    )

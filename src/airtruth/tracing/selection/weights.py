@@ -15,6 +15,8 @@ from airtruth.tracing.selection.rounds import Rival, SearchRound
 
 _POINTS: Final = 2.0
 """Score in standard deviations from which the residual points to one more effect [-] (convention)."""
+_MOST_MORE: Final = 3
+"""Number of sets of one effect more [-] (judgement: where the records are not explained, most effects have a score)."""
 _MOST_SETS: Final = 400
 """Number of sets that explain the derivatives and enter the weights [-] (judgement: the others weigh nothing)."""
 _LEAST_STD: Final = 1e-12
@@ -68,14 +70,16 @@ def _exchanged(last: SearchRound) -> Iterator[tuple[list[str], float]]:
 def _with_one_more(last: SearchRound) -> Iterator[tuple[list[str], float]]:
     """The last set with one effect that its residual points to, and the logarithm of the weight of each.
 
-    A score squared is the gain in 2 log L that a refit reaches to first order.
+    A score squared is the gain in 2 log L that a refit reaches to first order. The search has not accepted the effect, so that
+    its set weighs at most half as much.
     """
-    accepted = [e.name for e in last.null.hypothesis.effects]
-    explaining = last.sets[0].effects if last.sets else ()
-    for s in last.table.scores if accepted or explaining else ():
-        if abs(s.z) > _POINTS and s.effect.name not in (*accepted, *explaining):
-            lost = REFERENCE + len(s.effect.parameters)
-            yield [*accepted, *explaining, s.effect.name], 0.5 * s.z**2 - lost
+    named = [*(e.name for e in last.null.hypothesis.effects), *(last.sets[0].effects if last.sets else ())]
+    if not named:
+        return
+    seen = (s for s in last.table.scores if abs(s.z) > _POINTS and s.effect.name not in named)
+    for s in sorted(seen, key=lambda s: -abs(s.z))[:_MOST_MORE]:
+        gained = 0.5 * s.z**2 - REFERENCE - len(s.effect.parameters)
+        yield [*named, s.effect.name], min(gained, math.log(0.5))
 
 
 def _leading(own: SearchRound, accepted: Collection[str]) -> Iterator[tuple[str, float]]:
