@@ -191,11 +191,14 @@ def test_sets_that_the_search_has_tried_weigh_by_their_cost():
         exchanged(3.0, "gyro_lag", "inertia_error"),
         exchanged(1.0, "gyro_lag", "cg_shift"),
         exchanged(1.0, "gyro_lag", "mass_error", converged=False),
+        exchanged(-7.0, "gyro_lag", "cg_shift", "vane_lag"),
     )
     found = weights([tied(gyro_lag=80.0), released(cg_shift=5.0), end])
     assert found[("gyro_lag", "inertia_error")] == pytest.approx(math.exp(-3.0))
     assert found[("cg_shift", "gyro_lag")] == pytest.approx(1.0)
     assert ("gyro_lag", "mass_error") not in found
+    # 1 for the parameter, 4 for prior odds and Occam's factor of a third effect; the search has refused what is left
+    assert found[("cg_shift", "gyro_lag", "vane_lag")] == pytest.approx(0.5)
 
 
 def test_one_effect_more_weighs_by_its_score():

@@ -37,6 +37,10 @@ UNSUPPORTED: Final = "no test of the declared aircraft is significant over all t
 """Reason of a candidate whose score is significant among the scores alone."""
 IMMATERIAL: Final = "its size is immaterial"
 """Reason of a candidate that is too small to matter."""
+WORSE_LIKELIHOOD: Final = "it worsens the likelihood of records left out"
+"""Reason of a candidate that predicts records worse that its fit left out."""
+WORSE_FREE_RUN: Final = "it worsens the free run of records left out"
+"""The same of the free run."""
 IMPROBABLE: Final = 0.001
 """Probability below which refitted derivatives contradict the declared ones [-] (convention: three standard errors)."""
 _ALPHA_DOT: Final = "alpha_dot_hat"
@@ -184,14 +188,20 @@ def tested_on_left_out(
     loses = free.sum() < -_FREE_ERRORS * np.sqrt(max(float(covariance.sum()), 0.0))
     in_channels = loses_in_two_channels(free.sum(axis=0), covariance)
     reasons = (
-        *(["it worsens the likelihood of records left out"] if _is_loss(likelihood_gain) else []),
+        *([WORSE_LIKELIHOOD] if _is_loss(likelihood_gain) else []),
         *(
-            ["it worsens the free run of records left out"]
+            [WORSE_FREE_RUN]
             if (loses or in_channels) and not (reference.in_loop and gain >= _BEYOND_DOUBT)
             else []
         ),
     )
     return LeftOutTest(likelihood_gain, free.sum(axis=1), reasons)
+
+
+def predicts_records_left_out(problem: TraceProblem, null: PosteriorFit, fitted: PosteriorFit) -> bool:
+    """Whether a fit with effects worsens neither likelihood nor free run of records left out, against the null."""
+    gain = 2.0 * (null.cost - fitted.cost)
+    return not tested_on_left_out(problem, fitted, reference_of(problem, null), gain).reasons
 
 
 def loses_in_two_channels(gains: Array, covariance: Array) -> bool:

@@ -17,6 +17,8 @@ from airtruth.tracing.selection.acceptance import (
     SUPERSEDED,
     SURPASSED,
     UNCONVERGED,
+    WORSE_FREE_RUN,
+    WORSE_LIKELIHOOD,
     Candidate,
     assess_candidate,
     implausibility,
@@ -49,7 +51,8 @@ def rank(
     ----------
     fits : refits, best first; least : gain in 2 log L that is significant.
     replacement : keys (old, new); the old effect explains nothing beside the new one.
-    leader : key of the effect that leads whatever others gain, because the set with it explains more; "" for none.
+    leader : key of the effect that leads whatever others gain, because the set with it explains more; "" for none. Records
+        left out judge the set and not the leader, which others that the set still lacks may make worse.
     """
     if not fits:
         return ()
@@ -71,6 +74,9 @@ def rank(
             candidates.append(untested(r.score, r.fit, gain, OUTDONE, *implausible))
             continue
         candidate = assess_candidate(problem, r.score, r.fit, gain, reference, least)
+        if r.score.effect.key == leader:
+            still = (why for why in candidate.reasons if why not in (WORSE_LIKELIHOOD, WORSE_FREE_RUN))
+            candidate = replace(candidate, reasons=tuple(still))
         if gain < accepted - TIE:
             candidate = replace(candidate, reasons=(*candidate.reasons, OUTDONE))
         candidates.append(candidate)

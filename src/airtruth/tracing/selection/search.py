@@ -14,7 +14,7 @@ from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.profile import relocated
 from airtruth.tracing.model.parameters import Parameters
-from airtruth.tracing.selection.acceptance import OUTDONE, Candidate
+from airtruth.tracing.selection.acceptance import OUTDONE, Candidate, predicts_records_left_out
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import AHEAD, BETTER, better_set
 from airtruth.tracing.selection.explanation import AS_PROBABLE, events
@@ -183,7 +183,8 @@ class _Search:
         rounds: tuple[SearchRound, ...],
         lead: float = BETTER,
     ) -> tuple[SearchRound, ...]:
-        """The rounds of a search that accepts these effects first, if they lead others by a log-posterior.
+        """The rounds of a search that accepts these effects first, if they lead others by a log-posterior and predict the
+        records left out.
 
         Fewer effects are enough unless the odds against them are strong, and so is as much where they alone leave no anomaly.
         """
@@ -205,7 +206,9 @@ class _Search:
         simpler = len(_effects_of(again[-1])) < len(_effects_of(rounds[-1]))
         cleaner = again[-1].anomaly.p_value > _CLEAN and rounds[-1].anomaly.p_value < REMAINS
         needed = _STRONG_ODDS if simpler else 0.0 if cleaner else lead
-        return again if total_cost(again[-1]) < total_cost(rounds[-1]) - needed else rounds
+        if total_cost(again[-1]) >= total_cost(rounds[-1]) - needed:
+            return rounds
+        return again if predicts_records_left_out(self.problem, again[0].null, again[-1].null) else rounds
 
     def _branches(
         self,

@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterator, Sequence
 from typing import Final
 
 from airtruth.effects.increment import Increment
+from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.selection.acceptance import OUTDONE, has_converged
 from airtruth.tracing.selection.explanation import REFERENCE
 from airtruth.tracing.selection.ranking import TIE
@@ -17,6 +18,8 @@ _POINTS: Final = 2.0
 """Score in standard deviations from which the residual points to one more effect [-] (convention)."""
 _MOST_MORE: Final = 3
 """Number of sets of one effect more [-] (judgement: where the records are not explained, most effects have a score)."""
+_REFUSED: Final = math.log(0.5)
+"""Largest log-weight of a set with one effect more [-] (judgement: the search has refused the effect)."""
 _MOST_SETS: Final = 400
 """Number of sets that explain the derivatives and enter the weights [-] (judgement: the others weigh nothing)."""
 _LEAST_STD: Final = 1e-12
@@ -52,19 +55,29 @@ def weights(rounds: Sequence[SearchRound]) -> dict[tuple[str, ...], float]:
     for r in rounds:
         for names, log_weight in () if r.rival is None else r.rival.sets.items():
             add(names, log_weight)
-    known = set(found)
-    for every, log_weight in (*_exchanged(rounds[-1]), *_with_one_more(rounds[-1])):
-        if tuple(sorted(set(every))) not in known:
-            add(every, log_weight)
+    for tried in (_exchanged(rounds[-1]), _with_one_more(rounds[-1])):
+        known = set(found)
+        for every, log_weight in tried:
+            if tuple(sorted(set(every))) not in known:
+                add(every, log_weight)
     return found
 
 
 def _exchanged(last: SearchRound) -> Iterator[tuple[list[str], float]]:
-    """The sets that the search has tried in place of the last one, and the logarithm of the weight of each."""
-    own = last.null.cost + len(last.null.point.sizes)
+    """The sets that the search has tried in place of the last one, and the logarithm of the weight of each.
+
+    The search has not accepted one of more effects, so that it weighs at most half as much.
+    """
+    own, effects = _cost(last.null), len(last.null.hypothesis.effects)
     for f in last.exchanged:
         if f.converged:
-            yield [e.name for e in f.hypothesis.effects], own - f.cost - len(f.point.sizes)
+            names = [e.name for e in f.hypothesis.effects]
+            yield names, min(own - _cost(f), _REFUSED if len(names) > effects else 0.0)
+
+
+def _cost(fitted: PosteriorFit) -> float:
+    """Negative log-posterior with one for each parameter, and the prior odds and Occam's factor of each effect."""
+    return fitted.cost + len(fitted.point.sizes) + REFERENCE * len(fitted.hypothesis.effects)
 
 
 def _with_one_more(last: SearchRound) -> Iterator[tuple[list[str], float]]:
@@ -79,7 +92,7 @@ def _with_one_more(last: SearchRound) -> Iterator[tuple[list[str], float]]:
     seen = (s for s in last.table.scores if abs(s.z) > _POINTS and s.effect.name not in named)
     for s in sorted(seen, key=lambda s: -abs(s.z))[:_MOST_MORE]:
         gained = 0.5 * s.z**2 - REFERENCE - len(s.effect.parameters)
-        yield [*named, s.effect.name], min(gained, math.log(0.5))
+        yield [*named, s.effect.name], min(gained, _REFUSED)
 
 
 def _leading(own: SearchRound, accepted: Collection[str]) -> Iterator[tuple[str, float]]:
