@@ -23,7 +23,7 @@ def import_(
         typer.Argument(
             metavar="FILE...",
             help=".csv, .txt (.dat, .asc), .mat, .parquet, .ulg, .bin, .mf4 (.mdf) or .h5 (.hdf5, .hdf); "
-            "several files are one log.",
+            "several files become one log.",
         ),
     ],
     mapping: Annotated[
