@@ -70,9 +70,7 @@ def import_(
 
     if guess:
         if len(files) > 1:
-            raise ConfigurationError(
-                "--guess: proposes a mapping for one file; call it for each of the files"
-            )
+            raise ConfigurationError("--guess proposes a mapping for one file; run it once for each file")
         words = importers.read_dictionary(dictionary) if dictionary else None
         print_result(importers.guess_mapping(files[0], words=words), end="")
         return
