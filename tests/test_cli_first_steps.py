@@ -323,7 +323,7 @@ def test_a_log_file_extends_no_other_file(airtruth, tmp_path):
     (tmp_path / "mine.txt").write_text("mine\n")
     code, _, err = airtruth("example", "--log-file", "mine.txt")
     assert code == 2
-    assert "is no log file of airtruth; choose another --log-file" in err
+    assert "is not a log file of airtruth; choose another --log-file" in err
     assert (tmp_path / "mine.txt").read_text() == "mine\n"
     assert airtruth("example", "--log-file", ".")[0] == 2
 

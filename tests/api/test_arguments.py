@@ -40,7 +40,7 @@ REFUSED = {
         lambda: at.identify("out/light", "gtm", 1),
         "methods = 1: must be a name or a sequence of names",
     ),
-    "report": (lambda: at.report(None, "r.html"), "NoneType is no result; give what a function returned"),
+    "report": (lambda: at.report(None, "r.html"), "NoneType is not a result; give the result of a function"),
     "jobs": (lambda: at.fly("light.toml", "out/new", jobs=0), "jobs = 0: must be a whole number, 1 or more"),
     "records": (lambda: at.plan("light.toml", records=0), "records = 0: must be a whole number, 1 or more"),
     "records of an input": (

@@ -340,7 +340,7 @@ def test_a_failed_check_names_no_error(true):
     assert result.possible[0].errors
     states = {f.name: f.state for f in result.findings}
     assert not {"present", "one of"} & set(states.values())
-    assert {states[f.name] for f in result.possible[0].errors} == {"not judged"}
+    assert {states[f.name] for f in result.possible[0].errors} == {"not assessed"}
 
 
 def test_a_weak_manoeuvre_cannot_tell(true):
@@ -395,7 +395,7 @@ def test_channels_that_are_absent_are_said_so(true):
 
 def test_records_without_a_manoeuvre_are_refused(true):
     still = {n: np.full_like(v, v[0]) for n, v in true.items()}
-    with pytest.raises(LogError, match="no run can be judged"):
+    with pytest.raises(LogError, match="no run can be assessed"):
         check_kinematics(as_log(still))
 
 

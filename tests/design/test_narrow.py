@@ -239,9 +239,9 @@ def test_names_that_are_no_derivatives_are_refused(names, words):
 
 
 def test_one_flight_has_one_aim():
-    with pytest.raises(ConfigurationError, match="--split or --derivative"):
+    with pytest.raises(ConfigurationError, match="--split and --derivative exclude"):
         planned_from(None, Stated(("vane_lag", "gyro_lag"), {}, ("Cmq",)), "gtm", PlanOptions())
-    with pytest.raises(ConfigurationError, match="sizes belong to effects"):
+    with pytest.raises(ConfigurationError, match="--size applies to effects"):
         planned_from(None, Stated((), {"vane_lag.tau_s": 0.1}, ("Cmq",)), "gtm", PlanOptions())
 
 

@@ -53,12 +53,12 @@ def test_the_base_is_good(tmp_path):
         ('"KTAS"', '"KIAS"', ["no column 'KIAS'", "did you mean 'KTAS'"]),
         ('"KTAS"', "40", ["no column 40", "the file has 11"]),
         ('unit = "kt"', 'unit = "rad"', ["airspeed_m_s", "a unit of angle", "m_s, kt, ft_s, km_h"]),
-        ('unit = "kt"', 'unit = "mach"', ["'mach' is no unit known here", "km_h"]),
+        ('unit = "kt"', 'unit = "mach"', ["'mach' is not a known unit", "km_h"]),
         ('unit = "kt"\n', "", ["channels.airspeed_m_s.unit", "required"]),
         (
             "[channels.alpha_rad]",
             "[channels.alfa_rad]",
-            ["'alfa_rad' is no channel", "did you mean 'alpha_rad'"],
+            ["'alfa_rad' is not a channel", "did you mean 'alpha_rad'"],
         ),
         ("sign = -1", "sign = 2", ["channels.az_m_s2.sign", "got 2"]),
         ('column = "KTAS"', 'colum = "KTAS"', ["channels.airspeed_m_s.colum", "did you mean 'column'"]),
@@ -75,7 +75,7 @@ def test_the_base_is_good(tmp_path):
         (
             'run_id = "flight"',
             'constants = { mass_kg = { value = 3, unit = "ft" }, weight = { value = 3, unit = "kg" } }',
-            ["mass_kg", "a unit of length", "'weight' is no constant", "mass_kg"],
+            ["mass_kg", "a unit of length", "'weight' is not a constant", "mass_kg"],
         ),
         (
             'run_id = "flight"',

@@ -129,7 +129,7 @@ def test_labels_of_a_matrix_are_its_column_names(tmp_path):
 
 
 def test_a_constant_that_makes_no_sense(tmp_path):
-    with pytest.raises(LogError, match="mass_kg comes out as 0"):
+    with pytest.raises(LogError, match="mass_kg is 0, which has to be above 0"):
         convert(
             source(tmp_path, a=np.ones(50), m=np.zeros(50)),
             mapped(time={"rate_hz": 50}, constants={"mass_kg": {"column": "m", "unit": "kg"}}),

@@ -195,9 +195,9 @@ def test_a_dictionary_of_the_users_own(log, tmp_path):
     ("content", "message"),
     [
         ('[name]\nalpha_rad = "x"', "'name': did you mean 'names'"),
-        ('[names]\nalfa_rad = "x"', "'alfa_rad' is no channel; did you mean 'alpha_rad'"),
-        ("[names]\nalpha_rad = 3", "3 is no header"),
-        ('[units]\nx = "degg"', "'degg' is no unit; did you mean 'deg'"),
+        ('[names]\nalfa_rad = "x"', "'alfa_rad' is not a channel; did you mean 'alpha_rad'"),
+        ("[names]\nalpha_rad = 3", "3 is not a column name"),
+        ('[units]\nx = "degg"', "'degg' is not a unit; did you mean 'deg'"),
         ('[units]\nx = { unit = "deg", sign = 2 }', "sign = 1 or -1"),
         ("names = 3", "names must be a table"),
     ],

@@ -187,7 +187,7 @@ def test_structure(log: FlightLog) -> None:
 )
 def test_values_whose_powers_overflow(log: FlightLog, channel: str, value: float) -> None:
     text = complaint(with_channel(log, channel, slice(31, 40), value))
-    assert f"{channel}: {value:.3g} is no measurement, in 1 run: 'b' (row 1, t 0.02 s)" in text
+    assert f"{channel}: {value:.3g} is not a plausible measurement, in 1 run: 'b' (row 1, t 0.02 s)" in text
     assert "correct its unit" in text
 
 

@@ -107,7 +107,7 @@ def test_one_of_the_two_files_that_identify_a_campaign_is_enough(whole, tmp_path
 def test_verify_of_other_folders(tmp_path):
     for folder, words in (
         (tmp_path, "holds neither manifest.jsonl nor .airtruth.json"),
-        (tmp_path / "x", "is no folder"),
+        (tmp_path / "x", "is not a folder"),
     ):
         ended = command("verify", folder)
         assert (ended.code, words in ended.err) == (2, True)

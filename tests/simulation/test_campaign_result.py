@@ -83,7 +83,7 @@ def test_a_file_a_campaign_and_a_plan_fly_the_same(tmp_path: Path) -> None:
 
 def test_what_cannot_be_asked_of_it(tmp_path: Path) -> None:
     path = write(tmp_path / "campaign.toml")
-    with pytest.raises(ConfigurationError, match="plan has drawn its runs"):
+    with pytest.raises(ConfigurationError, match="plan already has its seed and runs"):
         fly(plan.make(path), tmp_path / "out", runs=3)
     with pytest.raises(ConfigurationError, match="runs: Input should be greater than or equal to 1"):
         fly(campaign_file.read(path), tmp_path / "out", runs=0)

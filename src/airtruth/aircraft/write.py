@@ -115,7 +115,8 @@ def changed(
     file = plane.file
     if file.jsbsim is None and change.in_aircraft:
         raise AircraftError(
-            f"{plane.folder}: aircraft.toml has no [jsbsim] table, so there is no model to write the change into"
+            f"{plane.folder}: aircraft.toml has no [jsbsim] table, so there is no model to write the change into; "
+            "`airtruth aircraft new` writes one"
         )
     require_new(out_folder)
     heading = _heading(plane, change, note)

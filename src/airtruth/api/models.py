@@ -210,7 +210,7 @@ def report(
 
     if not isinstance(result, str | os.PathLike | Result):
         raise ConfigurationError(
-            f"report: {type(result).__name__} is no result; give what a function returned, a folder or a file of estimates"
+            f"report: {type(result).__name__} is not a result; give the result of a function, a folder or a file of estimates"
         )
     source = Path(result) if isinstance(result, str | os.PathLike) else result
     inputs = [source] if isinstance(source, Path) else []

@@ -92,7 +92,7 @@ def plan(
     pressure : "constant", the airspeed is not an output of the filter, or "measured", it is one.
     split : keys of two or more effects to separate.
     derivatives : names of derivatives to determine with the smallest standard errors; a string is one of them.
-    trace : folder of a trace, or its trace.json. Without ``split`` and ``derivatives`` its answer asks: tied effects are
+    trace : folder of a trace, or its trace.json. Without ``split`` and ``derivatives`` its verdict decides: tied effects are
         separated, the band of a learned increment is narrowed.
     sizes : EFFECT.PARAMETER -> value [its unit]; an effect without sizes imitates the first.
     aircraft : shipped name or folder, instead of that of the campaign or of the trace.

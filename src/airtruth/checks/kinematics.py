@@ -114,7 +114,7 @@ def check_kinematics(
     findings = _scale_or_bias(findings)
     verdict = verdict_of(found, findings)
     if verdict == "failed":
-        findings = tuple(replace(f, state="not judged") if f.state in NAMED else f for f in findings)
+        findings = tuple(replace(f, state="not assessed") if f.state in NAMED else f for f in findings)
     causes = tuple(_cause(found, i, findings) for i in range(len(found.tried)))
     if chord is None:
         remarks.append(
@@ -171,19 +171,19 @@ def _records(logs: Sequence[FlightLog]) -> tuple[list[Record], list[str]]:
                 records.append(thinned(Record(run_id, dt, airspeed, alpha, q, az, elevator, ax, theta)))
     if not records:
         raise LogError(
-            f"no run can be judged: {runs} runs are shorter than two seconds or so, or elevator, "
+            f"no run can be assessed: {runs} runs are shorter than about two seconds, or elevator, "
             "q or alpha does not move in them; give a record with a manoeuvre"
         )
     remarks = []
     if len(records) < runs:
-        remarks.append(f"{len(records)} of {runs} runs were judged.")
+        remarks.append(f"{len(records)} of {runs} runs were assessed.")
     if not present["theta_rad"]:
         remarks.append(
-            "theta_rad is absent: q is not judged by itself, airspeed is not judged, and the flight path is "
-            "taken as level at the start."
+            "theta_rad is absent: q is not assessed separately, the airspeed is not assessed, and the flight path is "
+            "assumed level at the start."
         )
     if not present["ax_m_s2"]:
-        remarks.append("ax_m_s2 is absent: airspeed is not judged, and ax alpha is left out of alpha'.")
+        remarks.append("ax_m_s2 is absent: the airspeed is not assessed, and ax alpha is omitted in alpha'.")
     return records, remarks
 
 

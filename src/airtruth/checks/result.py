@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 Verdict = Literal["agrees", "errors", "one_of", "cannot_tell", "failed"]
 """Answers of a check: the channels agree; errors of instruments are present; one of several sets of errors is; the
 records cannot tell; the check itself failed."""
-State = Literal["present", "one of", "not needed", "not shown", "not judged"]
+State = Literal["present", "one of", "not needed", "not shown", "not assessed"]
 """An error is in every explanation, in some, in none although the records would show it, or the records would not
 show it; or an explanation has it and the check failed."""
 

@@ -23,10 +23,15 @@ def new(
     estimates: Annotated[
         Path | None, typer.Option(help="Estimates of `airtruth identify`, instead of [derivatives].")
     ] = None,
-    method: Annotated[str | None, typer.Option(metavar="NAME", help="Which method of the estimates.")] = None,
+    method: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Method whose estimates are used.")
+    ] = None,
     derivative: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=VALUE", help="Derivative to use instead; may be repeated."),
+        typer.Option(
+            metavar="NAME=VALUE",
+            help="Derivative that replaces the estimated or declared one; may be repeated.",
+        ),
     ] = None,
     log: Annotated[
         Path | None,
@@ -37,7 +42,7 @@ def new(
     alpha_deg: Annotated[float, typer.Option(help="Angle of attack of the trim [deg].")] = 3.0,
     elevator_deg: Annotated[float, typer.Option(help="Elevator of the trim [deg].")] = 0.0,
 ) -> None:
-    """Write a JSBSim aircraft that flies six derivatives about a trim, for one that has no model."""
+    """Write a JSBSim aircraft with six derivatives about a trim, for an aircraft without a JSBSim model."""
     from airtruth.simulation import new_aircraft as creation
 
     at = (

@@ -102,7 +102,10 @@ app = Application(
 """The command `airtruth`."""
 
 aircraft_app = Application(
-    help="Write aircraft.", cls=_StreamOrder, no_args_is_help=True, rich_markup_mode=None
+    help="Write a JSBSim aircraft from estimated or declared derivatives.",
+    cls=_StreamOrder,
+    no_args_is_help=True,
+    rich_markup_mode=None,
 )
 """The group `airtruth aircraft`."""
 new_app = Application(

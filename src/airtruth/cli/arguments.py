@@ -85,7 +85,7 @@ HeldOut = Annotated[
     typer.Option(
         "--hold-out",
         metavar="RUN_ID",
-        help="Run to hold out of the fit; may be repeated. Default: every third run, none of one or two.",
+        help="Run to hold out of the fit; may be repeated. Default: every third run; with one or two runs, none.",
     ),
 ]
 Threads = Annotated[
@@ -102,7 +102,7 @@ Increments = Annotated[
     bool | None,
     typer.Option(
         "--increments/--no-increments",
-        help="Learn increments from what no named effect explains. Default: yes, where the whole library is searched.",
+        help="Learn increments from the residual of the named effects. Default: yes, if the whole library is searched.",
     ),
 ]
 TimeBudget = Annotated[
@@ -111,7 +111,7 @@ TimeBudget = Annotated[
         "--time-budget",
         metavar="S",
         min=0.0,
-        help="Seconds after which the search starts nothing new; the answer is then provisional and lists what it left out.",
+        help="Seconds after which the search starts no new step; the answer is then provisional and lists the omitted steps.",
     ),
 ]
 Candidates = Annotated[
@@ -119,7 +119,7 @@ Candidates = Annotated[
     typer.Option(
         "--effect",
         metavar="KEY",
-        help="Candidate, may be repeated; default: all of `airtruth effects`.",
+        help="Effect to test, may be repeated; default: all of `airtruth effects` except those of the gusts.",
         autocompletion=complete_effect,
     ),
 ]

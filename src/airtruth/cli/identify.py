@@ -57,7 +57,7 @@ def identify(
     pressure: Annotated[
         Pressure,
         typer.Option(
-            help="Dynamic pressure: constant over a record, measured at each sample, or as the method has it."
+            help="Dynamic pressure: constant over a record, measured at each sample, or the default of the method."
         ),
     ] = "method",
     covariance: Annotated[

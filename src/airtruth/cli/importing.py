@@ -23,7 +23,7 @@ def import_(
         typer.Argument(
             metavar="FILE...",
             help=".csv, .txt (.dat, .asc), .mat, .parquet, .ulg, .bin, .mf4 (.mdf) or .h5 (.hdf5, .hdf); "
-            "several files are one log.",
+            "several files become one log.",
         ),
     ],
     mapping: Annotated[
@@ -70,9 +70,7 @@ def import_(
 
     if guess:
         if len(files) > 1:
-            raise ConfigurationError(
-                "--guess: proposes a mapping for one file; call it for each of the files"
-            )
+            raise ConfigurationError("--guess proposes a mapping for one file; run it once for each file")
         words = importers.read_dictionary(dictionary) if dictionary else None
         print_result(importers.guess_mapping(files[0], words=words), end="")
         return

@@ -168,7 +168,7 @@ def _opened(file: Path) -> logging.FileHandler:
             stream.seek(0)
             start = stream.read(len(FIRST_LINE))
             if start and start != FIRST_LINE.encode():
-                raise StoreError(f"{file}: is no log file of airtruth; choose another --log-file")
+                raise StoreError(f"{file}: is not a log file of airtruth; choose another --log-file")
             if not start:
                 stream.write(f"{FIRST_LINE}\n".encode())
         kept = _File(file, mode="a", encoding="utf-8", errors="backslashreplace")

@@ -15,7 +15,9 @@ from airtruth.errors import ConfigurationError
 
 @app.command(epilog="Example: airtruth effects elevator_delay")
 def effects(
-    name: Annotated[list[str] | None, typer.Argument(metavar="[NAME]...", help="Only these.")] = None,
+    name: Annotated[
+        list[str] | None, typer.Argument(metavar="[NAME]...", help="Effects to show; without it, all.")
+    ] = None,
     from_: Annotated[
         Path | None,
         typer.Option(

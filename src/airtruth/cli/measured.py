@@ -20,7 +20,8 @@ def check(
         str | None, typer.Option(metavar="A", help="Aircraft whose declared sensors are taken as known.")
     ] = None,
     run: Annotated[
-        list[str] | None, typer.Option(metavar="RUN_ID", help="Only this run, may be repeated.")
+        list[str] | None,
+        typer.Option(metavar="RUN_ID", help="Run to check, may be repeated; without it, all."),
     ] = None,
     each: Annotated[
         bool, typer.Option("--each", help="One check for each file instead of one for all.")

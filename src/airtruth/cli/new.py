@@ -81,7 +81,7 @@ def aircraft(
     ] = None,
     force: Replace = False,
 ) -> None:
-    """Write an aircraft: for a JSBSim model, which is surveyed and trimmed, or a commented aircraft.toml without one."""
+    """Write an aircraft from a JSBSim model, which is surveyed and trimmed, or a commented aircraft.toml without a model."""
     if jsbsim is not None:
         from airtruth.simulation.foreign_aircraft import new_from_jsbsim
 

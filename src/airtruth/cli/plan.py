@@ -57,11 +57,17 @@ def plan(
     ] = None,
     pressure: Annotated[
         PlanPressure,
-        typer.Option(help="constant: airspeed is not an output of the filter; measured: it is one."),
+        typer.Option(
+            help="constant: the filter does not use the airspeed as a measurement; measured: it does."
+        ),
     ] = "constant",
     split: Annotated[
         str | None,
-        typer.Option(metavar="A,B", help="Effects to separate, by key.", autocompletion=complete_effect),
+        typer.Option(
+            metavar="A,B",
+            help="Effects to separate, as NAME or NAME:VARIANT.",
+            autocompletion=complete_effect,
+        ),
     ] = None,
     derivative: Annotated[
         str | None,
@@ -76,7 +82,7 @@ def plan(
         typer.Option(
             "--from",
             metavar="DIR|trace.json",
-            help="Trace whose question is answered: tied effects, a learned increment, a derivative.",
+            help="Trace to plan the next flight for: it separates tied effects, or narrows an increment or a derivative.",
         ),
     ] = None,
     size: Annotated[
@@ -94,11 +100,15 @@ def plan(
             autocompletion=complete_aircraft,
         ),
     ] = None,
-    amplitude_deg: Annotated[float, typer.Option(help="Largest elevator about its trim [deg].")] = 2.0,
+    amplitude_deg: Annotated[
+        float, typer.Option(help="Largest deviation of the elevator from its trim [deg].")
+    ] = 2.0,
     rate_deg_s: Annotated[
-        float | None, typer.Option(help="Largest rate of the surface [deg/s]; default: none but the servo's.")
+        float | None, typer.Option(help="Largest rate of the surface [deg/s]; default: that of the servo.")
     ] = None,
-    alpha_deg: Annotated[float, typer.Option(help="Largest angle of attack about its trim [deg].")] = 6.0,
+    alpha_deg: Annotated[
+        float, typer.Option(help="Largest deviation of the angle of attack from its trim [deg].")
+    ] = 6.0,
     load_factor: Annotated[
         str, typer.Option(metavar="LOW,HIGH", help="Lowest and highest normal load factor.")
     ] = "0,2",

@@ -37,7 +37,7 @@ def report(
     log: Annotated[
         list[Path] | None,
         typer.Option(
-            metavar="LOG", help="Log of estimates that do not have it beside them; may be repeated."
+            metavar="LOG", help="Log of the estimates that is not in their folder; may be repeated."
         ),
     ] = None,
     aircraft: Annotated[

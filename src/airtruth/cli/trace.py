@@ -51,7 +51,7 @@ def trace(
     each: Annotated[
         bool,
         typer.Option(
-            "--each", help="Trace each LOG by itself, into a folder of its name, with a table of all."
+            "--each", help="Trace each LOG separately, into a folder of its name, with a table of all."
         ),
     ] = False,
     cluster: OnCluster = None,

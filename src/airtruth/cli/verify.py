@@ -16,7 +16,8 @@ from airtruth.errors import FAILED_RUNS
 @app.command(epilog="Example: airtruth verify out/light")
 def verify(
     folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="Folder of a campaign, or another --out of a command.")
+        Path,
+        typer.Argument(metavar="DIR", help="Folder into which a command wrote, or a parent of such folders."),
     ],
     json_: Json = False,
 ) -> None:

@@ -115,7 +115,8 @@ def _require_open_loop(campaign: Campaign) -> None:
     gains = campaign.augmentation
     if gains.damper_gain_s or gains.attitude_gain:
         raise ConfigurationError(
-            f"plan: campaign {campaign.name} flies with an augmentation, which the planned input does not know; set its "
+            f"plan: campaign {campaign.name} flies with an augmentation, "
+            "which a planned input does not take into account; set its "
             "gains to 0"
         )
 

@@ -104,9 +104,11 @@ def planned_from(
 
 def _question(stated: Stated, answer_file: Path | None) -> Asked:
     if stated.split and stated.derivatives:
-        raise ConfigurationError("plan: one flight has one aim; state --split or --derivative")
+        raise ConfigurationError("plan: --split and --derivative exclude each other; state one of them")
     if stated.sizes and not stated.split:
-        raise ConfigurationError("plan: sizes belong to effects; leave --size out, or state --split")
+        raise ConfigurationError(
+            "plan: --size applies to effects to separate; leave it out, or state --split"
+        )
     if stated.derivatives:
         return DerivativeQuestion(tuple(stated.derivatives))
     if stated.split or answer_file is None:

@@ -143,7 +143,7 @@ def _require(effects: Sequence[Effect]) -> None:
         )
     if any(e.key == "derivatives" for e in effects):
         raise ConfigurationError(
-            "plan: `derivatives` is refitted under every hypothesis; state an effect that changes more than them"
+            "plan: `derivatives` cannot be separated, because every hypothesis refits them; state another effect"
         )
 
 

@@ -185,9 +185,7 @@ def _at(
     bench.allow_for(effective(m.effect.change(m.values)) for m in search.criterion.members)
     reference = search.rate(REFERENCE, search.reference())
     if reference is None:
-        raise ConfigurationError(
-            "plan: the tracer's model loses the motion of a 3-2-1-1; lower the amplitude"
-        )
+        raise ConfigurationError("plan: the tracer's model diverges in a 3-2-1-1; lower the amplitude")
     search.best.clear()
     return Setup(search, reference)
 

@@ -75,8 +75,8 @@ EFFECTS: Final = (
         where="declared",
         parameters=(factor("on the dynamic pressure", 0.6, 1.6, 0.02),),
         describe=_caused("dynamic_pressure", "factor"),
-        explanation="The dynamic pressure differs from the one computed with airspeed and density: an error of position "
-        "or of density.",
+        explanation="The dynamic pressure differs from the one computed with airspeed and density: a position error of the "
+        "static pressure, or an error of the density.",
         source="All six derivatives times factor, q_bar = 1/2 density V^2. Material: 2 %, an airspeed error of 1 %.",
         distinguished_by="All six derivatives change by the same share; airspeed_scale also changes the rate of "
         "rotation of the flight path.",
@@ -138,7 +138,7 @@ EFFECTS: Final = (
             _shift("Cmde", 5.0, 0.05),
         ),
         describe=_shifted,
-        explanation="Derivatives differ from the declared ones, for a reason that has no name here.",
+        explanation="Derivatives differ from the declared ones, for a cause that the library does not contain.",
         source="Increments of the derivatives about the trim. Material: 3 to 6 % of the GTM's derivatives, 15 % of its "
         "CLq.",
         distinguished_by="A cause with fewer parameters explains the same shifts if there is one: mass, CG, tail, wing.",

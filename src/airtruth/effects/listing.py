@@ -60,7 +60,7 @@ def _parameter(p: Parameter) -> str:
     unit = _unit(p)
     parts = [f"{p.low:g} to {p.high:g}{unit}"]
     if not p.is_location:
-        parts += [f"neutral {p.neutral:g}", f"matters from {_material(p)}"]
+        parts += [f"neutral {p.neutral:g}", f"material from {_material(p)}"]
     if p.sign:
         parts.append(f"{'above' if p.sign > 0 else 'below'} zero on every real aircraft")
     if math.isfinite(p.spans):

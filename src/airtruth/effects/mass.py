@@ -27,7 +27,7 @@ EFFECTS: Final = (
         explanation="The elevator is more or less effective than declared: damage, a gap, an error of gearing.",
         source="Forces and moments of the elevator times factor; written as deflection times factor, exact where they "
         "are linear in it. Material: 5 %, the usual uncertainty of a wind-tunnel Cmde.",
-        distinguished_by="The accuracy of the declared Cmde and CLde limits it.",
+        distinguished_by="It is known only as accurately as Cmde and CLde are declared.",
     ),
     Effect(
         name="mass_error",
@@ -36,7 +36,7 @@ EFFECTS: Final = (
         describe=_change("mass", "factor"),
         explanation="The aircraft is heavier or lighter than declared, with the declared CG and pitch inertia.",
         source="Newton's second law. Material: 2 %, the accuracy of a weighing with the fuel estimated.",
-        distinguished_by="Weigh the aircraft: a scale error of the airspeed looks alike in az.",
+        distinguished_by="Weigh the aircraft. A scale error of the airspeed has a similar effect on az.",
     ),
     Effect(
         name="inertia_error",
@@ -45,7 +45,7 @@ EFFECTS: Final = (
         describe=_change("inertia", "factor"),
         explanation="The pitch inertia differs from the declared one.",
         source="Euler's equation. Material: 5 %, the accuracy of a swing test.",
-        distinguished_by="It scales Cmalpha, Cmq and Cmde together; their declared accuracy limits it.",
+        distinguished_by="It scales Cmalpha, Cmq and Cmde together, and is known only as accurately as they are declared.",
     ),
     Effect(
         name="cg_shift",
@@ -62,8 +62,8 @@ EFFECTS: Final = (
             ),
         ),
         describe=_change("cg", "dx_mac"),
-        explanation="The centre of gravity lies behind or ahead of its declared position. The records tell how far "
-        "it has moved past the sensors.",
+        explanation="The centre of gravity is behind or ahead of its declared position. The records determine how far "
+        "it has moved relative to the sensors.",
         source="Moment transfer: dCm = CL dx + ...; Etkin and Reid, Dynamics of Flight, 3rd ed., 1996, ch. 2. "
         "Material: 1 % of the chord.",
         distinguished_by="Two loadings; with one, Cmalpha and Cmq absorb it.",
@@ -84,7 +84,7 @@ EFFECTS: Final = (
             ),
         ),
         describe=_change("thrust_arm", "arm_m"),
-        explanation="The thrust line lies lower (nose-up) or higher than declared.",
+        explanation="The thrust line is lower (nose-up) or higher than declared.",
         source="M += arm T. Material: 2 cm on a model of the GTM's size.",
         distinguished_by="Change the thrust during the record: the trim absorbs the moment of a constant thrust.",
     ),

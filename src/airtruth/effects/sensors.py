@@ -133,7 +133,7 @@ def _arm(channel: str, equation: str, reach: float, material: float, distinguish
             step=0.01,
             spans=_MOST_SPANS,
         ),
-        f"The sensor of {channel} sits ahead of its declared position, or behind it.",
+        f"The sensor of {channel} is ahead of its declared position, or behind it.",
         f"{equation}; {_SOURCE}.",
         distinguished_by,
     )

@@ -65,7 +65,9 @@ def read_mat(path: Path) -> tuple[Arrays, Labels]:
     numeric = {name: _column(values) for name, values in raw.items() if values.dtype.kind in "biuf"}
     arrays = {name: values for name, values in numeric.items() if values.ndim in (1, 2) and values.size}
     if not arrays:
-        raise StoreError(f"{path}: holds no numeric array (variables: {', '.join(raw) or 'none'})")
+        raise StoreError(
+            f"{path}: holds no numeric array (variables: {', '.join(raw) or 'none'}); save the channels as numeric variables"
+        )
     return arrays, _labels(arrays, raw)
 
 

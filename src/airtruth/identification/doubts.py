@@ -165,7 +165,7 @@ class _Method:
         if self.aperiodic:
             yield (
                 f"{self.name}: no frequency and damping ratio{_some(self.aperiodic, self.runs)}: with these derivatives the "
-                "short period is no oscillation about a stable trim (its stiffness is negative)."
+                "short period is not an oscillation about a stable trim (its stiffness is negative)."
             )
         if self.bare:
             why = (

@@ -179,7 +179,7 @@ def _worked(
 ) -> _Work:
     """Identify each log, and pass its estimates to ``keep``."""
     if not asked.methods:
-        raise ConfigurationError("identify needs at least one method")
+        raise ConfigurationError("identify needs at least one method, such as iv-f1")
     plane = planes.load(asked.aircraft) if isinstance(asked.aircraft, str | Path) else asked.aircraft
     entries = sources(asked.logs)
     steps, total = count(1), len(asked.methods) * (1 if asked.joint else len(entries))

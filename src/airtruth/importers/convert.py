@@ -355,7 +355,7 @@ def _constants(piece: Piece, start: float, end: float, rows: NDArray[np.bool_] |
         mean = float(np.nanmean(values)) * factor
         if not np.isfinite(mean) or mean <= 0.0:
             raise LogError(
-                f"{source.path}: {name} comes out as {mean:g}; map another column, or state a value"
+                f"{source.path}: {name} is {mean:g}, which has to be above 0; map another column, or state a value"
             )
         result[name] = mean
     return result

@@ -121,10 +121,14 @@ def read_dictionary(path: Path | str) -> Words:
     for channel, headers in _table(path, raw, "names").items():
         known = (TIME, *SIGNALS, *DERIVED)
         if channel not in known:
-            raise ConfigurationError(f"{path}: [names] {channel!r} is no channel; {choices(channel, known)}")
+            raise ConfigurationError(
+                f"{path}: [names] {channel!r} is not a channel; {choices(channel, known)}"
+            )
         for header in headers if isinstance(headers, list) else [headers]:
             if not isinstance(header, str) or not plain_name(header):
-                raise ConfigurationError(f"{path}: [names] {channel}: {header!r} is no header; write text")
+                raise ConfigurationError(
+                    f"{path}: [names] {channel}: {header!r} is not a column name; write text"
+                )
             names[plain_name(header)] = channel
     known_units = sorted({u for table in (*UNITS.values(), TIME_UNITS) for u in table if u})
     units: dict[str, Unit] = {}
@@ -133,7 +137,7 @@ def read_dictionary(path: Path | str) -> Words:
         unit, sign = table.get("unit"), table.get("sign", 1)
         if unit not in known_units:
             raise ConfigurationError(
-                f"{path}: [units] {words!r}: {unit!r} is no unit; {choices(str(unit), known_units)}"
+                f"{path}: [units] {words!r}: {unit!r} is not a unit; {choices(str(unit), known_units)}"
             )
         if sign not in (1, -1) or set(table) - {"unit", "sign"}:
             raise ConfigurationError(f"{path}: [units] {words!r}: state unit, and sign = 1 or -1")

@@ -64,7 +64,7 @@ def unit_factor(dimension: str, unit: str) -> float:
     units = TIME_UNITS if dimension == "time" else UNITS[dimension]
     if unit not in units:
         owner = next((d for d, table in UNITS.items() if unit in table), None)
-        what = f"a unit of {owner.replace('_', ' ')}" if owner else "no unit known here"
+        what = f"a unit of {owner.replace('_', ' ')}" if owner else "not a known unit"
         raise ValueError(
             f"unit {unit!r} is {what}, where {dimension.replace('_', ' ')} is wanted; "
             f"use one of {', '.join(u or '(none)' for u in units)}"
@@ -295,7 +295,7 @@ def _units_of(table: dict[str, Any], dimensions: dict[str, str], what: str) -> N
     wrong = []
     for name, entry in table.items():
         if name not in dimensions:
-            wrong.append(f"{name!r} is no {what}; {choices(name, dimensions)}")
+            wrong.append(f"{name!r} is not a {what}; {choices(name, dimensions)}")
             continue
         try:
             unit_factor(dimensions[name], entry.unit)

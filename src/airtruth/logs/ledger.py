@@ -59,7 +59,9 @@ def read(folder: Path) -> dict[str, Entry]:
     except (FileNotFoundError, NotADirectoryError):
         return {}
     except OSError as error:
-        raise StoreError(f"{path}: cannot be read ({error.strerror})") from None
+        raise StoreError(
+            f"{path}: cannot be read ({error.strerror}); make it readable and run the same command again"
+        ) from None
     try:
         entries = {name: Entry(**entry) for name, entry in json.loads(content)["files"].items()}
         whole = _text(entries).encode() == content

@@ -161,7 +161,9 @@ def _content(path: Path) -> bytes:
     except FileNotFoundError:
         return b"".join(each(RemotePath.read_bytes, parts))
     except OSError as error:
-        raise StoreError(f"{path}: cannot be read; {error.strerror}") from error
+        raise StoreError(
+            f"{path}: cannot be read ({error.strerror}); make it readable and run the same command again"
+        ) from error
 
 
 def _parts(path: RemotePath) -> RemotePath:

@@ -230,7 +230,8 @@ def _values(log: FlightLog) -> Iterator[str]:
         if beyond.any():
             rows = np.flatnonzero(beyond)
             yield (
-                f"{name}: {values[rows[0]]:.3g} is no measurement, {_where(log, rows)}; correct its unit, or cut the "
+                f"{name}: {values[rows[0]]:.3g} is not a plausible measurement, {_where(log, rows)}; "
+                "correct its unit, or cut the "
                 "run there"
             )
 

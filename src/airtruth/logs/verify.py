@@ -104,13 +104,14 @@ def verify(folder: Path | str) -> Verification:
     """
     folder = location(folder)
     if not folder.is_dir():
-        raise StoreError(f"{folder}: is no folder; give the folder of a campaign or another --out")
+        raise StoreError(f"{folder}: is not a folder; give a folder into which a command wrote")
     files = {p.relative_to(folder).as_posix(): p for p in files_below(folder)}
     ledgers = {name for name in files if PurePosixPath(name).name == LEDGER}
     campaigns = _campaigns(files.keys())
     if not ledgers and not campaigns:
         raise StoreError(
-            f"{folder}: holds neither {MANIFEST} nor {LEDGER}, so there is nothing to compare its files with"
+            f"{folder}: holds neither {MANIFEST} nor {LEDGER}, with which its files could be compared; "
+            "give a folder into which a command wrote"
         )
     findings: list[Finding] = []
     recorded: dict[str, str] = {}

@@ -157,7 +157,9 @@ class Executive:
             If the property does not exist.
         """
         if not self._manager.hasNode(name):
-            raise AircraftError(f"JSBSim property {name!r} does not exist in {self.model.model}")
+            raise AircraftError(
+                f"JSBSim property {name!r} does not exist in {self.model.model}; correct its name in [jsbsim] of aircraft.toml"
+            )
         return self._manager.get_node(name)
 
     def nodes(self, names: Iterable[str]) -> list[Any]:
@@ -334,6 +336,7 @@ def jsbsim_model(aircraft: Aircraft) -> JsbsimModel:
     """
     if aircraft.file.jsbsim is None:
         raise AircraftError(
-            f"{aircraft.folder}: aircraft.toml has no [jsbsim] table, so there is nothing to fly"
+            f"{aircraft.folder}: aircraft.toml has no [jsbsim] table, so there is no model to fly; "
+            "`airtruth aircraft new` writes one"
         )
     return aircraft.file.jsbsim

@@ -64,7 +64,7 @@ _ALL: Final = (
     ),
     Example(
         "undeclared",
-        "eight flight tests of the GTM; some aircraft lack something that the records show",
+        "eight flight tests of the GTM; some have an effect that the declared aircraft lacks",
         tuple(f"data/undeclared/{letter}.parquet" for letter in "abcdefgh"),
         ("airtruth trace data/undeclared/a.parquet --aircraft gtm --out out/a",),
     ),

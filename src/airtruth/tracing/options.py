@@ -21,14 +21,15 @@ class TraceOptions:
     ----------
     model : "aircraft" probes the forces of the declared JSBSim aircraft; "linear" uses the linear short-period
         model of its derivatives. An aircraft without a JSBSim model is always linear.
-    hold_out : runs that serve the report alone, a string is one of them; None holds out every third, never the only one.
+    hold_out : runs that are not fitted and serve only the report, a string is one of them; None holds out every third, never
+        the only one.
     threads : number of records processed at a time; the answer does not depend on it.
     seed : seed of the random draws behind p-values, 0 or more.
     effects : keys of the candidates, a string is one of them; a name without a variant selects all of its variants; None
         for the library.
-    time_budget_s : time after which the search starts nothing new [s]; None for no limit. The answer then depends on the
-        machine, is provisional, and lists what was left out.
-    increments : whether increments are learned from what no named effect explains; None where the whole library is
+    time_budget_s : time after which the search starts no new step [s]; None for no limit. The answer then depends on the
+        machine, is provisional, and lists the omitted steps.
+    increments : whether increments are learned from the residual of the named effects; None where the whole library is
         searched.
     """
 

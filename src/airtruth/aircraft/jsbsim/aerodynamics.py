@@ -355,7 +355,9 @@ def _shares(aerodynamics: Element, force: _Force, total: str, where: str) -> dic
         if name in names or _PARTNER[name] in names:
             return {name: op("product", sign, total)}
     if not names & set(force.wind):
-        raise AircraftError(f"{where}: its <aerodynamics> have no axis {force.missing}")
+        raise AircraftError(
+            f"{where}: its <aerodynamics> have no axis {force.missing}, to which the effect adds; add the axis to the model"
+        )
     found = {}
     for name, (sign, component_of) in force.wind.items():
         share = op(component_of, "aero/alpha-rad")

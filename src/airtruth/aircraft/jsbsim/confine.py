@@ -67,14 +67,16 @@ def _size(path: Path) -> int:
     try:
         return path.stat().st_size
     except OSError as error:
-        raise AircraftError(f"{path}: cannot be read ({error.strerror})") from None
+        raise AircraftError(f"{path}: cannot be read ({error.strerror}); make it readable") from None
 
 
 def _parsed(path: Path, trusted: bool) -> ET.Element:
     if not path.is_file():
         raise AircraftError(f"{path}: is not a regular file")
     if _size(path) > LARGEST_BYTES:
-        raise AircraftError(f"{path}: has more than {LARGEST_BYTES / 1e6:.0f} MB; a JSBSim model has some kB")
+        raise AircraftError(
+            f"{path}: has more than {LARGEST_BYTES / 1e6:.0f} MB; a JSBSim model has some kB; is it the right file?"
+        )
     content = path.read_bytes()
     entities = b"<!DOCTYPE" in content or b"<!ENTITY" in content
     if not trusted and (entities or content[:2] in (b"\xff\xfe", b"\xfe\xff")):
@@ -85,9 +87,11 @@ def _parsed(path: Path, trusted: bool) -> ET.Element:
     try:
         root = ET.fromstring(content)
     except ET.ParseError as error:
-        raise AircraftError(f"{path}: this JSBSim model is not valid XML: {error}") from None
+        raise AircraftError(
+            f"{path}: this JSBSim model is not valid XML: {error}; correct it, or restore the original"
+        ) from None
     if _depth(root) > DEEPEST:
-        raise AircraftError(f"{path}: elements are nested more than {DEEPEST} deep")
+        raise AircraftError(f"{path}: elements are nested more than {DEEPEST} deep; flatten them")
     return root
 
 

@@ -65,7 +65,8 @@ def write(root: Element, terms: Sequence[DeclaredTerm], loaded: Masses, where: s
     if balance is None:
         if shift or mass != 1.0 or inertia != 1.0:
             raise AircraftError(
-                f"{where}: the model has no <mass_balance>, so mass, inertia and CG cannot be changed"
+                f"{where}: the model has no <mass_balance>, so mass, inertia and CG cannot be changed; "
+                "add one, or choose another effect"
             )
     else:
         about = 0.0
@@ -90,7 +91,9 @@ def _add(parent: Element, tag: str, more: float, kind: str, where: str, unit: st
     """Add to a number, ``more`` in SI, in the element's own unit."""
     element = parent.find(tag)
     if element is None:
-        raise AircraftError(f"{where}: <{parent.tag}> has no <{tag}>, which the effect has to change")
+        raise AircraftError(
+            f"{where}: <{parent.tag}> has no <{tag}>, which the effect has to change; add it to the model"
+        )
     factor = _TO_SI[(unit or element.get("unit") or _DEFAULTS[kind]).upper()]
     element.text = f" {float(element.text or 0.0) + more / factor!r} "
 

@@ -72,7 +72,9 @@ def fly(
     require_whole("jobs", jobs, 1)
     if isinstance(campaign, Plan):
         if seed is not None or runs is not None:
-            raise ConfigurationError("fly: a plan has drawn its runs; state seed and runs when it is made")
+            raise ConfigurationError(
+                "fly: a plan already has its seed and runs; state them when the plan is made"
+            )
         plan = campaign
     else:
         plan = make(campaign, seed, runs)
