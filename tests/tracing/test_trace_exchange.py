@@ -8,7 +8,16 @@ import trace_records as tr
 from scaled_records import ACCELEROMETER, GYRO, VANE, fitted, scaled_problem
 
 from airtruth.effects.registry import EFFECTS
+from airtruth.tracing.selection import ranking
+from airtruth.tracing.selection.acceptance import (
+    UNCONVERGED,
+    WORSE_FREE_RUN,
+    WORSE_LIKELIHOOD,
+    predicts_records_left_out,
+    untested,
+)
 from airtruth.tracing.selection.exchange import better_set, other_kinds
+from airtruth.tracing.selection.refit import Refit
 from airtruth.tracing.selection.rounds import scored_round, significant_gain
 
 LIBRARY = tuple(e for e in EFFECTS.values() if not e.in_derivatives)
@@ -99,3 +108,30 @@ def test_one_late_member_has_its_rival_alone():
     hypothesis = tr.NOTHING.plus(EFFECTS["gyro_lag"]).plus(EFFECTS["vane_scale"])
     last = SimpleNamespace(hypothesis=hypothesis, point=SimpleNamespace(sizes=np.array([0.02, 0.1])))
     assert list(other_kinds(LIBRARY, last)) == []
+
+
+def test_records_left_out_do_not_refuse_the_effect_that_leads(problem, monkeypatch):
+    """Another effect that the set still lacks may make them worse; the other reasons remain."""
+    last = scored_round(problem, fitted(problem, GYRO), [VANE, ACCELEROMETER], 1, 1, lambda step: None)
+    refits = [
+        Refit(score, fitted(problem, GYRO, score.effect), 0.0)
+        for score in sorted(last.table.scores, key=lambda s: -abs(s.z))
+    ]
+    first = refits[0].score.effect.key
+
+    def refused(problem, score, own, gain, *rest):
+        return untested(score, own, gain, WORSE_LIKELIHOOD, WORSE_FREE_RUN, UNCONVERGED)
+
+    monkeypatch.setattr(ranking, "assess_candidate", refused)
+    free, *_ = ranking.rank(problem, last.null, refits, LEAST)
+    led, *_ = ranking.rank(problem, last.null, refits, LEAST, leader=first)
+    assert free.score.effect.key == led.score.effect.key == first
+    assert free.reasons == (WORSE_LIKELIHOOD, WORSE_FREE_RUN, UNCONVERGED)
+    assert led.reasons == (UNCONVERGED,)
+
+
+def test_a_set_predicts_the_records_left_out_or_does_not(problem):
+    """The scales of gyro and vane are in the records."""
+    null, right = fitted(problem), fitted(problem, GYRO, VANE)
+    assert predicts_records_left_out(problem, null, right)
+    assert not predicts_records_left_out(problem, right, null)
