@@ -1,7 +1,8 @@
 """estimates.parquet: estimates of several methods in one file, each with the settings that made it.
 
 The file-level JSON under the key "airtruth" holds, under "estimates", for each method: version, options, joint,
-aircraft, constants, sources (name, SHA-256 and runs of each log), notes and forced faults.
+aircraft, constants, sensors (where errors of instruments are taken out), sources (name, SHA-256 and runs of each log),
+notes and forced faults.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ def write_estimates(
     """Write estimates, or merge them into a file of estimates.
 
     Rows of other methods are kept. Rows of the same method and run are replaced, which requires that the file's
-    rows of that method were made with the same settings (options, joint, aircraft and its constants).
+    rows of that method were made with the same settings (options, joint, aircraft, its constants and sensors).
 
     Parameters
     ----------
@@ -212,6 +213,8 @@ def _difference(record: Mapping[str, Any] | None, settings: Mapping[str, Any]) -
         return "without a record of their options"
     if record["joint"] != settings["joint"]:
         return _of_runs(not settings["joint"])
+    if record.get("sensors", {}) != settings.get("sensors", {}):
+        return "with other errors of instruments in aircraft.toml"
     different = [
         f"{name} {record['options'].get(name)!r} in the file, {value!r} now"
         for name, value in settings["options"].items()
