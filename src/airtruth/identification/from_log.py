@@ -120,7 +120,7 @@ def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made
         servo_s = task.plane.servo_time_s if isinstance(task.plane, Aircraft) else 0.0
         taken = taken_out(task.plane)
         parts = [
-            replace(p, batch=replace(as_ideal(p.batch, taken, task.options), servo_s=servo_s))
+            replace(p, batch=replace(as_ideal(p.batch, taken), servo_s=servo_s))
             for p in with_constants(log, task.plane)
         ]
         for part in parts:
