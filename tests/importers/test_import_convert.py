@@ -297,3 +297,24 @@ def test_the_cell_that_is_no_number_is_named_among_decimal_commas(tmp_path, deli
     read = open_source(tmp_path / "f.csv", mapping.source)
     with pytest.raises(LogError, match=r"column 'a', line 4: 'bad' is not a number"):
         convert(read, mapping)
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("t,a\n0,1\n# pause\n0.1,2\n\n0.2,bad\n", 6),
+        ("# made\n\nt,a\n% units\n# signs\n0,bad\n", 6),
+        ("0,1\n# pause\n# pause\n0.1,bad\n", 4),
+        ("t,a\n0,1\n0.1,bad\n", 3),
+    ],
+)
+def test_the_line_of_a_cell_counts_the_comments_before_it(tmp_path, text, line):
+    """As an editor counts, from 1."""
+    assert text.splitlines()[line - 1].endswith("bad")
+    (tmp_path / "f.csv").write_text(text)
+    layout = {"header": False} if text.startswith("0") else {}
+    mapping = MappingFile.model_validate(
+        {"channels": {"alpha_rad": {"column": 2, "unit": "rad"}}, "time": {"column": 1}, "source": layout}
+    )
+    with pytest.raises(LogError, match=f"line {line}: 'bad'"):
+        convert(open_source(tmp_path / "f.csv", mapping.source), mapping)

@@ -63,8 +63,9 @@ def read_text(path: Path, layout: TextFormat) -> Source:
     if header is None:
         cells = lines[first].split(None if layout.delimiter == WHITESPACE else layout.delimiter)
         header = not any(is_number(cell, layout.decimal) for cell in cells)
+    comments = [number for number, line in enumerate(lines[first:], first + 1) if names_a_comment(line)]
     rows = [line for line in lines[first:] if not names_a_comment(line)]
-    plain = len(rows) == len(lines) - first
+    plain = not comments
     _require_names(path, rows, layout.delimiter, header)
     try:
         frame = pd.read_csv(
@@ -84,7 +85,7 @@ def read_text(path: Path, layout: TextFormat) -> Source:
         raise StoreError(f"{path}: holds a header and no rows; export it again")
     names = _own_names([str(name) for name in frame.columns], rows, layout.delimiter) if header else ()
     columns = [_numeric(frame.iloc[:, i].to_numpy(), layout.decimal) for i in range(frame.shape[1])]
-    return table_source(path, names, columns, first_line=first + 1 + header)
+    return table_source(path, names, columns, first_line=first + 1 + header, comments=comments)
 
 
 def _numeric(values: NDArray[Any], decimal: str) -> NDArray[Any]:
