@@ -11,6 +11,7 @@ from airtruth.errors import LogError, StoreError
 from airtruth.identification import METHODS, Options, identify, identify_batch
 from airtruth.identification.declared_sensors import as_ideal, taken_out
 from airtruth.identification.store import write_estimates
+from airtruth.identification.stored import read_stored
 from airtruth.numerics.prefilter import butterworth, zero_phase
 from airtruth.physics.sensor_errors import SensorErrors
 from airtruth.physics.sensors import accelerometer_az, measure, vane_alpha
@@ -177,8 +178,12 @@ def test_estimates_with_other_declared_errors_are_not_merged(true, tmp_path):
     path = tmp_path / "estimates.parquet"
     write_estimates(path, identify(as_log(true), declaring(**ARMS), ["ls"]))
     write_estimates(path, identify(as_log(true), declaring(**ARMS), ["ls"]))
-    with pytest.raises(StoreError, match=r"ls with other errors of instruments in aircraft\.toml"):
-        write_estimates(path, identify(as_log(true), declaring(), ["ls"]))
+    for method in ("ls", "iv-f1"):
+        other = identify(as_log(true), declaring(), [method])
+        with pytest.raises(StoreError, match="which declares other errors of its instruments"):
+            write_estimates(path, other)
+    write_estimates(path, other, force=True)
+    assert read_stored(path)[0]["method"].tolist() == ["iv-f1"]
 
 
 def test_a_delay_beyond_the_record_is_an_error_that_names_it(true):

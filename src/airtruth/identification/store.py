@@ -162,6 +162,9 @@ def _kept(path: Path, methods: Sequence[str], settings: Mapping[str, Any], force
             return _NOTHING
         raise
     other = other_constants(old.records, settings["constants"])
+    own = settings.get("sensors", {})
+    if not other and any(record.get("sensors", {}) != own for record in old.records.values()):
+        other = "which declares other errors of its instruments"
     if other and not force:
         raise StoreError(
             f"{path}: holds estimates of another aircraft ({other}); choose another --out, or replace the whole "
@@ -213,8 +216,6 @@ def _difference(record: Mapping[str, Any] | None, settings: Mapping[str, Any]) -
         return "without a record of their options"
     if record["joint"] != settings["joint"]:
         return _of_runs(not settings["joint"])
-    if record.get("sensors", {}) != settings.get("sensors", {}):
-        return "with other errors of instruments in aircraft.toml"
     different = [
         f"{name} {record['options'].get(name)!r} in the file, {value!r} now"
         for name, value in settings["options"].items()
