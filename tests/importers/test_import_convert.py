@@ -4,6 +4,7 @@ import struct
 import tomllib
 
 import numpy as np
+import pandas as pd
 import pytest
 import scipy.io
 from import_flight import flown, foreign, write_csv
@@ -253,3 +254,67 @@ def test_units_are_guessed_by_size_where_names_say_nothing(tmp_path):
         "density_kg_m3": "kg_m3",
     }
     assert "do not contradict" in text
+
+
+@pytest.mark.parametrize("zone", [None, "UTC", "Europe/Berlin"])
+@pytest.mark.parametrize("unit", ["ns", "us", "ms"])
+def test_dates_and_durations_of_a_parquet_file_are_seconds(tmp_path, zone, unit):
+    """2024-05-01 00:00 UTC is 1,714,521,600 s after 1970; a float64 resolves 0.24 us there. The index holds the dates."""
+    steps = pd.to_timedelta(10 * np.arange(300), unit="ms")
+    dates = (pd.Timestamp("2024-05-01") + steps).as_unit(unit)
+    if zone:
+        dates = dates.tz_localize("UTC").tz_convert(zone)
+    table = pd.DataFrame(
+        {"a": np.arange(300.0), "after": steps.as_unit(unit)}, index=pd.Index(dates, name="date")
+    )
+    table.to_parquet(tmp_path / "f.parquet")
+    read = open_source(tmp_path / "f.parquet")
+    expected = 1714521600.0 + 0.01 * np.arange(300)
+    np.testing.assert_allclose(read.arrays["date"], expected, rtol=0.0, atol=3e-7)
+    np.testing.assert_allclose(read.arrays["after"], 0.01 * np.arange(300), rtol=1e-14, atol=1e-15)
+    for column in ("date", "after"):
+        made = convert(read, mapped(time={"column": column}))
+        np.testing.assert_allclose(made.t_s, 0.01 * np.arange(300), rtol=0.0, atol=3e-7)
+
+
+def test_a_missing_date_is_no_time(tmp_path):
+    dates = pd.Series(pd.to_datetime(["2024-05-01", None, "2024-05-02"]))
+    pd.DataFrame({"a": np.arange(3.0), "date": dates}).to_parquet(tmp_path / "f.parquet")
+    with pytest.raises(LogError, match="the time of alpha_rad in row 2 is empty or NaN; delete the row"):
+        convert(open_source(tmp_path / "f.parquet"), mapped(time={"column": "date"}))
+
+
+@pytest.mark.parametrize("delimiter", [";", "blanks"])
+def test_the_cell_that_is_no_number_is_named_among_decimal_commas(tmp_path, delimiter):
+    """Line 4, and not line 2, whose 1,5 is a number in a file with decimal commas."""
+    lines = ["t;a", "0,0;1,5", "0,1;1,6", "0,2;bad", "0,3;1,8"]
+    text = "\n".join(lines)
+    layout = {"decimal": ",", "delimiter": ";"}
+    if delimiter == "blanks":
+        text, layout = text.replace(";", "  "), {"decimal": ",", "format": "table"}
+    (tmp_path / "f.csv").write_text(text)
+    mapping = mapped(time={"column": "t"}, source=layout)
+    read = open_source(tmp_path / "f.csv", mapping.source)
+    with pytest.raises(LogError, match=r"column 'a', line 4: 'bad' is not a number"):
+        convert(read, mapping)
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("t,a\n0,1\n# pause\n0.1,2\n\n0.2,bad\n", 6),
+        ("# made\n\nt,a\n% units\n# signs\n0,bad\n", 6),
+        ("0,1\n# pause\n# pause\n0.1,bad\n", 4),
+        ("t,a\n0,1\n0.1,bad\n", 3),
+    ],
+)
+def test_the_line_of_a_cell_counts_the_comments_before_it(tmp_path, text, line):
+    """As an editor counts, from 1."""
+    assert text.splitlines()[line - 1].endswith("bad")
+    (tmp_path / "f.csv").write_text(text)
+    layout = {"header": False} if text.startswith("0") else {}
+    mapping = MappingFile.model_validate(
+        {"channels": {"alpha_rad": {"column": 2, "unit": "rad"}}, "time": {"column": 1}, "source": layout}
+    )
+    with pytest.raises(LogError, match=f"line {line}: 'bad'"):
+        convert(open_source(tmp_path / "f.csv", mapping.source), mapping)

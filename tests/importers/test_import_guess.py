@@ -319,3 +319,14 @@ def test_a_name_of_two_columns(log, tmp_path):
             import_log(tmp_path / "f.csv", tmp_path / "m.toml")
         assert words in str(caught.value)
         assert "q [deg/s].1" not in str(caught.value)
+
+
+def test_an_impact_pressure_is_no_dynamic_pressure(tmp_path):
+    """q_c/q_bar = ((1 + 0.2 M^2)^3.5 - 1)/(0.7 M^2): 1.064 at Mach 0.5, an airspeed that is 3.2 % high."""
+    mach = 0.5
+    assert (((1.0 + 0.2 * mach**2) ** 3.5 - 1.0) / (0.7 * mach**2)) ** 0.5 == pytest.approx(1.0315, abs=1e-4)
+    for name, mapped in (("qc [psf]", False), ("qbar [psf]", True)):
+        rows = "".join(f"{0.02 * k:.2f},{300.0 + k % 7}\n" for k in range(60))
+        (tmp_path / "f.csv").write_text(f"Time [s],{name}\n{rows}")
+        text = guess_mapping(tmp_path / "f.csv")
+        assert ("[channels.dynamic_pressure_pa]" in text) is mapped

@@ -1,11 +1,14 @@
 """Reading a campaign: what comes out, and the message for each thing that can be wrong."""
 
+import json
+
 import numpy as np
 import pytest
 import report_synthetic as synthetic
 
 from airtruth.errors import LogError, StoreError
 from airtruth.reporting import Campaign, read_campaign, stored_campaign
+from airtruth.reporting.campaign import describe
 
 
 @pytest.fixture
@@ -55,6 +58,12 @@ def test_description_names_the_campaign(tmp_path, pieces):
     description = {"name": "light", "title": "Light turbulence", "gust": {"level": "light"}}
     c = read_campaign(synthetic.write_campaign(tmp_path / "c", *pieces[:2], description))
     assert (c.name, c.title, c.gust) == ("light", "Light turbulence", "level light")
+
+
+def test_a_campaign_without_a_title_has_its_name(tmp_path):
+    """`fly` writes the empty title of such a campaign."""
+    (tmp_path / "campaign.json").write_text(json.dumps({"name": "light", "title": ""}))
+    assert describe(tmp_path).title == "light"
 
 
 def test_runs_that_the_truth_lacks_are_not_overlooked(tmp_path, pieces):

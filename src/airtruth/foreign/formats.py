@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
 
 from airtruth.errors import StoreError
 from airtruth.foreign.source import Source, packed, table_source
 from airtruth.foreign.text import WHITESPACE, TextFormat, read_text
 from airtruth.isolation.protocol import Reply
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def read(path: str, name: str, layout: Mapping[str, Any]) -> Reply:
@@ -47,8 +53,22 @@ def _parquet(path: Path, layout: TextFormat) -> Source:
         frame = frame.reset_index()
     if frame.empty:
         raise StoreError(f"{path}: holds no rows; export it again")
-    columns = [frame.iloc[:, i].to_numpy() for i in range(frame.shape[1])]
+    columns = [_in_seconds(frame.iloc[:, i]) for i in range(frame.shape[1])]
     return table_source(path, [str(name) for name in frame.columns], columns)
+
+
+_PER_SECOND: Final = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
+"""Unit of pandas' dates and durations -> integers per second."""
+
+
+def _in_seconds(column: pd.Series[Any]) -> NDArray[Any]:
+    """Values of a column; dates are seconds since 1970 and durations seconds, whatever the unit of their integers."""
+    if column.dtype.kind not in "mM":
+        return column.to_numpy()
+    integers, per_second = column.astype("int64").to_numpy(), _PER_SECOND[column.dt.unit]
+    # whole seconds and the rest apart: 2e18 ns have more digits than a float64
+    seconds = integers // per_second + integers % per_second / per_second
+    return np.where(column.isna().to_numpy(), np.nan, seconds)
 
 
 def _mat(path: Path, layout: TextFormat) -> Source:

@@ -33,6 +33,7 @@ class Source:
     units : name -> unit as the file states it.
     repeated : name that several columns of a table have -> their numbers; in ``arrays`` further ones have the name of
         `further_name`.
+    comments : lines of a text file among its rows that are none, in order.
     """
 
     path: Path
@@ -43,6 +44,14 @@ class Source:
     first_line: int = 0
     units: Mapping[str, str] = field(default_factory=dict)
     repeated: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    comments: tuple[int, ...] = ()
+
+    def line(self, row: int) -> int:
+        """Line of a row, counted from 0, in a text file; 0 if it is none."""
+        number = self.first_line + row if self.first_line else 0
+        for comment in self.comments:
+            number += comment <= number
+        return number
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -57,7 +66,11 @@ def further_name(name: str, number: int) -> str:
 
 
 def table_source(
-    path: Path, names: Sequence[str], columns: Sequence[NDArray[Any]], first_line: int = 0
+    path: Path,
+    names: Sequence[str],
+    columns: Sequence[NDArray[Any]],
+    first_line: int = 0,
+    comments: Sequence[int] = (),
 ) -> Source:
     """The columns of one table.
 
@@ -66,10 +79,11 @@ def table_source(
     path : the file.
     names : one for each column, of which several may be equal; none if the columns are numbered.
     columns : their values.
-    first_line : as of `Source`.
+    first_line, comments : as of `Source`.
     """
     if not names:
-        return Source(path, {f"{i}": one for i, one in enumerate(columns, 1)}, first_line=first_line)
+        numbered = {f"{i}": one for i, one in enumerate(columns, 1)}
+        return Source(path, numbered, first_line=first_line, comments=tuple(comments))
     numbers: dict[str, tuple[int, ...]] = {}
     arrays: dict[str, NDArray[Any]] = {}
     for number, (stated, values) in enumerate(zip(names, columns, strict=True), 1):
@@ -77,7 +91,7 @@ def table_source(
         arrays[further_name(name, number) if name in numbers else name] = values
         numbers[name] = (*numbers.get(name, ()), number)
     repeated = {name: several for name, several in numbers.items() if len(several) > 1}
-    return Source(path, arrays, first_line=first_line, repeated=repeated)
+    return Source(path, arrays, first_line=first_line, repeated=repeated, comments=tuple(comments))
 
 
 def packed(source: Source) -> Reply:
@@ -102,6 +116,7 @@ def packed(source: Source) -> Reply:
         "first_line": source.first_line,
         "units": dict(source.units),
         "repeated": [[name, list(numbers)] for name, numbers in source.repeated.items()],
+        "comments": list(source.comments),
     }
     return Reply(facts, tuple(arrays))
 
@@ -129,6 +144,7 @@ def unpacked(path: Path, reply: Reply) -> Source:
         facts["first_line"],
         facts["units"],
         {name: tuple(numbers) for name, numbers in facts["repeated"]},
+        tuple(facts["comments"]),
     )
 
 

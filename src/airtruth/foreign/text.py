@@ -7,6 +7,10 @@ import io
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError, StoreError, reason
 from airtruth.foreign.source import Source, table_source
@@ -59,8 +63,9 @@ def read_text(path: Path, layout: TextFormat) -> Source:
     if header is None:
         cells = lines[first].split(None if layout.delimiter == WHITESPACE else layout.delimiter)
         header = not any(is_number(cell, layout.decimal) for cell in cells)
+    comments = [number for number, line in enumerate(lines[first:], first + 1) if names_a_comment(line)]
     rows = [line for line in lines[first:] if not names_a_comment(line)]
-    plain = len(rows) == len(lines) - first
+    plain = not comments
     _require_names(path, rows, layout.delimiter, header)
     try:
         frame = pd.read_csv(
@@ -79,8 +84,19 @@ def read_text(path: Path, layout: TextFormat) -> Source:
     if frame.empty:
         raise StoreError(f"{path}: holds a header and no rows; export it again")
     names = _own_names([str(name) for name in frame.columns], rows, layout.delimiter) if header else ()
-    columns = [frame.iloc[:, i].to_numpy() for i in range(frame.shape[1])]
-    return table_source(path, names, columns, first_line=first + 1 + header)
+    columns = [_numeric(frame.iloc[:, i].to_numpy(), layout.decimal) for i in range(frame.shape[1])]
+    return table_source(path, names, columns, first_line=first + 1 + header, comments=comments)
+
+
+def _numeric(values: NDArray[Any], decimal: str) -> NDArray[Any]:
+    """Cells of a column that also holds text, its numbers with a decimal point: pandas leaves them as they are."""
+    if decimal == "." or values.dtype.kind != "O":
+        return values
+    cells = [
+        cell.strip().replace(decimal, ".") if isinstance(cell, str) and is_number(cell, decimal) else cell
+        for cell in values
+    ]
+    return np.array(cells, dtype=object)
 
 
 def names_a_comment(line: str) -> bool:

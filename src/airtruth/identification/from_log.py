@@ -15,6 +15,7 @@ from airtruth.errors import ConfigurationError, LogError, StoreError
 from airtruth.identification.batch import identify_batch
 from airtruth.identification.checks import airspeed_fault, check_batch, check_channels
 from airtruth.identification.condition import AircraftConstants
+from airtruth.identification.declared_sensors import as_ideal, taken_out
 from airtruth.identification.estimates import Estimates, concatenated
 from airtruth.identification.methods import Method
 from airtruth.identification.options import Options
@@ -117,7 +118,11 @@ def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made
         for run_id, name, own, declared in differing(log.metadata, log.run_ids, task.plane):
             found.stated.setdefault(name, []).append((run_id, own, declared))
         servo_s = task.plane.servo_time_s if isinstance(task.plane, Aircraft) else 0.0
-        parts = [replace(p, batch=replace(p.batch, servo_s=servo_s)) for p in with_constants(log, task.plane)]
+        taken = taken_out(task.plane)
+        parts = [
+            replace(p, batch=replace(as_ideal(p.batch, taken), servo_s=servo_s))
+            for p in with_constants(log, task.plane)
+        ]
         for part in parts:
             check_batch(part.batch, task.options)
             found.dt_s = max(found.dt_s, part.batch.dt_s)

@@ -14,6 +14,7 @@ from airtruth.aircraft import Aircraft
 from airtruth.errors import ConfigurationError, choices
 from airtruth.identification import tables
 from airtruth.identification.condition import AircraftConstants
+from airtruth.identification.declared_sensors import Taken, taken_out
 from airtruth.identification.estimates import Estimates, Parts, estimates_table
 from airtruth.identification.options import Options
 from airtruth.identification.record_constants import Constants, values_of
@@ -45,12 +46,14 @@ class Settings:
     joint : whether all runs share one estimate.
     aircraft : name of the aircraft.
     constants : its constants.
+    sensors : errors of its instruments that are taken out of the records (`declared_sensors.taken_out`).
     """
 
     options: Options
     joint: bool
     aircraft: str
     constants: Constants
+    sensors: Taken = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """The settings in types that JSON has."""
@@ -64,13 +67,14 @@ class Settings:
             "joint": self.joint,
             "aircraft": self.aircraft,
             "constants": dataclasses.asdict(self.constants),
+            **({"sensors": {name: dict(own) for name, own in self.sensors.items()}} if self.sensors else {}),
         }
 
 
 def settings_of(aircraft: AircraftConstants, options: Options, joint: bool) -> Settings:
     """Settings of an identification of this aircraft."""
     name = aircraft.name if isinstance(aircraft, Aircraft) else type(aircraft).__name__
-    return Settings(options, joint, name, values_of(aircraft))
+    return Settings(options, joint, name, values_of(aircraft), taken_out(aircraft))
 
 
 RUNS_PER_FRAME: Final = 2000
@@ -202,7 +206,9 @@ class IdentificationResult:
 
         if self.logs is None:
             return None
-        return simulated_records(self.logs, self.to_frame(), self.settings.constants)
+        return simulated_records(
+            self.logs, self.to_frame(), self.settings.constants, taken=self.settings.sensors
+        )
 
     def _parts(self) -> Iterable[Sequence[Estimates]]:
         return (self.estimates,)

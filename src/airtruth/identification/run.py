@@ -18,6 +18,7 @@ from airtruth.cluster import Cluster
 from airtruth.errors import ConfigurationError
 from airtruth.identification.batch import identify_batch, identify_joint
 from airtruth.identification.condition import AircraftConstants
+from airtruth.identification.declared_sensors import declared_words, taken_out
 from airtruth.identification.doubts import doubts
 from airtruth.identification.estimates import Estimates, concatenated
 from airtruth.identification.from_log import FromLog, LogTask, results_of
@@ -189,6 +190,7 @@ def _worked(
         settings_of(plane, asked.options, asked.joint),
         lambda failed: advance(next(steps), total, failed),
         keep,
+        notes=declared_words(taken_out(plane)),
     )
     tasks = (
         LogTask(Path.cwd(), entry, asked.methods, asked.options, plane, asked.force, asked.joint)

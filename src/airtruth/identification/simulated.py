@@ -8,6 +8,7 @@ fitted by least squares, the channels weighted by their standard deviations.
 
 from __future__ import annotations
 
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -15,9 +16,10 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from airtruth.identification.condition import AircraftConstants
+from airtruth.identification.declared_sensors import Taken, as_ideal
 from airtruth.identification.estimates import JOINT
 from airtruth.identification.record_constants import of_run, values_of
-from airtruth.logs.flight_log import FlightLog
+from airtruth.logs.flight_log import Batch, FlightLog
 from airtruth.logs.histories import Histories, History
 from airtruth.logs.sources import Logs, named_logs
 from airtruth.physics.atmosphere import air_density
@@ -106,6 +108,7 @@ def simulated_records(
     constants: AircraftConstants,
     most: int = MOST_RECORDS,
     of_runs: int | None = None,
+    taken: Taken = MappingProxyType({}),
 ) -> Histories:
     """Records beside the simulations by each method that has an estimate of them.
 
@@ -116,6 +119,7 @@ def simulated_records(
     constants : the aircraft; mass, inertia and lengths that a log states for a run replace its own.
     most : largest number of records; of more, that many evenly spaced ones are chosen.
     of_runs : number of runs of which ``estimates`` has those to show; None if it has all.
+    taken : errors of instruments that the identification took out of the records, and that are taken out here.
 
     Raises
     ------
@@ -137,17 +141,25 @@ def simulated_records(
     for _, log in named_logs(logs, run_ids=chosen):
         for run in log.run_ids:
             own = {method: rows.get((JOINT if joint else run, method)) for method in methods}
-            found[run] = _record(log, run, own, of_run(constants, log.metadata, run))
+            found[run] = _record(log, run, own, of_run(constants, log.metadata, run), taken)
     return Histories(tuple(found[run] for run in chosen), methods, chosen[0], of_runs or len(runs))
 
 
 def _record(
-    log: FlightLog, run_id: str, rows: dict[str, pd.Series[float] | None], constants: AircraftConstants
+    log: FlightLog,
+    run_id: str,
+    rows: dict[str, pd.Series[float] | None],
+    constants: AircraftConstants,
+    taken: Taken,
 ) -> History:
     at = log.rows(log.run_ids.index(run_id))
     channels = {name: values[at] for name, values in log.channels.items()}
     t_s = log.t_s[at]
     dt = float((t_s[-1] - t_s[0]) / (len(t_s) - 1))
+    if taken:
+        stacked = {name: values[None].astype(np.float64) for name, values in channels.items()}
+        ideal = as_ideal(Batch((run_id,), dt, t_s[None], stacked), taken)
+        channels, t_s = {name: values[0] for name, values in ideal.channels.items()}, ideal.t_s[0]
     airspeed, density = float(channels["airspeed_m_s"].mean()), float(air_density(channels).mean())
     own = values_of(constants)
     s = scale(own.wing_area_m2, own.chord_m, own.mass_kg, own.inertia_yy_kg_m2, airspeed, density)

@@ -1,7 +1,8 @@
 """estimates.parquet: estimates of several methods in one file, each with the settings that made it.
 
 The file-level JSON under the key "airtruth" holds, under "estimates", for each method: version, options, joint,
-aircraft, constants, sources (name, SHA-256 and runs of each log), notes and forced faults.
+aircraft, constants, sensors (where errors of instruments are taken out), sources (name, SHA-256 and runs of each log),
+notes and forced faults.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ def write_estimates(
     """Write estimates, or merge them into a file of estimates.
 
     Rows of other methods are kept. Rows of the same method and run are replaced, which requires that the file's
-    rows of that method were made with the same settings (options, joint, aircraft and its constants).
+    rows of that method were made with the same settings (options, joint, aircraft, its constants and sensors).
 
     Parameters
     ----------
@@ -161,6 +162,9 @@ def _kept(path: Path, methods: Sequence[str], settings: Mapping[str, Any], force
             return _NOTHING
         raise
     other = other_constants(old.records, settings["constants"])
+    own = settings.get("sensors", {})
+    if not other and any(record.get("sensors", {}) != own for record in old.records.values()):
+        other = "which declares other errors of its instruments"
     if other and not force:
         raise StoreError(
             f"{path}: holds estimates of another aircraft ({other}); choose another --out, or replace the whole "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NotRequired
 
 import numpy as np
 import pandas as pd
@@ -36,6 +36,7 @@ class Record(TypedDict):
     joint: bool
     aircraft: str
     constants: dict[str, float]
+    sensors: NotRequired[dict[str, dict[str, float]]]
     sources: list[tuple[str, str, int]]
     notes: list[str]
     forced: list[str]

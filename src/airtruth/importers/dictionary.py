@@ -38,7 +38,7 @@ NAMES: Final = {
     "throttle": r"throttle|thr|pla|power_?lever",
     "altitude_m": r"h|alt|altitude|h_?p|pressure_?alt(itude)?|hbaro|baro_?alt",
     "density_kg_m3": r"rho|density|air_?density",
-    "dynamic_pressure_pa": r"q_?bar|qc|dynamic_?pressure|q_?dyn|dyn_?press(ure)?",
+    "dynamic_pressure_pa": r"q_?bar|dynamic_?pressure|q_?dyn|dyn_?press(ure)?",
 }
 """Channel -> regular expression of the headers that usually name it."""
 _UNIT_WORDS: Final = {

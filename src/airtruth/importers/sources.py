@@ -79,7 +79,7 @@ def numbers(source: Source, place: Place, variable: str | None = None) -> tuple[
         try:
             result[row] = np.nan if text is None or str(text).strip() == "" else float(text)
         except (TypeError, ValueError):
-            line = f"line {row + source.first_line}" if source.first_line else f"row {row + 1}"
+            line = f"line {source.line(row)}" if source.first_line else f"row {row + 1}"
             raise LogError(
                 f"{shown}, {line}: {str(text)[:40]!r} is not a number; repair it, "
                 "or set [source] skip_rows, delimiter or decimal"

@@ -350,7 +350,7 @@ def describe(folder: Path) -> Description:
         raise StoreError(f"{path}: name {name!r} cannot be part of a file's name; leave out '/'")
     if not (runs is None or isinstance(runs, int)):
         raise StoreError(f"{path}: runs {runs!r} must be a whole number; {cure}")
-    return Description(name, title, runs, words)
+    return Description(name, title or name, runs, words)
 
 
 def _words(setting: object) -> str:

@@ -89,7 +89,8 @@ def identification_report(result: IdentificationResult, aircraft: Aircraft | Non
     stated = result.to_dict()
     record = {
         name: stated[name]
-        for name in ("version", "options", "joint", "aircraft", "constants", "notes", "forced")
+        for name in ("version", "options", "joint", "aircraft", "constants", "sensors", "notes", "forced")
+        if name in stated
     }
     sources = [(s.name, s.sha256, s.runs) for s in result.sources]
     made: Record = {**record, "sources": sources}  # type: ignore[typeddict-item]  # to_dict gives its keys
@@ -101,7 +102,8 @@ def identification_report(result: IdentificationResult, aircraft: Aircraft | Non
         require_same_aircraft(records, aircraft)
         declared = declared_at(aircraft, histories)
         rows = declared.before(result.to_frame())
-        histories = simulated_records(result.logs, rows, result.settings.constants)
+        settings = result.settings
+        histories = simulated_records(result.logs, rows, settings.constants, taken=settings.sensors)
     identified = Identified(
         frame=result.to_frame(),
         records=records,

@@ -130,8 +130,9 @@ def require_same_aircraft(records: Mapping[str, Record], aircraft: Aircraft) -> 
 def _simulated(logs: Logs, frame: pd.DataFrame, records: Mapping[str, Record], runs: int | None) -> Histories:
     if not records:
         raise StoreError("the estimates do not state the constants of their aircraft; identify again")
-    own = next(iter(records.values()))["constants"]
-    return simulated_records(logs, frame, Constants(**own), of_runs=runs)
+    own = next(iter(records.values()))
+    taken = own.get("sensors", {})
+    return simulated_records(logs, frame, Constants(**own["constants"]), of_runs=runs, taken=taken)
 
 
 def _beside(folder: Path, records: Mapping[str, Record]) -> tuple[list[str], str]:

@@ -1,0 +1,157 @@
+"""Records as instruments without the declared errors, at the centre of gravity, would have made them.
+
+aircraft.toml declares scale, lag, delay and position of each instrument (`airtruth.physics.sensor_errors`). They are taken
+out of the channels that the estimators read, in the reverse of the order in which a reading has them: scale, delay, lag,
+position. Biases remain: a free constant of each equation takes those of alpha, q, az and elevator.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.aircraft import Aircraft
+from airtruth.errors import LogError
+from airtruth.identification.condition import AircraftConstants
+from airtruth.identification.options import CUTOFF_SHARE
+from airtruth.logs.flight_log import Batch
+from airtruth.numerics.prefilter import butterworth, edge_samples, zero_phase
+from airtruth.physics.reconstruction import is_reconstructed
+from airtruth.physics.sensor_errors import SensorErrors
+
+Array = NDArray[np.float64]
+Taken = Mapping[str, Mapping[str, float]]
+"""Errors that are taken out: channel -> field of `SensorErrors` -> value [SI]."""
+
+CHANNELS: Final = ("airspeed_m_s", "alpha_rad", "q_rad_s", "az_m_s2", "elevator_rad")
+"""Channels that the estimators read and an instrument measures."""
+CUTOFF_HZ: Final = 12.5
+"""Cutoff of the low-pass before a rate is taken, or the share `CUTOFF_SHARE` of a lower sample rate [Hz] (judgement: with
+an accelerometer 0.3 m ahead in the GTM, CLde of filter-error errs by 10 % with 5 Hz, which takes the steps of the elevator
+out of q', by 2 % with 12.5 Hz, and its scatter grows with 18 Hz)."""
+ORDER: Final = 4
+"""Order of one pass of that low-pass [-]; that of the estimators."""
+_WORDS: Final = {
+    "scale": "scale {0:.6g}",
+    "lag_s": "lag {0:.6g} s",
+    "delay_s": "delay {0:.6g} s",
+    "x_m": "{0:.6g} m ahead of the CG",
+    "z_m": "{0:.6g} m below the CG",
+}
+"""Errors that are taken out, by the field of `SensorErrors`, in words."""
+_PLACED: Final = {"alpha_rad": ("x_m",), "az_m_s2": ("x_m", "z_m")}
+"""Channels that depend on the position of their instrument, and on which part of it."""
+_WHOLE: Final = 1e-6
+"""Part of a sample by which a delay may differ from whole samples [-] (rounding of decimal figures)."""
+
+
+def taken_out(constants: AircraftConstants) -> dict[str, dict[str, float]]:
+    """Errors that are taken out: channel -> field of `SensorErrors` -> value [SI]; {} for an object without sensors."""
+    if not isinstance(constants, Aircraft):
+        return {}
+    stated = {name: constants.file.sensors[name] for name in CHANNELS if name in constants.file.sensors}
+    found = {name: _effective(name, sensor.errors()) for name, sensor in stated.items()}
+    return {name: errors for name, errors in found.items() if errors}
+
+
+def declared_words(taken: Taken) -> list[str]:
+    """One sentence on the errors that are taken out of records; none where there are none."""
+    parts = [
+        f"{name} ({', '.join(_WORDS[key].format(value) for key, value in errors.items())})"
+        for name, errors in taken.items()
+    ]
+    if not parts:
+        return []
+    return [f"errors that the aircraft declares for its instruments are taken out of {', '.join(parts)}"]
+
+
+def as_ideal(batch: Batch, taken: Taken) -> Batch:
+    """Return the runs without the declared errors of their instruments, up to the longest delay shorter.
+
+    Delays are undone between samples by a cubic that keeps their order. Lags and the arm of the accelerometer need a rate,
+    that of the channel behind a low-pass. A reconstructed alpha had no vane, and stays.
+
+    Parameters
+    ----------
+    batch : runs (runs, samples) as measured.
+    taken : errors from `taken_out`; without any the runs are returned as they are.
+
+    Raises
+    ------
+    LogError
+        If a delay is longer than the record.
+    """
+    errors = {name: SensorErrors(**own) for name, own in taken.items() if name in batch.channels}
+    if is_reconstructed(batch.channels):
+        errors.pop("alpha_rad", None)
+    if not errors:
+        return batch
+    samples = batch.t_s.shape[1]
+    kept = samples - max(_steps(own, batch.dt_s) for own in errors.values())
+    sos = butterworth(min(CUTOFF_HZ, CUTOFF_SHARE / batch.dt_s), ORDER, batch.dt_s)
+    if kept <= edge_samples(sos):
+        longest = max(errors, key=lambda name: errors[name].delay_s)
+        raise LogError(
+            f"{longest}: the aircraft declares a delay of {errors[longest].delay_s:g} s, and the records last "
+            f"{(samples - 1) * batch.dt_s:.3g} s; correct [sensors.{longest}] delay"
+        )
+    channels = dict(batch.channels)
+    for name, own in errors.items():
+        advanced = _advanced(channels[name] / own.scale, own.delay_s / batch.dt_s)[:, :kept]
+        if own.lag_s > 0.0:
+            advanced = advanced + own.lag_s * _rate(advanced, sos, batch.dt_s)
+        channels[name] = advanced
+    channels = {name: np.ascontiguousarray(values[:, :kept]) for name, values in channels.items()}
+    for name, own in errors.items():
+        if name in _PLACED:
+            channels[name] = channels[name] + _moved(name, own, channels, sos, batch.dt_s)
+    return replace(batch, t_s=batch.t_s[:, :kept], channels=channels)
+
+
+def _effective(name: str, own: SensorErrors) -> dict[str, float]:
+    """The errors of a channel that are taken out, where they have an effect."""
+    neutral = SensorErrors()
+    return {
+        key: getattr(own, key)
+        for key in _WORDS
+        if getattr(own, key) != getattr(neutral, key) and (key[1:] != "_m" or key in _PLACED.get(name, ()))
+    }
+
+
+def _steps(own: SensorErrors, dt_s: float) -> int:
+    """Samples at the end of a record that a delay leaves without a value."""
+    return math.ceil(own.delay_s / dt_s - _WHOLE)
+
+
+def _advanced(x: Array, samples: float) -> Array:
+    """(runs, samples) series so many samples earlier; the end, which no sample shows, holds the last value."""
+    if samples == 0.0:
+        return x
+    from scipy.interpolate import PchipInterpolator
+
+    at = np.arange(x.shape[1], dtype=np.float64)
+    return np.asarray(PchipInterpolator(at, x, axis=1)(np.minimum(at + samples, at[-1])))
+
+
+def _rate(x: Array, sos: Array, dt_s: float) -> Array:
+    """(runs, samples) rate of a low-passed series: that of the cubic through its samples [unit/s]."""
+    from scipy.interpolate import CubicSpline
+
+    at = dt_s * np.arange(x.shape[1])
+    return np.asarray(CubicSpline(at, zero_phase(x, sos), axis=1)(at, 1))
+
+
+def _moved(name: str, own: SensorErrors, channels: Mapping[str, Array], sos: Array, dt_s: float) -> Array:
+    """Value at the CG less the reading, by `airtruth.physics.sensors.vane_alpha` and `accelerometer_az`."""
+    q = channels["q_rad_s"]
+    if name == "alpha_rad":
+        return np.asarray(q * own.x_m / channels["airspeed_m_s"])
+    return np.asarray(own.x_m * _rate(q, sos, dt_s) + own.z_m * np.square(q))
+
+
+__all__ = ["CHANNELS", "Taken", "as_ideal", "declared_words", "taken_out"]
