@@ -10,7 +10,7 @@ from trace_records import NOTHING, SETTINGS, fly, problem
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import likelihood_terms, marginal_information
-from airtruth.tracing.inference.robust import MEMORY_S, inflation, long_run, scatter
+from airtruth.tracing.inference.robust import MEMORY_S, inflation, long_run, mean_share, scatter
 from airtruth.tracing.model.parameters import Common, PerRecord
 from airtruth.tracing.model.settings import common_prior, per_record_prior
 
@@ -65,6 +65,22 @@ def whole(p, found):
 def test_elimination_is_the_whole_matrix():
     p, found = fitted(3, 2.0)
     np.testing.assert_allclose(inflation(p, found), np.maximum(whole(p, found), 1.0), rtol=1e-4)
+
+
+@pytest.mark.parametrize(("samples", "lags"), [(125, 50), (500, 50), (10, 30)])
+def test_share_that_is_left_without_the_mean_is_the_trace_of_both_matrices(samples, lags):
+    """Expected value of the long-run variance of a white series about its own mean, over that about zero: explicit matrices."""
+    at = np.arange(samples)
+    weights = np.maximum(0.0, 1.0 - np.abs(at[:, None] - at) / (lags + 1.0))
+    centred = np.eye(samples) - 1.0 / samples
+    assert mean_share(samples, lags) == pytest.approx(
+        np.trace(centred @ weights @ centred) / samples, rel=1e-12
+    )
+
+
+def test_share_of_a_long_record_is_one():
+    """1 - b + b^2/3 of Kiefer and Vogelsang, b = 0.01."""
+    assert mean_share(100_000, 999) == pytest.approx(1.0 - 0.01 + 0.01**2 / 3.0, abs=1e-5)
 
 
 def test_long_run_variance_by_hand():

@@ -6,7 +6,8 @@ with J the information, both with the records' own parameters eliminated. If the
 a misspecified model leaves motion in the innovations, J^-1 alone is too small.
 
 Sources: H. White, Econometrica 50 (1982), theorem 3.2; long-run variance, W. K. Newey and K. D. West, Econometrica 55
-(1987), eq. (5); few clusters, C. B. Hansen, J. Econometrics 141 (2007), eq. (3).
+(1987), eq. (5), and its share that is lost with the mean of a short record, N. M. Kiefer and T. J. Vogelsang, Econometric
+Theory 21 (2005) 1130-1164; few clusters, C. B. Hansen, J. Econometrics 141 (2007), eq. (3).
 """
 
 from __future__ import annotations
@@ -36,12 +37,14 @@ _RIDGE: Final = 1e-12
 """Ridge on the scaled information before it is inverted [-]; far above rounding, far below any information."""
 
 
-def inflation(problem: TraceProblem, fitted: PosteriorFit) -> Array:
+def inflation(problem: TraceProblem, fitted: PosteriorFit, unbiased: bool = False) -> Array:
     """Robust over plain standard deviation of common parameters and sizes, from the slopes within records.
 
     Parameters
     ----------
     fitted : a fit to the problem's records, at its optimum.
+    unbiased : whether long-run variances are divided by `mean_share`: an interval needs it, and a test whose threshold is
+        calibrated does not.
 
     Returns
     -------
@@ -53,7 +56,8 @@ def inflation(problem: TraceProblem, fitted: PosteriorFit) -> Array:
     for record, (slopes, own, mixed) in zip(problem.records, _slopes(problem, fitted), strict=True):
         free = slopes[:, marginal.stop : marginal.stop + own.shape[0]]
         z = slopes[:, marginal] - free @ np.linalg.solve(own, mixed.T)
-        total += long_run(z - z.mean(axis=0), round(MEMORY_S / record.signals.dt_s))
+        lags = round(MEMORY_S / record.signals.dt_s)
+        total += long_run(z - z.mean(axis=0), lags) / (mean_share(len(z), lags) if unbiased else 1.0)
     return _ratio(problem, fitted, total)
 
 
@@ -82,7 +86,7 @@ def _prior_information(problem: TraceProblem, fitted: PosteriorFit) -> Array:
 
 def robust_covariance(problem: TraceProblem, fitted: PosteriorFit) -> Array:
     """(common and sizes, common and sizes) covariance of a fit, widened by the larger of `inflation` and `scatter`."""
-    ratio = np.maximum(inflation(problem, fitted), scatter(problem, fitted))
+    ratio = np.maximum(inflation(problem, fitted, unbiased=True), scatter(problem, fitted))
     return np.asarray(fitted.covariance * np.outer(ratio, ratio))
 
 
@@ -128,4 +132,16 @@ def long_run(x: Array, lags: int) -> Array:
     return total
 
 
-__all__ = ["MEMORY_S", "inflation", "long_run", "robust_covariance", "scatter"]
+def mean_share(samples: int, lags: int) -> float:
+    """Share of `long_run` that a white series keeps on average when its mean is subtracted; about 1 - b + b^2/3, b the
+    lags over the samples.
+
+    Source: the trace of M W over the samples, with the Bartlett weights W and the removal M of the mean; N. M. Kiefer and
+    T. J. Vogelsang, Econometric Theory 21 (2005), section 3.
+    """
+    j = np.arange(1, min(lags, samples - 1) + 1)
+    every = samples + 2.0 * float(((samples - j) * (1.0 - j / (lags + 1.0))).sum())
+    return 1.0 - every / samples**2
+
+
+__all__ = ["MEMORY_S", "inflation", "long_run", "mean_share", "robust_covariance", "scatter"]
