@@ -138,7 +138,7 @@ def test_sizes_are_read_in_any_unit():
         (["elevator_delay"], {}, "state two with --split A,B"),
         (["elevator_delay", "gust_level"], {}, "act on the gusts alone"),
         (["elevator_delay", "nothing"], {}, "nothing"),
-        (["derivatives", "elevator_delay"], {}, "refitted under every hypothesis"),
+        (["derivatives", "elevator_delay"], {}, "every hypothesis refits them"),
         (["elevator_delay", "actuator_lag"], {"gyro_lag.tau_s": 1.0}, "EFFECT.PARAMETER=VALUE"),
         (["elevator_delay", "actuator_lag"], {"elevator_delay.delay_s": 9.0}, "outside its range"),
     ],
