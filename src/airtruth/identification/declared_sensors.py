@@ -102,7 +102,7 @@ def as_ideal(batch: Batch, taken: Taken) -> Batch:
         )
     channels = dict(batch.channels)
     for name, own in errors.items():
-        advanced = _advanced(channels[name] / own.scale, own.delay_s / batch.dt_s)[:, :kept]
+        advanced = _advanced(own.unscaled(channels[name]), own.delay_s / batch.dt_s)[:, :kept]
         if own.lag_s > 0.0:
             advanced = advanced + own.lag_s * _rate(advanced, sos, batch.dt_s)
         channels[name] = advanced

@@ -38,9 +38,9 @@ UNSUPPORTED: Final = "no test of the declared aircraft is significant over all t
 IMMATERIAL: Final = "its size is immaterial"
 """Reason of a candidate that is too small to matter."""
 WORSE_LIKELIHOOD: Final = "it worsens the likelihood of records left out"
-"""Reason of a candidate that predicts records worse that its fit left out."""
+"""Reason of a candidate that predicts the records left out of its fit worse than the fit without it."""
 WORSE_FREE_RUN: Final = "it worsens the free run of records left out"
-"""The same of the free run."""
+"""Reason of a candidate whose free run of these records is worse."""
 IMPROBABLE: Final = 0.001
 """Probability below which refitted derivatives contradict the declared ones [-] (convention: three standard errors)."""
 _ALPHA_DOT: Final = "alpha_dot_hat"

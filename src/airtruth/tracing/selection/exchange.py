@@ -87,7 +87,7 @@ def _tries(
     seed: int,
 ) -> Iterator[tuple[str, Callable[[], PosteriorFit | None]]]:
     """Each exchange as a phrase for the progress line, and the function that refits it."""
-    yield from suggested(problem, last, effects, seed)
+    yield from _suggested(problem, last, effects, seed)
     for index, effect in enumerate(last.hypothesis.effects):
         own = next((r for r in rounds if r.tied and r.tied[0].score.effect.key == effect.key), None)
         rival = None if own is None else best_rival(own, last, effect)
@@ -105,7 +105,7 @@ def _tries(
             yield phrase, partial(refit_scored, problem, last, scored.table, int(i))
 
 
-def suggested(
+def _suggested(
     problem: TraceProblem, last: PosteriorFit, effects: Sequence[Effect], seed: int
 ) -> Iterator[tuple[str, Callable[[], PosteriorFit | None]]]:
     """For each member the effects that score highest at the fit without it, as `_tries`.
@@ -113,11 +113,11 @@ def suggested(
     A candidate of the member's own round had to gain beside fewer effects. What delays the same signal is tried by
     `other_kinds` and among the look-alikes.
     """
+    taken = {e.name for e in last.hypothesis.effects}
     for member in last.hypothesis.effects:
         less = refit_without(problem, last, member)
         if less is None:
             continue
-        taken = {e.name for e in last.hypothesis.effects}
         late = late_signal(member)
         others = [e for e in effects if e.name not in taken and not (late and late_signal(e) == late)]
         table = score_test.table(less, problem, others, NO_WHITENER, seed)

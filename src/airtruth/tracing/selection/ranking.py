@@ -52,7 +52,7 @@ def rank(
     fits : refits, best first; least : gain in 2 log L that is significant.
     replacement : keys (old, new); the old effect explains nothing beside the new one.
     leader : key of the effect that leads whatever others gain, because the set with it explains more; "" for none. Records
-        left out judge the set and not the leader, which others that the set still lacks may make worse.
+        left out test the set and not its leader: a true effect can make them worse while another is missing.
     """
     if not fits:
         return ()

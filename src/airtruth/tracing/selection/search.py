@@ -134,8 +134,9 @@ class _Search:
             better, exchanged = better_set(
                 self.problem, rounds, last, first.effects, least, self.seed, self.advance
             )
-            follow = better is not None and count < _EXCHANGES
-            again = self.led(first, better or (), rounds, 0.5 * AHEAD) if follow else rounds
+            if better is None or count == _EXCHANGES:
+                break
+            again = self.led(first, better, rounds, 0.5 * AHEAD)
             if again is rounds:
                 break
             rounds = again
