@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,13 +21,14 @@ from airtruth.design.question import from_names
 from airtruth.design.split_result import SplitResult
 from airtruth.design.splitting import split
 from airtruth.design.verdict import Asked, asked_by
-from airtruth.errors import ConfigurationError
+from airtruth.errors import ConfigurationError, StoreError
 from airtruth.logs.histories import FILE, Histories, read_histories
 from airtruth.logs.outputs import writing
 from airtruth.logs.provenance import PROVENANCE, Provenance, aircraft_digests
+from airtruth.logs.remote import RemotePath, location
 from airtruth.physics.atmosphere import RHO0_KG_M3
 from airtruth.simulation.campaign import file as campaign_file
-from airtruth.simulation.campaign.file import Campaign
+from airtruth.simulation.campaign.file import NAME, Campaign
 from airtruth.tracing.answer import TraceAnswer, answer_path
 
 Step = Callable[[str], None]
@@ -82,6 +84,8 @@ def planned_from(
     ConfigurationError, AircraftError, TrimError, StoreError
         Naming what is wrong, where, and what to do.
     """
+    if out is not None:
+        _require_file(out)
     trace = stated.trace
     answer_file = None if trace is None else answer_path(trace)
     question = _question(stated, answer_file)
@@ -100,6 +104,17 @@ def planned_from(
             result.write(out)
             style.save(result.plot(), out.with_suffix(".png"))
     return result
+
+
+def _require_file(out: Path) -> None:
+    """Refuse a file that the campaign cannot be written to, or flown from, before the flight is computed."""
+    if out.suffix != ".toml" or not re.fullmatch(NAME, out.stem):
+        raise ConfigurationError(
+            f"--out {out}: its name is that of the campaign and of its runs; write FILE.toml, with letters, digits, "
+            "_, . and - in FILE"
+        )
+    if not isinstance(location(out), RemotePath) and not out.parent.is_dir():
+        raise StoreError(f"{out}: the folder {out.parent} does not exist: create it or choose another --out")
 
 
 def _question(stated: Stated, answer_file: Path | None) -> Asked:

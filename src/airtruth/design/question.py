@@ -159,6 +159,11 @@ def estimated(accepted: AcceptedEffect) -> Hypothesised:
     return Hypothesised(effect, clipped(effect, sizes), std)
 
 
+def typical_sizes(effect: Effect) -> Array:
+    """(parameters,) sizes of an effect that a first flight shows, in size coordinates."""
+    return np.array([_typical_size(p) for p in effect.parameters])
+
+
 def _typical_size(p: Parameter) -> float:
     low, high = p.reach
     if p.is_location:
@@ -188,4 +193,13 @@ def at_point(hypothesised: Hypothesised, point: LinearPoint) -> Hypothesised:
     )
 
 
-__all__ = ["MOST", "Hypothesised", "at_point", "estimated", "from_names", "is_separable", "tied_in"]
+__all__ = [
+    "MOST",
+    "Hypothesised",
+    "at_point",
+    "estimated",
+    "from_names",
+    "is_separable",
+    "tied_in",
+    "typical_sizes",
+]
