@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,12 +22,13 @@ from airtruth.design.splitting import split
 from airtruth.design.verdict import Asked, asked_by
 from airtruth.errors import ConfigurationError, StoreError
 from airtruth.logs.histories import FILE, Histories, read_histories
+from airtruth.logs.names import name_of
 from airtruth.logs.outputs import writing
 from airtruth.logs.provenance import PROVENANCE, Provenance, aircraft_digests
 from airtruth.logs.remote import RemotePath, location
 from airtruth.physics.atmosphere import RHO0_KG_M3
 from airtruth.simulation.campaign import file as campaign_file
-from airtruth.simulation.campaign.file import NAME, Campaign
+from airtruth.simulation.campaign.file import Campaign
 from airtruth.tracing.answer import TraceAnswer, answer_path
 
 Step = Callable[[str], None]
@@ -90,7 +90,7 @@ def planned_from(
     answer_file = None if trace is None else answer_path(trace)
     question = _question(stated, answer_file)
     records = _records(answer_file)
-    declared, base = _base(campaign, aircraft, records, "" if out is None else out.stem)
+    declared, base = _base(campaign, aircraft, records, "" if out is None else name_of(out))
     inputs = [p for p in (campaign, answer_file) if isinstance(p, Path)]
     with writing("plan", inputs, force=force) as outputs:
         if out is not None:
@@ -108,11 +108,8 @@ def planned_from(
 
 def _require_file(out: Path) -> None:
     """Refuse a file that the campaign cannot be written to, or flown from, before the flight is computed."""
-    if out.suffix != ".toml" or not re.fullmatch(NAME, out.stem):
-        raise ConfigurationError(
-            f"--out {out}: its name is that of the campaign and of its runs; write FILE.toml, with letters, digits, "
-            "_, . and - in FILE"
-        )
+    if out.suffix != ".toml":
+        raise ConfigurationError(f"--out {out}: the campaign file needs the suffix .toml; write FILE.toml")
     if not isinstance(location(out), RemotePath) and not out.parent.is_dir():
         raise StoreError(f"{out}: the folder {out.parent} does not exist: create it or choose another --out")
 

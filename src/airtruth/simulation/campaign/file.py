@@ -30,8 +30,8 @@ Array = NDArray[np.float64]
 
 NO_GUST: Final = "none"
 """Gust level of still air."""
-NAME: Final = r"^[A-Za-z0-9_.-]+$"
-"""Pattern of the name of a campaign, with which the names of its runs begin."""
+
+
 MOST_STEPS: Final = 4e6
 """Simulation steps of a run [-] (judgement: an hour at 1 kHz; planning it takes 3 s)."""
 
@@ -267,7 +267,7 @@ class Campaign(Table):
 
     dimensions: ClassVar[dict[str, str]] = {"duration": "time"}
     schema_: Literal[1] = Field(default=1, alias="schema")
-    name: str = Field(pattern=NAME)
+    name: str = Field(pattern=r"^[A-Za-z0-9_.-]+$")
     title: str = ""
     aircraft: str
     runs: int = Field(ge=1, le=1_000_000)  # a plan of a million runs takes 3 s
