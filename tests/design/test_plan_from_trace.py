@@ -75,8 +75,10 @@ def test_a_shipped_aircraft_is_stated_by_its_name(tmp_path, planned):
 
 
 def test_the_name_of_any_file_is_made_one_that_a_campaign_accepts(tmp_path, planned):
-    base, _ = planned(traced(tmp_path / "t", aircraft.load("gtm")), tmp_path / "my plan.toml")
+    out = tmp_path / "made before the search" / "my plan.toml"
+    base, _ = planned(traced(tmp_path / "t", aircraft.load("gtm")), out)
     assert base.name == "my-plan"
+    assert out.parent.is_dir()
 
 
 def test_an_aircraft_that_changed_since_is_refused(tmp_path, own):

@@ -20,12 +20,13 @@ from airtruth.design.question import from_names
 from airtruth.design.split_result import SplitResult
 from airtruth.design.splitting import split
 from airtruth.design.verdict import Asked, asked_by
-from airtruth.errors import ConfigurationError, StoreError
+from airtruth.errors import ConfigurationError
+from airtruth.logs.atomic import make_folder
 from airtruth.logs.histories import FILE, Histories, read_histories
 from airtruth.logs.names import name_of
 from airtruth.logs.outputs import writing
 from airtruth.logs.provenance import PROVENANCE, Provenance, aircraft_digests
-from airtruth.logs.remote import RemotePath, location
+from airtruth.logs.remote import location
 from airtruth.physics.atmosphere import RHO0_KG_M3
 from airtruth.simulation.campaign import file as campaign_file
 from airtruth.simulation.campaign.file import Campaign
@@ -84,8 +85,8 @@ def planned_from(
     ConfigurationError, AircraftError, TrimError, StoreError
         Naming what is wrong, where, and what to do.
     """
-    if out is not None:
-        _require_file(out)
+    if out is not None and out.suffix != ".toml":
+        raise ConfigurationError(f"--out {out}: the campaign file needs the suffix .toml; write FILE.toml")
     trace = stated.trace
     answer_file = None if trace is None else answer_path(trace)
     question = _question(stated, answer_file)
@@ -95,6 +96,7 @@ def planned_from(
     with writing("plan", inputs, force=force) as outputs:
         if out is not None:
             outputs.require(out, out.with_suffix(".png"))
+            make_folder(location(out).parent)
         result = (
             split(base, question, options, declared, step)
             if isinstance(question, tuple)
@@ -104,14 +106,6 @@ def planned_from(
             result.write(out)
             style.save(result.plot(), out.with_suffix(".png"))
     return result
-
-
-def _require_file(out: Path) -> None:
-    """Refuse a file that the campaign cannot be written to, or flown from, before the flight is computed."""
-    if out.suffix != ".toml":
-        raise ConfigurationError(f"--out {out}: the campaign file needs the suffix .toml; write FILE.toml")
-    if not isinstance(location(out), RemotePath) and not out.parent.is_dir():
-        raise StoreError(f"{out}: the folder {out.parent} does not exist: create it or choose another --out")
 
 
 def _question(stated: Stated, answer_file: Path | None) -> Asked:
