@@ -279,6 +279,22 @@ def test_shifted_derivatives_ask_for_the_one_that_is_known_least(answer):
     assert asked_by(shifted, "trace.json") == DerivativeQuestion(("Cmalpha",))
 
 
+def test_a_cause_tied_with_wrong_declarations_asks_for_the_derivative_that_is_known_least(answer):
+    """No input separates `derivatives`; the other ties of the cause still count."""
+    size = {"factor": ParameterEstimate(0.8, 0.05, (0.7, 0.9))}
+    cause = AcceptedEffect("tail_effectiveness", size, 1e-9, 1.0, indistinguishable_from=("derivatives",))
+    known = replace(
+        answer.derivatives,
+        declared={"Cmalpha": -2.0, "Cmq": -40.0},
+        after_std={"Cmalpha": 0.02, "Cmq": 2.0},
+    )
+    tied = replace(answer, verdict="one_of", effects=(cause,), candidates=(), derivatives=known)
+    assert asked_by(tied, "trace.json") == DerivativeQuestion(("Cmq",))
+    more = replace(cause, indistinguishable_from=("derivatives", "wing_effectiveness"))
+    pair = asked_by(replace(tied, effects=(more,)), "trace.json")
+    assert [h.effect.key for h in pair] == ["tail_effectiveness", "wing_effectiveness"]
+
+
 def test_a_provisional_name_is_separated_from_its_nearest_rival(answer):
     effect = AcceptedEffect("gyro_lag", {"tau_s": ParameterEstimate(0.02, 0.002, (0.016, 0.024))}, 1e-9, 3.0)
     rivals = (

@@ -45,10 +45,10 @@ def planned(monkeypatch):
 
     monkeypatch.setattr(from_files, "narrow", narrow)
 
-    def ask(folder):
+    def ask(folder, out=None):
         with pytest.raises(ConfigurationError, match="no search"):
             from_files.planned_from(
-                None, from_files.Stated(derivatives=("Cmq",), trace=folder), None, PlanOptions()
+                None, from_files.Stated(derivatives=("Cmq",), trace=folder), None, PlanOptions(), out
             )
         return given[-1]
 
@@ -72,6 +72,13 @@ def test_a_trace_of_a_copy_plans_for_the_copy(tmp_path, own, planned):
 def test_a_shipped_aircraft_is_stated_by_its_name(tmp_path, planned):
     base, _ = planned(traced(tmp_path / "t", aircraft.load("gtm")))
     assert base.aircraft == "gtm"
+
+
+def test_the_name_of_any_file_is_made_one_that_a_campaign_accepts(tmp_path, planned):
+    out = tmp_path / "made before the search" / "my plan.toml"
+    base, _ = planned(traced(tmp_path / "t", aircraft.load("gtm")), out)
+    assert base.name == "my-plan"
+    assert out.parent.is_dir()
 
 
 def test_an_aircraft_that_changed_since_is_refused(tmp_path, own):

@@ -15,6 +15,7 @@ from airtruth.api.plans import base_campaign
 from airtruth.design import search as searching
 from airtruth.design import splitting
 from airtruth.design.bench import Bench
+from airtruth.design.criterion import criterion
 from airtruth.design.flight import PlanOptions
 from airtruth.design.limits import Limits
 from airtruth.design.question import from_names
@@ -146,6 +147,33 @@ def test_sizes_are_read_in_any_unit():
 def test_questions_that_no_flight_answers_are_refused(keys, sizes, words):
     with pytest.raises(ConfigurationError, match=words):
         from_names(keys, sizes)
+
+
+def test_an_effect_that_cannot_imitate_the_first_has_its_typical_size(bench, model):
+    """At its neutral value it would be no effect, and the separation from it zero."""
+    record = flown(bench).record
+    hypotheses = from_names(["vane_arm", "gyro_lag"], {})
+    judged = criterion(model, hypotheses, record, bench.plant.derivative_cov, 0)
+    (lag,) = EFFECTS["gyro_lag"].parameters
+    assert judged.members[1].sizes == pytest.approx([4.0 * lag.material])
+    assert judged.rate(flown(bench)).min() > 0.5
+    imitating = from_names(["elevator_delay", "actuator_lag"], {})
+    (bandwidth,) = EFFECTS["actuator_lag"].parameters
+    found = criterion(model, imitating, record, bench.plant.derivative_cov, 0).members[1].sizes[0]
+    assert found == pytest.approx(imitating[0].sizes[0], rel=0.3)  # a lag of about the delay
+    assert found >= bandwidth.material
+
+
+@pytest.mark.parametrize("name", ["next.png", "next"])
+def test_a_file_from_which_no_campaign_flies_is_refused_before_the_search(name, tmp_path):
+    with pytest.raises(ConfigurationError, match="--out"):
+        at.plan(split=("elevator_delay", "actuator_lag"), aircraft="gtm", out=tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_option_without_a_name_is_refused():
+    run = CliRunner().invoke(cli.app, ["plan", "--derivative", ",", "--aircraft", "gtm"])
+    assert run.exit_code != 0
 
 
 @pytest.fixture

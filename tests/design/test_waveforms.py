@@ -119,8 +119,24 @@ def test_extremes_are_those_of_the_flight():
 
 @pytest.mark.parametrize(
     "stated",
-    [{"amplitude_rad": 0.0}, {"load_factor": (1.2, 2.0)}, {"length_s": 0.1}, {"alpha_rad": math.nan}],
+    [
+        {"amplitude_rad": 0.0},
+        {"amplitude_rad": math.inf},
+        {"load_factor": (1.2, 2.0)},
+        {"load_factor": (0.0, math.inf)},
+        {"length_s": 0.1},
+        {"alpha_rad": math.nan},
+        {"alpha_rad": math.inf},
+        {"airspeed": math.inf},
+    ],
 )
 def test_limits_that_no_flight_keeps_are_refused(stated):
     with pytest.raises(ConfigurationError, match="plan: "):
         Limits(**stated)
+
+
+def test_a_refused_limit_is_named_in_the_unit_of_its_option():
+    with pytest.raises(
+        ConfigurationError, match=r"deviation of the elevator \(amplitude_rad\) is -2 deg; state"
+    ):
+        Limits(amplitude_rad=-2.0 * DEG)

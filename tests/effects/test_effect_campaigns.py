@@ -118,6 +118,7 @@ def test_dry_run_names_the_effects_and_the_copy_goes_with_its_plan(tmp_path):
         ({"name": "elevator_delay", "delay_mm": 1}, "did you mean 'delay_ms'"),
         ({"name": "elevator_delay"}, "delay_s is missing"),
         ({"name": "elevator_delay", "delay_s": 3.0}, "outside its range of 0 to 0.2 s"),
+        ({"name": "rate_limit", "rate_rad_s": 99.0}, "outside its range of 0.1 to 20 rad/s"),
         ({"name": "elevator_delay", "delay_s": 0.1, "delay_ms": 100}, "given twice"),
         ({"name": "elevator_delay", "delay_s": "long"}, "has to be a number"),
         ({"name": "cm_alpha_nonlinear"}, "state its variant; allowed: break, quadratic"),

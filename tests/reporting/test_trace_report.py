@@ -362,5 +362,6 @@ def test_what_cannot_be_reported(tmp_path):
     with pytest.raises(StoreError, match=r"name it report\.html"):
         report(tmp_path, tmp_path / "report.gif")
     (tmp_path / "trace.json").write_text("{")
-    with pytest.raises(StoreError, match="airtruth trace"):
-        report(tmp_path, tmp_path / "report.html")
+    for source in (tmp_path, tmp_path / "trace.json"):  # a trace by its folder or by its file
+        with pytest.raises(StoreError, match="airtruth trace"):
+            report(source, tmp_path / "report.html")

@@ -178,6 +178,25 @@ def test_the_width_of_a_written_step_is_within_its_range():
     assert width.low <= width.default <= width.high
 
 
+@pytest.mark.parametrize(
+    ("changes", "slope", "location"),
+    [
+        ({}, "1/rad", "rad"),
+        ({"over": "qbar_pa"}, "1/Pa", "Pa"),
+        ({"over": "q_hat"}, "-", "-"),
+        ({"acts_on": "az_m_s2"}, "m/s2/rad", "rad"),
+        ({"by": "elevator_rad"}, "1/rad/rad", "rad"),
+    ],
+)
+def test_the_written_module_states_the_units_of_its_parameters(changes, slope, location):
+    at = np.linspace(0.0, 0.2, 9)
+    learned = replace(an_effect((-0.4 * np.maximum(at - 0.1, 0.0)).tolist()), **changes)
+    (effect,) = executed(effect_module(Answer(learned)))
+    meanings = {p.name: p.meaning for p in effect.parameters}
+    assert meanings["slope"] == f"slope [{slope}], learned: -0.4"
+    assert meanings["at"] == f"value of the signal where it begins [{location}], learned: 0.1"
+
+
 def test_a_form_of_a_pair_adds_no_derivative_at_the_trim():
     """A break at 0.05 below the trim 0.1 is not recovered: it would be -0.02 at the trim, where the derivative is declared."""
     at = np.linspace(0.0, 0.2, 9)

@@ -37,11 +37,13 @@ def campaign(
     force: Replace = False,
 ) -> None:
     """Write a commented campaign of six runs in light turbulence."""
+    from airtruth.logs.names import name_of
     from airtruth.starting import campaign_text
 
-    text = campaign_text(_name(out), aircraft, eas_kt, altitude_ft)
+    name = name_of(out)
+    text = campaign_text(name, aircraft, eas_kt, altitude_ft)
     file = quote(str(out))
-    _write(out, text, [f"airtruth plan {file}", f"airtruth fly {file} --out out/{_name(out)}"], force)
+    _write(out, text, [f"airtruth plan {file}", f"airtruth fly {file} --out out/{name}"], force)
 
 
 @new_app.command("mapping", epilog="Example: airtruth new mapping flight7.csv --out flight7.toml")
@@ -87,6 +89,7 @@ def aircraft(
 
         print_result(new_from_jsbsim(jsbsim, out, force=force).summary())
         return
+    from airtruth.logs.names import name_of
     from airtruth.starting import aircraft_text
 
     folder = out.parent if out.suffix == ".toml" else out
@@ -95,7 +98,7 @@ def aircraft(
         f"airtruth identify LOG.parquet --aircraft {quote(str(folder))}",
         f"airtruth check LOG.parquet --aircraft {quote(str(folder))}",
     ]
-    _write(file, aircraft_text(_name(folder.absolute())), steps, force)
+    _write(file, aircraft_text(name_of(folder.absolute())), steps, force)
 
 
 @app.command(epilog="Example: airtruth example vane")
@@ -134,10 +137,3 @@ def _write(file: Path, text: str, steps: list[str], force: bool) -> None:
 
 def _next(commands: list[str] | tuple[str, ...]) -> list[str]:
     return ["", "next:", *(f"  {command}" for command in commands)]
-
-
-def _name(path: Path) -> str:
-    """A name that campaigns and aircraft accept, from that of a file."""
-    import re
-
-    return re.sub(r"[^A-Za-z0-9_.-]+", "-", path.stem).strip("-") or "first"

@@ -141,7 +141,9 @@ def plan(
         with progress_bar("plan", "kinds of runs", quiet) as advance:
             result = forecast(campaign, records, pressure, advance)
     else:
-        stated = Stated(_listed(split), _sizes(size or []), _listed(derivative), trace)
+        stated = Stated(
+            _listed("--split", split), _sizes(size or []), _listed("--derivative", derivative), trace
+        )
         limits = _limits(amplitude_deg, rate_deg_s, alpha_deg, load_factor, length_s, airspeed_percent)
         options = PlanOptions(limits, records, seed)
         with status("plan", quiet) as step:
@@ -165,8 +167,11 @@ def _require_of(context: typer.Context, predicts: bool) -> None:
         raise ConfigurationError(f"plan: {', '.join(stated)} applies to {needs}; or leave it out")
 
 
-def _listed(text: str | None) -> list[str]:
-    return [] if text is None else [name.strip() for name in text.split(",") if name.strip()]
+def _listed(option: str, text: str | None) -> list[str]:
+    names = [] if text is None else [name.strip() for name in text.split(",") if name.strip()]
+    if text is not None and not names:
+        raise ConfigurationError(f"{option} {text!r}: states no name; write names with commas between them")
+    return names
 
 
 def _limits(

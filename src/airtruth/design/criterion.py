@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.design.bench import Flown
-from airtruth.design.question import Hypothesised
+from airtruth.design.question import Hypothesised, typical_sizes
 from airtruth.design.separation import Distance, Experiment, Member, Model
 from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.model.records import TraceRecord
@@ -141,12 +141,17 @@ def criterion(
 
 
 def _imitation(experiment: Experiment, y: Array, h: Hypothesised) -> Array:
-    """Sizes of a hypothesis that fit outputs best, from several starts of either sign."""
+    """Sizes of a hypothesis that fit outputs best, from several starts of either sign.
+
+    Where the best fit is immaterial the effect does not imitate these outputs, and its typical size counts: at the neutral
+    value it would be no effect, from which no input separates another.
+    """
     still = np.zeros(Common.size)
     tried: list[Distance] = []
     for start in _starts(h):
         tried.append(experiment.distance(y, h.effect, start, still))
-    return min(tried, key=lambda d: d.sigma).sizes
+    best = min(tried, key=lambda d: d.sigma).sizes
+    return best if abs(best[0]) >= h.effect.parameters[0].material else typical_sizes(h.effect)
 
 
 def _starts(h: Hypothesised) -> list[Array]:

@@ -21,9 +21,12 @@ from airtruth.design.split_result import SplitResult
 from airtruth.design.splitting import split
 from airtruth.design.verdict import Asked, asked_by
 from airtruth.errors import ConfigurationError
+from airtruth.logs.atomic import make_folder
 from airtruth.logs.histories import FILE, Histories, read_histories
+from airtruth.logs.names import name_of
 from airtruth.logs.outputs import writing
 from airtruth.logs.provenance import PROVENANCE, Provenance, aircraft_digests
+from airtruth.logs.remote import location
 from airtruth.physics.atmosphere import RHO0_KG_M3
 from airtruth.simulation.campaign import file as campaign_file
 from airtruth.simulation.campaign.file import Campaign
@@ -82,15 +85,18 @@ def planned_from(
     ConfigurationError, AircraftError, TrimError, StoreError
         Naming what is wrong, where, and what to do.
     """
+    if out is not None and out.suffix != ".toml":
+        raise ConfigurationError(f"--out {out}: the campaign file needs the suffix .toml; write FILE.toml")
     trace = stated.trace
     answer_file = None if trace is None else answer_path(trace)
     question = _question(stated, answer_file)
     records = _records(answer_file)
-    declared, base = _base(campaign, aircraft, records, "" if out is None else out.stem)
+    declared, base = _base(campaign, aircraft, records, "" if out is None else name_of(out))
     inputs = [p for p in (campaign, answer_file) if isinstance(p, Path)]
     with writing("plan", inputs, force=force) as outputs:
         if out is not None:
             outputs.require(out, out.with_suffix(".png"))
+            make_folder(location(out).parent)
         result = (
             split(base, question, options, declared, step)
             if isinstance(question, tuple)

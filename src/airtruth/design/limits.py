@@ -19,6 +19,13 @@ LEAST_LENGTH_S: Final = 1.0
 """Shortest input that is planned [s] (judgement: a short period of a small aircraft)."""
 MOST_LENGTH_S: Final = 60.0
 """Longest input that is planned [s] (judgement: the search flies it some hundred times)."""
+_WORDS: Final[Mapping[str, tuple[str, str, float]]] = {
+    "amplitude_rad": ("the largest deviation of the elevator", "deg", DEG),
+    "rate_rad_s": ("the largest rate of the surface", "deg/s", DEG),
+    "alpha_rad": ("the largest deviation of the angle of attack", "deg", DEG),
+    "airspeed": ("the largest change of the airspeed", "%", 0.01),
+}
+"""Limit -> words, the unit of its option, and the size of that unit [SI]."""
 
 
 @dataclass(frozen=True)
@@ -50,14 +57,17 @@ class Limits:
         ConfigurationError
             Naming the limit, its value and what is allowed.
         """
-        for name in ("amplitude_rad", "rate_rad_s", "alpha_rad", "airspeed"):
+        for name, (words, unit, size) in _WORDS.items():
             value = getattr(self, name)
-            if not value > 0.0:
-                raise ConfigurationError(f"plan: {name} = {value:g} has to be above 0")
-        if not self.load_factor[0] < 1.0 < self.load_factor[1]:
-            low, high = self.load_factor
+            if not value > 0.0 or (math.isinf(value) and name != "rate_rad_s"):
+                raise ConfigurationError(
+                    f"plan: {words} ({name}) is {value / size:g} {unit}; state a finite value above 0"
+                )
+        low, high = self.load_factor
+        if not low < 1.0 < high or math.isinf(low) or math.isinf(high):
             raise ConfigurationError(
-                f"plan: load factors of {low:g} to {high:g} exclude steady flight; state LOW,HIGH around 1"
+                f"plan: load factors of {low:g} to {high:g}; state a finite LOW below 1 and a finite HIGH above 1, which is "
+                "steady flight"
             )
         if not LEAST_LENGTH_S <= self.length_s <= MOST_LENGTH_S:
             raise ConfigurationError(

@@ -97,12 +97,17 @@ def tied_in(answer: TraceAnswer) -> tuple[Hypothesised, ...]:
     differ. Empty where there are none that an input separates."""
     for accepted in answer.effects:
         names = {accepted.name, *accepted.indistinguishable_from} - {INCREMENT}
-        if accepted.key not in EFFECTS or (len(names) == 1 and not accepted.other_variants):
+        if accepted.key not in EFFECTS or not is_separable(EFFECTS[accepted.key]):
+            continue
+        if len(names) == 1 and not accepted.other_variants:
             continue
         tied = [c.key for c in answer.candidates if c.testable and not c.why_not and c.name in names]
         others = [key for key in tied if key != accepted.key and key in EFFECTS]
         missing = names - {accepted.name} - {EFFECTS[key].name for key in others}
         others += [e.key for name in sorted(missing) for e in named(name)[:1]]
+        others = [key for key in others if is_separable(EFFECTS[key])]
+        if not others:
+            continue
         every = (estimated(accepted), *(Hypothesised(EFFECTS[key]) for key in others[: MOST - 1]))
         _require([h.effect for h in every])
         return every
@@ -159,6 +164,11 @@ def estimated(accepted: AcceptedEffect) -> Hypothesised:
     return Hypothesised(effect, clipped(effect, sizes), std)
 
 
+def typical_sizes(effect: Effect) -> Array:
+    """(parameters,) sizes of an effect that a first flight shows, in size coordinates."""
+    return np.array([_typical_size(p) for p in effect.parameters])
+
+
 def _typical_size(p: Parameter) -> float:
     low, high = p.reach
     if p.is_location:
@@ -188,4 +198,13 @@ def at_point(hypothesised: Hypothesised, point: LinearPoint) -> Hypothesised:
     )
 
 
-__all__ = ["MOST", "Hypothesised", "at_point", "estimated", "from_names", "is_separable", "tied_in"]
+__all__ = [
+    "MOST",
+    "Hypothesised",
+    "at_point",
+    "estimated",
+    "from_names",
+    "is_separable",
+    "tied_in",
+    "typical_sizes",
+]

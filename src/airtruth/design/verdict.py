@@ -20,8 +20,8 @@ def asked_by(answer: TraceAnswer, source: str) -> Asked:
     """The question that a trace leaves open.
 
     Learned increments ask for a narrower band, and tied effects or sets of effects for their separation. The effect
-    `derivatives` asks for the derivative that is known least, and a provisional verdict with one name for the separation
-    from the nearest rival.
+    `derivatives`, accepted or tied with the accepted one, asks for the derivative that is known least, and a provisional
+    verdict with one name for the separation from the nearest rival.
 
     Parameters
     ----------
@@ -41,6 +41,8 @@ def asked_by(answer: TraceAnswer, source: str) -> Asked:
     for effect in answer.effects:
         if effect.name == "derivatives" and effect.parameters:
             return DerivativeQuestion((_widest(answer, effect),))
+        if "derivatives" in effect.indistinguishable_from:
+            return DerivativeQuestion((_least_known(answer),))
     first, rival = _doubtful(answer), next(_rivals(answer), "")
     if first is not None and answer.provisional and rival:
         return (estimated(first), Hypothesised(EFFECTS[rival]))
@@ -54,6 +56,12 @@ def _widest(answer: TraceAnswer, effect: AcceptedEffect) -> str:
         for name, p in effect.parameters.items()
     }
     return max(share, key=lambda name: share[name])
+
+
+def _least_known(answer: TraceAnswer) -> str:
+    """The derivative whose standard deviation after the trace is the largest share of its declared value."""
+    declared, std = answer.derivatives.declared, answer.derivatives.after_std
+    return max(std, key=lambda name: std[name] / max(abs(declared[name]), 1e-9), default="Cmq")
 
 
 def _doubtful(answer: TraceAnswer) -> AcceptedEffect | None:
@@ -71,10 +79,8 @@ def _rivals(answer: TraceAnswer) -> Iterator[str]:
 
 
 def _nothing_open(answer: TraceAnswer, first: AcceptedEffect | None) -> str:
-    declared, std = answer.derivatives.declared, answer.derivatives.after_std
-    least = max(std, key=lambda name: std[name] / max(abs(declared[name]), 1e-9), default="Cmq")
     rivals = list(_rivals(answer))[:2]
-    derivative = f"--derivative {least} for the derivative that is known least"
+    derivative = f"--derivative {_least_known(answer)} for the derivative that is known least"
     if answer.verdict == "none":
         return (
             "the verdict is none and leaves no effects to separate, because the declared aircraft explains the records; "

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 from airtruth.errors import ConfigurationError, choices
 from airtruth.physics.terms import Change
 from airtruth.quantity import LARGEST
-from airtruth.units import UNITS
+from airtruth.units import UNITS, printed
 
 GTM: Final[Mapping[str, float]] = {
     "CLalpha": 4.787,
@@ -257,7 +257,8 @@ class Effect:
                 )
             value = values[p.name]
             if not (p.low <= value <= p.high or (value == p.neutral and not p.is_location)):
+                bounds = f"{p.low:g} to {p.high:g} {printed(p.unit)}".rstrip()
                 raise ConfigurationError(
-                    f"effect {self.key}: {p.name} = {value:g} is outside its range of {p.low:g} to {p.high:g} {p.unit}"
+                    f"effect {self.key}: {p.name} = {value:g} is outside its range of {bounds}"
                 )
         return values

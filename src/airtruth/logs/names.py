@@ -1,8 +1,21 @@
-"""Names whose order as text is that of their numbers, however large they become."""
+"""Names of files and runs: of a campaign or aircraft by its file, and numbers whose order as text is their own."""
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from string import ascii_lowercase
+
+
+def name_of(path: Path) -> str:
+    """A name that campaigns and aircraft accept, from that of a file.
+
+    Examples
+    --------
+    >>> name_of(Path("out/my plan.toml"))
+    'my-plan'
+    """
+    return re.sub(r"[^A-Za-z0-9_.-]+", "-", path.stem).strip("-") or "first"
 
 
 def ordered_number(number: int, digits: int) -> str:
@@ -25,4 +38,4 @@ def chunk_file(chunk: int) -> str:
     return f"{ordered_number(chunk, 5)}.parquet"
 
 
-__all__ = ["chunk_file", "ordered_number"]
+__all__ = ["chunk_file", "name_of", "ordered_number"]

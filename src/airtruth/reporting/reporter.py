@@ -34,8 +34,8 @@ def report(
 
     Parameters
     ----------
-    source : folder that `airtruth trace`, `airtruth loop`, or `airtruth fly` and `airtruth identify` wrote; file of estimates;
-        or a result in memory.
+    source : folder that `airtruth trace`, `airtruth loop`, or `airtruth fly` and `airtruth identify` wrote; trace.json or
+        loop.json of one; file of estimates; or a result in memory.
     out : the page, .html, beside which the tables have the suffixes .csv and .tex; or the stem of the figures, which
         are the files STEM-NAME.
     kind : "html", "png", "svg" or "pdf"; None for what the suffix of ``out`` states.
@@ -97,6 +97,8 @@ def _of_result(result: Result, logs: Logs | None, aircraft: Aircraft | None) -> 
 
 
 def _of_path(path: Path, logs: Logs | None, aircraft: Aircraft | None) -> Report:
+    if path.name in ("loop.json", "trace.json") and path.is_file():
+        path = path.parent
     if (path / "loop.json").is_file():
         from airtruth.reporting.pages.loop_page import stored_loop_report
 

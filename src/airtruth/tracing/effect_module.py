@@ -21,6 +21,17 @@ MODULE: Final = "learned_effects"
 """Name of the module and of the package."""
 _SIGNALS: Final = {name: signal for signal, name in SIGNAL_NAMES.items()}
 """Name of a signal in an answer -> its name in a term."""
+_UNITS: Final = {
+    "alpha": "rad",
+    "elevator": "rad",
+    "qbar": "Pa",
+    "alpha_rad": "rad",
+    "q_rad_s": "rad/s",
+    "az_m_s2": "m/s2",
+}
+"""Signal of a term, or channel -> unit; the others have none."""
+_MEANINGS: Final = {"at": "value of the signal where it begins", "width": "width of the step"}
+"""Location -> meaning."""
 _RANGE: Final = 4.0
 """Largest size that the effect may take, over the learned one [-] (judgement: another aircraft of its kind)."""
 _MATERIAL: Final = 0.2
@@ -144,9 +155,12 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
         f"def _terms_{number}(values):\n    return Change(\n        states=({states}),\n        {field}={terms},\n    )\n"
     )
     locations = {k: values[k] for k in ("at", "width") if k in values}
-    parameters = [_size(name, value) for name, value in sizes.items()]
+    parameters = [
+        _size(name, value, _unit(name, e.acts_on or "", factor, over)) for name, value in sizes.items()
+    ]
     if e.table is not None:
-        parameters += [_location(name, value, e.table) for name, value in locations.items()]
+        unit = _UNITS.get(over, "-")
+        parameters += [_location(name, value, unit, e.table) for name, value in locations.items()]
     lines = "".join(f"        {p},\n" for p in parameters)
     yield (
         f"EFFECT_{number} = Effect(\n"
@@ -195,19 +209,31 @@ def _of_table(term: str, table: IncrementTable, signal: str, by: str) -> str:
     return f"(\n{rows}        )"
 
 
-def _size(name: str, value: float) -> str:
+def _unit(size: str, acts_on: str, factor: str, over: str) -> str:
+    """Unit of a size: of a step, of a slope or share over a signal, of a curvature, or of a factor."""
+    if size == "factor":
+        return "-"
+    of_derivative = factor and acts_on not in READINGS
+    above = "" if factor and not of_derivative else _UNITS.get(acts_on, "")
+    signals = [factor] if of_derivative else []
+    signals += [over] * {"step": 0, "slope": 1, "share": 1, "curvature": 2}[size]
+    below = [unit for unit in (_UNITS.get(signal, "") for signal in signals) if unit]
+    return "/".join([above or ("1" if below else "-"), *below])
+
+
+def _size(name: str, value: float, unit: str) -> str:
     reach = max(_RANGE * abs(value), 1e-9)
     return (
-        f'Parameter("{name}", "-", "learned: {value:.4g}", low={-reach!r}, high={reach!r}, '
+        f'Parameter("{name}", "-", "{name} [{unit}], learned: {value:.4g}", low={-reach!r}, high={reach!r}, '
         f"material={_MATERIAL * abs(value)!r}, step={0.1 * abs(value)!r})"
     )
 
 
-def _location(name: str, value: float, table: IncrementTable) -> str:
+def _location(name: str, value: float, unit: str, table: IncrementTable) -> str:
     span = table.at[-1] - table.at[0]
     low, high = (table.at[0], table.at[-1]) if name == "at" else (min(0.05 * span, value), max(span, value))
     return (
-        f'Parameter("{name}", "-", "learned: {value:.4g}", low={low!r}, high={high!r}, material=0.0, '
+        f'Parameter("{name}", "-", "{_MEANINGS[name]} [{unit}], learned: {value:.4g}", low={low!r}, high={high!r}, material=0.0, '
         f"is_location=True, step={0.05 * span!r}, default={value!r})"
     )
 
