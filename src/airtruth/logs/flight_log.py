@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.channels import RUN_ID, SIGNALS, TIME
-from airtruth.errors import LogError, choices
+from airtruth.errors import LogError, choices, reason
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,6 +39,19 @@ class FlightLog:
     offsets: NDArray[np.int64]
     t_s: Array
     channels: Mapping[str, Array]
+
+    def __post_init__(self) -> None:
+        """Turn lists, columns of frames and arrays of other types into arrays.
+
+        Raises
+        ------
+        LogError
+            Naming the first that does not hold numbers.
+        """
+        own = {name: _floats(name, values) for name, values in self.channels.items()}
+        object.__setattr__(self, "channels", own)
+        object.__setattr__(self, "t_s", _floats(TIME, self.t_s))
+        object.__setattr__(self, "offsets", np.asarray(self.offsets, dtype=np.int64))
 
     def rows(self, run: int) -> slice:
         """Rows of one run, by its index."""
@@ -166,6 +179,16 @@ class FlightLog:
 
 SHOWN_CHANNELS = 4
 """Channels that the repr of a log names (judgement: one line of a terminal)."""
+
+
+def _floats(name: str, values: object) -> Array:
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise LogError(
+            f"{name}: {type(values).__name__} does not hold numbers alone ({reason(error)}); give one number per row, NaN "
+            "for a missing one"
+        ) from error
 
 
 def _count(number: int, noun: str) -> str:
