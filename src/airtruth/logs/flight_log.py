@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.channels import RUN_ID, SIGNALS, TIME
-from airtruth.errors import LogError, choices, reason
+from airtruth.errors import LogError, choices, counted, reason
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -157,7 +157,7 @@ class FlightLog:
         """Return number, duration and sample rate of the runs, and the first channels."""
         names = list(self.channels)
         shown = ", ".join([*names[:SHOWN_CHANNELS], *["..."][: len(names) > SHOWN_CHANNELS]])
-        return f"FlightLog({_extent(self)}, {_count(len(names), 'channel')}: {shown})"
+        return f"FlightLog({_extent(self)}, {counted(len(names), 'channel')}: {shown})"
 
     def _repr_html_(self) -> str:
         """Return a table of the channels with unit, extremes and mean."""
@@ -191,14 +191,10 @@ def _floats(name: str, values: object) -> Array:
         ) from error
 
 
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
-
-
 def _extent(log: FlightLog) -> str:
     """Number, duration and sample rate of the runs; a range where they differ."""
     runs = [log.t_s[rows] for rows in map(log.rows, range(len(log))) if rows.stop - rows.start > 1]
-    text = _count(len(log), "run")
+    text = counted(len(log), "run")
     if not runs:
         return text
     durations = [float(t[-1] - t[0]) for t in runs]
@@ -217,7 +213,7 @@ def unknown_runs(missing: Collection[str], run_ids: Sequence[str]) -> str:
     names = sorted(missing)
     near = difflib.get_close_matches(names[0], run_ids, n=1)
     hint = f"did you mean {near[0]!r}? " if near else ""
-    extent = f"the log holds {_count(len(run_ids), 'run')}"
+    extent = f"the log holds {counted(len(run_ids), 'run')}"
     span = f", {run_ids[0]!r} to {run_ids[-1]!r}" if run_ids else ""
     return f"no run {', '.join(map(repr, names[:5]))}; {hint}{extent}{span}"
 
