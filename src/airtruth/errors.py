@@ -57,6 +57,11 @@ def reason(error: BaseException) -> str:
     return " ".join(str(error).split())[:LONGEST_REASON].rstrip(".") or type(error).__name__
 
 
+def counted(number: int, noun: str) -> str:
+    """Return ``1 run`` or ``2 runs``, of a noun whose plural ends in s."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 MOST_HINTS: Final = 3
 """Names that are offered because they contain a wrong one [-] (judgement: a line of a terminal)."""
 

@@ -133,20 +133,26 @@ def panels(
     return figure, figure.subplots(rows, columns, sharex=sharex, sharey=sharey, squeeze=False)
 
 
-def legend_above(figure: Figure, axes: Iterable[Axes], title: str = "") -> None:
-    """Put one legend of all ``axes`` above the panels, under the figure's heading, where it hides no data."""
+def legend_above(figure: Figure, axes: Iterable[Axes], title: str = "", columns: int = 4) -> None:
+    """Put one legend of all ``axes`` above the panels, under the figure's heading, where it hides no data.
+
+    Parameters
+    ----------
+    columns : most entries side by side; fewer for long entries or a narrow figure.
+    """
     entries: dict[str, Artist] = {}
     for ax in axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
-    figure.legend(
+    legend = figure.legend(
         list(entries.values()),
         list(entries),
         loc="outside upper center",
-        ncols=min(len(entries), 4),
+        ncols=min(len(entries), columns),
         title=title or None,
         title_fontproperties={"weight": "bold", "size": 10.0},
     )
+    legend.get_title().set_multialignment("center")
 
 
 def save(figure: Figure, path: Path) -> None:

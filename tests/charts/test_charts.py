@@ -124,3 +124,38 @@ def test_any_number_is_drawn_or_left_out(values):
     page = as_html(Chart("n", "t", (panel, rows), 2))
     drawn = re.sub(r"<title>[^<]*</title>|<text[^>]*>[^<]*</text>", "", page)
     assert not re.search(r"\bnan\b|\binf\b", drawn)
+
+
+def test_the_figure_states_its_caption():
+    """A figure stands alone in the folder of a trace: the shaded range and the record are explained in it."""
+    figure = as_figure(Chart("n", "t", (Panel(),), 1, caption="Shaded: " + "noise " * 40))
+    caption = figure.get_supxlabel()
+    assert caption.split() == ["Shaded:", *["noise"] * 40]
+    assert max(map(len, caption.splitlines())) < 110
+
+
+def test_marks_of_two_colours_have_two_shapes():
+    panel = Panel(
+        rows=("a", "b"),
+        marks=(Mark(0, 1.0, label="before", colour="vermillion"), Mark(1, 2.0, label="after")),
+    )
+    drawn = Chart("n", "t", (panel,), 1)
+    assert [line.get_marker() for line in as_figure(drawn).axes[0].lines] == ["s", "o"]
+    page = as_html(drawn)  # each twice: in the legend and in the panel
+    assert (page.count("<polygon"), page.count("<circle")) == (2, 2)
+
+
+def test_a_small_mark_is_half_as_large():
+    marks = (Mark(0, 1.0), Mark(0, 2.0, small=True))
+    drawn = Chart("n", "t", (Panel(rows=("a",), marks=marks),), 1)
+    large, small = as_figure(drawn).axes[0].lines
+    assert small.get_markersize() == 0.5 * large.get_markersize()
+    assert re.findall(r' r="([\d.]+)"', as_html(drawn)) == ["3.5", "1.75"]
+
+
+def test_the_labels_of_a_narrow_panel_stay_apart():
+    """Labels of five characters beside each other: six are the most in a panel of 3.3 inches."""
+    panel = Panel(rows=("ls", "iv-f1"), marks=(Mark(0, -37.9, -47.2, -29.1), Mark(1, -37.8, -46.2, -29.7)))
+    ax = as_figure(Chart("n", "t", (panel,) * 4, 4)).axes[0]
+    low, high = ax.get_xlim()
+    assert sum(low <= at <= high for at in ax.get_xticks()) <= 6

@@ -124,4 +124,9 @@ def test_the_result_of_check(log):
     assert len(result.to_frame()) == len(result.findings)
     assert np.isfinite(result.to_frame()["estimate"].astype(float)).all()
     assert result._repr_html_().count("<table") == 2
-    assert len(result.plot().axes) == 2
+    figure = result.plot()
+    names, sets = figure.axes
+    assert figure.get_suptitle().split() == result.sentences[0].split()
+    assert names.yaxis_inverted()
+    shown = result.causes[: len(sets.patches)]
+    assert [text.get_text().strip() == "possible" for text in sets.texts] == [c.possible for c in shown]

@@ -66,3 +66,12 @@ def test_instruments_remove_the_bias_of_a_common_disturbance():
     assert plain.value[-1, 0] - 1.0 > 0.1
     assert abs(clean.value[-1, 0] - 1.0) < 0.05
     assert clean.strength[-1] > 10.0
+
+
+def test_a_record_too_short_to_leave_a_residual_gives_no_factor():
+    """One line below 4 Hz is two numbers, which two factors fit exactly whatever they are."""
+    a, b = signals(5, samples=20)
+    y, x = spectrum(a - b, DT), np.stack([spectrum(a, DT), spectrum(b, DT)], axis=1)
+    assert y.shape[-1] == 2
+    assert np.isnan(regress(y[:1], x[:1]).value).all()
+    assert np.isfinite(regress(y, x).value[-1]).all()  # four records together leave a residual

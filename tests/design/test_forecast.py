@@ -1,6 +1,7 @@
 """Standard errors to expect of a campaign, before it is flown."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +68,10 @@ def test_every_form_of_the_result_agrees(made):
     assert bars[4].get_height() == pytest.approx(100.0 * expected / abs(result.theta[4]))
     assert "Cmq" in result.summary()
     assert "<table" in result._repr_html_()
+    alone = replace(result, records=1)
+    assert "std of 1 record" in alone.table().columns
+    (legend,) = alone.plot().legends
+    assert [words.get_text() for words in legend.get_texts()] == ["one record", "1 record together"]
 
 
 def test_unknown_pressure_and_silent_sensors_are_refused(made):

@@ -374,7 +374,10 @@ def test_a_trace_with_an_increment_plans_its_band(quick, answer, gtm, campaign, 
     assert [row[0] for row in result.table().rows] == frame["family"].tolist()
     assert "Cm over alpha_rad = 0.065" in result.summary()
     assert result._repr_html_().count("<table") == 2
-    assert len(result.plot().axes) == 3
+    figure = result.plot()
+    assert len(figure.axes) == 3
+    assert len(figure.legends) == 1
+    assert not any(ax.get_legend() for ax in figure.axes), "a legend hides a curve"
     assert make(tmp_path / "next.toml").campaign.runs == 3
 
 

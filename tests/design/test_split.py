@@ -224,7 +224,10 @@ def test_every_form_of_the_result_agrees(quick, tmp_path):
     assert [row[0] for row in result.table().rows] == frame["family"].tolist()
     assert "standard deviations" in result.summary()
     assert "<table" in result._repr_html_()
-    assert len(result.plot().axes) == 4
+    figure = result.plot()
+    assert len(figure.axes) == 4
+    assert len(figure.legends) == 1
+    assert not any(ax.get_legend() for ax in figure.axes), "a legend hides a curve"
     assert result.prediction.difference.shape == (len(result.prediction.t_s), 3)
 
 

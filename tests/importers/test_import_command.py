@@ -34,7 +34,7 @@ def test_guess_import_check_identify(folder):
     assert "[channels.airspeed_m_s]" in guessed.stdout
     done = run("import", folder / "f.csv", "--mapping", folder / "m.toml", "--out", folder / "f.parquet")
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("1 runs, 401 rows in ")
+    assert done.stdout.startswith("1 run, 401 rows in ")
     assert done.stderr == ""
     assert read_log(folder / "f.parquet").metadata["source"] == "f.csv"
     checked = run("check", folder / "f.parquet", "--aircraft", "gtm")

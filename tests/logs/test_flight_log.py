@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from airtruth.errors import LogError
@@ -130,3 +131,30 @@ def test_html_lists_channels_with_units(log: FlightLog) -> None:
     assert "<p>Flightlog:3runsof0.58to0.78sat50Hz</p>" in page
     assert f"<td>az_m_s2</td><td>m/s2</td><td>{log.channels['az_m_s2'].min():.4g}</td>" in page
     assert "<td>NaN</td>" in log.select([])._repr_html_()  # no extremes without samples
+
+
+def test_lists_and_columns_of_frames_become_arrays(log: FlightLog) -> None:
+    frame = log.to_frame()
+    given = replace(
+        log,
+        offsets=log.offsets.tolist(),
+        t_s=frame["t_s"],
+        channels={
+            "alpha_rad": frame["alpha_rad"].tolist(),
+            "q_rad_s": frame["q_rad_s"].astype("Float64"),
+            "throttle": frame["throttle"].astype(object),
+        },
+    )
+    assert given.offsets.dtype == np.int64
+    for name, values in given.channels.items():
+        assert type(values) is np.ndarray
+        np.testing.assert_array_equal(values, log.channels[name])
+    np.testing.assert_array_equal(given.t_s, log.t_s)
+    assert log.channels["alpha_rad"] is replace(log).channels["alpha_rad"]  # what is right is not copied
+
+
+def test_values_that_are_no_numbers_are_named(log: FlightLog) -> None:
+    with pytest.raises(
+        LogError, match=r"throttle: Series does not hold numbers alone .*; give one number per row"
+    ):
+        replace(log, channels={"throttle": pd.Series(["idle"] * 100)})

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from airtruth.errors import ConfigurationError, LogError, StoreError
@@ -36,6 +37,11 @@ def test_each_form_resolves_to_files_or_logs(log: FlightLog, folder: Path) -> No
         ([], ConfigurationError, "none is given"),
         ([3], ConfigurationError, "int is not a log; give a file"),
         (None, ConfigurationError, "NoneType is not a log"),
+        (
+            pd.DataFrame(),
+            ConfigurationError,
+            "DataFrame is not a log; .*; write the frame with its method to_parquet",
+        ),
         ("absent", StoreError, "no such file or folder"),
     ],
 )

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -153,9 +154,20 @@ def test_a_run_in_two_places_shows(tmp_path: Path) -> None:
             {"time": [0.0], "aoa": [0.1]},
             r"not a flight log, it has no column run_id nor t_s \(columns: time, aoa\)",
         ),
-        ({"run_id": [1], "t_s": [0.0]}, "run_id is int64, not a string"),
-        ({"run_id": ["a", None], "t_s": [0.0, 1.0]}, "run_id is empty in 1 rows, the first is row 1"),
-        ({"run_id": ["a"], "t_s": ["0"]}, "t_s is string, not a floating-point time"),
+        ({"run_id": [1], "t_s": [0.0]}, "run_id is int64, not a string; write the names of the runs"),
+        (
+            {"run_id": ["a", None], "t_s": [0.0, 1.0]},
+            "run_id is empty in 1 row, the first is row 1; name the run",
+        ),
+        (
+            {"run_id": ["a"], "t_s": ["0"]},
+            "t_s is string, not a floating-point time in seconds; write the seconds",
+        ),
+        (
+            {"run_id": ["a"], "t_s": [0.0], "alpha_rad": ["0.1"]},
+            r"channel 'alpha_rad' is string, not numeric; write it as float64 \[rad\], or leave it out",
+        ),
+        ({"run_id": ["a"], "t_s": [0.0], "throttle": [True]}, "channel 'throttle' is bool, not numeric"),
         ({"run_id": pa.array([], pa.string()), "t_s": pa.array([], pa.float64())}, "the log has no rows"),
     ],
 )
@@ -286,8 +298,16 @@ def test_places(log: FlightLog, tmp_path: Path) -> None:
     assert store.log_paths(logs / "a.parquet") == [logs / "a.parquet"]
     with pytest.raises(StoreError, match="no such file or folder"):
         store.log_paths(tmp_path / "absent")
-    with pytest.raises(StoreError, match="holds no flight log"):
+    with pytest.raises(
+        StoreError, match=r"holds no flight log .*; `airtruth fly` or `airtruth import` writes them"
+    ):
         store.log_paths(tmp_path)
+    (tmp_path / "parts" / "run_id=a").mkdir(parents=True)
+    store.write_log(tmp_path / "parts" / "run_id=a" / "0.parquet", log)
+    with pytest.raises(
+        StoreError, match=r"run_id=a/0\.parquet lies in a folder below it: give that folder, or write"
+    ):
+        store.log_paths(tmp_path / "parts")
 
 
 def test_tables(tmp_path: Path) -> None:
@@ -402,3 +422,20 @@ def test_files_are_readable_by_others(log: FlightLog, tmp_path: Path) -> None:
     finally:
         os.umask(mask)
     assert (tmp_path / "log.parquet").stat().st_mode & 0o777 == 0o644
+
+
+def test_decimals_and_views_of_strings_are_read(tmp_path: Path) -> None:
+    """Types that databases and data-frame libraries write; a channel without any value is left out."""
+    exact = pa.array([Decimal("0.02"), None], pa.decimal128(12, 9))
+    path = write_foreign(
+        tmp_path / "types.parquet",
+        run_id=pa.array(["a", "a"], pa.string_view()),
+        t_s=pa.array([Decimal("0.0"), Decimal("0.02")], pa.decimal128(12, 9)),
+        alpha_rad=exact,
+        throttle=pa.nulls(2),
+    )
+    back = store.read_log(path)
+    assert back.run_ids == ("a",)
+    np.testing.assert_array_equal(back.t_s, [0.0, 0.02])
+    assert list(back.channels) == ["alpha_rad"]
+    np.testing.assert_array_equal(back.channels["alpha_rad"], [0.02, np.nan])

@@ -130,7 +130,7 @@ def test_single_precision_is_named_as_the_cause(log: FlightLog) -> None:
 def test_time_that_is_not_finite(log: FlightLog) -> None:
     t = log.t_s.copy()
     t[80] = np.nan
-    assert "t_s: 1 values are NaN or infinite, in 1 run: 'c' (row 10)" in complaint(with_time(log, t))
+    assert "t_s: one value is NaN or infinite, in 1 run: 'c' (row 10)" in complaint(with_time(log, t))
 
 
 def test_sample_rate_of_the_metadata(log: FlightLog) -> None:
@@ -150,7 +150,7 @@ def test_all_problems_at_once(log: FlightLog) -> None:
         "elevator_rad: required",
         "1 gap",
         "not the 100 Hz",
-        "alpha_rad: 1 values",
+        "alpha_rad: one value is",
     ):
         assert part in str(caught.value)
 
@@ -194,3 +194,13 @@ def test_values_whose_powers_overflow(log: FlightLog, channel: str, value: float
 @pytest.mark.parametrize("factor", [1e-300, 1e-12, 1e12, 1e300])
 def test_times_whose_steps_overflow(log: FlightLog, factor: float) -> None:
     assert "t_s: times beyond 1e+09 s or steps below 1e-09 s" in complaint(with_time(log, log.t_s * factor))
+
+
+def test_rows_out_of_order_are_one_problem(log: FlightLog) -> None:
+    """The pieces of a log whose runs alternate are short and have gaps; sorting cures all of it."""
+    n = len(log.t_s)
+    mixed = replace(log, run_ids=tuple("ab" * (n // 2)), offsets=np.arange(n + 1))
+    assert complaint(mixed) == (
+        "flight log: 1 problem\n  - run_id: 2 runs: 'a', 'b' in more than one part; sort by run_id and t_s, or rename the "
+        "runs"
+    )

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from airtruth.api.trace_tasks import Ended, TraceTask, attempt, attempted_on
-from airtruth.charts import Chart, Mark, Panel
+from airtruth.charts import Bar, Chart, Panel
 from airtruth.cluster import Cluster
 from airtruth.errors import ConfigurationError, LogError, StoreError
 from airtruth.logs.histories import FILE, read_histories
@@ -96,10 +96,10 @@ class TracedSets:
         from airtruth.charts import as_figure
 
         names = tuple(sorted(self.verdicts))
-        counts = [float(self.verdicts[name]) for name in names]
-        marks = tuple(Mark(row, n, 0.0, n, None, "", "blue") for row, n in enumerate(counts))
-        panel = Panel(x_label="Sets of records", rows=names, marks=marks)
-        return as_figure(Chart(NAME, "Verdicts", (panel,), columns=1))
+        counts = [self.verdicts[name] for name in names]
+        bars = tuple(Bar(row, float(n), words=str(n)) for row, n in enumerate(counts))
+        panel = Panel(x_label="number of sets [-]", rows=names, bars=bars)
+        return as_figure(Chart(NAME, f"Verdicts of {len(self.sets)} sets of records", (panel,), columns=1))
 
     def _repr_html_(self) -> str:
         return as_html(self.table())

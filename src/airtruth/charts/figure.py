@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from airtruth.charts.model import Chart, Colour, Panel, drawable
+from airtruth.charts.model import SHAPES, Chart, Colour, Panel, Shape, drawable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,6 +21,8 @@ _HEIGHT_IN: Final = 1.9
 """Height of a panel without rows [inch] (judgement)."""
 _ROW_IN: Final = 0.19
 """Height of a row [inch]; judgement: a line of type."""
+_TICKS: Final = 5
+"""Most intervals between ticks of the scale of x [-] (judgement: five labels of five characters fit into a panel)."""
 _INSIDE: Final = 0.6
 """Share of the scale from which the words of a bar stand inside it [-] (judgement: they fit)."""
 _UNDER_LABEL: Final = -0.3
@@ -29,6 +31,20 @@ _UNDER_TICKS: Final = -0.14
 """The same below a panel without a label [-] (judgement)."""
 _DASHES: Final = {"solid": "-", "dashed": "--", "dotted": ":", "points": "."}
 """Matplotlib's name of each stroke."""
+_MARKERS: Final[dict[Shape, str]] = {
+    "circle": "o",
+    "square": "s",
+    "triangle": "^",
+    "diamond": "D",
+    "wedge": "v",
+}
+"""Matplotlib's name of each shape."""
+_MARK_PT: Final = 4.5
+"""Size of a mark [pt] (judgement: wider than the line of its interval)."""
+_CAPTION_IN: Final = 0.16
+"""Height of a line of the caption [inch]; judgement: a line of its type."""
+_LETTERS_PER_IN: Final = 15
+"""Characters of the caption in an inch of width [1/inch] (judgement: its type, with a margin)."""
 
 
 def as_figure(chart: Chart) -> Figure:
@@ -38,12 +54,14 @@ def as_figure(chart: Chart) -> Figure:
     columns = min(chart.columns, len(chart.panels))
     rows = -(-len(chart.panels) // columns)
     tallest = max((_height(panel) for panel in chart.panels), default=_HEIGHT_IN)
+    width = _WIDE_IN if columns == 1 else _WIDTH_IN * columns
+    caption = textwrap.wrap(chart.caption, int(_LETTERS_PER_IN * width))
     with style.applied():
         figure, axes = style.panels(
             rows,
             columns,
-            width_in=_WIDE_IN if columns == 1 else _WIDTH_IN * columns,
-            height_in=0.8 + rows * tallest,
+            width_in=width,
+            height_in=0.8 + rows * tallest + _CAPTION_IN * len(caption),
         )
         for ax, panel in zip(axes.ravel(), chart.panels, strict=False):
             _draw(ax, panel)
@@ -56,6 +74,8 @@ def as_figure(chart: Chart) -> Figure:
             style.legend_above(figure, axes.ravel(), title)
         else:
             figure.suptitle(title, fontsize=10.0, fontweight="bold")
+        if caption:
+            figure.supxlabel("\n".join(caption), fontsize=7.5)
     return figure
 
 
@@ -105,7 +125,9 @@ def _draw(ax: Axes, panel: Panel) -> None:
                 ax.hlines(mark.row, *mark.widest, color=colour, linewidth=1.0)
             if drawable(mark.lower) and drawable(mark.upper):
                 ax.hlines(mark.row, mark.lower, mark.upper, color=colour, linewidth=3.0)
-            ax.plot(mark.value, mark.row, "o", color=colour, markersize=4.5, label=mark.label or None)
+            size = 0.5 * _MARK_PT if mark.small else _MARK_PT
+            marker = _MARKERS[SHAPES[mark.colour]]
+            ax.plot(mark.value, mark.row, marker, color=colour, markersize=size, label=mark.label or None)
     if panel.words:
         ax.text(0.5, 0.5, panel.words, transform=ax.transAxes, ha="center", va="center", color=_shade("grey"))
     _label(ax, panel)
@@ -133,6 +155,7 @@ def _draw_ranges(ax: Axes, panel: Panel) -> None:
 def _label(ax: Axes, panel: Panel) -> None:
     ax.set(title=panel.title, xlabel=panel.x_label)
     ax.set_xlim(*panel.x_range())
+    ax.locator_params(axis="x", nbins=_TICKS)
     if panel.rows:
         ax.set_yticks(range(len(panel.rows)), panel.rows, fontsize=7.5)
         ax.set_ylim(len(panel.rows) - 0.4, -0.6)

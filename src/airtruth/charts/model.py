@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final, Literal
 
@@ -11,6 +11,20 @@ Colour = Literal["blue", "vermillion", "green", "purple", "orange", "sky", "ink"
 """Role of a colour; each medium and each theme has its own shade of it."""
 Stroke = Literal["solid", "dashed", "dotted", "points"]
 """How a line is drawn."""
+Shape = Literal["circle", "square", "triangle", "diamond", "wedge"]
+"""Outline of a mark; a wedge is a triangle that points down."""
+
+SHAPES: Final[Mapping[Colour, Shape]] = {
+    "blue": "circle",
+    "vermillion": "square",
+    "green": "triangle",
+    "purple": "diamond",
+    "orange": "wedge",
+    "sky": "circle",
+    "ink": "square",
+    "grey": "triangle",
+}
+"""Shape of the marks of each colour: print without colours, and readers who do not see them, tell marks apart."""
 
 LARGEST: Final = 1e30
 """Largest magnitude that is drawn [-]; judgement: beyond any quantity, and its square does not overflow."""
@@ -57,6 +71,7 @@ class Mark:
     row : position among the rows of the panel; fractions set marks of one row apart.
     value : the value; lower, upper : ends of its interval, NaN for none.
     widest : ends of a second, wider interval, None for none.
+    small : whether its shape is half as large, for a second quantity beside the first.
     """
 
     row: float
@@ -66,6 +81,7 @@ class Mark:
     widest: tuple[float, float] | None = None
     label: str = ""
     colour: Colour = "blue"
+    small: bool = False
 
 
 @dataclass(frozen=True)
@@ -203,6 +219,7 @@ def _range(values: Iterable[float], margin: float) -> tuple[float, float]:
 
 __all__ = [
     "LARGEST",
+    "SHAPES",
     "SMALLEST",
     "Band",
     "Bar",
@@ -212,6 +229,7 @@ __all__ = [
     "Mark",
     "Panel",
     "Rule",
+    "Shape",
     "Stroke",
     "drawable",
 ]

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from airtruth.charts.model import Band, Bar, Chart, Line, Mark, Panel, Rule, drawable
+from airtruth.charts.model import SHAPES, Band, Bar, Chart, Colour, Line, Mark, Panel, Rule, Shape, drawable
 from airtruth.charts.ticks import label, ticks
 
 _WIDTH: Final = 340.0
@@ -27,6 +27,16 @@ _LEAST_PLOT: Final = 120.0
 """Least width that the labels of rows leave to the data [px] (judgement)."""
 _DASHES: Final = {"solid": "", "dashed": ' stroke-dasharray="6 3"', "dotted": ' stroke-dasharray="1.5 3"'}
 """Attribute of each stroke."""
+_CORNERS: Final[dict[Shape, tuple[tuple[float, float], ...]]] = {
+    "circle": (),
+    "square": ((-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)),
+    "triangle": ((0.0, -1.2), (1.2, 0.9), (-1.2, 0.9)),
+    "diamond": ((0.0, -1.3), (1.3, 0.0), (0.0, 1.3), (-1.3, 0.0)),
+    "wedge": ((0.0, 1.2), (1.2, -0.9), (-1.2, -0.9)),
+}
+"""Corners of each shape over the radius of a circle of the same weight [-] (judgement)."""
+_RADIUS: Final = 3.5
+"""Radius of a mark [px] (judgement: wider than the line of its interval)."""
 
 
 @dataclass(frozen=True)
@@ -71,9 +81,9 @@ def _entry(words: str, item: Line | Mark | Bar | Rule | Band) -> str:
     elif isinstance(item, Bar):
         key = f'<rect x="4" y="2" width="14" height="8" fill="var(--{item.colour})"/>'
     elif isinstance(item, Mark):
-        key = _interval(item, 1.0, 21.0, 6.0) + _dot(item.colour, 11.0, 6.0)
+        key = _interval(item, 1.0, 21.0, 6.0) + _dot(item.colour, 11.0, 6.0, SHAPES[item.colour])
     elif isinstance(item, Line) and item.stroke == "points":
-        key = _dot(item.colour, 11.0, 6.0, 2.0)
+        key = _dot(item.colour, 11.0, 6.0, "circle", 2.0)
     else:
         dash = _DASHES[item.stroke] if isinstance(item, Line) else ""
         key = f'<line x1="0" x2="22" y1="6" y2="6" stroke="var(--{item.colour})" stroke-width="2"{dash}/>'
@@ -223,7 +233,8 @@ def _mark(mark: Mark, f: _Frame) -> Iterator[str]:
     if drawable(mark.lower) and drawable(mark.upper):
         yield _interval(mark, f.px(mark.lower), f.px(mark.upper), y)
         words += f" [{mark.lower:.4g}, {mark.upper:.4g}]"
-    yield _dot(mark.colour, f.px(mark.value), y, title=words)
+    radius = 0.5 * _RADIUS if mark.small else _RADIUS
+    yield _dot(mark.colour, f.px(mark.value), y, SHAPES[mark.colour], radius, words)
 
 
 def _interval(mark: Mark, low: float, high: float, y: float) -> str:
@@ -233,8 +244,11 @@ def _interval(mark: Mark, low: float, high: float, y: float) -> str:
     )
 
 
-def _dot(colour: str, x: float, y: float, radius: float = 3.5, title: str = "") -> str:
+def _dot(colour: Colour, x: float, y: float, shape: Shape, radius: float = _RADIUS, title: str = "") -> str:
     words = f"<title>{title}</title>" if title else ""
+    corners = " ".join(f"{x + radius * a:.1f},{y + radius * b:.1f}" for a, b in _CORNERS[shape])
+    if corners:
+        return f'<polygon class="dot" points="{corners}" fill="var(--{colour})">{words}</polygon>'
     return f'<circle class="dot" cx="{x:.1f}" cy="{y:.1f}" r="{radius:g}" fill="var(--{colour})">{words}</circle>'
 
 

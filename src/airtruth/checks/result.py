@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -142,13 +143,20 @@ class CheckResult:
         left.errorbar(value, places, xerr=np.maximum(ends.reshape(-1, 2), 0.0).T, fmt="o", color=style.BLUE)
         left.axvline(0.0, color=style.GREY)
         left.set_yticks(places, [f.name for f in shown_ones])
-        left.set_xlabel("estimate less declared value, standard errors")
-        causes = self.causes[:10]
-        colours = [style.GREEN if c.possible else style.GREY for c in causes]
-        right.barh(np.arange(len(causes)), [c.distance for c in causes], color=colours)
+        left.invert_yaxis()
+        left.set_xlabel("estimate less declared value [standard errors]")
+        left.set_title("errors of instruments, 95 % intervals")
+        causes = self.causes[:SETS]
+        for place, cause in enumerate(causes):
+            right.barh(place, cause.distance, color=style.GREEN if cause.possible else style.GREY)
+            right.text(cause.distance, place, f" {_judged(cause, self)}", va="center", fontsize=7.5)
+        right.margins(x=0.3)  # the words behind the longest bar
+        right.set_xlim(left=0.0)
         right.set_yticks(np.arange(len(causes)), [c.name for c in causes])
         right.invert_yaxis()
-        right.set_xlabel("distance from the best set (green: possible)")
+        right.set_xlabel("distance from the best set [-]")
+        right.set_title("sets of errors, the best first")
+        figure.suptitle(textwrap.fill(self.sentences[0], 110), fontsize=10.0, fontweight="bold")
         return figure
 
     def _repr_html_(self) -> str:

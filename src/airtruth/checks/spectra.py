@@ -36,7 +36,7 @@ class Factors:
 
     Attributes
     ----------
-    value : (runs + 1, k) factors; NaN where the regressors do not move.
+    value : (runs + 1, k) factors; NaN where the regressors do not move, or the lines are too few.
     covariance : (runs + 1, k, k) covariance of the factors.
     share : (runs + 1,) squared multiple correlation.
     strength : (runs + 1,) smallest first-stage F over the regressors; infinite without instruments.
@@ -104,11 +104,12 @@ def regress(y: Array, x: Array, z: Array | None = None) -> Factors:
     moment = np.einsum("rkn,rn->rk", projected, y)
     normal = np.concatenate([normal, normal.sum(axis=0, keepdims=True)])
     moment = np.concatenate([moment, moment.sum(axis=0, keepdims=True)])
+    degrees = np.append(np.full(len(y), count), count * len(y))
     inverse = _inverse(normal)
+    inverse[degrees < x.shape[1] + 2] = np.nan  # too few lines to leave a residual
     value = np.einsum("rkl,rl->rk", inverse, moment)
     each = _meat(y - np.einsum("rk,rkn->rn", value[:-1], x), projected)
     pooled = _meat(y - np.einsum("k,rkn->rn", value[-1], x), projected).sum(axis=0, keepdims=True)
-    degrees = np.append(np.full(len(y), count), count * len(y))
     correction = degrees / np.maximum(degrees - x.shape[1] - 1.0, 1.0)
     covariance = inverse @ np.concatenate([each, pooled]) @ inverse * correction[:, None, None]
     rest = np.append(_power(y - np.einsum("rk,rkn->rn", value[:-1], x)), 0.0)

@@ -66,7 +66,7 @@ def import_(
 ) -> None:
     """Convert measured logs of other formats to a flight log."""
     from airtruth import importers
-    from airtruth.errors import ConfigurationError
+    from airtruth.errors import ConfigurationError, counted
 
     if guess:
         if len(files) > 1:
@@ -93,7 +93,9 @@ def import_(
     for sentence in (*imported.notes, *(fault.sentence for fault in imported.faults)):
         notice(sentence)
     log = imported.log
-    print_result(f"{len(log.run_ids)} runs, {len(log.t_s)} rows in {out}: {', '.join(log.channels)}")
+    print_result(
+        f"{counted(len(log.run_ids), 'run')}, {len(log.t_s)} rows in {out}: {', '.join(log.channels)}"
+    )
 
 
 def _find(files: list[Path], mapping: list[Path], out: Path, *, force: bool, quiet: bool) -> None:

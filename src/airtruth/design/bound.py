@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from airtruth.arguments import require_whole
 from airtruth.design.information import LinearExperiment, sensor_noise
-from airtruth.errors import ConfigurationError, choices
+from airtruth.errors import ConfigurationError, choices, counted
 from airtruth.identification.likelihood.options import PRESSURES
 from airtruth.physics.gust_figures import GustScales
 from airtruth.physics.short_period import PARAMETERS
@@ -27,7 +27,7 @@ from airtruth.simulation.campaign.plan import Plan, PlannedRun, make, planned_ru
 from airtruth.simulation.campaign.run import Progress
 from airtruth.simulation.disposable import isolated_flight
 from airtruth.simulation.trim import Trim
-from airtruth.table import Table, as_html, as_text, flat
+from airtruth.table import Table, as_html, as_text, flat, significant
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -102,7 +102,7 @@ class ForecastResult:
                 "with effects" if self.with_effects else "declared",
                 "std of a record",
                 "percent",
-                f"std of {self.records} records",
+                f"std of {counted(self.records, 'record')}",
                 "percent of these",
             ),
             rows=[(name, *(float(c[i]) for c in columns)) for i, name in enumerate(PARAMETERS)],
@@ -153,18 +153,21 @@ class ForecastResult:
         from airtruth import style
 
         with style.applied():
-            figure = style.new_figure(6.0, 3.2)
+            figure = style.new_figure(6.6, 3.4)
             ax = figure.subplots()
             at = np.arange(len(PARAMETERS))
-            labels = ("one record", f"{self.records} records together")
+            labels = ("one record", f"{counted(self.records, 'record')} together")
             for offset, values, label, colour in zip(
                 (-0.2, 0.2), self.percent, labels, (style.BLUE, style.ORANGE), strict=True
             ):
-                ax.bar(at + offset, values, width=0.4, label=label, color=colour)
+                bars = ax.bar(at + offset, values, width=0.4, label=label, color=colour)
+                ax.bar_label(bars, [significant(v, 2) for v in values], fontsize=7.5)
             ax.set_yscale("log")
+            ax.margins(y=0.1)  # the numbers above the bars
             ax.set_xticks(at, PARAMETERS)
+            ax.grid(axis="x", visible=False)
             ax.set_ylabel("least standard error [%]")
-            ax.legend()
+            style.legend_above(figure, [ax], self.table().title)
         return figure
 
     def _repr_html_(self) -> str:

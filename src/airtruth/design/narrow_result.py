@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.design.planned_campaign import PlannedCampaign, draw_elevator
+from airtruth.physics.short_period import UNITS
 from airtruth.table import Table, as_html, as_text, flat
 from airtruth.table.model import Number, Row, significant
 from airtruth.tracing.answer import Z95
@@ -227,8 +229,10 @@ class NarrowResult(PlannedCampaign):
             middle.plot(p.t_s, p.alpha_rad / DEG, color=style.BLUE)
             middle.set_ylabel("alpha [deg]")
             middle.set_xlabel("time [s]")
+            middle.sharex(axes[0, 0])
             for k, target in enumerate(self.targets):
                 self._draw(axes[2 + k, 0], target)
+            style.legend_above(figure, axes.ravel(), textwrap.fill(self._notes()[0], 70), columns=3)
         return figure
 
     def _draw(self, ax: Axes, target: str) -> None:
@@ -238,20 +242,23 @@ class NarrowResult(PlannedCampaign):
         own = [q for q in self.quantities if q.target == target]
         value = np.array([q.value for q in own])
         kinds = (
-            ("known", style.GREY, np.array([q.known for q in own])),
-            ("with the 3-2-1-1", style.ORANGE, np.array([q.reference for q in own])),
-            ("expected", style.BLUE, np.array([q.expected for q in own])),
+            ("known", "^", style.GREY, np.array([q.known for q in own])),
+            ("with the 3-2-1-1", "s", style.ORANGE, np.array([q.reference for q in own])),
+            ("expected", "o", style.BLUE, np.array([q.expected for q in own])),
         )
         at = [q.at for q in own if q.at is not None]
-        step = 0.08 * float(np.ptp(at)) / max(len(at) - 1, 1) if len(at) == len(own) and at else 1.0
-        for k, (label, colour, std) in enumerate(kinds):
-            x = np.array(at) + (k - 1) * step if len(at) == len(own) and at else np.full(len(own), float(k))
-            ax.errorbar(x, value, Z95 * std, fmt="o", markersize=3, color=colour, capsize=2, label=label)
-        if not at:
-            ax.set_xticks([])
-        ax.set_ylabel(f"{target}, 95 %" if not at else "increment, 95 %")
-        ax.set_xlabel("" if not at else target)
-        ax.legend(loc="upper left", ncols=3)
+        is_curve = len(at) == len(own) and bool(at)
+        step = 0.08 * float(np.ptp(at)) / max(len(at) - 1, 1) if is_curve else 1.0
+        for k, (label, marker, colour, std) in enumerate(kinds):
+            x = np.array(at) + (k - 1) * step if is_curve else np.full(len(own), float(k))
+            ax.errorbar(x, value, Z95 * std, fmt=marker, markersize=4, color=colour, capsize=2, label=label)
+        if is_curve:
+            ax.set_xlabel(target)
+            ax.set_ylabel("increment, 95 %")
+        else:
+            ax.set_xticks(range(len(kinds)), [label for label, *_ in kinds])
+            ax.set_xlim(-0.5, len(kinds) - 0.5)
+            ax.set_ylabel(f"{target} [{UNITS.get(target, '-')}], 95 %")
 
     def _repr_html_(self) -> str:
         return as_html(self.table()) + as_html(self.quantity_table())

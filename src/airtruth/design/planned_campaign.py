@@ -80,7 +80,7 @@ class PlannedCampaign(ABC):
 
 
 def draw_elevator(ax: Axes, t_s: Array, reference_rad: Array, elevator_rad: Array, family: str) -> None:
-    """Draw the computed input beside the 3-2-1-1 of equal length.
+    """Draw the computed input beside the 3-2-1-1 of equal length; the caller draws the legend, where it hides neither.
 
     Parameters
     ----------
@@ -89,10 +89,9 @@ def draw_elevator(ax: Axes, t_s: Array, reference_rad: Array, elevator_rad: Arra
     """
     from airtruth import style
 
-    ax.plot(t_s, reference_rad / DEG, color=style.GREY, label="3-2-1-1 of equal length")
+    ax.plot(t_s, reference_rad / DEG, "--", color=style.GREY, label="3-2-1-1 of equal length")
     ax.plot(t_s, elevator_rad / DEG, color=style.BLUE, label=family)
     ax.set_ylabel("elevator [deg]")
-    ax.legend(loc="lower left")
 
 
 __all__ = ["PlannedCampaign", "draw_elevator"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -192,15 +193,30 @@ class SplitResult(PlannedCampaign):
 
         p = self.prediction
         with style.applied():
-            figure, axes = style.panels(4, 1, width_in=6.5, height_in=6.5, sharex=True)
+            figure, axes = style.panels(4, 1, width_in=6.5, height_in=7.2, sharex=True)
             draw_elevator(axes[0, 0], p.t_s, p.reference_rad, p.elevator_rad, self.best.family)
             for k, label in enumerate(_LABELS):
                 ax, scale = axes[k + 1, 0], _SCALES[k]
-                ax.axhspan(-scale * p.noise[k], scale * p.noise[k], color="#EEEEEE")
-                ax.plot(p.t_s, scale * p.difference[:, k], color=style.VERMILLION)
+                ax.axhspan(
+                    -scale * p.noise[k], scale * p.noise[k], color="#EEEEEE", label="noise of a sample"
+                )
+                ax.plot(
+                    p.t_s,
+                    scale * p.difference[:, k],
+                    color=style.VERMILLION,
+                    label="difference of the outputs",
+                )
                 ax.set_ylabel(label)
-            axes[1, 0].set_title("difference of the hypotheses; grey: noise of a sample", loc="left")
             axes[-1, 0].set_xlabel("time [s]")
+            names = ", ".join(m.effect.key for m in self.hypotheses)
+            style.legend_above(
+                figure,
+                axes.ravel(),
+                textwrap.fill(
+                    f"{names}: separated by {significant(self.best.least)} standard deviations or more", 70
+                ),
+                columns=2,
+            )
         return figure
 
     def _repr_html_(self) -> str:

@@ -66,9 +66,13 @@ def intervals_chart(
     )
     percent = f"{100.0 * confidence:g} % interval"
     words = (
-        f"estimate and {percent}" if runs == 1 else f"mean; mean {percent} (thick); 95 % of the runs (thin)"
+        f"Estimate and {percent}."
+        if runs == 1
+        else f"Mean of the converged runs; mean {percent} (thick); 95 % of the runs (thin)."
     )
-    return Chart("intervals", f"{f'Run {first}' if runs == 1 else f'{runs} runs'}: {words}", panels, _COLUMNS)
+    by = f"{len(methods)} methods" if len(methods) > 1 else "".join(methods)
+    title = f"Derivatives of {f'run {first}' if runs == 1 else f'{runs} runs'} by {by}"
+    return Chart("intervals", title, panels, _COLUMNS, words)
 
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")

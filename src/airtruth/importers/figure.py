@@ -21,7 +21,7 @@ MOST_ROWS: Final = 24
 
 @style.themed
 def draw(found: ManoeuvreResult) -> Figure:
-    """Elevator and pitch rate over the flight, accepted manoeuvres green and others grey, with their names."""
+    """Elevator and pitch rate over the flight, accepted manoeuvres green and others grey and hatched, with their names."""
     span = float(found.t_s[-1] - found.t_s[0])
     rows = min(MOST_ROWS, max(1, int(np.ceil(span / ROW_S))))
     length = span / rows
@@ -40,6 +40,7 @@ def draw(found: ManoeuvreResult) -> Figure:
                 max(one.start_s, low),
                 min(one.end_s, low + length),
                 color=style.GREEN if good else style.GREY,
+                hatch=None if good else "//",
                 alpha=0.3,
                 label=("accepted" if good else "not accepted"),
             )

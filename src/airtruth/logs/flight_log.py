@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.channels import RUN_ID, SIGNALS, TIME
-from airtruth.errors import LogError, choices
+from airtruth.errors import LogError, choices, counted, reason
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,6 +39,19 @@ class FlightLog:
     offsets: NDArray[np.int64]
     t_s: Array
     channels: Mapping[str, Array]
+
+    def __post_init__(self) -> None:
+        """Turn lists, columns of frames and arrays of other types into arrays.
+
+        Raises
+        ------
+        LogError
+            Naming the first that does not hold numbers.
+        """
+        own = {name: _floats(name, values) for name, values in self.channels.items()}
+        object.__setattr__(self, "channels", own)
+        object.__setattr__(self, "t_s", _floats(TIME, self.t_s))
+        object.__setattr__(self, "offsets", np.asarray(self.offsets, dtype=np.int64))
 
     def rows(self, run: int) -> slice:
         """Rows of one run, by its index."""
@@ -144,7 +157,7 @@ class FlightLog:
         """Return number, duration and sample rate of the runs, and the first channels."""
         names = list(self.channels)
         shown = ", ".join([*names[:SHOWN_CHANNELS], *["..."][: len(names) > SHOWN_CHANNELS]])
-        return f"FlightLog({_extent(self)}, {_count(len(names), 'channel')}: {shown})"
+        return f"FlightLog({_extent(self)}, {counted(len(names), 'channel')}: {shown})"
 
     def _repr_html_(self) -> str:
         """Return a table of the channels with unit, extremes and mean."""
@@ -168,14 +181,20 @@ SHOWN_CHANNELS = 4
 """Channels that the repr of a log names (judgement: one line of a terminal)."""
 
 
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+def _floats(name: str, values: object) -> Array:
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise LogError(
+            f"{name}: {type(values).__name__} does not hold numbers alone ({reason(error)}); give one number per row, NaN "
+            "for a missing one"
+        ) from error
 
 
 def _extent(log: FlightLog) -> str:
     """Number, duration and sample rate of the runs; a range where they differ."""
     runs = [log.t_s[rows] for rows in map(log.rows, range(len(log))) if rows.stop - rows.start > 1]
-    text = _count(len(log), "run")
+    text = counted(len(log), "run")
     if not runs:
         return text
     durations = [float(t[-1] - t[0]) for t in runs]
@@ -194,7 +213,7 @@ def unknown_runs(missing: Collection[str], run_ids: Sequence[str]) -> str:
     names = sorted(missing)
     near = difflib.get_close_matches(names[0], run_ids, n=1)
     hint = f"did you mean {near[0]!r}? " if near else ""
-    extent = f"the log holds {_count(len(run_ids), 'run')}"
+    extent = f"the log holds {counted(len(run_ids), 'run')}"
     span = f", {run_ids[0]!r} to {run_ids[-1]!r}" if run_ids else ""
     return f"no run {', '.join(map(repr, names[:5]))}; {hint}{extent}{span}"
 

@@ -48,9 +48,12 @@ def sources(logs: Logs) -> tuple[Path | FlightLog, ...]:
         elif isinstance(item, str | os.PathLike):
             resolved += log_paths(item)
         else:
+            step = ""
+            if hasattr(item, "to_parquet"):
+                step = "; write the frame with its method to_parquet and give the file"
             raise ConfigurationError(
                 f"logs: {type(item).__name__} is not a log; give a file, a folder of logs, a FlightLog, "
-                "or a sequence of these"
+                f"or a sequence of these{step}"
             )
     if not resolved:
         raise ConfigurationError("logs: none is given; give a file, a folder of logs or a FlightLog")

@@ -164,12 +164,20 @@ def log_paths(path: str | os.PathLike[str]) -> list[Path]:
     if not exists:
         raise StoreError(f"{path}: no such file or folder; give a log (.parquet) or a folder of logs")
     folder = path / "logs" if (path / "logs").is_dir() else path
-    paths = sorted(p for p in folder.glob("*.parquet") if p.name not in CAMPAIGN_TABLES)
+    paths = _logs_of(folder, "*.parquet")
     if not paths:
-        raise StoreError(
-            f"{folder}: holds no flight log (*.parquet); `airtruth fly` or `airtruth import` writes them"
+        below = next(iter(_logs_of(folder, "*/*.parquet")), None)
+        step = (
+            "`airtruth fly` or `airtruth import` writes them"
+            if below is None
+            else f"{below} lies in a folder below it: give that folder, or write a partitioned data set as one file"
         )
+        raise StoreError(f"{folder}: holds no flight log (*.parquet); {step}")
     return paths
+
+
+def _logs_of(folder: Path, pattern: str) -> list[Path]:
+    return sorted(p for p in folder.glob(pattern) if p.name not in CAMPAIGN_TABLES)
 
 
 def iter_logs(path: Path | str, columns: Sequence[str] | None = None) -> Iterator[FlightLog]:
@@ -235,35 +243,54 @@ def _channels(path: Path, schema: pa.Schema, columns: Sequence[str] | None) -> l
             f"{path}: log schema {version!r}, but this version reads schema {SCHEMA}; use a newer airtruth"
         )
     kinds = {f.name: f.type for f in schema}
-    if not pa.types.is_floating(kinds[TIME]):
-        raise LogError(f"{path}: {TIME} is {kinds[TIME]}, not a floating-point time in seconds")
+    if not (pa.types.is_floating(kinds[TIME]) or pa.types.is_decimal(kinds[TIME])):
+        raise LogError(
+            f"{path}: {TIME} is {kinds[TIME]}, not a floating-point time in seconds; write the seconds from the start of "
+            "each run as float64"
+        )
     if columns is None:
         return [
             name
             for name in schema.names
             if name not in (RUN_ID, TIME)
-            and (pa.types.is_floating(kinds[name]) or _numeric(name, kinds[name]))
+            and (pa.types.is_floating(kinds[name]) or _is_signal(path, name, kinds[name]))
         ]
     wanted = [name for name in dict.fromkeys(columns) if name not in (RUN_ID, TIME)]
     for name in wanted:
         if name not in kinds:
             raise LogError(f"{path}: no channel {name!r}; {choices(name, kinds.keys() - {RUN_ID, TIME})}")
-        if not (pa.types.is_floating(kinds[name]) or pa.types.is_integer(kinds[name])):
-            raise LogError(f"{path}: channel {name!r} is {kinds[name]}, not numeric")
+        _require_numeric(path, name, kinds[name])
     return wanted
 
 
-def _numeric(name: str, kind: pa.DataType) -> bool:
-    return name in SIGNALS and pa.types.is_integer(kind)
+def _is_signal(path: Path, name: str, kind: pa.DataType) -> bool:
+    """Whether a column is a channel of the vocabulary, which has to be numeric; a column without any value is none."""
+    if name not in SIGNALS or pa.types.is_null(kind):
+        return False
+    _require_numeric(path, name, kind)
+    return True
+
+
+def _require_numeric(path: Path, name: str, kind: pa.DataType) -> None:
+    if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind)):
+        unit = f" [{SIGNALS[name].unit}]" if name in SIGNALS else ""
+        raise LogError(
+            f"{path}: channel {name!r} is {kind}, not numeric; write it as float64{unit}, or leave it out"
+        )
 
 
 def _runs(path: Path, column: pa.ChunkedArray) -> tuple[tuple[str, ...], NDArray[np.int64]]:
     kind = column.type.value_type if pa.types.is_dictionary(column.type) else column.type
-    if not (pa.types.is_string(kind) or pa.types.is_large_string(kind)):
-        raise LogError(f"{path}: {RUN_ID} is {kind}, not a string")
+    if pa.types.is_string_view(kind):
+        column = column.cast(pa.string())
+    elif not (pa.types.is_string(kind) or pa.types.is_large_string(kind)):
+        raise LogError(f"{path}: {RUN_ID} is {kind}, not a string; write the names of the runs as strings")
     if column.null_count:
         row = int(np.flatnonzero(column.is_null().to_numpy())[0])
-        raise LogError(f"{path}: {RUN_ID} is empty in {column.null_count} rows, the first is row {row}")
+        rows = f"{column.null_count} row{'s' * (column.null_count > 1)}"
+        raise LogError(
+            f"{path}: {RUN_ID} is empty in {rows}, the first is row {row}; name the run of each row"
+        )
     if len(column) == 0:
         raise LogError(f"{path}: the log has no rows; fly or import it again")
     encoded = column if pa.types.is_dictionary(column.type) else column.dictionary_encode()
@@ -298,6 +325,8 @@ def _select(
 
 
 def _floats(column: pa.ChunkedArray, keep: slice | NDArray[np.int64]) -> Array:
+    if pa.types.is_decimal(column.type):
+        column = column.cast(pa.float64())
     return np.ascontiguousarray(column.to_numpy()[keep], dtype=np.float64)
 
 

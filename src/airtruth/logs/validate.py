@@ -57,7 +57,9 @@ def validate(log: FlightLog, *, minimum_samples: int = MINIMUM_SAMPLES, source: 
     """
     problems = list(_structure(log))
     if not problems:
-        problems = [*_missing(log), *_runs(log, minimum_samples), *_time(log), *_values(log)]
+        parted = list(_parted(log))  # the length and the times of such a part tell nothing
+        extent = parted or [*_short(log, minimum_samples), *_time(log)]
+        problems = [*_missing(log), *extent, *_values(log)]
     if problems:
         count = f"{len(problems)} problems" if len(problems) > 1 else "1 problem"
         raise LogError("\n  - ".join([f"{source}: {count}", *problems]))
@@ -96,11 +98,14 @@ def _missing(log: FlightLog) -> Iterator[str]:
         yield "density_kg_m3 or altitude_m: one of the two is required, both are missing; map one on import"
 
 
-def _runs(log: FlightLog, minimum_samples: int) -> Iterator[str]:
+def _parted(log: FlightLog) -> Iterator[str]:
     counts = Counter(log.run_ids)
     if len(counts) < len(log.run_ids):
         names = _listed([repr(name) for name, count in counts.items() if count > 1], "run")
         yield f"run_id: {names} in more than one part; sort by run_id and t_s, or rename the runs"
+
+
+def _short(log: FlightLog, minimum_samples: int) -> Iterator[str]:
     lengths = np.diff(log.offsets)
     short = np.flatnonzero(lengths < minimum_samples)
     if len(short):
@@ -113,7 +118,7 @@ def _time(log: FlightLog) -> Iterator[str]:
     if not np.isfinite(log.t_s).all():
         bad = np.flatnonzero(~np.isfinite(log.t_s))
         where = _where(log, bad, with_time=False)
-        yield f"t_s: {len(bad)} values are NaN or infinite, {where}; repair them or cut the run there"
+        yield f"t_s: {_not_finite(bad)}, {where}; repair them or cut the run there"
         return
     steps = np.diff(log.t_s)
     if np.abs(log.t_s).max(initial=0.0) > LARGEST or (np.abs(steps[steps != 0.0]) < 1.0 / LARGEST).any():
@@ -216,7 +221,7 @@ def _values(log: FlightLog) -> Iterator[str]:
         if not finite.all():
             bad = np.flatnonzero(~finite)
             yield (
-                f"{name}: {len(bad)} values are NaN or infinite, {_where(log, bad)}; "
+                f"{name}: {_not_finite(bad)}, {_where(log, bad)}; "
                 "cut the run there, or leave the channel out if it is optional"
             )
         below = finite & (values <= 0.0)
@@ -234,6 +239,10 @@ def _values(log: FlightLog) -> Iterator[str]:
                 "correct its unit, or cut the "
                 "run there"
             )
+
+
+def _not_finite(rows: Index) -> str:
+    return f"{len(rows)} values are NaN or infinite" if len(rows) > 1 else "one value is NaN or infinite"
 
 
 def _where(log: FlightLog, rows: Index, *, with_time: bool = True) -> str:

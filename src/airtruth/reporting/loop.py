@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.errors import LogError
+from airtruth.errors import LogError, counted
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.reporting.campaign import Campaign
 from airtruth.reporting.paper.layout import STANDARD_ERROR
@@ -157,7 +157,7 @@ def lay_out(table: LoopTable) -> Table:
         Group(f"Runs used of {runs}", tuple(_used(table))),
     )
     return Table(
-        title=f"{table.title} - campaign {table.campaign.name!r}, {runs} runs",
+        title=f"{table.title} - campaign {table.campaign.name!r}, {counted(runs, 'run')}",
         columns=("", "true", *table.statistics),
         groups=groups,
         notes=(

@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator
 from typing import Final
 
+from airtruth.errors import counted
 from airtruth.physics import short_period
 from airtruth.reporting.paper import published
 from airtruth.reporting.paper.comparison import RUNS, SIX
@@ -51,7 +52,7 @@ def lay_out(table: PaperTable) -> Table:
         heading = "Median (scaled median absolute deviation)"
         groups.append(Group(heading, tuple(_medians(table)), supplement=True))
     return Table(
-        title=f"{table.spec.title} - campaign {table.campaign.name!r}, {table.campaign.runs} runs",
+        title=f"{table.spec.title} - campaign {table.campaign.name!r}, {counted(table.campaign.runs, 'run')}",
         columns=("", "true", *table.methods),
         groups=tuple(group for group in groups if group.rows),
         notes=tuple(_notes(table)),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from airtruth.channels import SIGNALS
-from airtruth.errors import LogError, choices
+from airtruth.errors import LogError, choices, counted
 from airtruth.logs.names import chunk_file
 from airtruth.simulation.campaign.chunk import FAILED, INTERRUPTED, OK, Outcome
 from airtruth.simulation.campaign.plan import Plan
@@ -72,7 +72,7 @@ class CampaignResult:
         numbers = f"{self.flown_now} flown now, {len(failures)} failed"
         if interrupted:
             numbers += f", {len(interrupted)} interrupted"
-        lines = [f"{self.runs} runs in {self.folder} ({numbers})"]
+        lines = [f"{counted(self.runs, 'run')} in {self.folder} ({numbers})"]
         reasons = Counter(outcome.reason for outcome in failures).most_common(SHOWN_REASONS)
         return "\n".join([*lines, *(f"{count} failed: {reason}" for reason, count in reasons)])
 

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from airtruth.channels import shown
-from airtruth.charts import Band, Bar, Chart, Colour, Line, Mark, Panel, Rule
+from airtruth.charts import Band, Bar, Chart, Colour, Mark, Panel, Rule, Stroke
 from airtruth.logs.histories import Histories, History
 from airtruth.table import significant
 from airtruth.tracing.answer import CandidateScore, TraceAnswer
 from airtruth.tracing.presentation.candidates import ranked
 from airtruth.tracing.presentation.effect_panel import line
 from airtruth.tracing.presentation.error_table import stages_of
+from airtruth.tracing.presentation.text import FAR_SIGMA, headline
 from airtruth.tracing.presentation.trace_histories import panel_of
 
 Array = NDArray[np.float64]
@@ -26,6 +27,8 @@ LEVEL: Final = 0.05
 """Level of Holm's rule that the scores are drawn against [-]; that of the first round of the search."""
 COLOURS: Final[dict[str, Colour]] = {"alpha_rad": "blue", "q_rad_s": "vermillion", "az_m_s2": "green"}
 """Channel -> colour where one panel shows several."""
+_STROKES: Final[dict[str, Stroke]] = {"q_rad_s": "dashed", "az_m_s2": "dotted"}
+"""Channel -> stroke beside its colour; the first is solid."""
 _SMALLEST: Final = 1e-290
 """Probability up to which a p-value is converted to a normal variable [-] (above underflow)."""
 _LARGEST_SIGMA: Final = 36.0
@@ -62,7 +65,7 @@ def trace_chart(answer: TraceAnswer, histories: Histories) -> Chart:
     group = f", {record.group}" if record.group else ""
     return Chart(
         name="trace",
-        title="Residual as declared, the effect, residual with it",
+        title=f"{headline(answer)}. Residual as declared, the effect, residual {best}",
         panels=tuple(panels),
         columns=3,
         caption=f"Free runs of record {record.run_id}{group}. Shaded: two standard deviations of the response to gusts "
@@ -96,12 +99,13 @@ def _contribution(record: History) -> Panel:
     return Panel(
         title=title,
         x_label="time [s]",
-        y_label="[σ of the floor]",
+        y_label="effect [σ of the floor]",
         lines=tuple(
             replace(
                 line(record.t_s[::step], moved[::step] / (record.floor.get(channel) or np.nan)),
                 label=_short(channel),
                 colour=COLOURS.get(channel, "ink"),
+                stroke=_STROKES.get(channel, "solid"),
             )
             for channel, moved in record.effect.items()
         ),
@@ -120,24 +124,20 @@ def _stages(answer: TraceAnswer) -> Panel:
     floor = by_stage.get("floor")
     if floor is None:
         return Panel(title="rms over the floor", words="no floor recorded")
-    marks, lines = [], []
+    marks = []
     for channel, colour in COLOURS.items():
-        small = []
         for row, rms in enumerate(by_stage.values()):
             if rms is not None and channel in rms.free_run and floor.free_run.get(channel):
                 value = rms.free_run[channel] / floor.free_run[channel]
                 marks.append(Mark(row - 0.15, value, label=_short(channel), colour=colour))
             if rms is not None and channel in rms.innovation and floor.innovation.get(channel):
-                small.append((rms.innovation[channel] / floor.innovation[channel], row + 0.2))
-        if small:
-            x, y = zip(*small, strict=True)
-            lines.append(Line(x, y, colour=colour, stroke="points"))
+                value = rms.innovation[channel] / floor.innovation[channel]
+                marks.append(Mark(row + 0.2, value, colour=colour, small=True))
     return Panel(
         title="rms over the floor",
-        x_label="large: free run, small: innovation",
+        x_label="ratio [-]; large: free run, small: innovation",
         rows=tuple(names),
         marks=tuple(marks),
-        lines=tuple(lines),
         rules=(Rule(1.0),),
     )
 
@@ -155,9 +155,10 @@ def scores_chart(answer: TraceAnswer) -> Chart:
     for at, r in enumerate(rows):
         accepted, same = r.candidate.key in leading, r.candidate.name in alike
         colour: Colour = "vermillion" if accepted else "orange" if same else "blue"
-        words = "" if r.gain is None else f"refit gains {significant(r.gain)} in 2 log L"
         label = "accepted" if accepted else "looks the same" if same else "not accepted"
-        bars.append(Bar(at, sigma[at], label, colour, words))
+        words = [] if colour == "blue" else [label]
+        words += [] if r.gain is None else [f"refit gains {significant(r.gain)} in 2 log L"]
+        bars.append(Bar(at, sigma[at], label, colour, ": ".join(words)))
     # Holm's rule goes by significance, whatever the order of the rows
     order = np.argsort(-np.array(sigma), kind="stable")
     needed = np.empty(len(rows))
@@ -177,7 +178,7 @@ def scores_chart(answer: TraceAnswer) -> Chart:
     )
     return Chart(
         name="scores",
-        title="Candidates at the refitted aircraft without effects",
+        title=f"{headline(answer)}. Candidates at the refitted aircraft without effects",
         panels=(panel,),
         columns=1,
         caption="An effect is accepted on the gain of its refit, which can be large although its score is small.",
@@ -215,29 +216,35 @@ def chart_of_shifts(names: tuple[str, ...], marks: tuple[Mark, ...], caption: st
     ----------
     names : one row each; marks : estimates in these rows; caption : what they are.
     """
+    far = [name for row, name in enumerate(names) if any(_is_far(m) for m in marks if round(m.row) == row)]
+    beyond = f"{', '.join(far)} beyond" if far else "all within"
     panel = Panel(
         x_label="shift [declared standard deviations]",
         rows=names,
         marks=marks,
         rules=(Rule(0.0, label="as declared"),),
-        bands=(Band(-2.0, 2.0, axis="x", label="two declared standard deviations"),),
+        bands=(Band(-FAR_SIGMA, FAR_SIGMA, axis="x", label="two declared standard deviations"),),
     )
     return Chart(
         name="shifts",
-        title="Shifts of the derivatives from their declaration",
+        title=f"Shifts of the derivatives from their declaration: {beyond} two standard deviations",
         panels=(panel,),
         columns=1,
         caption=caption,
     )
 
 
+def _is_far(mark: Mark) -> bool:
+    return abs(mark.value) > FAR_SIGMA
+
+
 def innovations_chart(histories: Histories) -> Chart:
-    """Whitened innovations of one record and their autocorrelation, before and after."""
+    """Whitened innovations of one record and their autocorrelation, as declared and of the last stage."""
     record = histories.first
     models = list(dict.fromkeys((histories.models[0], histories.models[-1])))
     return Chart(
         name="innovations",
-        title="Whitened innovations and their autocorrelation",
+        title=f"Whitened innovations and their autocorrelation, {' and '.join(models)}",
         panels=tuple(p for channel in record.measured for p in _whiteness(record, channel, models)),
         columns=2,
         caption=f"Record {record.run_id}. Shaded: 95 % of white noise.",

@@ -10,10 +10,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import shown
+from airtruth.channels import SIGNALS, shown
 from airtruth.charts import Band, Line, Mark, Panel, Rule
 from airtruth.effects.registry import EFFECTS
-from airtruth.physics.terms import AeroTerm, Change, shape_of
+from airtruth.physics.terms import READINGS, AeroTerm, Change, shape_of
 from airtruth.table import significant
 from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
 from airtruth.tracing.answer import TraceAnswer
@@ -22,6 +22,7 @@ from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import FINE, TraceRecord
 from airtruth.tracing.model.surface import through
 from airtruth.tracing.presentation.shown_record import ShownRecord
+from airtruth.tracing.presentation.text import unit_of
 from airtruth.units import DEG
 
 Array = NDArray[np.float64]
@@ -41,7 +42,7 @@ def effect_panel(answer: TraceAnswer, shown_: ShownRecord) -> Panel:
     change = shown_.change
     table = next((e for e in answer.effects if e.table is not None), None)
     if table is not None:
-        return _learned(table, table.table)
+        return learned_panel(table, table.table)
     if change.surface:
         return _surface(shown_.record, change)
     if change.aero and change.aero[0].signal in _CURVES and not change.aero[0].factor and not change.states:
@@ -106,7 +107,7 @@ def _curve(shown_: ShownRecord, terms: tuple[AeroTerm, ...]) -> Panel:
     return Panel(
         title=f"the effect: {first.coefficient}",
         x_label=f"{first.signal} [deg]",
-        y_label=first.coefficient,
+        y_label=f"{first.coefficient} [-]",
         lines=(
             replace(line(angle, declared), label="declared", colour="grey"),
             replace(line(angle, before), label="before", stroke="dotted"),
@@ -116,28 +117,42 @@ def _curve(shown_: ShownRecord, terms: tuple[AeroTerm, ...]) -> Panel:
     )
 
 
-def _learned(effect: AcceptedEffect, table: IncrementTable | None) -> Panel:
+def learned_panel(effect: AcceptedEffect, table: IncrementTable | None) -> Panel:
     """A learned increment with its band, and the density of the samples below it."""
     if table is None:
         return Panel(title="the effect", words="no table")
     over = effect.over or ""
     factor, unit = (1.0 / DEG, "deg") if over.endswith("_rad") else (1.0, "Pa" if over == "qbar_pa" else "-")
+    subject, scale = _subject(effect)
     behind = "state driven by " if effect.states and not effect.by else ""
     x = [factor * at for at in table.at]
-    bottom, top = min(table.low), max(table.high)
+    value, lower, upper = (
+        tuple(scale * v for v in values) for values in (table.value, table.low, table.high)
+    )
+    bottom, top = min(lower), max(upper)
     most = max(*table.samples, 1)
     density = [bottom - (top - bottom) * _DENSITY * (1.0 - n / most) for n in table.samples]
     return Panel(
         title=f"the effect: increment of {effect.subject}",
         x_label=f"{behind}{over.removesuffix('_rad').removesuffix('_pa')} [{unit}]",
-        y_label=f"increment of {effect.subject}",
+        y_label=f"increment of {subject}",
         lines=(
-            replace(line(x, table.value), label="learned", colour="vermillion"),
-            replace(line(x, table.low), label="95 % band", colour="vermillion", stroke="dotted"),
-            replace(line(x, table.high), colour="vermillion", stroke="dotted"),
+            replace(line(x, value), label="learned", colour="vermillion"),
+            replace(line(x, lower), label="95 % band", colour="vermillion", stroke="dotted"),
+            replace(line(x, upper), colour="vermillion", stroke="dotted"),
             replace(line(x, density), label="density of the samples", colour="grey"),
         ),
     )
+
+
+def _subject(effect: AcceptedEffect) -> tuple[str, float]:
+    """What a learned increment changes, with its display unit, and the factor to this unit from SI."""
+    acts_on, by = effect.acts_on or "", effect.by or ""
+    if acts_on in READINGS and not by:
+        return shown(acts_on)
+    own = SIGNALS[acts_on].unit if acts_on in READINGS else ""
+    unit = (f"{own or 1}/rad" if by.endswith("_rad") else own) or "-"
+    return f"{effect.subject} [{unit}]", 1.0
 
 
 def _declared_curve(plant: Plant, term: AeroTerm) -> Array:
@@ -192,7 +207,8 @@ def _estimates(answer: TraceAnswer) -> Panel:
             marks.append(
                 Mark(len(rows), estimate.value, low, high, label="estimate, 95 %", colour="vermillion")
             )
-            rows.append(f"{effect.name} {name} = {significant(estimate.value)}")
+            size = f"{significant(estimate.value)} {unit_of(effect.key, name)}".rstrip()
+            rows.append(f"{effect.name} {name} = {size}")
     known = (EFFECTS[e.key] for e in answer.effects if e.key in EFFECTS)
     neutral = {p.neutral for effect in known for p in effect.parameters if not p.is_location}
     return Panel(
@@ -225,4 +241,4 @@ def _motion(shown_: ShownRecord, channel: str = "q_rad_s") -> Panel:
     )
 
 
-__all__ = ["effect_panel", "line"]
+__all__ = ["effect_panel", "learned_panel", "line"]

@@ -20,7 +20,7 @@ from airtruth.units import printed
 
 MOST_CANDIDATES: Final = 8
 """Number of candidates in the text [-] (judgement: as many as a round refits)."""
-_FAR_SIGMA: Final = 2.0
+FAR_SIGMA: Final = 2.0
 """Declared standard deviations beyond which the verdict names a derivative [-] (convention)."""
 
 
@@ -75,12 +75,31 @@ def _conclusion(answer: TraceAnswer) -> str:
             f"Unexplained: the declared aircraft lacks something ({_evidence(answer.anomaly)}), and no candidate "
             "passes every acceptance test."
         )
-    alike = sorted({name for e in answer.effects for name in e.indistinguishable_from})
-    kind = "Learned" if answer.verdict == "learned" else "One of several" if alike else "Traced"
-    sentence = f"{_contradiction(answer)}{kind}: {_causes(answer)}"
+    alike = _alike(answer)
+    sentence = f"{_contradiction(answer)}{_kind(answer)}: {_causes(answer)}"
     if alike:
         sentence += f", or an effect that looks the same in these records: {', '.join(alike)}"
     return sentence + "."
+
+
+def headline(answer: TraceAnswer) -> str:
+    """The verdict in a few words, for the heading of a figure: ``Traced: vane_arm (provisional)``."""
+    if answer.effects:
+        words = f"{_kind(answer)}: {_listed([e.key for e in answer.effects])}"
+        words += "".join(f" or {name}" for name in _alike(answer))
+    else:
+        words = "No missing effect" if answer.verdict == "none" else "Unexplained residual"
+    return words + (" (provisional)" if answer.provisional else "")
+
+
+def _kind(answer: TraceAnswer) -> str:
+    """What an answer with effects states about them."""
+    return "Learned" if answer.verdict == "learned" else "One of several" if _alike(answer) else "Traced"
+
+
+def _alike(answer: TraceAnswer) -> list[str]:
+    """Effects that look the same as an accepted one."""
+    return sorted({name for e in answer.effects for name in e.indistinguishable_from})
 
 
 def _contradiction(answer: TraceAnswer) -> str:
@@ -91,7 +110,7 @@ def _contradiction(answer: TraceAnswer) -> str:
     far = [
         f"{name} {significant(s.estimate)} for {significant(s.declared)}"
         for name, s in declared.shifts.items()
-        if abs(s.sigma) > _FAR_SIGMA
+        if abs(s.sigma) > FAR_SIGMA
     ]
     shifts = f": {', '.join(far)}" if far else ""
     return f"The records contradict the declared model ({probability(declared.p_value)}){shifts}. "
@@ -285,10 +304,12 @@ def _wrapped(heading: str, words: str) -> list[str]:
 
 
 __all__ = [
+    "FAR_SIGMA",
     "as_trace_text",
     "detectable",
     "effect_details",
     "effect_line",
+    "headline",
     "increment_words",
     "interval",
     "largest_words",
