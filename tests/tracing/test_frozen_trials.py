@@ -5,6 +5,7 @@ The truth is validation/blind's own (docs/blind.md). Expected names are those of
 less in them are only required to answer.
 """
 
+import numpy as np
 import pytest
 
 from airtruth.logs.store import read_log
@@ -302,10 +303,24 @@ def test_three_effects_are_reported_where_a_branch_or_a_tie_led_elsewhere(tmp_pa
         assert truth <= set().union(*(names(e) for e in answer["effects"]))
 
 
-@pytest.mark.parametrize("number", [17, 26, 28, 30])
-def test_a_vane_with_friction_in_gusts_is_no_certain_lag(number, tmp_path):
-    """Four frictions of lambda 53 to 136 beyond the library that were a lag of the vane without reservation, or `none`."""
-    assert answered(20261827, number, "unmodelled", tmp_path)["provisional"]
+@pytest.mark.parametrize(
+    ("seed", "number"),
+    [(20261827, 17), (20261827, 26), (20261827, 28), (20261827, 30), (20262107, 2), (20262107, 27)],
+)
+def test_a_vane_with_friction_in_gusts_is_no_certain_lag(seed, number, tmp_path):
+    """Frictions of lambda 53 to 136 beyond the library that were a lag of the vane without reservation, or `none`."""
+    assert answered(seed, number, "unmodelled", tmp_path)["provisional"]
+
+
+@pytest.mark.parametrize(("number", "frequency_hz"), [(31, 8.458), (43, 7.517)])
+def test_a_mode_of_the_gyro_is_learned_beside_the_late_gyro_that_it_imitates(number, frequency_hz, tmp_path):
+    """Modes of lambda 117 and 34 beyond the library that were a late gyro without reservation; flown frequencies."""
+    answer = answered(20262107, number, "unmodelled", tmp_path)
+    assert answer["verdict"] == "learned"
+    assert answer["provisional"]
+    (mode,) = [e for e in answer["effects"] if e["name"] == "increment"]
+    assert mode["acts_on"] == "q_rad_s"
+    assert 1.0 / (2.0 * np.pi * mode["parameters"]["time_s"]["value"]) == pytest.approx(frequency_hz, rel=0.1)
 
 
 @pytest.mark.parametrize(

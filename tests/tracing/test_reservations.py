@@ -148,6 +148,15 @@ def test_an_error_of_the_vane_beside_a_friction_of_the_vane_is_provisional():
     assert reservations(effects("gyro_lag", "cg_shift"), (), friction_p_value=1e-9) == ()
 
 
+def test_a_vane_that_is_no_later_than_a_friction_makes_it_in_gusts_is_provisional():
+    late = AcceptedEffect("vane_lag", {"tau_s": ParameterEstimate(0.005, 0.0005, (0.004, 0.006))}, 1e-9, 5.0)
+    (reason,) = reservations([late], (), friction_lag_s=0.0051)
+    assert "looks like a lag of 5 ms, and vane_lag is not larger" in reason
+    assert reservations([late], (), friction_lag_s=0.0049) == ()
+    assert reservations(effects("gyro_lag", "vane_scale"), (), friction_lag_s=1.0) == ()
+    assert len(reservations([late], (), friction_p_value=DOUBT, friction_lag_s=0.0051)) == 1
+
+
 def shift(declared, declared_std, estimate, std):
     return DerivativeShift(
         declared, declared_std, estimate, std, (estimate - 2.0 * std, estimate + 2.0 * std), 0.0

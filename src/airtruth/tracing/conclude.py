@@ -38,6 +38,7 @@ from airtruth.tracing.declared_model import (
     remaining_evidence,
     with_axial_force,
 )
+from airtruth.tracing.friction import imitated_lag_s
 from airtruth.tracing.increment_table import in_physical_terms, increment_rows, least_certain
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, derivative_likelihood
 from airtruth.tracing.inference.hypothesis import is_curvature
@@ -102,7 +103,8 @@ def conclude(
     sizes = cause_sizes(likelihood, case.declared)
     verdict = _verdict((*stated, *along), declared)
     confirmed = confirmation(stages)
-    reserved = reservations((*stated, *along), sets, declared.p_value, rounds[-1].p_value_of(FRICTION))
+    friction = (last.p_value_of(FRICTION), imitated_lag_s(case.fitted, last.reported) if effects else 0.0)
+    reserved = reservations((*stated, *along), sets, declared.p_value, *friction)
     errors = stage_errors(stages)
     return TraceAnswer(
         verdict=verdict,

@@ -28,6 +28,8 @@ DOUBT: Final = 0.05
 """Probability of the test of a friction of the vane below which a named error of the vane is provisional [-] (convention)."""
 UNUSUAL: Final = 3.0
 """Size of a named cause over the standard deviation of its prior from which the names are provisional [-] (convention)."""
+_LATE_VANE: Final = ("vane_lag", "sensor_delay:alpha_rad")
+"""Effects that make the vane late, by a time [s]."""
 _AXIAL: Final = "CX"
 """Coefficient whose increments a wrong angle of attack imitates: ax shows them, after the effects of the other channels."""
 _ONE_EVENT: Final = frozenset({"cg_shift", "mass_error", "inertia_error"})
@@ -39,6 +41,7 @@ def reservations(
     sets: Sequence[Alternative],
     declared_p_value: float = 0.0,
     friction_p_value: float = 1.0,
+    friction_lag_s: float = 0.0,
 ) -> tuple[str, ...]:
     """Each reason against relying on the names of an answer, in words.
 
@@ -48,6 +51,7 @@ def reservations(
     sets : sets of causes with their posterior weights, the leading one first.
     declared_p_value : of the test of the declared model [-].
     friction_p_value : of the test of a friction of the vane where the effects have been added [-].
+    friction_lag_s : lag of the vane that a plausible friction imitates in these records, see `friction.imitated_lag_s` [s].
     """
     named = [e for e in effects if e.acts_on is None]
     listed = ", ".join(e.key for e in named)
@@ -104,7 +108,20 @@ def reservations(
             f"{', '.join(of_vane)}), and in gusts a friction of the vane looks like a lag: the name is provisional until the "
             "vane has been moved by hand on the ground with the log running"
         )
+    late = [e.key for e in named if e.key in _LATE_VANE and 0.0 < _value(e) <= friction_lag_s]
+    if late and not (of_vane and friction_p_value <= DOUBT):
+        found.append(
+            f"in the gusts of these records, a friction of the vane of 0.1 deg looks like a lag of {1e3 * friction_lag_s:.0f} "
+            f"ms, and {', '.join(late)} is not larger: the name is provisional until a flight in calm air shows it again, or "
+            "until the vane has been moved by hand on the ground with the log running"
+        )
     return tuple(found)
+
+
+def _value(effect: AcceptedEffect) -> float:
+    """Estimate of the first parameter of an effect of the library [unit of the parameter]."""
+    stated = _size(effect)
+    return 0.0 if stated is None else stated[1].value
 
 
 def _probability(effect: AcceptedEffect, sets: Sequence[Alternative]) -> float:

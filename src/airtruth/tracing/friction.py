@@ -1,0 +1,38 @@
+"""The lag of the vane that a friction of the vane imitates in gusts."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.model.parameters import PerRecord
+from airtruth.tracing.selection.omnibus import views
+
+PLAUSIBLE_RAD: Final = float(np.radians(0.1))
+"""Half width of the play of a plausible vane with friction [rad] (judgement: a dry bearing or a potentiometer)."""
+
+
+def imitated_lag_s(problem: TraceProblem, fitted: PosteriorFit) -> float:
+    """Lag of the vane [s] nearest to a friction of the half width `PLAUSIBLE_RAD`; 0 where a calm record shows the difference.
+
+    While the angle of attack moves, a vane with friction reads alpha - w sgn(alpha'), one with a lag alpha - T alpha'. The
+    mean square of the difference is least for T = w E|alpha'| / E alpha'^2. Gusts keep the vane moving, so that it does not
+    show where it sticks.
+
+    Source: equivalent linearisation, A. Gelb and W. E. Vander Velde, Multiple-Input Describing Functions, 1968, section 1.5.
+
+    Parameters
+    ----------
+    problem, fitted : records, and a fit of them; the motion is the one that the filter predicts.
+    """
+    airspeed_m_s = np.array([r.signals.airspeed_m_s.mean() for r in problem.records])
+    gust_rad = np.exp(fitted.point.per_record[:, PerRecord.log_gust]) / airspeed_m_s
+    if gust_rad.min() <= PLAUSIBLE_RAD:
+        return 0.0
+    rate_rad_s = np.concatenate([np.diff(v.alpha_rad) / v.dt_s for v in views(fitted, problem)])
+    return float(PLAUSIBLE_RAD * np.abs(rate_rad_s).mean() / np.square(rate_rad_s).mean())
+
+
+__all__ = ["PLAUSIBLE_RAD", "imitated_lag_s"]
