@@ -9,8 +9,9 @@ from airtruth.quantity import Ratio
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.answer import Alternative, DeclaredModel, DerivativeShift
 from airtruth.tracing.declared_model import traceable_errors
-from airtruth.tracing.notes import within_assumed_uncertainty
+from airtruth.tracing.notes import within_assumed_uncertainty, worse_free_run
 from airtruth.tracing.reservations import DOUBT, MANY, causes, reservations
+from airtruth.tracing.stage_errors import BySet, Errors, Rms
 
 
 def effects(*names):
@@ -171,6 +172,23 @@ def test_a_shift_within_an_uncertainty_that_is_assumed_is_a_note():
     assert "the records give Cmq -31.4 +- 0.20 for -43.0 +- 6.5;" in note
     assert not list(within_assumed_uncertainty(declared, {"Cmq": Ratio(value=-43.0, std=6.45)}))
     assert list(within_assumed_uncertainty(declared, {"Cmq": Ratio(value=-43.0)}))
+
+
+def errors_of(before, after):
+    stages = {
+        name: BySet(held_out=Rms({"alpha_rad": 0.01 * size, "q_rad_s": 0.04 * size}, {}))
+        for name, size in (("before", before), ("after", after))
+    }
+    return Errors({"alpha_rad": 0.02, "q_rad_s": 0.08}, stages)
+
+
+def test_a_worse_free_run_is_a_note():
+    (note,) = worse_free_run(errors_of(1.0, 1.07))
+    assert note.startswith(
+        "on the held-out records, the error of the free run is 7 % larger after than before"
+    )
+    assert not list(worse_free_run(errors_of(1.0, 1.019)))
+    assert not list(worse_free_run(Errors({}, {"before": BySet(), "after": BySet()})))
 
 
 def test_a_traceable_cause_contradicts_the_declared_model_in_four_of_five_flights():

@@ -129,7 +129,7 @@ def conclude(
         ),
         notes=(
             *reserved,
-            *notes(stages, last, declared, replay, forced),
+            *notes(stages, last, declared, errors, replay, forced),
             *_unwritten(case, stated, updated_aircraft, replay),
         ),
         tolerances=tolerances(stages),

@@ -16,7 +16,7 @@ from airtruth.tracing.model.compile import CHANNELS
 from airtruth.tracing.model.parameters import COLOUR_TIME_S, Common
 from airtruth.tracing.replay import disagreement
 from airtruth.tracing.selection.rounds import SearchRound
-from airtruth.tracing.stage_errors import Replay
+from airtruth.tracing.stage_errors import Errors, Replay
 from airtruth.tracing.stages import Stages, in_closed_loop
 
 Array = NDArray[np.float64]
@@ -27,6 +27,8 @@ is of no use to a reader)."""
 _FAR: Final = 5.0
 """Distance of an estimate from a declared derivative from which a note states it, in standard deviations of the estimate [-]
 (judgement: no chance over six derivatives)."""
+_WORSE: Final = 1.02
+"""Error of a free run after over that before, from which a note states it [-] (judgement)."""
 _IN_LOOP: Final = (
     "the elevator responds to the motion (a damper, an autopilot or a pilot): gusts move it too, so that the free run of a "
     "false model may come closer than that of the true one; the innovations remain a valid test"
@@ -35,7 +37,12 @@ _IN_LOOP: Final = (
 
 
 def notes(
-    stages: Stages, last: SearchRound, declared: DeclaredModel, replay: Replay | None, forced: Sequence[str]
+    stages: Stages,
+    last: SearchRound,
+    declared: DeclaredModel,
+    errors: Errors,
+    replay: Replay | None,
+    forced: Sequence[str],
 ) -> Iterator[str]:
     """Each note, in words.
 
@@ -43,6 +50,7 @@ def notes(
     ----------
     stages, last : assessed stages, and the last round of the search.
     declared : test of the declared model.
+    errors : of every stage.
     replay : records flown again in JSBSim, None where nothing was flown again.
     forced : faults of the logs that the caller overruled.
     """
@@ -52,6 +60,7 @@ def notes(
         yield from within_assumed_uncertainty(
             declared, stages.case.fitted.records[0].plant.aircraft.file.derivatives
         )
+    yield from worse_free_run(errors)
     if in_closed_loop(stages):
         yield _IN_LOOP
     if stages.case.left_out:
@@ -63,6 +72,25 @@ def notes(
         yield from disagreement(replay, stages)
     if forced:
         yield "the logs contradict physics and were traced all the same (--force): " + "; ".join(forced)
+
+
+def worse_free_run(errors: Errors) -> Iterator[str]:
+    """A free run of the held-out records whose error is larger after than before, however uncertain the difference is."""
+    before, after = (_relative_free_run(errors, stage) for stage in ("before", "after"))
+    if before and after and after > _WORSE * before:
+        yield (
+            f"on the held-out records, the error of the free run is {100.0 * (after / before - 1.0):.0f} % larger after than "
+            "before; `confirmed` states whether the difference is significant"
+        )
+
+
+def _relative_free_run(errors: Errors, stage: str) -> float | None:
+    """Root mean square over the channels of error over signal [-]; None where no record is held out."""
+    own = errors.stages.get(stage)
+    if own is None or own.held_out is None:
+        return None
+    relative = [error / errors.channels[channel] for channel, error in own.held_out.free_run.items()]
+    return float(np.sqrt(np.mean(np.square(relative))))
 
 
 def within_assumed_uncertainty(declared: DeclaredModel, stated: Mapping[str, Quantity]) -> Iterator[str]:
