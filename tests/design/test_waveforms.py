@@ -115,6 +115,8 @@ def test_extremes_are_those_of_the_flight():
     assert reached.share(Limits(airspeed=0.02)) == pytest.approx(2.5)
     assert reached.share(Limits(amplitude_rad=2.0 * DEG, alpha_rad=4.0 * DEG)) == pytest.approx(0.75)
     assert reached.share(Limits(load_factor=(0.0, 1.25))) == pytest.approx(2.0)
+    assert "deg/s, not limited, alpha" in reached.beside(Limits())
+    assert "of 10 deg/s, alpha" in reached.beside(Limits(rate_rad_s=10.0 * DEG))
 
 
 @pytest.mark.parametrize(

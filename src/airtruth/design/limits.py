@@ -122,9 +122,14 @@ class Extremes:
         """What is reached beside what is allowed, in words."""
         low, high = self.load_factor
         least, most = limits.load_factor
+        limit = (
+            f"of {limits.rate_rad_s / DEG:.3g} deg/s"
+            if math.isfinite(limits.rate_rad_s)
+            else "deg/s, not limited"
+        )
         return (
             f"elevator {self.elevator_rad / DEG:.3g} of {limits.amplitude_rad / DEG:.3g} deg, rate "
-            f"{self.rate_rad_s / DEG:.3g} of {limits.rate_rad_s / DEG:.3g} deg/s, alpha {self.alpha_rad / DEG:.3g} of "
+            f"{self.rate_rad_s / DEG:.3g} {limit}, alpha {self.alpha_rad / DEG:.3g} of "
             f"{limits.alpha_rad / DEG:.3g} deg about the trim, load factor {low:.3g} to {high:.3g} of {least:.3g} to "
             f"{most:.3g}, airspeed {100.0 * self.airspeed:.3g} of {100.0 * limits.airspeed:.3g} % from the trim"
         )
