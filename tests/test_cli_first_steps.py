@@ -113,6 +113,14 @@ def test_a_new_aircraft_loads(airtruth, tmp_path):
     assert set(aircraft.file.derivatives) == {"CLalpha", "CLq", "CLde", "Cmalpha", "Cmq", "Cmde"}
 
 
+def test_the_file_of_a_new_aircraft_has_one_name(airtruth, tmp_path):
+    code, _, err = airtruth("new", "aircraft", "--out", "mine.toml")
+    assert (code, "state the folder, for example --out mine" in err) == (2, True)
+    assert not list(tmp_path.glob("*.toml"))
+    assert airtruth("new", "aircraft", "--out", "mine/aircraft.toml")[0] == 0
+    assert (tmp_path / "mine" / "aircraft.toml").is_file()
+
+
 def test_a_new_mapping_imports_the_example(airtruth, tmp_path):
     code, out, _ = airtruth("new", "mapping", "--out", "map.toml")
     assert code == 0

@@ -116,6 +116,12 @@ def test_an_empty_folder_names_the_commands(tmp_path):
         report(tmp_path, tmp_path / "report.html")
 
 
+def test_a_file_that_holds_no_result_is_refused(tmp_path):
+    (tmp_path / "first.toml").write_text('name = "first"')
+    with pytest.raises(StoreError, match=r"first\.toml: holds no result; allowed: the folder of a trace"):
+        report(tmp_path / "first.toml", tmp_path / "report.html")
+
+
 def test_text_that_utf_8_cannot_hold_is_written_as_an_escape(tmp_path):
     page, *_ = write_files(Report("a \ud800 b", "", ""), tmp_path / "page.html", "html")
     assert page.read_text() == "a \\ud800 b"

@@ -12,6 +12,7 @@ from airtruth.cli.application import app, new_app
 from airtruth.cli.arguments import Replace
 from airtruth.cli.completion import complete_aircraft, complete_example
 from airtruth.cli.output import print_result
+from airtruth.errors import ConfigurationError
 
 Out = Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write.")]
 
@@ -84,6 +85,11 @@ def aircraft(
     force: Replace = False,
 ) -> None:
     """Write an aircraft from a JSBSim model, which is surveyed and trimmed, or a commented aircraft.toml without a model."""
+    if out.suffix == ".toml" and out.name != "aircraft.toml":
+        raise ConfigurationError(
+            f"--out {out}: the file of an aircraft is aircraft.toml in a folder of its own; state the folder, for example "
+            f"--out {quote(str(out.with_suffix('')))}"
+        )
     if jsbsim is not None:
         from airtruth.simulation.foreign_aircraft import new_from_jsbsim
 
@@ -92,7 +98,7 @@ def aircraft(
     from airtruth.logs.names import name_of
     from airtruth.starting import aircraft_text
 
-    folder = out.parent if out.suffix == ".toml" else out
+    folder = out.parent if out.name == "aircraft.toml" else out
     file = folder / "aircraft.toml"
     steps = [
         f"airtruth identify LOG.parquet --aircraft {quote(str(folder))}",

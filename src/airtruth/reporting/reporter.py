@@ -111,6 +111,11 @@ def _of_path(path: Path, logs: Logs | None, aircraft: Aircraft | None) -> Report
         return trace_report(*read_trace(path))
     if (path / TRUTH).is_file():
         return _of_campaign(open_campaign(path), logs, aircraft)
+    if path.is_file() and path.suffix != ".parquet":
+        raise StoreError(
+            f"{path}: holds no result; allowed: the folder of a trace, a loop or an identified campaign, its trace.json or "
+            "loop.json, or the Parquet file of estimates that `airtruth identify` writes"
+        )
     estimates = path if path.is_file() else path / ESTIMATES
     if estimates.is_file():
         from airtruth.reporting.campaign import read_estimates
