@@ -312,6 +312,15 @@ def test_a_vane_with_friction_in_gusts_is_no_certain_lag(seed, number, tmp_path)
     assert answered(seed, number, "unmodelled", tmp_path)["provisional"]
 
 
+@pytest.mark.parametrize(("number", "frequency_hz"), [(14, 2.998), (55, 1.623)])
+def test_a_sloshing_fuel_that_no_omnibus_test_shows_is_learned(number, frequency_hz, tmp_path):
+    """Fuel of lambda 53 and 65 beyond the library in moderate gusts, which was answered `none`; flown frequencies."""
+    answer = answered(20262127, number, "unmodelled", tmp_path)
+    assert answer["verdict"] == "learned"
+    mode = next(e for e in answer["effects"] if e["name"] == "increment")
+    assert 1.0 / (2.0 * np.pi * mode["parameters"]["time_s"]["value"]) == pytest.approx(frequency_hz, rel=0.1)
+
+
 @pytest.mark.parametrize(("number", "frequency_hz"), [(31, 8.458), (43, 7.517)])
 def test_a_mode_of_the_gyro_is_learned_beside_the_late_gyro_that_it_imitates(number, frequency_hz, tmp_path):
     """Modes of lambda 117 and 34 beyond the library that were a late gyro without reservation; flown frequencies."""

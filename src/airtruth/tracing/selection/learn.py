@@ -60,8 +60,8 @@ _PROMISING: Final = 0.2
 """Log evidence of a shape without a refit, over that of names without an anomaly, from which it is refitted instead [-]
 (judgement: refits have tripled it)."""
 _EVIDENT: Final = 7.0
-"""Log evidence of a shape without a refit from which it is refitted beside names that leave no anomaly [-] (judgement: beside
-true names the best of all shapes had 0 to 5.7 in 30 blind trials)."""
+"""Log evidence of a shape without a refit from which it is refitted where no anomaly remains [-] (judgement: beside true names
+the best of all shapes had 0 to 5.7 in 30 blind trials)."""
 _NAMES_LEAD: Final = 5.0
 """Log evidence by which increments alone have to lead for named effects to be given up [-] (judgement: a name is
 preferred to a curve)."""
@@ -77,10 +77,10 @@ def with_increments(
 ) -> tuple[SearchRound, ...]:
     """The rounds of a search with increments of what its effects leave.
 
-    Where named effects leave an anomaly, increments are learned beside them, and so are evident ones that leave none. Instead of
-    names they are learned in any case: names that fit may imitate what the library lacks. Causes of released derivatives have
-    such rivals where they leave the derivatives contradicted. The names remain unless increments alone have a much larger
-    evidence. Names that the increments make unnecessary are given up, and so is the release of the derivatives.
+    Where an anomaly remains, increments are learned beside the named effects, and so are evident ones where none remains.
+    Instead of names they are learned in any case: names that fit may imitate what the library lacks. Causes of released
+    derivatives have such rivals where they leave the derivatives contradicted. The names remain unless increments alone have a
+    much larger evidence. Names that the increments make unnecessary are given up, and so is the release of the derivatives.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ class _Learning:
             tried = [s for s in every if not (accepted and s.of_derivative)]
             least = 0.0
             if last.anomaly.p_value > REMAINS:
-                if accepted or not last.null.hypothesis.effects:
+                if accepted:
                     break
                 least = _EVIDENT
             candidates = self._candidates(last.null, last, tried, least)
