@@ -45,7 +45,7 @@ def swapped(t):
 
 
 CASES = {
-    "nan": (lambda: changed("q_rad_s", hole), "q_rad_s: 1 value.* NaN.*b0-run-0001.*row 100"),
+    "nan": (lambda: changed("q_rad_s", hole), "q_rad_s: one value is NaN.*b0-run-0001.*row 100"),
     "gap": (lambda: times(lambda t: t + 0.3 * (t > 2.0)), r"t_s: 1 gap.*0\.3.*b0-run-0001"),
     "uneven": (
         lambda: times(lambda t: t + 0.004 * np.sin(37.0 * t)),

@@ -121,7 +121,7 @@ def test_doubts_and_means_of_parts_are_those_of_all_runs(whole):
 
 def test_estimates_of_no_run_are_an_empty_chart(whole):
     chart = intervals_chart(whole.to_frame().iloc[:0])
-    assert chart.title.startswith("0 runs")
+    assert chart.title == "Derivatives of 0 runs"
     assert not any(panel.marks for panel in chart.panels)
 
 

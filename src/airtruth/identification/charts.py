@@ -71,7 +71,7 @@ def intervals_chart(
         else f"Mean of the converged runs; mean {percent} (thick); 95 % of the runs (thin)."
     )
     by = f"{len(methods)} methods" if len(methods) > 1 else "".join(methods)
-    title = f"Derivatives of {f'run {first}' if runs == 1 else f'{runs} runs'} by {by}"
+    title = f"Derivatives of {f'run {first}' if runs == 1 else f'{runs} runs'}" + (f" by {by}" if by else "")
     return Chart("intervals", title, panels, _COLUMNS, words)
 
 
