@@ -176,7 +176,7 @@ def test_an_accepted_effect_leads_the_candidates_with_its_gain(answer):
     assert "accepted; its refit gains" in line
     (panel,) = scores_chart(changed).panels
     assert panel.rows[0] == "elevator_delay"
-    assert panel.bars[0].words.startswith("refit gains")
+    assert panel.bars[0].words.startswith("accepted: refit gains")
     assert candidate_table(changed).rows[0][0] == "elevator_delay"
 
 

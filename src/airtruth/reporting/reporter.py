@@ -111,7 +111,7 @@ def _of_path(path: Path, logs: Logs | None, aircraft: Aircraft | None) -> Report
         return trace_report(*read_trace(path))
     if (path / TRUTH).is_file():
         return _of_campaign(open_campaign(path), logs, aircraft)
-    if path.is_file() and path.suffix != ".parquet":
+    if path.is_file() and path.suffix != ".parquet" and not _begins_as_parquet(path):
         raise StoreError(
             f"{path}: holds no result; allowed: the folder of a trace, a loop or an identified campaign, its trace.json or "
             "loop.json, or the Parquet file of estimates that `airtruth identify` writes"
@@ -132,6 +132,11 @@ def _of_path(path: Path, logs: Logs | None, aircraft: Aircraft | None) -> Report
         f"{path}: nothing to report; expected trace.json (`airtruth trace ... --out {shown}`) or {ESTIMATES} "
         f"(`airtruth identify {shown} --aircraft A --out {quote(str(path / ESTIMATES))}`)"
     )
+
+
+def _begins_as_parquet(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(4) == b"PAR1"
 
 
 def _of_campaign(campaign: Parted, logs: Logs | None, aircraft: Aircraft | None) -> Report:
