@@ -201,7 +201,8 @@ class _Search:
                 return rounds
             fitted = relocated(self.problem, own.tied[0].fit, placed=effect.key)
             again = (*again, replace(own, release=None))
-            left = tuple(e for e in begin.effects if e.key != effect.key)
+            accepted = {effect.key, *(e.key for e in fitted.hypothesis.effects)}
+            left = tuple(e for e in begin.effects if e.key not in accepted)
             starts = (*starts, RoundStart(fitted.hypothesis, fitted.point, left, settled=True, near=fitted))
         again = self.rounds(starts, again)
         simpler = len(_effects_of(again[-1])) < len(_effects_of(rounds[-1]))
