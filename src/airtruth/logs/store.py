@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from airtruth.arguments import require_whole
 from airtruth.channels import RUN_ID, SIGNALS, TIME
-from airtruth.errors import ConfigurationError, LogError, StoreError, choices
+from airtruth.errors import ConfigurationError, LogError, StoreError, choices, counted
 from airtruth.logs.atomic import atomic_file, write_text
 from airtruth.logs.flight_log import FlightLog, unknown_runs
 from airtruth.logs.remote import location
@@ -287,7 +287,7 @@ def _runs(path: Path, column: pa.ChunkedArray) -> tuple[tuple[str, ...], NDArray
         raise LogError(f"{path}: {RUN_ID} is {kind}, not a string; write the names of the runs as strings")
     if column.null_count:
         row = int(np.flatnonzero(column.is_null().to_numpy())[0])
-        rows = f"{column.null_count} row{'s' * (column.null_count > 1)}"
+        rows = counted(column.null_count, "row")
         raise LogError(
             f"{path}: {RUN_ID} is empty in {rows}, the first is row {row}; name the run of each row"
         )

@@ -38,7 +38,7 @@ from airtruth.tracing.declared_model import (
     remaining_evidence,
     with_axial_force,
 )
-from airtruth.tracing.friction import imitated_lag_s
+from airtruth.tracing.friction import LATE_VANE, imitated_lag_s
 from airtruth.tracing.increment_table import in_physical_terms, increment_rows, least_certain
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, derivative_likelihood
 from airtruth.tracing.inference.hypothesis import is_curvature
@@ -103,8 +103,9 @@ def conclude(
     sizes = cause_sizes(likelihood, case.declared)
     verdict = _verdict((*stated, *along), declared)
     confirmed = confirmation(stages)
-    friction = (last.p_value_of(FRICTION), imitated_lag_s(case.fitted, last.reported) if effects else 0.0)
-    reserved = reservations((*stated, *along), sets, declared.p_value, *friction)
+    late = any(e.key in LATE_VANE for e in stated)
+    lag_s = imitated_lag_s(case.fitted, last.reported) if late else 0.0
+    reserved = reservations((*stated, *along), sets, declared.p_value, last.p_value_of(FRICTION), lag_s)
     errors = stage_errors(stages)
     return TraceAnswer(
         verdict=verdict,

@@ -9,8 +9,11 @@ import numpy as np
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.parameters import PerRecord
 from airtruth.tracing.selection.omnibus import views
+from airtruth.units import DEG
 
-PLAUSIBLE_RAD: Final = float(np.radians(0.1))
+LATE_VANE: Final = frozenset({"vane_lag", "sensor_delay:alpha_rad"})
+"""Effects that make the vane late, by a time [s]."""
+PLAUSIBLE_RAD: Final = 0.1 * DEG
 """Half width of the play of a plausible vane with friction [rad] (judgement: a dry bearing or a potentiometer)."""
 
 
@@ -35,4 +38,4 @@ def imitated_lag_s(problem: TraceProblem, fitted: PosteriorFit) -> float:
     return float(PLAUSIBLE_RAD * np.abs(rate_rad_s).mean() / np.square(rate_rad_s).mean())
 
 
-__all__ = ["PLAUSIBLE_RAD", "imitated_lag_s"]
+__all__ = ["LATE_VANE", "PLAUSIBLE_RAD", "imitated_lag_s"]

@@ -14,8 +14,10 @@ from airtruth.effects.increment import NAME
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.answer import DECLARED_LEVEL, Alternative
+from airtruth.tracing.friction import LATE_VANE, PLAUSIBLE_RAD
 from airtruth.tracing.model.settings import VANE
 from airtruth.tracing.selection.explanation import USUAL_SIZES
+from airtruth.units import DEG
 
 MANY: Final = 3
 """Number of separate causes from which their names are provisional [-] (judgement: in the blind trials an effect outside
@@ -28,8 +30,6 @@ DOUBT: Final = 0.05
 """Probability of the test of a friction of the vane below which a named error of the vane is provisional [-] (convention)."""
 UNUSUAL: Final = 3.0
 """Size of a named cause over the standard deviation of its prior from which the names are provisional [-] (convention)."""
-_LATE_VANE: Final = ("vane_lag", "sensor_delay:alpha_rad")
-"""Effects that make the vane late, by a time [s]."""
 _AXIAL: Final = "CX"
 """Coefficient whose increments a wrong angle of attack imitates: ax shows them, after the effects of the other channels."""
 _ONE_EVENT: Final = frozenset({"cg_shift", "mass_error", "inertia_error"})
@@ -102,18 +102,18 @@ def reservations(
             "names are provisional"
         )
     of_vane = [e.key for e in named if e.key in EFFECTS and EFFECTS[e.key].channels == (VANE,)]
+    late = [e.key for e in named if e.key in LATE_VANE and 0.0 < _value(e) <= friction_lag_s]
     if of_vane and friction_p_value <= DOUBT:
         found.append(
             f"the vane moves less than gyro and accelerometer show where the motion turns (p = {friction_p_value:.2g} beside "
             f"{', '.join(of_vane)}), and in gusts a friction of the vane looks like a lag: the name is provisional until the "
             "vane has been moved by hand on the ground with the log running"
         )
-    late = [e.key for e in named if e.key in _LATE_VANE and 0.0 < _value(e) <= friction_lag_s]
-    if late and not (of_vane and friction_p_value <= DOUBT):
+    elif late:
         found.append(
-            f"in the gusts of these records, a friction of the vane of 0.1 deg looks like a lag of {1e3 * friction_lag_s:.0f} "
-            f"ms, and {', '.join(late)} is not larger: the name is provisional until a flight in calm air shows it again, or "
-            "until the vane has been moved by hand on the ground with the log running"
+            f"in the gusts of these records, a friction of the vane of {PLAUSIBLE_RAD / DEG:.1g} deg looks like a lag of "
+            f"{1e3 * friction_lag_s:.0f} ms, and {', '.join(late)} is not larger: the name is provisional until a flight in "
+            "calm air shows it again, or until the vane has been moved by hand on the ground with the log running"
         )
     return tuple(found)
 
