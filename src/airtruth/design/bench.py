@@ -24,9 +24,9 @@ from airtruth.simulation.manoeuvres import Manoeuvre, sample
 from airtruth.simulation.resolution import trimmed_and_linear
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import trim
+from airtruth.tracing.conditions import gust_length_m
 from airtruth.tracing.model.plant import Plant, probed
 from airtruth.tracing.model.records import TraceRecord, read
-from airtruth.tracing.prepare import gust_length_m
 
 Array = NDArray[np.float64]
 

@@ -32,8 +32,8 @@ from airtruth.simulation.campaign.file import (
 )
 from airtruth.simulation.manoeuvres import Manoeuvre
 from airtruth.simulation.simulator import Condition, jsbsim_model
+from airtruth.tracing.conditions import gust_length_m
 from airtruth.tracing.model.settings import declared_change, settings_of
-from airtruth.tracing.prepare import gust_length_m
 
 T = TypeVar("T")
 

@@ -15,26 +15,15 @@ from airtruth.aircraft import Aircraft, Sensor
 from airtruth.aircraft.tail import tail_geometry
 from airtruth.checks.excitation import LEAST_ELEVATOR_RAD
 from airtruth.effects.effect import Effect
-from airtruth.errors import ConfigurationError, FlightError, LogError, TrimError, choices
+from airtruth.errors import ConfigurationError, LogError, choices
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.composition import directions
-from airtruth.physics.gust_figures import gust_scales
 from airtruth.physics.reconstruction import is_reconstructed
 from airtruth.physics.short_period import PARAMETERS
-from airtruth.simulation.trim import Trim
+from airtruth.tracing.conditions import other_trims, records_of
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.model.plant import (
-    Plant,
-    declared_derivatives,
-    engines,
-    linear,
-    probed,
-    trim_of,
-    with_throttle,
-)
-from airtruth.tracing.model.records import FINE, Signals, TraceRecord, head_samples, read
-from airtruth.tracing.model.remainder import remainder
+from airtruth.tracing.model.records import FINE, Signals, TraceRecord, read
 from airtruth.tracing.model.settings import VANE, declared_change, resolved, settings_of
 from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.selection.explanation import DERIVATIVES, causes_of
@@ -43,26 +32,15 @@ from airtruth.units import DEG
 
 Array = NDArray[np.float64]
 
-_SAME_SPEED: Final = 0.03
-"""Relative difference in airspeed within which records share a plant [-] (judgement: 6 % in dynamic pressure, which
-the filter follows; more plants cost more probes of JSBSim)."""
-_SAME_ALTITUDE_M: Final = 200.0
-"""Difference in altitude within which records share a plant [m] (judgement: 2 % in density)."""
 _LEAST_SAMPLES: Final = 40
 """Least number of samples of a record [-] (judgement: fewer do not show a short period at 20 to 50 Hz)."""
 _THRUST_STD: Final = 0.05
 """Prior standard deviation of the thrust over its trimmed value, throttle logged [-] (judgement)."""
 _THRUST_UNKNOWN_STD: Final = 0.25
 """The same without a logged throttle [-] (judgement)."""
-_CLIMB_RAD: Final = 1.0 * DEG
-"""Flight-path angle below which a record starts in level flight [rad] (judgement: the noise of theta - alpha)."""
-_CLIMB_SAMPLES: Final = 10
-"""Number of samples at the start of a record whose mean is its flight-path angle [-] (judgement)."""
 _LEAD_S: Final = 3.0
 """Time before the second half of a record from which the filter runs [s] (judgement: several short periods, and time
 constants of slow sensors)."""
-_GUST_ALTITUDE_M: Final = (30.0, 20000.0)
-"""Altitudes between which the gust scales are evaluated [m] (judgement: within the range of MIL-F-8785C)."""
 _AIR: Final = "each record has its own gust level, and the measured airspeed contains the horizontal gusts"
 """Why an effect of the air is not tested."""
 _NO_VANE: Final = (
@@ -132,7 +110,7 @@ def prepare(
     notes = []
     if model != options.model:
         notes.append("the aircraft has no JSBSim model: it is traced with the linear short-period model")
-    records = _records(signals, aircraft, model, chosen)
+    records = records_of(signals, aircraft, model, chosen)
     fitted = tuple(r for r in records if r.signals.run_id not in chosen)
     has_throttle = all(r.signals.throttle is not None for r in fitted)
     has_vane = not any(is_reconstructed(log.channels) for log in logs)
@@ -143,6 +121,7 @@ def prepare(
     if len(fitted) == 1:
         notes.append("one record is fitted: each of its halves is left out in turn")
         fitted = _halves(fitted[0])
+    notes.extend(other_trims(records))
     if not held:
         notes.append("nothing is held out: the verdict is provisional")
     if not has_vane:
@@ -255,115 +234,6 @@ def _hold_out(runs: Sequence[str], options: TraceOptions) -> tuple[str, ...]:
     return tuple(options.hold_out)
 
 
-def _records(
-    signals: Sequence[Signals], aircraft: Aircraft, model: str, held: Sequence[str]
-) -> list[TraceRecord]:
-    """Records with the declared aircraft and the gusts of their flight conditions.
-
-    Fitted records of one condition share a plant. Held-out records have no influence on it; they have tables of their
-    own about the same trim, over the range that they reach.
-    """
-    records: dict[int, TraceRecord] = {}
-    for group in _conditions(signals, held):
-        everyone = [signals[i] for i in group]
-        members = [s for s in everyone if s.run_id not in held] or everyone
-        length = gust_length_m(float(np.mean([s.altitude_m for s in members])))
-        for i, plant in zip(group, _plants(everyone, members, aircraft, model), strict=True):
-            records[i] = TraceRecord(signals[i], plant, length, _remainder(signals[i], plant))
-    return [records[i] for i in range(len(signals))]
-
-
-def _conditions(signals: Sequence[Signals], held: Sequence[str]) -> list[list[int]]:
-    """Indices of the runs of each flight condition, fitted runs first."""
-    groups: list[list[int]] = []
-    for i, s in sorted(enumerate(signals), key=lambda item: item[1].run_id in held):
-        for group in groups:
-            first = signals[group[0]]
-            near = abs(s.airspeed_m_s.mean() / first.airspeed_m_s.mean() - 1.0) < _SAME_SPEED
-            if near and abs(s.altitude_m - first.altitude_m) < _SAME_ALTITUDE_M:
-                group.append(i)
-                break
-        else:
-            groups.append([i])
-    return groups
-
-
-def _plants(
-    everyone: Sequence[Signals], members: Sequence[Signals], aircraft: Aircraft, model: str
-) -> list[Plant]:
-    """The plant of each run of one flight condition; ``members`` are the runs that determine the condition."""
-    speed = float(np.mean([s.airspeed_m_s.mean() for s in members]))
-    density = float(np.mean([s.density_kg_m3.mean() for s in members]))
-    if model == "linear":
-        at = _trim(aircraft, members, speed, density) if aircraft.file.jsbsim is not None else None
-        derivatives = declared_derivatives(aircraft, at)
-        power = None if at is None else engines(aircraft, at)
-        starts = map(_start_of, everyone)
-        return [linear(aircraft, derivatives, speed, density, *start, power) for start in starts]
-    at = _trim(aircraft, members, speed, density)
-    plant = _probed(aircraft, at, members)
-    wider = plant if len(members) == len(everyone) else _probed(aircraft, at, everyone)
-    return [plant if any(s is m for m in members) else wider for s in everyone]
-
-
-def _remainder(s: Signals, plant: Plant) -> Array | None:
-    """What the JSBSim model has beyond the tables along a run; None for the linear model, and where it diverges."""
-    if plant.trim is None:
-        return None
-    try:
-        return remainder(s, plant)
-    except FlightError:
-        return None
-
-
-def _start_of(s: Signals) -> tuple[float, float]:
-    """Mean angle of attack and elevator [rad] over the start of a run."""
-    head = head_samples(s.dt_s)
-    return float(s.y[:head, 0].mean()), float(s.elevator_rad[: head * s.sub * FINE].mean())
-
-
-def _probed(aircraft: Aircraft, at: Trim, runs: Sequence[Signals]) -> Plant:
-    """Tables over the angles and pitch rates that the runs reach."""
-    rate = max(float(np.abs(s.y[:, 1]).max()) for s in runs)
-    return probed(
-        aircraft, at, _reach([s.y[:, 0] for s in runs]), _reach([s.elevator_rad for s in runs]), rate
-    )
-
-
-def _reach(series: Sequence[Array]) -> tuple[float, float]:
-    """Smallest and largest value."""
-    return min(float(x.min()) for x in series), max(float(x.max()) for x in series)
-
-
-def _trim(aircraft: Aircraft, members: Sequence[Signals], speed: float, density: float) -> Trim:
-    s = members[0]
-    climb = float(
-        np.mean(
-            [m.theta_rad[: _CLIMB_SAMPLES * m.sub].mean() - m.y[:_CLIMB_SAMPLES, 0].mean() for m in members]
-        )
-    )
-    gamma = climb if abs(climb) > _CLIMB_RAD else 0.0
-    for tried in (gamma, 0.0):
-        try:
-            at = trim_of(aircraft, speed, density, s.altitude_m, tried)
-            levers = [m.throttle for m in members if m.throttle is not None]
-            if levers:  # the logged throttle counts, not that of the declared trim
-                at = with_throttle(aircraft, at, float(np.mean(levers)))
-            return at
-        except TrimError as error:
-            problem = error
-    raise LogError(
-        f"the declared aircraft {aircraft.name} cannot fly steadily at the {speed:.3g} m/s and {s.altitude_m:.0f} m of "
-        f"run {s.run_id} ({problem}): is it another aircraft, or another unit of airspeed?"
-    )
-
-
-def gust_length_m(altitude_m: float) -> float:
-    """Scale length of the vertical gust [m] in light turbulence at an altitude [m]."""
-    lowest, highest = _GUST_ALTITUDE_M
-    return gust_scales("mil-f-8785c", "light", min(max(altitude_m, lowest), highest)).length_w_m
-
-
 def _halves(record: TraceRecord) -> tuple[TraceRecord, TraceRecord]:
     """The record cut where the elevator has made half of its travel, so that both parts are excited.
 
@@ -385,4 +255,4 @@ def _halves(record: TraceRecord) -> tuple[TraceRecord, TraceRecord]:
     return halves[0], halves[1]
 
 
-__all__ = ["Case", "gust_length_m", "prepare", "undo_input_sensors"]
+__all__ = ["Case", "prepare", "undo_input_sensors"]

@@ -1,0 +1,187 @@
+"""Flight conditions of the records of a trace: the declared aircraft and the gusts of each."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.aircraft import Aircraft
+from airtruth.errors import FlightError, LogError, TrimError
+from airtruth.physics.gust_figures import gust_scales
+from airtruth.simulation.trim import Trim
+from airtruth.tracing.model.plant import (
+    Plant,
+    declared_derivatives,
+    engines,
+    linear,
+    probed,
+    trim_of,
+    with_throttle,
+)
+from airtruth.tracing.model.records import FINE, Signals, TraceRecord, head_samples
+from airtruth.tracing.model.remainder import remainder
+from airtruth.units import DEG
+
+Array = NDArray[np.float64]
+
+_SAME_SPEED: Final = 0.03
+"""Relative difference in airspeed within which records share a plant [-] (judgement: 6 % in dynamic pressure, which
+the filter follows; more plants cost more probes of JSBSim)."""
+_SAME_ALTITUDE_M: Final = 200.0
+"""Difference in altitude within which records share a plant [m] (judgement: 2 % in density)."""
+_CLIMB_RAD: Final = 1.0 * DEG
+"""Flight-path angle below which a record starts in level flight [rad] (judgement: the noise of theta - alpha)."""
+_CLIMB_SAMPLES: Final = 10
+"""Number of samples at the start of a record whose mean is its flight-path angle [-] (judgement)."""
+_TRIM_SPEEDS: Final = 25
+"""Number of airspeeds of a record at which a trim is sought where there is none at its mean [-] (judgement: steps of 1 m/s
+in a record that loses half of 43 m/s)."""
+_OTHER_TRIM: Final = 2.0 * _SAME_SPEED
+"""Relative difference between trim and mean airspeed that is reported [-]: records of one condition differ by less."""
+_GUST_ALTITUDE_M: Final = (30.0, 20000.0)
+"""Altitudes between which the gust scales are evaluated [m] (judgement: within the range of MIL-F-8785C)."""
+
+
+def records_of(
+    signals: Sequence[Signals], aircraft: Aircraft, model: str, held: Sequence[str]
+) -> list[TraceRecord]:
+    """Records with the declared aircraft and the gusts of their flight conditions.
+
+    Fitted records of one condition share a plant. Held-out records have no influence on it; they have tables of their
+    own about the same trim, over the range that they reach.
+    """
+    records: dict[int, TraceRecord] = {}
+    for group in _conditions(signals, held):
+        everyone = [signals[i] for i in group]
+        members = [s for s in everyone if s.run_id not in held] or everyone
+        length = gust_length_m(float(np.mean([s.altitude_m for s in members])))
+        for i, plant in zip(group, _plants(everyone, members, aircraft, model), strict=True):
+            records[i] = TraceRecord(signals[i], plant, length, _remainder(signals[i], plant))
+    return [records[i] for i in range(len(signals))]
+
+
+def _conditions(signals: Sequence[Signals], held: Sequence[str]) -> list[list[int]]:
+    """Indices of the runs of each flight condition, fitted runs first."""
+    groups: list[list[int]] = []
+    for i, s in sorted(enumerate(signals), key=lambda item: item[1].run_id in held):
+        for group in groups:
+            first = signals[group[0]]
+            near = abs(s.airspeed_m_s.mean() / first.airspeed_m_s.mean() - 1.0) < _SAME_SPEED
+            if near and abs(s.altitude_m - first.altitude_m) < _SAME_ALTITUDE_M:
+                group.append(i)
+                break
+        else:
+            groups.append([i])
+    return groups
+
+
+def _plants(
+    everyone: Sequence[Signals], members: Sequence[Signals], aircraft: Aircraft, model: str
+) -> list[Plant]:
+    """The plant of each run of one flight condition; ``members`` are the runs that determine the condition."""
+    speed = float(np.mean([s.airspeed_m_s.mean() for s in members]))
+    density = float(np.mean([s.density_kg_m3.mean() for s in members]))
+    if model == "linear":
+        at = _trim(aircraft, members, speed, density) if aircraft.file.jsbsim is not None else None
+        derivatives = declared_derivatives(aircraft, at)
+        power = None if at is None else engines(aircraft, at)
+        starts = map(_start_of, everyone)
+        return [linear(aircraft, derivatives, speed, density, *start, power) for start in starts]
+    at = _trim(aircraft, members, speed, density)
+    plant = _probed(aircraft, at, members)
+    wider = plant if len(members) == len(everyone) else _probed(aircraft, at, everyone)
+    return [plant if any(s is m for m in members) else wider for s in everyone]
+
+
+def _remainder(s: Signals, plant: Plant) -> Array | None:
+    """What the JSBSim model has beyond the tables along a run; None for the linear model, and where it diverges."""
+    if plant.trim is None:
+        return None
+    try:
+        return remainder(s, plant)
+    except FlightError:
+        return None
+
+
+def _start_of(s: Signals) -> tuple[float, float]:
+    """Mean angle of attack and elevator [rad] over the start of a run."""
+    head = head_samples(s.dt_s)
+    return float(s.y[:head, 0].mean()), float(s.elevator_rad[: head * s.sub * FINE].mean())
+
+
+def _probed(aircraft: Aircraft, at: Trim, runs: Sequence[Signals]) -> Plant:
+    """Tables over the angles and pitch rates that the runs reach."""
+    rate = max(float(np.abs(s.y[:, 1]).max()) for s in runs)
+    return probed(
+        aircraft, at, _reach([s.y[:, 0] for s in runs]), _reach([s.elevator_rad for s in runs]), rate
+    )
+
+
+def _reach(series: Sequence[Array]) -> tuple[float, float]:
+    """Smallest and largest value."""
+    return min(float(x.min()) for x in series), max(float(x.max()) for x in series)
+
+
+def _trim(aircraft: Aircraft, members: Sequence[Signals], speed: float, density: float) -> Trim:
+    s = members[0]
+    climb = float(
+        np.mean(
+            [m.theta_rad[: _CLIMB_SAMPLES * m.sub].mean() - m.y[:_CLIMB_SAMPLES, 0].mean() for m in members]
+        )
+    )
+    gamma = climb if abs(climb) > _CLIMB_RAD else 0.0
+    for tried in (gamma, 0.0):
+        try:
+            at = trim_of(aircraft, speed, density, s.altitude_m, tried)
+            return _at_logged_throttle(aircraft, at, members)
+        except TrimError as error:
+            problem = error
+    for near in _reached_speeds(members, speed):
+        with contextlib.suppress(TrimError):
+            at = trim_of(aircraft, near, density, s.altitude_m, 0.0)
+            return _at_logged_throttle(aircraft, at, members)
+    raise LogError(
+        f"the declared aircraft {aircraft.name} cannot fly steadily at the {speed:.3g} m/s and {s.altitude_m:.0f} m of "
+        f"run {s.run_id}, nor at another airspeed that it reaches ({problem}): is it another aircraft, or another unit of "
+        "airspeed?"
+    )
+
+
+def _at_logged_throttle(aircraft: Aircraft, at: Trim, members: Sequence[Signals]) -> Trim:
+    """The trim at the mean of the logged throttle, which counts, not that of the declared trim."""
+    levers = [m.throttle for m in members if m.throttle is not None]
+    return with_throttle(aircraft, at, float(np.mean(levers))) if levers else at
+
+
+def _reached_speeds(members: Sequence[Signals], speed: float) -> list[float]:
+    """Airspeeds that the runs reach [m/s], those nearest to ``speed`` first."""
+    low = min(float(m.airspeed_m_s.min()) for m in members)
+    high = max(float(m.airspeed_m_s.max()) for m in members)
+    return sorted(np.linspace(low, high, _TRIM_SPEEDS).tolist(), key=lambda v: abs(v - speed))
+
+
+def other_trims(records: Sequence[TraceRecord]) -> list[str]:
+    """Notes on records at whose mean airspeed the declared aircraft cannot fly steadily."""
+    notes = []
+    for record in records:
+        at = record.plant.trim
+        mean = float(record.signals.airspeed_m_s.mean())
+        if at is not None and abs(at.airspeed_m_s / mean - 1.0) > _OTHER_TRIM:
+            notes.append(
+                f"{record.signals.run_id} has a mean airspeed of {mean:.3g} m/s, where the declared aircraft cannot fly "
+                f"steadily: its forces are those about a trim at {at.airspeed_m_s:.3g} m/s, taken to the airspeeds of the record"
+            )
+    return notes
+
+
+def gust_length_m(altitude_m: float) -> float:
+    """Scale length of the vertical gust [m] in light turbulence at an altitude [m]."""
+    lowest, highest = _GUST_ALTITUDE_M
+    return gust_scales("mil-f-8785c", "light", min(max(altitude_m, lowest), highest)).length_w_m
+
+
+__all__ = ["gust_length_m", "other_trims", "records_of"]
