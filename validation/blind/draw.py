@@ -443,6 +443,6 @@ def plain(trial: Trial) -> dict[str, Any]:
     """A trial as JSON data."""
     data = asdict(trial)
     for manoeuvre in data["manoeuvres"]:
-        del manoeuvre["measured"]
+        del manoeuvre["measured"], manoeuvre["samples_rad"]
         manoeuvre["highest_hz"] = min(manoeuvre["highest_hz"], _UNLIMITED_HZ)
     return data

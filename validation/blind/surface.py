@@ -33,13 +33,15 @@ class Manoeuvre:
 
     Attributes
     ----------
-    kind : "doublet", "3211" or "multisine"; amplitude [rad], start [s], unit step [s].
+    kind : "doublet", "3211", "multisine" or "sampled"; amplitude [rad], start [s], unit step [s].
     phases : of the multisine's lines [rad]; lines above ``highest_hz`` are left out.
     swing : largest change of the airspeed by a phugoid over the record, relative to that of the trim [-].
     shear : change of the airspeed by wind along the path over the record, likewise.
     damper_s : gain of a pitch damper [s].
     log_step_s : period of the log [s].
     measured : measured surface at 8 kHz from the lead on, deviation from trim [rad], in place of the input.
+    samples_rad : command of the kind "sampled" at 1 kHz from the start of the record, deviation from trim [rad]; linear
+        between samples, zero before the first.
     """
 
     kind: str
@@ -53,6 +55,7 @@ class Manoeuvre:
     damper_s: float = 0.0
     log_step_s: float = LOG_STEP_S
     measured: Array | None = field(default=None, compare=False)
+    samples_rad: Array | None = field(default=None, compare=False)
 
 
 _SEQUENCES: Final = {"doublet": (1, -1), "3211": (1, 1, 1, -1, -1, 1, -1)}
@@ -61,6 +64,9 @@ MULTISINE_HZ: Final = (0.4, 0.8, 1.2, 1.6, 2.0, 2.6, 3.2, 4.0, 5.0)
 
 def command(manoeuvre: Manoeuvre, time_s: Array) -> Array:
     """Deviation of the command from trim [rad] at any times [s]."""
+    if manoeuvre.samples_rad is not None:
+        samples = manoeuvre.samples_rad
+        return np.interp(time_s, np.arange(len(samples)) * STEP_S, samples, left=0.0)
     t = time_s - manoeuvre.start_s
     if manoeuvre.kind == "multisine":
         lines = zip(MULTISINE_HZ, manoeuvre.phases, strict=True)
