@@ -63,14 +63,15 @@ def test_it_is_its_slope_in_the_cell_of_the_trim():
     [
         (Shape("CL", "elevator", -0.1, 0.1, 4, 0.0), True),
         (Shape("Cm", "qhat", -0.01, 0.01, 4, 0.0), True),
-        (Shape("Cm", "alpha_dot_hat", -0.01, 0.01, 4, 0.0), False),
+        (Shape("Cm", "alpha_dot_hat", -0.01, 0.01, 4, 0.0), True),
+        (Shape("alpha_rad", "alpha", 0.0, 0.2, 4, 0.05), True),
+        (Shape("Cm", "alpha", 0.0, 0.2, 4, 0.05, Memory("lag", 0.2)), True),
+        (Shape("Cm", "alpha", 0.0, 0.2, 4, 0.05, None, "elevator", 0.0), True),
         (Shape("CX", "alpha", 0.0, 0.2, 4, 0.05), False),
-        (Shape("alpha_rad", "alpha", 0.0, 0.2, 4, 0.05), False),
-        (Shape("Cm", "alpha", 0.0, 0.2, 4, 0.05, Memory("lag", 0.2)), False),
-        (Shape("Cm", "alpha", 0.0, 0.2, 4, 0.05, None, "elevator", 0.0), False),
+        (Shape("alpha_rad", "qbar", 500.0, 900.0, 4, 700.0, Memory("lag", 0.1), "alpha", 0.1), False),
     ],
 )
-def test_a_function_has_a_slope_where_the_declaration_has_its_derivative(shape, has_slope):
+def test_every_function_has_a_slope_but_those_of_the_axial_force_and_of_a_lag(shape, has_slope):
     names = [p.name for p in increment(shape).parameters]
     assert ("slope" in names) == has_slope
     assert increment(shape).bends == 3 + has_slope
@@ -95,7 +96,7 @@ def test_a_linear_part_behind_a_lag_vanishes_at_rest():
 
 def test_a_prior_applies_to_the_bends_and_not_to_the_times():
     effect = increment(Shape("Cm", "alpha", 0.0, 0.2, 4, 0.05, Memory("lag", 0.2)), prior_std=0.01)
-    assert [p.prior_std for p in effect.parameters] == [0.01] * 3 + [math.inf]
+    assert [p.prior_std for p in effect.parameters] == [0.01] * 4 + [math.inf]
 
 
 def test_the_written_table_is_the_increment_and_flags_its_range(tmp_path):

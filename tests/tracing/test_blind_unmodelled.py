@@ -9,7 +9,7 @@ import pytest
 
 from airtruth.effects.registry import EFFECTS as LIBRARY
 from airtruth.tracing.options import TraceOptions
-from validation.blind import draw, refit, scoring, sensors, states, tracing
+from validation.blind import bands, draw, refit, scoring, sensors, states, tracing, truths
 from validation.blind.aircraft_xml import Body, Shape
 from validation.blind.figures import (
     ALPHA_TRIM_RAD,
@@ -184,3 +184,64 @@ def test_scores_of_leave_one_out():
     assert s["after_over_oracle"] == (1.1, 1)
     assert s["after_over_oracle_of_all"] == (pytest.approx(1.65), 4)
     assert s["after_over_oracle_of_curves"] == (pytest.approx(1.55), 2)
+
+
+def test_the_share_of_a_band_counts_the_samples_of_the_true_curve():
+    """A break of Cm of 0.4 at 0.1 rad, inertia 10 % high, no draw of a derivative; the answer's Cmalpha is 0.1 high."""
+    at = np.array([0.05, 0.1, 0.15, 0.2])
+    true = np.array([0.0, 0.0, 0.02, 0.04]) / 1.1 - 0.1 * (at - 0.05)
+    off = np.array([0.0, 0.0, 0.0, 0.01])
+    table = {
+        "at": at.tolist(),
+        "low": (true + off - 0.001).tolist(),
+        "high": (true + off + 0.001).tolist(),
+        "samples": [10, 20, 30, 40],
+        "trim": 0.05,
+    }
+    names = ("CLalpha", "CLq", "CLde", "Cmalpha", "Cmq", "Cmde")
+    declared = dict.fromkeys(names, 1.1)
+    stated = dict.fromkeys(names, 1.0) | {"Cmalpha": 1.1}
+    own = {"name": "increment", "acts_on": "Cm", "over": "alpha_rad", "states": [], "table": table}
+    truth = {
+        "trial": {
+            "effects": [
+                {"key": "cm_alpha_nonlinear:break", "values": {"dCmalpha": 0.4, "at_alpha_rad": 0.1}}
+            ],
+            "body": {"mass": 1.0, "inertia": 1.1, "cg": 0.0},
+        },
+        "increments": dict.fromkeys(names, 0.0),
+    }
+    answer = {"effects": [own], "derivatives": {"declared": declared, "after": stated}}
+    behind_a_lag = {**own, "states": [{"kind": "lag"}]}
+    assert bands.covered({"truth": truth, "answer": answer}) == [pytest.approx(0.6)]
+    assert bands.covered({"truth": truth, "answer": {**answer, "effects": [behind_a_lag]}}) == []
+    both = [{"truth": truth, "answer": answer}, {"truth": truth, "answer": {"failed": "no"}}]
+    assert bands.score(both) == (pytest.approx(0.6), 1)
+
+
+@pytest.mark.parametrize("key", sorted(bands.CURVES))
+def test_the_true_curve_of_a_band_is_that_of_the_flown_aircraft(key):
+    """A table or a sensor of the truth, evaluated by its own code, is the curve at angles about the trim."""
+    kind = truths.EFFECTS[key]
+    values = kind.values(0.3, 0.5)
+    parts = kind.parts(values)
+    x = np.linspace(-0.05, 0.2, 26)
+    curve = bands.CURVES[key].value(values, x)
+    if parts.faults:
+        expected = sensors.faulty(x, parts.faults, 0.001) - x
+    else:
+        (shape,) = parts.shapes
+        expected = shape.value * shaped(shape, x)
+    np.testing.assert_allclose(curve, expected, atol=1e-15)
+
+
+def shaped(shape, x):
+    """The shape of an increment by hand, the elevator at 1 rad where it multiplies."""
+    by_hand = {
+        "alpha-above": np.maximum(0.0, x - shape.at),
+        "alpha-square": (x - shape.at) ** 2,
+        "alpha-elevator": x - shape.at,
+        "elevator-below": np.minimum(0.0, x),
+        "elevator-odd-square": x * np.abs(x),
+    }
+    return by_hand[shape.shape]

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from airtruth.cluster import workers
 from airtruth.logs.store import write_text
-from validation.blind import results, scoring, set_scoring
+from validation.blind import bands, results, scoring, set_scoring
 from validation.blind.draw import MODES
 from validation.blind.trials import Plan, run
 
@@ -58,11 +58,12 @@ def main() -> int:
         cases = run(plan, arguments.jobs, cluster)
     scores = scoring.score(cases)
     sets = set_scoring.set_scores(cases)
-    text = results.markdown(scores, sets)
+    of_bands = bands.score(cases)
+    text = results.markdown(scores, sets, of_bands)
     folder = arguments.out / f"{plan.mode}-{plan.seed}"
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / "scores.md", text)
-    write_text(folder / "scores.json", results.as_json({**scores, "sets": sets}))
+    write_text(folder / "scores.json", results.as_json({**scores, "sets": sets, "bands": of_bands}))
     results.figures(scores, cases, folder)
     print(text)
     for failure in sorted(set(scores["failed"])):

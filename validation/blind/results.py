@@ -33,18 +33,26 @@ def _averaged(pair: tuple[float, int]) -> str:
     return f"{_number(pair[0])} (of {pair[1]})"
 
 
-def markdown(scores: Mapping[str, Any], sets: Mapping[str, Mapping[str, Any]] | None = None) -> str:
+def markdown(
+    scores: Mapping[str, Any],
+    sets: Mapping[str, Mapping[str, Any]] | None = None,
+    bands: tuple[float, int] | None = None,
+) -> str:
     """All scores; shares with their 95 % Clopper-Pearson intervals.
 
     Parameters
     ----------
     scores : of `scoring.score`.
     sets : of `set_scoring.set_scores`.
+    bands : of `bands.score`.
     """
     parts = [_of_sets(mode, one) for mode, one in (sets or {}).items()]
     of_sets = sum(one["trials"] for one in (sets or {}).values())
     if not of_sets or scores["trials"] - len(scores["failed"]) > of_sets:
         parts.append(_of_single_effects(scores))
+    if bands is not None and bands[1]:
+        share = f"{bands[0]:.2f} of the samples, mean of {bands[1]} tables"
+        parts.append(f"The 95 % band of a learned table contains the true curve about {share}.")
     return "\n\n".join(parts) + "\n"
 
 

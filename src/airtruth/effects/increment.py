@@ -8,9 +8,10 @@ s is the signal, or the state x of a first-order lag, of a mode or of a play tha
 cell. With a factor p, which counts from p0, the function is an increment of the derivative of p. With the factor x - p, x
 the lag of p with the time constant tau, it is the change of a lag's time constant over tau, small against one. The
 function is zero at the trim and constant outside the range in which it was learned. In the cell that holds the trim it
-is a straight line: of slope c/w over a signal that has a declared derivative, because a bend within the cell moves the
-mean slope away from the derivative, and zero over any other signal. The bends b_k and c have independent normal priors,
-which is the prior of an integrated random walk: a penalised linear spline.
+is a straight line of slope c/w: the slope of a function that nothing declares, and beside a declared derivative the part
+by which a bend within the cell moves the mean slope away from it. c is left out of an increment of CX, whose declared
+slope is a parameter of its own, and of a lag that changes. The bends b_k and c have independent normal priors, which is
+the prior of an integrated random walk: a penalised linear spline.
 
 Source: S. N. Wood, Generalized Additive Models, 2nd ed., 2017, sections 5.3 and 5.8 (splines as normal priors);
 D. Ruppert, M. P. Wand and R. J. Carroll, Semiparametric Regression, 2003, section 3.5 (truncated lines).
@@ -72,8 +73,6 @@ _SLOPE: Final = "slope"
 """Name of the rise c over the cell of the trim."""
 _HELD: Final = 1e-6
 """Standard deviation over its largest value of a slope that is held [-]: none but for rounding."""
-_DECLARED: Final = frozenset({"alpha", "elevator", "qhat"})
-"""Signals over which lift and moment have a declared derivative."""
 _REACH_OF_MEMORY: Final = 3.0
 """Largest ratio by which a refit may change a time constant or a half width [-] (judgement: the grid's steps are smaller)."""
 
@@ -154,7 +153,7 @@ class Shape:
     def coefficients(self) -> tuple[str, ...]:
         """Names of the coefficients of the function: of its bends, and of the slope where it has one."""
         bends = tuple(_bend(k) for k in range(len(self.knots)))
-        slope = self.acts_on in ("CL", "Cm") and self.signal in _DECLARED and not (self.memory or self.factor)
+        slope = self.acts_on != "CX" and not (self.memory and self.factor)
         return (*bends, _SLOPE) if bends and slope else bends
 
     @property
