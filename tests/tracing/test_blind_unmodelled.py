@@ -215,6 +215,7 @@ def test_the_share_of_a_band_counts_the_samples_of_the_true_curve():
     behind_a_lag = {**own, "states": [{"kind": "lag"}]}
     assert bands.covered({"truth": truth, "answer": answer}) == [pytest.approx(0.6)]
     assert bands.covered({"truth": truth, "answer": {**answer, "effects": [behind_a_lag]}}) == []
+    assert bands.covered({"truth": {"trial": {"effects": []}}, "answer": answer}) == []
     both = [{"truth": truth, "answer": answer}, {"truth": truth, "answer": {"failed": "no"}}]
     assert bands.score(both) == (pytest.approx(0.6), 1)
 

@@ -69,12 +69,12 @@ _SLOPES: Final = {
 
 def covered(case: Case) -> list[float]:
     """For each comparable table, the share of its samples that lie about a point where the band holds the true curve [-]."""
-    (truth, *others) = case["truth"]["trial"]["effects"]
-    curve = CURVES.get(truth["key"])
-    if curve is None or others:
+    flown = case["truth"]["trial"]["effects"]
+    curve = CURVES.get(flown[0]["key"]) if len(flown) == 1 else None
+    if curve is None:
         return []
     return [
-        _share(case, curve, truth["values"], effect["table"])
+        _share(case, curve, flown[0]["values"], effect["table"])
         for effect in case["answer"].get("effects", ())
         if effect["name"] == "increment" and effect.get("table") and not effect.get("states")
         if (effect["acts_on"], effect["over"], effect.get("by")) == (curve.acts_on, curve.over, curve.by)
