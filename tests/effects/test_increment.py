@@ -146,6 +146,7 @@ def test_a_single_break_is_still_written_as_a_formula(tmp_path):
             {"step": -0.01, "at": 0.11, "width": 0.03},
         ),
         ("curve", lambda x: 2.0 * (x - 0.06) ** 2, {"curvature": 2.0}),
+        ("line", lambda x: 5.0 * (x - 0.06), {"slope": 5.0}),
     ],
 )
 def test_closed_forms_recover_what_made_the_table(name, truth, expected):

@@ -117,6 +117,18 @@ def test_the_written_module_holds_the_closed_form():
     (effect,) = executed(effect_module(Answer(an_effect(value))))
     assert [p.name for p in effect.parameters] == ["slope", "at"]
     assert effect.change({"slope": -0.4, "at": 0.1}).aero[0].shape == "above"
+    assert "Learned from 0 to 0.2 rad; it extrapolates outside this range." in effect.source
+
+
+def test_the_written_module_of_a_derivative_that_changes_linearly_is_a_line():
+    """The table is Cmde = 5 (alpha - 0.09), the trim between two points."""
+    own = an_effect((5.0 * (np.linspace(0.0, 0.2, 9) - 0.09)).tolist())
+    pair = replace(own, table=replace(own.table, trim=0.09), by="elevator_rad", by_at=0.01)
+    (effect,) = executed(effect_module(Answer(pair)))
+    (term,) = effect.change({"slope": 5.0}).aero
+    assert [p.name for p in effect.parameters] == ["slope"]
+    assert (term.shape, term.signal, term.amplitude, term.at) == ("linear", "alpha", 5.0, 0.09)
+    assert (term.factor, term.factor_at) == ("elevator", 0.01)
 
 
 def behind_a_lag(acts_on, time_s):

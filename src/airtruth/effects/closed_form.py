@@ -1,4 +1,4 @@
-"""Short closed forms of a learned increment: a break, a step, a curve, or a part behind a state.
+"""Short closed forms of a learned increment: a line, a break, a step, a curve, or a part behind a state.
 
 A form is as good as the table if its weighted residual is no larger than the band allows: chi-square over the points
 that have samples, the standard deviations those of the band. Forms are compared with the table by their difference from
@@ -36,7 +36,7 @@ class ClosedForm:
 
     Attributes
     ----------
-    name : "break above", "break below", "step above", "step below" or "curve".
+    name : "line", "break above", "break below", "step above", "step below" or "curve".
     values : parameter -> value; a slope [1/unit of the signal], a location [unit of the signal], a step [-], a curvature
         [1/unit^2].
     statistic, degrees : weighted sum of squares, and points less parameters [-].
@@ -73,7 +73,7 @@ def closed_forms(
     at, value, std : (points,) of the signal, of the increment, and its standard deviation; points whose standard
         deviation is zero are those where the increment is zero by definition, and do not count; nor do those of infinite
         standard deviation, which have no samples.
-    trim : value of the signal at the trim, about which a curve is measured [unit of the signal].
+    trim : value of the signal at the trim, about which a curve and a line are measured [unit of the signal].
     of_pair : whether another signal multiplies the table; a constant is then a derivative, and no form may add one.
     """
     x, y, s = (np.asarray(v, dtype=np.float64) for v in (at, value, std))
@@ -114,6 +114,7 @@ def _forms(trim: float) -> dict[str, tuple[tuple[str, ...], _Form]]:
             lambda x, p: step(-x, np.array([p[0], -p[1], p[2]])),
         ),
         "curve": (("curvature",), lambda x, p: p[0] * (x - trim) ** 2),
+        "line": (("slope",), lambda x, p: p[0] * (x - trim)),
     }
 
 

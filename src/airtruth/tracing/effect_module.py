@@ -48,6 +48,7 @@ _TERMS: Final = {
             {term}("{c}", "{s}", "below", values["step"] / values["width"], values["at"] - values["width"]{by}),
         )""",
     "curve": '({term}("{c}", "{s}", "quadratic", values["curvature"], {trim!r}{by}),)',
+    "line": '({term}("{c}", "{s}", "linear", values["slope"], {trim!r}{by}),)',
     "share": """(
             {term}("{c}", "{s}", "linear", values["share"], {trim!r}),
             {term}("{c}", "{driver}", "linear", -values["share"], {trim!r}),
@@ -138,7 +139,7 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
         terms = _TERMS[form.name].format(term=term, c=e.acts_on, s=signal, driver=driver, trim=trim, by=by)
         sentence = (
             f"Closed form of the learned table ({form.name}): chi-square {form.statistic:.3g} over "
-            f"{form.degrees} degrees of freedom."
+            f"{form.degrees} degrees of freedom.{_beyond(form, e)}"
         )
     elif e.table is None:
         terms = _TERMS["share"].format(term=term, c=e.acts_on, s=signal, driver=driver, trim=0.0)
@@ -171,6 +172,15 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
         f'    explanation="Learned from flight logs: {e.variant}.",\n'
         f'    source="{sentence}",\n)\n'
     )
+
+
+def _beyond(form: ClosedForm, e: AcceptedEffect) -> str:
+    """A sentence on the flight outside the learned range, where a line, a break and a curve go on and a step does not."""
+    if e.table is None or form.name.startswith("step"):
+        return ""
+    unit = _UNITS.get(_SIGNALS[e.over or ""], "")
+    ends = " to ".join(f"{end:.4g}" for end in (e.table.at[0], e.table.at[-1]))
+    return f" Learned from {ends}{unit and ' '}{unit}; it extrapolates outside this range."
 
 
 def _form(e: AcceptedEffect) -> ClosedForm | None:
