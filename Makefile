@@ -16,7 +16,7 @@ BUDGET ?= 1
 AT := $(if $(STORE),--store $(STORE))
 CAMPAIGNS := light light-fit moderate moderate-fit
 
-.PHONY: planned check-study help setup setup-dev lock installed docs docs-links campaign campaign-quick loop study blind test test-slow test-long test-all fuzz robustness mutants lint kernels browser bench clean
+.PHONY: planned planned-ties check-study help setup setup-dev lock installed docs docs-links campaign campaign-quick loop study blind test test-slow test-long test-all fuzz robustness mutants lint kernels browser bench clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -74,6 +74,10 @@ fleet: $(READY) ## 35 aircraft of the JSBSim package surveyed, flown and traced 
 
 planned: $(DEVELOP) ## planned flights of six pairs of effects, flown and traced (about an hour; continues after an interruption)
 	$(BIN)/python -m studies.planned_flights --out $(OUT)/planned
+
+planned-ties: $(DEVELOP) ## the next flight after blind trials that leave a tie, planned, flown and traced (hours; continues after an interruption)
+	$(BIN)/python -m validation.blind --mode single --seed 20262102 --trials 446 --only-counted --jobs $(JOBS) --out $(OUT)/blind-ties
+	$(BIN)/python -m studies.planned_ties --blind $(OUT)/blind-ties --out $(OUT)/planned-ties --seed 20262161 --jobs $(JOBS)
 
 check-study: $(DEVELOP) ## 500 records with none to three sensor errors through `airtruth check` (about ten minutes)
 	$(BIN)/python -m studies.check_study --jobs $(JOBS)

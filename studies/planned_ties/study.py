@@ -39,6 +39,7 @@ from airtruth.simulation.campaign import file as campaign_file
 from airtruth.simulation.campaign.file import NO_GUST, Campaign
 from airtruth.simulation.campaign.plan import make, planned_runs
 from airtruth.tracing import trace
+from airtruth.tracing.selection.explanation import DERIVATIVES
 from studies.planned_flights import separations
 from validation.blind import draw
 from validation.blind.figures import STEP_S, STRONG
@@ -65,8 +66,8 @@ def ties(blind: Path) -> list[str]:
 def sets(answer: dict[str, Any]) -> list[list[str]]:
     """The sets of an answer that have several effects, those that an input can separate."""
     every = [[e["name"], *e["indistinguishable_from"]] for e in answer.get("effects", ())]
-    known = {effect.name for effect in EFFECTS.values()}
-    return [s for s in every if 1 < len(s) <= _PLANNABLE and known.issuperset(s)]
+    separable = {e.name for e in EFFECTS.values() if e.where != "air" and e.name != DERIVATIVES}
+    return [s for s in every if 1 < len(s) <= _PLANNABLE and separable.issuperset(s)]
 
 
 def one(blind: Path, name: str, out: Path, seed: int) -> str:
