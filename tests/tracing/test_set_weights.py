@@ -1,12 +1,16 @@
 """Weights of the sets that a search leaves, on rounds whose costs are stated."""
 
 import math
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import pytest
 
 from airtruth.effects.increment import Shape, increment
+from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.selection.acceptance import IMMATERIAL, OUTDONE
+from airtruth.tracing.selection.learn import chosen
+from airtruth.tracing.selection.rounds import Rival
 from airtruth.tracing.selection.weights import alike_in_rivals, rival_of, weights
 
 
@@ -229,3 +233,42 @@ def test_one_effect_more_weighs_by_its_score():
             ("gyro_lag", "gyro_scale"): math.exp(0.5 * 2.8**2 - 5.0),
         }
     )
+
+
+@dataclass(frozen=True)
+class Round:
+    """What the choice between names and increments reads of a round."""
+
+    tied: tuple[SimpleNamespace, ...]
+    rival: Rival | None = None
+
+
+CURVE = increment(Shape("Cm", "alpha", 0.0, 0.2, 8, 0.06))
+VANE = increment(Shape("alpha_rad", "alpha", 0.0, 0.2, 8, 0.06))
+
+
+def learned_round(effect):
+    return Round((SimpleNamespace(score=SimpleNamespace(effect=effect)),))
+
+
+NAMED = (Round(()),)
+
+
+@pytest.mark.parametrize(
+    ("beside", "alone", "lead", "expected"),
+    [
+        ((), CURVE, 5.1, {("cm_alpha_nonlinear",): -5.1}),
+        ((), VANE, 2.0, {("increment",): 2.0}),
+        ((), CURVE, 2.0, None),
+        ((VANE,), CURVE, 2.0, {("increment",): 2.0}),
+        ((), None, 2.0, None),
+    ],
+    ids=["in place of the name", "acts elsewhere", "acts where the name does", "beside an increment", "none"],
+)
+def test_increments_alone_take_the_place_of_names_or_are_their_rival(beside, alone, lead, expected):
+    """Names keep their place up to a lead of 5."""
+    grown = (*(learned_round(e) for e in beside), *NAMED)
+    rounds = NAMED if alone is None else (learned_round(alone), Round(()))
+    found = chosen(grown, rounds, lead, (EFFECTS["cm_alpha_nonlinear:quadratic"],), ())
+    assert (found[0].tied == rounds[0].tied) == (lead > 5.0 or alone is None)
+    assert (None if found[0].rival is None else found[0].rival.sets) == expected

@@ -124,12 +124,31 @@ def _learned(
     gain = bare[0].null.cost - (total_cost(last) - evidence)
     promising = _PROMISING * gain if last.anomaly.p_value > REMAINS else 0.0
     alone, alone_evidence = replace(learn, promising=promising).grown(bare)
-    lead = alone_evidence - gain
+    return chosen(grown, alone, alone_evidence - gain, named, explains)
+
+
+def chosen(
+    grown: tuple[SearchRound, ...],
+    alone: tuple[SearchRound, ...],
+    lead: float,
+    named: Sequence[Effect],
+    explains: Sequence[str],
+) -> tuple[SearchRound, ...]:
+    """The rounds with the named effects, or those of increments alone where these lead by far; the others are a rival.
+
+    Increments alone are no rival of names that act where they do and need no increment: a curve is as good as any name of it.
+
+    Parameters
+    ----------
+    grown, alone : rounds with names, and increments beside them where those were learned, and rounds of increments alone.
+    lead : log evidence of the second over the first [-].
+    named, explains : the named effects, and the names that explain released derivatives.
+    """
+    learned = tuple(c.score.effect for c in _accepted(alone))
     if len(alone) > 1 and lead > _NAMES_LEAD:
         names = tuple(sorted({*(e.name for e in named), *explains}))
         return (replace(alone[0], rival=Rival({names: -lead})), *alone[1:])
-    learned = tuple(c.score.effect for c in _accepted(alone))
-    if learned and grown is rounds and _acts_on(learned) != _acts_on(named):
+    if learned and (_accepted(grown) or _acts_on(learned) != _acts_on(named)):
         sets = {} if grown[0].rival is None else dict(grown[0].rival.sets)
         rival = Rival({**sets, tuple(sorted({e.name for e in learned})): lead})
         return (replace(grown[0], rival=rival), *grown[1:])
@@ -275,4 +294,4 @@ def _tied(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     return tuple(c for c in accepted if accepted[0].gain - c.gain <= TIE)
 
 
-__all__ = ["LEAST_RECORDS", "MOST_INCREMENTS", "with_increments"]
+__all__ = ["LEAST_RECORDS", "MOST_INCREMENTS", "chosen", "with_increments"]
