@@ -321,6 +321,13 @@ def test_a_sloshing_fuel_that_no_omnibus_test_shows_is_learned(number, frequency
     assert 1.0 / (2.0 * np.pi * mode["parameters"]["time_s"]["value"]) == pytest.approx(frequency_hz, rel=0.1)
 
 
+def test_a_hysteresis_that_no_omnibus_test_shows_is_learned(tmp_path):
+    """Hysteresis of Cm of lambda 70 beyond the library in calm air, which was answered `none`."""
+    answer = answered(20262157, 56, "unmodelled", tmp_path)
+    assert answer["verdict"] == "learned"
+    assert [e["variant"] for e in answer["effects"]] == ["Cm over a play of alpha_rad"]
+
+
 @pytest.mark.parametrize(("number", "frequency_hz"), [(31, 8.458), (43, 7.517)])
 def test_a_mode_of_the_gyro_is_learned_beside_the_late_gyro_that_it_imitates(number, frequency_hz, tmp_path):
     """Modes of lambda 117 and 34 beyond the library that were a late gyro without reservation; flown frequencies."""
