@@ -53,6 +53,15 @@ def records_of(
 
     Fitted records of one condition share a plant. Held-out records have no influence on it; they have tables of their
     own about the same trim, over the range that they reach.
+
+    Parameters
+    ----------
+    signals : runs; held : names of those that are held out; model : "aircraft" or "linear".
+
+    Raises
+    ------
+    LogError
+        If the aircraft has a trim at no airspeed that the records of a condition reach.
     """
     records: dict[int, TraceRecord] = {}
     for group in _conditions(signals, held):
@@ -165,7 +174,7 @@ def _reached_speeds(members: Sequence[Signals], speed: float) -> list[float]:
 
 
 def other_trims(records: Sequence[TraceRecord]) -> list[str]:
-    """Notes on records at whose mean airspeed the declared aircraft cannot fly steadily."""
+    """Notes on records at whose mean airspeed the declared aircraft cannot fly steadily, without a final period."""
     notes = []
     for record in records:
         at = record.plant.trim
