@@ -1,55 +1,91 @@
-"""Flight conditions of a trace where the declared aircraft cannot fly steadily at the mean airspeed of a record."""
+"""Records of two flight conditions: each has its own declared derivatives, prior and scale."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-import trace_flights as flights
+import trace_records as tr
 
 from airtruth.effects.registry import EFFECTS
-from airtruth.errors import LogError
-from airtruth.simulation.trim import trim
-from airtruth.tracing import TraceOptions
-from airtruth.tracing.prepare import prepare
+from airtruth.physics.terms import Change
+from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.optimise import fit, initial_parameters
+from airtruth.tracing.model.compile import compile_change
+from airtruth.tracing.model.parameters import Common
+from airtruth.tracing.model.response import pack_aircraft
+from airtruth.tracing.model.settings import common_prior
+from airtruth.units import DEG
 
-SLOW_M_S = 26.0
-"""An airspeed at which the trim of the T2 ends at full throttle."""
+pytestmark = pytest.mark.slow
+
+FAST = 1.3 * tr.V
+DECLARED_FAST = tr.TRUTH * [1.15, 0.9, 1.1, 0.8, 1.2, 0.9]
+MORE = np.array([0.15, -4.0, 0.03, -0.06, 3.0, 0.07])
+"""Increments of the derivatives that both conditions have in common, about one declared standard deviation each."""
+ARM_M = 0.3
+HYPOTHESIS = Hypothesis(Change(), (EFFECTS["vane_arm"],))
 
 
 @pytest.fixture(scope="module")
-def log(tmp_path_factory):
-    return flights.log_of(flights.fly(tmp_path_factory.mktemp("conditions") / "null"))
+def records():
+    """Two records at each of two airspeeds, with a vane arm."""
+    rng = np.random.default_rng(90)
+    made = []
+    for v, declared in ((tr.V, tr.TRUTH), (FAST, DECLARED_FAST)):
+        for amplitude in (2.0, -2.0):
+            plant = tr.plant(declared, v=v)
+            name = f"{v:.0f} {amplitude}"
+            one = tr.fly(rng, declared + MORE, 0.2, amplitude=amplitude * DEG, name=name, v=v, plant_=plant)
+            y = one.signals.y.copy()
+            y[:, 0] -= ARM_M / v * y[:, 1]
+            made.append(replace(one, signals=replace(one.signals, y=y)))
+    return made
 
 
-def with_airspeed(log, low_m_s, high_m_s):
-    """Every record with an airspeed that falls from the higher to the lower value."""
-    speed = np.concatenate([np.linspace(high_m_s, low_m_s, log.t_s[log.rows(i)].size) for i in range(3)])
-    return replace(log, channels={**log.channels, "airspeed_m_s": speed})
+def fitted(records):
+    problem = tr.problem(records)
+    start = initial_parameters(problem, HYPOTHESIS)
+    found = fit(problem, HYPOTHESIS, replace(start, sizes=np.array([0.1])))
+    assert found is not None
+    assert found.converged
+    return found
 
 
-def prepared(log, gtm):
-    return prepare([log], gtm, [EFFECTS["gyro_scale"]], TraceOptions())
+@pytest.fixture(scope="module")
+def forward(records):
+    return fitted(records)
 
 
-def test_a_trim_at_an_airspeed_that_the_record_passes(log, gtm):
-    """The trim is the nearest that exists, and a note states both airspeeds."""
-    case = prepared(with_airspeed(log, SLOW_M_S - 10.0, SLOW_M_S + 10.0), gtm)
-    notes = [note for note in case.notes if "cannot fly steadily" in note]
-    assert [note.split()[0] for note in notes] == list(log.run_ids)
-    at = case.fitted.records[0].plant.trim
-    assert at is not None
-    assert SLOW_M_S < at.airspeed_m_s < SLOW_M_S + 3.0
-    where = "mean airspeed of 26 m/s, where the declared aircraft cannot fly steadily"
-    assert f"{where}: its forces are those about a trim at {at.airspeed_m_s:.3g} m/s" in notes[0]
-    assert trim(gtm, at.condition).alpha_rad == pytest.approx(at.alpha_rad, abs=1e-6)
+def test_the_increments_are_common_to_both_conditions(forward):
+    """Simulated with the declared derivatives of each condition and the same increments: three standard errors."""
+    off = forward.point.common[Common.derivatives] - MORE
+    assert (np.abs(off) < 3.0 * forward.common_std[Common.derivatives]).all()
+    assert abs(forward.point.sizes[0] - ARM_M) < 3.0 * forward.size_std(0)
+    assert forward.size_std(0) < 0.1
 
 
-def test_no_airspeed_of_the_record_has_a_trim(log, gtm):
-    with pytest.raises(
-        LogError, match=r"gtm cannot fly steadily at the 26 m/s .* nor at another airspeed that it reaches"
-    ):
-        prepared(with_airspeed(log, SLOW_M_S - 1.0, SLOW_M_S + 1.0), gtm)
+def test_the_order_of_the_conditions_does_not_matter(records, forward):
+    order = [3, 1, 0, 2]
+    turned = fitted([records[i] for i in order])
+    assert turned.cost == pytest.approx(forward.cost, rel=1e-8)
+    std = np.sqrt(np.diag(forward.covariance))
+    shift = np.append(turned.point.common - forward.point.common, turned.point.sizes - forward.point.sizes)
+    np.testing.assert_allclose(shift / std, 0.0, atol=1e-5)
+    np.testing.assert_allclose(turned.point.per_record, forward.point.per_record[order], atol=1e-6)
+    np.testing.assert_allclose(turned.covariance, forward.covariance, rtol=1e-4, atol=1e-12)
 
 
-def test_no_note_where_the_aircraft_flies(log, gtm):
-    assert not [note for note in prepared(log, gtm).notes if "cannot fly steadily" in note]
+def test_the_inertia_turns_about_each_condition_s_own_derivatives():
+    """Increments of the moment: i times the declared derivatives of the condition."""
+    common = np.zeros(Common.size)
+    common[Common.inertia] = 0.05
+    for declared in (tr.TRUTH, DECLARED_FAST):
+        packed = pack_aircraft(tr.plant(declared), compile_change(Change()), common)
+        np.testing.assert_allclose(packed.increments[Common.moment], 0.05 * declared[3:], rtol=1e-12)
+
+
+def test_the_prior_of_two_conditions_is_their_mean_covariance(records):
+    """Covariances of the derivatives and of the inertia are averaged; precisions are not added."""
+    joint = [np.linalg.inv(common_prior([r], tr.SETTINGS)) for r in records]
+    both = np.linalg.inv(common_prior(records, tr.SETTINGS))
+    np.testing.assert_allclose(both, np.mean(joint, axis=0), rtol=1e-7, atol=1e-12)
