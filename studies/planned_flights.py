@@ -53,6 +53,7 @@ from airtruth.simulation.linearise import linearise
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import trim
 from airtruth.tracing import TraceOptions, trace
+from airtruth.tracing.answer import TraceAnswer
 from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.model.plant import declared_covariance
 from airtruth.tracing.prepare import Case, prepare
@@ -256,16 +257,22 @@ def traced(
     flying.fly(campaign, folder, 1)
     began = time.perf_counter()
     answer = trace(folder, gtm, TraceOptions(effects=CANDIDATES)).answer
-    names = [[e.name, *e.indistinguishable_from] for e in answer.effects]
     return {
         "truth": member.effect.key,
         "values": values,
-        "verdict": answer.verdict,
-        "provisional": answer.provisional,
-        "sets": names,
-        "variants": [[e.key, *e.other_variants] for e in answer.effects],
+        **summary(answer),
         "consistent": None if answer.declared_model is None else answer.declared_model.consistent,
         "seconds": time.perf_counter() - began,
+    }
+
+
+def summary(answer: TraceAnswer) -> dict[str, Any]:
+    """What both studies keep of an answer: its verdict, and the names and the variants of each set."""
+    return {
+        "verdict": answer.verdict,
+        "provisional": answer.provisional,
+        "sets": [[e.name, *e.indistinguishable_from] for e in answer.effects],
+        "variants": [[e.key, *e.other_variants] for e in answer.effects],
     }
 
 

@@ -22,7 +22,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from airtruth import aircraft as planes
 from airtruth.api.plans import base_campaign
 from airtruth.design import PlanOptions, SplitResult
 from airtruth.design.from_files import Stated, planned_from
+from airtruth.design.question import MOST, is_separable
 from airtruth.effects.registry import EFFECTS
 from airtruth.errors import AirtruthError
 from airtruth.logs.atomic import write_text
@@ -39,15 +40,12 @@ from airtruth.simulation.campaign import file as campaign_file
 from airtruth.simulation.campaign.file import NO_GUST, Campaign
 from airtruth.simulation.campaign.plan import make, planned_runs
 from airtruth.tracing import trace
-from airtruth.tracing.selection.explanation import DERIVATIVES
-from studies.planned_flights import separations
+from studies.planned_flights import separations, single, summary
 from validation.blind import draw
 from validation.blind.figures import STEP_S, STRONG
+from validation.blind.scoring import base
 from validation.blind.surface import Manoeuvre
 from validation.blind.trials import flown_apart
-
-_PLANNABLE: Final = 4
-"""Most effects that one flight separates (docs/plan.md)."""
 
 
 def ties(blind: Path) -> list[str]:
@@ -57,8 +55,7 @@ def ties(blind: Path) -> list[str]:
         answer = json.loads(path.read_text())
         truth = json.loads((blind / "truth" / path.name).read_text())
         (key,) = [effect["key"] for effect in truth["trial"]["effects"]]
-        name = key.partition(":")[0]
-        if truth["lambda"][key] > STRONG and any(name in tie for tie in sets(answer)):
+        if truth["lambda"][key] > STRONG and any(base(key) in tie for tie in sets(answer)):
             found.append(path.stem)
     return found
 
@@ -66,8 +63,8 @@ def ties(blind: Path) -> list[str]:
 def sets(answer: dict[str, Any]) -> list[list[str]]:
     """The sets of an answer that have several effects, those that an input can separate."""
     every = [[e["name"], *e["indistinguishable_from"]] for e in answer.get("effects", ())]
-    separable = {e.name for e in EFFECTS.values() if e.where != "air" and e.name != DERIVATIVES}
-    return [s for s in every if 1 < len(s) <= _PLANNABLE and separable.issuperset(s)]
+    separable = {e.name for e in EFFECTS.values() if is_separable(e)}
+    return [s for s in every if 1 < len(s) <= MOST and separable.issuperset(s)]
 
 
 def one(blind: Path, name: str, out: Path, seed: int) -> str:
@@ -75,7 +72,7 @@ def one(blind: Path, name: str, out: Path, seed: int) -> str:
     truth = json.loads((blind / "truth" / f"{name}.json").read_text())
     answer = json.loads((blind / "answer" / f"{name}.json").read_text())
     drawn = truth["trial"]
-    trial = draw.draw(drawn["seed"], drawn["number"], name.split("-")[0])
+    trial = draw.draw(drawn["seed"], drawn["number"], drawn["composition"])
     folder = out / name
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / "trace.json", json.dumps(answer))
@@ -91,7 +88,9 @@ def one(blind: Path, name: str, out: Path, seed: int) -> str:
 def flown_and_traced(trial: draw.Trial, first_log: Path, folder: Path, seed: int) -> dict[str, Any]:
     """The planned flight of one trial, its separations, and the answer to both flights."""
     gtm = planes.load("gtm")
-    result = planned_from(base(trial.air), Stated(trace=folder / "trace.json"), None, PlanOptions(seed=seed))
+    result = planned_from(
+        campaign_in(trial.air), Stated(trace=folder / "trace.json"), None, PlanOptions(seed=seed)
+    )
     assert isinstance(result, SplitResult)
     write_text(folder / "next.toml", result.to_toml())
     campaigns = {"planned": result.campaign, "reference": result.reference_campaign}
@@ -117,17 +116,10 @@ def flown_and_traced(trial: draw.Trial, first_log: Path, folder: Path, seed: int
     second = replace(log, run_ids=tuple(f"planned-{run}" for run in log.run_ids))
     write_log(folder / "second.parquet", second)
     answered = trace([first_log, folder / "second.parquet"], gtm).answer
-    return facts | {
-        "answer": {
-            "verdict": answered.verdict,
-            "provisional": answered.provisional,
-            "sets": [[e.name, *e.indistinguishable_from] for e in answered.effects],
-            "keys": [[e.key, *e.other_variants] for e in answered.effects],
-        }
-    }
+    return facts | {"answer": {"truth": trial.effects[0].key, **summary(answered)}}
 
 
-def base(air: str) -> Campaign:
+def campaign_in(air: str) -> Campaign:
     """Condition, rates and sensors of the trials, in their air."""
     campaign = base_campaign(None, False, "gtm")
     assert isinstance(campaign, Campaign)
@@ -167,11 +159,11 @@ def report(out: Path) -> str:
         ratios = [j["planned"] / j["reference"] for j in facts["jsbsim"] if j["reference"] > 0.0]
         expected.append(facts["ratio"])
         reached += ratios
-        alone = single(facts)
-        broken += alone
         answer = facts["answer"]
+        alone = single(answer)
+        broken += alone
         names = "; ".join(", ".join(names) for names in answer["sets"]) or answer["verdict"]
-        truth = facts["truth"][0]["key"].partition(":")[0]
+        truth = base(answer["truth"])
         wrong += bool(answer["sets"]) and not any(truth in names for names in answer["sets"])
         named += bool(answer["sets"])
         shown = ", ".join(f"{r:.2f}" for r in ratios)
@@ -185,14 +177,3 @@ def report(out: Path) -> str:
             f"{np.median(expected):.2f}, in JSBSim {np.median(reached):.2f}"
         )
     return "\n".join(lines)
-
-
-def single(facts: dict[str, Any]) -> bool:
-    """Whether the answer has the true effect in a set of one."""
-    key = facts["truth"][0]["key"]
-    name = key.partition(":")[0]
-    answer = facts["answer"]
-    return any(
-        own == [name] and (keys == [key] or ":" not in key)
-        for own, keys in zip(answer["sets"], answer["keys"], strict=True)
-    )

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from airtruth.simulation.campaign.file import Campaign
+from studies.planned_flights import single
 from studies.planned_ties import study
 from validation.blind import surface
 
@@ -60,7 +61,7 @@ def facts(truth, sets, keys=None, jsbsim=((2.0, 1.0), (3.0, 2.0)), ratio=2.5):
         "sigma": 4.0,
         "ratio": ratio,
         "jsbsim": [{"planned": a, "reference": b} for a, b in jsbsim],
-        "answer": {"verdict": "traced", "sets": sets, "keys": keys or sets},
+        "answer": {"truth": truth, "verdict": "traced", "sets": sets, "variants": keys or sets},
     }
 
 
@@ -75,7 +76,7 @@ def facts(truth, sets, keys=None, jsbsim=((2.0, 1.0), (3.0, 2.0)), ratio=2.5):
     ],
 )
 def test_a_tie_is_broken_by_a_set_of_the_true_effect_alone(truth, sets, keys, alone):
-    assert study.single(facts(truth, sets, keys)) is alone
+    assert single(facts(truth, sets, keys)["answer"]) is alone
 
 
 def test_the_report_counts_ties_wrong_names_and_ratios(tmp_path):

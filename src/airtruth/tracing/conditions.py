@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Sequence
 from typing import Final
 
@@ -143,20 +142,18 @@ def _trim(aircraft: Aircraft, members: Sequence[Signals], speed: float, density:
         )
     )
     gamma = climb if abs(climb) > _CLIMB_RAD else 0.0
-    for tried in (gamma, 0.0):
+    level = (speed, 0.0)
+    problems: dict[tuple[float, float], TrimError] = {}
+    for tried in dict.fromkeys([(speed, gamma), level, *((v, 0.0) for v in _reached_speeds(members, speed))]):
         try:
-            at = trim_of(aircraft, speed, density, s.altitude_m, tried)
+            at = trim_of(aircraft, tried[0], density, s.altitude_m, tried[1])
             return _at_logged_throttle(aircraft, at, members)
         except TrimError as error:
-            problem = error
-    for near in _reached_speeds(members, speed):
-        with contextlib.suppress(TrimError):
-            at = trim_of(aircraft, near, density, s.altitude_m, 0.0)
-            return _at_logged_throttle(aircraft, at, members)
+            problems[tried] = error
     raise LogError(
         f"the declared aircraft {aircraft.name} cannot fly steadily at the {speed:.3g} m/s and {s.altitude_m:.0f} m of "
-        f"run {s.run_id}, nor at another airspeed that it reaches ({problem}): is it another aircraft, or another unit of "
-        "airspeed?"
+        f"run {s.run_id}, nor at another airspeed that it reaches ({problems[level]}): is it another aircraft, or another "
+        "unit of airspeed?"
     )
 
 
@@ -182,7 +179,8 @@ def other_trims(records: Sequence[TraceRecord]) -> list[str]:
         if at is not None and abs(at.airspeed_m_s / mean - 1.0) > _OTHER_TRIM:
             notes.append(
                 f"{record.signals.run_id} has a mean airspeed of {mean:.3g} m/s, where the declared aircraft cannot fly "
-                f"steadily: its forces are those about a trim at {at.airspeed_m_s:.3g} m/s, taken to the airspeeds of the record"
+                f"steadily: its forces are those about a trim at {at.airspeed_m_s:.3g} m/s, evaluated at the airspeeds of the "
+                "record"
             )
     return notes
 

@@ -60,8 +60,8 @@ _PROMISING: Final = 0.2
 """Log evidence of a shape without a refit, over that of names without an anomaly, from which it is refitted instead [-]
 (judgement: refits have tripled it)."""
 _EVIDENT: Final = 5.0
-"""Log evidence of a shape without a refit from which it is refitted where no anomaly remains [-] (judgement: a refit of what is
-true has tripled it, and one of what is not costs a few seconds)."""
+"""Log evidence of a shape without a refit from which it is refitted where no anomaly remains [-] (judgement: refits of
+true shapes have tripled it, and a refit of a wrong one costs a few seconds)."""
 _NAMES_LEAD: Final = 5.0
 """Log evidence by which increments alone have to lead for named effects to be given up [-] (judgement: a name is
 preferred to a curve)."""
@@ -136,7 +136,8 @@ def chosen(
 ) -> tuple[SearchRound, ...]:
     """The rounds with the named effects, or those of increments alone where these lead by far; the others are a rival.
 
-    Increments alone are no rival of names that act where they do and need no increment: a curve is as good as any name of it.
+    Increments alone are no rival of names that need no increment beside them and act on the same coefficients and channels,
+    because a curve can imitate any name there.
 
     Parameters
     ----------
