@@ -1,6 +1,7 @@
 """Learned increments: the spline and its terms, the table that an aircraft flies, and the closed forms of a table."""
 
 import math
+from dataclasses import replace
 
 import jsbsim
 import numpy as np
@@ -81,6 +82,27 @@ def test_a_held_slope_has_next_to_no_prior_deviation():
     held = increment(SHAPE, prior_std=0.01).with_slope_held()
     assert [p.prior_std for p in held.parameters[:-1]] == [0.01] * 7
     assert held.parameters[-1].prior_std < 1e-5 * held.parameters[-1].high
+
+
+@pytest.mark.parametrize(
+    ("cell", "expected"),
+    [
+        (4, lambda u: np.clip((u - 0.10) / 0.02, 0.0, 1.0)),
+        (0, lambda u: np.clip((u - 0.04) / 0.02, -1.0, 0.0)),
+        (2, lambda u: (np.clip(u, 0.06, 0.08) - 0.07) / 0.02),
+    ],
+    ids=["above the trim", "below", "about it"],
+)
+def test_a_step_rises_over_its_cell_and_is_zero_at_the_trim(cell, expected):
+    """The cells are 0.02 rad wide from 0.02 rad, the trim is 0.07 rad."""
+    effect = increment(replace(SHAPE, memory=Memory("play", half_width=0.005), step_cell=cell))
+    change = effect.change({"step": -0.01})
+    x = np.linspace(0.0, 0.2, 81)
+    assert [p.name for p in effect.parameters] == ["step"]
+    assert {t.signal for t in change.aero} == {change.states[0].name}
+    assert change.states[0].half_width == 0.005
+    np.testing.assert_allclose(total(change, x), -0.01 * expected(x), atol=1e-15)
+    np.testing.assert_allclose(effect.shape.basis(x)[:, 0], expected(x), atol=1e-13)
 
 
 def test_a_linear_part_behind_a_lag_vanishes_at_rest():

@@ -339,6 +339,28 @@ def test_a_mode_of_the_gyro_is_learned_beside_the_late_gyro_that_it_imitates(num
     assert 1.0 / (2.0 * np.pi * mode["parameters"]["time_s"]["value"]) == pytest.approx(frequency_hz, rel=0.1)
 
 
+def test_a_moment_that_switches_is_learned_as_a_step_behind_a_play(tmp_path):
+    """Separation that comes 1.2 deg above the trim and goes at 0.4 deg, lambda 160 beyond the library: a step at 0.8 deg behind
+    a play of 0.4 deg. The answer was `none`."""
+    answer = answered(20262157, 69, "unmodelled", tmp_path)
+    assert answer["verdict"] == "learned"
+    step = next(e for e in answer["effects"] if e["variant"] == "Cm over a play of alpha_rad")
+    assert {e["name"] for e in answer["effects"]} == {"increment"}
+    assert list(step["parameters"]) == ["step"]
+    at, value = (np.array(step["table"][key]) for key in ("at", "value"))
+    rise = np.argmax(np.abs(np.diff(value)))
+    location = 0.5 * (at[rise] + at[rise + 1]) - step["table"]["trim"]
+    assert location == pytest.approx(np.radians(0.8), abs=np.radians(0.3))
+    assert step["states"][0]["half_width"] == pytest.approx(np.radians(0.4), abs=np.radians(0.15))
+
+
+def test_a_mode_of_the_gyro_with_as_much_evidence_is_a_rival_of_the_late_gyro(tmp_path):
+    """A mode of 7.96 Hz, lambda 35 beyond the library, was a late gyro without reservation."""
+    answer = answered(20262157, 74, "unmodelled", tmp_path)
+    assert answer["provisional"]
+    assert "increment" in answer["effects"][0]["indistinguishable_from"]
+
+
 @pytest.mark.parametrize(
     ("number", "verdict"), [(2, "learned"), (11, "learned"), (29, "traced"), (36, "traced")]
 )

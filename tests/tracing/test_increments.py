@@ -34,8 +34,14 @@ from airtruth.tracing.model.parameters import Parameters, size_index
 from airtruth.tracing.presentation.text import increment_words
 from airtruth.tracing.selection.acceptance import SUPERSEDED, Candidate
 from airtruth.tracing.selection.explanation import CauseSet
-from airtruth.tracing.selection.increment_fit import FittedIncrement, evidence_score, redundant_increment
-from airtruth.tracing.selection.increments import flown, log_evidences, shapes
+from airtruth.tracing.selection.increment_fit import (
+    FittedIncrement,
+    effective_bends,
+    evidence_score,
+    is_apart_from_zero,
+    redundant_increment,
+)
+from airtruth.tracing.selection.increments import flown, log_evidences, screen, shapes, sharpened
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.release import Release
 from airtruth.tracing.selection.rounds import RoundStart, search_round
@@ -260,6 +266,29 @@ def test_hysteresis_has_its_module_its_words_and_its_file():
     assert stored.validate_json(json.dumps(effect.to_dict())) == effect
 
 
+@pytest.mark.parametrize(
+    ("value", "shape", "amplitude", "at", "width"),
+    [
+        ([0.0] * 5 + [-0.02] * 4, "above", -0.8, 0.1, 0.025),
+        ([0.02] * 2 + [0.0] * 7, "below", -0.8, 0.05, 0.025),
+    ],
+)
+def test_the_written_module_of_a_step_behind_a_play_has_its_cell(value, shape, amplitude, at, width):
+    """The trim is 0.06 rad. The table does not tell where within the zeros a step begins; the increment does."""
+    own = an_effect(value)
+    step = replace(
+        own,
+        parameters={"step": ParameterEstimate(-0.02, 0.001, (-0.022, -0.018))},
+        states=(IncrementState("play", "alpha_rad", 0.0, half_width=0.01),),
+        table=replace(own.table, trim=0.06),
+    )
+    (effect,) = executed(effect_module(Answer(step)))
+    values = {p.name: p.default for p in effect.parameters}
+    assert (values["at"], values["width"]) == pytest.approx((at, width))
+    first = effect.change(values | {"step": 0.02 if shape == "below" else -0.02}).aero[0]
+    assert (first.shape, first.amplitude, first.at) == (shape, pytest.approx(amplitude), pytest.approx(at))
+
+
 def of_a_derivative(value):
     """The same of the derivative Cmde, from an elevator of 0.01 rad on."""
     return replace(
@@ -354,6 +383,44 @@ def varying(share):
     speed = one.signals.airspeed_m_s
     rising = speed * np.linspace(1.0, 1.0 + share, speed.size)
     return replace(one, signals=replace(one.signals, airspeed_m_s=rising))
+
+
+def test_a_step_behind_a_play_is_sharpened_to_its_location_and_half_width():
+    """A reading of the vane that jumps by 0.3 deg where a play of 0.4 deg passes 0.9 deg, to within half a cell of the grid."""
+    low, high, half, at = -3.0 * DEG, 3.0 * DEG, 0.4 * DEG, 0.9 * DEG
+
+    def jumping(one):
+        y, play = one.signals.y.copy(), 0.0
+        for k, alpha in enumerate(one.signals.y[:, 0]):
+            play = min(max(play, alpha - half), alpha + half)
+            y[k, 0] = alpha + 0.3 * DEG * (play > at)
+        return replace(one, signals=replace(one.signals, y=y))
+
+    quiet = 0.1 * tr.SETTINGS.noise
+    rng = np.random.default_rng(5)
+    problem = tr.problem([jumping(tr.fly(rng, sigma_w=0.0, amplitude=a * DEG, noise=quiet)) for a in (3, -3)])
+    null = fit(problem, tr.NOTHING, initial_parameters(problem, tr.NOTHING))
+    tried = [
+        Shape("alpha_rad", "alpha", low, high, 12, 0.0, Memory("play", half_width=h), step_cell=k)
+        for h in (0.2 * DEG, 0.45 * DEG)
+        for k in range(12)
+    ]
+    best = screen(problem, null, NO_WHITENER, tried)[0]
+    sharp = sharpened(problem, null, NO_WHITENER, [best])[0]
+    shape = sharp.effect.shape
+    assert sharp.log_evidence > best.log_evidence
+    assert shape.low + (shape.step_cell + 0.5) * shape.width == pytest.approx(at, abs=0.25 * DEG)
+    assert shape.memory.half_width == pytest.approx(half, abs=0.1 * DEG)
+
+
+def test_bends_that_the_prior_holds_do_not_count():
+    """Ten bends, of which two have a tenth of their prior's standard deviation and eight all of it: gamma of a diagonal."""
+    variance = np.array([0.01] * 2 + [1.0] * 8)
+    assert effective_bends(0.25 * np.diag(variance), 0.5) == pytest.approx(2.0 * 0.99)
+    bends = 0.5 * np.sqrt(variance) * np.array([2.6, 2.6] + [0.0] * 8)
+    # chi-square of 13.5: significant on 2 degrees of freedom, not on 10 (probability 0.0011 and 0.20)
+    assert is_apart_from_zero(bends, 0.25 * np.diag(variance), 1.98)
+    assert not is_apart_from_zero(bends, 0.25 * np.diag(variance), 10.0)
 
 
 NEEDED = increment(Shape("Cm", "elevator", -3.0 * DEG, 3.0 * DEG, 6, trim=0.0), 0.01)

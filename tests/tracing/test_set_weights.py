@@ -259,11 +259,19 @@ NAMED = (Round(()),)
     [
         ((), CURVE, 5.1, {("cm_alpha_nonlinear",): -5.1}),
         ((), VANE, 2.0, {("increment",): 2.0}),
-        ((), CURVE, 2.0, None),
+        ((), CURVE, -2.0, None),
+        ((), CURVE, 2.0, {("increment",): 2.0}),
         ((VANE,), CURVE, 2.0, {("increment",): 2.0}),
         ((), None, 2.0, None),
     ],
-    ids=["in place of the name", "acts elsewhere", "acts where the name does", "beside an increment", "none"],
+    ids=[
+        "in place of the name",
+        "acts elsewhere",
+        "acts where the name does, with less evidence",
+        "with more",
+        "beside an increment",
+        "none",
+    ],
 )
 def test_increments_alone_take_the_place_of_names_or_are_their_rival(beside, alone, lead, expected):
     """Names keep their place up to a lead of 5."""

@@ -104,7 +104,8 @@ def learned(accepted: AcceptedEffect, plant: Plant) -> Learned:
     effect = increment(shape)
     effect = effect.with_prior(effect.parameters[0].high).with_slope_held()
     others = effect.parameters[len(shape.coefficients) :]
-    sizes = np.array([p.size(accepted.parameters[p.name].value) for p in others])
+    values = dict(shape.estimated_memory) | {name: own.value for name, own in accepted.parameters.items()}
+    sizes = np.array([p.size(values[p.name]) for p in others])
     if table is None:
         share = accepted.parameters[effect.parameters[0].name]
         return Learned(effect, sizes, np.zeros(0), np.array([share.value]), np.array([share.std]))

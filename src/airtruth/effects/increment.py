@@ -44,7 +44,7 @@ SIGNAL_NAMES: Final[Mapping[str, str]] = {
 """Signal of a term -> its name in an answer; a rate is multiplied by c/(2V)."""
 Acted = Literal["CL", "Cm", "CX", "alpha_rad", "q_rad_s", "az_m_s2"]
 """Coefficient, or channel whose reading changes."""
-_STEP: Final[Mapping[str, float]] = {
+_DIFFERENCE: Final[Mapping[str, float]] = {
     "CL": 1e-3,
     "Cm": 1e-4,
     "CX": 1e-4,
@@ -71,6 +71,11 @@ _ACTS: Final = {"CL": "lift", "Cm": "pitching moment", "CX": "axial force"}
 """Coefficient in words."""
 _SLOPE: Final = "slope"
 """Name of the rise c over the cell of the trim."""
+STEP: Final = "step"
+"""Name of the rise of a step."""
+STEPS: Final = 12
+"""Number of locations of a step that are told apart beforehand, and cells in which it is tried first [-] (judgement: in six
+flights that switch, steps of a width between 1/24 and 1/10 of the range have similar evidence)."""
 _HELD: Final = 1e-6
 """Standard deviation over its largest value of a slope that is held [-]: none but for rounding."""
 _REACH_OF_MEMORY: Final = 3.0
@@ -127,6 +132,8 @@ class Shape:
     factor : one of `airtruth.physics.terms.FACTORS`, whose derivative changes, or whose lag in a reading does; empty where
         the coefficient or the reading itself does.
     factor_trim : value of the factor at the trim.
+    step_cell : number of the cell over which a step behind a play rises; None for a function that may bend at every knot. The
+        half width of its play is not estimated: the cost has a kink there.
     """
 
     acts_on: Acted
@@ -138,6 +145,7 @@ class Shape:
     memory: Memory | None = None
     factor: str = ""
     factor_trim: float = 0.0
+    step_cell: int | None = None
 
     @property
     def width(self) -> float:
@@ -152,6 +160,8 @@ class Shape:
     @property
     def coefficients(self) -> tuple[str, ...]:
         """Names of the coefficients of the function: of its bends, and of the slope where it has one."""
+        if self.step_cell is not None:
+            return (STEP,)
         bends = tuple(_bend(k) for k in range(len(self.knots)))
         slope = self.acts_on != "CX" and not (self.memory and self.factor)
         return (*bends, _SLOPE) if bends and slope else bends
@@ -173,6 +183,17 @@ class Shape:
         return bool(self.factor) and not self.of_reading
 
     @property
+    def estimated_memory(self) -> Mapping[str, float]:
+        """Constants of the memory that a refit estimates, by name."""
+        fixed = self.memory is None or bool(self.factor) or self.step_cell is not None
+        return {} if fixed or self.memory is None else self.memory.values
+
+    @property
+    def prior_weight(self) -> float:
+        """Probability beforehand over that of a function [-]: all steps behind one play share that of one function."""
+        return 1.0 if self.step_cell is None else 1.0 / STEPS
+
+    @property
     def variant(self) -> str:
         """Variant of the effect: coefficient or channel, signal and memory."""
         over = SIGNAL_NAMES[self.signal]
@@ -191,8 +212,8 @@ class Shape:
         if self.factor:
             lag = StateTerm(self.state, self.memory.kind, self.factor, self.memory.time_s)
             return self._change(self._bends(values, self.signal), lag)
-        estimated = {name: values[name] for name in self.memory.values}
-        state = StateTerm(self.state, self.memory.kind, self.signal, **estimated)
+        own = self.memory.values | {name: values[name] for name in self.estimated_memory}
+        state = StateTerm(self.state, self.memory.kind, self.signal, **own)
         if self.cells:
             return self._change(self._bends(values, state.name), state)
         share = values["share"]
@@ -215,6 +236,9 @@ class Shape:
         )
 
     def _bends(self, values: Mapping[str, float], signal: str) -> tuple[Piece, ...]:
+        if self.step_cell is not None:
+            first = self.low + self.step_cell * self.width
+            return self._rise(values[STEP] / self.width, signal, first, first + self.width)
         sides: tuple[Literal["below", "above"], ...] = ("below", "above")
         above = [(at, values[_bend(k)] / self.width) for k, at in enumerate(self.knots) if at > self.trim]
         below = [(at, values[_bend(k)] / self.width) for k, at in enumerate(self.knots) if at <= self.trim]
@@ -226,16 +250,18 @@ class Shape:
             for at, slope in rows
             if len(rows) > 1
         )
-        return pieces + (self._slope(values[_SLOPE] / self.width, signal) if _SLOPE in values else ())
+        slope = values.get(_SLOPE)
+        return pieces + (() if slope is None else self._rise(slope / self.width, signal, self.low, self.high))
 
-    def _slope(self, slope: float, signal: str) -> tuple[Piece, ...]:
-        """A straight line through zero at the trim, constant outside the range."""
-        return (
-            Piece(signal, "above", slope, self.trim),
-            Piece(signal, "above", -slope, self.high),
-            Piece(signal, "below", slope, self.trim),
-            Piece(signal, "below", -slope, self.low),
-        )
+    def _rise(self, slope: float, signal: str, low: float, high: float) -> tuple[Piece, ...]:
+        """A straight line between two values of the signal, zero at the trim and constant outside of them."""
+        above, below = max(low, self.trim), min(high, self.trim)
+        pieces: tuple[Piece, ...] = ()
+        if high > self.trim:
+            pieces += (Piece(signal, "above", slope, above), Piece(signal, "above", -slope, high))
+        if low < self.trim:
+            pieces += (Piece(signal, "below", slope, below), Piece(signal, "below", -slope, low))
+        return pieces
 
     def basis(self, signal: ArrayLike) -> Array:
         """Increments by a unit of each coefficient, without the factor.
@@ -301,13 +327,14 @@ def increment(shape: Shape, prior_std: float = math.inf) -> Increment:
     size = "share" if not shape.cells else ""
     names = [size] if size else list(shape.coefficients)
     scale = _DERIVATIVE[shape.factor]
-    reach, step = scale * _REACH[shape.acts_on], scale * _STEP[shape.acts_on]
+    reach, step = scale * _REACH[shape.acts_on], scale * _DIFFERENCE[shape.acts_on]
     if size:
         rate = _QHAT if shape.of_reading and shape.signal == "qhat" else 1.0
         reach, step = 20.0 * rate * reach, 100.0 * rate * step
     meanings = {
         "share": "part that acts through the state [1/unit of the signal]",
         _SLOPE: "rise over the cell of the trim",
+        STEP: "rise over the cell of the step",
     }
     parameters = [
         Parameter(
@@ -322,8 +349,10 @@ def increment(shape: Shape, prior_std: float = math.inf) -> Increment:
         )
         for name in names
     ]
-    if shape.memory is not None and not shape.factor:
-        parameters += [_of_memory(name, value, shape.memory) for name, value in shape.memory.values.items()]
+    if shape.memory is not None:
+        parameters += [
+            _of_memory(name, value, shape.memory) for name, value in shape.estimated_memory.items()
+        ]
     acts = _ACTS.get(shape.acts_on, f"reading of {shape.acts_on}")
     return Increment(
         name=NAME,
@@ -349,4 +378,4 @@ def _of_memory(name: str, value: float, memory: Memory) -> Parameter:
     return Parameter(name, "s", meaning, low, high, 0.0, is_location=True, step=value)
 
 
-__all__ = ["NAME", "SIGNAL_NAMES", "Increment", "Memory", "Shape", "increment"]
+__all__ = ["NAME", "SIGNAL_NAMES", "STEP", "STEPS", "Increment", "Memory", "Shape", "increment"]

@@ -34,7 +34,7 @@ from airtruth.tracing.increment_table import table_of
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import MEMORY_S, long_run
 from airtruth.tracing.prepare import Case
-from airtruth.tracing.selection.increment_fit import LEAST_ODDS, is_apart_from_zero
+from airtruth.tracing.selection.increment_fit import LEAST_ODDS, effective_bends, is_apart_from_zero
 from airtruth.tracing.selection.increments import CELLS, best_prior, covered
 from airtruth.tracing.selection.learn import LEAST_RECORDS
 from airtruth.tracing.selection.score_test import eliminated
@@ -292,9 +292,10 @@ def _excess(
 
 def _is_accepted(own: _Learned, case: Case, fitted: Sequence[AxialSeries]) -> bool:
     """Whether it has evidence, exceeds two standard deviations, explains records left out and is material."""
+    degrees = effective_bends(own.covariance, own.effect.parameters[0].prior_std)
     return (
         own.log_evidence >= LEAST_ODDS
-        and is_apart_from_zero(own.bends, own.covariance)
+        and is_apart_from_zero(own.bends, own.covariance, degrees)
         and own.explained >= _EXPLAINED
         and _relative_swing(own, case, fitted) >= _MATERIAL
     )

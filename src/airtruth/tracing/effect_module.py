@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from airtruth.effects.closed_form import ClosedForm, closed_forms
-from airtruth.effects.increment import SIGNAL_NAMES
+from airtruth.effects.increment import SIGNAL_NAMES, STEP
 from airtruth.errors import StoreError
 from airtruth.logs import atomic
 from airtruth.physics.terms import READINGS
@@ -188,12 +188,24 @@ def _form(e: AcceptedEffect) -> ClosedForm | None:
     if e.table is None:
         return None
     t = e.table
+    if STEP in e.parameters:
+        return _step_of(t)
     rows = zip(t.low, t.high, t.samples, strict=True)
     std = [(high - low) / (2.0 * Z95) if n else math.inf for low, high, n in rows]
     return next(
         (f for f in closed_forms(t.at, t.value, std, t.origin, of_pair=e.by is not None) if f.is_as_good),
         None,
     )
+
+
+def _step_of(table: IncrementTable) -> ClosedForm:
+    """The step whose rise over one cell is all that the table has, but for a constant, which belongs to the trim."""
+    rises = [after - before for before, after in pairwise(table.value)]
+    cell = max(range(len(rises)), key=lambda k: abs(rises[k]))
+    width = table.at[cell + 1] - table.at[cell]
+    if table.at[cell + 1] > table.origin:
+        return ClosedForm("step above", {"step": rises[cell], "at": table.at[cell], "width": width}, 0.0, 0)
+    return ClosedForm("step below", {"step": -rises[cell], "at": table.at[cell + 1], "width": width}, 0.0, 0)
 
 
 def _of_table(term: str, table: IncrementTable, signal: str, by: str) -> str:

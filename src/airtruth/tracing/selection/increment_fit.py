@@ -82,10 +82,10 @@ class FittedIncrement:
     log_evidence: float
 
 
-def refitted(problem: TraceProblem, null: PosteriorFit, s: Screened, tried: int) -> FittedIncrement | None:
+def refitted(problem: TraceProblem, null: PosteriorFit, s: Screened, tried: float) -> FittedIncrement | None:
     """All parameters with the increment; the prior's standard deviation is estimated again, once."""
-    memory, effect = s.effect.shape.memory, s.effect
-    of_memory = [] if memory is None or effect.shape.factor else list(memory.values.values())
+    effect = s.effect
+    of_memory = list(effect.shape.estimated_memory.values())
     sizes = np.concatenate([null.point.sizes, s.start, of_memory])
     start = replace(null.point, sizes=sizes)
     own = fit(problem, null.hypothesis.plus(effect), start, iterations=_ITERATIONS)
@@ -102,7 +102,7 @@ def refitted(problem: TraceProblem, null: PosteriorFit, s: Screened, tried: int)
 
 
 def converged(
-    problem: TraceProblem, null: PosteriorFit, learned: Sequence[FittedIncrement], tried: int
+    problem: TraceProblem, null: PosteriorFit, learned: Sequence[FittedIncrement], tried: float
 ) -> list[FittedIncrement]:
     """The refits, best first, the best one converged if a few more refits achieve it."""
     ranked = sorted(learned, key=lambda own: -own.log_evidence)
@@ -122,13 +122,26 @@ def _restated(own: PosteriorFit, effect: Increment) -> Increment | None:
     """The increment with the prior that its bends ask for (MacKay's fixed point); None where that is the present one."""
     bends, covariance = fitted_bends(own, effect, own.covariance)
     old = effect.parameters[0].prior_std
-    effective = effect.bends - float(np.trace(covariance)) / old**2
+    effective = effective_bends(covariance, old)
     if not effective > 0.0:
         return None
     new = float(np.sqrt(bends @ bends / effective))
     low, high = 1e-3 * effect.parameters[0].high, effect.parameters[0].high
     new = min(max(new, low), high)
     return effect.with_prior(new) if abs(np.log(new / old)) > np.log(1.5) else None
+
+
+def effective_bends(covariance: Array, prior_std: float) -> float:
+    """Number of bends that the records determine [-]: all less the share of the prior in their variance.
+
+    Parameters
+    ----------
+    covariance : (bends, bends) of a fit with the prior; prior_std : standard deviation of the prior of each bend [-].
+
+    Source: D. J. C. MacKay, Neural Computation 4 (1992) 415-447, section 4 (gamma, the number of well-determined
+        parameters).
+    """
+    return float(len(covariance) - np.trace(covariance) / prior_std**2)
 
 
 def fitted_bends(own: PosteriorFit, effect: Increment, covariance: Array) -> tuple[Array, Array]:
@@ -143,12 +156,18 @@ def fitted_bends(own: PosteriorFit, effect: Increment, covariance: Array) -> tup
     return own.point.sizes[first : first + effect.bends], covariance[at, at]
 
 
-def log_evidence(null: PosteriorFit, own: PosteriorFit, effect: Increment, tried: int) -> float:
-    """Log of the posterior odds of an increment (Laplace), one for each of its times; every shape equally probable."""
+def log_evidence(null: PosteriorFit, own: PosteriorFit, effect: Increment, tried: float) -> float:
+    """Log of the posterior odds of an increment (Laplace), one for each of its times.
+
+    Parameters
+    ----------
+    tried : sum of the weights of all shapes tried, see `Shape.prior_weight`.
+    """
     _, covariance = fitted_bends(own, effect, own.covariance)
     volume = np.linalg.slogdet(covariance)[1] - 2.0 * effect.bends * np.log(effect.parameters[0].prior_std)
     times = len(effect.parameters) - effect.bends
-    return float(null.cost - own.cost + 0.5 * volume - times - np.log(tried))
+    log_prior = np.log(effect.shape.prior_weight / tried)
+    return float(null.cost - own.cost + 0.5 * volume - times + log_prior)
 
 
 def assessed(problem: TraceProblem, own: FittedIncrement, reference: Reference) -> Candidate:
@@ -159,11 +178,14 @@ def assessed(problem: TraceProblem, own: FittedIncrement, reference: Reference) 
     excess = float(np.mean(ratios[first : first + own.effect.bends] ** 2))
     left_out = tested_on_left_out(problem, own.fit, reference, gain)
     swing = relative_swing(problem, own.fit, own.effect)
+    degrees = effective_bends(
+        fitted_bends(own.fit, own.effect, own.fit.covariance)[1], own.effect.parameters[0].prior_std
+    )
     bends, covariance = fitted_bends(own.fit, own.effect, robust_covariance(problem, own.fit))
     reasons = (
         *([] if has_converged(own.fit, gain) else [UNCONVERGED]),
         *(["its evidence is not significant"] if own.log_evidence < LEAST_ODDS * excess else []),
-        *([] if is_apart_from_zero(bends, covariance) else [WITHIN_ERROR]),
+        *([] if is_apart_from_zero(bends, covariance, degrees) else [WITHIN_ERROR]),
         *left_out.reasons,
         *([IMMATERIAL] if swing < (_MATERIAL_READING if own.effect.shape.of_reading else _MATERIAL) else []),
     )
@@ -179,14 +201,17 @@ def assessed(problem: TraceProblem, own: FittedIncrement, reference: Reference) 
     )
 
 
-def is_apart_from_zero(bends: Array, covariance: Array) -> bool:
+def is_apart_from_zero(bends: Array, covariance: Array, degrees: float) -> bool:
     """Whether bends exceed two standard deviations (Wald).
 
     Parameters
     ----------
     bends : (bends,) estimates; covariance : (bends, bends) of their errors.
+    degrees : number of bends that the records determine [-], at least one is counted: the prior holds the others at zero,
+        where they add nothing to the statistic.
     """
-    return bool(chi2.sf(bends @ np.linalg.solve(covariance, bends), len(bends)) < _TWO_DEVIATIONS)
+    statistic = bends @ np.linalg.solve(covariance, bends)
+    return bool(chi2.sf(statistic, max(degrees, 1.0)) < _TWO_DEVIATIONS)
 
 
 def relative_swing(problem: TraceProblem, own: PosteriorFit, effect: Increment) -> float:
@@ -254,13 +279,13 @@ def evidence_score(own: FittedIncrement) -> Score:
     )
 
 
-def redundant_increment(problem: TraceProblem, fitted: PosteriorFit, tried: int) -> Increment | None:
+def redundant_increment(problem: TraceProblem, fitted: PosteriorFit, tried: float) -> Increment | None:
     """The first increment that the last effect makes redundant: its posterior odds beside the others are too low.
 
     Parameters
     ----------
     fitted : a fit with its effects in the order of their acceptance.
-    tried : number of shapes that were tried.
+    tried : see `log_evidence`.
     """
     for effect in fitted.hypothesis.effects[:-1]:
         if isinstance(effect, Increment):
@@ -276,8 +301,10 @@ __all__ = [
     "FittedIncrement",
     "assessed",
     "converged",
+    "effective_bends",
     "evidence_score",
     "fitted_bends",
+    "is_apart_from_zero",
     "log_evidence",
     "redundant_increment",
     "refitted",

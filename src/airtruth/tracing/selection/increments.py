@@ -11,6 +11,7 @@ Source: D. J. C. MacKay, Neural Computation 4 (1992) 415-447, section 3 (evidenc
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from airtruth.effects.effect import Effect
-from airtruth.effects.increment import Increment, Memory, Shape, increment
+from airtruth.effects.increment import STEPS, Increment, Memory, Shape, increment
 from airtruth.numerics.rates import smooth_rate
 from airtruth.physics.terms import FACTORS, READINGS
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
@@ -64,6 +65,11 @@ to find a narrow peak)."""
 _PLAYS: Final = (0.01, 0.03, 0.1, 0.25)
 """Half widths of plays of the angle of attack that are tried, over its range [-] (judgement: a refit moves them by up to a factor
 of three)."""
+_RELAYS: Final = (0.03, 0.06, 0.09, 0.13, 0.2)
+"""Half widths of plays behind which steps are tried, over the range [-] (judgement: closer than `_PLAYS`, because a refit does
+not move them)."""
+_FINER_STEPS: Final = (12, 16, 24)
+"""Numbers of cells tried for a leading step [-] (judgement: as `_FINER`)."""
 _SENSED: Final = ("q_rad_s", "az_m_s2")
 """Channels at which a mode is tried: gyro and accelerometer feel the structure, a vane does not (judgement)."""
 _NYQUIST_SHARE: Final = 0.5
@@ -121,11 +127,36 @@ def shapes(problem: TraceProblem) -> list[Shape]:
                 for time_s in _SLOW_S:
                     add(CELLS, Memory("lag", time_s))
                 for share in _PLAYS:
-                    add(0, Memory("play", half_width=share * (high - low)))
+                    play = Memory("play", half_width=share * (high - low))
+                    add(0, play)
+                    add(CELLS, play)
+                found += _relays(coefficient, low, high, trim)
     found += _over_pressure_and_pairs(records, ranges, trims)
     of_readings = [*_of_readings(ranges, trims, highest_hz), *_of_a_changing_lag(records, trims)]
     measured = dict(zip(READINGS, problem.settings.measured, strict=True))
     return found + [shape for shape in of_readings if measured[shape.acts_on]]
+
+
+def _relays(coefficient: Literal["CL", "Cm"], low: float, high: float, trim: float) -> Iterator[Shape]:
+    """Steps behind a play of the angle of attack: what switches on at one angle and off at a smaller one."""
+    for share in _RELAYS:
+        play = Memory("play", half_width=share * (high - low))
+        for cell in range(STEPS):
+            yield Shape(coefficient, "alpha", low, high, STEPS, trim, play, step_cell=cell)
+
+
+def _finer_steps(shape: Shape) -> Iterator[Shape]:
+    """A step about its location and about the half width of its play."""
+    cell, memory = shape.step_cell, shape.memory
+    if cell is None or memory is None:
+        return
+    for cells in _FINER_STEPS:
+        width = (shape.high - shape.low) / cells
+        first, last = (cell - 0.5) * shape.width, (cell + 1.5) * shape.width
+        near = [k for k in range(cells) if first <= (k + 0.5) * width <= last]
+        for k, ratio in itertools.product(near, _NEARBY):
+            play = replace(memory, half_width=ratio * memory.half_width)
+            yield replace(shape, cells=cells, step_cell=k, memory=play)
 
 
 def _over_pressure_and_pairs(
@@ -234,11 +265,14 @@ def screen(
 def sharpened(
     problem: TraceProblem, null: PosteriorFit, whitener: Whitener, leading: Sequence[Screened]
 ) -> list[Screened]:
-    """The shapes with the detail of largest evidence, best first: cells of a function, frequency and damping of a mode.
+    """The shapes with the detail of largest evidence, best first: cells of a function, frequency and damping of a mode,
+    location and half width of a step.
 
     A lightly damped mode is narrower than the steps of the grid, and a refit that begins beside its peak ends there.
     """
-    near = [replace(s.effect.shape, cells=n) for s in leading if s.effect.shape.cells for n in _FINER]
+    functions = [s.effect.shape for s in leading if s.effect.shape.cells and s.effect.shape.step_cell is None]
+    near = [replace(shape, cells=n) for shape in functions for n in _FINER]
+    near += [shape for s in leading for shape in _finer_steps(s.effect.shape)]
     near += [
         replace(shape, memory=replace(shape.memory, time_s=shape.memory.time_s / ratio, damping=damping))
         for shape in (s.effect.shape for s in leading)

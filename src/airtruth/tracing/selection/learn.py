@@ -54,8 +54,13 @@ LEAST_RECORDS: Final = 3
 a measured record of 60 s always leaves an anomaly beside a linear model)."""
 _REFITTED: Final = 3
 """Number of shapes that are refitted for one increment [-] (judgement: a refit costs seconds to a minute)."""
+_SHARPENED: Final = 12
+"""Number of variants whose detail is sharpened before they are compared [-] (judgement: about a second, and the evidence of a
+lightly damped mode beside the grid is a third of that at its peak)."""
 _HOPELESS: Final = 8.0
-"""Log evidence behind the leading shape from which a shape is not refitted [-] (judgement)."""
+"""Log evidence behind the leading shape up to which a shape is refitted in any case [-] (judgement)."""
+_HALF: Final = 0.5
+"""Evidence over that of the leading shape from which a shape is refitted [-] (judgement: refits have doubled it)."""
 _PROMISING: Final = 0.2
 """Log evidence of a shape without a refit, over that of names without an anomaly, from which it is refitted instead [-]
 (judgement: refits have tripled it)."""
@@ -65,6 +70,9 @@ true shapes have tripled it, and a refit of a wrong one costs a few seconds)."""
 _NAMES_LEAD: Final = 5.0
 """Log evidence by which increments alone have to lead for named effects to be given up [-] (judgement: a name is
 preferred to a curve)."""
+_AS_GOOD: Final = -1.0
+"""Log evidence over that of names from which increments alone are a rival also where they act as the names do [-] (judgement:
+true names of 40 trials lead by 3.7 and more)."""
 
 
 def with_increments(
@@ -136,8 +144,8 @@ def chosen(
 ) -> tuple[SearchRound, ...]:
     """The rounds with the named effects, or those of increments alone where these lead by far; the others are a rival.
 
-    Increments alone are no rival of names that need no increment beside them and act on the same coefficients and channels,
-    because a curve can imitate any name there.
+    Increments alone with less evidence are no rival of names that need no increment beside them and act on the same
+    coefficients and channels, because a curve can imitate any name there.
 
     Parameters
     ----------
@@ -149,7 +157,7 @@ def chosen(
     if len(alone) > 1 and lead > _NAMES_LEAD:
         names = tuple(sorted({*(e.name for e in named), *explains}))
         return (replace(alone[0], rival=Rival({names: -lead})), *alone[1:])
-    if learned and (_accepted(grown) or _acts_on(learned) != _acts_on(named)):
+    if learned and (lead > _AS_GOOD or _accepted(grown) or _acts_on(learned) != _acts_on(named)):
         sets = {} if grown[0].rival is None else dict(grown[0].rival.sets)
         rival = Rival({**sets, tuple(sorted({e.name for e in learned})): lead})
         return (replace(grown[0], rival=rival), *grown[1:])
@@ -201,14 +209,14 @@ class _Learning:
             rounds = (*rounds[:-1], replace(last, candidates=(*last.candidates, *candidates), tied=tied))
             if not tied:
                 break
-            rounds = self._replacing(rounds, len(tried)) or rounds
+            rounds = self._replacing(rounds, _weight(tried)) or rounds
             following = self._following(rounds, rounds[-1].tied[0].fit)
             if following is None:
                 break
             rounds = (*rounds, following)
         return rounds, sum(0.5 * c.gain for c in _accepted(rounds))
 
-    def _replacing(self, rounds: tuple[SearchRound, ...], tried: int) -> tuple[SearchRound, ...] | None:
+    def _replacing(self, rounds: tuple[SearchRound, ...], tried: float) -> tuple[SearchRound, ...] | None:
         """The rounds with the last increment in place of an earlier one that it makes redundant."""
         best = rounds[-1].tied[0].fit
         new, old = best.hypothesis.effects[-1], redundant_increment(self.problem, best, tried)
@@ -247,19 +255,19 @@ class _Learning:
         present = {e.variant for e in _increments_of(null)}
         tried = [s for s in every if s.variant not in present]
         least = 0.0 if present else self.promising
-        leading = _leading(screen(self.problem, last.null, NO_WHITENER, tried), least)
-        leading = sharpened(self.problem, last.null, NO_WHITENER, leading)
+        screened = _of_each_variant(screen(self.problem, last.null, NO_WHITENER, tried))[:_SHARPENED]
+        leading = _leading(sharpened(self.problem, last.null, NO_WHITENER, screened), least)
         if not leading or leading[0].log_evidence < evident:
             return ()
         learned = []
         for s in leading:
             if may_begin(self.advance, f"refit {s.effect.key}"):
-                own = refitted(self.problem, null, s, len(tried))
+                own = refitted(self.problem, null, s, _weight(tried))
                 learned += [] if own is None else [own]
         if not learned:
             return ()
         reference = reference_of(self.problem, null)
-        ranked = converged(self.problem, null, learned, len(tried))
+        ranked = converged(self.problem, null, learned, _weight(tried))
         found: list[Candidate] = []
         for own in ranked:
             accepted = next((c for c in found if not c.reasons), None)
@@ -279,14 +287,23 @@ def _accepted(rounds: Sequence[SearchRound]) -> list[Candidate]:
     return [r.tied[0] for r in rounds if r.tied and isinstance(r.tied[0].score.effect, Increment)]
 
 
-def _leading(screened: Sequence[Screened], least: float) -> list[Screened]:
-    """The best shape of each variant, as far as their evidence is near that of the first and above ``least``."""
+def _weight(shapes: Sequence[Shape]) -> float:
+    return sum(s.prior_weight for s in shapes)
+
+
+def _of_each_variant(screened: Sequence[Screened]) -> list[Screened]:
+    """The best shape of each variant, best first."""
     best: dict[str, Screened] = {}
     for s in screened:
         best.setdefault(s.effect.variant, s)
+    return list(best.values())
+
+
+def _leading(screened: Sequence[Screened], least: float) -> list[Screened]:
+    """The shapes whose evidence is near that of the first and above ``least``."""
     first = screened[0].log_evidence if screened else 0.0
-    near = [s for s in best.values() if s.log_evidence > max(first - _HOPELESS, least)]
-    return near[:_REFITTED]
+    near = max(min(first - _HOPELESS, _HALF * first), least)
+    return [s for s in screened if s.log_evidence > near][:_REFITTED]
 
 
 def _tied(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
