@@ -17,6 +17,7 @@ from airtruth.effects.increment import Memory, Shape, increment
 from airtruth.effects.registry import EFFECTS
 from airtruth.errors import ConfigurationError
 from airtruth.physics.terms import AeroTerm, Change, shape_of, term_value
+from airtruth.table import significant
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable, ParameterEstimate
 from airtruth.tracing.effect_module import MODULE, effect_module
@@ -287,6 +288,12 @@ def test_the_written_module_of_a_step_behind_a_play_has_its_cell(value, shape, a
     assert (values["at"], values["width"]) == pytest.approx((at, width))
     first = effect.change(values | {"step": 0.02 if shape == "below" else -0.02}).aero[0]
     assert (first.shape, first.amplitude, first.at) == (shape, pytest.approx(amplitude), pytest.approx(at))
+    middle = at + (0.5 if shape == "above" else -0.5) * width
+    comes, goes = significant(middle + 0.01), significant(middle - 0.01)
+    sentence = (
+        f"a step of -0.020 (95 %: -0.0220 to -0.0180) that comes where alpha_rad rises above {comes} and goes"
+    )
+    assert f"{sentence} where it falls below {goes}" in increment_words(step)
 
 
 def of_a_derivative(value):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from typing import Any, Literal
 
 
@@ -42,6 +43,12 @@ class IncrementTable:
             max((x for x in sure if x < self.origin), default=None),
             min((x for x in sure if x > self.origin), default=None),
         )
+
+    @property
+    def steepest(self) -> int:
+        """Number of the first point of the steepest cell, which is that of a step."""
+        rises = [abs(after - before) for before, after in pairwise(self.value)]
+        return rises.index(max(rises))
 
     def to_dict(self) -> dict[str, list[float] | float | None]:
         """Keys of trace.json."""

@@ -200,12 +200,12 @@ def _form(e: AcceptedEffect) -> ClosedForm | None:
 
 def _step_of(table: IncrementTable) -> ClosedForm:
     """The step whose rise over one cell is all that the table has, but for a constant, which belongs to the trim."""
-    rises = [after - before for before, after in pairwise(table.value)]
-    cell = max(range(len(rises)), key=lambda k: abs(rises[k]))
-    width = table.at[cell + 1] - table.at[cell]
-    if table.at[cell + 1] > table.origin:
-        return ClosedForm("step above", {"step": rises[cell], "at": table.at[cell], "width": width}, 0.0, 0)
-    return ClosedForm("step below", {"step": -rises[cell], "at": table.at[cell + 1], "width": width}, 0.0, 0)
+    first = table.steepest
+    low, high = table.at[first : first + 2]
+    rise, width = table.value[first + 1] - table.value[first], high - low
+    if high > table.origin:
+        return ClosedForm("step above", {"step": rise, "at": low, "width": width}, 0.0, 0)
+    return ClosedForm("step below", {"step": -rise, "at": high, "width": width}, 0.0, 0)
 
 
 def _of_table(term: str, table: IncrementTable, signal: str, by: str) -> str:

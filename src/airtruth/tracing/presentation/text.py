@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Iterator
 from typing import Final
 
+from airtruth.effects.increment import STEP
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import READINGS
 from airtruth.table import WIDTH, as_text, significant
@@ -200,7 +201,10 @@ def increment_words(effect: AcceptedEffect) -> str:
     """A learned increment in words: largest value, onset, memory, and size relative to the declared model."""
     over, table = effect.over or "", effect.table
     parts = []
-    if table is not None:
+    play = next((state.half_width for state in effect.states if state.kind == "play"), None)
+    if table is not None and STEP in effect.parameters and play is not None:
+        parts.append(_switch(effect.parameters[STEP], table, over, play))
+    elif table is not None:
         parts.append(f"{effect.subject} {largest_words(table, over)}")
         if effect.by and effect.states:
             change_s = max(table.value, key=abs) * effect.states[0].time_s
@@ -219,6 +223,16 @@ def increment_words(effect: AcceptedEffect) -> str:
         )
         parts.append(f"{significant(100.0 * effect.relative_size, 2)} % of the {whole}")
     return "; ".join(parts)
+
+
+def _switch(step: ParameterEstimate, table: IncrementTable, over: str, half_width: float) -> str:
+    """A step behind a play: its size, and the values of the signal at which it comes and goes."""
+    middle = 0.5 * sum(table.at[table.steepest : table.steepest + 2])
+    comes, goes = (significant(middle + half) for half in (half_width, -half_width))
+    return (
+        f"a step of {significant(step.value, 2)} (95 %: {interval(step)}) that comes where {over} rises above {comes} and goes "
+        f"where it falls below {goes}"
+    )
 
 
 def _onset(table: IncrementTable, over: str) -> str:
