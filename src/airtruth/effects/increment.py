@@ -190,11 +190,6 @@ class Shape:
         return {} if fixed or self.memory is None else self.memory.values
 
     @property
-    def is_narrow(self) -> bool:
-        """Whether its evidence has a narrow peak: a mode over its frequency, a step over its location."""
-        return self.step_cell is not None or (self.memory is not None and self.memory.kind == "mode")
-
-    @property
     def prior_weight(self) -> float:
         """Probability beforehand over that of a function [-]: all steps behind one play share that of one function."""
         return 1.0 if self.step_cell is None else 1.0 / STEPS

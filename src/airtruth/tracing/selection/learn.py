@@ -55,7 +55,7 @@ a measured record of 60 s always leaves an anomaly beside a linear model)."""
 _REFITTED: Final = 3
 """Number of shapes that are refitted for one increment [-] (judgement: a refit costs seconds to a minute)."""
 _SHARPENED: Final = 12
-"""Number of variants whose detail is sharpened before they are compared [-] (judgement: half a second, and the evidence of a
+"""Number of variants whose detail is sharpened before they are compared [-] (judgement: about a second, and the evidence of a
 lightly damped mode beside the grid is a third of that at its peak)."""
 _HOPELESS: Final = 8.0
 """Log evidence behind the leading shape up to which a shape is refitted in any case [-] (judgement)."""
@@ -255,7 +255,7 @@ class _Learning:
         present = {e.variant for e in _increments_of(null)}
         tried = [s for s in every if s.variant not in present]
         least = 0.0 if present else self.promising
-        screened = _worth_sharpening(screen(self.problem, last.null, NO_WHITENER, tried))
+        screened = _of_each_variant(screen(self.problem, last.null, NO_WHITENER, tried))[:_SHARPENED]
         leading = _leading(sharpened(self.problem, last.null, NO_WHITENER, screened), least)
         if not leading or leading[0].log_evidence < evident:
             return ()
@@ -291,29 +291,19 @@ def _weight(shapes: Sequence[Shape]) -> float:
     return sum(s.prior_weight for s in shapes)
 
 
-def _worth_sharpening(screened: Sequence[Screened]) -> list[Screened]:
-    """The best shape of each leading variant; functions as far as their evidence is near that of the first.
-
-    A nearby frequency raises the evidence of a mode up to threefold, more cells that of a function by less.
-    """
+def _of_each_variant(screened: Sequence[Screened]) -> list[Screened]:
+    """The best shape of each variant, best first."""
     best: dict[str, Screened] = {}
     for s in screened:
         best.setdefault(s.effect.variant, s)
-    variants = list(best.values())[:_SHARPENED]
-    near = _near(variants)
-    return [s for s in variants if s.effect.shape.is_narrow or s.log_evidence > near]
+    return list(best.values())
 
 
 def _leading(screened: Sequence[Screened], least: float) -> list[Screened]:
     """The shapes whose evidence is near that of the first and above ``least``."""
-    near = max(_near(screened), least)
-    return [s for s in screened if s.log_evidence > near][:_REFITTED]
-
-
-def _near(screened: Sequence[Screened]) -> float:
-    """Log evidence from which a shape is near the first."""
     first = screened[0].log_evidence if screened else 0.0
-    return min(first - _HOPELESS, _HALF * first)
+    near = max(min(first - _HOPELESS, _HALF * first), least)
+    return [s for s in screened if s.log_evidence > near][:_REFITTED]
 
 
 def _tied(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
