@@ -75,8 +75,8 @@ _SLOPE: Final = "slope"
 STEP: Final = "step"
 """Name of the rise of a step."""
 STEPS: Final = 12
-"""Number of locations of a step that are told apart beforehand, and cells in which it is tried first [-] (judgement: in six
-flights that switch, steps of a width between 1/24 and 1/10 of the range have similar evidence)."""
+"""Number of cells in which a step is tried first, which are equally probable a priori [-] (judgement: in five
+flight tests that switch, steps of a width between 1/24 and 1/10 of the range have similar evidence)."""
 _HELD: Final = 1e-6
 """Standard deviation over its largest value of a slope that is held [-]: none but for rounding."""
 _REACH_OF_MEMORY: Final = 3.0
@@ -186,12 +186,13 @@ class Shape:
     @property
     def estimated_memory(self) -> Mapping[str, float]:
         """Constants of the memory that a refit estimates, by name."""
-        fixed = self.memory is None or bool(self.factor) or self.step_cell is not None
-        return {} if fixed or self.memory is None else self.memory.values
+        if self.memory is None or self.factor or self.step_cell is not None:
+            return {}
+        return self.memory.values
 
     @property
     def prior_weight(self) -> float:
-        """Probability beforehand over that of a function [-]: all steps behind one play share that of one function."""
+        """Prior probability over that of a function [-]: all steps behind one play share that of one function."""
         return 1.0 if self.step_cell is None else 1.0 / STEPS
 
     @property

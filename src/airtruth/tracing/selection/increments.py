@@ -326,9 +326,7 @@ def log_evidences(gradient: Array, information: Array, stds: Array) -> Array:
 
 def _directions(e: Increment) -> list[Direction]:
     """One direction for each bend, the other bends at zero and the memory as the shape has it."""
-    memory = e.shape.memory
-    of_memory = {} if memory is None else memory.values
-    zero = {p.name: of_memory.get(p.name, 0.0) for p in e.parameters}
+    zero = {p.name: e.shape.estimated_memory.get(p.name, 0.0) for p in e.parameters}
     return [Direction(_single(e, p.name, zero), (), p.step) for p in e.parameters[: e.bends]]
 
 

@@ -56,7 +56,7 @@ _REFITTED: Final = 3
 """Number of shapes that are refitted for one increment [-] (judgement: a refit costs seconds to a minute)."""
 _SHARPENED: Final = 12
 """Number of variants whose detail is sharpened before they are compared [-] (judgement: about a second, and the evidence of a
-lightly damped mode beside the grid is a third of that at its peak)."""
+lightly damped mode beside the grid may be less than half of that at its peak)."""
 _HOPELESS: Final = 8.0
 """Log evidence behind the leading shape up to which a shape is refitted in any case [-] (judgement)."""
 _HALF: Final = 0.5
@@ -72,7 +72,7 @@ _NAMES_LEAD: Final = 5.0
 preferred to a curve)."""
 _AS_GOOD: Final = -1.0
 """Log evidence over that of names from which increments alone are a rival also where they act as the names do [-] (judgement:
-true names of 40 trials lead by 3.7 and more)."""
+true names lead by 3.7 to 26 in the 13 trials of 28 where such increments were learned)."""
 
 
 def with_increments(
