@@ -179,6 +179,7 @@ def test_scores_of_leave_one_out():
         "learned": (1, 4),
         "named_without_reservation": (1, 4),
         "passed_as_none": (0, 4),
+        "worse_unrefused": (1, 4),
         "worse_in_silence": (1, 4),
     }
     assert s["after_over_oracle"] == (1.1, 1)

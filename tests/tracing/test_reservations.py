@@ -9,7 +9,7 @@ from airtruth.quantity import Ratio
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.answer import Alternative, DeclaredModel, DerivativeShift
 from airtruth.tracing.declared_model import traceable_errors
-from airtruth.tracing.notes import within_assumed_uncertainty, worse_free_run
+from airtruth.tracing.notes import within_assumed_uncertainty, worse_held_out
 from airtruth.tracing.reservations import DOUBT, MANY, causes, reservations
 from airtruth.tracing.stage_errors import BySet, Errors, Rms
 
@@ -174,21 +174,30 @@ def test_a_shift_within_an_uncertainty_that_is_assumed_is_a_note():
     assert list(within_assumed_uncertainty(declared, {"Cmq": Ratio(value=-43.0)}))
 
 
-def errors_of(before, after):
+def errors_of(free_run, innovation):
+    """Errors before of half of the signal and of a quarter, and errors after that are so many times as large."""
     stages = {
-        name: BySet(held_out=Rms({"alpha_rad": 0.01 * size, "q_rad_s": 0.04 * size}, {}))
-        for name, size in (("before", before), ("after", after))
+        name: BySet(
+            held_out=Rms(
+                {"alpha_rad": 0.01 * a, "q_rad_s": 0.04 * a}, {"alpha_rad": 0.005 * b, "q_rad_s": 0.02 * b}
+            )
+        )
+        for name, a, b in (("before", 1.0, 1.0), ("after", free_run, innovation))
     }
     return Errors({"alpha_rad": 0.02, "q_rad_s": 0.08}, stages)
 
 
-def test_a_worse_free_run_is_a_note():
-    (note,) = worse_free_run(errors_of(1.0, 1.07))
+@pytest.mark.parametrize(("words", "rises"), [("free run", (1.07, 1.0)), ("innovations", (0.9, 1.07))])
+def test_a_worse_error_of_the_held_out_records_is_a_note(words, rises):
+    (note,) = worse_held_out(errors_of(*rises))
     assert note.startswith(
-        "on the held-out records, the error of the free run is 7 % larger after than before"
+        f"on the held-out records, the error of the {words} is 7 % larger after than before"
     )
-    assert not list(worse_free_run(errors_of(1.0, 1.019)))
-    assert not list(worse_free_run(Errors({}, {"before": BySet(), "after": BySet()})))
+
+
+def test_a_rise_of_less_than_two_percent_is_no_note():
+    assert not list(worse_held_out(errors_of(1.019, 1.019)))
+    assert not list(worse_held_out(Errors({}, {"before": BySet(), "after": BySet()})))
 
 
 def test_a_traceable_cause_contradicts_the_declared_model_in_four_of_five_flights():

@@ -33,6 +33,8 @@ CURVES: Final = ("elevator_asymmetry", "cm_alpha_nonlinear", "cl_alpha_nonlinear
 """Effects of the library that increments can express: a coefficient over a signal."""
 WORSE: Final = 1.02
 """A held-out error counts as worse above this ratio."""
+_NOTE_OF_WORSE: Final = "on the held-out records, the error of "
+"""Start of the note (notes.worse_held_out) by which an answer states a larger held-out error."""
 
 
 @dataclass(frozen=True)
@@ -326,11 +328,22 @@ def lacking(cases: Sequence[Case]) -> dict[str, Any]:
             bool(accepted(c)) and not c["answer"]["provisional"] for c in cases
         ),
         "passed_as_none": share(c["answer"]["verdict"] == "none" for c in cases),
-        "worse_in_silence": share(
+        "worse_unrefused": share(
             (ratio(c, "after", "before") or 0.0) > WORSE and c["answer"].get("confirmed") is not False
             for c in cases
         ),
+        "worse_in_silence": share(
+            (ratio(c, "after", "before") or 0.0) > WORSE and not states_worse(c) for c in cases
+        ),
     }
+
+
+def states_worse(case: Case) -> bool:
+    """Whether an answer states that a held-out error is larger after: `confirmed` is false, or a note."""
+    answer = case["answer"]
+    return answer.get("confirmed") is False or any(
+        note.startswith(_NOTE_OF_WORSE) for note in answer.get("notes", ())
+    )
 
 
 def score(cases: Sequence[Case]) -> dict[str, Any]:

@@ -40,6 +40,7 @@ from validation.blind.scoring import (
     of,
     ratio,
     share,
+    states_worse,
 )
 
 _OWN_FORMULA: Final = ("tail_effectiveness", "wing_effectiveness", "icing")
@@ -164,11 +165,9 @@ def worse(case: Case, kind: str) -> bool:
     return rise > _ERRORS / np.sqrt(len(names) * count)
 
 
-def unconfirmed_in_silence(case: Case) -> bool:
-    """Whether an effect is accepted that makes a held-out error worse, and the answer does not say so."""
-    return case["answer"].get("confirmed") is not False and any(
-        worse(case, k) for k in ("innovation", "free_run")
-    )
+def worse_in_silence(case: Case) -> bool:
+    """Whether an effect is accepted that makes a held-out error worse, and the answer does not state it."""
+    return not states_worse(case) and any(worse(case, k) for k in ("innovation", "free_run"))
 
 
 def wrong_without_reservation(case: Case) -> bool:
@@ -204,7 +203,7 @@ def set_scores(cases: Sequence[Case]) -> dict[str, dict[str, Any]]:
                 "derivative_coverage_right": share(flag for c in right for flag in derivatives_covered(c)),
                 "parameter_coverage": share(flag for c in some for flag in parameters_covered(c)),
                 "after_over_oracle": median(ratio(c, "after", "oracle") for c in named),
-                "unconfirmed_in_silence": share(unconfirmed_in_silence(c) for c in named),
+                "worse_in_silence": share(worse_in_silence(c) for c in named),
                 "by_set": by_set(some),
             }
         if every and mode in CONDITIONS:

@@ -16,7 +16,7 @@ from airtruth.tracing.model.compile import CHANNELS
 from airtruth.tracing.model.parameters import COLOUR_TIME_S, Common
 from airtruth.tracing.replay import disagreement
 from airtruth.tracing.selection.rounds import SearchRound
-from airtruth.tracing.stage_errors import Errors, Replay
+from airtruth.tracing.stage_errors import Errors, PerChannel, Replay
 from airtruth.tracing.stages import Stages, in_closed_loop
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ _FAR: Final = 5.0
 """Distance of an estimate from a declared derivative from which a note states it, in standard deviations of the estimate [-]
 (judgement: no chance over six derivatives)."""
 _WORSE: Final = 1.02
-"""Error of a free run after over that before, from which a note states it [-] (judgement)."""
+"""Error of held-out records after over that before, from which a note states it [-] (judgement)."""
 _IN_LOOP: Final = (
     "the elevator responds to the motion (a damper, an autopilot or a pilot): gusts move it too, so that the free run of a "
     "false model may come closer than that of the true one; the innovations remain a valid test"
@@ -60,7 +60,7 @@ def notes(
         yield from within_assumed_uncertainty(
             declared, stages.case.fitted.records[0].plant.aircraft.file.derivatives
         )
-    yield from worse_free_run(errors)
+    yield from worse_held_out(errors)
     if in_closed_loop(stages):
         yield _IN_LOOP
     if stages.case.left_out:
@@ -74,23 +74,26 @@ def notes(
         yield "the logs contradict physics and were traced all the same (--force): " + "; ".join(forced)
 
 
-def worse_free_run(errors: Errors) -> Iterator[str]:
-    """A free run of the held-out records whose error is larger after than before, however uncertain the difference is."""
-    before, after = (_relative_free_run(errors, stage) for stage in ("before", "after"))
-    if before and after and after > _WORSE * before:
-        yield (
-            f"on the held-out records, the error of the free run is {100.0 * (after / before - 1.0):.0f} % larger after than "
-            "before; `confirmed` states whether the difference is significant"
-        )
+def worse_held_out(errors: Errors) -> Iterator[str]:
+    """An error of the held-out records that is larger after than before, however uncertain the difference is."""
+    before, after = (errors.stages.get(stage) for stage in ("before", "after"))
+    if before is None or after is None or before.held_out is None or after.held_out is None:
+        return
+    for words, old, new in (
+        ("the free run", before.held_out.free_run, after.held_out.free_run),
+        ("the innovations", before.held_out.innovation, after.held_out.innovation),
+    ):
+        was, own = (_relative(error, errors.channels) for error in (old, new))
+        if was > 0.0 and own > _WORSE * was:
+            yield (
+                f"on the held-out records, the error of {words} is {100.0 * (own / was - 1.0):.0f} % larger after than "
+                "before; `confirmed` states whether the difference is significant"
+            )
 
 
-def _relative_free_run(errors: Errors, stage: str) -> float | None:
-    """Root mean square over the channels of error over signal [-]; None where no record is held out."""
-    own = errors.stages.get(stage)
-    if own is None or own.held_out is None:
-        return None
-    relative = [error / errors.channels[channel] for channel, error in own.held_out.free_run.items()]
-    return float(np.sqrt(np.mean(np.square(relative))))
+def _relative(error: PerChannel, signal: PerChannel) -> float:
+    """Root mean square over the channels of error over signal [-]."""
+    return float(np.sqrt(np.mean([(e / signal[channel]) ** 2 for channel, e in error.items()])))
 
 
 def within_assumed_uncertainty(declared: DeclaredModel, stated: Mapping[str, Quantity]) -> Iterator[str]:
