@@ -1,5 +1,7 @@
 """What a static probe does not see, from a change to aircraft.toml and back."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -66,6 +68,14 @@ def test_a_reading_keeps_the_state_that_multiplies_it(tmp_path):
     assert [r.behind for r in twice.readings] == ["late", "late_2"]
     declared = declared_dynamics(twice)
     assert [r.behind for r in declared.readings] == [s.name for s in declared.states]
+
+
+def test_a_bend_without_a_slope_is_an_end_of_a_table_beside_other_bends_and_nothing_alone():
+    end = replace(STATIC, amplitude=0.0, at=0.2)
+    assert effective(Change(aero=(STATIC, end))).aero == (STATIC, end)
+    assert effective(Change(aero=(end,))).aero == ()
+    elsewhere = replace(end, coefficient="CL")
+    assert effective(Change(aero=(STATIC, elsewhere))).aero == (STATIC,)
 
 
 def test_the_file_says_it_to_the_last_bit(tmp_path):

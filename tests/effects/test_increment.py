@@ -17,6 +17,7 @@ from airtruth.physics.terms import AeroTerm, Change, shape_of
 SHAPE = Shape("Cm", "alpha", 0.02, 0.18, 8, trim=0.07)
 BENDS = [0.002, -0.001, 0.003, -0.004, 0.002, 0.001, -0.002]
 SLOPE = 0.0015
+SWITCH = replace(SHAPE, memory=Memory("play", half_width=0.005), step_cell=4)
 
 
 def values_of(shape, bends, slope=SLOPE):
@@ -95,7 +96,7 @@ def test_a_held_slope_has_next_to_no_prior_deviation():
 )
 def test_a_step_rises_over_its_cell_and_is_zero_at_the_trim(cell, expected):
     """The cells are 0.02 rad wide from 0.02 rad, the trim is 0.07 rad."""
-    effect = increment(replace(SHAPE, memory=Memory("play", half_width=0.005), step_cell=cell))
+    effect = increment(replace(SWITCH, step_cell=cell))
     change = effect.change({"step": -0.01})
     x = np.linspace(0.0, 0.2, 81)
     assert [p.name for p in effect.parameters] == ["step"]
@@ -121,9 +122,16 @@ def test_a_prior_applies_to_the_bends_and_not_to_the_times():
     assert [p.prior_std for p in effect.parameters] == [0.01] * 4 + [math.inf]
 
 
-def test_the_written_table_is_the_increment_and_flags_its_range(tmp_path):
-    """JSBSim interpolates the written table, slope and all; the expected values are those of the terms."""
-    change = increment(SHAPE).change(values_of(SHAPE, BENDS))
+@pytest.mark.parametrize(
+    "change",
+    [increment(SHAPE).change(values_of(SHAPE, BENDS)), increment(SWITCH).change({"step": -0.01})],
+    ids=["function", "step"],
+)
+def test_the_written_table_is_the_increment_and_flags_its_range(tmp_path, change):
+    """JSBSim interpolates the written table, slope and all; the expected values are those of the terms.
+
+    The state of a play is at first its signal.
+    """
     folder = write_aircraft("gtm", change, tmp_path / "learned")
     text = (folder / "learned.xml").read_text()
     assert "<tableData>" in text

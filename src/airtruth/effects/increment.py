@@ -240,7 +240,9 @@ class Shape:
     def _bends(self, values: Mapping[str, float], signal: str) -> tuple[Piece, ...]:
         if self.step_cell is not None:
             first = self.low + self.step_cell * self.width
-            return self._rise(values[STEP] / self.width, signal, first, first + self.width)
+            rise = self._rise(values[STEP] / self.width, signal, first, first + self.width)
+            # ends without a slope: the table of a written aircraft then covers the learned range, and its flag states the rest
+            return (*rise, Piece(signal, "below", 0.0, self.low), Piece(signal, "above", 0.0, self.high))
         sides: tuple[Literal["below", "above"], ...] = ("below", "above")
         above = [(at, values[_bend(k)] / self.width) for k, at in enumerate(self.knots) if at > self.trim]
         below = [(at, values[_bend(k)] / self.width) for k, at in enumerate(self.knots) if at <= self.trim]

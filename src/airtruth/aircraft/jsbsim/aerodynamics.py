@@ -164,7 +164,7 @@ def _grouped(terms: Sequence[AeroTerm]) -> tuple[list[list[AeroTerm]], list[Aero
     balanced = (_balanced(group) for group in bends.values())
     learned = [group for group in balanced if len(group) >= _LEAST_BENDS]
     taken = {id(term) for group in learned for term in group}
-    return learned, [term for term in terms if id(term) not in taken]
+    return learned, [term for term in terms if id(term) not in taken and term.amplitude != 0.0]
 
 
 def _balanced(group: list[AeroTerm]) -> list[AeroTerm]:
