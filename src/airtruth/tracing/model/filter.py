@@ -2,8 +2,8 @@
 follow the airspeed.
 
 Between samples the motion is integrated by the classical Runge-Kutta method, whose weights are Simpson's: the middle
-value of an input carries its area. The low-passed copies of the gust, the lags and the delays of sensors are
-integrated exactly for a signal that is linear over half a step.
+value of an input carries its area. The low-passed copies of the gust are integrated exactly for a signal that is linear over
+half a step, and the lags and the delays of sensors for one that is linear over a quarter.
 
 Source: R. E. Maine and K. W. Iliff, NASA RP-1138 (1985), for the filter.
 """
@@ -48,6 +48,9 @@ from airtruth.tracing.model.steady import SteadyFilter, without_update
 
 Array = NDArray[np.float64]
 
+_PARTS: Final = 4
+"""Parts of a step over which a signal is linear for the lag or the delay of its sensor [-]: with two, a delay of 5.6 ms in a
+record of 46 steps of the elevator is off by 0.9 standard deviations of the gyro's noise in all, and looks like a lag."""
 _LOST: Final = 1e6
 """Magnitude of a state [its unit] beyond which the motion has left all bounds; judgement."""
 
@@ -59,7 +62,7 @@ class Steps(NamedTuple):
     ----------
     h : step of integration [s].
     decay, mean : (2, leads) of the gust's low-passed copies [-].
-    phi, early, late : (outputs, order, order), (outputs, order) of the sensors' delays over half a step.
+    phi, early, late : (outputs, order, order), (outputs, order) of the sensors' delays over a part of a step.
     forget : decay of the slow noise over a sample [-].
     has_late_sensors : whether any sensor has a lag or a delay.
     """
@@ -81,7 +84,7 @@ class Work(NamedTuple):
     ----------
     rate : (4, states) of the stages; tried : (states,) at a stage.
     out, last : (outputs,) at the end and the start of a step; first : (2,) rates of alpha and q at its start.
-    ends : (3,) a signal at start, middle and end of a step; held : (order,) states of a delay.
+    ends : (parts + 1,) a signal at the ends of the parts of a step; held : (order,) states of a delay.
     """
 
     rate: Array
@@ -105,7 +108,7 @@ def _steps(model: FilterModel, dt_s: float, sub: int) -> Steps:
     for i in range(OUTPUTS):
         if model.states.delay[i] >= 0:
             system = delay_system(model.sensors.delay_s[i])
-            step(system, np.zeros(DELAY_ORDER), DELAY_ORDER, 0.5 * h, phi[i], early[i], late[i], unused)
+            step(system, np.zeros(DELAY_ORDER), DELAY_ORDER, h / _PARTS, phi[i], early[i], late[i], unused)
     states = model.states
     forget = math.exp(-dt_s / model.sensors.slow_time_s) if states.noise >= 0 else 0.0
     has_late_sensors = states.size > states.motion + (OUTPUTS if states.noise >= 0 else 0)
@@ -182,7 +185,7 @@ def _advance_motion(
 def _advance_sensors(
     x: Array, point: int, grid: GridSignals, model: FilterModel, steps: Steps, work: Work
 ) -> None:
-    """Lags and delays over the step that `_advance_motion` has made, in two halves.
+    """Lags and delays over the parts of the step that `_advance_motion` has made.
 
     In between the signal has the motion's own curvature: a cubic through values and slopes.
     """
@@ -191,36 +194,40 @@ def _advance_sensors(
     outputs(x, work.rate[0, 1], az, at, model, work.out)
     ends = work.ends
     for i in range(OUTPUTS):
-        middle = 0.5 * (work.last[i] + work.out[i])
+        rise = work.out[i] - work.last[i]
+        early = late = 0.0  # slopes over the step beyond those of a straight line
         if i < 2:
-            middle += model.sensors.scale[i] * steps.h / 8.0 * (work.first[i] - work.rate[0, i])
-        ends[0], ends[1], ends[2] = work.last[i], middle, work.out[i]
+            early = model.sensors.scale[i] * steps.h * work.first[i] - rise
+            late = model.sensors.scale[i] * steps.h * work.rate[0, i] - rise
+        for part in range(_PARTS + 1):
+            s = part / _PARTS
+            ends[part] = work.last[i] + s * rise + s * (1.0 - s) * ((1.0 - s) * early - s * late)
         if model.states.lag[i] >= 0:
-            _advance_lag(x, model.states.lag[i], 0.5 * steps.h / model.sensors.lag_s[i], ends)
+            _advance_lag(x, model.states.lag[i], steps.h / (_PARTS * model.sensors.lag_s[i]), ends)
         if model.states.delay[i] >= 0:
             _advance_delay(x, model.states.delay[i], i, steps, work)
 
 
 @inner
 def _advance_lag(x: Array, at: int, r: float, ends: Array) -> None:
-    """A lag over two half steps of r time constants each; its output replaces its input in ``ends``."""
+    """A lag over the parts of a step of r time constants each; its output replaces its input in ``ends``."""
     decay = math.exp(-r)
     mean = (1.0 - decay) / r
     before = ends[0]
     ends[0] = x[at]
-    for half in range(1, 3):
-        x[at] = decay * x[at] + (mean - decay) * before + (1.0 - mean) * ends[half]
-        before, ends[half] = ends[half], x[at]
+    for part in range(1, _PARTS + 1):
+        x[at] = decay * x[at] + (mean - decay) * before + (1.0 - mean) * ends[part]
+        before, ends[part] = ends[part], x[at]
 
 
 @inner
 def _advance_delay(x: Array, at: int, i: int, steps: Steps, work: Work) -> None:
     ends, held = work.ends, work.held
-    for half in range(2):
+    for part in range(_PARTS):
         for row in range(DELAY_ORDER):
             held[row] = x[at + row]
         for row in range(DELAY_ORDER):
-            total = steps.early[i, row] * ends[half] + steps.late[i, row] * ends[half + 1]
+            total = steps.early[i, row] * ends[part] + steps.late[i, row] * ends[part + 1]
             for m in range(DELAY_ORDER):
                 total += steps.phi[i, row, m] * held[m]
             x[at + row] = total
@@ -371,7 +378,7 @@ def innovations(given: KernelInput, steady: SteadyFilter, e: Array) -> tuple[boo
         np.zeros(OUTPUTS),
         np.zeros(OUTPUTS),
         np.zeros(2),
-        np.zeros(3),
+        np.zeros(_PARTS + 1),
         np.zeros(DELAY_ORDER),
     )
     sound, more = _innovations(given, steps, work, _initial_state(given), steady, e)
