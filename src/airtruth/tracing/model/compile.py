@@ -117,8 +117,8 @@ def _effects(change: Change, first: Ints) -> EffectArrays:
             f"effect: two states are named {twice.pop()!r}; an effect with a state can be added once"
         )
     # the airspeed is measured, so that an axial force moves no output of the filter
-    every: list[AeroTerm | ReadingTerm] = [t for t in change.aero if t.coefficient != "CX"]
-    every += change.readings
+    stated: list[AeroTerm | ReadingTerm] = [t for t in change.aero if t.coefficient != "CX"]
+    every = [t for t in (*stated, *change.readings) if t.amplitude != 0.0]
     terms = np.zeros((len(every), 6), dtype=np.int64)
     for i, term in enumerate(every):
         acts_on = term.channel if isinstance(term, ReadingTerm) else term.coefficient
