@@ -16,7 +16,7 @@ from airtruth.aircraft import write as writing
 from airtruth.effects.increment import Memory, Shape, increment
 from airtruth.effects.registry import EFFECTS
 from airtruth.errors import ConfigurationError
-from airtruth.physics.terms import AeroTerm, Change, shape_of, term_value
+from airtruth.physics.terms import AeroTerm, Change, ReadingTerm, shape_of, term_value
 from airtruth.table import significant
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable, ParameterEstimate
@@ -153,6 +153,12 @@ def test_two_written_effects_with_memory_have_states_of_their_own():
     np.testing.assert_array_equal(compiled.effects.term_index[:, 3], compiled.effect_states)
     with pytest.raises(ConfigurationError, match="two states are named 'learned-Cm-alpha-lag'"):
         compile_change(moment.change({"slope": -0.4, "at": 0.1}) + moment.change({"slope": 0.1, "at": 0.1}))
+
+
+def test_the_filter_leaves_out_terms_without_a_size():
+    flat, bent = (AeroTerm("Cm", "alpha", "above", slope, 0.1) for slope in (0.0, -0.4))
+    reading = ReadingTerm("q_rad_s", "alpha", "linear", 0.0)
+    assert compile_change(Change(aero=(flat, bent), readings=(reading,))).effects.amplitude.tolist() == [-0.4]
 
 
 @pytest.mark.parametrize("trim", [0.05, 0.06, 0.075])
