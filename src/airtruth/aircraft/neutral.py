@@ -9,7 +9,7 @@ from dataclasses import replace
 from airtruth.aircraft import Sensor
 from airtruth.errors import ConfigurationError
 from airtruth.physics.sensor_errors import KINDS
-from airtruth.physics.terms import CAUSES, DECLARED, AeroTerm, Change, SensorTerm, SurfaceTerm
+from airtruth.physics.terms import CAUSES, DECLARED, Change, SensorTerm, SurfaceTerm
 
 
 def effective(change: Change) -> Change:
@@ -17,8 +17,8 @@ def effective(change: Change) -> Change:
 
     A bend without a slope remains beside other bends over its signal: it is an end of their table.
     """
-    curved = {_curve(term) for term in change.aero if term.amplitude != 0.0} - {None}
-    aero = tuple(term for term in change.aero if term.amplitude != 0.0 or _curve(term) in curved)
+    curves = {term.curve for term in change.aero if term.amplitude != 0.0} - {None}
+    aero = tuple(term for term in change.aero if term.amplitude != 0.0 or term.curve in curves)
     readings = tuple(term for term in change.readings if term.amplitude != 0.0)
     signals = {term.signal for term in aero} | {
         name for term in readings for name in (term.signal, term.behind)
@@ -34,12 +34,6 @@ def effective(change: Change) -> Change:
         readings=readings,
         air=tuple(term for term in change.air if term.factor != 1.0),
     )
-
-
-def _curve(term: AeroTerm) -> tuple[str, str, str, float] | None:
-    """What the bends of one table share; None for a term that is no bend."""
-    is_bend = term.shape in ("above", "below")
-    return (term.coefficient, term.signal, term.factor, term.factor_at) if is_bend else None
 
 
 def _neutral_surface(term: SurfaceTerm) -> bool:

@@ -158,9 +158,8 @@ def _grouped(terms: Sequence[AeroTerm]) -> tuple[list[list[AeroTerm]], list[Aero
     """Bends of one coefficient over one signal that are constant beyond their ends, and the other terms."""
     bends: dict[tuple[str, str, str, float], list[AeroTerm]] = {}
     for term in terms:
-        if term.shape in ("above", "below"):
-            same = (term.coefficient, term.signal, term.factor, term.factor_at)
-            bends.setdefault(same, []).append(term)
+        if (curve := term.curve) is not None:
+            bends.setdefault(curve, []).append(term)
     balanced = (_balanced(group) for group in bends.values())
     learned = [group for group in balanced if len(group) >= _LEAST_BENDS]
     taken = {id(term) for group in learned for term in group}

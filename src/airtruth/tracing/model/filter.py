@@ -49,8 +49,8 @@ from airtruth.tracing.model.steady import SteadyFilter, without_update
 Array = NDArray[np.float64]
 
 _PARTS: Final = 4
-"""Parts of a step over which a signal is linear for the lag or the delay of its sensor [-]: with two, a delay of 5.6 ms in a
-record of 46 steps of the elevator is off by 0.9 standard deviations of the gyro's noise in all, and looks like a lag."""
+"""Parts of a step over which a signal is linear for the lag or the delay of its sensor [-]. With two parts, the error of a gyro
+delayed by 5.6 ms is 0.9 standard deviations of its noise, as root sum of squares over a record with 46 elevator steps."""
 _LOST: Final = 1e6
 """Magnitude of a state [its unit] beyond which the motion has left all bounds; judgement."""
 
