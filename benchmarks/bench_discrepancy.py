@@ -16,16 +16,20 @@ fitted initial states and offsets (airtruth frees biases and trims, the peers tw
 sample ahead (airtruth: from its filter; the peers: from the measured state).
 
     pip install pysindy; python -m benchmarks.bench_discrepancy [--trials N] [--seed S] [--budget SECONDS]
+    python -m benchmarks.bench_discrepancy --blind DIR [DIR ...]   # the answers of validation.blind, which have no time
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,12 +39,14 @@ from scipy.signal import savgol_filter
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.store import log_paths, read_log
 from airtruth.units import G0
-from validation.blind import trials
+from validation.blind import draw, trials
 from validation.blind.figures import DECLARED
 
 Array = NDArray[np.float64]
 Function = Callable[[Array], Array]
 """(points, 3) alpha, q, elevator -> (points, 2) alpha' - q, q'."""
+Pair = tuple[float, float]
+"""Errors of a free run and one sample ahead [-]."""
 
 SMOOTHED = 7
 """Samples of the local quadratic that differentiates the gyro."""
@@ -216,7 +222,7 @@ def stepped(function: Function, x: Array, elevator: Array, dt_s: float, offset: 
     return np.asarray(x + dt_s / 6.0 * (a + 2.0 * b + 2.0 * c + d))
 
 
-def errors(function: Function, record: Record, spread: Array) -> tuple[float, float]:
+def errors(function: Function, record: Record, spread: Array) -> Pair:
     """Free run and one step ahead: root mean square of alpha and q over their standard deviation."""
     x, e = record.z[:, :2], record.z[:, 2]
     inputs = np.column_stack([e[:-1], 0.5 * (e[:-1] + e[1:]), e[1:]])
@@ -258,11 +264,49 @@ def errors(function: Function, record: Record, spread: Array) -> tuple[float, fl
     return float(np.sqrt(best)), float(np.sqrt((ahead**2).mean()))
 
 
-def ours(log: Path, budget_s: float) -> tuple[dict[str, tuple[float, float]], str]:
-    """Errors of the stages *declared*, *before* and *after*, and the verdict."""
-    from airtruth.tracing import TraceOptions, trace  # the process that flies the trials must not load it
+PEERS: dict[str, Callable[[list[Record], tuple[Array, Array]], Function]] = {
+    "SINDy": sindy,
+    "Gaussian process": gaussian_process,
+    "orthogonal functions": orthogonal_functions,
+}
+"""What learns a model from records, whose inputs are scaled by the given mean and standard deviation."""
 
-    answer = trace(log, DECLARED, TraceOptions(time_budget_s=budget_s)).to_dict()
+
+@dataclass(frozen=True)
+class Trial:
+    """A blind trial that was answered: its label, the cause, the log, the answer and the processor time of the trace [s]."""
+
+    label: str
+    cause: str
+    log: Path
+    answer: dict[str, Any]
+    seconds: float = float("nan")
+
+
+def flown(seed: int, count: int, budget_s: float, folder: Path) -> Iterator[Trial]:
+    """Trials of the mode off-library, flown and traced here."""
+    for number in range(count):
+        (path,) = trials.frozen(seed, [number], "off-library", folder)
+        (log,) = log_paths(path)
+        (effect,) = draw.draw(seed, number, "off-library").effects
+        from airtruth.tracing import TraceOptions, trace  # the process that flies the trials must not load it
+
+        began = time.process_time()
+        answer = trace(log, DECLARED, TraceOptions(time_budget_s=budget_s)).to_dict()
+        yield Trial(path.name, effect.key, log, answer, time.process_time() - began)
+
+
+def answered(folder: Path) -> Iterator[Trial]:
+    """Trials of a folder of `validation.blind`, with the answers that it has."""
+    for path in sorted((folder / "answer").glob("*.json")):
+        answer = json.loads(path.read_text())
+        (effect,) = json.loads((folder / "truth" / path.name).read_text())["trial"]["effects"]
+        if "failed" not in answer:
+            yield Trial(path.stem, effect["key"], folder / "logs" / path.stem / "log.parquet", answer)
+
+
+def ours(answer: dict[str, Any]) -> dict[str, Pair]:
+    """Errors of the stages *declared*, *before* and *after* of an answer."""
     error = answer["error"]
     names = ("alpha_rad", "q_rad_s")
 
@@ -271,8 +315,57 @@ def ours(log: Path, budget_s: float) -> tuple[dict[str, tuple[float, float]], st
         return float(np.sqrt(np.mean([(own[n] / error["channels"][n]) ** 2 for n in names])))
 
     stages = [s for s in ("declared", "before", "after") if s in error]
-    found = {s: (over(s, "free_run"), over(s, "innovation")) for s in stages}
-    return found, str(answer["verdict"])
+    return {s: (over(s, "free_run"), over(s, "innovation")) for s in stages}
+
+
+def compared(trial: Trial) -> dict[str, tuple[float, float, float]]:
+    """Free run, one sample ahead and processor time [s] of every model on a trial; "airtruth" is its last stage."""
+    own = records_of(read_log(trial.log))
+    held = own[2::3]
+    fitted = [r for r in own if not any(r is h for h in held)]
+    whole = np.concatenate([r.z for r in fitted])
+    scale = (whole.mean(axis=0), whole.std(axis=0))
+    rows: dict[str, tuple[float, float, float]] = {}
+    for name, learn in PEERS.items():
+        began = time.process_time()
+        function = learn(fitted, scale)
+        spent = time.process_time() - began
+        pairs = [errors(function, r, scale[1][:2]) for r in held]
+        free, ahead = np.sqrt(np.mean(np.array(pairs) ** 2, axis=0))
+        rows[name] = (float(free), float(ahead), spent)
+    rows |= {f"airtruth, {stage}": (*pair, trial.seconds) for stage, pair in ours(trial.answer).items()}
+    rows["airtruth"] = rows.get("airtruth, after", rows["airtruth, before"])
+    return rows
+
+
+def line(name: str, row: Iterable[float]) -> str:
+    """A row of a table; a value that was not measured is left out."""
+    return f"  {name:24}" + "".join(f"{value:12.4f}" if np.isfinite(value) else "" for value in row)
+
+
+def summary(causes: list[str], every: list[dict[str, tuple[float, float, float]]]) -> str:
+    """Medians of every model, and the error of airtruth over that of the best other model of each trial."""
+    lines = [f"median of {len(every)} trials: free run, one sample ahead, seconds"]
+    for name in [*PEERS, "airtruth, declared", "airtruth, before", "airtruth"]:
+        median = np.median([rows[name] for rows in every], axis=0)
+        lines.append(line(name, median))
+    best = np.array([np.min([rows[name][:2] for name in PEERS], axis=0) for rows in every])
+    ratio = np.array([rows["airtruth"][:2] for rows in every]) / best
+    lines.append(
+        "airtruth over the best other model of each trial: median, quartiles, share of trials below 1"
+    )
+    for k, kind in enumerate(("free run", "one sample ahead")):
+        low, middle, high = np.quantile(ratio[:, k], [0.25, 0.5, 0.75])
+        lines.append(f"  {kind:24}{middle:12.2f}{low:8.2f}{high:6.2f}{np.mean(ratio[:, k] < 1.0):8.2f}")
+    lines.append(
+        "by the cause: trials, median in the free run and one sample ahead, trials at or above 1 in either"
+    )
+    for cause in sorted(set(causes)):
+        rows = ratio[[c == cause for c in causes]]
+        free, ahead = np.median(rows, axis=0)
+        lost = int((rows >= 1.0).any(axis=1).sum())
+        lines.append(f"  {cause:32}{len(rows):4d}{free:8.2f}{ahead:8.2f}{lost:4d}")
+    return "\n".join(lines)
 
 
 def main() -> None:
@@ -280,45 +373,30 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--trials", type=int, default=6)
+    parser.add_argument(
+        "--blind", type=Path, nargs="+", help="folders of validation.blind whose answers serve"
+    )
+    parser.add_argument("--trials", type=int, default=6, help="flown and traced here, without --blind")
     parser.add_argument("--seed", type=int, default=77)
-    parser.add_argument("--budget", type=float, default=120.0)
+    parser.add_argument("--budget", type=float, default=120.0, help="of a trace [s]")
     chosen = parser.parse_args()
-    peers = {
-        "SINDy": sindy,
-        "Gaussian process": gaussian_process,
-        "orthogonal functions": orthogonal_functions,
-    }
-    every: dict[str, list[tuple[float, float, float]]] = {}
+    causes, every = [], []
     with tempfile.TemporaryDirectory() as folder:
-        for number in range(chosen.trials):
-            (flown,) = trials.frozen(chosen.seed, [number], "off-library", Path(folder))
-            (path,) = log_paths(flown)
-            rows: dict[str, tuple[float, float, float]] = {}
-            own = records_of(read_log(path))
-            held = own[2::3]
-            fitted = [r for r in own if not any(r is h for h in held)]
-            whole = np.concatenate([r.z for r in fitted])
-            scale = (whole.mean(axis=0), whole.std(axis=0))
-            for name, learn in peers.items():
-                began = time.process_time()
-                function = learn(fitted, scale)
-                spent = time.process_time() - began
-                pairs = [errors(function, r, scale[1][:2]) for r in held]
-                free, ahead = np.sqrt(np.mean(np.array(pairs) ** 2, axis=0))
-                rows[name] = (float(free), float(ahead), spent)
-            began = time.process_time()
-            stages, verdict = ours(path, chosen.budget)
-            spent = time.process_time() - began
-            rows |= {f"airtruth, {stage}": (*pair, spent) for stage, pair in stages.items()}
-            rows["airtruth"] = rows.get("airtruth, after", rows["airtruth, before"])
-            print(f"\ntrial {number} ({verdict}): free run, one step ahead, seconds")
+        source = (
+            chain.from_iterable(answered(blind) for blind in chosen.blind)
+            if chosen.blind
+            else flown(chosen.seed, chosen.trials, chosen.budget, Path(folder))
+        )
+        for trial in source:
+            rows = compared(trial)
+            causes.append(trial.cause)
+            every.append(rows)
+            print(
+                f"\n{trial.label}, {trial.cause} ({trial.answer['verdict']}): free run, one sample ahead, seconds"
+            )
             for name, row in rows.items():
-                every.setdefault(name, []).append(row)
-                print(f"  {name:24}" + "".join(f"{value:12.4f}" for value in row), flush=True)
-    print("\nmedian over the trials: free run, one step ahead, seconds")
-    for name, found in every.items():
-        print(f"  {name:24}" + "".join(f"{value:12.4f}" for value in np.median(found, axis=0)), flush=True)
+                print(line(name, row), flush=True)
+    print(f"\n{summary(causes, every)}")
 
 
 if __name__ == "__main__":

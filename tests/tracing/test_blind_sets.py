@@ -355,12 +355,12 @@ def test_an_effect_that_worsens_a_held_out_error_has_to_say_so():
         }
         stages["after"]["held_out"][kind] = dict.fromkeys(CHANNELS, ratio)
         one["answer"]["error"] = stages
-        assert set_scoring.worse_in_silence(one) == expected
-        assert not set_scoring.worse_in_silence({**one, "answer": {**one["answer"], "confirmed": False}})
+        assert set_scoring.worse_unstated(one) == expected
+        assert not set_scoring.worse_unstated({**one, "answer": {**one["answer"], "confirmed": False}})
         one["answer"]["notes"] = [
             "on the held-out records, the error of the innovations is 6 % larger after than before"
         ]
-        assert not set_scoring.worse_in_silence(one)
+        assert not set_scoring.worse_unstated(one)
 
 
 def test_a_null_that_is_called_contradicted_counts_per_air():

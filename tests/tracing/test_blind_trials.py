@@ -192,8 +192,8 @@ def test_scores_of_a_hand_made_set():
         "learned": (1, 4),
         "named_without_reservation": (1, 4),
         "passed_as_none": (0, 4),
-        "worse_unrefused": (0, 4),
-        "worse_in_silence": (0, 4),
+        "worse_not_denied": (0, 4),
+        "worse_unstated": (0, 4),
     }
     assert s["off_library"]["after_over_oracle"] == (2.0, 1)
     assert {k: (v.hits, v.count) for k, v in s["pairs"].items()} == {

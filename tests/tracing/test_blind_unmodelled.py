@@ -179,8 +179,8 @@ def test_scores_of_leave_one_out():
         "learned": (1, 4),
         "named_without_reservation": (1, 4),
         "passed_as_none": (0, 4),
-        "worse_unrefused": (1, 4),
-        "worse_in_silence": (1, 4),
+        "worse_not_denied": (1, 4),
+        "worse_unstated": (1, 4),
     }
     assert s["after_over_oracle"] == (1.1, 1)
     assert s["after_over_oracle_of_all"] == (pytest.approx(1.65), 4)

@@ -9,6 +9,7 @@ import pytest
 import trace_records as tr
 from scipy.linalg import expm, solve_discrete_are
 
+from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import Change, SensorTerm, SurfaceTerm
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import TraceProblem
@@ -42,7 +43,12 @@ def test_a_delay_of_the_surface_carries_the_corner_to_later_cells():
     late = filter_inputs(made, Change(surface=(SurfaceTerm("delay", 1.5 * tr.DT),)))
     assert late.corner_rad2 == pytest.approx([0.0, 0.0, 0.0, 0.5, 0.5, 0.0], abs=0.05)
     assert late.corner_rad2.sum() == pytest.approx(1.0, rel=0.02)
-    assert filter_inputs(made, Change()).corner_rad2 is made.signals.corner_rad2
+    plain = filter_inputs(made, Change())
+    assert plain.corner_rad2 is made.signals.corner_rad2
+    assert late.grid is not plain.grid
+    assert (
+        filter_inputs(made, EFFECTS["elevator_asymmetry"].change({"dCmde": 0.1})).grid is plain.grid
+    )  # a term of the aircraft changes no input
 
 
 def test_a_servo_that_the_samples_show_is_no_corner():

@@ -70,7 +70,7 @@ def holds(answer, name, parameter, value):
     return any(name in found for found in named(answer))
 
 
-def no_worse_in_silence(answer):
+def no_worse_unstated(answer):
     """Held-out errors after are those before or less, or the answer says that it is not confirmed."""
     before, after = (answer["error"][stage]["held_out"] for stage in ("before", "after"))
     worse = any(
@@ -93,7 +93,7 @@ def test_a_lost_tail_is_named_and_not_a_curvature(answered):
     assert any(found & {"tail_effectiveness", "derivatives"} for found in named(a))
     assert not {e["name"] for e in a["effects"]} <= BENT
     assert a["verdict"] in ("traced", "one_of")
-    assert no_worse_in_silence(a)
+    assert no_worse_unstated(a)
 
 
 @TAIL
@@ -187,7 +187,7 @@ def test_a_slow_vane_and_a_late_surface_are_both_named(transport, tmp_path):
     assert not {"lift_lag", "downwash_lag", "lift_alpha_dot"} & {e["name"] for e in a["effects"]}
     assert holds(a, "vane_lag", "tau_s", rebuilt.VANE_LAG_S)
     assert holds(a, "elevator_delay", "delay_s", rebuilt.SURFACE_DELAY_S)
-    assert no_worse_in_silence(a)
+    assert no_worse_unstated(a)
 
 
 def test_a_late_surface_behind_a_declared_lag_is_named(transport, tmp_path):

@@ -13,7 +13,14 @@ from airtruth.tracing.inference.hypothesis import Hypothesis, unconstrained_by
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import Sensitivities, likelihood_terms, sensitivities_of
 from airtruth.tracing.inference.whitening import NO_WHITENER, Whitener, autoregression
-from airtruth.tracing.model.parameters import COMMON_STEP, PER_RECORD_STEP, Common, Parameters, PerRecord
+from airtruth.tracing.model.parameters import (
+    COMMON_STEP,
+    PER_RECORD_STEP,
+    Common,
+    Layout,
+    Parameters,
+    PerRecord,
+)
 from airtruth.tracing.model.response import respond, respond_to
 from airtruth.tracing.model.settings import common_prior, per_record_prior
 from airtruth.units import DEG
@@ -44,6 +51,21 @@ def off_optimum():
 def likelihood(problem, point):
     found = sensitivities_of(problem, 0, TWO, point)
     return likelihood_terms(found, NO_WHITENER, levels=True)[0]
+
+
+def test_derivatives_in_levels_can_be_left_out(off_optimum):
+    """Those in the levels of noise and gusts are then zero, and the others stay the same to the last bit."""
+    problem, point = off_optimum
+    every = sensitivities_of(problem, 0, TWO, point)
+    without = sensitivities_of(problem, 0, TWO, point, with_levels=False)
+    layout = Layout(len(point.sizes))
+    levels = [*Common.noise, layout.per_record.start + PerRecord.log_gust]
+    rest = np.setdiff1d(np.arange(layout.total), levels)
+    assert np.abs(every.w[levels]).any(axis=(1, 2)).all()
+    assert not without.t[levels].any()
+    assert not without.w[levels].any()
+    assert np.array_equal(without.t[rest], every.t[rest])
+    assert np.array_equal(without.w[rest], every.w[rest])
 
 
 def moved(point, i, h):

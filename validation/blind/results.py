@@ -76,7 +76,7 @@ def _of_sets(mode: str, scores: Mapping[str, Any]) -> str:
         ("the same where the right set is first", scores["derivative_coverage_right"]),
         ("parameters inside their 95 % interval", scores["parameter_coverage"]),
         ("held-out error after / truth's own, median", _averaged(scores["after_over_oracle"])),
-        ("held-out error worse, and the answer does not state it", scores["worse_in_silence"]),
+        ("held-out error worse, and the answer does not state it", scores["worse_unstated"]),
     ]
     if "false_trace" in scores:
         summary += [
@@ -202,8 +202,8 @@ def _of_lacking(mode: str, scores: Mapping[str, Any]) -> list[tuple[str, object]
         *rows,
         (f"{mode}: named without reservation", scores["named_without_reservation"]),
         (f"{mode}: passed as none", scores["passed_as_none"]),
-        (f"{mode}: held-out error worse, and `confirmed` is not false", scores["worse_unrefused"]),
-        (f"{mode}: held-out error worse, and the answer does not state it", scores["worse_in_silence"]),
+        (f"{mode}: held-out error worse, and `confirmed` is not false", scores["worse_not_denied"]),
+        (f"{mode}: held-out error worse, and the answer does not state it", scores["worse_unstated"]),
     ]
 
 

@@ -328,11 +328,11 @@ def lacking(cases: Sequence[Case]) -> dict[str, Any]:
             bool(accepted(c)) and not c["answer"]["provisional"] for c in cases
         ),
         "passed_as_none": share(c["answer"]["verdict"] == "none" for c in cases),
-        "worse_unrefused": share(
+        "worse_not_denied": share(
             (ratio(c, "after", "before") or 0.0) > WORSE and c["answer"].get("confirmed") is not False
             for c in cases
         ),
-        "worse_in_silence": share(
+        "worse_unstated": share(
             (ratio(c, "after", "before") or 0.0) > WORSE and not states_worse(c) for c in cases
         ),
     }

@@ -165,7 +165,7 @@ def worse(case: Case, kind: str) -> bool:
     return rise > _ERRORS / np.sqrt(len(names) * count)
 
 
-def worse_in_silence(case: Case) -> bool:
+def worse_unstated(case: Case) -> bool:
     """Whether an effect is accepted that makes a held-out error worse, and the answer does not state it."""
     return not states_worse(case) and any(worse(case, k) for k in ("innovation", "free_run"))
 
@@ -203,7 +203,7 @@ def set_scores(cases: Sequence[Case]) -> dict[str, dict[str, Any]]:
                 "derivative_coverage_right": share(flag for c in right for flag in derivatives_covered(c)),
                 "parameter_coverage": share(flag for c in some for flag in parameters_covered(c)),
                 "after_over_oracle": median(ratio(c, "after", "oracle") for c in named),
-                "worse_in_silence": share(worse_in_silence(c) for c in named),
+                "worse_unstated": share(worse_unstated(c) for c in named),
                 "by_set": by_set(some),
             }
         if every and mode in CONDITIONS:

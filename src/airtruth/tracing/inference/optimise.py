@@ -87,6 +87,7 @@ class PosteriorSearch:
     whitener : an autoregression that is held.
     levels : whether noise and gust levels and the share of slow noise are free.
     shape : parameters of the shape that vectors have.
+    with_levels : whether the derivatives in levels are made where they are not free, for those who read them at the end.
     """
 
     problem: TraceProblem
@@ -95,6 +96,7 @@ class PosteriorSearch:
     whitener: Whitener
     levels: bool
     shape: Parameters
+    with_levels: bool = True
 
     def evaluate(self, x: Array, index: Ints, near: Sequence[Evaluated] | None) -> list[Evaluated | None]:
         """The posterior at each row; see `Problems.evaluate`."""
@@ -109,7 +111,9 @@ class PosteriorSearch:
 
         def one(i: int) -> tuple[Sensitivities, LikelihoodTerms] | None:
             old = None if near is None else near.sensitivities[i]
-            made = sensitivities_of(self.problem, i, self.hypothesis, point, old=old)
+            made = sensitivities_of(
+                self.problem, i, self.hypothesis, point, with_levels=self.with_levels, old=old
+            )
             return None if made is None else (made, likelihood_terms(made, self.whitener, self.levels))
 
         done = [d for d in self.problem.each(one, range(len(self.problem.records))) if d is not None]
@@ -256,8 +260,9 @@ def initial_parameters(
     own[:, PerRecord.log_gust] = np.log(_ROUGH_M_S)
     first = np.zeros(len(hypothesis.parameters)) if sizes is None else sizes
     point = Parameters(np.zeros(Common.size), own, first)
+    priors = problem.priors(hypothesis)
     search = PosteriorSearch(
-        problem, hypothesis, problem.priors(hypothesis), NO_WHITENER, levels=False, shape=point
+        problem, hypothesis, priors, NO_WHITENER, levels=False, shape=point, with_levels=False
     )
     options = replace(_SEARCH, iterations=iterations, renewed_end=False)
     return point.of_vector(minimise(search, point.vector[None, :], options).x[0])

@@ -190,6 +190,7 @@ def sensitivities_of(
     point: Parameters,
     *,
     per_record_only: bool = False,
+    with_levels: bool = True,
     old: Sensitivities | None = None,
 ) -> Sensitivities | None:
     """Innovations of one record and their derivatives by one-sided differences; None where the motion is lost.
@@ -198,6 +199,7 @@ def sensitivities_of(
     ----------
     index : number of the record.
     per_record_only : differentiate in the record's own parameters alone.
+    with_levels : differentiate in the levels of noise and gusts; else their derivatives are zero.
     old : derivatives at a nearby point, which are whitened again and kept; those in a size that are NaN are made.
     """
     record, settings = problem.records[index], problem.settings
@@ -223,14 +225,17 @@ def sensitivities_of(
         return differences.sensitivities if np.isfinite(differences.t).all() else None
     if not per_record_only:
         has_shift = given.compiled.declared["cg"] != DECLARED["cg"]
+        held = () if with_levels else Common.noise
         for i in free_common(settings):
-            if i == Common.mounting and not has_shift:
+            if i in held or (i == Common.mounting and not has_shift):
                 continue
             h = COMMON_STEP[i]
             differences.put(i, respond_to(given, settings, _moved(common, i, h), own), h)
         for k in range(len(sizes)):
             put_size(k)
     for i in range(PerRecord.size):
+        if i == PerRecord.log_gust and not with_levels:
+            continue
         h = PER_RECORD_STEP[i]
         steady = None if i == PerRecord.log_gust else base.steady
         moved = respond_to(given, settings, common, _moved(own, i, h), steady=steady)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -33,6 +33,8 @@ Array = NDArray[np.float64]
 
 LOST: Final = 1e9
 """Residual of a sample that a lost motion does not reach [unit of the output] (judgement: beyond any that counts)."""
+_AS_MEASURED: Final = "filter inputs"
+"""Name of the inputs that no change of sensors or surface affects, among what a record keeps."""
 _MOST_SLOW: Final = 0.99
 """Largest share of slow noise [-]: beyond the search's bound, where the differences need a slope."""
 
@@ -95,6 +97,15 @@ class FilterInputs:
 def filter_inputs(record: TraceRecord, change: Change | CompiledChange) -> FilterInputs:
     """Undo what a change says of the inputs' sensors, and put what it says of the surface behind the elevator."""
     compiled = change if isinstance(change, CompiledChange) else compile_change(change)
+    if compiled.surface or compiled.inputs:
+        return _inputs(record, compiled)
+    as_measured: FilterInputs | None = record.kept.get(_AS_MEASURED)
+    if as_measured is None:
+        as_measured = record.kept[_AS_MEASURED] = _inputs(record, compiled)
+    return replace(as_measured, compiled=compiled)
+
+
+def _inputs(record: TraceRecord, compiled: CompiledChange) -> FilterInputs:
     s, plant = record.signals.with_lead, record.plant
     y, theta = s.y, s.theta_rad
     if plant.alpha_shift_rad != 0.0:
