@@ -19,7 +19,7 @@ from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim, trim
 from airtruth.tracing.inference.assess import noise_floor
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.model.compile import CHANNELS, compile_change
+from airtruth.tracing.model.compile import CHANNELS
 from airtruth.tracing.model.records import FINE, TraceRecord
 from airtruth.tracing.stage_errors import MOST_RECORDS, PerChannel, Replay
 from airtruth.tracing.stages import Stages
@@ -91,7 +91,7 @@ def _weights(stages: Stages) -> list[Array]:
     """(3,) of each record: standard deviations of its free run that gusts and sensor noise explain."""
     problem, assessed = stages.reported
     model = stages.models["before"]
-    compiled = compile_change(model.hypothesis.change(model.sizes))
+    compiled = model.hypothesis.compiled(model.sizes)
     pairs = zip(problem.records[:MOST_RECORDS], assessed["before"], strict=False)
     return [
         noise_floor(record, problem.settings, compiled, model.common, own.per_record) for record, own in pairs

@@ -12,7 +12,7 @@ from airtruth.tracing.inference.assess import Assessment, assess, fitted_noise_f
 from airtruth.tracing.inference.feedback import responds_to_motion
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.model.compile import CHANNELS, compile_change
+from airtruth.tracing.model.compile import CHANNELS
 from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.acceptance import Candidate
@@ -166,7 +166,7 @@ def _floor(problem: TraceProblem, stages: Stages, assessed: dict[str, list[Asses
 
 def free_run_floor(problem: TraceProblem, model: StageModel, assessed: Sequence[Assessment]) -> Array:
     """(records, 3) root mean squares of free runs that gusts and sensor noise alone explain."""
-    compiled = compile_change(model.hypothesis.change(model.sizes))
+    compiled = model.hypothesis.compiled(model.sizes)
     return np.array(
         [
             fitted_noise_floor(

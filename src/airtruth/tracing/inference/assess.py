@@ -17,7 +17,7 @@ from airtruth.numerics.normal_equations import scaled_step
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem, likelihood_terms, sensitivities_of
 from airtruth.tracing.inference.whitening import NO_WHITENER
-from airtruth.tracing.model.compile import CompiledChange, compile_change
+from airtruth.tracing.model.compile import CompiledChange
 from airtruth.tracing.model.linearise import process_intensity
 from airtruth.tracing.model.parameters import (
     CORE,
@@ -102,7 +102,7 @@ def assess(
     own = per_record
     if own is None or not settled:
         own = _fit_own(problem, index, hypothesis, common, sizes, own)
-    compiled = compile_change(hypothesis.change(sizes))
+    compiled = hypothesis.compiled(sizes)
     response = respond(record, settings, compiled, common, own)
     residual = free_run(record, settings, compiled, common, own, hypothesis.unconstrained)
     with np.errstate(over="ignore", invalid="ignore"):  # the model may leave all bounds on this record
@@ -124,13 +124,13 @@ def own_likelihood(
 ) -> float:
     """Negative log-likelihood of one record, own parameters at their best; parameters as of `assess`."""
     own = _fit_own(problem, index, hypothesis, common, sizes, per_record)
-    compiled = compile_change(hypothesis.change(sizes))
+    compiled = hypothesis.compiled(sizes)
     return _negative_log_likelihood(respond(problem.records[index], problem.settings, compiled, common, own))
 
 
 def likelihood_at(problem: TraceProblem, hypothesis: Hypothesis, point: Parameters) -> float:
     """Negative log-likelihood of all records at a point; infinite where a motion leaves all bounds."""
-    compiled = compile_change(hypothesis.change(point.sizes))
+    compiled = hypothesis.compiled(point.sizes)
     return sum(
         _negative_log_likelihood(respond(record, problem.settings, compiled, point.common, own))
         for record, own in zip(problem.records, point.per_record, strict=True)

@@ -16,7 +16,6 @@ from airtruth.tracing.inference.posterior import (
     PosteriorFit,
     Priors,
     TraceProblem,
-    at_bounds,
     likelihood_terms,
     marginal_information,
 )
@@ -50,7 +49,7 @@ def leave_one_out(problem: TraceProblem, fitted: PosteriorFit) -> LeftOut:
     """
     hypothesis, point, layout = fitted.hypothesis, fitted.point, fitted.layout
     terms = [likelihood_terms(s, NO_WHITENER, levels=True) for s in fitted.sensitivities]
-    fixed = at_bounds(point)
+    fixed = point.at_bounds
     priors = problem.priors(hypothesis)
     total = marginal_information(priors, point, terms, levels=True, fixed=fixed).information
     nothing = np.zeros_like(priors.common)

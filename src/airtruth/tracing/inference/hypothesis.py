@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect, Parameter
 from airtruth.physics.terms import AeroTerm, Change
+from airtruth.tracing.model.compile import CompiledChange, compile_change
 from airtruth.tracing.model.parameters import Common, size_index
 
 Array = NDArray[np.float64]
+
+_KEPT: Final = 64
+"""Number of compiled changes that a hypothesis keeps [-] (judgement: more than a point and a step in each of its sizes)."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +41,9 @@ class Hypothesis:
     also_unconstrained: tuple[int, ...] = ()
     trim_alpha_rad: float = 0.0
     spread: Array | None = field(default=None, compare=False)
+    _compiled: dict[bytes, CompiledChange] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     @cached_property
     def unconstrained(self) -> tuple[int, ...]:
@@ -76,6 +84,17 @@ class Hypothesis:
     def change(self, sizes: Array) -> Change:
         """All that the hypothesis changes at these sizes."""
         return self.declared + self.added(sizes)
+
+    def compiled(self, sizes: Array) -> CompiledChange:
+        """`change` as the filter's arrays; the latest are kept, because each record asks for the same ones."""
+        key = sizes.tobytes()
+        found = self._compiled.get(key)
+        if found is None:
+            found = compile_change(self.change(sizes))
+            if len(self._compiled) >= _KEPT:
+                self._compiled.clear()
+            self._compiled[key] = found
+        return found
 
     def added(self, sizes: Array) -> Change:
         """What the effects change at these sizes, without what is declared."""

@@ -20,7 +20,6 @@ from airtruth.physics.terms import DECLARED
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.whitening import Whitener
 from airtruth.tracing.model.parameters import (
-    BOUNDS,
     COMMON_STEP,
     OUTPUTS,
     PER_RECORD_STEP,
@@ -204,7 +203,7 @@ def sensitivities_of(
     """
     record, settings = problem.records[index], problem.settings
     common, own, sizes = point.common, point.per_record[index], point.sizes
-    given = filter_inputs(record, hypothesis.change(sizes))
+    given = filter_inputs(record, hypothesis.compiled(sizes))
     base = respond_to(given, settings, common, own)
     if not np.isfinite(base.logdet):
         return None
@@ -214,7 +213,7 @@ def sensitivities_of(
     def put_size(k: int) -> None:
         p = hypothesis.parameter(k)
         h = _LOCATION_STEP * p.step if p.is_location or abs(sizes[k]) > p.step else p.step
-        change = hypothesis.change(_moved(sizes, k, h))
+        change = hypothesis.compiled(_moved(sizes, k, h))
         differences.put(size_index(k), respond(record, settings, change, common, own), h)
 
     if old is not None:
@@ -384,11 +383,6 @@ def marginal_information(
     return Marginal(gradient, information, tuple(eliminated))
 
 
-def at_bounds(point: Parameters) -> tuple[int, ...]:
-    """Indices of the common parameters that are at an end of their range."""
-    return tuple(i for i, ends in BOUNDS.items() if point.common[i] in ends)
-
-
 __all__ = [
     "Eliminated",
     "LikelihoodTerms",
@@ -397,7 +391,6 @@ __all__ = [
     "Priors",
     "Sensitivities",
     "TraceProblem",
-    "at_bounds",
     "likelihood_terms",
     "marginal_information",
     "prior_cost",

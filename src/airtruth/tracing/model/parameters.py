@@ -161,6 +161,11 @@ class Parameters:
         """All in one array: common, sizes, then the records one by one."""
         return np.concatenate([self.common, self.sizes, self.per_record.ravel()])
 
+    @property
+    def at_bounds(self) -> tuple[int, ...]:
+        """Indices of the common parameters that are at an end of their range."""
+        return tuple(i for i, ends in BOUNDS.items() if self.common[i] in ends)
+
     def with_levels(self, other: Parameters) -> Parameters:
         """The parameters with the levels of noise and gusts of others for the same records."""
         common, per_record = self.common.copy(), self.per_record.copy()

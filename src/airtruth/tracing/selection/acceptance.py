@@ -18,7 +18,6 @@ from airtruth.tracing.inference.cross_validate import LeftOut, leave_one_out, on
 from airtruth.tracing.inference.feedback import responds_to_motion
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import MEMORY_S, inflation, long_run
-from airtruth.tracing.model.compile import compile_change
 from airtruth.tracing.model.parameters import OUTPUTS, Common, PerRecord, size_index
 from airtruth.tracing.model.plant import alpha_dot
 from airtruth.tracing.selection.score_test import Score
@@ -108,7 +107,7 @@ class Reference:
 
 def reference_of(problem: TraceProblem, null: PosteriorFit) -> Reference:
     """The null as the reference of every candidate of its round."""
-    compiled = compile_change(null.hypothesis.change(null.point.sizes))
+    compiled = null.hypothesis.compiled(null.point.sizes)
     weight = tuple(
         noise_floor(record, problem.settings, compiled, null.point.common, local)
         for record, local in zip(problem.records, null.point.per_record, strict=True)

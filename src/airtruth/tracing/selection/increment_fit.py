@@ -27,9 +27,10 @@ from airtruth.tracing.selection.acceptance import (
     has_converged,
     tested_on_left_out,
 )
+from airtruth.tracing.selection.direction import Direction
 from airtruth.tracing.selection.increments import Screened, flown
 from airtruth.tracing.selection.refit import refit_without
-from airtruth.tracing.selection.score_test import Direction, Score
+from airtruth.tracing.selection.score_test import Score
 
 Array = NDArray[np.float64]
 

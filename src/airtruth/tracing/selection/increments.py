@@ -27,7 +27,7 @@ from airtruth.physics.terms import FACTORS, READINGS
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import Whitener
 from airtruth.tracing.model.records import TraceRecord
-from airtruth.tracing.selection.score_test import Direction, gradients
+from airtruth.tracing.selection.direction import Direction, gradients
 
 Array = NDArray[np.float64]
 

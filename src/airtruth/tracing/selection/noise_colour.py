@@ -20,7 +20,6 @@ from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import (
     PosteriorFit,
     TraceProblem,
-    at_bounds,
     likelihood_terms,
     marginal_information,
     sensitivities_of,
@@ -28,7 +27,7 @@ from airtruth.tracing.inference.posterior import (
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.parameters import BOUNDS, Common, Parameters
 from airtruth.tracing.prepare import Case
-from airtruth.tracing.selection.score_test import eliminated
+from airtruth.tracing.selection.direction import eliminated
 
 Array = NDArray[np.float64]
 
@@ -101,7 +100,7 @@ def share_slopes(problem: TraceProblem, null: PosteriorFit) -> tuple[Array, Arra
     if any(t is None for t in sensitivities):
         return np.zeros(len(SHARES)), np.eye(len(SHARES))
     pieces = [likelihood_terms(t, NO_WHITENER, levels=True) for t in sensitivities if t is not None]
-    held = tuple(i for i in at_bounds(null.point) if i not in SHARES)
+    held = tuple(i for i in null.point.at_bounds if i not in SHARES)
     gradient, information, _ = marginal_information(
         problem.priors(null.hypothesis), null.point, pieces, levels=True, fixed=held
     )

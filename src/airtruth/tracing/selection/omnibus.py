@@ -27,7 +27,7 @@ from airtruth.tracing.model.response import External, Response, filter_inputs, r
 from airtruth.tracing.model.settings import without_vane
 from airtruth.tracing.model.surface import play
 from airtruth.tracing.selection.anomaly import DERIVATIVES_MOVED, Anomaly
-from airtruth.tracing.selection.score_test import inserted, projected
+from airtruth.tracing.selection.direction import inserted, projected
 from airtruth.tracing.selection.spectrum import lines
 
 Array = NDArray[np.float64]
@@ -315,7 +315,7 @@ def _tangents(null: PosteriorFit, problem: TraceProblem, index: int, series: Ser
     """Whitened derivatives of a record's innovations in the amounts of some series, (series, samples, 3)."""
     record: TraceRecord = problem.records[index]
     base = null.sensitivities[index]
-    given = filter_inputs(record, null.hypothesis.change(null.point.sizes))
+    given = filter_inputs(record, null.hypothesis.compiled(null.point.sizes))
     still = np.zeros_like(base.r)
     nothing = np.zeros((len(still) - 1) * record.signals.sub + 1)
 

@@ -18,19 +18,10 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from airtruth.effects.effect import Effect
-from airtruth.physics.terms import Change
-from airtruth.tracing.inference.posterior import (
-    PosteriorFit,
-    Sensitivities,
-    TraceProblem,
-    at_bounds,
-    likelihood_terms,
-    marginal_information,
-)
+from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import NO_WHITENER, Whitener
-from airtruth.tracing.model.compile import compile_change
-from airtruth.tracing.model.parameters import Common
-from airtruth.tracing.model.response import Response, respond
+from airtruth.tracing.model.response import respond
+from airtruth.tracing.selection.direction import Direction, change_along, extended_by, with_freedoms
 
 Array = NDArray[np.float64]
 
@@ -47,30 +38,6 @@ _PERCEPTIBLE: Final = 1.0
 """Sum of squared whitened innovations that a perceptible step changes [-] (judgement: one standard deviation)."""
 _GROWTH: Final = 1.5
 """Factor by which an imperceptible step grows [-] (judgement)."""
-_RIDGE: Final = 1e-12
-"""Addition to the diagonal of the scaled nuisance information [-]; above rounding, below any information."""
-_ROUNDING: Final = 1e-8
-"""Share of an information that remains after elimination and counts as rounding [-] (judgement)."""
-
-
-@dataclass(frozen=True)
-class Direction:
-    """One way to leave the null: an effect at one location.
-
-    Attributes
-    ----------
-    effect : the effect.
-    locations : its parameters after the size, in their size coordinates.
-    step : size at which the difference is taken.
-    """
-
-    effect: Effect
-    locations: tuple[float, ...]
-    step: float
-
-    def sizes(self, size: float) -> Array:
-        """Vector of the effect's parameters in their size coordinates."""
-        return np.array([size, *self.locations])
 
 
 @dataclass(frozen=True)
@@ -147,9 +114,9 @@ def table(
     """
     by_effect = [directions(effect, null, problem) for effect in effects]
     tried = [_perceptible_step(d, null, problem) for own in by_effect for d in own]
-    extended = problem.each(lambda i: _with(null, problem, i, tried), range(len(problem.records)))
-    gradient, information = _with_freedoms(null, problem, extended, whitener, tried)
-    white_gradient, white_information = _with_freedoms(
+    extended = extended_by(null, problem, tried)
+    gradient, information = with_freedoms(null, problem, extended, whitener, tried)
+    white_gradient, white_information = with_freedoms(
         null, problem, extended, NO_WHITENER, tried, levels=True
     )
     rng = np.random.default_rng([seed, len(tried), 7])
@@ -211,7 +178,7 @@ def _perceptible_step(direction: Direction, null: PosteriorFit, problem: TracePr
     step = direction.step
 
     def moves(size: float) -> float:
-        change = _with_effect(null, replace(direction, step=size))
+        change = change_along(null, replace(direction, step=size))
         total = 0.0
         for record, local, tangent in zip(
             problem.records, null.point.per_record, null.sensitivities, strict=True
@@ -223,11 +190,6 @@ def _perceptible_step(direction: Direction, null: PosteriorFit, problem: TracePr
     while abs(step) < largest and moves(step) < _PERCEPTIBLE:
         step *= _GROWTH
     return replace(direction, step=min(step, largest))
-
-
-def _with_effect(null: PosteriorFit, d: Direction) -> Change:
-    sizes = np.concatenate([null.point.sizes, d.sizes(d.step)])
-    return null.hypothesis.plus(d.effect).change(sizes)
 
 
 def holm(p_values: Sequence[float]) -> Array:
@@ -267,125 +229,4 @@ def _p_value(z: Array, best: int, one_sided: bool, information: Array, rng: np.r
     return float((np.count_nonzero(largest >= top) + 1) / (_DRAWS + 1))
 
 
-def gradients(
-    null: PosteriorFit, problem: TraceProblem, tried: Sequence[Direction], whitener: Whitener
-) -> tuple[Array, Array]:
-    """Gradient (directions,) and information (directions, directions) of unit sizes, nuisance parameters eliminated."""
-    extended = problem.each(lambda i: _with(null, problem, i, tried), range(len(problem.records)))
-    return projected(null, problem, extended, whitener, len(tried))
-
-
-def _with(null: PosteriorFit, problem: TraceProblem, index: int, tried: Sequence[Direction]) -> Sensitivities:
-    """Sensitivities of one record at the null, with the directions as further common parameters."""
-    record, base, k = problem.records[index], null.sensitivities[index], len(null.point.sizes)
-    t = np.zeros((len(tried), *base.r.shape))
-    w = np.zeros((len(tried), 3, 3))
-    more = np.zeros(len(tried))
-
-    def respond_with(change: Change) -> Response:
-        compiled = compile_change(change)
-        return respond(record, problem.settings, compiled, null.point.common, null.point.per_record[index])
-
-    e = respond_with(null.hypothesis.change(null.point.sizes))
-    for i, d in enumerate(tried):
-        moved = respond_with(_with_effect(null, d))
-        if not np.isfinite(moved.logdet):
-            continue
-        t[i] = (moved.e - e.e) @ base.white.T / d.step
-        w[i] = base.white @ ((moved.covariance - e.covariance) / d.step) @ base.white.T
-        more[i] = (moved.more_logdet - e.more_logdet) / d.step
-    return inserted(base, k, t, w, more)
-
-
-def inserted(base: Sensitivities, k: int, t: Array, w: Array, more: Array | None = None) -> Sensitivities:
-    """Sensitivities with further directions after the ``k`` sizes.
-
-    Parameters
-    ----------
-    t, w, more : (directions, samples, 3), (directions, 3, 3) and (directions,), as of `Sensitivities`; None is zero.
-    """
-    at = Common.size + k
-    added = np.zeros(len(t)) if more is None else more
-    return Sensitivities(
-        base.r,
-        base.logdet,
-        np.concatenate([base.t[:at], t, base.t[at:]]),
-        np.concatenate([base.w[:at], w, base.w[at:]]),
-        base.white,
-        base.more if base.more.size == 1 else np.concatenate([base.more[:at], added, base.more[at:]]),
-    )
-
-
-def _with_freedoms(
-    null: PosteriorFit,
-    problem: TraceProblem,
-    sensitivities: Sequence[Sensitivities],
-    whitener: Whitener,
-    tried: Sequence[Direction],
-    levels: bool = False,
-) -> tuple[Array, Array]:
-    """`projected`, each direction with the derivatives that its effect leaves unconstrained."""
-    count = len(tried)
-    gradient, information = projected(null, problem, sensitivities, whitener, count, levels)
-    kept = null.hypothesis.unconstrained
-    freedoms = [null.hypothesis.plus(d.effect).unconstrained for d in tried]
-    for free in sorted({f for f in freedoms if f != kept}):
-        rows = [i for i, f in enumerate(freedoms) if f == free]
-        freer = replace(null, hypothesis=replace(null.hypothesis, also_unconstrained=free))
-        g, h = projected(freer, problem, sensitivities, whitener, count, levels)
-        gradient[rows] = g[rows]
-        information[rows], information[:, rows] = h[rows], h[:, rows]
-    return gradient, information
-
-
-def projected(
-    null: PosteriorFit,
-    problem: TraceProblem,
-    sensitivities: Sequence[Sensitivities],
-    whitener: Whitener,
-    count: int,
-    levels: bool = False,
-) -> tuple[Array, Array]:
-    """Gradient and information of further directions, nuisance parameters eliminated, priors included.
-
-    Parameters
-    ----------
-    sensitivities : of each record, with ``count`` directions after the sizes of the null.
-    levels : whether noise and gust levels count.
-    """
-    k = len(null.point.sizes)
-    terms = [likelihood_terms(t, whitener, levels) for t in sensitivities]
-    gradient, information, _ = marginal_information(
-        problem.priors(null.hypothesis), null.point, terms, levels=levels, fixed=at_bounds(null.point)
-    )
-    return eliminated(gradient, information, range(Common.size + k, len(gradient)))
-
-
-def eliminated(gradient: Array, information: Array, kept: Sequence[int]) -> tuple[Array, Array]:
-    """Gradient and information of the parameters with the indices ``kept``, all others eliminated."""
-    own = np.asarray(kept, dtype=np.int64)
-    rest = np.setdiff1d(np.arange(len(gradient)), own)
-    nuisance = information[np.ix_(rest, rest)]
-    scale = np.sqrt(np.maximum(np.diag(nuisance), 1e-30))
-    normal = nuisance / np.outer(scale, scale) + _RIDGE * np.eye(rest.size)
-    across = information[np.ix_(own, rest)] / scale
-    solved = np.linalg.solve(normal, np.column_stack([gradient[rest] / scale, across.T]))
-    g = gradient[own] - across @ solved[:, 0]
-    h = information[np.ix_(own, own)] - across @ solved[:, 1:]
-    small = np.diag(h) < _ROUNDING * np.diag(information)[own]
-    g[small], h[small], h[:, small] = 0.0, 0.0, 0.0
-    return g, h
-
-
-__all__ = [
-    "Direction",
-    "Score",
-    "Table",
-    "directions",
-    "eliminated",
-    "gradients",
-    "holm",
-    "inserted",
-    "projected",
-    "table",
-]
+__all__ = ["Score", "Table", "directions", "holm", "table"]
