@@ -166,7 +166,8 @@ def minimise(
     for search in searches:
         if search.status is Status.RUNNING:
             search.status = Status.ITERATIONS
-    _renew(problems, [s for s in searches if options.renewed_end and not s.fresh])
+    renewed = [s for s in searches if options.renewed_outrun or s.status is not Status.OUTRUN]
+    _renew(problems, [s for s in renewed if options.renewed_end and not s.fresh])
     return Solution(
         np.array([s.x for s in searches]),
         tuple(s.at for s in searches),

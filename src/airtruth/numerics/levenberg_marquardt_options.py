@@ -82,6 +82,7 @@ class Options:
         step decreases the cost by less than ``stale``, or by less than ``creeping`` times what it promised. A search
         converges with renewed derivatives alone.
     renewed_end : whether they are also renewed where a search ends without convergence.
+    renewed_outrun : whether this includes a search that cannot reach its rival.
     chords : most further steps with the same derivatives after a trial that decreases the cost by less than half of
         what was promised: they lead back into a curved valley.
     outrun : margin behind a rival's cost beyond which a search ends, provided that four more steps like the last
@@ -97,6 +98,7 @@ class Options:
     stale: float = 0.0
     creeping: float = 0.0
     renewed_end: bool = True
+    renewed_outrun: bool = True
     chords: int = 0
     outrun: float = np.inf
     outrun_renewed: float = np.inf

@@ -202,12 +202,16 @@ def fit(
     whitener : an autoregression that is held; with one, levels should not be free.
     free_levels : whether noise and gust levels and the share of slow noise are fitted.
     rival : cost of a better hypothesis; the search ends early once it is plainly out of reach.
-    only_better : whether an end that does not lead the rival is of no use, so that the search ends once it will not.
+    only_better : whether an end that does not lead the rival is of no use, so that the search ends once it will not. The
+        derivatives and the covariance of such an end are those of a point before it.
     near : a fit of the same problem whose derivatives the first steps use, with other effects perhaps.
     """
     priors = problem.priors(hypothesis)
     search = PosteriorSearch(problem, hypothesis, priors, whitener, free_levels, start)
-    options = replace(_SEARCH, iterations=iterations, outrun_renewed=0.0 if only_better else np.inf)
+    outrun_renewed = 0.0 if only_better else np.inf
+    options = replace(
+        _SEARCH, iterations=iterations, outrun_renewed=outrun_renewed, renewed_outrun=not only_better
+    )
     first = None if near is None else [Evaluated(near.cost, (), nearby(near, hypothesis))]
     at_near = near is not None and begins_at(near, hypothesis, start)
     solution = minimise(search, start.vector[None, :], options, rival, first, at_near)

@@ -156,6 +156,7 @@ def refit_absorbed(
     *,
     either_sign: bool = False,
     rival: float = np.inf,
+    only_better: bool = False,
 ) -> list[Refit]:
     """The refits with those of effects that refitted derivatives may have absorbed, best first.
 
@@ -167,6 +168,7 @@ def refit_absorbed(
     fits : refits of the leading candidates; skip : keys of effects that are not refitted.
     either_sign : whether a two-sided size begins at a usual size of either sign, and not at zero.
     rival : cost of another explanation; refits that stay far behind end early.
+    only_better : whether a refit that does not lead the rival and the others is of no use.
     """
     known = {r.score.effect.key for r in fits} | set(skip)
     found = list(fits)
@@ -177,7 +179,7 @@ def refit_absorbed(
             continue
         for size in _usual_sizes(s, either_sign):
             ahead = min((r.fit.cost for r in found), default=rival)
-            tried = with_effect(problem, null, s, size, min(ahead, rival))
+            tried = with_effect(problem, null, s, size, min(ahead, rival), only_better=only_better)
             if tried is not None:
                 found.append(Refit(s, tried, 0.0))
     return sorted(found, key=lambda r: r.cost)

@@ -162,7 +162,15 @@ class _Search:
         taken = {e.key for e in accepted}
         cost = total_cost(last)
         fits = refit_absorbed(
-            self.problem, null, base.table, (), self.advance, taken, either_sign=True, rival=cost
+            self.problem,
+            null,
+            base.table,
+            (),
+            self.advance,
+            taken,
+            either_sign=True,
+            rival=cost,
+            only_better=True,
         )
         if not fits or fits[0].cost > cost:
             return rounds
