@@ -155,6 +155,19 @@ def test_a_step_with_renewed_derivatives_may_have_a_margin_of_its_own():
     assert found.status == (Status.OUTRUN,)
 
 
+@pytest.mark.parametrize("renewed", [False, True])
+def test_a_search_that_a_rival_ends_need_not_renew_its_derivatives(renewed):
+    """Its end is the same."""
+    start = np.array([[0.02, 4000.0, 250.0]])
+    near = [At(np.nan, np.empty(0), meyer(start[0])[1])]
+    options = Options(100, reuse=True, outrun=1e-3, renewed_outrun=renewed)
+    found = minimise(LeastSquares(meyer), start, options, rival=-1e30, near=near)
+    (at,), (x,) = found.at, found.x
+    assert found.status == (Status.OUTRUN,)
+    assert np.array_equal(at.jacobian, meyer(x)[1]) == renewed
+    assert at.cost == 0.5 * float(meyer(x)[0] @ meyer(x)[0])
+
+
 def test_derivatives_that_promise_too_much_are_renewed():
     """The slope of exp(x) at its start is that of a far steeper curve at the end: steps with it creep."""
 
