@@ -195,6 +195,13 @@ def test_a_worse_error_of_the_held_out_records_is_a_note(words, rises):
     )
 
 
+def test_an_error_that_doubles_is_stated_as_a_ratio():
+    (note,) = worse_held_out(errors_of(12069.0, 1.0))
+    assert note.startswith(
+        "on the held-out records, the error of the free run is 12069 times as large after as before;"
+    )
+
+
 def test_a_rise_of_less_than_two_percent_is_no_note():
     assert not list(worse_held_out(errors_of(1.019, 1.019)))
     assert not list(worse_held_out(Errors({}, {"before": BySet(), "after": BySet()})))

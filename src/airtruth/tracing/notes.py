@@ -29,6 +29,8 @@ _FAR: Final = 5.0
 (judgement: no chance over six derivatives)."""
 _WORSE: Final = 1.02
 """Error of held-out records after over that before, from which a note states it [-] (judgement)."""
+_TIMES: Final = 2.0
+"""Ratio of two errors from which the ratio is stated and not the difference [-] (convention)."""
 _IN_LOOP: Final = (
     "the elevator responds to the motion (a damper, an autopilot or a pilot): gusts move it too, so that the free run of a "
     "false model may come closer than that of the true one; the innovations remain a valid test"
@@ -85,9 +87,15 @@ def worse_held_out(errors: Errors) -> Iterator[str]:
     ):
         was, own = (_relative(error, errors.channels) for error in (old, new))
         if was > 0.0 and own > _WORSE * was:
+            ratio = own / was
+            larger = (
+                f"{100.0 * (ratio - 1.0):.0f} % larger after than before"
+                if ratio < _TIMES
+                else f"{significant(ratio)} times as large after as before"
+            )
             yield (
-                f"on the held-out records, the error of {words} is {100.0 * (own / was - 1.0):.0f} % larger after than "
-                "before; `confirmed` states whether the difference is significant"
+                f"on the held-out records, the error of {words} is {larger}; `confirmed` states whether the difference is "
+                "significant"
             )
 
 
