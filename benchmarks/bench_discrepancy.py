@@ -25,7 +25,7 @@ import argparse
 import json
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -56,6 +56,8 @@ POINTS = 300
 """Points of the Gaussian process."""
 FITTED = 10
 """Steps of Levenberg and Marquardt for initial states and offsets of a held-out record."""
+_PASSABLE = 0.8
+"""Error over that of the best other model which airtruth is required to reach [-]; the true aircraft need not reach it."""
 DEGREE = 3
 """Degree of the polynomials."""
 
@@ -274,13 +276,21 @@ PEERS: dict[str, Callable[[list[Record], tuple[Array, Array]], Function]] = {
 
 @dataclass(frozen=True)
 class Trial:
-    """A blind trial that was answered: its label, the cause, the log, the answer and the processor time of the trace [s]."""
+    """A blind trial that was answered.
+
+    Attributes
+    ----------
+    label, cause, log, answer : its name, the undeclared effect, its records and the answer to them.
+    seconds : processor time of the trace [s].
+    oracle : root mean square of alpha [rad] and q [rad/s] that a free run of the true aircraft leaves on the held-out records.
+    """
 
     label: str
     cause: str
     log: Path
     answer: dict[str, Any]
     seconds: float = float("nan")
+    oracle: Mapping[str, float] | None = None
 
 
 def flown(seed: int, count: int, budget_s: float, folder: Path) -> Iterator[Trial]:
@@ -300,22 +310,28 @@ def answered(folder: Path) -> Iterator[Trial]:
     """Trials of a folder of `validation.blind`, with the answers that it has."""
     for path in sorted((folder / "answer").glob("*.json")):
         answer = json.loads(path.read_text())
-        (effect,) = json.loads((folder / "truth" / path.name).read_text())["trial"]["effects"]
+        truth = json.loads((folder / "truth" / path.name).read_text())
+        (effect,) = truth["trial"]["effects"]
         if "failed" not in answer:
-            yield Trial(path.stem, effect["key"], folder / "logs" / path.stem / "log.parquet", answer)
+            log = folder / "logs" / path.stem / "log.parquet"
+            yield Trial(path.stem, effect["key"], log, answer, oracle=truth["oracle"]["free_run"])
 
 
 def ours(answer: dict[str, Any]) -> dict[str, Pair]:
     """Errors of the stages *declared*, *before* and *after* of an answer."""
     error = answer["error"]
-    names = ("alpha_rad", "q_rad_s")
 
     def over(stage: str, kind: str) -> float:
-        own = error[stage]["held_out"][kind]
-        return float(np.sqrt(np.mean([(own[n] / error["channels"][n]) ** 2 for n in names])))
+        return over_signal(error[stage]["held_out"][kind], answer)
 
     stages = [s for s in ("declared", "before", "after") if s in error]
     return {s: (over(s, "free_run"), over(s, "innovation")) for s in stages}
+
+
+def over_signal(error: Mapping[str, float], answer: dict[str, Any]) -> float:
+    """Root mean square of the errors of alpha and q over their signals in an answer."""
+    signal = answer["error"]["channels"]
+    return float(np.sqrt(np.mean([(error[n] / signal[n]) ** 2 for n in ("alpha_rad", "q_rad_s")])))
 
 
 def compared(trial: Trial) -> dict[str, tuple[float, float, float]]:
@@ -335,6 +351,8 @@ def compared(trial: Trial) -> dict[str, tuple[float, float, float]]:
         rows[name] = (float(free), float(ahead), spent)
     rows |= {f"airtruth, {stage}": (*pair, trial.seconds) for stage, pair in ours(trial.answer).items()}
     rows["airtruth"] = rows.get("airtruth, after", rows["airtruth, before"])
+    if trial.oracle is not None:
+        rows["true aircraft"] = (over_signal(trial.oracle, trial.answer), np.nan, np.nan)
     return rows
 
 
@@ -357,6 +375,13 @@ def summary(causes: list[str], every: list[dict[str, tuple[float, float, float]]
     for k, kind in enumerate(("free run", "one sample ahead")):
         low, middle, high = np.quantile(ratio[:, k], [0.25, 0.5, 0.75])
         lines.append(f"  {kind:24}{middle:12.2f}{low:8.2f}{high:6.2f}{np.mean(ratio[:, k] < 1.0):8.2f}")
+    if "true aircraft" in every[0]:
+        limit = np.array([rows["true aircraft"][0] for rows in every]) / best[:, 0]
+        within = float(np.median(ratio[limit < _PASSABLE, 0]))
+        lines.append(
+            f"free run of the true aircraft over that of the best other model: median {np.median(limit):.2f}, below "
+            f"{_PASSABLE} in {np.mean(limit < _PASSABLE):.2f} of the trials; there that of airtruth has {within:.2f}"
+        )
     lines.append(
         "by the cause: trials, median in the free run and one sample ahead, trials at or above 1 in either"
     )
