@@ -153,7 +153,7 @@ class Experiment:
         basis = self._basis(hypothesis)
 
         def innovations(sizes: Array) -> Array:
-            change = hypothesis.compiled(sizes)
+            change = hypothesis.change(sizes)
             moved = respond(record, self.model.settings, change, common, own)
             return (moved.e @ self._white.T).ravel()
 

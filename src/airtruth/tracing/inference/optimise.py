@@ -87,7 +87,7 @@ class PosteriorSearch:
     whitener : an autoregression that is held.
     levels : whether noise and gust levels and the share of slow noise are free.
     shape : parameters of the shape that vectors have.
-    with_levels : whether the derivatives in levels are made where they are not free, for those who read them at the end.
+    with_levels : whether derivatives in the levels are computed although the levels are held; the fit's sensitivities hold them.
     """
 
     problem: TraceProblem

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
-from airtruth.physics.terms import Change
 from airtruth.tracing.inference.posterior import (
     PosteriorFit,
     Sensitivities,
@@ -54,10 +53,10 @@ class Direction:
         return np.array([size, *self.locations])
 
 
-def change_along(null: PosteriorFit, d: Direction) -> Change:
+def change_along(null: PosteriorFit, d: Direction) -> CompiledChange:
     """What a null and a step in a direction change."""
     sizes = np.concatenate([null.point.sizes, d.sizes(d.step)])
-    return null.hypothesis.plus(d.effect).change(sizes)
+    return compile_change(null.hypothesis.plus(d.effect).change(sizes))
 
 
 def gradients(
@@ -70,7 +69,7 @@ def gradients(
 def extended_by(null: PosteriorFit, problem: TraceProblem, tried: Sequence[Direction]) -> list[Sensitivities]:
     """Sensitivities of each record at the null, with the directions as further common parameters."""
     plain = null.hypothesis.compiled(null.point.sizes)
-    changes = [compile_change(change_along(null, d)) for d in tried]
+    changes = [change_along(null, d) for d in tried]
     steps = [d.step for d in tried]
     return problem.each(lambda i: _with(null, problem, i, plain, changes, steps), range(len(problem.records)))
 

@@ -138,7 +138,7 @@ def chi_square(gradient: Array, information: Array) -> tuple[float, int, float]:
 
 def views(null: PosteriorFit, problem: TraceProblem) -> list[View]:
     """Each record as the families of directions use it, at the optimum of a null hypothesis."""
-    change = null.hypothesis.change(null.point.sizes)
+    change = null.hypothesis.compiled(null.point.sizes)
     elevators = [nodes(r.signals.elevator_rad) for r in problem.records]
     elevators = [e - e[0] for e in elevators]
     largest = max(float(np.abs(e).max()) for e in elevators)
