@@ -14,6 +14,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 BUDGET ?= 1
 # make campaign-quick STORE=s3://BUCKET/FOLDER flies into an object store (docs/stores.md)
 AT := $(if $(STORE),--store $(STORE))
+LATE := elevator_delay actuator_lag gyro_lag sensor_delay
 CAMPAIGNS := light light-fit moderate moderate-fit
 
 .PHONY: planned planned-ties check-study help setup setup-dev lock installed docs docs-links campaign campaign-quick loop study blind test test-slow test-long test-all fuzz robustness mutants lint kernels browser bench clean
@@ -76,8 +77,8 @@ planned: $(DEVELOP) ## planned flights of six pairs of effects, flown and traced
 	$(BIN)/python -m studies.planned_flights --out $(OUT)/planned
 
 planned-ties: $(DEVELOP) ## the next flight after blind trials that leave a tie, planned, flown and traced (hours; continues after an interruption)
-	$(BIN)/python -m validation.blind --mode single --seed 20262102 --trials 446 --only-counted --jobs $(JOBS) --out $(OUT)/blind-ties
-	$(BIN)/python -m studies.planned_ties --blind $(OUT)/blind-ties --out $(OUT)/planned-ties --seed 20262161 --jobs $(JOBS)
+	$(BIN)/python -m validation.blind --mode single --seed 20262202 --trials 446 --only-counted $(LATE:%=--effect %) --jobs $(JOBS) --out $(OUT)/blind-ties
+	$(BIN)/python -m studies.planned_ties --blind $(OUT)/blind-ties --out $(OUT)/planned-ties --seed 20262201 --jobs $(JOBS)
 
 check-study: $(DEVELOP) ## 500 records with none to three sensor errors through `airtruth check` (about ten minutes)
 	$(BIN)/python -m studies.check_study --jobs $(JOBS)

@@ -41,6 +41,13 @@ def main() -> int:
         action="store_true",
         help="trace only the trials without an effect and those above the noncentrality that the scores count",
     )
+    parser.add_argument(
+        "--effect",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="fly only the trials with this effect, any variant of it; repeat it for several",
+    )
     arguments = parser.parse_args()
     if arguments.trials < 1 or arguments.jobs < 1:
         parser.error("--trials and --jobs must be at least 1")
@@ -53,7 +60,10 @@ def main() -> int:
         arguments.out,
         arguments.tracer,
         arguments.only_counted,
+        tuple(arguments.effect),
     )
+    if not plan.numbers:
+        parser.error(f"none of the trials has the effect {' or '.join(plan.effects)}; see `airtruth effects`")
     with workers(arguments.cluster) as cluster:
         cases = run(plan, arguments.jobs, cluster)
     scores = scoring.score(cases)

@@ -23,7 +23,7 @@ from airtruth.logs.store import read_log, write_text
 from validation.blind import draw, information, refit, tracing
 from validation.blind.figures import CHANNELS, LEAVE_ONE_OUT, STRONG
 from validation.blind.flight import LeftRangeError
-from validation.blind.scoring import beyond
+from validation.blind.scoring import base, beyond
 from validation.blind.set_scoring import strong
 
 _ATTEMPTS: Final = 3
@@ -35,6 +35,7 @@ class Plan:
     """What to do: trials 0 to ``count`` - 1 of a seed and mode, into ``out``, by the tracer MODULE:NAME.
 
     ``only_counted``: trace only what a score counts, the trials without an effect and those above the noncentrality.
+    ``effects``: only the trials with one of these effects, variants included; empty for all.
     """
 
     count: int
@@ -43,6 +44,19 @@ class Plan:
     out: Path
     tracer: str = "validation.blind.tracing:answer"
     only_counted: bool = False
+    effects: tuple[str, ...] = ()
+
+    @property
+    def numbers(self) -> list[int]:
+        """The trials that are flown."""
+        every = range(self.count)
+        if not self.effects:
+            return list(every)
+        return [
+            k
+            for k in every
+            if any(base(e.key) in self.effects for e in draw.draw(self.seed, k, self.mode).effects)
+        ]
 
     def file(self, stage: str, number: int) -> Path:
         """JSON file of one trial and stage, "truth" or "answer"."""
@@ -98,7 +112,7 @@ def run(plan: Plan, jobs: int, cluster: Cluster | None = None) -> list[dict[str,
     """
     for folder in ("truth", "answer", "logs"):
         (plan.out / folder).mkdir(parents=True, exist_ok=True)
-    numbers = list(range(plan.count))
+    numbers = plan.numbers
     _stage(plan, "truth", fly, [k for k in numbers if not plan.file("truth", k).exists()], jobs, cluster)
     if plan.only_counted:
         numbers = [k for k in numbers if _counts(json.loads(plan.file("truth", k).read_text()))]
