@@ -147,6 +147,7 @@ def test_a_guessed_mapping_is_valid_toml_on_any_terminal(tmp_path):
         assert tomllib.loads(done.stdout) == tomllib.loads(plain.stdout)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_sigterm_stops_the_workers_and_leaves_a_campaign_that_resumes(tmp_path):
     temporary = tmp_path / "temporary"

@@ -84,6 +84,7 @@ def test_a_new_campaign_has_a_finite_condition(option, value):
         campaign_text("c", **{option: value})
 
 
+@pytest.mark.long
 def test_printed_commands_are_quoted(airtruth, tmp_path):
     name = "flight 7;x.csv"
     (tmp_path / name).write_text("t,q\n0,1\n0.02,2\n")
@@ -131,6 +132,7 @@ def test_a_new_mapping_imports_the_example(airtruth, tmp_path):
     assert (tmp_path / "flight7.parquet").is_file()
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_new_mapping_of_a_file_is_the_guess(airtruth, tmp_path):
     airtruth("example", "csv")

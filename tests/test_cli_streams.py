@@ -137,8 +137,9 @@ def test_streams_of_quick_commands(name, home):
     check_endings(name, home)
 
 
+@pytest.mark.long
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sampled(SLOW, 13))
+@pytest.mark.parametrize("name", SLOW)
 def test_streams_of_every_command(name, campaign):
     check_endings(name, campaign)
 
@@ -219,8 +220,9 @@ def test_an_interrupt_during_the_imports(delay, home):
     check_interrupt("effects", delay, home)
 
 
+@pytest.mark.long
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sampled(SLOW, 13))
+@pytest.mark.parametrize("name", SLOW)
 def test_an_interrupt_of_every_command(name, campaign):
     rng = random.Random(name)
     for _ in range(4):

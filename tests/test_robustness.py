@@ -62,7 +62,7 @@ def test_a_killed_command_ends_with_the_files_of_an_undisturbed_one(verbs, tmp_p
     [
         ("RLIMIT_NOFILE", 9),
         pytest.param("RLIMIT_AS", 800_000 * 1024, marks=pytest.mark.long),
-        ("RLIMIT_AS", 1_100_000_000),
+        pytest.param("RLIMIT_AS", 1_100_000_000, marks=pytest.mark.long),
         pytest.param("RLIMIT_FSIZE", 20_000, marks=pytest.mark.long),
     ],
 )

@@ -130,6 +130,7 @@ def test_theta_and_biases(tmp_path):
     assert np.mean(-slopes) == pytest.approx(GYRO_BIAS_RAD_S, abs=4.0 * slopes.std() / np.sqrt(RUNS))
 
 
+@pytest.mark.long
 def test_records_together_are_better_than_one(tmp_path):
     logs = flown(tmp_path, arm=0.3, runs=20)
     parts = records(logs)

@@ -44,9 +44,8 @@ def contents(folder):
     return {p.relative_to(folder): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
-@pytest.mark.parametrize(
-    "methods", [None, pytest.param(("ls",), marks=pytest.mark.long)], ids=["trace", "loop"]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("methods", [None, ("ls",)], ids=["trace", "loop"])
 def test_the_files_are_those_of_this_machine(methods, cluster, declared, logs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copy(logs / "a.parquet", tmp_path / "a.parquet")

@@ -27,7 +27,7 @@ def logs(tmp_path_factory):
     return of
 
 
-@pytest.mark.parametrize("name", sampled(ROWS, 3))
+@pytest.mark.parametrize("name", sampled(ROWS, 5))
 def test_a_row_is_imported_and_identified(name, logs):
     folder, _ = logs(name)
     joined = [log for _, log in named_logs(folder)]

@@ -68,6 +68,7 @@ def test_delay_shifts_the_response_and_not_the_measured_surface(tmp_path):
         np.testing.assert_allclose(after[:, shift:], before[:, :-shift], rtol=0, atol=1e-8)
 
 
+@pytest.mark.long
 def test_effects_are_the_same_over_processes(tmp_path):
     effects = [LATE, {"name": "mass_error", "factor": 1.05}]
     alone = campaigns.fly(tmp_path / "alone", effect=effects)

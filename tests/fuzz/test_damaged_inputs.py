@@ -44,6 +44,7 @@ def test_bytes_of_logs(content, rng):
         logs.use(folder / "log.parquet", rng)
 
 
+@pytest.mark.long
 @examples(4)
 @given(strategies.altered_logs(), strategies.RANDOM)
 def test_contents_of_logs(content, rng):

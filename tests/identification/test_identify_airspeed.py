@@ -132,6 +132,7 @@ def test_a_given_airspeed_and_a_measured_one_exclude_each_other():
         Options(pressure="measure")
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_the_efficiency_study_prints_its_table():
     command = [sys.executable, "-m", "studies.efficiency_study", "--runs", "20"]

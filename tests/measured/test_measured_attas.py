@@ -66,6 +66,7 @@ def test_once_declared_it_is_not_found_again(logs):
     assert result.enlargement > 1.0
 
 
+@pytest.mark.long
 def test_wrong_signs_and_units_of_real_records_are_refused(logs):
     for log in logs:
         for name, factor in (

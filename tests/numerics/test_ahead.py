@@ -175,10 +175,9 @@ def test_a_child_ends_with_its_caller(tmp_path):
     assert not list(tmp_path.glob("*/filter._innovations-*.nbi"))
 
 
+@pytest.mark.long
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "plan", [IDENTIFY, pytest.param(TRACE, marks=pytest.mark.long)], ids=lambda plan: plan.module
-)
+@pytest.mark.parametrize("plan", [IDENTIFY, TRACE], ids=lambda plan: plan.module)
 def test_the_first_run_has_the_bytes_of_the_second(plan, tmp_path):
     names = [name for name, _ in import_module(plan.module).KERNELS]
     assert result(plan, tmp_path / "cache", tmp_path / "out") == result(

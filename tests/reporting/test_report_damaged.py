@@ -78,6 +78,7 @@ def test_the_description_of_a_campaign_is_wrong(tmp_path, light, entries):
     page_or_error(tmp_path, tmp_path)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @EXAMPLES
 @given(values=st.lists(NUMBERS, min_size=8, max_size=8), column=st.integers(0, 7))

@@ -68,6 +68,7 @@ def test_a_run_is_drawn_as_it_was_logged(flown: CampaignResult) -> None:
         flown.plot(flown.failures[0].run_id)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_file_a_campaign_and_a_plan_fly_the_same(tmp_path: Path) -> None:
     path = write(tmp_path / "campaign.toml")

@@ -61,6 +61,7 @@ def test_a_run_that_ends_its_process_is_one_failed_run(tmp_path, dies, jobs):
     assert (again.code, "0 flown now" in again.out) == (1, True)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_run_whose_process_is_killed_is_interrupted_and_flown_by_the_next_command(tmp_path, dies, whole):
     file, out = write(tmp_path / "campaign.toml", runs=RUNS), tmp_path / "out"

@@ -64,6 +64,7 @@ def test_air_that_turns_nose_up_acts_as_turning_nose_down(flight, gtm, paper_tri
     assert flown["alpha_rad"][0] == pytest.approx(paper_trim.alpha_rad, abs=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_gusts_of_a_campaign_start_stationary_or_from_rest(tmp_path):
     condition = {"eas_kt": 75.0, "altitude_ft": 7000.0}
@@ -90,6 +91,7 @@ def short():
     return CALM | {"manoeuvre": step}
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_level_and_factor_scale_the_gusts_of_the_same_draw(tmp_path):
     one = fly(tmp_path / "one", runs=2, gust={"level": "light", "factor": 0.01}, **CALM)

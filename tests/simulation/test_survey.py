@@ -109,6 +109,7 @@ def test_names_are_read_from_every_form_of_reference(tmp_path):
     assert names.switches == ["ap/pitch-hold", "fcs/fbw-override"]
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_propeller_starts_and_its_torque_is_held(tmp_path):
     """The Cessna 182 of the JSBSim package, whose engine stalls in JSBSim's own steady state."""

@@ -44,6 +44,7 @@ def test_best_setting_differs_from_the_plain_campaign_in_manoeuvre_and_length_al
     assert fit.manoeuvre[0].amplitude.value == pytest.approx(1.0 * DEG)
 
 
+@pytest.mark.long
 def test_gust_components_are_switched_in_the_plan(small):
     folder = cases.flown(small, calm(), runs=1)
     plan = read_table(folder / "plan.parquet")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tiers import sampled
 
 from airtruth import aircraft as planes
 from airtruth.simulation.campaign import plan
@@ -56,7 +57,7 @@ def traced(folder, effect, key):
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("replay-plain")]
 
 
-@pytest.fixture(scope="module", params=[KINK, DELAY, ARM], ids=["kink", "delay", "arm"])
+@pytest.fixture(scope="module", params=sampled([KINK, DELAY, ARM], 3), ids=["kink", "delay", "arm"])
 def found(request, tmp_path_factory):
     effect = request.param
     folder = tmp_path_factory.mktemp("replay")

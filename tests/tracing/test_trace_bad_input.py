@@ -164,6 +164,7 @@ def test_an_aircraft_of_quite_another_kind(command, log, tmp_path):
         assert found["anomaly"]["p_value"] < 1e-6
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_an_aircraft_that_cannot_fly_there(command, log, tmp_path):
     """A T-38 at 75 kt: no trim."""

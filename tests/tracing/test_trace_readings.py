@@ -99,6 +99,7 @@ def test_the_flown_log_and_the_updated_aircraft_have_the_increment(tmp_path):
     assert all(np.abs(d).max() < 1e-6 for c, d in difference.items() if c != "q_rad_s")
 
 
+@pytest.mark.long
 def test_the_loop_takes_the_increment_out_of_the_records(tmp_path):
     folder = write_aircraft(aircraft.load("gtm"), BENDING, tmp_path / "bending")
     clean, bent = (

@@ -102,6 +102,7 @@ def vane_is_left_out(answer):
     assert not named & {*VANE, "sensor_delay"}
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_without_a_vane_nothing_is_traced_where_nothing_is_missing(tmp_path):
     log = without_vane(fly(tmp_path / "null", runs=6, duration=8.0), tmp_path)
