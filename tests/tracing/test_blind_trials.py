@@ -94,13 +94,17 @@ def test_weak_trials_can_be_left_out(plan, cases):
     assert not only.file("answer", 1).exists()
 
 
-def test_trials_of_some_effects_are_those_of_the_whole_seed():
+def test_selected_trials_are_those_of_the_whole_seed():
     """Delays of any sensor count as one effect, and a trial keeps its number."""
     plan = trials.Plan(40, 4, "single", Path(), effects=("sensor_delay",))
     drawn = [draw.draw(4, k, "single").effects[0].key for k in range(40)]
     assert plan.numbers == [k for k, key in enumerate(drawn) if key.startswith("sensor_delay:")]
     assert len(plan.numbers) > 1
     assert replace(plan, effects=()).numbers == list(range(40))
+    kinds = [draw.draw(4, k, "single").noise for k in range(40)]
+    both = replace(plan, noise="white").numbers
+    assert both == [k for k in plan.numbers if kinds[k] == "white"]
+    assert 0 < len(both) < len(plan.numbers)
 
 
 def test_a_tracer_that_fails_is_counted(plan, cases):

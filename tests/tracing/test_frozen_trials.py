@@ -117,6 +117,19 @@ def test_the_second_half_of_a_single_record_begins_in_motion(number, tmp_path):
             assert abs(p["value"] - flown[effect["name"]][name]) < 3.0 * p["std"]
 
 
+def test_a_refit_that_ends_where_the_motion_diverges_is_no_start(tmp_path):
+    """A vane 0.286 s slow and a surface 84 ms late, one fitted record of 5 s in calm air. The refit of the declared aircraft
+    ended beside motions that diverge. The trace began there, and stated that the aircraft does not fly like the record."""
+    from airtruth.tracing import TraceOptions, trace
+    from validation.blind.trials import frozen
+
+    (folder,) = frozen(20262105, [38], "slow", tmp_path)
+    answer = trace(folder, "gtm", TraceOptions(hold_out=("r2",))).to_dict()
+    found = {e["name"]: next(iter(e["parameters"].values())) for e in answer["effects"]}
+    for name, truth in (("vane_lag", 0.2859), ("elevator_delay", 0.0843)):
+        assert abs(found[name]["value"] - truth) < 3.0 * found[name]["std"]
+
+
 @pytest.mark.parametrize("number", [2, 4])
 def test_released_derivatives_do_not_take_the_part_of_an_effect(number, tmp_path):
     """Three effects, lambda 131 and 141. In the first trial wrong derivatives of lift had taken the part of an accelerometer

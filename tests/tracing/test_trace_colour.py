@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import trace_records as tr
+from scipy.stats import norm
 
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.prepare import Case
-from airtruth.tracing.selection.noise_colour import SHARES, scores, share_slopes, with_coloured_noise
+from airtruth.tracing.selection import noise_colour
+from airtruth.tracing.selection.noise_colour import (
+    LATER_LEVEL,
+    LEVEL,
+    SHARES,
+    TYPICAL,
+    later_level,
+    scores,
+    share_slopes,
+    with_coloured_noise,
+)
 from airtruth.tracing.selection.release import DeclaredCauses
 from airtruth.units import DEG
 
@@ -88,6 +100,36 @@ def test_slow_noise_enters_fitted_and_held_out_records():
     assert found.held.settings.coloured
     assert (start.common[list(SHARES)] > 0.0).any()
     assert found.fitted.records == slow.fitted.records
+
+
+def test_typical_score_is_that_of_simulated_records():
+    """20 pairs of linear records, flown by another program than the 37 flights behind the constant; each of the 60 scores over
+    the root of the samples scatters by about 0.08."""
+    found = []
+    for seed in range(20):
+        problem = tr.problem(flown(seed, 0.5))
+        slow = replace(problem, settings=replace(problem.settings, coloured=True))
+        null = fit(problem, tr.NOTHING, initial_parameters(problem, tr.NOTHING))
+        found.append(scores(slow, null) / np.sqrt(sum(r.samples for r in problem.records)))
+    assert np.mean(found) == pytest.approx(TYPICAL, abs=0.03)
+
+
+def test_less_is_enough_beside_effects_in_a_short_record():
+    """Two thirds of the typical score: 0.2 sqrt(400) = 4 in 400 samples; 0.2 sqrt(960) > 6.17, the limit of the first test."""
+    assert later_level(400) == pytest.approx(3.0 * norm.sf(4.0))
+    assert later_level(100) == LATER_LEVEL
+    assert later_level(960) == later_level(100_000) == LEVEL
+
+
+def test_a_search_does_not_begin_where_the_motion_diverges(monkeypatch):
+    """A refit of the declared aircraft ended, not converged, where its derivatives cannot be computed."""
+    short = case(5, 0.0)
+    ended = SimpleNamespace(converged=False, hypothesis=short.hypothesis, point=None)
+    ends = iter([ended, None])
+    monkeypatch.setattr(noise_colour, "fit", lambda *args, **options: next(ends))
+    found, start = with_coloured_noise(short)
+    assert found is short
+    np.testing.assert_array_equal(start.vector, initial_parameters(short.fitted, short.hypothesis).vector)
 
 
 def test_noise_that_nobody_declares_is_no_slow_noise():

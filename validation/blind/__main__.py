@@ -17,6 +17,7 @@ from airtruth.cluster import workers
 from airtruth.logs.store import write_text
 from validation.blind import bands, results, scoring, set_scoring
 from validation.blind.draw import MODES
+from validation.blind.sensors import NOISE_KINDS
 from validation.blind.trials import Plan, run
 
 
@@ -48,6 +49,9 @@ def main() -> int:
         metavar="NAME",
         help="fly only the trials with this effect, any variant of it; repeat it for several",
     )
+    parser.add_argument(
+        "--noise", choices=NOISE_KINDS, default="", help="fly only the trials with this noise of the sensors"
+    )
     arguments = parser.parse_args()
     if arguments.trials < 1 or arguments.jobs < 1:
         parser.error("--trials and --jobs must be at least 1")
@@ -61,9 +65,10 @@ def main() -> int:
         arguments.tracer,
         arguments.only_counted,
         tuple(arguments.effect),
+        arguments.noise,
     )
     if not plan.numbers:
-        parser.error(f"none of the trials has the effect {' or '.join(plan.effects)}; see `airtruth effects`")
+        parser.error("no trial has such an effect and such noise; `airtruth effects` lists the effects")
     with workers(arguments.cluster) as cluster:
         cases = run(plan, arguments.jobs, cluster)
     scores = scoring.score(cases)

@@ -36,6 +36,7 @@ class Plan:
 
     ``only_counted``: trace only what a score counts, the trials without an effect and those above the noncentrality.
     ``effects``: only the trials with one of these effects, variants included; empty for all.
+    ``noise``: only the trials with this noise of the sensors; empty for any.
     """
 
     count: int
@@ -45,18 +46,16 @@ class Plan:
     tracer: str = "validation.blind.tracing:answer"
     only_counted: bool = False
     effects: tuple[str, ...] = ()
+    noise: str = ""
 
     @property
     def numbers(self) -> list[int]:
         """The trials that are flown."""
-        every = range(self.count)
-        if not self.effects:
-            return list(every)
-        return [
-            k
-            for k in every
-            if any(base(e.key) in self.effects for e in draw.draw(self.seed, k, self.mode).effects)
-        ]
+        return [k for k in range(self.count) if self._is_flown(draw.draw(self.seed, k, self.mode))]
+
+    def _is_flown(self, trial: draw.Trial) -> bool:
+        has_effect = not self.effects or any(base(e.key) in self.effects for e in trial.effects)
+        return has_effect and self.noise in ("", trial.noise)
 
     def file(self, stage: str, number: int) -> Path:
         """JSON file of one trial and stage, "truth" or "answer"."""

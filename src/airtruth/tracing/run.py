@@ -39,7 +39,7 @@ from airtruth.tracing.selection.budget import Advance, Budget, may_begin
 from airtruth.tracing.selection.corner_share import with_corner_share
 from airtruth.tracing.selection.learn import with_increments
 from airtruth.tracing.selection.look_alikes import with_look_alikes
-from airtruth.tracing.selection.noise_colour import beside, with_coloured_noise
+from airtruth.tracing.selection.noise_colour import beside, later_level, with_coloured_noise
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.rounds import LEVEL, SearchRound
 from airtruth.tracing.selection.search import search
@@ -209,7 +209,8 @@ def _with_later_colour(
     At the declared aircraft a strong effect drives slow noise to its limits, and it does not enter. Slow noise can take the
     share of an effect too, so that the effects of the first search are tried beside it.
     """
-    coloured, point = beside(case, rounds[-1].null)
+    level = later_level(sum(r.samples for r in case.fitted.records))
+    coloured, point = beside(case, rounds[-1].null, level)
     phrase = "search with coloured noise"
     if not coloured.fitted.settings.coloured or not may_begin(advance, phrase):
         return case, rounds

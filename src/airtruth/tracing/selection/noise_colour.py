@@ -35,6 +35,13 @@ LEVEL: Final = 1e-9
 """Significance level of the three scores together [-] (judgement: half of the variance correlated over 80 ms scores 8 to
 17 standard deviations in four records of some seconds; a model error scores too, and less slow noise than that does no
 harm as white noise)."""
+TYPICAL: Final = 0.3
+"""Score over the root of the samples that a sensor has whose noise is slow for half of its variance, correlated over 80 ms [-];
+the mean of 37 flights of one or two fitted records."""
+_LATER: Final = 2.0 / 3.0
+"""Share of the typical score that is enough beside accepted effects [-] (judgement)."""
+LATER_LEVEL: Final = 5e-4
+"""Largest significance level of the three scores together beside accepted effects [-] (judgement)."""
 FIRST_SHARE: Final = 0.2
 """Share of slow noise at which a search begins [-] (judgement; at zero the correlation time has no effect)."""
 SHARES: Final = np.r_[Common.colour_shares]
@@ -45,15 +52,35 @@ def with_coloured_noise(case: Case) -> tuple[Case, Parameters]:
     """The case, with slow noise where its fitted records show some, and the parameters at which its search begins."""
     start = initial_parameters(case.fitted, case.hypothesis)
     null = fit(case.fitted, case.hypothesis, start)
-    return (case, start) if null is None else beside(case, null)
+    return (case, start) if null is None or _is_edge(case, null) else beside(case, null)
 
 
-def beside(case: Case, null: PosteriorFit) -> tuple[Case, Parameters]:
+def _is_edge(case: Case, null: PosteriorFit) -> bool:
+    """Whether a fit ended where the motion diverges a step further, so that no other fit can begin there."""
+    return not null.converged and fit(case.fitted, null.hypothesis, null.point, iterations=0) is None
+
+
+def later_level(samples: int) -> float:
+    """Significance level of the three scores together beside accepted effects [-].
+
+    The limit of a score is two thirds of the typical one. A short record cannot reach the limit of `LEVEL`, and intervals under
+    white noise are then too narrow. From 950 samples on the level is `LEVEL`, because a model error scores too.
+
+    Parameters
+    ----------
+    samples : of all fitted records.
+    """
+    level = len(SHARES) * float(norm.sf(_LATER * TYPICAL * np.sqrt(samples)))
+    return min(max(level, LEVEL), LATER_LEVEL)
+
+
+def beside(case: Case, null: PosteriorFit, level: float = LEVEL) -> tuple[Case, Parameters]:
     """The case, with slow noise where its fitted records show some beside what a fit explains, and where a refit ends.
 
     Parameters
     ----------
     null : a fit of the case without slow noise.
+    level : significance level of the three scores together [-].
     """
     problem, hypothesis = case.fitted, null.hypothesis
     if not problem.settings.noise_is_declared:
@@ -61,7 +88,7 @@ def beside(case: Case, null: PosteriorFit) -> tuple[Case, Parameters]:
     settings = replace(problem.settings, coloured=True)
     slow = replace(problem, settings=settings)
     z = scores(slow, null)
-    if not (norm.sf(z) < LEVEL / len(SHARES)).any():
+    if not (norm.sf(z) < level / len(SHARES)).any():
         return case, null.point
     common = null.point.common.copy()
     common[SHARES] = np.where(z > 0.0, FIRST_SHARE, 0.0)
