@@ -86,7 +86,8 @@ check-study: $(DEVELOP) ## 500 records with none to three sensor errors through 
 blind: $(READY) ## 200 flight tests that the tracer has not seen, scored against their truth
 	$(BIN)/python -m validation.blind --trials 200 --seed 1 --jobs $(JOBS) --out $(OUT)/blind
 
-test: lint kernels ## lint, types, unit and property tests, one end-to-end run of each command
+test: $(DEVELOP) ## lint, types, unit and property tests, one end-to-end run of each command
+	$(MAKE) --no-print-directory --jobs $(JOBS) lint kernels
 	$(BIN)/python -m pytest -n $(JOBS) --dist loadgroup
 
 test-slow: kernels ## interrupted campaigns, stores, clusters, pages in a browser, one of each kind of trace
