@@ -48,11 +48,6 @@ _BETTER_NULL_ITERATIONS: Final = 20
 _AGREES: Final = 0.2
 """Share of the size known beforehand by which a converged refit may differ from it without a second one that begins there
 [-] (judgement: another optimum, in which the derivatives have absorbed the effect, has a fraction of its size)."""
-_USUAL: Final = 0.15
-"""Share of its plausible range at which the search for an effect without a score begins [-] (judgement)."""
-_LARGE: Final = 0.5
-"""Share at which a second search begins where either sign is tried [-] (judgement: near the usual share the derivatives may
-keep a large effect in an optimum of their own)."""
 
 
 @dataclass(frozen=True)
@@ -146,45 +141,6 @@ def _from_both(
     return Refit(r.score, tried, freedom.correction(effect, tried))
 
 
-def refit_absorbed(
-    problem: TraceProblem,
-    null: PosteriorFit,
-    table: Table,
-    fits: Sequence[Refit],
-    advance: Advance,
-    skip: Collection[str] = (),
-    *,
-    either_sign: bool = False,
-    rival: float = np.inf,
-    only_better: bool = False,
-) -> list[Refit]:
-    """The refits with those of effects that refitted derivatives may have absorbed, best first.
-
-    At a null whose derivatives contradict the declaration such an effect has no score; its refit begins at the
-    declared aircraft.
-
-    Parameters
-    ----------
-    fits : refits of the leading candidates; skip : keys of effects that are not refitted.
-    either_sign : whether a two-sided size begins at a usual size of either sign, and not at zero.
-    rival : cost of another explanation; refits that stay far behind end early.
-    only_better : whether a refit that does not lead the rival and the others is of no use.
-    """
-    known = {r.score.effect.key for r in fits} | set(skip)
-    found = list(fits)
-    for s in table.scores:
-        if s.effect.key in known or len(s.effect.parameters) > 1:
-            continue
-        if not may_begin(advance, f"refit {s.effect.key} from the declared aircraft"):
-            continue
-        for size in _usual_sizes(s, either_sign):
-            ahead = min((r.fit.cost for r in found), default=rival)
-            tried = with_effect(problem, null, s, size, min(ahead, rival), only_better=only_better)
-            if tried is not None:
-                found.append(Refit(s, tried, 0.0))
-    return sorted(found, key=lambda r: r.cost)
-
-
 def refit_known(
     problem: TraceProblem,
     null: PosteriorFit,
@@ -217,17 +173,6 @@ def refit_known(
         if tried is not None and (key not in best or tried.cost < best[key].fit.cost):
             best[key] = Refit(s, tried, freedom.correction(s.effect, tried))
     return sorted(best.values(), key=lambda r: r.cost)
-
-
-def _usual_sizes(s: Score, either_sign: bool) -> tuple[float, ...]:
-    """Sizes at which the search for an effect without a score begins."""
-    first = s.effect.parameters[0]
-    low, high = first.reach
-    if first.one_sided:
-        return (_USUAL * high,)
-    if not either_sign:
-        return (0.0,)
-    return tuple(share * end for share in (_USUAL, _LARGE) for end in (high, low))
 
 
 def _leading(
@@ -348,7 +293,6 @@ __all__ = [
     "Refit",
     "better_null",
     "losses_without",
-    "refit_absorbed",
     "refit_leaders",
     "refit_scored",
     "refit_without",

@@ -20,6 +20,7 @@ from airtruth.tracing.inference.profile import Profile, best_location, location_
 from airtruth.tracing.inference.whitening import Whitener, autoregression
 from airtruth.tracing.model.parameters import Common, Parameters
 from airtruth.tracing.selection import score_test
+from airtruth.tracing.selection.absorbed import refit_absorbed
 from airtruth.tracing.selection.acceptance import SUPERSEDED, SURPASSED, UNSUPPORTED, Candidate, has_converged
 from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.budget import Advance
@@ -31,7 +32,6 @@ from airtruth.tracing.selection.refit import (
     LED,
     Refit,
     better_null,
-    refit_absorbed,
     refit_known,
     refit_leaders,
 )

@@ -14,11 +14,12 @@ from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.profile import relocated
 from airtruth.tracing.model.parameters import Parameters
+from airtruth.tracing.selection.absorbed import refit_absorbed
 from airtruth.tracing.selection.acceptance import OUTDONE, Candidate, predicts_records_left_out
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import AHEAD, BETTER, better_set
 from airtruth.tracing.selection.explanation import AS_PROBABLE, events
-from airtruth.tracing.selection.refit import losses_without, refit_absorbed
+from airtruth.tracing.selection.refit import losses_without
 from airtruth.tracing.selection.release import DeclaredCauses, Release
 from airtruth.tracing.selection.rounds import (
     NOTHING_DECLARED,

@@ -1,0 +1,110 @@
+"""Refits of effects that refitted derivatives may have absorbed, so that they have no score."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from airtruth.tracing.inference.optimise import fit
+from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.selection.budget import Advance, may_begin
+from airtruth.tracing.selection.from_declared import with_effect
+from airtruth.tracing.selection.refit import Refit
+from airtruth.tracing.selection.score_test import Score, Table
+
+_USUAL: Final = 0.15
+"""Share of its plausible range at which the search for an effect without a score begins [-] (judgement)."""
+_LARGE: Final = 0.5
+"""Share at which a second search begins where either sign is tried [-] (judgement: near the usual share the derivatives may
+keep a large effect in an optimum of their own)."""
+RECORDS: Final = 8
+"""Number of records from which every effect is refitted [-]; of more records, those between are left out until a few effects
+lead (judgement: six to eight records name a cause as a rule, and a planned flight has up to 30)."""
+_LEADERS: Final = 4
+"""Number of effects that are then refitted to all records [-] (judgement)."""
+
+
+def refit_absorbed(
+    problem: TraceProblem,
+    null: PosteriorFit,
+    table: Table,
+    fits: Sequence[Refit],
+    advance: Advance,
+    skip: Collection[str] = (),
+    *,
+    either_sign: bool = False,
+    rival: float = np.inf,
+    only_better: bool = False,
+) -> list[Refit]:
+    """The refits with those of effects that refitted derivatives may have absorbed, best first.
+
+    At a null whose derivatives contradict the declaration such an effect has no score; its refit begins at the
+    declared aircraft.
+
+    Parameters
+    ----------
+    fits : refits of the leading candidates; skip : keys of effects that are not refitted.
+    either_sign : whether a two-sided size begins at a usual size of either sign, and not at zero.
+    rival : cost of another explanation; refits that stay far behind end early.
+    only_better : whether a refit that does not lead the rival and the others is of no use.
+    """
+    known = {r.score.effect.key for r in fits} | set(skip)
+    untried = (s for s in table.scores if s.effect.key not in known and len(s.effect.parameters) == 1)
+    starts = [(s, _usual_sizes(s, either_sign)) for s in untried]
+    if len(problem.records) > RECORDS:
+        starts = _leading_starts(problem, null, starts, advance)
+    found = list(fits)
+    for s, sizes in starts:
+        if not may_begin(advance, f"refit {s.effect.key} from the declared aircraft"):
+            continue
+        for size in sizes:
+            ahead = min((r.fit.cost for r in found), default=rival)
+            tried = with_effect(problem, null, s, size, min(ahead, rival), only_better=only_better)
+            if tried is not None:
+                found.append(Refit(s, tried, 0.0))
+    return sorted(found, key=lambda r: r.cost)
+
+
+def _usual_sizes(s: Score, either_sign: bool) -> tuple[float, ...]:
+    """Sizes at which the search for an effect without a score begins."""
+    first = s.effect.parameters[0]
+    low, high = first.reach
+    if first.one_sided:
+        return (_USUAL * high,)
+    if not either_sign:
+        return (0.0,)
+    return tuple(share * end for share in (_USUAL, _LARGE) for end in (high, low))
+
+
+def _leading_starts(
+    problem: TraceProblem,
+    null: PosteriorFit,
+    starts: Sequence[tuple[Score, tuple[float, ...]]],
+    advance: Advance,
+) -> list[tuple[Score, tuple[float, ...]]]:
+    """The scores of the effects that explain some of the records best, each with the best of its starts."""
+    number = len(problem.records)
+    kept = np.linspace(0, number - 1, RECORDS).round().astype(int)
+    some = replace(problem, records=tuple(problem.records[i] for i in kept))
+    base = fit(some, null.hypothesis, replace(null.point, per_record=null.point.per_record[kept]))
+    if base is None:
+        return list(starts)
+    ends: list[tuple[float, Score, float]] = []
+    for s, sizes in starts:
+        if not may_begin(advance, f"refit {s.effect.key} to {RECORDS} of {number} records"):
+            continue
+        for size in sizes:
+            ahead = min((cost for cost, _, _ in ends), default=np.inf)
+            tried = with_effect(some, base, s, size, ahead)
+            if tried is not None:
+                ends.append((tried.cost, s, size))
+    best: dict[str, tuple[Score, tuple[float, ...]]] = {}
+    for _, s, size in sorted(ends, key=lambda end: end[0]):
+        best.setdefault(s.effect.key, (s, (size,)))
+    return list(best.values())[:_LEADERS]
+
+
+__all__ = ["RECORDS", "refit_absorbed"]
