@@ -11,7 +11,7 @@ OUT ?= out
 LOCK := uv pip compile --quiet pyproject.toml --universal --python-version 3.11 --generate-hashes --no-header --no-annotate
 # Processes run side by side: further threads for small matrices only wait for each other.
 export OPENBLAS_NUM_THREADS ?= 1
-# Containers set it; every process would then compile all modules that it imports, which takes seconds.
+# Containers set this variable, and every process then compiles all modules that it imports, which takes seconds.
 unexport PYTHONDONTWRITEBYTECODE
 BUDGET ?= 1
 # make campaign-quick STORE=s3://BUCKET/FOLDER flies into an object store (docs/stores.md)
