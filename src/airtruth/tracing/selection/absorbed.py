@@ -21,10 +21,12 @@ _LARGE: Final = 0.5
 """Share at which a second search begins where either sign is tried [-] (judgement: near the usual share the derivatives may
 keep a large effect in an optimum of their own)."""
 RECORDS: Final = 8
-"""Number of records from which every effect is refitted [-]; of more records, those between are left out until a few effects
-lead (judgement: six to eight records name a cause as a rule, and a planned flight has up to 30)."""
+"""Largest number of records to which every effect is refitted [-] (judgement: six to eight records name a cause as a rule, and
+a planned flight has up to 30)."""
 _LEADERS: Final = 4
-"""Number of effects that are then refitted to all records [-] (judgement)."""
+"""Number of effects that are refitted to all of more records [-] (judgement)."""
+Starts = Sequence[tuple[Score, tuple[float, ...]]]
+"""Scores, each with the sizes at which a refit of its effect begins."""
 
 
 def refit_absorbed(
@@ -53,19 +55,34 @@ def refit_absorbed(
     """
     known = {r.score.effect.key for r in fits} | set(skip)
     untried = (s for s in table.scores if s.effect.key not in known and len(s.effect.parameters) == 1)
-    starts = [(s, _usual_sizes(s, either_sign)) for s in untried]
+    starts: Starts = [(s, _usual_sizes(s, either_sign)) for s in untried]
     if len(problem.records) > RECORDS:
         starts = _leading_starts(problem, null, starts, advance)
-    found = list(fits)
+    ahead = min([rival, *(r.fit.cost for r in fits)])
+    ends = _refitted(problem, null, starts, advance, "from the declared aircraft", ahead, only_better)
+    return sorted([*fits, *(r for r, _ in ends)], key=lambda r: r.cost)
+
+
+def _refitted(
+    problem: TraceProblem,
+    null: PosteriorFit,
+    starts: Starts,
+    advance: Advance,
+    phrase: str,
+    rival: float = np.inf,
+    only_better: bool = False,
+) -> list[tuple[Refit, float]]:
+    """Refits from the declared aircraft, each with the size at which it began; rival and only_better as of `refit_absorbed`."""
+    found: list[tuple[Refit, float]] = []
     for s, sizes in starts:
-        if not may_begin(advance, f"refit {s.effect.key} from the declared aircraft"):
+        if not may_begin(advance, f"refit {s.effect.key} {phrase}"):
             continue
         for size in sizes:
-            ahead = min((r.fit.cost for r in found), default=rival)
-            tried = with_effect(problem, null, s, size, min(ahead, rival), only_better=only_better)
+            ahead = min([rival, *(r.fit.cost for r, _ in found)])
+            tried = with_effect(problem, null, s, size, ahead, only_better=only_better)
             if tried is not None:
-                found.append(Refit(s, tried, 0.0))
-    return sorted(found, key=lambda r: r.cost)
+                found.append((Refit(s, tried, 0.0), size))
+    return found
 
 
 def _usual_sizes(s: Score, either_sign: bool) -> tuple[float, ...]:
@@ -79,31 +96,18 @@ def _usual_sizes(s: Score, either_sign: bool) -> tuple[float, ...]:
     return tuple(share * end for share in (_USUAL, _LARGE) for end in (high, low))
 
 
-def _leading_starts(
-    problem: TraceProblem,
-    null: PosteriorFit,
-    starts: Sequence[tuple[Score, tuple[float, ...]]],
-    advance: Advance,
-) -> list[tuple[Score, tuple[float, ...]]]:
+def _leading_starts(problem: TraceProblem, null: PosteriorFit, starts: Starts, advance: Advance) -> Starts:
     """The scores of the effects that explain some of the records best, each with the best of its starts."""
     number = len(problem.records)
     kept = np.linspace(0, number - 1, RECORDS).round().astype(int)
     some = replace(problem, records=tuple(problem.records[i] for i in kept))
     base = fit(some, null.hypothesis, replace(null.point, per_record=null.point.per_record[kept]))
     if base is None:
-        return list(starts)
-    ends: list[tuple[float, Score, float]] = []
-    for s, sizes in starts:
-        if not may_begin(advance, f"refit {s.effect.key} to {RECORDS} of {number} records"):
-            continue
-        for size in sizes:
-            ahead = min((cost for cost, _, _ in ends), default=np.inf)
-            tried = with_effect(some, base, s, size, ahead)
-            if tried is not None:
-                ends.append((tried.cost, s, size))
+        return starts
+    ends = _refitted(some, base, starts, advance, f"to {RECORDS} of {number} records")
     best: dict[str, tuple[Score, tuple[float, ...]]] = {}
-    for _, s, size in sorted(ends, key=lambda end: end[0]):
-        best.setdefault(s.effect.key, (s, (size,)))
+    for r, size in sorted(ends, key=lambda pair: pair[0].cost):
+        best.setdefault(r.score.effect.key, (r.score, (size,)))
     return list(best.values())[:_LEADERS]
 
 

@@ -52,11 +52,11 @@ def with_coloured_noise(case: Case) -> tuple[Case, Parameters]:
     """The case, with slow noise where its fitted records show some, and the parameters at which its search begins."""
     start = initial_parameters(case.fitted, case.hypothesis)
     null = fit(case.fitted, case.hypothesis, start)
-    return (case, start) if null is None or _is_edge(case, null) else beside(case, null)
+    return (case, start) if null is None or _diverges_nearby(case, null) else beside(case, null)
 
 
-def _is_edge(case: Case, null: PosteriorFit) -> bool:
-    """Whether a fit ended where the motion diverges a step further, so that no other fit can begin there."""
+def _diverges_nearby(case: Case, null: PosteriorFit) -> bool:
+    """Whether a fit ended, not converged, where the motion diverges within a step, so that no other fit can begin there."""
     return not null.converged and fit(case.fitted, null.hypothesis, null.point, iterations=0) is None
 
 
@@ -64,7 +64,7 @@ def later_level(samples: int) -> float:
     """Significance level of the three scores together beside accepted effects [-].
 
     The limit of a score is two thirds of the typical one. A short record cannot reach the limit of `LEVEL`, and intervals under
-    white noise are then too narrow. From 950 samples on the level is `LEVEL`, because a model error scores too.
+    white noise are then too narrow. From 953 samples on the level is `LEVEL`, because a model error scores too.
 
     Parameters
     ----------
