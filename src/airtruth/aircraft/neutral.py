@@ -58,8 +58,8 @@ def fitted(sensors: Mapping[str, Sensor], terms: Iterable[SensorTerm]) -> dict[s
         value = kind.combined(declared.value, term.value)
         if value < 0.0 and not kind.may_be_negative:
             raise ConfigurationError(
-                f"{term.channel}: a {term.kind} of {value:g} s in all is not possible; "
-                f"{declared.value:g} s is declared, so the effect may take off no more than that"
+                f"{term.channel}: the total {term.kind} would be {value:g} s and cannot be negative; "
+                f"{declared.value:g} s is declared, so the effect can reduce it by {declared.value:g} s at most"
             )
         changed = declared.model_copy(update={"value": value})
         result[term.channel] = sensor.model_copy(update={kind.key: changed})

@@ -41,7 +41,7 @@ CODES: Final = {
     "inconsistent": "the channel contradicts the others, by no known mistake",
     "impossible": "the values are outside the range of flight",
     "name": "the column has the name of no channel but resembles one",
-    "lag": "the channel is late against the others",
+    "lag": "the channel is late relative to the others",
     "reconstructed": "the channel was computed from others, and agrees with them by construction",
     "metadata": "the unit in the file's metadata contradicts the column's name",
 }

@@ -45,12 +45,12 @@ def conclusions(
     result = _headline(verdict, found, findings, causes)
     if verdict != "agrees" and found.enlargement > 1.0:
         result.append(
-            f"The errors leave motion of the elevator unexplained (p = {found.p_value:.1g}): noise of the instruments is "
-            f"enlarged by {found.enlargement**0.5:.2g} for it. Terms outside this check (sideslip, roll, flexibility, "
-            "other sensor errors) are present."
+            f"The errors do not explain all motion that follows the elevator (p = {found.p_value:.1g}), so the sensor noise is "
+            f"multiplied by {found.enlargement**0.5:.2g}. The motion has terms outside this check (sideslip, roll, "
+            "flexibility or other sensor errors)."
         )
     if not found.stable:
-        result.append("The weight of the noise did not settle: take sizes with reserve.")
+        result.append("The estimate of the sensor noise did not converge, so the sizes are unreliable.")
     dark = [f.name for f in findings if f.state == "not shown"]
     if dark:
         result.append(

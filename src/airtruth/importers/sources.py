@@ -51,7 +51,7 @@ def _isolated(path: Path, name: str, section: SourceSection) -> Source:
         return unpacked(path, call(Task("airtruth.foreign.formats:read", arguments, limits, FORMATS[name])))
     except IsolatedError as error:
         what = {
-            "crash": f"the reader of {name} files died on it ({error.detail}), so it is damaged; export it again",
+            "crash": f"the reader of {name} files crashed ({error.detail}), so the file is damaged; export it again",
             "time": f"is not read within {limits.seconds:.0f} s; it is damaged, or export a shorter part of the flight",
             "memory": f"reading it needs more than {limits.memory_bytes / 1e9:.1f} GB of memory; it is damaged, or "
             "export fewer channels or a shorter part of the flight",

@@ -341,9 +341,13 @@ def _next_flight(
     for best, others in effects:
         names = {c.score.effect.key: c.score.effect for c in (best, *others)}
         if len({e.name for e in names.values()}) > 1:
-            split = " ".join(dict.fromkeys(e.distinguished_by for e in names.values() if e.distinguished_by))
+            ways: dict[str, list[str]] = {}
+            for key, effect in names.items():
+                ways.setdefault(effect.distinguished_by, []).append(key)
+            split = " ".join(f"{', '.join(keys)}: {way}" for way, keys in ways.items() if way)
             lines.append(
-                f"To separate {', '.join(names)}: {split} `airtruth plan --from` computes the input that separates them most."
+                f"Separate {', '.join(names)} as follows. {split} `airtruth plan --from` computes the input that "
+                "separates them most."
             )
     lines += learned
     if remaining.p_value <= ANOMALY_LEVEL:

@@ -109,8 +109,8 @@ def disagreement(check: CheckResult | None, answer: TraceAnswer, dt_s: float) ->
     if sets and all(sets) and not any(one & traced for one in sets):
         words = " or ".join(sorted({" with ".join(sorted(one)) for one in sets}))
         result.append(
-            f"the kinematic check of the fitted records names {words}, and the trace accepts none of these: it is "
-            "without reservation only where both agree; inspect `airtruth check`"
+            f"the kinematic check of the fitted records names {words}, and the trace accepts none of these, so "
+            "the answer is provisional; inspect `airtruth check`"
         )
     for effect in answer.effects:
         found = next((f for f in check.findings if f.name == _key(effect.name, effect.channel)), None)

@@ -67,13 +67,13 @@ def notes(
         yield _IN_LOOP
     if stages.case.left_out:
         yield (
-            "the time budget ended the search, which is provisional for it; left out: "
+            "the time budget ended the search, so the answer is provisional; left out: "
             + "; ".join(stages.case.left_out)
         )
     if replay is not None:
         yield from disagreement(replay, stages)
     if forced:
-        yield "the logs contradict physics and were traced all the same (--force): " + "; ".join(forced)
+        yield "the logs contradict physics and were traced because of --force: " + "; ".join(forced)
 
 
 def worse_held_out(errors: Errors) -> Iterator[str]:

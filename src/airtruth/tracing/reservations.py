@@ -59,8 +59,8 @@ def reservations(
     beside = [e for e in effects if e.acts_on != _AXIAL]
     if beside and len(beside) < len(effects):
         found.append(
-            f"ax contradicts the declared axial force; it would do so too where {', '.join(e.key for e in beside)} "
-            f"{'are' if len(beside) > 1 else 'is'} not the true cause, so that both are provisional"
+            f"ax contradicts the declared axial force; a wrong name instead of {', '.join(e.key for e in beside)} "
+            "would contradict it as well, so both are provisional"
         )
     if named and len(named) < len(beside):
         found.append(
