@@ -2,7 +2,7 @@
 
 For each pair of effects a flight is planned (`airtruth plan --split`). Two questions follow.
 
-1. Separation. JSBSim flies the planned input and the 3-2-1-1 of equal length and limits with either effect, in still air
+1. Separation. JSBSim flies the planned input and the 3-2-1-1 of equal length and limits with either effect, in calm air
    and without sensor noise. The outputs of JSBSim pass the tracer's filter under both hypotheses, everything else refitted
    to first order. The difference of the squared innovations is the square of the separation, without any randomness.
 2. Ties. JSBSim flies the planned campaign with either effect in gusts and with sensor noise, the derivatives drawn from
@@ -206,7 +206,7 @@ def separations(
 
 
 def still(campaign: Campaign, effects: list[dict[str, Any]]) -> Campaign:
-    """Two equal runs in still air with ideal sensors.
+    """Two equal runs in calm air with ideal sensors.
 
     JSBSim holds the surface over a step. At 200 Hz this hides the difference between a delay and a lag of 4 ms.
     """

@@ -43,7 +43,7 @@ _ITERATIONS: Final = 6
 _WIDER: Final = 24.0
 """Variance of the derivatives beside an effect that moves them, over the declared one, added [-]: five standard deviations."""
 _SLOW_SHARE: Final = 0.4
-"""Share of slow noise from which the fit of coloured noise begins [-]."""
+"""Share of correlated noise from which the fit of correlated noise begins [-]."""
 _IN_DERIVATIVES: Final = ("cg_shift", "mass_error", "inertia_error", "elevator_effectiveness")
 """Effects of the filter that move the derivatives."""
 

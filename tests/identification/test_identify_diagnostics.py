@@ -64,7 +64,7 @@ def test_cragg_donald_is_the_smallest_canonical_correlation():
 
 
 def test_kleibergen_paap_is_cragg_donald_in_white_noise():
-    """Regressors = instruments + noise: both agree on average if it is white; in slow noise not."""
+    """Regressors = instruments + noise: both agree on average if it is white; in correlated noise not."""
     rng = np.random.default_rng(2)
     n, runs = 250, 300
     calm = fly()

@@ -1,4 +1,4 @@
-"""Von Neumann's ratio of white noise, of coloured noise and of a line."""
+"""Von Neumann's ratio of white noise, of correlated noise and of a line."""
 
 import numpy as np
 

@@ -194,8 +194,8 @@ def test_an_effect_that_derivatives_absorbed_is_refitted_beside_an_accepted_one(
 
 
 def test_coloured_noise_behind_a_strong_effect_is_found(tmp_path):
-    """A vane 60 ms late, lambda 344, moderate gusts, coloured noise. At the declared aircraft the delay drives the share of slow
-    noise to its limit; without slow noise an increment was learned beside the delay."""
+    """A vane 60 ms late, lambda 344, moderate gusts, correlated noise. At the declared aircraft the delay drives the share of
+    this noise to its limit; without correlated noise an increment was learned beside the delay."""
     answer = answered(20261221, 30, "drift", tmp_path)
     (effect,) = answer["effects"]
     assert (effect["name"], effect["channel"], answer["provisional"]) == ("sensor_delay", "alpha_rad", False)
@@ -293,7 +293,7 @@ def test_a_downwash_lag_is_no_wrong_cmq(tmp_path):
 
 
 def test_slow_noise_takes_no_effect_away(tmp_path):
-    """The search with slow noise lost the delay of the surface, which the search before had accepted."""
+    """The search with correlated noise lost the delay of the surface, which the search before had accepted."""
     from airtruth.tracing import TraceOptions, trace
     from validation.blind.trials import frozen
 

@@ -138,7 +138,7 @@ def allowed(errors=(), p_value=0.5, state="not needed"):
 
 
 def test_a_check_without_an_error_limits_what_a_trace_may_name():
-    """Five standard errors about the estimate; effects that are no error of an instrument keep their range."""
+    """Five standard errors about the estimate; effects that are no error of a sensor keep their range."""
     plain = [(e.low, e.high) for e in (EFFECTS[k].parameters[0] for k in ("gyro_scale", "inertia_error"))]
     assert allowed() == [pytest.approx((0.982, 1.022)), plain[1]]
     assert allowed(errors=(SimpleNamespace(name="vane_lag"),)) == plain

@@ -1,4 +1,4 @@
-"""Slow noise of the sensors enters where the records show it, and not elsewhere."""
+"""Correlated noise of the sensors enters where the records show it, and not elsewhere."""
 
 from __future__ import annotations
 

@@ -238,7 +238,7 @@ def test_lagging_sensors(lag):
 
 @pytest.mark.parametrize("shares", [(0.0, 0.0, 0.0), (0.5, 0.0, 0.3)])
 def test_innovations_are_those_of_the_steady_kalman_filter(shares):
-    """A noisy record through x+ = phi x + ..., x <- x + K e with the DARE's gain, slow noise among the states."""
+    """A noisy record through x+ = phi x + ..., x <- x + K e with the DARE's gain, correlated noise among the states."""
     rng = np.random.default_rng(5)
     made = tr.fly(rng, sigma_w=0.3, amplitude=0.5 * DEG)
     common, per_record = tr.still()

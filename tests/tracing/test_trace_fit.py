@@ -351,7 +351,7 @@ def test_a_loose_coefficient_has_a_wide_offset():
     np.testing.assert_allclose(std[(3,)], [0.1, 0.5])
 
 
-# -- slow noise
+# -- correlated noise
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5])

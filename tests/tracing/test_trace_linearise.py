@@ -13,7 +13,7 @@ from airtruth.tracing.model.parameters import CORE, DELAY_ORDER, PerRecord, stat
 
 WHITE = np.array([0.0, 0.0, 0.0, 0.1])
 SLOW = np.array([0.7 * tr.SETTINGS.noise[0], 0.0, 0.5 * tr.SETTINGS.noise[2], 0.08])
-"""Standard deviations of the sensors' slow noise, and its correlation time [s]."""
+"""Standard deviations of the sensors' correlated noise, and its correlation time [s]."""
 
 
 def linearised(lags=None, sigma_w=0.3, delays=None, colour=WHITE):
@@ -57,7 +57,7 @@ def test_linearisation_of_lagging_sensors():
 @pytest.mark.parametrize("colour", [WHITE, SLOW])
 @pytest.mark.parametrize("delays", [np.zeros(3), np.array([0.01, 0.03, 0.0])])
 def test_steady_gain_solves_the_riccati_equation(sigma_w, delays, colour):
-    """K, S and the whitener against scipy's DARE with Van Loan's noise covariance; delays and slow noise are states of
+    """K, S and the whitener against scipy's DARE with Van Loan's noise covariance; delays and correlated noise are states of
     their own.
     """
     a, c, model = linearised(sigma_w=sigma_w, delays=delays, colour=colour)

@@ -20,7 +20,7 @@ HYPOTHESIS = NOTHING.plus(EFFECTS["vane_arm"])
 
 
 def disturbed(rng, sign, amount):
-    """A record whose alpha and pitch rate carry slow noise that the model does not know."""
+    """A record whose alpha and pitch rate carry correlated noise that the model does not know."""
     record = fly(rng, samples=300, amplitude=sign * 0.035, name=f"r{sign}")
     slow = np.zeros((300, 2))
     for k in range(1, 300):

@@ -57,7 +57,7 @@ class Correction:
     mistake : the mistake in words.
     cure : what to write in the import mapping.
     apply : channels (runs, samples) -> those that change.
-    sensor : whether it is an error of an instrument and none of the mapping; such an error never refuses a log.
+    sensor : whether it is an error of a sensor and none of the mapping; such an error never refuses a log.
     penalty : what it adds to the sum: minus twice the logarithm of how often the mistake is made,
         relative to a wrong sign (judgement).
     """

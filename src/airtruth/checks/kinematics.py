@@ -83,7 +83,7 @@ def check_kinematics(
     chord_m: float | None = None,
     biases: Mapping[str, float] | None = None,
 ) -> CheckResult:
-    """Estimate the errors of instruments from all runs together; the gate is not passed.
+    """Estimate the errors of sensors from all runs together; the gate is not passed.
 
     The errors are common to all runs. The noise is estimated for each run.
 
@@ -135,7 +135,7 @@ def check_kinematics(
 
 
 def declared_errors(aircraft: Aircraft) -> dict[str, float]:
-    """Errors of instruments that aircraft.toml declares, as `check_kinematics` takes them."""
+    """Errors of sensors that aircraft.toml declares, as `check_kinematics` takes them."""
     result = {}
     for error in ERRORS.values():
         sensor = aircraft.file.sensors.get(error.channel)

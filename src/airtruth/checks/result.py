@@ -1,4 +1,4 @@
-"""The result of `airtruth check`: errors of instruments, the sets of errors that explain a log, conclusions in words."""
+"""The result of `airtruth check`: errors of sensors, the sets of errors that explain a log, conclusions in words."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Verdict = Literal["agrees", "errors", "one_of", "cannot_tell", "failed"]
-"""Answers of a check: the channels agree; errors of instruments are present; one of several sets of errors is; the
+"""Answers of a check: the channels agree; errors of sensors are present; one of several sets of errors is; the
 records cannot tell; the check itself failed."""
 State = Literal["present", "one of", "not needed", "not shown", "not assessed"]
 """An error is in every explanation, in some, in none although the records would show it, or the records would not
@@ -26,7 +26,7 @@ show it; or an explanation has it and the check failed."""
 
 @dataclass(frozen=True)
 class Finding:
-    """An instrument error with its uncertainty.
+    """A sensor error with its uncertainty.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Cause:
 
 @dataclass(frozen=True)
 class CheckResult:
-    """Errors of the instruments of a log, as its kinematics show them; see `airtruth.result.Result`.
+    """Errors of the sensors of a log, as its kinematics show them; see `airtruth.result.Result`.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ class CheckResult:
         return "\n\n".join(["\n".join(self.sentences), *(as_text(table) for table in tables(self))])
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per error of an instrument: estimate, std, 95 % interval, declared value."""
+        """One row per error of a sensor: estimate, std, 95 % interval, declared value."""
         return tables(self)[0].to_frame()
 
     def to_dict(self) -> dict[str, Any]:
@@ -145,7 +145,7 @@ class CheckResult:
         left.set_yticks(places, [f.name for f in shown_ones])
         left.invert_yaxis()
         left.set_xlabel("estimate less declared value [standard errors]")
-        left.set_title("errors of instruments, 95 % intervals")
+        left.set_title("errors of sensors, 95 % intervals")
         causes = self.causes[:SETS]
         for place, cause in enumerate(causes):
             right.barh(place, cause.distance, color=style.GREEN if cause.possible else style.GREY)
@@ -185,7 +185,7 @@ def tables(result: CheckResult) -> tuple[Table, Table]:
         for f in result.findings
     ]
     found = flat(
-        title=f"Errors of instruments in {len(result.run_ids)} run{'s' * (len(result.run_ids) > 1)}, 95 % intervals",
+        title=f"Errors of sensors in {len(result.run_ids)} run{'s' * (len(result.run_ids) > 1)}, 95 % intervals",
         columns=("error", "unit", "estimate", "std", "lower", "upper", "declared", "smallest shown", "state"),
         rows=tuple(rows),
         notes=tuple(f"{f.name}: {f.meaning}" for f in result.findings),

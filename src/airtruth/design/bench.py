@@ -44,7 +44,7 @@ _RATE_MARGIN: Final = 1.5
 
 @dataclass(frozen=True)
 class Flown:
-    """An input as flown by the declared aircraft in still air.
+    """An input as flown by the declared aircraft in calm air.
 
     Attributes
     ----------

@@ -1,6 +1,6 @@
 """Standard errors of the six derivatives that a campaign can reach, before it is flown.
 
-Each kind of run is flown once in still air. The Cramer-Rao bound of
+Each kind of run is flown once in calm air. The Cramer-Rao bound of
 `airtruth.identification.likelihood.cramer_rao` is evaluated for its elevator, its gusts and the noise of the sensors,
 with unknown levels and biases. Information adds up over runs.
 """
@@ -249,7 +249,7 @@ def _bound(
     flown: Mapping[str, Array],
     noise: Mapping[str, float],
 ) -> Array:
-    """The bound (6, 6) of one run of the table, from its trim, derivatives (6,) and flight in still air."""
+    """The bound (6, 6) of one run of the table, from its trim, derivatives (6,) and flight in calm air."""
     gusts = GustScales(run.sigma_u_m_s, run.sigma_w_m_s, run.length_u_m, run.length_w_m)
     experiment = LinearExperiment(
         plan.aircraft, noise, gusts, at.airspeed_m_s, plan.dt_s * plan.log_every, plan.campaign.gust.start

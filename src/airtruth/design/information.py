@@ -46,7 +46,7 @@ class LinearExperiment:
 
         Parameters
         ----------
-        flown : channel -> (samples,) of a flight in still air; the elevator counts, and the flight condition.
+        flown : channel -> (samples,) of a flight in calm air; the elevator counts, and the flight condition.
         theta : (6,) true derivatives [-].
         """
         batch, options = self._read(flown)
@@ -58,7 +58,7 @@ class LinearExperiment:
 
         Parameters
         ----------
-        flown : channel -> (samples,) of a flight in still air.
+        flown : channel -> (samples,) of a flight in calm air.
         theta : (6,) true derivatives [-]; the fit starts there.
         """
         batch, options = self._read(flown)

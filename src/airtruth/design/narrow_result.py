@@ -70,7 +70,7 @@ class NarrowRow:
 
 @dataclass(frozen=True)
 class Histories:
-    """The planned flight in still air.
+    """The planned flight in calm air.
 
     Attributes
     ----------
@@ -179,7 +179,7 @@ class NarrowResult(PlannedCampaign):
             f"Expected standard error of {self.campaign.runs} records: {expected}{gain}.",
             f"At {at.eas_m_s:.4g} m/s EAS, {at.altitude_m:.4g} m, in vertical gusts of {significant(self.gust_m_s)} m/s; "
             "mean over draws of the derivatives. Other derivatives, biases and initial state are free.",
-            f"Reached in still air, as declared and with the changes allowed for: {self.reached.beside(self.limits)}. "
+            f"Reached in calm air, as declared and with the changes allowed for: {self.reached.beside(self.limits)}. "
             f"The declared aircraft flies angles of attack of {alpha.min():.3g} to {alpha.max():.3g} deg.",
         )
 

@@ -31,7 +31,7 @@ class PlannedCampaign(ABC):
     ----------
     aircraft : name.
     campaign : flies the computed input; reference_campaign : the same with the 3-2-1-1.
-    limits, reached : limits, and what the aircraft reaches in still air, as declared and with the changes allowed for.
+    limits, reached : limits, and what the aircraft reaches in calm air, as declared and with the changes allowed for.
     condition : flight condition.
     gust_m_s : vertical gust that is expected [m/s].
     tried : inputs that were flown.

@@ -1,6 +1,6 @@
 """Separation of two hypotheses by a record: the noncentrality that remains once everything else is refitted.
 
-The outputs of a hypothesis, flown by the tracer's model through the elevator of the record in still air, are filtered by
+The outputs of a hypothesis, flown by the tracer's model through the elevator of the record in calm air, are filtered by
 the tracer's filter under the other hypothesis. With r the whitened innovations (zero under the true hypothesis), T their
 derivatives by the nuisance parameters x (derivatives, thrust, gust shape, inertia; biases, trim and initial state of the
 record), S those by the sizes s of the other hypothesis, and P the prior precision of x, the separation d has
@@ -134,7 +134,7 @@ class Experiment:
         self._bases: dict[tuple[int, ...], Array] = {}
 
     def outputs(self, truth: Member, common: Array) -> Array:
-        """(samples, 3) outputs of the record that the tracer's model has with an effect, in still air."""
+        """(samples, 3) outputs of the record that the tracer's model has with an effect, in calm air."""
         hypothesis = self.model.hypothesis((truth.effect,), self.record)
         return flown_by(self.model, self.record, hypothesis, truth.sizes, common).signals.y
 
@@ -192,7 +192,7 @@ class Experiment:
 def flown_by(
     model: Model, record: TraceRecord, hypothesis: Hypothesis, sizes: Array, common: Array
 ) -> TraceRecord:
-    """The record with the outputs that the tracer's model has under a hypothesis, in still air.
+    """The record with the outputs that the tracer's model has under a hypothesis, in calm air.
 
     Parameters
     ----------

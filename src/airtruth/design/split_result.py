@@ -56,7 +56,7 @@ class InputRow:
 
 @dataclass(frozen=True)
 class Prediction:
-    """The planned flight as predicted, in still air.
+    """The planned flight as predicted, in calm air.
 
     Attributes
     ----------
@@ -150,7 +150,7 @@ class SplitResult(PlannedCampaign):
             f"Separation of {self.fitted} fitted of {self.campaign.runs} records at {at.eas_m_s:.4g} m/s EAS, "
             f"{at.altitude_m:.4g} m, in vertical gusts of {significant(self.gust_m_s)} m/s; mean over draws of sizes and "
             "derivatives.",
-            f"Reached in still air, as declared and with each effect: {self.reached.beside(self.limits)}.",
+            f"Reached in calm air, as declared and with each effect: {self.reached.beside(self.limits)}.",
         )
 
     def summary(self) -> str:

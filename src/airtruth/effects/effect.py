@@ -181,7 +181,7 @@ class Effect:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Columns of a log on which it acts as an error of an instrument, sorted."""
+        """Columns of a log on which it acts as an error of a sensor, sorted."""
         middle = {p.name: 0.5 * (p.low + p.high) for p in self.parameters}
         change = self.describe(middle)
         return tuple(sorted({t.channel for t in change.sensors} | {t.channel for t in change.readings}))

@@ -1,4 +1,4 @@
-"""Errors of instruments beyond those declared; kinds and names are those of `airtruth.physics.sensor_errors`."""
+"""Errors of sensors beyond those declared; kinds and names are those of `airtruth.physics.sensor_errors`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from airtruth.units import DEG, UNITS
 Values = Mapping[str, float]
 
 _SOURCE: Final = "Klein and Morelli, Aircraft System Identification, 2006, ch. 10 (data compatibility)"
-"""Source of the equations of instruments."""
+"""Source of the equations of sensors."""
 
 
 def _error(

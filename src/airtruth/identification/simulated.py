@@ -119,7 +119,7 @@ def simulated_records(
     constants : the aircraft; mass, inertia and lengths that a log states for a run replace its own.
     most : largest number of records; of more, that many evenly spaced ones are chosen.
     of_runs : number of runs of which ``estimates`` has those to show; None if it has all.
-    taken : errors of instruments that the identification took out of the records, and that are taken out here.
+    taken : errors of sensors that the identification took out of the records, and that are taken out here.
 
     Raises
     ------

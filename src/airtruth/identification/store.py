@@ -1,7 +1,7 @@
 """estimates.parquet: estimates of several methods in one file, each with the settings that made it.
 
 The file-level JSON under the key "airtruth" holds, under "estimates", for each method: version, options, joint,
-aircraft, constants, sensors (where errors of instruments are taken out), sources (name, SHA-256 and runs of each log),
+aircraft, constants, sensors (where errors of sensors are taken out), sources (name, SHA-256 and runs of each log),
 notes and forced faults.
 """
 

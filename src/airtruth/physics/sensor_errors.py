@@ -1,4 +1,4 @@
-"""Errors of instruments: the one vocabulary of flying, checking, tracing and updating.
+"""Errors of sensors: the one vocabulary of flying, checking, tracing and updating.
 
 A reading y follows from the true motion in this order (`airtruth.physics.sensors.at_instrument` and `measure`):
 position of the instrument, lag, delay, scale, bias, noise, hold, quantisation, limits. aircraft.toml declares these
@@ -22,7 +22,7 @@ Kind = Literal["bias", "scale", "lag", "delay", "arm"]
 
 @dataclass(frozen=True)
 class ErrorKind:
-    """One kind of error of an instrument.
+    """One kind of error of a sensor.
 
     Attributes
     ----------

@@ -45,7 +45,7 @@ _PLANET: Final = Path(__file__).with_name("flat_planet.xml")
 
 @dataclass(frozen=True)
 class Condition:
-    """A steady flight condition, wings level, in still air.
+    """A steady flight condition, wings level, in calm air.
 
     Attributes
     ----------

@@ -2,7 +2,7 @@
 
 A refit of the derivatives can absorb a slow vane, which then has no score and is never a candidate. The kinematic check
 needs no aerodynamics and knows it. Its causes are therefore always refitted, from the declared aircraft. Where it needs no
-error of an instrument at all, it limits the errors that a trace may name.
+error of a sensor at all, it limits the errors that a trace may name.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from airtruth.physics.sensor_errors import KINDS
 from airtruth.tracing.answer import TraceAnswer
 
 _ERRORS: Final = 5.0
-"""Standard errors of the kinematic check beyond which it excludes an error of an instrument [-] (judgement: its noise is not
+"""Standard errors of the kinematic check beyond which it excludes an error of a sensor [-] (judgement: its noise is not
 quite white)."""
 _FITS: Final = 0.05
 """Probability of the check's absolute test from which it fits the records [-] (convention)."""
@@ -62,7 +62,7 @@ def starts_of(check: CheckResult | None) -> dict[str, float]:
 
 
 def within_kinematics(effects: Sequence[Effect], check: CheckResult | None) -> tuple[Effect, ...]:
-    """The effects; errors of instruments have the range that a check allows, if the check needs none of them.
+    """The effects; errors of sensors have the range that a check allows, if the check needs none of them.
 
     A range ends `_ERRORS` standard errors from the estimate of the check, and contains the neutral value. A refit that ends at
     an end of its range is not accepted. Errors that the records do not show keep their range.

@@ -22,7 +22,7 @@ from airtruth.tracing.stages import Stages, in_closed_loop
 Array = NDArray[np.float64]
 
 _WORTH_A_NOTE: Final = 0.02
-"""Share of slow noise in a sensor's variance from which a note mentions it [-] (judgement: a smaller share
+"""Share of correlated noise in a sensor's variance from which a note mentions it [-] (judgement: a smaller share
 is of no use to a reader)."""
 _FAR: Final = 5.0
 """Distance of an estimate from a declared derivative from which a note states it, in standard deviations of the estimate [-]
@@ -57,7 +57,7 @@ def notes(
     forced : faults of the logs that the caller overruled.
     """
     yield from stages.case.notes
-    yield from _slow_noise(last.null.point.common)
+    yield from _correlated_noise(last.null.point.common)
     if declared.consistent:
         yield from within_assumed_uncertainty(
             declared, stages.case.fitted.records[0].plant.aircraft.file.derivatives
@@ -119,7 +119,7 @@ def within_assumed_uncertainty(declared: DeclaredModel, stated: Mapping[str, Qua
         )
 
 
-def _slow_noise(common: Array) -> Iterator[str]:
+def _correlated_noise(common: Array) -> Iterator[str]:
     shares = {
         channel: float(share) for channel, share in zip(CHANNELS, common[Common.colour_shares], strict=True)
     }
@@ -129,8 +129,7 @@ def _slow_noise(common: Array) -> Iterator[str]:
     if named:
         time_s = COLOUR_TIME_S * math.exp(common[Common.log_colour_time])
         yield (
-            f"part of the sensor noise is slow: of the noise variance, {', '.join(named)} is correlated over "
-            f"{time_s:.2g} s"
+            f"the sensor noise is correlated in time: {', '.join(named)} of the noise variance, over {time_s:.2g} s"
         )
 
 

@@ -161,7 +161,7 @@ def _checked(logs: Logs, aircraft: Aircraft, force: bool) -> tuple[list[FlightLo
 def _search(
     case: Case, options: TraceOptions, advance: Advance, known: Mapping[str, float]
 ) -> tuple[Case, tuple[SearchRound, ...]]:
-    """The case with the coloured noise and the corners that its records show, and the rounds of the search."""
+    """The case with the correlated noise and the corners that its records show, and the rounds of the search."""
     advance("refit the declared aircraft")
     limited = None if options.time_budget_s is None else Budget(options.time_budget_s, advance)
     steps = advance if limited is None else limited
@@ -204,14 +204,14 @@ def _with_later_colour(
     advance: Advance,
     known: Mapping[str, float],
 ) -> tuple[Case, tuple[SearchRound, ...]]:
-    """The search again with slow noise that shows beside what it explained, where that explains more.
+    """The search again with correlated noise that shows beside what it explained, where that explains more.
 
-    At the declared aircraft a strong effect drives slow noise to its limits, and it does not enter. Slow noise can take the
-    share of an effect too, so that the effects of the first search are tried beside it.
+    At the declared aircraft a strong effect drives correlated noise to its limits, and it does not enter. Correlated noise can
+    imitate a share of an effect too, so that the effects of the first search are tried beside it.
     """
     level = later_level(sum(r.samples for r in case.fitted.records))
     coloured, point = beside(case, rounds[-1].null, level)
-    phrase = "search with coloured noise"
+    phrase = "search with correlated noise"
     if not coloured.fitted.settings.coloured or not may_begin(advance, phrase):
         return case, rounds
     start = replace(point, sizes=np.empty(0))

@@ -29,7 +29,7 @@ from airtruth.simulation.manoeuvres import KINDS, MOST_HARMONICS
 Array = NDArray[np.float64]
 
 NO_GUST: Final = "none"
-"""Gust level of still air."""
+"""Gust level of calm air."""
 
 
 MOST_STEPS: Final = 4e6
@@ -170,7 +170,7 @@ class WindTable(Table):
 
     keeps = "true_airspeed": the trim has the stated EAS whatever the wind, so on a flat, non-rotating
     planet the wind changes the ground speed alone (Galileo). keeps = "ground_speed": the stated EAS is
-    that of still air, the ground speed stays, and the airspeed of the trim is less by the wind.
+    that of calm air, the ground speed stays, and the airspeed of the trim is less by the wind.
     """
 
     dimensions: ClassVar[dict[str, str]] = {"along_track": "speed"}

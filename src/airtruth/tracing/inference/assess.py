@@ -327,7 +327,7 @@ class _LinearModel(NamedTuple):
     Attributes
     ----------
     a, c : (n, n) and (3, n); process : (n,) intensities [1/s]; variance : (3,) of the white noise.
-    noise : first state of the sensors' slow noise; -1 for none.
+    noise : first state of the sensors' correlated noise; -1 for none.
     """
 
     a: Array

@@ -85,7 +85,7 @@ class PosteriorSearch:
     ----------
     problem, hypothesis, priors : what is fitted.
     whitener : an autoregression that is held.
-    levels : whether noise and gust levels and the share of slow noise are free.
+    levels : whether noise and gust levels and the share of correlated noise are free.
     shape : parameters of the shape that vectors have.
     with_levels : whether derivatives in the levels are computed although the levels are held; the fit's sensitivities hold them.
     """
@@ -200,7 +200,7 @@ def fit(
     Parameters
     ----------
     whitener : an autoregression that is held; with one, levels should not be free.
-    free_levels : whether noise and gust levels and the share of slow noise are fitted.
+    free_levels : whether noise and gust levels and the share of correlated noise are fitted.
     rival : cost of a better hypothesis; the search ends early once it is plainly out of reach.
     only_better : whether an end that does not lead the rival is of no use, so that the search ends once it will not. The
         derivatives and the covariance of such an end are those of a point before it.

@@ -66,7 +66,7 @@ class CompiledChange:
     inputs: Mapping[str, SensorErrors]
 
     def states(self, slow: bool) -> StateLayout:
-        """States of the filter; ``slow``: the sensors have slow noise."""
+        """States of the filter; ``slow``: the sensors have correlated noise."""
         return state_layout(self.effect_states, self.motion, self.lag_s, self.delay_s, slow)
 
 

@@ -63,7 +63,7 @@ class Steps(NamedTuple):
     h : step of integration [s].
     decay, mean : (2, leads) of the gust's low-passed copies [-].
     phi, early, late : (outputs, order, order), (outputs, order) of the sensors' delays over a part of a step.
-    forget : decay of the slow noise over a sample [-].
+    forget : decay of the correlated noise over a sample [-].
     has_late_sensors : whether any sensor has a lag or a delay.
     """
 
@@ -138,7 +138,7 @@ def _settle_sensors(x: Array, out: Array, model: FilterModel) -> None:
 
 @inner
 def _reading(x: Array, value: float, i: int, model: FilterModel) -> float:
-    """What a sensor with lag, delay and slow noise reads of an output."""
+    """What a sensor with lag, delay and correlated noise reads of an output."""
     at = model.states.lag[i]
     if at >= 0:
         value = x[at]
@@ -248,7 +248,7 @@ def _update(x: Array, k_gain: Array, e: Array) -> bool:
 
 @inner
 def _read(x: Array, at: AirPoint, model: FilterModel, work: Work) -> None:
-    """What the sensors read before lags, delays and slow noise, into ``work.out``."""
+    """What the sensors read before lags, delays and correlated noise, into ``work.out``."""
     az = rates(x, at, model, work.rate[0])
     outputs(x, work.rate[0, 1], az, at, model, work.out)
 

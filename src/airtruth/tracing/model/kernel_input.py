@@ -101,7 +101,7 @@ class SensorArrays(NamedTuple):
     bias : (3,) [units of the outputs]; scale : (3,) [-]; arm_m : (3,) position ahead of the CG [m].
     lag_s, delay_s : (3,) [s]; 0 for none.
     variance : (3,) of the white noise [units of the outputs squared].
-    slow_std : (3,) of the slow noise, a Gauss-Markov process [units of the outputs]; slow_time_s : its correlation
+    slow_std : (3,) of the correlated noise, a Gauss-Markov process [units of the outputs]; slow_time_s : its correlation
         time [s].
     """
 

@@ -80,7 +80,7 @@ def _half_width(state: int, at: AirPoint, model: FilterModel) -> float:
 
 
 def linearise(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array) -> Array:
-    """A and C of the motion, effects' states, late sensors and slow noise about a state, by central differences.
+    """A and C of the motion, effects' states, late sensors and correlated noise about a state, by central differences.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def _differences(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array)
 
 
 def _add_sensors(model: FilterModel, a: Array, c: Array) -> None:
-    """Put lags, delays and slow noise behind the outputs of the motion."""
+    """Put lags, delays and correlated noise behind the outputs of the motion."""
     sensors, states = model.sensors, model.states
     for i in range(OUTPUTS):
         at = states.lag[i]
@@ -141,7 +141,7 @@ def _add_sensors(model: FilterModel, a: Array, c: Array) -> None:
 
 
 def process_intensity(airspeed_m_s: float, model: FilterModel) -> Array:
-    """(states,) intensities [1/s] of the white noise that drives gusts and slow noise."""
+    """(states,) intensities [1/s] of the white noise that drives gusts and correlated noise."""
     process = np.zeros(model.states.size)
     process[2] = 2.0 * airspeed_m_s / model.gusts.length_m
     if model.states.noise >= 0:

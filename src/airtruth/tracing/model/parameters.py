@@ -36,7 +36,7 @@ class Common:
     mounting : share of a shift of the CG that moves the CG past the sensors, less 1/2 [-]: 1/2 if they are bolted to the
         airframe, -1/2 if they keep their declared distance from the CG.
     colour_shares : share of the noise variance of alpha, q and az that is slow [-].
-    log_colour_time : logarithm of the correlation time of the slow noise over `COLOUR_TIME_S`.
+    log_colour_time : logarithm of the correlation time of the correlated noise over `COLOUR_TIME_S`.
     colour : shares and correlation time; noise : everything that describes the sensors' noise (indices).
     """
 
@@ -128,7 +128,7 @@ large against rounding and small against the curvature of the innovations."""
 PER_RECORD_STEP: Final = np.array([1e-5, 1e-4, 1e-3, 1e-3, 1e-5, 1e-4, 1e-3, 1e-5, 1e-6, 1e-4])
 """The same in `PerRecord`."""
 COLOUR_TIME_S: Final = 0.1
-"""Unit of the correlation time of slow noise [s]."""
+"""Unit of the correlation time of correlated noise [s]."""
 BOUNDS: Final[dict[int, tuple[float, float]]] = {
     Common.rotary: (-0.75, 0.75),
     Common.rolloff: (-0.75, 0.75),
@@ -137,8 +137,8 @@ BOUNDS: Final[dict[int, tuple[float, float]]] = {
     Common.log_colour_time: (-1.6, 1.0),
 }
 """Range of the bounded common parameters [units there]; judgement. Gusts and the mounting of the sensors: none to all, and a
-quarter beyond for a form that is neither of the two. Slow noise: some white noise has to remain, and the correlation time stays
-between 20 and 270 ms, because slower noise cannot be told from motion."""
+quarter beyond for a form that is neither of the two. Correlated noise: some white noise has to remain, and the correlation time
+stays between 20 and 270 ms, because slower noise cannot be told from motion."""
 
 
 @dataclass(frozen=True)
@@ -232,7 +232,7 @@ LEAD_COUNT: Final = 3
 LEAD: Final = LATE_GUST + 1
 """First of these states."""
 CORE: Final = LEAD + LEAD_COUNT
-"""States of the motion and the gusts; those of effects, of late sensors and of slow noise follow [-]."""
+"""States of the motion and the gusts; those of effects, of late sensors and of correlated noise follow [-]."""
 OUTPUTS: Final = 3
 """Outputs of the filter, see `airtruth.tracing.model.compile.CHANNELS` [-]."""
 AZ: Final = 2
@@ -250,7 +250,7 @@ class StateLayout(NamedTuple):
     motion : number of states of the motion, the gusts and the effects, which are integrated together.
     effect : (effects with states,) first state of each.
     lag, delay : (outputs,) first state of a sensor's lag and delay; -1 for none.
-    noise : first state of the sensors' slow noise; -1 for none.
+    noise : first state of the sensors' correlated noise; -1 for none.
     size : number of states.
     """
 
@@ -277,13 +277,13 @@ def effect_states(kinds: list[str]) -> tuple[Ints, int]:
 
 
 def state_layout(effect: Ints, motion: int, lags: Array, delays: Array, slow: bool) -> StateLayout:
-    """States behind those of the motion: for each sensor its lag, then its delay; then the slow noise.
+    """States behind those of the motion: for each sensor its lag, then its delay; then the correlated noise.
 
     Parameters
     ----------
     effect, motion : see `effect_states`.
     lags, delays : (outputs,) of the sensors [s]; 0 for none.
-    slow : whether the sensors have slow noise.
+    slow : whether the sensors have correlated noise.
     """
     lag, delay = np.full(OUTPUTS, -1, dtype=np.int64), np.full(OUTPUTS, -1, dtype=np.int64)
     at = motion

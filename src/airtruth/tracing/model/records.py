@@ -237,8 +237,8 @@ def _quiet(elevator: Array, dt_s: float, std: float) -> Array:
     """The elevator without the noise of its sensor where it is at rest.
 
     It is at rest where it stays within three standard deviations of its median over 0.2 s and has settled (`_settled`). Of a
-    stretch that shows nothing
-    but white noise the mean is taken, else the median: slow noise of a median moves an aircraft as well as that of the samples.
+    stretch that shows nothing but white noise the mean is taken, else the median: correlated noise of a median moves an aircraft
+    as well as that of the samples.
     """
     from scipy.ndimage import median_filter
 

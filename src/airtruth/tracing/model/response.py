@@ -36,7 +36,7 @@ LOST: Final = 1e9
 _AS_MEASURED: Final = "filter inputs"
 """Name of the inputs that no change of sensors or surface affects, among what a record keeps."""
 _MOST_SLOW: Final = 0.99
-"""Largest share of slow noise [-]: beyond the search's bound, where the differences need a slope."""
+"""Largest share of correlated noise [-]: beyond the search's bound, where the differences need a slope."""
 
 
 @dataclass(frozen=True)

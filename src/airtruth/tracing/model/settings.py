@@ -40,7 +40,7 @@ _NOISE_STD: Final = 0.1
 _NOISE_UNKNOWN_STD: Final = 1.0
 """The same where the noise is not declared [-]: a factor of e (judgement)."""
 _COLOUR_STD: Final = (0.5, 0.5, 0.5, 0.7)
-"""Prior standard deviations of the three shares of slow noise and of the logarithm of its time [-] (judgement)."""
+"""Prior standard deviations of the three shares of correlated noise and of the logarithm of its time [-] (judgement)."""
 _NOISE: Final = (0.1 * DEG, 0.3 * DEG, 0.1)
 """Noise of alpha [rad], q [rad/s], az [m/s2] where none is declared: small flight-test instruments (judgement)."""
 _RESOLUTION: Final = 0.01

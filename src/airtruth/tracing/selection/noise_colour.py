@@ -1,6 +1,6 @@
 """Coloured sensor noise: whether part of the noise is slow, tested before anything is traced.
 
-Slow noise (a Gauss-Markov process beside the white one) costs states and parameters, and most records have none, so
+Correlated noise (a Gauss-Markov process beside the white one) costs states and parameters, and most records have none, so
 it enters only where the records show it. It is indistinguishable from a model error where the noise levels are not
 declared, where it would be as slow as a motion, and where all noise would be slow: then it does not enter.
 
@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 
 LEVEL: Final = 1e-9
 """Significance level of the three scores together [-] (judgement: half of the variance correlated over 80 ms scores 8 to
-17 standard deviations in four records of some seconds; a model error scores too, and less slow noise than that does no
+17 standard deviations in four records of some seconds; a model error scores too, and less correlated noise than that does no
 harm as white noise)."""
 TYPICAL: Final = 0.3
 """Score over the root of the samples that a sensor has whose noise is slow for half of its variance, correlated over 80 ms [-];
@@ -43,13 +43,13 @@ _LATER: Final = 2.0 / 3.0
 LATER_LEVEL: Final = 5e-4
 """Largest significance level of the three scores together beside accepted effects [-] (judgement)."""
 FIRST_SHARE: Final = 0.2
-"""Share of slow noise at which a search begins [-] (judgement; at zero the correlation time has no effect)."""
+"""Share of correlated noise at which a search begins [-] (judgement; at zero the correlation time has no effect)."""
 SHARES: Final = np.r_[Common.colour_shares]
 """Indices of the shares among the common parameters."""
 
 
 def with_coloured_noise(case: Case) -> tuple[Case, Parameters]:
-    """The case, with slow noise where its fitted records show some, and the parameters at which its search begins."""
+    """The case, with correlated noise where its fitted records show some, and the parameters at which its search begins."""
     start = initial_parameters(case.fitted, case.hypothesis)
     null = fit(case.fitted, case.hypothesis, start)
     return (case, start) if null is None or _diverges_nearby(case, null) else beside(case, null)
@@ -75,11 +75,11 @@ def later_level(samples: int) -> float:
 
 
 def beside(case: Case, null: PosteriorFit, level: float = LEVEL) -> tuple[Case, Parameters]:
-    """The case, with slow noise where its fitted records show some beside what a fit explains, and where a refit ends.
+    """The case, with correlated noise where its fitted records show some beside what a fit explains, and where a refit ends.
 
     Parameters
     ----------
-    null : a fit of the case without slow noise.
+    null : a fit of the case without correlated noise.
     level : significance level of the three scores together [-].
     """
     problem, hypothesis = case.fitted, null.hypothesis
@@ -108,7 +108,7 @@ def scores(problem: TraceProblem, null: PosteriorFit) -> Array:
 
     Parameters
     ----------
-    problem : problem with slow noise; null : a fit without.
+    problem : problem with correlated noise; null : a fit without.
     """
     slope, information = share_slopes(problem, null)
     return np.asarray(-slope / np.sqrt(np.diag(information)))

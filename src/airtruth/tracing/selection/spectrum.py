@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 _BAND_HZ: Final = 0.5
 """Width of a band of the spectrum [Hz] (judgement: a mode with 2 % damping at 10 Hz lies in one)."""
 _LOWEST_HZ: Final = 1.0
-"""Lowest frequency of the spectral test [Hz]; gust level, biases and coloured noise are free below (judgement)."""
+"""Lowest frequency of the spectral test [Hz]; gust level, biases and correlated noise are free below (judgement)."""
 
 
 def lines(residuals: Sequence[Array], dt_s: Sequence[float]) -> Anomaly:
