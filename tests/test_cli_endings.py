@@ -40,6 +40,13 @@ def raises(error):
     return verb
 
 
+def test_an_empty_argument_is_not_the_current_folder(command):
+    """A shell passes one for "$LOG" where the variable is not set."""
+    code, out, err = command("identify", "", "--aircraft", "gtm")
+    assert (code, out) == (2, "")
+    assert "the argument after 'identify' is empty; state it, or leave it out" in err
+
+
 def test_an_unforeseen_exception_is_one_sentence_and_a_report(command, monkeypatch, tmp_path):
     monkeypatch.setattr("airtruth.effects.listing.as_text", raises(ZeroDivisionError("by\nzero")))
     code, out, err = command("effects", "elevator_delay")

@@ -13,12 +13,13 @@ from faults import FAULTS
 from tiers import sampled
 
 from airtruth import aircraft as planes
-from airtruth.checks.columns import dropouts
+from airtruth.checks.columns import dropouts, spikes
 from airtruth.checks.corrections import catalogue
 from airtruth.checks.fault import CODES
 from airtruth.checks.gate import inspect, require
 from airtruth.errors import LogError
 from airtruth.logs.store import read_log, write_log
+from airtruth.units import G0
 
 ROOT = Path(__file__).resolve().parents[2]
 UNDECLARED = sorted((ROOT / "data" / "undeclared").glob("*.parquet"))
@@ -51,6 +52,66 @@ def test_every_fault_is_named_without_an_aircraft(name, log):
     fault = certain(inspect(FAULTS[name](log)))[0]
     assert fault.channel in FAULTS[name].channels
     assert fault.code in FAULTS[name].codes
+
+
+D = 180.0 / np.pi
+ANGLES = ("alpha_rad", "theta_rad", "elevator_rad", "elevator_command_rad")
+PITCH = ("alpha_rad", "theta_rad", "q_rad_s")
+SURFACE = ("elevator_rad", "elevator_command_rad")
+SHARED = {
+    "surface and command, trailing edge up positive": (dict.fromkeys(SURFACE, -1.0), "sign"),
+    "nose down positive": (dict.fromkeys(PITCH, -1.0), "sign"),
+    "all angles and rates in degrees": (dict.fromkeys((*ANGLES, "q_rad_s"), D), "unit"),
+    "all angles in degrees": (dict.fromkeys(ANGLES, D), "unit"),
+    "motion in degrees": (dict.fromkeys(PITCH, D), "unit"),
+    "surface and command in degrees": (dict.fromkeys(SURFACE, D), "unit"),
+    "accelerations in g": (dict.fromkeys(("az_m_s2", "ax_m_s2"), 1.0 / G0), "unit"),
+    "accelerations of opposite sign": (dict.fromkeys(("az_m_s2", "ax_m_s2"), -1.0), "sign"),
+}
+"""Mistakes that several channels share: factor of each channel, and the kind."""
+
+
+@pytest.mark.parametrize("path", sampled(UNDECLARED[:4], 4), ids=lambda path: path.stem)
+@pytest.mark.parametrize("mistake", SHARED)
+def test_a_mistake_that_channels_share_is_named_for_each(mistake, path, gtm):
+    """Such logs were refused with a wrong cause, for example exchanged columns."""
+    factors, code = SHARED[mistake]
+    log = read_log(path)
+    channels = {n: factors.get(n, 1.0) * x for n, x in log.channels.items()}
+    faults = certain(inspect(replace(log, channels=channels), gtm))
+    assert {(f.channel, f.code) for f in faults} == {(name, code) for name in factors}
+    for fault in faults:
+        others = set(factors) - {fault.channel}
+        assert all(name in fault.sentence.split(" in all ")[0] for name in others)
+        assert f"under [channels.{fault.channel}]" in fault.sentence
+
+
+def test_a_shared_unit_and_a_shared_sign_are_both_named(log, gtm):
+    """Everything in degrees, and the surface positive with its trailing edge up."""
+    factors = dict.fromkeys((*ANGLES, "q_rad_s"), D) | dict.fromkeys(SURFACE, -D)
+    channels = {n: factors.get(n, 1.0) * x for n, x in log.channels.items()}
+    faults = certain(inspect(replace(log, channels=channels), gtm))
+    expected = {(name, "unit") for name in factors} | {(name, "sign") for name in SURFACE}
+    assert {(f.channel, f.code) for f in faults} == expected
+
+
+def test_outliers_are_no_wrong_unit(log, gtm):
+    """One sample in 97 of 20 rad/s, as errors of telemetry are; it was called a gyro in deg/s."""
+    x = log.channels["q_rad_s"].copy()
+    x[::97] = 20.0
+    (fault,) = certain(inspect(replace(log, channels={**log.channels, "q_rad_s": x}), gtm))
+    assert (fault.channel, fault.code) == ("q_rad_s", "spike")
+    assert f"isolated outliers in {len(x[::97])} samples of all 6 runs" in fault.sentence
+
+
+def test_a_short_peak_of_the_motion_is_no_outlier():
+    """Three samples of a coarse record at rest are a peak, two of twice the size are an outlier."""
+    x = np.zeros((1, 64))
+    x[0, 30:33] = 0.5
+    assert list(spikes(SimpleNamespace(channels={"q_rad_s": x}))) == []
+    x[0, 10:12] = 1.2
+    ((name, bad, count),) = spikes(SimpleNamespace(channels={"q_rad_s": x}))
+    assert (name, bad.tolist(), count) == ("q_rad_s", [True], 2)
 
 
 def test_a_late_vane_and_a_wrong_airspeed_that_fit_alike_are_both_named(log):

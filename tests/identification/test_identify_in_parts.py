@@ -157,3 +157,6 @@ def test_a_full_disk_is_one_sentence(whole, tmp_path):
         StoreError, match="absent: does not exist; create the folder, or choose another --out"
     ):
         Spool(tmp_path / "absent")
+    (tmp_path / "file").touch()
+    with pytest.raises(StoreError, match="file: is a file and not a folder; choose another --out"):
+        Spool(tmp_path / "file")

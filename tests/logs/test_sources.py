@@ -43,6 +43,7 @@ def test_each_form_resolves_to_files_or_logs(log: FlightLog, folder: Path) -> No
             "DataFrame is not a log; .*; write the frame with its method to_parquet",
         ),
         ("absent", StoreError, "no such file or folder"),
+        ("", StoreError, "the path is empty"),
     ],
 )
 def test_other_things_are_refused(given: object, error: type[Exception], message: str) -> None:

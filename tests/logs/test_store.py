@@ -182,7 +182,8 @@ def test_what_is_not_a_log_is_named(tmp_path: Path, columns: dict[str, object], 
     [
         (b"{", "malformed"),
         (b"[1]", "not an object"),
-        (b'{"schema": 2}', "log schema 2, but this version reads schema 1"),
+        (b'{"schema": 2}', "log schema 2, but this version reads schema 1; use a newer airtruth"),
+        (b'{"schema": "1"}', "log schema '1', but .* schema 1; state schema 1, a number"),
     ],
 )
 def test_bad_metadata(tmp_path: Path, document: bytes, message: str) -> None:

@@ -179,6 +179,7 @@ def test_structure(log: FlightLog) -> None:
     )
     empty = FlightLog({}, (), np.zeros(1, dtype=np.int64), np.empty(0), {})
     assert "holds no run" in complaint(empty)
+    assert "run_id: empty" in complaint(replace(log, run_ids=("", *log.run_ids[1:])))
 
 
 @pytest.mark.parametrize(

@@ -43,8 +43,8 @@ def identify(
     -------
     IdentificationResult
         Its ``to_frame()`` has one row per run and method (per method if ``joint``): run_id, method, converged,
-        iterations, status, and for each derivative [1/rad, rates as q c/(2V)], wn_rad_s [rad/s] and zeta [-] the
-        value, NAME_std, NAME_lower and NAME_upper.
+        iterations, for each derivative [1/rad, rates as q c/(2V)], wn_rad_s [rad/s] and zeta [-] the value, NAME_std,
+        NAME_lower and NAME_upper, and status.
 
     Raises
     ------

@@ -52,6 +52,13 @@ FAR: Final = 3.0
 FEWEST_DROPOUTS: Final = 3
 """Fewest samples in a log that are dropouts: one or two may be real."""
 
+SPIKE: Final = 12.0
+"""Distance of an outlier from the median of its neighbours, in robust standard deviations of the channel's steps."""
+SPIKE_SAMPLES: Final = 5
+"""Samples of that median: one or two successive samples are an outlier, a real peak has three or more."""
+SPIKE_SHARE: Final = 0.01
+"""The least distance of an outlier, as a share of what `SIGNALS` allows [-]: the resolution of a channel is finer (judgement)."""
+
 
 def names(log: FlightLog) -> Iterator[Fault]:
     """Columns that resemble a channel that the log lacks."""
@@ -202,6 +209,27 @@ def _drops_out(x: Array, zero: Bools) -> bool:
     return bool((far & (before * after > 0.0)).any())
 
 
+def spikes(batch: Batch) -> Iterator[tuple[str, Bools, int]]:
+    """Channels with isolated outliers, and the runs and number of samples.
+
+    An outlier is farther from the median of its neighbours than all of the motion that remains without outliers.
+    """
+    from scipy.ndimage import median_filter
+
+    for name in ("alpha_rad", "q_rad_s", "az_m_s2", "theta_rad", "ax_m_s2", "airspeed_m_s", "altitude_m"):
+        x = batch.channels.get(name)
+        if x is None:
+            continue
+        smooth = median_filter(x, size=(1, SPIKE_SAMPLES), mode="mirror")
+        usual = 1.4826 * np.median(np.abs(np.diff(x, axis=1)), axis=1)
+        least = np.maximum(
+            np.maximum(SPIKE * usual, np.ptp(smooth, axis=1)), SPIKE_SHARE * SIGNALS[name].limit
+        )
+        out = np.abs(x - smooth) > least[:, None]
+        if out.any():
+            yield name, out.any(axis=1), int(out.sum())
+
+
 def frozen(batch: Batch) -> Iterator[tuple[str, Bools, float]]:
     """Channels that stay at one value while the others require a change, and the longest such time [s]."""
     c, dt = batch.channels, batch.dt_s
@@ -259,4 +287,4 @@ def _stretches(equal: Bools, fewest: int) -> Iterator[tuple[int, int]]:
             yield int(start), int(stop)
 
 
-__all__ = ["constant", "copies", "dropouts", "frozen", "names", "reconstructed", "units"]
+__all__ = ["constant", "copies", "dropouts", "frozen", "names", "reconstructed", "spikes", "units"]

@@ -1,49 +1,22 @@
-"""Corrections: what each known mistake of a log would be undone by, and the best explanation of failed tests.
-
-A log that fails its tests is corrected for each known mistake in turn and tested once more. The sum of the
-squared distances is minus twice a log likelihood, so its decrease is the likelihood ratio of "this mistake was
-made" against "none was". A mistake is certain if it explains nearly everything that failed; a log that no
-mistake explains (a gust, a turn, an unstable aircraft) is not refused.
-"""
+"""Corrections: what each known mistake of a log would be undone by."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.aircraft import Aircraft
 from airtruth.channels import SIGNALS
-from airtruth.checks.evidence import relations
-from airtruth.checks.relation import ATMOSPHERE_M, Relation
-from airtruth.logs.flight_log import Batch
+from airtruth.checks.relation import ATMOSPHERE_M
 from airtruth.physics.atmosphere import density_kg_m3
 from airtruth.units import DEG, FT, G0, KT, SLUG
 
 Array = NDArray[np.float64]
 Channels = Mapping[str, Array]
-
-SUSPECT: Final = 9.0
-"""Sum of squared distances above which corrections are tried; the clean logs of the tests are mostly below it."""
-GAIN: Final = 7.0
-"""Least decrease of the sum for a certain mistake: a likelihood ratio of exp(3.5)."""
-REST: Final = 0.4
-"""Largest share of the sum that a certain mistake may leave."""
-PARTIAL: Final = 6.0
-"""Decrease of the sum beyond `GAIN` that a mistake in a part of the runs has to bring: a likelihood ratio of exp(3).
-
-Columns are mapped once for all runs of a log (judgement), and gusts shift the estimates of a single run.
-"""
-AERODYNAMIC: Final = ("elevator", "ax_slope")
-"""Tests that take alpha and q as right; the others are kinematic."""
-MOST_RUNS: Final = 12
-"""Runs that are tested with each correction; more would cost time and add no certainty."""
-MOST_FAULTS: Final = 4
-"""Mistakes that are looked for in one log, one after another."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +31,7 @@ class Correction:
     cure : what to write in the import mapping.
     apply : channels (runs, samples) -> those that change.
     sensor : whether it is an error of a sensor and none of the mapping; such an error never refuses a log.
+    parts : the corrections of the single channels, if several channels share the mistake.
     penalty : what it adds to the sum: minus twice the logarithm of how often the mistake is made,
         relative to a wrong sign (judgement).
     """
@@ -69,6 +43,7 @@ class Correction:
     apply: Callable[[Channels], Channels]
     penalty: float = 0.0
     sensor: bool = False
+    parts: tuple[Correction, ...] = ()
 
 
 def _scaled(name: str, factor: float) -> Callable[[Channels], Channels]:
@@ -115,6 +90,47 @@ _SCALES: Final = (0.1, 0.2, 0.5, 2.0, 5.0, 10.0)
 """Factors by which an airspeed or density of no known unit may be wrong [-]."""
 
 
+_PITCH: Final = ("alpha_rad", "theta_rad", "q_rad_s")
+"""Channels of the motion about the pitch axis, whose positive sense a recorder may have the other way round."""
+_SURFACE: Final = ("elevator_rad", "elevator_command_rad")
+_FORCES: Final = ("az_m_s2", "ax_m_s2")
+
+
+def _shared(names: tuple[str, ...], single: Sequence[Correction]) -> Iterator[Correction]:
+    """Mistakes that several channels share: a recorder has one unit for its angles, and one positive sense for an axis.
+
+    Parameters
+    ----------
+    names : channels of the log.
+    single : corrections of single channels.
+    """
+    angles = tuple(n for n in names if SIGNALS[n].dimension == "angle")
+    rates = tuple(n for n in names if SIGNALS[n].dimension == "angular_rate")
+    in_units = ((*angles, *rates), angles, _PITCH, _PITCH[:2], _SURFACE, _FORCES)
+    in_sense = (_PITCH, _SURFACE, _FORCES)
+    tried: set[frozenset[Correction]] = set()
+    for code, groups in (("unit", in_units), ("sign", in_sense)):
+        for group in groups:
+            members = [c for c in single if c.code == code and c.channels[0] in group]
+            for mistake in dict.fromkeys(c.mistake for c in members):
+                parts = tuple(c for c in members if c.mistake == mistake)
+                if len(parts) > 1 and frozenset(parts) not in tried:
+                    tried.add(frozenset(parts))
+                    yield _together(parts)
+
+
+def _together(parts: tuple[Correction, ...]) -> Correction:
+    return Correction(
+        tuple(c.channels[0] for c in parts),
+        parts[0].code,
+        parts[0].mistake,
+        "; ".join(c.cure for c in parts),
+        lambda c: {name: values for part in parts for name, values in part.apply(c).items()},
+        0.5 * len(parts),
+        parts=parts,
+    )
+
+
 def _gravity(c: Channels, name: str) -> Array:
     """Share of gravity in an accelerometer that an acceleration without gravity lacks [m/s2]."""
     theta = c.get("theta_rad", np.zeros_like(c[name]))
@@ -146,8 +162,6 @@ def _gravity_corrections(name: str) -> Iterator[Correction]:
     )
 
 
-RIVAL: Final = 2.0
-"""Difference of two sums below which both mistakes are named: a likelihood ratio of e."""
 LAGS_S: Final = (0.1, 0.2, 0.3, 0.5, 0.8)
 """Lags of an alpha vane that are tried [s] (judgement: pneumatic probes of transports have half a second)."""
 _STATE_OF_FLIGHT: Final = frozenset({"airspeed_m_s", "altitude_m", "density_kg_m3", "throttle"})
@@ -223,6 +237,7 @@ def catalogue(names: tuple[str, ...], dt_s: float) -> list[Correction]:
             result += _unit_corrections(name, _RATE)
         elif dimension == "acceleration":
             result += [*_unit_corrections(name, _FORCE), *_gravity_corrections(name)]
+    result += [*_shared(names, result)]
     name = "airspeed_m_s"
     if name in names:
         for unit, (factor, mistake) in _SPEED.items():
@@ -241,133 +256,4 @@ def catalogue(names: tuple[str, ...], dt_s: float) -> list[Correction]:
     return [*result, *_air_corrections(names), *_swaps(names), *_lags(names, dt_s)]
 
 
-@dataclass(frozen=True)
-class Explanation:
-    """A mistake that explains failed tests.
-
-    Attributes
-    ----------
-    correction : its inverse; None if no known mistake explains them.
-    failed : the test that failed most.
-    gain : decrease of the sum of squared distances.
-    certain : whether hardly anything is left, see `GAIN` and `REST`.
-    rival : the inverse of another mistake that explains the tests nearly as well, see `RIVAL`.
-    """
-
-    correction: Correction | None
-    failed: Relation
-    gain: float
-    certain: bool
-    rival: Correction | None = None
-
-    @property
-    def mistake(self) -> str:
-        """The mistake in words, and its rival."""
-        if self.correction is None or self.rival is None:
-            return "" if self.correction is None else self.correction.mistake
-        same = self.rival.channels == self.correction.channels
-        other = self.rival.mistake if same else f"{self.rival.channels[0]}: {self.rival.mistake}"
-        return f"{self.correction.mistake}, or {other}"
-
-    @property
-    def cure(self) -> str:
-        """What to write in the mapping, for either."""
-        words = [one.cure for one in (self.correction, self.rival) if one is not None]
-        return "; or ".join(words)
-
-
-def total(results: list[Relation], before: list[Relation] | None = None) -> float:
-    """Sum of the squared distances of all runs together.
-
-    With ``before``, a test that a correction leaves without information counts as before the correction: to
-    hide the evidence is no explanation.
-    """
-    own = {t.name: t for t in before or () if t.name != "range"}
-    return float(
-        sum(
-            max(t.distance[-1], own[t.name].distance[-1])
-            if t.name in own and not t.informed
-            else t.distance[-1]
-            for t in results
-        )
-    )
-
-
-def explain(batch: Batch, aircraft: Aircraft | None = None, *, partial: bool = False) -> list[Explanation]:
-    """Mistakes that were made in a batch, the clearest first; empty if its tests pass.
-
-    Parameters
-    ----------
-    partial : whether the batch is a part of the runs of a log, see `PARTIAL`.
-    """
-    batch = _first(batch, MOST_RUNS)
-    least = GAIN + (PARTIAL if partial else 0.0)
-    results = relations(batch, aircraft)
-    now = total(results)
-    found: list[Explanation] = []
-    while now > SUSPECT and len(found) < MOST_FAULTS:
-        names = tuple(n for n in batch.channels if n in SIGNALS)
-        used = {n for e in found if e.correction for n in e.correction.channels}
-        best: tuple[float, Correction, Batch, list[Relation]] | None = None
-        values: list[tuple[float, Correction]] = []
-        for correction in catalogue(names, batch.dt_s):
-            if used & set(correction.channels):
-                continue
-            changed = replace(batch, channels={**batch.channels, **correction.apply(batch.channels)})
-            after = relations(changed, aircraft)
-            value = total(after, results) + correction.penalty
-            values.append((value, correction))
-            if best is None or value < best[0]:
-                best = value, correction, changed, after
-        failed = _first_failed(results)
-        if best is None or now - best[0] < least:
-            found.append(Explanation(None, failed, 0.0, False))
-            break
-        helped = max(results, key=lambda t: _decrease(t, best[3]))
-        found.append(Explanation(best[1], helped, now - best[0], False, _rival(best[1], best[0], values)))
-        batch, results, now = best[2], best[3], best[0] - best[1].penalty
-    explained = sum(e.gain for e in found)
-    certain = now < max(SUSPECT, REST * explained)
-    return [
-        replace(e, certain=certain and e.correction is not None and not e.correction.sensor) for e in found
-    ]
-
-
-def _rival(best: Correction, value: float, values: list[tuple[float, Correction]]) -> Correction | None:
-    """Another mistake that fits about as well: another unit or gravity of the channel, or a mistake beside a late sensor."""
-    kinds = {"unit", "gravity"}
-    near = [
-        (v, one)
-        for v, one in values
-        if v - value < RIVAL
-        and (
-            (one.channels == best.channels and {one.code, best.code} == kinds)
-            or (best.sensor and not one.sensor)
-        )
-    ]
-    return min(near, key=lambda pair: pair[0])[1] if near else None
-
-
-def _first_failed(results: list[Relation]) -> Relation:
-    """The test that fails most; a test of the elevator's effect holds alpha and q, so that theirs come first."""
-    clear = [t for t in results if t.name not in AERODYNAMIC and t.distance[-1] > GAIN]
-    return max(clear or results, key=lambda t: float(t.distance[-1]))
-
-
-def _decrease(test: Relation, after: list[Relation]) -> float:
-    now = sum(
-        float(t.distance[-1])
-        for t in after
-        if t.name == test.name and (t.name != "range" or t.channels == test.channels)
-    )
-    return float(test.distance[-1]) - now
-
-
-def _first(batch: Batch, count: int) -> Batch:
-    if len(batch.run_ids) <= count:
-        return batch
-    channels = {name: values[:count] for name, values in batch.channels.items()}
-    return replace(batch, run_ids=batch.run_ids[:count], t_s=batch.t_s[:count], channels=channels)
-
-
-__all__ = ["Correction", "Explanation", "catalogue", "explain", "total"]
+__all__ = ["Correction", "catalogue"]

@@ -38,6 +38,7 @@ CODES: Final = {
     "gravity": "the accelerometer lacks gravity, or counts it twice",
     "constant": "the channel does not change while the aircraft moves",
     "dropout": "some samples are zero or frozen",
+    "spike": "some samples are isolated outliers",
     "inconsistent": "the channel contradicts the others, by no known mistake",
     "impossible": "the values are outside the range of flight",
     "name": "the column has the name of no channel but resembles one",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.checks import columns
-from airtruth.checks.corrections import SUSPECT, Correction, Explanation, explain
+from airtruth.checks.corrections import Correction
 from airtruth.checks.evidence import OUTSIDE, relations
+from airtruth.checks.explanation import SUSPECT, Explanation, explain
 from airtruth.checks.fault import Fault
 from airtruth.checks.relation import Relation
 from airtruth.checks.sentences import culprit, evidence, runs
@@ -126,20 +127,30 @@ def _explained(
     """The faults of some runs; a mistake is reported for every run that its correction does not make worse."""
     for one in found:
         if one.correction is not None:
-            correction, name = one.correction, one.correction.channels[0]
-            affected = which | _helped(batch, correction, aircraft) if one.certain else which
+            affected = which | _helped(batch, one.correction, aircraft) if one.certain else which
             ids = [batch.run_ids[i] for i in np.flatnonzero(affected)]
-            mistake = one.mistake if one.certain else f"possibly {one.mistake}"
-            sentence = f"{name}: {mistake} in {runs(ids, total)}: {evidence(one.failed)}; {one.cure}"
-            yield Fault(name, ids[0], correction.code, sentence, one.certain, one.gain)
+            for part, failed in zip(one.correction.parts or (one.correction,), one.failed, strict=True):
+                name = part.channels[0]
+                others = [n for n in one.correction.channels if n != name] if one.correction.parts else []
+                mistake, cure = (part.mistake, part.cure) if others else (one.mistake, one.cure)
+                mistake = (mistake if one.certain else f"possibly {mistake}") + _like(others)
+                sentence = f"{name}: {mistake} in {runs(ids, total)}: {evidence(failed)}; {cure}"
+                yield Fault(name, ids[0], part.code, sentence, one.certain, one.gain)
             continue
         ids = [batch.run_ids[i] for i in np.flatnonzero(which)]
-        name, outside = one.failed.channels[0], one.failed.name == "range"
-        sentence = f"{name}: inconsistent in {runs(ids, total)}: {evidence(one.failed)}; check its unit, sign and axis"
+        (failed,) = one.failed
+        name, outside = failed.channels[0], failed.name == "range"
+        sentence = (
+            f"{name}: inconsistent in {runs(ids, total)}: {evidence(failed)}; check its unit, sign and axis"
+        )
         code = "impossible" if outside else "inconsistent"
-        distance = float(one.failed.distance[-1])
-        certain = (outside and distance >= OUTSIDE) or _unrelated(batch, one.failed)
+        distance = float(failed.distance[-1])
+        certain = (outside and distance >= OUTSIDE) or _unrelated(batch, failed)
         yield Fault(name, ids[0], code, sentence, certain, distance)
+
+
+def _like(others: Sequence[str]) -> str:
+    return f", like {' and '.join(others)}," if others else ""
 
 
 def _helped(batch: Batch, correction: Correction, aircraft: Aircraft | None) -> Bools:
@@ -170,6 +181,13 @@ def _column_faults(batch: Batch, aircraft: Aircraft | None, total: int) -> Itera
             name, first, "dropout",
             f"{name}: zero in {count} samples of {where}, amid others that are not: dropouts; cut the runs "
             "there, or interpolate them before the import", True, float(count),
+        )  # fmt: skip
+    for name, bad, count in columns.spikes(batch):
+        first, where = named(bad)
+        yield Fault(
+            name, first, "spike",
+            f"{name}: isolated outliers in {count} samples of {where}: errors of the recording; replace them by "
+            "interpolated values before the import, or cut the runs there", True, float(count),
         )  # fmt: skip
     for name, bad, longest in columns.frozen(batch):
         first, where = named(bad)

@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -16,7 +16,15 @@ from typing import Final, NoReturn
 from airtruth.cli.application import app
 from airtruth.cli.failure import lacking_resource, write_failure
 from airtruth.cli.output import close_stdout, escape_what_cannot_be_encoded, notice
-from airtruth.errors import FAILED_RUNS, INTERRUPTED, TERMINATED, UNEXPECTED, USAGE, AirtruthError
+from airtruth.errors import (
+    FAILED_RUNS,
+    INTERRUPTED,
+    TERMINATED,
+    UNEXPECTED,
+    USAGE,
+    AirtruthError,
+    ConfigurationError,
+)
 
 ENDINGS: Final = {INTERRUPTED: "interrupted", TERMINATED: "terminated"}
 """Words for an exit code that a signal caused."""
@@ -38,6 +46,7 @@ def main() -> None:
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")  # pyarrow's own pool keeps what it frees
     signals: list[int] = []
     try:
+        _refuse_empty(sys.argv[1:])
         with _caught(signals):
             app(prog_name="airtruth")  # also as `python -m airtruth`, for the completion of shells
     except AirtruthError as error:
@@ -70,6 +79,13 @@ def main() -> None:
             sys.exit(USAGE)
         notice(write_failure(error, sys.argv))
         sys.exit(UNEXPECTED)
+
+
+def _refuse_empty(arguments: Sequence[str]) -> None:
+    """An empty argument would mean the current folder."""
+    if "" in arguments:
+        before = arguments[arguments.index("") - 1] if arguments.index("") else "airtruth"
+        raise ConfigurationError(f"the argument after {before!r} is empty; state it, or leave it out")
 
 
 def _stopped(code: int) -> NoReturn:

@@ -215,18 +215,18 @@ def half_width(confidence: float) -> float:
 
 
 def estimates_table(estimates: Estimates) -> pd.DataFrame:
-    """One row per run: run_id, method, converged, iterations, status, then NAME, NAME_std, ..._upper."""
+    """One row per run: run_id, method, converged, iterations, then NAME, NAME_std, ..._upper, then status."""
     q = quantities(estimates)
     columns: dict[str, object] = {
         "run_id": list(estimates.run_ids),
         "method": [estimates.method] * len(estimates.run_ids),
         "converged": estimates.converged,
         "iterations": estimates.iterations,
-        "status": np.array(list(SENTENCES.values()), dtype=object)[estimates.status].tolist(),
     }
     for i, name in enumerate(q.names):
         columns[name] = q.value[:, i]
         columns[f"{name}_std"] = q.std[:, i]
         columns[f"{name}_lower"] = q.lower[:, i]
         columns[f"{name}_upper"] = q.upper[:, i]
+    columns["status"] = np.array(list(SENTENCES.values()), dtype=object)[estimates.status].tolist()
     return pd.DataFrame(columns)

@@ -130,8 +130,8 @@ class IdentificationResult:
     def to_frame(self) -> pd.DataFrame:
         """One row per run and method, the columns of estimates.parquet (docs/methods.md).
 
-        run_id, method, converged, iterations, status; then NAME, NAME_std, NAME_lower, NAME_upper of each of
-        CLalpha ... Cmde [-], wn_rad_s [rad/s] and zeta [-]. Runs keep their order, and each run the order of
+        run_id, method, converged, iterations; NAME, NAME_std, NAME_lower, NAME_upper of each of CLalpha ... Cmde [-],
+        wn_rad_s [rad/s] and zeta [-]; status. Runs keep their order, and each run the order of
         the methods.
         """
         return _frame(self.estimates)

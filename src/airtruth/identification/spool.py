@@ -83,6 +83,8 @@ class Spool:
         where = self._folder or tempfile.gettempdir()
         if error.errno == errno.ENOENT:
             return StoreError(f"{where}: does not exist; create the folder, or choose another --out")
+        if error.errno == errno.ENOTDIR:
+            return StoreError(f"{where}: is a file and not a folder; choose another --out")
         return StoreError(
             f"{where}: a temporary file of the estimates cannot be written ({reason(error)}); free space there and run again"
         )

@@ -230,11 +230,13 @@ def location(path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     StoreError
-        If the scheme is unknown, or the URL has no bucket, or states options.
+        If the path is empty, the scheme is unknown, or the URL has no bucket or states options.
     """
     if isinstance(path, RemotePath):
         return path
     text = os.fspath(path)
+    if not text:
+        raise StoreError("the path is empty; give a file, a folder or a URL")
     scheme, colon, rest = text.partition(":/")
     if not colon or len(scheme) < 2 or not scheme.isalnum() or Path(f"{scheme}:").exists():
         return Path(path)

@@ -239,9 +239,9 @@ def _channels(path: Path, schema: pa.Schema, columns: Sequence[str] | None) -> l
         )
     version = metadata_of(path, schema).get("schema", SCHEMA)
     if version != SCHEMA:
-        raise LogError(
-            f"{path}: log schema {version!r}, but this version reads schema {SCHEMA}; use a newer airtruth"
-        )
+        newer = isinstance(version, int) and version > SCHEMA
+        step = "use a newer airtruth" if newer else f"state schema {SCHEMA}, a number, in the metadata"
+        raise LogError(f"{path}: log schema {version!r}, but this version reads schema {SCHEMA}; {step}")
     kinds = {f.name: f.type for f in schema}
     if not (pa.types.is_floating(kinds[TIME]) or pa.types.is_decimal(kinds[TIME])):
         raise LogError(

@@ -80,6 +80,8 @@ def _structure(log: FlightLog) -> Iterator[str]:
         )
     elif not log.run_ids:
         yield "the log holds no run; fly or import it again"
+    elif "" in log.run_ids:
+        yield "run_id: empty; name every run"
     for name, values in log.channels.items():
         if values.shape != (rows,):
             yield f"{name}: shape {values.shape} where t_s has {rows} rows; give one value per row"
