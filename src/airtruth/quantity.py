@@ -257,6 +257,12 @@ def keys_to_si(raw: Mapping[str, object], dimensions: Mapping[str, str]) -> dict
 
 _NO_UNIT = "_?"
 """Suffix of a key without a unit: it makes the key unknown to the model, and `explain` recognises it."""
+_TABLE, _LIST = "must be a table", "must be a list"
+_SHAPES: Final = {
+    **dict.fromkeys(("dict_type", "model_type", "model_attributes_type", "dataclass_type"), _TABLE),
+    **dict.fromkeys(("tuple_type", "list_type"), _LIST),
+}
+"""Type of a problem in pydantic -> words of a TOML file."""
 
 
 def _longest_name(key: str, dimensions: Mapping[str, str]) -> str | None:
@@ -305,10 +311,19 @@ def explain(error: ValidationError, model: type[BaseModel]) -> list[str]:
             continue  # present with a wrong unit, which another sentence explains
         if item["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
             message = _explain_key(key, _model_at(model, table))
-        elif item["type"] not in ("value_error", "missing"):
-            message = f"{message} (got {item['input']!r})"
+        elif item["type"] == "missing":
+            message = _explain_missing(key, _model_at(model, table))
+        elif item["type"] != "value_error":
+            message = f"{_SHAPES.get(item['type'], message)} (got {item['input']!r})"
         sentences.append(f"{path}: {message}")
     return sentences
+
+
+def _explain_missing(key: str, model: type[Any] | None) -> str:
+    dimension = getattr(model, "dimensions", {}).get(key)
+    if dimension is None:
+        return "is required"
+    return f"is required; write {', '.join(f'{key}_{u}' if u else key for u in UNITS[dimension])}"
 
 
 def _explain_key(key: str, model: type[Any] | None) -> str:

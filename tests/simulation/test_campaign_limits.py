@@ -44,8 +44,10 @@ CAMPAIGN = tomllib.loads(
         ({"runs": "7"}, "runs: write a number (got '7')"),
         ({"condition": {"eas_kt": {"choose": ["75"]}, "altitude_ft": 0.0}}, "write a number (got '75')"),
         ({"sensors": {"ideal": 1}}, "sensors.ideal: write true or false (got 1)"),
-        ({"condition": 5}, "condition"),
-        ({"manoeuvre": {}}, "manoeuvre"),
+        ({"condition": 5}, "condition: must be a table (got 5)"),
+        ({"condition": {"eas_kt": 75.0}}, "altitude: is required; write altitude_m, altitude_ft"),
+        ({"manoeuvre": {}}, "write [[manoeuvre]] with two brackets"),
+        ({"manoeuvre": [3]}, "manoeuvre.0: must be a table (got 3)"),
     ],
 )
 def test_a_number_out_of_range(tmp_path, changes, words):

@@ -93,7 +93,9 @@ _SCALES: Final = (0.1, 0.2, 0.5, 2.0, 5.0, 10.0)
 _PITCH: Final = ("alpha_rad", "theta_rad", "q_rad_s")
 """Channels of the motion about the pitch axis, whose positive sense a recorder may have the other way round."""
 _SURFACE: Final = ("elevator_rad", "elevator_command_rad")
+"""Channels of the elevator."""
 _FORCES: Final = ("az_m_s2", "ax_m_s2")
+"""Channels of the specific force."""
 
 
 def _shared(names: tuple[str, ...], single: Sequence[Correction]) -> Iterator[Correction]:
