@@ -108,10 +108,17 @@ def test_a_short_peak_of_the_motion_is_no_outlier():
     """Three samples of a coarse record at rest are a peak, two of twice the size are an outlier."""
     x = np.zeros((1, 64))
     x[0, 30:33] = 0.5
-    assert list(spikes(SimpleNamespace(channels={"q_rad_s": x}))) == []
+    assert list(spikes(SimpleNamespace(channels={"q_rad_s": x}, dt_s=0.02))) == []
     x[0, 10:12] = 1.2
-    ((name, bad, count),) = spikes(SimpleNamespace(channels={"q_rad_s": x}))
+    ((name, bad, count),) = spikes(SimpleNamespace(channels={"q_rad_s": x}, dt_s=0.02))
     assert (name, bad.tolist(), count) == ("q_rad_s", [True], 2)
+    assert list(spikes(SimpleNamespace(channels={"q_rad_s": x}, dt_s=0.1))) == []
+
+
+def test_a_fast_oscillation_is_no_outlier():
+    """A mode of 5 Hz at 25 Hz: the median of its neighbours removes it."""
+    x = np.sin(2.0 * np.pi * 5.0 * 0.04 * np.arange(100))[None]
+    assert list(spikes(SimpleNamespace(channels={"q_rad_s": x}, dt_s=0.04))) == []
 
 
 def test_a_late_vane_and_a_wrong_airspeed_that_fit_alike_are_both_named(log):

@@ -209,5 +209,5 @@ def test_sensor_terms_come_on_top_of_what_is_declared():
     sensor = fitted({"alpha_rad": declared}, terms)["alpha_rad"]
     found = [getattr(sensor, k).value for k in ("scale", "bias", "x", "lag", "delay", "noise_std")]
     assert found == pytest.approx([2.2, -0.01, 1.3, 0.02, 0.05, 0.001], rel=1e-15)
-    with pytest.raises(ConfigurationError, match=r"may take off no more than"):
+    with pytest.raises(ConfigurationError, match=r"can reduce it by 0 s at most"):
         fitted({}, EFFECTS["vane_lag"].change({"tau_s": -0.1}).sensors)

@@ -53,9 +53,12 @@ FEWEST_DROPOUTS: Final = 3
 """Fewest samples in a log that are dropouts: one or two may be real."""
 
 SPIKE: Final = 12.0
-"""Distance of an outlier from the median of its neighbours, in robust standard deviations of the channel's steps."""
+"""Distance of an outlier from the median of its neighbours, in robust standard deviations of the channel's steps, and in
+distances of nine tenths of the samples."""
 SPIKE_SAMPLES: Final = 5
 """Samples of that median: one or two successive samples are an outlier, a real peak has three or more."""
+SPIKE_S: Final = 0.2
+"""Longest time of these samples [s]: motion of an aircraft lasts longer, and coarser records are not tested (judgement)."""
 SPIKE_SHARE: Final = 0.01
 """The least distance of an outlier, as a share of what `SIGNALS` allows [-]: the resolution of a channel is finer (judgement)."""
 
@@ -212,8 +215,11 @@ def _drops_out(x: Array, zero: Bools) -> bool:
 def spikes(batch: Batch) -> Iterator[tuple[str, Bools, int]]:
     """Channels with isolated outliers, and the runs and number of samples.
 
-    An outlier is farther from the median of its neighbours than all of the motion that remains without outliers.
+    An outlier is farther from the median of its neighbours than all of the motion that remains without outliers, and than
+    nine tenths of the samples are by far.
     """
+    if (SPIKE_SAMPLES - 1) * batch.dt_s > SPIKE_S:
+        return
     from scipy.ndimage import median_filter
 
     for name in ("alpha_rad", "q_rad_s", "az_m_s2", "theta_rad", "ax_m_s2", "airspeed_m_s", "altitude_m"):
@@ -221,11 +227,11 @@ def spikes(batch: Batch) -> Iterator[tuple[str, Bools, int]]:
         if x is None:
             continue
         smooth = median_filter(x, size=(1, SPIKE_SAMPLES), mode="mirror")
+        distance = np.abs(x - smooth)
         usual = 1.4826 * np.median(np.abs(np.diff(x, axis=1)), axis=1)
-        least = np.maximum(
-            np.maximum(SPIKE * usual, np.ptp(smooth, axis=1)), SPIKE_SHARE * SIGNALS[name].limit
-        )
-        out = np.abs(x - smooth) > least[:, None]
+        most = np.maximum(usual, np.quantile(distance, 0.9, axis=1))
+        allowed = SPIKE_SHARE * SIGNALS[name].limit
+        out = distance > np.maximum(np.maximum(SPIKE * most, np.ptp(smooth, axis=1)), allowed)[:, None]
         if out.any():
             yield name, out.any(axis=1), int(out.sum())
 

@@ -6,7 +6,7 @@ many names is weaker evidence for each of them than a good fit by one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from airtruth.effects.effect import Parameter
@@ -16,7 +16,7 @@ from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.answer import DECLARED_LEVEL, Alternative
 from airtruth.tracing.friction import LATE_VANE, PLAUSIBLE_RAD
 from airtruth.tracing.model.settings import VANE
-from airtruth.tracing.selection.explanation import USUAL_SIZES
+from airtruth.tracing.selection.explanation import DERIVATIVES, USUAL_SIZES
 from airtruth.units import DEG
 
 MANY: Final = 3
@@ -55,7 +55,7 @@ def reservations(
     """
     named = [e for e in effects if e.acts_on is None]
     listed = ", ".join(e.key for e in named)
-    found = []
+    found = [*_beside_derivatives(named)]
     beside = [e for e in effects if e.acts_on != _AXIAL]
     if beside and len(beside) < len(effects):
         found.append(
@@ -116,6 +116,15 @@ def reservations(
             "calm air shows it again, or until the vane has been moved by hand on the ground with the log running"
         )
     return tuple(found)
+
+
+def _beside_derivatives(named: Sequence[AcceptedEffect]) -> Iterator[str]:
+    others = [e.key for e in named if e.name != DERIVATIVES]
+    if 0 < len(others) < len(named):
+        yield (
+            f"no cause is named for the changed derivatives, and it may also have caused what {', '.join(others)} "
+            f"explain{'' if len(others) > 1 else 's'}: the names are provisional until a flight of their own confirms them"
+        )
 
 
 def _value(effect: AcceptedEffect) -> float:
