@@ -36,8 +36,6 @@ MOST_RUNS: Final = 12
 """Runs that are tested with each correction; more would cost time and add no certainty."""
 MOST_FAULTS: Final = 4
 """Mistakes that are looked for in one log, one after another."""
-
-
 RIVAL: Final = 2.0
 """Difference of two sums below which both mistakes are named: a likelihood ratio of e."""
 

@@ -131,9 +131,9 @@ def _explained(
             ids = [batch.run_ids[i] for i in np.flatnonzero(affected)]
             for part, failed in zip(one.correction.parts or (one.correction,), one.failed, strict=True):
                 name = part.channels[0]
-                others = [n for n in one.correction.channels if n != name] if one.correction.parts else []
-                mistake, cure = (part.mistake, part.cure) if others else (one.mistake, one.cure)
-                mistake = (mistake if one.certain else f"possibly {mistake}") + _like(others)
+                others = [other.channels[0] for other in one.correction.parts if other is not part]
+                cure = part.cure if others else one.cure
+                mistake = (one.mistake if one.certain else f"possibly {one.mistake}") + _like(others)
                 sentence = f"{name}: {mistake} in {runs(ids, total)}: {evidence(failed)}; {cure}"
                 yield Fault(name, ids[0], part.code, sentence, one.certain, one.gain)
             continue
