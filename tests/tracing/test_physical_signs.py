@@ -7,13 +7,8 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.selection import acceptance
 
 
-class _Score:
-    def __init__(self, key):
-        self.effect = EFFECTS[key]
-
-
 def reasons(key, size, span_m=2.0, declared=0.0):
-    return set(acceptance.size_reasons(_Score(key), size, span_m, declared))
+    return set(acceptance.size_reasons(EFFECTS[key], size, span_m, declared))
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from scipy.stats import chi2
 
 from airtruth.aircraft.dynamics import declared_dynamics
 from airtruth.effects.effect import Effect
+from airtruth.effects.increment import Increment
 from airtruth.tracing.inference.assess import Assessment, noise_floor
 from airtruth.tracing.inference.cross_validate import LeftOut, leave_one_out, one_by_the_other
 from airtruth.tracing.inference.feedback import responds_to_motion
@@ -146,7 +147,7 @@ def assess_candidate(
     reasons = [
         *_fit_reasons(s, own, gain, least, excess),
         *left_out.reasons,
-        *implausibility(problem, s, own),
+        *implausibility(problem, s.effect, own),
     ]
     return Candidate(
         s, own, gain, left_out.likelihood_gain, left_out.free_run_gain, size, std, tuple(reasons)
@@ -231,14 +232,21 @@ def _fit_reasons(s: Score, own: PosteriorFit, gain: float, least: float, excess:
         yield "after its refit its size is no larger than its uncertainty"
 
 
-def implausibility(problem: TraceProblem, s: Score, own: PosteriorFit) -> Iterator[str]:
-    """Why the estimates of a refitted effect are not accepted, whatever it gains, in words."""
+def implausibility(problem: TraceProblem, effect: Effect, own: PosteriorFit) -> Iterator[str]:
+    """Why the estimates of an effect of a fit are not accepted, whatever it gains, in words."""
     span_m = max(r.plant.aircraft.constants.span_m for r in problem.records)
-    size = _size(s, own)[0]
-    is_reversed = s.effect.parameters[0].sign * size < 0.0
-    declared = declared_part(problem, s.effect) if is_reversed else 0.0
-    yield from size_reasons(s, size, span_m, declared)
-    yield from shape_reasons(s.effect, own.point.sizes[_first_size(s, own) :])
+    sizes = own.point.sizes[own.hypothesis.span(effect.key)]
+    size = float(sizes[0])
+    is_reversed = effect.parameters[0].sign * size < 0.0
+    declared = declared_part(problem, effect) if is_reversed else 0.0
+    yield from size_reasons(effect, size, span_m, declared)
+    yield from shape_reasons(effect, sizes)
+
+
+def is_plausible(problem: TraceProblem, own: PosteriorFit) -> bool:
+    """Whether the estimates of every effect of a fit are accepted."""
+    named = (e for e in own.hypothesis.effects if not isinstance(e, Increment))
+    return not any(why for e in named for why in implausibility(problem, e, own))
 
 
 def declared_part(problem: TraceProblem, effect: Effect) -> float:
@@ -253,14 +261,14 @@ def declared_part(problem: TraceProblem, effect: Effect) -> float:
     return 0.0
 
 
-def size_reasons(s: Score, size: float, span_m: float, declared: float = 0.0) -> Iterator[str]:
+def size_reasons(effect: Effect, size: float, span_m: float, declared: float = 0.0) -> Iterator[str]:
     """Why the size of an effect is not accepted, in words.
 
     Parameters
     ----------
     span_m : wing span of the aircraft [m]; declared : size that the declared aircraft has already.
     """
-    first = s.effect.parameters[0]
+    first = effect.parameters[0]
     if first.sign * size < 0.0 and first.sign * (declared + size) < -_SLIGHT * abs(declared):
         yield "its size has a sign that no aircraft has"
     if abs(size) > first.spans * span_m:

@@ -26,10 +26,12 @@ from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection import score_test
-from airtruth.tracing.selection.acceptance import Candidate
+from airtruth.tracing.selection.acceptance import Candidate, is_plausible
 from airtruth.tracing.selection.budget import Advance, may_begin
+from airtruth.tracing.selection.late import late_signal
 from airtruth.tracing.selection.refit import losses_without, refit_scored, refit_without
 from airtruth.tracing.selection.rounds import MOST_EFFECTS, REMAINS, SearchRound
+from airtruth.tracing.selection.subsets import Subset, subsets
 
 BETTER: Final = 5.0
 """Log-posterior by which another set has to lead [-] (judgement: a gain of 10 in 2 log L, as that of a first effect)."""
@@ -37,10 +39,10 @@ AHEAD: Final = 1.0
 """Log-posterior by which another set of no more parameters has to lead [-] (judgement: odds of 2.7)."""
 _ADDED: Final = 2
 """Number of effects that are added for what remains [-] (judgement: each costs a refit)."""
+_PREDICTED: Final = 3
+"""Number of sets that the quadratic predicts to be better, and that are refitted [-] (judgement: each costs a refit)."""
 _SUGGESTED: Final = 2
 """Number of rivals of each member that scores suggest [-] (judgement: each costs a refit)."""
-_LATE: Final = ("delay", "lag")
-"""Kinds of terms that delay a signal."""
 
 
 def better_set(
@@ -72,7 +74,8 @@ def better_set(
         if tried is not None:
             fits.append(tried)
             lead = BETTER if len(tried.point.sizes) > len(last.point.sizes) else AHEAD
-            if _cost(tried) < min(_cost(last) - lead, np.inf if best is None else _cost(best)):
+            leads = _cost(tried) < min(_cost(last) - lead, np.inf if best is None else _cost(best))
+            if leads and is_plausible(problem, tried):
                 best = tried
     needed = () if best is None else _needed(problem, best, least)
     kept = {e.key for e in needed} != {e.key for e in last.hypothesis.effects}
@@ -87,6 +90,10 @@ def _tries(
     seed: int,
 ) -> Iterator[tuple[str, Callable[[], PosteriorFit | None]]]:
     """Each exchange as a phrase for the progress line, and the function that refits it."""
+    for s in _predicted(problem, last, effects):
+        phrase = f"{', '.join(e.key for e in s.effects)} as a set"
+        hypothesis = replace(last.hypothesis, effects=s.effects)
+        yield phrase, partial(fit, problem, hypothesis, s.start, rival=last.cost, near=last)
     yield from _suggested(problem, last, effects, seed)
     for index, effect in enumerate(last.hypothesis.effects):
         own = next((r for r in rounds if r.tied and r.tied[0].score.effect.key == effect.key), None)
@@ -103,6 +110,25 @@ def _tries(
         if scored.adjusted[i] < REMAINS:
             phrase = f"{scored.table.scores[i].effect.key} beside the other effects"
             yield phrase, partial(refit_scored, problem, last, scored.table, int(i))
+
+
+def _predicted(problem: TraceProblem, last: PosteriorFit, effects: Sequence[Effect]) -> list[Subset]:
+    """The sets that lead the fitted one by the quadratic about it; of those that are late in the same places the best one."""
+    found: list[Subset] = []
+    seen = {_places(last.hypothesis.effects)}
+    own = {e.key for e in last.hypothesis.effects}
+    for s in subsets(problem, last, effects, MOST_EFFECTS):
+        if {e.key for e in s.effects} == own or s.cost >= 0.0 or len(found) == _PREDICTED:
+            break
+        if _places(s.effects) not in seen:
+            seen.add(_places(s.effects))
+            found.append(s)
+    return found
+
+
+def _places(effects: Sequence[Effect]) -> frozenset[str]:
+    """Names of effects, those that delay a signal by its channel."""
+    return frozenset(late_signal(e) or e.name for e in effects)
 
 
 def _suggested(
@@ -165,17 +191,6 @@ def other_kinds(
             yield (*late, *rest), np.concatenate([np.array(list(late_s.values())), *begin])
 
 
-def late_signal(effect: Effect) -> str:
-    """Channel whose reading an effect delays, or "surface"; empty for any other effect.
-
-    The size of such an effect is a time [s].
-    """
-    change = effect.describe({p.name: p.value(p.step) for p in effect.parameters})
-    if any(term.kind in _LATE for term in change.surface):
-        return "surface"
-    return next((term.channel for term in change.sensors if term.kind in _LATE), "")
-
-
 def best_rival(own: SearchRound, last: PosteriorFit, effect: Effect) -> Candidate | None:
     """The best candidate of another name that was refitted in the round of an effect; one, because each costs a refit."""
     taken = {e.name for e in last.hypothesis.effects if e.key != effect.key}
@@ -231,4 +246,4 @@ def _needed(problem: TraceProblem, fitted: PosteriorFit, least: float) -> tuple[
         fitted = less
 
 
-__all__ = ["BETTER", "best_rival", "better_set", "late_signal", "other_kinds", "starts_in_place_of"]
+__all__ = ["BETTER", "best_rival", "better_set", "other_kinds", "starts_in_place_of"]

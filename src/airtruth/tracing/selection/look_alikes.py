@@ -17,7 +17,8 @@ from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import OUTDONE, Candidate, has_converged
 from airtruth.tracing.selection.budget import Advance, may_begin
-from airtruth.tracing.selection.exchange import best_rival, late_signal, starts_in_place_of
+from airtruth.tracing.selection.exchange import best_rival, starts_in_place_of
+from airtruth.tracing.selection.late import late_signal
 from airtruth.tracing.selection.ranking import TIE, gains_of
 from airtruth.tracing.selection.refit import Refit
 from airtruth.tracing.selection.rounds import SearchRound

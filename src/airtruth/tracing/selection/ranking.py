@@ -44,6 +44,7 @@ def rank(
     least: float,
     replacement: tuple[str, str] | None = None,
     leader: str = "",
+    in_set: bool = False,
 ) -> tuple[Candidate, ...]:
     """Rank the refitted candidates by their gain, and test those that lead.
 
@@ -53,6 +54,7 @@ def rank(
     replacement : keys (old, new); the old effect explains nothing beside the new one.
     leader : key of the effect that leads whatever others gain, because the set with it explains more; "" for none. Records
         left out test the set and not its leader: a true effect can make them worse while another is missing.
+    in_set : whether that set has been fitted, so that no test of the leader alone refuses it.
     """
     if not fits:
         return ()
@@ -70,12 +72,13 @@ def rank(
             candidates.append(untested(r.score, r.fit, gain, SUPERSEDED, f"that is {replacement[1]}"))
             continue
         if gain < accepted - TIE and r.score.effect.name != leading:
-            implausible = implausibility(problem, r.score, r.fit)
+            implausible = implausibility(problem, r.score.effect, r.fit)
             candidates.append(untested(r.score, r.fit, gain, OUTDONE, *implausible))
             continue
         candidate = assess_candidate(problem, r.score, r.fit, gain, reference, least)
         if r.score.effect.key == leader:
-            still = (why for why in candidate.reasons if why not in (WORSE_LIKELIHOOD, WORSE_FREE_RUN))
+            alone = set(candidate.reasons) - {UNCONVERGED} if in_set else {WORSE_LIKELIHOOD, WORSE_FREE_RUN}
+            still = (why for why in candidate.reasons if why not in alone)
             candidate = replace(candidate, reasons=tuple(still))
         if gain < accepted - TIE:
             candidate = replace(candidate, reasons=(*candidate.reasons, OUTDONE))

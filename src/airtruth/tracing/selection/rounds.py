@@ -95,6 +95,7 @@ class RoundStart:
     settled : whether the round follows a replacement or a choice between tied effects; neither is made twice.
     scores_only : whether the candidates are scored and none is refitted.
     leader : key of the effect that leads the round, whatever others gain; "" for the one that gains most.
+    in_set : whether the leader belongs to a set that has been fitted, so that no test of it alone refuses it.
     near : a fit near the start, whose derivatives the first steps use.
     """
 
@@ -105,6 +106,7 @@ class RoundStart:
     settled: bool = False
     scores_only: bool = False
     leader: str = ""
+    in_set: bool = False
     near: PosteriorFit | None = None
 
     @property
@@ -254,7 +256,7 @@ def search_round(
                 start, near, restarts = better.point, better, restarts - 1
                 continue
             least = significant_gain(begin.tested, later=count > 0)
-            candidates = rank(problem, null, fits, least, begin.replacement, begin.leader)
+            candidates = rank(problem, null, fits, least, begin.replacement, begin.leader, begin.in_set)
         omnibus = anomalies(gls, problem, whitener)
         sets = () if begin.hypothesis.spread is None else explained(problem, null, declared)
         own = SearchRound(

@@ -113,7 +113,7 @@ def table(
     seed : seed of the draws behind the p-values of effects with a location.
     """
     by_effect = [directions(effect, null, problem) for effect in effects]
-    tried = [_perceptible_step(d, null, problem) for own in by_effect for d in own]
+    tried = [perceptible_step(d, null, problem) for own in by_effect for d in own]
     extended = extended_by(null, problem, tried)
     gradient, information = with_freedoms(null, problem, extended, whitener, tried)
     white_gradient, white_information = with_freedoms(
@@ -169,7 +169,7 @@ def _score(
     )
 
 
-def _perceptible_step(direction: Direction, null: PosteriorFit, problem: TraceProblem) -> Direction:
+def perceptible_step(direction: Direction, null: PosteriorFit, problem: TraceProblem) -> Direction:
     """The direction with a step that changes the innovations: a limit has no effect until it is low enough."""
     first = direction.effect.parameters[0]
     largest = max(abs(first.size(first.low)), abs(first.size(first.high)))
@@ -229,4 +229,4 @@ def _p_value(z: Array, best: int, one_sided: bool, information: Array, rng: np.r
     return float((np.count_nonzero(largest >= top) + 1) / (_DRAWS + 1))
 
 
-__all__ = ["Score", "Table", "directions", "holm", "table"]
+__all__ = ["Score", "Table", "directions", "holm", "perceptible_step", "table"]

@@ -15,7 +15,7 @@ from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.profile import relocated
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.absorbed import refit_absorbed
-from airtruth.tracing.selection.acceptance import OUTDONE, Candidate, predicts_records_left_out
+from airtruth.tracing.selection.acceptance import OUTDONE, Candidate, is_plausible, predicts_records_left_out
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import AHEAD, BETTER, better_set
 from airtruth.tracing.selection.explanation import AS_PROBABLE, events
@@ -126,7 +126,8 @@ class _Search:
         ) < 2:
             rounds = self._with_absorbed(first, rounds, beside=not any(weak))
         for count in range(_EXCHANGES + 1):
-            if len(rounds[-1].null.hypothesis.effects) + len(rounds[-1].sets[:1]) < 2:
+            is_single = len(rounds[-1].null.hypothesis.effects) + len(rounds[-1].sets[:1]) < 2
+            if is_single and rounds[-1].anomaly.p_value > REMAINS:
                 return rounds
             last = self._declared(rounds[-1].null)
             if last is None:
@@ -137,7 +138,7 @@ class _Search:
             )
             if better is None or count == _EXCHANGES:
                 break
-            again = self.led(first, better, rounds, 0.5 * AHEAD)
+            again = self.led(first, better, rounds, 0.5 * AHEAD, as_set=True)
             if again is rounds:
                 break
             rounds = again
@@ -192,21 +193,26 @@ class _Search:
         effects: Sequence[Effect],
         rounds: tuple[SearchRound, ...],
         lead: float = BETTER,
+        as_set: bool = False,
     ) -> tuple[SearchRound, ...]:
         """The rounds of a search that accepts these effects first, if they lead others by a log-posterior and predict the
         records left out.
 
         Fewer effects are enough unless the odds against them are strong, and so is as much where they alone leave no anomaly.
+
+        Parameters
+        ----------
+        as_set : whether the effects have been fitted together: no test of one of them alone refuses the set.
         """
         starts: tuple[RoundStart, ...] = (first,)
         again: tuple[SearchRound, ...] = ()
         for effect in effects:
             if not may_begin(self.advance, f"search led by {effect.key}"):
                 return rounds
-            begin = replace(starts[-1], leader=effect.key, settled=True)
+            begin = replace(starts[-1], leader=effect.key, in_set=as_set, settled=True)
             known = {key: value for key, value in self.known.items() if key == effect.key}
             own = search_round(self.problem, begin, len(again), self.seed, self.advance, known=known)
-            if own is None or not own.tied:
+            if own is None or not own.tied or own.tied[0].score.effect.key != effect.key:
                 return rounds
             fitted = relocated(self.problem, own.tied[0].fit, placed=effect.key)
             again = (*again, replace(own, release=None))
@@ -217,7 +223,9 @@ class _Search:
         simpler = len(_effects_of(again[-1])) < len(_effects_of(rounds[-1]))
         cleaner = again[-1].anomaly.p_value > _CLEAN and rounds[-1].anomaly.p_value < REMAINS
         needed = _STRONG_ODDS if simpler else 0.0 if cleaner else lead
-        if total_cost(again[-1]) >= total_cost(rounds[-1]) - needed:
+        if total_cost(again[-1]) >= total_cost(rounds[-1]) - needed or not is_plausible(
+            self.problem, again[-1].null
+        ):
             return rounds
         return again if predicts_records_left_out(self.problem, again[0].null, again[-1].null) else rounds
 

@@ -44,10 +44,10 @@ def weights(rounds: Sequence[SearchRound]) -> dict[tuple[str, ...], float]:
     accepted = {r.tied[0].score.effect.name for r in rounds if r.tied}
     leading = [list(_leading(r, accepted)) for r in rounds if r.tied]
     carried = _carried(rounds)
-    for added in itertools.product(*leading):
+    combined = [([name for name, _ in c], sum(gain for _, gain in c)) for c in itertools.product(*leading)]
+    for led, gain in combined:
         for explaining, log_weight in _explanations(rounds):
-            every = [*(name for name, _ in added), *explaining, *carried]
-            add(every, log_weight + sum(gain for _, gain in added))
+            add([*led, *explaining, *carried], log_weight + gain)
     for rest, lost in _without_one(rounds):
         for explaining, log_weight in _explanations(rounds):
             if rest or explaining or carried:
@@ -55,7 +55,7 @@ def weights(rounds: Sequence[SearchRound]) -> dict[tuple[str, ...], float]:
     for r in rounds:
         for names, log_weight in () if r.rival is None else r.rival.sets.items():
             add(names, log_weight)
-    for tried in (_exchanged(rounds[-1]), _with_one_more(rounds[-1])):
+    for tried in (_exchanged(rounds[-1]), _with_one_more(rounds[-1], combined)):
         known = set(found)
         for every, log_weight in tried:
             if tuple(sorted(set(every))) not in known:
@@ -80,19 +80,29 @@ def _cost(fitted: PosteriorFit) -> float:
     return fitted.cost + len(fitted.point.sizes) + REFERENCE * len(fitted.hypothesis.effects)
 
 
-def _with_one_more(last: SearchRound) -> Iterator[tuple[list[str], float]]:
+def _with_one_more(
+    last: SearchRound, combined: Sequence[tuple[Sequence[str], float]]
+) -> Iterator[tuple[list[str], float]]:
     """The last set with one effect that its residual points to, and the logarithm of the weight of each.
 
     A score squared is the gain in 2 log L that a refit reaches to first order. The search has not accepted the effect, so that
-    its set weighs at most half as much.
+    its set weighs at most half as much. The effect gains as much beside rivals of the accepted effects.
+
+    Parameters
+    ----------
+    last : the round at the end.
+    combined : the accepted effects, or rivals in their place, with the logarithm of the weight of each; the accepted first.
     """
     named = [*(e.name for e in last.null.hypothesis.effects), *(last.sets[0].effects if last.sets else ())]
     if not named:
         return
-    seen = (s for s in last.table.scores if abs(s.z) > _POINTS and s.effect.name not in named)
+    beside = [name for name in named if name not in combined[0][0]]
+    seen = [s for s in last.table.scores if abs(s.z) > _POINTS and s.effect.name not in named]
     for s in sorted(seen, key=lambda s: -abs(s.z))[:_MOST_MORE]:
         gained = 0.5 * s.z**2 - REFERENCE - len(s.effect.parameters)
-        yield [*named, s.effect.name], min(gained, _REFUSED)
+        for names, log_weight in combined:
+            if s.effect.name not in names:
+                yield [*names, *beside, s.effect.name], log_weight + min(gained, _REFUSED)
 
 
 def _leading(own: SearchRound, accepted: Collection[str]) -> Iterator[tuple[str, float]]:
