@@ -13,13 +13,13 @@ from airtruth.units import DEG
 VANE, GYRO, ACCELEROMETER = (EFFECTS[f"{name}_scale"] for name in ("vane", "gyro", "accelerometer"))
 
 
-def scaled_problem():
-    """Two records; the vane reads 1.3 and the gyro 1.1 of the truth."""
+def scaled_problem(vane=1.3, gyro=1.1):
+    """Two records; vane and gyro read these factors of the truth."""
     rng = np.random.default_rng(4)
     records = []
     for amplitude in (2.0, -2.0):
         one = tr.fly(rng, amplitude=amplitude * DEG, sigma_w=0.05, name=str(amplitude))
-        y = one.signals.y * [1.3, 1.1, 1.0]
+        y = one.signals.y * [vane, gyro, 1.0]
         records.append(replace(one, signals=replace(one.signals, y=y)))
     return tr.problem(records)
 

@@ -48,7 +48,7 @@ def reached(problem, first, second, rivals, scored=()):
 
 def better_of(problem, *search):
     rounds = reached(problem, *search)
-    return better_set(problem, rounds, rounds[-1].null, LIBRARY, LEAST, 1, lambda step: None)[0]
+    return better_set(problem, rounds, rounds[-1].null, LIBRARY, LEAST, lambda step: None)[0]
 
 
 def test_a_wrong_member_gives_way_to_its_rival(problem):
@@ -82,7 +82,7 @@ def test_what_remains_points_to_an_effect_that_makes_another_redundant(problem):
 
 def test_every_exchange_is_kept_for_the_look_alikes(problem):
     rounds = reached(problem, GYRO, VANE, [ACCELEROMETER])
-    better, fits = better_set(problem, rounds, rounds[-1].null, LIBRARY, LEAST, 1, lambda step: None)
+    better, fits = better_set(problem, rounds, rounds[-1].null, LIBRARY, LEAST, lambda step: None)
     assert better is None
     assert ["gyro_scale", "accelerometer_scale"] in [[e.key for e in f.hypothesis.effects] for f in fits]
 

@@ -1,10 +1,10 @@
-"""Sets of effects one exchange away from the one that a search has reached.
+"""Sets of effects that may explain more than the one that a search has reached.
 
 A search accepts one effect after another. Two causes that are alike at first may lead it to a set of three that together
 imitate them: the delay of a gyro in place of its lag, then a lag of the surface in place of its delay, then the lag of the
-gyro for what remains. An exchange of one member for its rival, and the removal of what becomes redundant, leads back. The
-rivals of a member are the best candidate of its round and those to which the residual of the others points. So does an effect
-to which what remains points: it is added, and what it makes redundant is removed.
+gyro for what remains. The quadratic about the fit predicts the best sets of all effects (`subsets`), and these are refitted.
+So are exchanges of one member for the best rival of its round, of delays for lags, and the set with an effect to which what
+remains points. What becomes redundant is removed.
 
 Source: P. Pudil, J. Novovicova and J. Kittler, Pattern Recognition Letters 15 (1994) 1119-1125 (floating search).
 """
@@ -23,13 +23,11 @@ from numpy.typing import NDArray
 from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.parameters import Parameters
-from airtruth.tracing.selection import score_test
 from airtruth.tracing.selection.acceptance import Candidate, is_plausible
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.late import late_signal
-from airtruth.tracing.selection.refit import losses_without, refit_scored, refit_without
+from airtruth.tracing.selection.refit import losses_without, refit_scored
 from airtruth.tracing.selection.rounds import MOST_EFFECTS, REMAINS, SearchRound
 from airtruth.tracing.selection.subsets import Subset, subsets
 
@@ -39,10 +37,11 @@ AHEAD: Final = 1.0
 """Log-posterior by which another set of no more parameters has to lead [-] (judgement: odds of 2.7)."""
 _ADDED: Final = 2
 """Number of effects that are added for what remains [-] (judgement: each costs a refit)."""
-_PREDICTED: Final = 3
-"""Number of sets that the quadratic predicts to be better, and that are refitted [-] (judgement: each costs a refit)."""
-_SUGGESTED: Final = 2
-"""Number of rivals of each member that scores suggest [-] (judgement: each costs a refit)."""
+_PREDICTED: Final = 6
+"""Number of sets that the quadratic puts first, and that are refitted [-] (judgement: each costs a refit)."""
+_NEARLY: Final = 3.0
+"""Log-posterior by which the quadratic may put such a set behind the fitted one [-] (judgement: half of a tie's difference in
+2 log L)."""
 
 
 def better_set(
@@ -51,7 +50,6 @@ def better_set(
     last: PosteriorFit,
     effects: Sequence[Effect],
     least: float,
-    seed: int,
     advance: Advance,
 ) -> tuple[tuple[Effect, ...] | None, tuple[PosteriorFit, ...]]:
     """The effects of a better set, the one that explains most first, and the fit of every exchange.
@@ -63,11 +61,10 @@ def better_set(
     rounds : a finished search that accepted effects; last : fit of these under the declaration of the derivatives.
     effects : candidates of the search.
     least : gain in 2 log L below which a member of the new set is removed.
-    seed : seed of the draws behind p-values.
     """
     best: PosteriorFit | None = None
     fits: list[PosteriorFit] = []
-    for phrase, refit in _tries(problem, rounds, last, effects, seed):
+    for phrase, refit in _tries(problem, rounds, last, effects):
         if not may_begin(advance, phrase):
             return None, tuple(fits)
         tried = refit()
@@ -87,14 +84,12 @@ def _tries(
     rounds: Sequence[SearchRound],
     last: PosteriorFit,
     effects: Sequence[Effect],
-    seed: int,
 ) -> Iterator[tuple[str, Callable[[], PosteriorFit | None]]]:
     """Each exchange as a phrase for the progress line, and the function that refits it."""
     for s in _predicted(problem, last, effects):
         phrase = f"{', '.join(e.key for e in s.effects)} as a set"
         hypothesis = replace(last.hypothesis, effects=s.effects)
         yield phrase, partial(fit, problem, hypothesis, s.start, rival=last.cost, near=last)
-    yield from _suggested(problem, last, effects, seed)
     for index, effect in enumerate(last.hypothesis.effects):
         own = next((r for r in rounds if r.tied and r.tied[0].score.effect.key == effect.key), None)
         rival = None if own is None else best_rival(own, last, effect)
@@ -113,15 +108,21 @@ def _tries(
 
 
 def _predicted(problem: TraceProblem, last: PosteriorFit, effects: Sequence[Effect]) -> list[Subset]:
-    """The sets that lead the fitted one by the quadratic about it; of those that are late in the same places the best one."""
+    """The sets that the quadratic about a fit puts before it or next to it; of those that are late in the same places the best.
+
+    What delays the same signal is tried by `other_kinds` and among the look-alikes.
+    """
     found: list[Subset] = []
-    seen = {_places(last.hypothesis.effects)}
-    own = {e.key for e in last.hypothesis.effects}
+    own, behind = _places(last.hypothesis.effects), np.inf
+    seen = {own}
     for s in subsets(problem, last, effects, MOST_EFFECTS):
-        if {e.key for e in s.effects} == own or s.cost >= 0.0 or len(found) == _PREDICTED:
+        places = _places(s.effects)
+        if places == own and not np.isfinite(behind):
+            behind = s.cost + _NEARLY
+        if s.cost > min(behind, 0.0) or len(found) == _PREDICTED:
             break
-        if _places(s.effects) not in seen:
-            seen.add(_places(s.effects))
+        if places not in seen:
+            seen.add(places)
             found.append(s)
     return found
 
@@ -129,28 +130,6 @@ def _predicted(problem: TraceProblem, last: PosteriorFit, effects: Sequence[Effe
 def _places(effects: Sequence[Effect]) -> frozenset[str]:
     """Names of effects, those that delay a signal by its channel."""
     return frozenset(late_signal(e) or e.name for e in effects)
-
-
-def _suggested(
-    problem: TraceProblem, last: PosteriorFit, effects: Sequence[Effect], seed: int
-) -> Iterator[tuple[str, Callable[[], PosteriorFit | None]]]:
-    """For each member the effects that score highest at the fit without it, as `_tries`.
-
-    A candidate of the member's own round had to gain beside fewer effects. What delays the same signal is tried by
-    `other_kinds` and among the look-alikes.
-    """
-    taken = {e.name for e in last.hypothesis.effects}
-    for member in last.hypothesis.effects:
-        less = refit_without(problem, last, member)
-        if less is None:
-            continue
-        late = late_signal(member)
-        others = [e for e in effects if e.name not in taken and not (late and late_signal(e) == late)]
-        table = score_test.table(less, problem, others, NO_WHITENER, seed)
-        for i in np.argsort(-np.array(table.white), kind="stable")[:_SUGGESTED]:
-            rival = table.scores[i].effect.key
-            phrase = f"{rival} in place of {member.key} beside the other effects"
-            yield phrase, partial(refit_scored, problem, less, table, int(i), last.cost)
 
 
 def _scored(rounds: Sequence[SearchRound], last: PosteriorFit) -> SearchRound:

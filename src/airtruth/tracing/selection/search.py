@@ -133,9 +133,7 @@ class _Search:
             if last is None:
                 return rounds
             least = significant_gain(first.tested, later=True)
-            better, exchanged = better_set(
-                self.problem, rounds, last, first.effects, least, self.seed, self.advance
-            )
+            better, exchanged = better_set(self.problem, rounds, last, first.effects, least, self.advance)
             if better is None or count == _EXCHANGES:
                 break
             again = self.led(first, better, rounds, 0.5 * AHEAD, as_set=True)
