@@ -9,7 +9,7 @@ import pytest
 import scipy.io
 from import_flight import flown, foreign, write_csv
 
-from airtruth.errors import LogError
+from airtruth.errors import ConfigurationError, LogError
 from airtruth.importers import (
     MappingFile,
     Source,
@@ -86,7 +86,7 @@ def test_mixed_rates_come_to_one_clock_by_the_stated_method(method, tolerance, t
     np.testing.assert_allclose(made.channels["alpha_rad"], np.sin(t), atol=tolerance)
     np.testing.assert_allclose(made.channels["q_rad_s"], np.cos(t), atol=1.5 * tolerance)
     np.testing.assert_array_equal(made.channels["density_kg_m3"], 1.1)
-    assert made.metadata["resampled"] == {"rate_hz": 50.0, "method": method}
+    assert made.metadata["resampled"] == {"rate_hz": 50.0, "method": method, "from_hz": {"q_rad_s": 25.0}}
 
 
 def test_empty_cells_of_a_slow_channel_are_interpolated_when_asked(tmp_path):
@@ -275,6 +275,25 @@ def test_dates_and_durations_of_a_parquet_file_are_seconds(tmp_path, zone, unit)
     for column in ("date", "after"):
         made = convert(read, mapped(time={"column": column}))
         np.testing.assert_allclose(made.t_s, 0.01 * np.arange(300), rtol=0.0, atol=3e-7)
+
+
+def test_a_unit_of_dates_is_refused(tmp_path):
+    """They are seconds already; milliseconds would make 100 Hz of 0.1 Hz."""
+    dates = pd.Timestamp("2024-05-01") + pd.to_timedelta(10 * np.arange(5), unit="ms")
+    pd.DataFrame({"a": np.arange(5.0), "date": dates}).to_parquet(tmp_path / "f.parquet")
+    with pytest.raises(ConfigurationError, match=r"'date' holds dates or durations, .*; state unit = .s."):
+        convert(open_source(tmp_path / "f.parquet"), mapped(time={"column": "date", "unit": "ms"}))
+
+
+def test_a_manoeuvre_that_the_file_does_not_hold_in_full_is_stated(tmp_path):
+    made = convert(
+        source(tmp_path, t=2.0 + np.arange(100) * 0.02, a=np.arange(100.0)),
+        mapped(time={"column": "t"}, manoeuvre=[{"run_id": "one", "start_s": 1.0, "end_s": 30.0}]),
+    )
+    assert made.metadata["shortened"] == [
+        "run 'one': [[manoeuvre]] start_s is 1, but the first sample is at 2 s",
+        "run 'one': [[manoeuvre]] end_s is 30, but the last sample is at 3.98 s",
+    ]
 
 
 def test_a_missing_date_is_no_time(tmp_path):

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from airtruth.errors import ConfigurationError, LogError, StoreError
+from airtruth.logs import manifest
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.sources import IN_MEMORY, named_logs, sources
 from airtruth.logs.store import write_log
@@ -69,3 +70,19 @@ def test_runs_and_channels_are_chosen_over_all_logs(log: FlightLog, folder: Path
 def test_a_run_in_two_logs_is_refused(log: FlightLog, folder: Path) -> None:
     with pytest.raises(LogError, match=r"run 'a' is in .*a\.parquet and in log in memory"):
         list(named_logs([folder, replace(log, metadata={})]))
+
+
+def test_a_campaign_without_a_recorded_log_is_refused(tmp_path):
+    """The logs that are left can be given themselves."""
+    (tmp_path / "logs").mkdir()
+    for number in range(3):
+        (tmp_path / "logs" / f"0000{number}.parquet").touch()
+    files = {f"logs/0000{number}.parquet": "0" * 64 for number in range(3)}
+    manifest.append(tmp_path / manifest.MANIFEST, manifest.sealed({"files": files}))
+    assert len(sources(tmp_path)) == 3
+    (tmp_path / "logs" / "00001.parquet").unlink()
+    with pytest.raises(
+        StoreError, match=r"00001\.parquet: recorded in manifest\.jsonl and missing; .* give .*logs to use"
+    ):
+        sources(tmp_path)
+    assert len(sources(tmp_path / "logs")) == 2

@@ -44,6 +44,7 @@ CODES: Final = {
     "name": "the column has the name of no channel but resembles one",
     "lag": "the channel is late relative to the others",
     "reconstructed": "the channel was computed from others, and agrees with them by construction",
+    "interpolated": "the channel has fewer samples of its own than the log",
     "metadata": "the unit in the file's metadata contradicts the column's name",
 }
 """Kinds of fault and their meanings."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.checks import columns
+from airtruth.checks import columns, times
 from airtruth.checks.corrections import Correction
 from airtruth.checks.evidence import OUTSIDE, relations
 from airtruth.checks.explanation import SUSPECT, Explanation, explain
@@ -50,7 +50,10 @@ def inspect(log: FlightLog, aircraft: Aircraft | None = None) -> tuple[Fault, ..
     tuple of Fault
         The certain faults first; empty for a plausible log.
     """
-    faults = [*columns.names(log), *columns.units(log), *columns.reconstructed(log)]
+    wrong = tuple(times.clock(log))
+    if wrong:  # every other test compares rates of change
+        return wrong
+    faults = [*columns.names(log), *columns.units(log), *columns.reconstructed(log), *times.interpolated(log)]
     for batch in batches(log):
         faults += _batch_faults(batch, aircraft, len(log.run_ids))
     merged: dict[tuple[str, str], Fault] = {}

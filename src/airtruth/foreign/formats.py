@@ -54,16 +54,20 @@ def _parquet(path: Path, layout: TextFormat) -> Source:
     if frame.empty:
         raise StoreError(f"{path}: holds no rows; export it again")
     columns = [_in_seconds(frame.iloc[:, i]) for i in range(frame.shape[1])]
-    return table_source(path, [str(name) for name in frame.columns], columns)
+    names = [str(name) for name in frame.columns]
+    dates = [name for name, kind in zip(names, frame.dtypes, strict=True) if kind.kind in _DATES]
+    return table_source(path, names, columns, dates=dates)
 
 
+_DATES: Final = "mM"
+"""Kinds of numpy types that are durations or dates."""
 _PER_SECOND: Final = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 """Unit of pandas' dates and durations -> integers per second."""
 
 
 def _in_seconds(column: pd.Series[Any]) -> NDArray[Any]:
     """Values of a column; dates are seconds since 1970 and durations seconds, whatever the unit of their integers."""
-    if column.dtype.kind not in "mM":
+    if column.dtype.kind not in _DATES:
         return column.to_numpy()
     integers, per_second = column.astype("int64").to_numpy(), _PER_SECOND[column.dt.unit]
     # whole seconds and the rest apart: 2e18 ns have more digits than a float64

@@ -34,6 +34,7 @@ class Source:
     repeated : name that several columns of a table have -> their numbers; in ``arrays`` further ones have the name of
         `further_name`.
     comments : lines of a text file among its rows that are none, in order.
+    dates : names of columns of dates or durations, whose values are seconds.
     """
 
     path: Path
@@ -45,6 +46,7 @@ class Source:
     units: Mapping[str, str] = field(default_factory=dict)
     repeated: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     comments: tuple[int, ...] = ()
+    dates: tuple[str, ...] = ()
 
     def line(self, row: int) -> int:
         """Line of a row, counted from 0, in a text file; 0 if it is none."""
@@ -71,6 +73,7 @@ def table_source(
     columns: Sequence[NDArray[Any]],
     first_line: int = 0,
     comments: Sequence[int] = (),
+    dates: Sequence[str] = (),
 ) -> Source:
     """The columns of one table.
 
@@ -79,7 +82,7 @@ def table_source(
     path : the file.
     names : one for each column, of which several may be equal; none if the columns are numbered.
     columns : their values.
-    first_line, comments : as of `Source`.
+    first_line, comments, dates : as of `Source`.
     """
     if not names:
         numbered = {f"{i}": one for i, one in enumerate(columns, 1)}
@@ -91,7 +94,9 @@ def table_source(
         arrays[further_name(name, number) if name in numbers else name] = values
         numbers[name] = (*numbers.get(name, ()), number)
     repeated = {name: several for name, several in numbers.items() if len(several) > 1}
-    return Source(path, arrays, first_line=first_line, repeated=repeated, comments=tuple(comments))
+    return Source(
+        path, arrays, first_line=first_line, repeated=repeated, comments=tuple(comments), dates=tuple(dates)
+    )
 
 
 def packed(source: Source) -> Reply:
@@ -117,6 +122,7 @@ def packed(source: Source) -> Reply:
         "units": dict(source.units),
         "repeated": [[name, list(numbers)] for name, numbers in source.repeated.items()],
         "comments": list(source.comments),
+        "dates": list(source.dates),
     }
     return Reply(facts, tuple(arrays))
 
@@ -145,6 +151,7 @@ def unpacked(path: Path, reply: Reply) -> Source:
         facts["units"],
         {name: tuple(numbers) for name, numbers in facts["repeated"]},
         tuple(facts["comments"]),
+        tuple(facts["dates"]),
     )
 
 

@@ -21,8 +21,8 @@ from airtruth.importers.mapping import CONSTANTS, MappingFile, Place, Resample, 
 from airtruth.importers.runs import require_rows, run_of_file, runs_of
 from airtruth.importers.series import Series, base_clock, read_series
 from airtruth.importers.sources import Source, numbers, open_source
-from airtruth.importers.uniform import shortened, uniform
-from airtruth.logs.flight_log import RECORD_CONSTANTS, FlightLog
+from airtruth.importers.uniform import beyond, shortened, slower, uniform
+from airtruth.logs.flight_log import RECORD_CONSTANTS, RESAMPLED, FlightLog
 from airtruth.units import DEG
 
 Array = NDArray[np.float64]
@@ -268,14 +268,16 @@ def built(merged: Merged) -> FlightLog:
         As `import_log`.
     """
     source, mapping = merged.pieces[0].source, merged.pieces[0].mapping
-    ids, times, blocks, facts, drifts, lost = [], [], [], {}, [], []
+    ids, times, blocks, facts, drifts, lost, slow = [], [], [], {}, [], [], []
     for run_id, start, end, rows in runs_of(source, mapping, merged.series):
         where = f"{source.path}, run {run_id!r}"
         if rows is not None:
             require_rows(where, merged.series, len(rows))
         cut = {name: one.between(start, end, rows) for name, one in merged.series.items()}
         t, values = uniform(where, cut, merged.resample)
-        lost += [f"run {run_id!r}: {sentence}" for sentence in shortened(cut)]
+        lost += [f"run {run_id!r}: {sentence}" for sentence in [*shortened(cut), *beyond(cut, start, end)]]
+        if merged.resample is not None:
+            slow.append(slower(cut, merged.resample.rate_hz))
         values = airspeed_from_pressure(where, values)
         if mapping.reconstruct.alpha:
             values, drift = with_alpha(where, values, (t[-1] - t[0]) / (len(t) - 1), mapping.reconstruct)
@@ -290,6 +292,8 @@ def built(merged: Merged) -> FlightLog:
     metadata = _metadata(merged, times)
     if facts:
         metadata[RECORD_CONSTANTS] = facts
+    if merged.resample:
+        metadata[RESAMPLED] = _resampled(merged.resample, slow)
     if lost:
         metadata[_SHORTENED] = lost
     if drifts:
@@ -303,13 +307,20 @@ def built(merged: Merged) -> FlightLog:
     )
 
 
+def _resampled(resample: Resample, slow: Sequence[Mapping[str, float]]) -> dict[str, object]:
+    """The common rate, the method, and the least rate of each channel that has fewer samples of its own."""
+    own_hz: dict[str, float] = {}
+    for one in slow:
+        own_hz |= {name: min(hz, own_hz.get(name, hz)) for name, hz in one.items()}
+    stated: dict[str, object] = {"rate_hz": resample.rate_hz, "method": resample.method}
+    return stated | ({"from_hz": own_hz} if own_hz else {})
+
+
 def _metadata(merged: Merged, times: Sequence[Array]) -> dict[str, object]:
     mapping = merged.pieces[0].mapping
     metadata: dict[str, object] = {"source": ", ".join(p.source.path.name for p in merged.pieces)}
     if mapping.aircraft:
         metadata["aircraft"] = mapping.aircraft
-    if merged.resample:
-        metadata["resampled"] = {"rate_hz": merged.resample.rate_hz, "method": merged.resample.method}
     moved = [
         {
             "file": p.source.path.name,

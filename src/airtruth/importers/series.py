@@ -77,6 +77,7 @@ def base_clock(source: Source, mapping: MappingFile) -> Series | None:
     empty = np.empty(0)
     if time.column is not None:
         place = Place(column=time.column, variable=time.variable)
+        _check_date(source, place, time.unit, "[time]")
         values, _ = numbers(source, place, mapping.source.variable)
         if mapping.resample is None:
             _check_precision(f"{source.path}: time column {time.column!r}", values, time.unit)
@@ -101,6 +102,7 @@ def _series(source: Source, mapping: MappingFile, name: str, one: Channel, clock
         return Series(always, np.full(len(always), factor * (one.scale * one.value + one.offset)))
     own = None
     if one.clock is not None:
+        _check_date(source, one.clock, one.clock.unit, f"channels.{name}.clock")
         raw, _ = numbers(source, one.clock, variable)
         with np.errstate(invalid="ignore", over="ignore"):
             shifted = _seconds(raw, one.clock.unit) + one.clock.offset_s
@@ -130,6 +132,15 @@ def _seconds(values: Array, unit: str) -> Array:
 
 def _rounding(values: Array, unit: str) -> float:
     return single_precision_s(values[np.isfinite(values)]) * unit_factor("time", unit)
+
+
+def _check_date(source: Source, place: Place, unit: str, where: str) -> None:
+    """Refuse a unit of dates or durations: they are read as seconds, whatever the unit of the file's integers."""
+    if place.column in source.dates and unit != "s":
+        raise ConfigurationError(
+            f"{source.path}: {where} unit = {unit!r}, but column {place.column!r} holds dates or durations, which are read "
+            'as seconds; state unit = "s", or leave it out'
+        )
 
 
 def _check_precision(where: str, t: Array, unit: str) -> None:

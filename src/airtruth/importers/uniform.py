@@ -28,6 +28,8 @@ GAP: Final = (10.0, 0.5)
 """Usual steps and time [s] that a pause must both exceed to be a gap (judgement: jitter and single lost samples do not)."""
 LOST_S: Final = 0.5
 """Time at either end of a record from which the loss is stated [s] (judgement: recorders start within half a second)."""
+SLOWER: Final = 0.8
+"""Share of the common rate below which the rate of a channel's own samples counts as lower [-] (judgement)."""
 SNAP: Final = 0.75
 """Largest distance of a time in single precision from an even grid [resolutions]: a half is rounding, the rest the error
 of the fitted grid."""
@@ -107,6 +109,38 @@ def shortened(series: Mapping[str, Series]) -> list[str]:
     return sentences + (
         [f"its last {tail:.3g} s are left out, where {first} has no value"] if tail > LOST_S else []
     )
+
+
+def beyond(series: Mapping[str, Series], start_s: float, end_s: float) -> list[str]:
+    """What a run lacks of the times that the mapping states for it, in words.
+
+    Parameters
+    ----------
+    series : channels of the run; start_s, end_s : stated times on their clock [s], infinite where none are stated.
+    """
+    times = [one.t_s[np.isfinite(one.t_s)] for one in series.values() if not one.constant]
+    known = [t for t in times if len(t)]
+    if not known:
+        return []
+    low, high = min(t.min() for t in known), max(t.max() for t in known)
+    early = np.isfinite(start_s) and low - start_s > LOST_S
+    late = np.isfinite(end_s) and end_s - high > LOST_S
+    sentences = (
+        [f"[[manoeuvre]] start_s is {start_s:g}, but the first sample is at {low:g} s"] if early else []
+    )
+    return sentences + (
+        [f"[[manoeuvre]] end_s is {end_s:g}, but the last sample is at {high:g} s"] if late else []
+    )
+
+
+def slower(series: Mapping[str, Series], rate_hz: float) -> dict[str, float]:
+    """Channel -> rate of its own samples [Hz], of those whose rate is less than `SLOWER` of the common one."""
+    own: dict[str, float] = {}
+    for name, one in series.items():
+        t = one.t_s[np.isfinite(one.values)] if not one.constant else np.empty(0)
+        if len(t) > 1 and t[-1] > t[0] and (hz := (len(t) - 1) / float(t[-1] - t[0])) < SLOWER * rate_hz:
+            own[name] = float(f"{hz:.4g}")
+    return own
 
 
 def _phase(full: Mapping[str, Series], start: float, end: float, rate_hz: float) -> float:
@@ -257,4 +291,14 @@ def _rate(one: Series) -> str:
     return f"{(len(one.t_s) - 1) / (one.t_s[-1] - one.t_s[0]):.4g} Hz"
 
 
-__all__ = ["MOST_SAMPLES", "even_times", "gaps", "low_passed", "resampled", "shortened", "uniform"]
+__all__ = [
+    "MOST_SAMPLES",
+    "beyond",
+    "even_times",
+    "gaps",
+    "low_passed",
+    "resampled",
+    "shortened",
+    "slower",
+    "uniform",
+]

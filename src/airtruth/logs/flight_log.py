@@ -276,6 +276,8 @@ def _common_metadata(logs: Sequence[FlightLog]) -> dict[str, object]:
     return common | ({RECORD_CONSTANTS: constants} if constants else {})
 
 
+RESAMPLED = "resampled"
+"""Key of the metadata with the rate to which an import resampled a log, the method, and the lower rates of its channels."""
 RECORD_CONSTANTS = "record_constants"
 """Metadata entry with the mass, inertia and reference lengths of single runs: run -> name -> value in SI."""
 

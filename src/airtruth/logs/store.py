@@ -6,7 +6,7 @@ import json
 import logging
 import os
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, Final, Literal
 
@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from airtruth.arguments import require_whole
 from airtruth.channels import RUN_ID, SIGNALS, TIME
 from airtruth.errors import ConfigurationError, LogError, StoreError, choices, counted
+from airtruth.logs import manifest
 from airtruth.logs.atomic import atomic_file, write_text
 from airtruth.logs.flight_log import FlightLog, unknown_runs
+from airtruth.logs.manifest import MANIFEST
 from airtruth.logs.remote import location
 from airtruth.logs.tables import (
     KEY,
@@ -152,7 +154,7 @@ def log_paths(path: str | os.PathLike[str]) -> list[Path]:
     Raises
     ------
     StoreError
-        If the path does not exist or holds no log.
+        If the path does not exist or holds no log, or a campaign folder lacks a log that its manifest records.
     """
     path = location(path)
     try:
@@ -173,7 +175,26 @@ def log_paths(path: str | os.PathLike[str]) -> list[Path]:
             else f"{below} lies in a folder below it: give that folder, or write a partitioned data set as one file"
         )
         raise StoreError(f"{folder}: holds no flight log (*.parquet); {step}")
+    if folder is not path:
+        _require_recorded(path, {p.name for p in paths})
     return paths
+
+
+def _require_recorded(campaign: Path, present: Collection[str]) -> None:
+    """Refuse a campaign folder without a log that was flown: a result would not show that runs are missing."""
+    recorded: set[str] = set()
+    for record in manifest.scan(campaign / MANIFEST).records:
+        files = record.get("files")
+        recorded |= set(files) if isinstance(files, Mapping) else set()
+    names = sorted(
+        name for name in recorded if name.startswith("logs/") and name.removeprefix("logs/") not in present
+    )
+    if names:
+        more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+        raise StoreError(
+            f"{campaign / names[0]}{more}: recorded in {MANIFEST} and missing; `airtruth fly` with the same campaign and "
+            f"folder writes it again, or give {campaign / 'logs'} to use the logs that are left"
+        )
 
 
 def _logs_of(folder: Path, pattern: str) -> list[Path]:
