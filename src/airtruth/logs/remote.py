@@ -215,6 +215,10 @@ class _Stream(io.RawIOBase):
         super().close()
 
 
+_LONGEST_NAME: Final = 255
+"""Bytes of the name of a file or folder (NAME_MAX of Linux and macOS)."""
+
+
 def location(path: str | os.PathLike[str]) -> Path:
     """A file or folder as a user names it: a local path, or a URL of an object store.
 
@@ -230,13 +234,20 @@ def location(path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     StoreError
-        If the path is empty, the scheme is unknown, or the URL has no bucket or states options.
+        If the path is empty or has a name that no file system takes, the scheme is unknown, or the URL has no bucket or
+        states options.
     """
     if isinstance(path, RemotePath):
         return path
     text = os.fspath(path)
     if not text:
         raise StoreError("the path is empty; give a file, a folder or a URL")
+    longest = max(text.split("/"), key=len)
+    if len(os.fsencode(longest)) > _LONGEST_NAME:
+        raise StoreError(
+            f"{longest[:20]}...: a name of {len(os.fsencode(longest))} bytes, and a file system takes {_LONGEST_NAME}; give a "
+            "shorter one"
+        )
     scheme, colon, rest = text.partition(":/")
     if not colon or len(scheme) < 2 or not scheme.isalnum() or Path(f"{scheme}:").exists():
         return Path(path)
