@@ -331,3 +331,23 @@ def test_a_sample_of_zero_that_comes_back_is_a_dropout():
     x[:, 6::16] = 0.0
     ((name, bad, count),) = dropouts(SimpleNamespace(channels={"q_rad_s": x}))
     assert (name, bad.tolist(), count) == ("q_rad_s", [True], int((x == 0.0).sum()))
+
+
+def test_a_surface_that_moves_nothing_is_no_wrong_unit(log, gtm):
+    """Doublets of 2 deg beside motion of gusts alone: in degrees they would be 0.03 deg."""
+    pulse = np.where((log.t_s > 1.0) & (log.t_s < 3.0), np.sign(2.0 - log.t_s), 0.0) * np.radians(2.0)
+    for names in (("elevator_rad",), ("elevator_rad", "elevator_command_rad")):
+        channels = {
+            n: x for n, x in log.channels.items() if n not in ("elevator_rad", "elevator_command_rad")
+        }
+        channels |= {n: pulse + log.channels[n].mean() for n in names}
+        found = inspect(replace(log, channels=channels), gtm)
+        assert [f for f in found if f.certain and "degrees" in f.sentence] == []
+
+
+def test_a_run_that_repeats_another_is_named(log, gtm):
+    both = type(log).concat([log, replace(log, run_ids=tuple(f"{r}-again" for r in log.run_ids))])
+    (fault,) = (f for f in inspect(both, gtm) if f.channel == "run_id")
+    assert (fault.code, fault.certain) == ("copy", False)
+    assert "has the samples of run" in fault.sentence
+    assert "5 further runs repeat others" in fault.sentence

@@ -125,6 +125,9 @@ class Answer:
     effects: tuple[AcceptedEffect, ...]
     provisional: bool = False
     notes: tuple[str, ...] = ()
+    verdict: str = "traced"
+    anomaly: object = None
+    remaining: object = None
 
 
 def allowed(errors=(), p_value=0.5, state="not needed"):
@@ -145,3 +148,17 @@ def test_a_check_without_an_error_limits_what_a_trace_may_name():
     assert allowed(p_value=0.01) == plain
     assert allowed(state="not shown") == plain
     assert list(within_kinematics([EFFECTS["gyro_scale"]], None)) == [EFFECTS["gyro_scale"]]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "p_value", "expected"),
+    [("none", 1e-7, "unexplained"), ("none", 1e-5, "none"), ("traced", 1e-7, "traced")],
+)
+def test_channels_that_contradict_each_other_are_not_nothing(verdict, p_value, expected):
+    """A gyro that is late in one record of four leaves no trace in the fit of all."""
+    check = SimpleNamespace(verdict="cannot_tell", p_value=p_value, statistic=300.0, possible=(), findings=())
+    found = with_contradictions(Answer((), verdict=verdict), check, 0.02)
+    assert found.verdict == expected
+    if expected == "unexplained":
+        assert found.remaining.p_value == found.anomaly.p_value == p_value
+        assert "single records" in found.notes[0]

@@ -14,7 +14,7 @@ from airtruth.simulation.campaign import plan
 from airtruth.simulation.campaign import run as campaign
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.model.compile import CHANNELS
-from airtruth.tracing.replay import flown_again
+from airtruth.tracing.replay import flown_again, worsened
 from airtruth.tracing.stage_errors import Replay
 from validation import replay_plain
 
@@ -106,3 +106,13 @@ def test_replay_needs_nothing_of_the_project():
     names |= {str(n.module) for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
     roots = {name.split(".")[0] for name in names}
     assert roots <= set(sys.stdlib_module_names) | {"jsbsim", "numpy", "pyarrow"}
+
+
+@pytest.mark.parametrize(
+    ("updated", "stated"),
+    [(None, False), ({"q_rad_s": 1.04, "az_m_s2": 0.5}, False), ({"q_rad_s": 1.06, "az_m_s2": 0.5}, True)],
+)
+def test_an_updated_aircraft_that_flies_worse_is_stated(updated, stated):
+    found = worsened(Replay(declared={"q_rad_s": 1.0, "az_m_s2": 1.0}, updated=updated))
+    assert bool(found) == stated
+    assert not found or "q_rad_s 1.06)" in found[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import hashlib
 from collections.abc import Iterator, Mapping
 from itertools import combinations
 from typing import Final
@@ -126,6 +127,28 @@ def reconstructed(log: FlightLog) -> Iterator[Fault]:
         "agrees with q_rad_s and az_m_s2 by construction, and no error of a vane can be estimated; identify adds its "
         "uncertainty to the intervals, trace takes q_rad_s and az_m_s2 as outputs and alpha as a state", False, 1.0,
     )  # fmt: skip
+
+
+def repeated(log: FlightLog) -> Iterator[Fault]:
+    """Runs that hold the samples of an earlier run: they would count as independent evidence."""
+    first: dict[str, str] = {}
+    copies = []
+    for i, run_id in enumerate(log.run_ids):
+        values = [np.ascontiguousarray(log.channels[name][log.rows(i)]) for name in sorted(log.channels)]
+        if not any(np.ptp(x) > 0.0 for x in values):
+            continue
+        digest = hashlib.sha256(b"".join(x.tobytes() for x in values))
+        earlier = first.setdefault(digest.hexdigest(), run_id)
+        if earlier != run_id:
+            copies.append((run_id, earlier))
+    if copies:
+        run_id, earlier = copies[0]
+        more = f", and {len(copies) - 1} further runs repeat others" if len(copies) > 1 else ""
+        yield Fault(
+            "run_id", run_id, "copy",
+            f"run_id: run {run_id!r} has the samples of run {earlier!r}{more}: copies count as independent evidence, and "
+            "intervals become too narrow; leave them out", False, float(len(copies)),
+        )  # fmt: skip
 
 
 def _plain(unit: str) -> str:
@@ -293,4 +316,14 @@ def _stretches(equal: Bools, fewest: int) -> Iterator[tuple[int, int]]:
             yield int(start), int(stop)
 
 
-__all__ = ["constant", "copies", "dropouts", "frozen", "names", "reconstructed", "spikes", "units"]
+__all__ = [
+    "constant",
+    "copies",
+    "dropouts",
+    "frozen",
+    "names",
+    "reconstructed",
+    "repeated",
+    "spikes",
+    "units",
+]

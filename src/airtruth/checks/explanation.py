@@ -8,9 +8,13 @@ mistake explains (a gust, a turn, an unstable aircraft) is not refused.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.channels import SIGNALS
@@ -36,6 +40,9 @@ MOST_RUNS: Final = 12
 """Runs that are tested with each correction; more would cost time and add no certainty."""
 MOST_FAULTS: Final = 4
 """Mistakes that are looked for in one log, one after another."""
+LEAST_INPUT_RAD: Final = math.radians(0.2)
+"""Least range of a surface that moves the aircraft, of the record that it moves most [rad] (judgement): flight-test inputs are
+0.5 deg and more, and a unit that leaves less was not used."""
 RIVAL: Final = 2.0
 """Difference of two sums below which both mistakes are named: a likelihood ratio of e."""
 
@@ -112,7 +119,10 @@ def explain(batch: Batch, aircraft: Aircraft | None = None, *, partial: bool = F
         for correction in catalogue(names, batch.dt_s):
             if any(_excludes(one, correction) for one in made):
                 continue
-            changed = replace(batch, channels={**batch.channels, **correction.apply(batch.channels)})
+            corrected = correction.apply(batch.channels)
+            if _stills(corrected):
+                continue
+            changed = replace(batch, channels={**batch.channels, **corrected})
             after = relations(changed, aircraft)
             value = total(after, results) + correction.penalty
             values.append((value, correction))
@@ -130,6 +140,12 @@ def explain(batch: Batch, aircraft: Aircraft | None = None, *, partial: bool = F
     return [
         replace(e, certain=certain and e.correction is not None and not e.correction.sensor) for e in found
     ]
+
+
+def _stills(corrected: Mapping[str, NDArray[np.float64]]) -> bool:
+    """Whether a correction makes a surface too small to have moved the aircraft."""
+    surface = corrected.get("elevator_rad")
+    return surface is not None and float(np.ptp(surface, axis=1).max()) < LEAST_INPUT_RAD
 
 
 def _excludes(made: Correction, other: Correction) -> bool:

@@ -53,7 +53,8 @@ def inspect(log: FlightLog, aircraft: Aircraft | None = None) -> tuple[Fault, ..
     wrong = tuple(times.clock(log))
     if wrong:  # every other test compares rates of change
         return wrong
-    faults = [*columns.names(log), *columns.units(log), *columns.reconstructed(log), *times.interpolated(log)]
+    faults = [*columns.names(log), *columns.units(log), *columns.reconstructed(log)]
+    faults += [*columns.repeated(log), *times.interpolated(log)]
     for batch in batches(log):
         faults += _batch_faults(batch, aircraft, len(log.run_ids))
     merged: dict[tuple[str, str], Fault] = {}

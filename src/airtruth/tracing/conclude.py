@@ -48,6 +48,7 @@ from airtruth.tracing.intervals import at_measured_alpha, estimates, widened_by_
 from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.notes import notes
 from airtruth.tracing.prepare import Case
+from airtruth.tracing.replay import worsened
 from airtruth.tracing.reservations import reservations
 from airtruth.tracing.selection.acceptance import SURPASSED, Candidate
 from airtruth.tracing.selection.anomaly import Anomaly
@@ -113,6 +114,7 @@ def conclude(
         or confirmed is False
         or bool(case.left_out)
         or bool(reserved)
+        or bool(worsened(replay))
         or (bool(stated or along) and remaining.p_value <= ANOMALY_LEVEL),
         anomaly=_evidence(anomaly),
         remaining=_evidence(remaining),

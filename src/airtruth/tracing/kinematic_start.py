@@ -20,13 +20,16 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.sensor_errors import KINDS
-from airtruth.tracing.answer import TraceAnswer
+from airtruth.tracing.answer import Evidence, TraceAnswer
 
 _ERRORS: Final = 5.0
 """Standard errors of the kinematic check beyond which it excludes an error of a sensor [-] (judgement: its noise is not
 quite white)."""
 _FITS: Final = 0.05
 """Probability of the check's absolute test from which it fits the records [-] (convention)."""
+_IMPOSSIBLE: Final = 1e-6
+"""Probability of the check's absolute test below which an answer without a cause is not that nothing is missing [-] (judgement:
+the least of 60 flights without an effect is 6e-4)."""
 _SAMPLES: Final = 0.5
 """Time over the sample period up to which the check does not contradict a trace [-] (judgement: between two samples it follows
 the motion by a polynomial, and a surface that steps bends it; ideal sensors logged at 20 Hz show a gyro late by a quarter of a
@@ -133,9 +136,20 @@ def _margin(one: Finding, dt_s: float) -> float:
 
 
 def with_contradictions(answer: TraceAnswer, check: CheckResult | None, dt_s: float) -> TraceAnswer:
-    """The answer with its contradictions to a check, which make its effects provisional; ``dt_s`` as of `disagreement`."""
+    """The answer with its contradictions to a check, which make its effects provisional; ``dt_s`` as of `disagreement`.
+
+    Where the channels contradict each other beyond doubt, something is missing, although the whole of the records fits the
+    declared aircraft: a sensor that was late in one record, for example.
+    """
     found = disagreement(check, answer, dt_s)
     provisional = answer.provisional or bool(found and answer.effects)
+    if answer.verdict == "none" and check is not None and check.p_value < _IMPOSSIBLE:
+        left = Evidence(check.statistic, check.p_value, "the kinematics of the fitted records")
+        found.append(
+            f"the channels of the fitted records contradict each other (p = {check.p_value:.2g} of the kinematic check), and no "
+            "missing effect explains it; run `airtruth check` on single records, because an error may be in one of them alone"
+        )
+        answer = replace(answer, verdict="unexplained", anomaly=left, remaining=left)
     return replace(answer, provisional=provisional, notes=(*answer.notes, *found))
 
 

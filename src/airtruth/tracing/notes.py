@@ -14,7 +14,7 @@ from airtruth.table import significant
 from airtruth.tracing.answer import DeclaredModel
 from airtruth.tracing.model.compile import CHANNELS
 from airtruth.tracing.model.parameters import COLOUR_TIME_S, Common
-from airtruth.tracing.replay import disagreement
+from airtruth.tracing.replay import disagreement, worsened
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.stage_errors import Errors, PerChannel, Replay
 from airtruth.tracing.stages import Stages, in_closed_loop
@@ -72,6 +72,7 @@ def notes(
         )
     if replay is not None:
         yield from disagreement(replay, stages)
+        yield from worsened(replay)
     if forced:
         yield "the logs contradict physics and were traced because of --force: " + "; ".join(forced)
 

@@ -29,6 +29,9 @@ Array = NDArray[np.float64]
 _APART: Final = 0.25
 """Logarithm of the ratio of two errors of one free run, in JSBSim and in the filter, from which they disagree [-]
 (judgement: they agree within 0.05 for the shipped aircraft)."""
+_WORSE: Final = 1.05
+"""Ratio of two errors in JSBSim from which the updated aircraft is worse [-] (judgement: derivatives within their uncertainty
+change an error by a few per cent)."""
 
 
 def flown_again(stages: Stages, aircraft: Aircraft, updated: str | Path | None) -> Replay:
@@ -84,6 +87,24 @@ def disagreement(replay: Replay, stages: Stages) -> list[str]:
         "JSBSim and the filter disagree on the motion of the declared aircraft (error in JSBSim over error of the "
         f"filter: {', '.join(apart)}): the JSBSim model has dynamics that forces at rest do not show, and the traced "
         "effect may be these dynamics; declare them under [dynamics] in aircraft.toml (docs/aircraft.md)"
+    ]
+
+
+def worsened(replay: Replay | None) -> list[str]:
+    """A sentence where the updated aircraft flies the records worse than the declared one."""
+    if replay is None or replay.declared is None or replay.updated is None:
+        return []
+    worse = [
+        f"{channel} {replay.updated[channel] / max(rms, 1e-12):.2f}"
+        for channel, rms in replay.declared.items()
+        if replay.updated[channel] > _WORSE * rms
+    ]
+    if not worse:
+        return []
+    return [
+        "in JSBSim the updated aircraft flies the records worse than the declared one (error of the updated over error of the "
+        f"declared: {', '.join(worse)}), so the answer is provisional; do not use the updated aircraft before another flight "
+        "confirms it"
     ]
 
 
@@ -164,4 +185,4 @@ def track(record: TraceRecord, aircraft: Aircraft, weight: Array) -> Track:
     )
 
 
-__all__ = ["disagreement", "flown_again", "track"]
+__all__ = ["disagreement", "flown_again", "track", "worsened"]
