@@ -13,6 +13,7 @@ from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.profile import relocated
 from airtruth.tracing.model.parameters import Parameters
+from airtruth.tracing.selection import look_alikes
 from airtruth.tracing.selection.acceptance import OUTDONE, SURPASSED, Candidate
 from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.look_alikes import with_look_alikes
@@ -116,3 +117,27 @@ def test_a_break_finds_its_angle_again_beside_a_later_effect(problem):
     assert (std < [0.3, 2e-3, 0.05, 0.02]).all()
     assert (np.abs(found.point.sizes - truth) < 3.0 * std).all()
     assert relocated(problem, found, placed="cm_alpha_nonlinear:break") is found
+
+
+@pytest.mark.parametrize("near", [True, False])
+def test_a_late_rival_is_followed_by_its_own_twin(problem, monkeypatch, near):
+    """A gyro lag that explains nearly as much as the member may be a gyro delay as well."""
+    monkeypatch.setattr(look_alikes, "TIE", 1e6 if near else -1e6)
+    lag, delay = EFFECTS["gyro_lag"], EFFECTS["sensor_delay:q_rad_s"]
+    library = (*LIBRARY, lag, delay)
+    start = RoundStart(
+        fitted(problem, VANE).hypothesis, fitted(problem, VANE).point, library[1:], scores_only=True
+    )
+    second = search_round(problem, start, 1, 1, lambda step: None)
+    gyro = candidate(problem, second, 50.0, (), VANE, GYRO)
+    tied = candidate(problem, second, 49.0, (), VANE, lag)
+    first, last = scored(problem), scored(problem, VANE, GYRO)
+    vane = candidate(problem, first, 60.0, (), VANE)
+    rounds = (
+        replace(first, candidates=(vane,), tied=(vane,)),
+        replace(second, candidates=(gyro, tied), tied=(gyro, tied)),
+        last,
+    )
+    steps = []
+    with_look_alikes(problem, rounds, library, steps.append)
+    assert ("sensor_delay:q_rad_s in place of gyro_scale beside the other effects" in steps) == near

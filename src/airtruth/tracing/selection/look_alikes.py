@@ -7,7 +7,7 @@ and each of them can lead a round in which another cause is still missing.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
 from airtruth.effects.effect import Effect
@@ -60,7 +60,10 @@ def _beside_the_others(
     own, last = rounds[at], rounds[-1].null
     leader, member = own.tied[0], own.tied[0].score.effect
     fits = [Refit(leader.score, last, 0.0)]
-    for effect, starts in _rivals(own, rounds[-1], effects):
+    waiting = list(_rivals(own, rounds[-1], effects))
+    known_keys = {e.key for e in last.hypothesis.effects} | {effect.key for effect, _ in waiting}
+    while waiting:
+        effect, starts = waiting.pop(0)
         if not may_begin(advance, f"{effect.key} in place of {member.key} beside the other effects"):
             return own
         score = next((s for s in own.table.scores if s.effect.key == effect.key), None)
@@ -73,6 +76,10 @@ def _beside_the_others(
         tried = min((end for end in ends if end is not None), key=lambda end: end.cost, default=None)
         if score is not None and tried is not None:
             fits.append(Refit(score, tried, 0.0))
+            near = tried.cost - last.cost < TIE
+            for twin in list(_twins(effect, effects, known_keys)) if near else ():
+                known_keys.add(twin.key)
+                waiting.append((twin, [tried.point]))
     gains = gains_of(problem, last, sorted(fits, key=lambda r: r.cost))
     tested: dict[str, Candidate] = {}
     for r in fits[1:]:
@@ -86,6 +93,15 @@ def _beside_the_others(
     alike = (c for c in tested.values() if not c.reasons)
     known = {c.score.effect.key: c for c in own.candidates}
     return replace(own, candidates=tuple((known | tested).values()), tied=(leader, *alike))
+
+
+def _twins(one: Effect, effects: Sequence[Effect], taken: Collection[str]) -> Iterator[Effect]:
+    """Effects that delay the same signal as another: what one explains the others explain nearly as well."""
+    late = late_signal(one)
+    for effect in effects:
+        is_twin = late != "" and late_signal(effect) == late
+        if is_twin and effect.key not in taken and len(effect.parameters) == len(one.parameters):
+            yield effect
 
 
 def _keys(fitted: PosteriorFit) -> set[str]:
@@ -102,12 +118,9 @@ def _rivals(
     """
     last, member = end.null, own.tied[0].score.effect
     taken = {e.key for e in last.hypothesis.effects}
-    late = late_signal(member)
-    for effect in effects:
-        is_twin = late != "" and late_signal(effect) == late
-        if is_twin and effect.key not in taken and len(effect.parameters) == len(member.parameters):
-            taken.add(effect.key)
-            yield effect, [last.point]
+    for twin in list(_twins(member, effects, taken)):
+        taken.add(twin.key)
+        yield twin, [last.point]
     best = best_rival(own, last, member)
     for c in (*own.tied[1:], *(() if best is None else (best,))):
         key = c.score.effect.key
