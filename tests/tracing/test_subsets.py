@@ -90,3 +90,10 @@ def test_sizes_are_within_the_plausible_range(problem):
             low, high = e.parameters[0].reach
             assert low <= s.start.sizes[at] <= high
             at += len(e.parameters)
+
+
+@pytest.mark.parametrize(
+    ("members", "further", "number"), [((), (), 0), ((), (VANE,), 1), ((VANE,), (), 1), ((VANE,), (GYRO,), 3)]
+)
+def test_a_library_of_few_effects_has_few_sets(problem, members, further, number):
+    assert len(list(subsets(problem, fitted(problem, *members), further, 3))) == number

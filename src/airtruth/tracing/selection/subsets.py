@@ -116,7 +116,7 @@ def subsets(
     slope, information = eliminated(q.marginal.gradient, q.marginal.information, [int(i) for i in q.columns])
     slope = slope - information @ q.at  # where every size is zero
     found = []
-    for number in range(1, most + 1):
+    for number in range(1, min(most, len(q.effects)) + 1):
         for chosen, sizes, gain in _of_number(slope, information, q.effects, number):
             parameters = sum(len(q.effects[i].parameters) for i in chosen)
             found.append((gain + parameters + REFERENCE * number, chosen, sizes))
