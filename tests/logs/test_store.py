@@ -440,3 +440,18 @@ def test_decimals_and_views_of_strings_are_read(tmp_path: Path) -> None:
     np.testing.assert_array_equal(back.t_s, [0.0, 0.02])
     assert list(back.channels) == ["alpha_rad"]
     np.testing.assert_array_equal(back.channels["alpha_rad"], [0.02, np.nan])
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        ({"offsets": np.array([0, 10, 20])}, "do not divide .* rows into"),
+        ({"channels": {"alpha_rad": np.zeros(3)}}, "alpha_rad has 3 rows"),
+        ({"metadata": {"mass": float("nan")}}, "the metadata are no JSON"),
+        ({"metadata": {"mass": object()}}, "the metadata are no JSON"),
+    ],
+)
+def test_a_log_that_would_not_be_written_as_a_whole_is_refused(log, tmp_path, change, problem):
+    with pytest.raises(LogError, match=problem):
+        store.write_log(tmp_path / "log.parquet", replace(log, **change))
+    assert list(tmp_path.iterdir()) == []
