@@ -36,15 +36,14 @@ def clock(log: FlightLog) -> Iterator[Fault]:
     if not wrong:
         return
     run, hz = wrong[0]
-    as_stated, unit = next(
+    likely = next(
         (
-            (f"{hz * per_second:.3g} Hz", f" in {unit}")
-            for unit, per_second in _LIKELY
-            if _usual(hz * per_second)
+            f"; the rate would be {hz * factor:.3g} Hz if the times are in {unit}"
+            for unit, factor in _LIKELY
+            if _usual(hz * factor)
         ),
-        ("", ""),
+        "",
     )
-    likely = f"; the rate would be {as_stated} if the times are{unit}" if as_stated else ""
     yield Fault(
         "t_s", run, "unit",
         f"t_s: {hz:.3g} samples per second in {runs([one for one, _ in wrong], len(log))}, where a flight test has "

@@ -32,6 +32,7 @@ from airtruth.logs.tables import (
     require_memory,
     write_table,
 )
+from airtruth.logs.validate import row_problems
 
 Array = NDArray[np.float64]
 
@@ -85,7 +86,9 @@ def write_log(
     require_whole("runs_per_group", runs_per_group, 1)
     fields = [pa.field(RUN_ID, pa.string()), _field(TIME, "float64")]
     fields += [_field(name, dtype) for name in log.channels]
-    _require_rows(path, log)
+    problems = list(row_problems(log))
+    if problems:
+        raise LogError(f"{path}: {'; '.join(problems)}")
     try:
         document = json.dumps({"schema": SCHEMA, **log.metadata}, allow_nan=False).encode()
     except (TypeError, ValueError) as error:
@@ -97,20 +100,6 @@ def write_log(
     with atomic_file(path) as file, _writer(file, schema) as writer:
         for first in range(0, len(order), runs_per_group):
             writer.write_table(_group(log, order[first : first + runs_per_group], schema))
-
-
-def _require_rows(path: Path | str, log: FlightLog) -> None:
-    """Refuse a log of which some rows would not be written."""
-    rows, offsets = len(log.t_s), log.offsets
-    for name, values in log.channels.items():
-        if len(values) != rows:
-            raise LogError(f"{path}: {name} has {len(values)} rows and t_s {rows}; give one value per row")
-    divides = len(offsets) == len(log.run_ids) + 1 and offsets[0] == 0 and offsets[-1] == rows
-    if not divides or (np.diff(offsets) < 0).any():
-        raise LogError(
-            f"{path}: offsets {offsets[:3].tolist()} ... {offsets[-1:].tolist()} do not divide {rows} rows into "
-            f"{len(log.run_ids)} runs; they begin with 0, end with {rows} and have one entry more than there are runs"
-        )
 
 
 def read_log(

@@ -66,22 +66,29 @@ def validate(log: FlightLog, *, minimum_samples: int = MINIMUM_SAMPLES, source: 
 
 
 def _structure(log: FlightLog) -> Iterator[str]:
-    rows = len(log.t_s)
+    if _divides(log):
+        if not log.run_ids:
+            yield "the log holds no run; fly or import it again"
+        elif "" in log.run_ids:
+            yield "run_id: empty; name every run"
+    yield from row_problems(log)
+
+
+def _divides(log: FlightLog) -> bool:
+    """Whether the offsets divide the rows into the runs."""
     offsets = log.offsets
-    if (
-        len(offsets) != len(log.run_ids) + 1
-        or offsets[0] != 0
-        or offsets[-1] != rows
-        or (np.diff(offsets) < 0).any()
-    ):
+    ends = len(offsets) == len(log.run_ids) + 1 and offsets[0] == 0 and offsets[-1] == len(log.t_s)
+    return bool(ends and (np.diff(offsets) >= 0).all())
+
+
+def row_problems(log: FlightLog) -> Iterator[str]:
+    """Rows that belong to no run, and channels of another number of rows, in words."""
+    rows = len(log.t_s)
+    if not _divides(log):
         yield (
             f"offsets do not divide {rows} rows into {len(log.run_ids)} runs; "
             "they are the first row of each run, and the number of rows"
         )
-    elif not log.run_ids:
-        yield "the log holds no run; fly or import it again"
-    elif "" in log.run_ids:
-        yield "run_id: empty; name every run"
     for name, values in log.channels.items():
         if values.shape != (rows,):
             yield f"{name}: shape {values.shape} where t_s has {rows} rows; give one value per row"
@@ -265,4 +272,4 @@ def _listed(items: list[str], noun: str, count: int | None = None) -> str:
     return f"{count} {noun}{'s' if count > 1 else ''}: {', '.join(items[:_SHOWN])}{more}"
 
 
-__all__ = ["JITTER", "MINIMUM_SAMPLES", "single_precision_s", "validate"]
+__all__ = ["JITTER", "MINIMUM_SAMPLES", "row_problems", "single_precision_s", "validate"]
