@@ -45,6 +45,7 @@ UNITS: Final[dict[str, dict[str, float]]] = {
     "pressure": {"pa": 1.0, "hpa": 100.0, "kpa": 1e3, "psf": PSF, "psi": LBF / INCH**2},
     "density": {"kg_m3": 1.0, "slug_ft3": SLUG / FT**3},
     "ratio": {"": 1.0, "pct": 0.01},
+    "per_angle": {"per_rad": 1.0, "per_deg": 1.0 / DEG},
 }
 """Dimension -> suffix of a unit -> factor to SI."""
 
@@ -56,6 +57,7 @@ _PRINTED: Final = {
     "m_s": "m/s",
     "m_s2": "m/s2",
     "kg_m2": "kg m2",
+    "per_rad": "1/rad",
 }
 """Unit -> its printed form; others are printed as they are."""
 

@@ -23,6 +23,8 @@ from airtruth.quantity import Quantity, Strict
 FILE: Final = "aircraft.toml"
 """Name of the file that makes a folder an aircraft."""
 
+AIRSPEED: Final = "airspeed_m_s"
+"""The channel whose sensor may have a position error."""
 _SENSOR_DIMENSIONS: Final = {kind.key: kind.dimension for kind in KINDS.values() if kind.dimension}
 """Dimension of a sensor's entry where it is not that of its channel."""
 
@@ -32,7 +34,8 @@ class Sensor(Strict):
 
     noise_std: white, one sample to the next [unit of the channel]; bias, quantum, minimum, maximum
     likewise; scale: factor [-]; lag: time constant [s]; delay, hold (sample and hold) [s];
-    x, z: position ahead of and below the CG [m] (vane, accelerometer).
+    x, z: position ahead of and below the CG [m] (vane, accelerometer); alpha_slope: relative change of the airspeed with the
+    angle of attack about its mean [1/rad].
     """
 
     noise_std: Quantity = Quantity(value=0.0)
@@ -46,6 +49,7 @@ class Sensor(Strict):
     maximum: Quantity | None = None
     x: Quantity = Quantity(value=0.0)
     z: Quantity = Quantity(value=0.0)
+    alpha_slope: Quantity = Quantity(value=0.0)
 
     _checked = field_validator(*(kind.key for kind in KINDS.values() if not kind.may_be_negative))(
         qt.not_negative
@@ -221,6 +225,10 @@ def sensor_tables(channel: str, raw: Any) -> Any:
         if key not in Sensor.model_fields:
             result[key] = table
             continue
+        if key == "alpha_slope" and channel != AIRSPEED:
+            raise ValueError(
+                f"{channel}.{key}: only {AIRSPEED} has a slope over the angle of attack; delete the entry"
+            )
         try:
             result[key] = qt.table_in(_SENSOR_DIMENSIONS.get(key, dimension), table)
         except ValidationError as error:

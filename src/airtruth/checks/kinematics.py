@@ -36,8 +36,8 @@ LONGEST_ARM_M: Final = 40.0
 """Largest arm where no chord is known [m]: judgement, half the length of the largest aircraft."""
 USUAL_ARM_M: Final = 10.0
 """Arm that is not unusual where no chord is known [m]: judgement."""
-AIRSPEED_DELAY: Final = "sensor_delay:airspeed_m_s"
-"""The error that the equation of airspeed shows."""
+AIRSPEED: Final = ("sensor_delay:airspeed_m_s", "airspeed_alpha_slope")
+"""Errors that the equation of airspeed shows."""
 ATTITUDE: Final = ("gyro_lag", "attitude_lag", "sensor_delay:theta_rad", "sensor_delay:q_rad_s", "gyro_scale")
 """Errors that need theta, because without it nothing predicts q but alpha, whose own errors are the same."""
 NAMED: Final = ("present", "one of")
@@ -202,7 +202,7 @@ def _candidates(records: Sequence[Record], chord_m: float | None) -> dict[str, f
     """Errors that the channels can show, with their usual sizes [SI]."""
     result = {}
     for name, error in ERRORS.items():
-        if name == AIRSPEED_DELAY or (name in ATTITUDE and records[0].theta is None):
+        if name in AIRSPEED or (name in ATTITUDE and records[0].theta is None):
             continue
         arm = USUAL_ARM_M if chord_m is None else error.usual * chord_m
         result[name] = arm if error.kind == "arm" else error.usual
@@ -237,7 +237,7 @@ def _errors(found: Search, usual: Mapping[str, float]) -> list[Finding]:
 
 
 def _airspeed(found: Search) -> list[Finding]:
-    """Delay of airspeed, by the equation of airspeed alone.
+    """Delay and position error of airspeed, by the equation of airspeed alone.
 
     That equation needs the vertical position of the longitudinal accelerometer, its alignment and the lag of the
     pneumatic lines, which no log states. It therefore has no part in the errors of the other instruments.
@@ -246,7 +246,7 @@ def _airspeed(found: Search) -> list[Finding]:
     if problem.records[0].ax is None or problem.records[0].theta is None:
         return []
     known = {**problem.known, **dict(zip(one.names, one.value, strict=True))}
-    usual = {AIRSPEED_DELAY: ERRORS[AIRSPEED_DELAY].usual}
+    usual = {name: ERRORS[name].usual for name in AIRSPEED}
     alone = problem_of(problem.records, ("airspeed",), known, problem.limits, lines=problem.lines)
     return _errors(completed(search(alone, usual), usual), usual)
 
@@ -332,4 +332,12 @@ def _cause(found: Search, place: int, findings: Sequence[Finding]) -> Cause:
     )
 
 
-__all__ = ["check_kinematics", "check_log", "check_logs", "declared_biases", "declared_errors"]
+__all__ = [
+    "AIRSPEED",
+    "NAMED",
+    "check_kinematics",
+    "check_log",
+    "check_logs",
+    "declared_biases",
+    "declared_errors",
+]

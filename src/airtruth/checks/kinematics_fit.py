@@ -22,6 +22,9 @@ SHORTENED: Final = 4
 """Largest number of times that a step is shortened to 30 % [-]: judgement; a hundredth of a step is left then."""
 EDGE: Final = 1e-3
 """Share of the range within which an estimate counts as at its limit [-]: judgement."""
+ALPHA_SLOPES: Final = (-2.0, 2.0)
+"""Range of the slope of a position error [1/rad]: judgement; a static source far from a good position errs by 1 % of the airspeed
+per degree."""
 SCALES: Final = (0.4, 2.5)
 """Range of a scale [-]: judgement; an error beyond is one of units, which the gate tests."""
 
@@ -210,6 +213,7 @@ def limits_of(records: Sequence[Record], longest_arm_m: float) -> dict[str, tupl
             "lag": (0.0, longest),
             "delay": (0.0, longest),
             "arm": (-longest_arm_m, longest_arm_m),
+            "alpha_slope": ALPHA_SLOPES,
         }[error.kind]
     return result
 

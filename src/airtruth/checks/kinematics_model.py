@@ -153,6 +153,9 @@ _ALL: Final = (
     InstrumentError("alpha_rad", "delay", 0.2, 1e-3, "delay of alpha against q and az"),
     InstrumentError("az_m_s2", "delay", 0.1, 1e-3, "delay of az against the other channels"),
     InstrumentError("airspeed_m_s", "delay", 0.3, 1e-3, "delay of airspeed against ax and theta"),
+    InstrumentError(
+        "airspeed_m_s", "alpha_slope", 0.3, 1e-3, "relative change of the airspeed with alpha about its mean"
+    ),
 )
 """Each error with its usual size and the step of its derivative (judgement: usual sizes are those of flight-test
 instruments; steps are small against any error that matters)."""
@@ -185,7 +188,10 @@ def compare(
         attitude = _late(turned, dt, error("theta_rad", "delay"), error("theta_rad", "lag"))
         result["theta"] = record.theta - attitude
     q = earlier(record.q + q_lag * record.q_dot, dt, q_delay) / q_scale
-    airspeed = record.airspeed / error("airspeed_m_s", "scale")
+    # the mean of alpha stays, because a constant of it is not determined
+    swing = (record.alpha - record.alpha.mean()) / error("alpha_rad", "scale")
+    slope = 1.0 + error("airspeed_m_s", "alpha_slope") * swing
+    airspeed = record.airspeed / (error("airspeed_m_s", "scale") * slope)
     az = earlier(record.az, dt, error("az_m_s2", "delay")) / error("az_m_s2", "scale")
     arm = error("az_m_s2", "arm")
     ax = record.ax if record.ax is not None else 0.0
@@ -193,9 +199,7 @@ def compare(
         theta = record.alpha.mean() + turned - turned.mean() - (q.mean() - record.q.mean()) * record.t
     else:
         theta = earlier(record.theta, dt, error("theta_rad", "delay")) + error("theta_rad", "lag") * q
-    # the mean of alpha stays, because a constant of it is not determined
-    moved = (record.alpha - record.alpha.mean()) / error("alpha_rad", "scale") + record.alpha.mean()
-    alpha = moved + error("alpha_rad", "arm") * q / record.airspeed
+    alpha = swing + record.alpha.mean() + error("alpha_rad", "arm") * q / record.airspeed
     force = az * np.cos(alpha) - ax * np.sin(alpha) + G0 * np.cos(theta - alpha)
     # the integral of x q_dot/V is x q/V up to the change of V, which does not matter over a manoeuvre
     turning = turned + arm * (q - q[0]) / airspeed + integral(force / airspeed, dt)
@@ -207,7 +211,7 @@ def compare(
         alpha = alpha + lead * (q + force / airspeed)
         rate = ax * np.cos(alpha) + (az + arm * record.q_dot) * np.sin(alpha) - G0 * np.sin(theta - alpha)
         late = earlier(integral(rate, dt), dt, -error("airspeed_m_s", "delay"))
-        result["airspeed"] = record.airspeed - error("airspeed_m_s", "scale") * late
+        result["airspeed"] = error("airspeed_m_s", "scale") * (airspeed - late)
     return result
 
 

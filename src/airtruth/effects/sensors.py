@@ -155,6 +155,23 @@ EFFECTS: Final = (
     _scale("q_rad_s", 0.01, "theta as a second measurement of q."),
     _scale("az_m_s2", 0.01, "Gravity at the trim: az of level flight is known."),
     _scale("airspeed_m_s", 0.02, "A speed course."),
+    _error(
+        "airspeed_m_s",
+        "alpha_slope",
+        Parameter(
+            "slope",
+            "per_rad",
+            "relative, of airspeed_m_s over alpha",
+            low=-2.0,
+            high=2.0,
+            material=0.1,
+            step=0.01,
+        ),
+        "airspeed_m_s changes with the angle of attack: the position error of its static source, or the angle of a Pitot tube.",
+        "V_reading = V (1 + slope (alpha - mean alpha)); W. Gracey, Measurement of Aircraft Speed and Altitude, NASA RP-1046, "
+        "1980, ch. 7 (static-pressure error over lift coefficient). Material: 0.2 % of the airspeed per degree.",
+        "ax, az and theta give the change of the airspeed (`airtruth check`).",
+    ),
     _bias("alpha_rad", 5.0 * DEG, 0.1 * DEG),
     _bias("q_rad_s", 5.0 * DEG, 0.1 * DEG),
     _bias("az_m_s2", 1.0, 0.02),

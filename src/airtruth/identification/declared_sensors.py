@@ -2,7 +2,7 @@
 
 aircraft.toml declares scale, lag, delay and position of each instrument (`airtruth.physics.sensor_errors`). They are taken
 out of the channels that the estimators read, in the reverse of the order in which a reading has them: scale, delay, lag,
-position. Biases remain: a free constant of each equation takes those of alpha, q, az and elevator.
+position, slope over alpha. Biases remain: a free constant of each equation takes those of alpha, q, az and elevator.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ _WORDS: Final = {
     "delay_s": "delay {0:.6g} s",
     "x_m": "{0:.6g} m ahead of the CG",
     "z_m": "{0:.6g} m below the CG",
+    "alpha_slope_per_rad": "{0:.6g} per rad of alpha",
 }
 """Errors that are taken out, by the field of `SensorErrors`, in words."""
 _PLACED: Final = {"alpha_rad": ("x_m",), "az_m_s2": ("x_m", "z_m")}
@@ -110,6 +111,10 @@ def as_ideal(batch: Batch, taken: Taken) -> Batch:
     for name, own in errors.items():
         if name in _PLACED:
             channels[name] = channels[name] + _moved(name, own, channels, sos, batch.dt_s)
+    if "airspeed_m_s" in errors:
+        channels["airspeed_m_s"] = channels["airspeed_m_s"] / errors["airspeed_m_s"].slope(
+            channels["alpha_rad"]
+        )
     return replace(batch, t_s=batch.t_s[:, :kept], channels=channels)
 
 

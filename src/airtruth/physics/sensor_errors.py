@@ -1,8 +1,8 @@
 """Errors of sensors: the one vocabulary of flying, checking, tracing and updating.
 
 A reading y follows from the true motion in this order (`airtruth.physics.sensors.at_instrument` and `measure`):
-position of the instrument, lag, delay, scale, bias, noise, hold, quantisation, limits. aircraft.toml declares these
-errors by their `ErrorKind.key`; an effect (`airtruth.physics.terms.SensorTerm`) adds to those of the kinds in `Kind`.
+position of the instrument, slope over alpha, lag, delay, scale, bias, noise, hold, quantisation, limits. aircraft.toml
+declares these errors by their `ErrorKind.key`; an effect (`airtruth.physics.terms.SensorTerm`) adds to those of the kinds in `Kind`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-Kind = Literal["bias", "scale", "lag", "delay", "arm"]
+Kind = Literal["bias", "scale", "lag", "delay", "arm", "alpha_slope"]
 """Errors that an effect may add to those declared."""
 
 
@@ -42,7 +42,7 @@ class ErrorKind:
     @property
     def field(self) -> str:
         """Attribute of `SensorErrors` that holds the value."""
-        return self.key + {"time": "_s", "length": "_m"}.get(self.dimension, "")
+        return self.key + {"time": "_s", "length": "_m", "per_angle": "_per_rad"}.get(self.dimension, "")
 
     def combined(self, first: float, second: float) -> float:
         """Return two errors in series as one; two lags as one of their sum, to first order in their time constants.
@@ -67,6 +67,7 @@ KINDS: Final[Mapping[str, ErrorKind]] = {
     "maximum": ErrorKind("maximum", neutral=np.inf),
     "arm": ErrorKind("x", "length"),
     "arm_down": ErrorKind("z", "length"),
+    "alpha_slope": ErrorKind("alpha_slope", "per_angle"),
 }
 """Every kind of error by its name."""
 
@@ -95,6 +96,8 @@ class SensorErrors:
     minimum, maximum : ends of the range [unit of the channel].
     hold_s : update period of a slower instrument, which holds its value between updates [s]; 0 for none.
     x_m, z_m : position ahead of and below the centre of gravity [m]; it matters to alpha_rad, ax_m_s2, az_m_s2.
+    alpha_slope_per_rad : relative change of the reading with the angle of attack about its mean [1/rad]; of airspeed_m_s alone,
+        the position error of a static source.
     """
 
     noise_std: float = 0.0
@@ -108,6 +111,7 @@ class SensorErrors:
     hold_s: float = 0.0
     x_m: float = 0.0
     z_m: float = 0.0
+    alpha_slope_per_rad: float = 0.0
 
     @property
     def lead_s(self) -> float:
@@ -123,6 +127,21 @@ class SensorErrors:
             If ``kind`` is not in `KINDS`.
         """
         return float(getattr(self, KINDS[kind].field))
+
+    def slope(self, alpha_rad: Array) -> Array:
+        """Factor that the angle of attack puts on a reading [-].
+
+        Parameters
+        ----------
+        alpha_rad : (..., samples) of whole records [rad]; the factor is 1 at the mean of each.
+
+        Examples
+        --------
+        >>> SensorErrors(alpha_slope_per_rad=-0.5).slope(np.array([0.0, 0.2])).tolist()
+        [1.05, 0.95]
+        """
+        off = alpha_rad - alpha_rad.mean(axis=-1, keepdims=True)
+        return np.asarray(1.0 + self.alpha_slope_per_rad * off)
 
     def scaled(self, truth: Array) -> Array:
         """Apply scale and bias [unit of the channel], any shape.

@@ -150,13 +150,13 @@ def accelerometer_az(
 
 
 def at_instrument(channel: str, truth: Mapping[str, Array], errors: SensorErrors) -> Array:
-    """True value of a channel where its instrument is: the arms of vane and accelerometers applied.
+    """True value of a channel where its instrument is: the arms of vane and accelerometers and the position error applied.
 
     Parameters
     ----------
     channel : column of a log.
     truth : channel -> values of one shape at the centre of gravity [SI]; alpha_rad needs q_rad_s and airspeed_m_s,
-        the accelerometers need q_rad_s and q_dot_rad_s2.
+        the accelerometers need q_rad_s and q_dot_rad_s2; airspeed_m_s with a position error needs alpha_rad.
     errors : position of the instrument.
 
     Returns
@@ -164,6 +164,8 @@ def at_instrument(channel: str, truth: Mapping[str, Array], errors: SensorErrors
     Values of that shape [unit of the channel]; those of ``truth`` itself where the position does not matter.
     """
     x, z = errors.x_m, errors.z_m
+    if channel == "airspeed_m_s" and errors.alpha_slope_per_rad != 0.0:
+        return truth[channel] * errors.slope(truth["alpha_rad"])
     if x == 0.0 and z == 0.0:
         return truth[channel]
     if channel == "alpha_rad":

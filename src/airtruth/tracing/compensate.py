@@ -280,6 +280,10 @@ def _undo_sensors(channels: dict[str, Array], terms: Sequence[SensorTerm], dt_s:
     errors = {name: sensor.errors() for name, sensor in fitted({}, terms).items() if name in channels}
     for name, own in errors.items():
         channels[name] = _advanced(own.unscaled(channels[name]), own.lead_s / dt_s)
+    if "airspeed_m_s" in errors:
+        channels["airspeed_m_s"] = channels["airspeed_m_s"] / errors["airspeed_m_s"].slope(
+            channels["alpha_rad"]
+        )
     for name, own in errors.items():
         if own.x_m != 0.0:
             channels[name] = channels[name] + _arm(name, own, channels, dt_s)

@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Final
 
 from airtruth.aircraft import Aircraft
-from airtruth.checks.kinematics import check_kinematics, declared_errors
+from airtruth.checks.kinematics import AIRSPEED, NAMED, check_kinematics, declared_errors
 from airtruth.checks.kinematics_model import ERRORS
 from airtruth.checks.result import CheckResult, Finding
 from airtruth.effects.effect import Effect
@@ -21,6 +21,7 @@ from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.sensor_errors import KINDS
 from airtruth.tracing.answer import Evidence, TraceAnswer
+from airtruth.units import printed
 
 _ERRORS: Final = 5.0
 """Standard errors of the kinematic check beyond which it excludes an error of a sensor [-] (judgement: its noise is not
@@ -60,7 +61,7 @@ def starts_of(check: CheckResult | None) -> dict[str, float]:
     """Effect -> value of its parameter [SI], of the causes that a check names."""
     if check is None or check.verdict not in ("errors", "one_of"):
         return {}
-    named = {f.name for cause in check.possible for f in cause.errors}
+    named = {f.name for cause in check.possible for f in cause.errors} | {f.name for f in _of_airspeed(check)}
     return {f.name: _beyond_declared(f) for f in check.findings if f.name in named and f.name in EFFECTS}
 
 
@@ -70,9 +71,14 @@ def within_kinematics(effects: Sequence[Effect], check: CheckResult | None) -> t
     A range ends `_ERRORS` standard errors from the estimate of the check, and contains the neutral value. A refit that ends at
     an end of its range is not accepted. Errors that the records do not show keep their range.
     """
-    if check is None or check.p_value < _FITS or [c.errors for c in check.possible] != [()]:
+    if check is None:
         return tuple(effects)
-    shown = {f.name: f for f in check.findings if f.name in ERRORS and f.state != "not shown"}
+    fits = check.p_value >= _FITS and [c.errors for c in check.possible] == [()]
+    shown = {
+        f.name: f
+        for f in check.findings
+        if f.name in ERRORS and f.state not in ("not shown", "not assessed") and (fits or f.name in AIRSPEED)
+    }
     return tuple(_limited(e, shown[e.key]) if e.key in shown else e for e in effects)
 
 
@@ -83,6 +89,11 @@ def _limited(effect: Effect, found: Finding) -> Effect:
     )
     low, high = max(only.low, min(low, only.neutral)), min(only.high, max(high, only.neutral))
     return replace(effect, parameters=(replace(only, low=low, high=high),))
+
+
+def _of_airspeed(check: CheckResult) -> list[Finding]:
+    """Errors of the airspeed that its own equation shows and the library holds; no set of the other errors has them."""
+    return [f for f in check.findings if f.name in AIRSPEED and f.name in EFFECTS and f.state in NAMED]
 
 
 def _beyond_declared(one: Finding) -> float:
@@ -108,7 +119,13 @@ def disagreement(check: CheckResult | None, answer: TraceAnswer, dt_s: float) ->
         {f.name for f in cause.errors if f.name in EFFECTS and abs(f.value - f.declared) > _margin(f, dt_s)}
         for cause in check.possible
     ]
-    result = []
+    result = [
+        f"the airspeed contradicts ax, az and theta unless its reading changes with the angle of attack ({f.name} "
+        f"{f.lower:.2g} to {f.upper:.2g} {printed(f.unit)}), and the trace does not accept that error, so the answer is "
+        "provisional; inspect `airtruth check`"
+        for f in _of_airspeed(check)
+        if f.name not in traced
+    ]
     if sets and all(sets) and not any(one & traced for one in sets):
         words = " or ".join(sorted({" with ".join(sorted(one)) for one in sets}))
         result.append(

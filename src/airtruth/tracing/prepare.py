@@ -23,7 +23,7 @@ from airtruth.physics.short_period import PARAMETERS
 from airtruth.tracing.conditions import other_trims, records_of
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.model.records import FINE, Signals, TraceRecord, read
+from airtruth.tracing.model.records import FINE, Signals, TraceRecord, fine, read
 from airtruth.tracing.model.settings import VANE, declared_change, resolved, settings_of
 from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.selection.explanation import DERIVATIVES, causes_of
@@ -187,7 +187,8 @@ def undo_input_sensors(s: Signals, aircraft: Aircraft) -> Signals:
         if late > 0.0:
             at = np.arange(len(x))
             x = np.interp(at + late, at, x)
-        return errors.unscaled(x)
+        x = errors.unscaled(x)
+        return x / errors.slope(fine(s.y[:, 0], cells)) if errors.alpha_slope_per_rad != 0.0 else x
 
     return replace(
         s,

@@ -172,7 +172,14 @@ def track(record: TraceRecord, aircraft: Aircraft, weight: Array) -> Track:
     def true(channel: str, fine: Array, cells: int) -> Array:
         late = _lead_s(channel, record.plant.aircraft, aircraft) / s.dt_s
         values = np.interp(grid + late, np.arange(len(fine)) / cells, fine)
-        return _corrected(channel, values, record.plant.aircraft, aircraft)
+        values = _corrected(channel, values, record.plant.aircraft, aircraft)
+        old, new = (
+            plane.file.sensors.get(channel, Sensor()).errors() for plane in (record.plant.aircraft, aircraft)
+        )
+        if old.alpha_slope_per_rad == new.alpha_slope_per_rad:
+            return values
+        alpha = np.interp(grid, np.arange(samples), s.y[:, 0])
+        return values * old.slope(alpha) / new.slope(alpha)
 
     outputs: Mapping[str, Array] = {c: s.y[:, i] for i, c in enumerate(CHANNELS)}
     return Track(

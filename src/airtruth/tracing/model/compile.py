@@ -50,7 +50,7 @@ class CompiledChange:
     effect_states, motion : first state of each effect with states; states up to the last of them.
     declared : quantity of `airtruth.physics.terms.DECLARED` -> all its terms together.
     bias, scale, lag_s, delay_s, arm_m : (3,) of the outputs [units of the outputs, -, s, s, m].
-    inputs : channel of an input -> scale and bias of its sensor.
+    inputs : channel of an input -> scale, bias and position error of its sensor.
     """
 
     surface: tuple[SurfaceTerm, ...]
@@ -159,8 +159,10 @@ def _with_error(errors: SensorErrors, term: SensorTerm) -> SensorErrors:
         return replace(errors, scale=errors.scale * term.value)
     if term.kind == "bias":
         return replace(errors, bias=errors.bias + term.value)
+    if term.kind == "alpha_slope" and term.channel == "airspeed_m_s":
+        return replace(errors, alpha_slope_per_rad=errors.alpha_slope_per_rad + term.value)
     raise ConfigurationError(
-        f"effect on {term.channel}: {term.kind!r}; {choices(term.kind, ('bias', 'scale'))}"
+        f"effect on {term.channel}: {term.kind!r}; {choices(term.kind, ('bias', 'scale', 'alpha_slope of airspeed_m_s'))}"
     )
 
 

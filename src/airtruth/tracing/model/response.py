@@ -24,6 +24,7 @@ from airtruth.tracing.model.kernel_input import (
 from airtruth.tracing.model.parameters import COLOUR_TIME_S, OUTPUTS, Common, PerRecord
 from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, nodes
+from airtruth.tracing.model.records import fine as on_grid
 from airtruth.tracing.model.schedule import Schedule, schedule
 from airtruth.tracing.model.settings import Settings
 from airtruth.tracing.model.steady import SteadyFilter, steady_filter
@@ -114,12 +115,13 @@ def _inputs(record: TraceRecord, compiled: CompiledChange) -> FilterInputs:
     fine = _undo(compiled, "elevator_rad", s.elevator_rad)
     if compiled.surface:
         fine = through(compiled.surface, fine, s.dt_s / (s.sub * FINE), s.elevator_std_rad)
-    elevator, v = nodes(fine), _undo(compiled, "airspeed_m_s", s.airspeed_m_s)
+    v, ground = (_airspeed(compiled, s, x) for x in (s.airspeed_m_s, s.ground_m_s))
+    elevator = nodes(fine)
     lift, moment = _remainder(record, compiled, elevator.size)
     grid = GridSignals(
         elevator_rad=elevator,
         airspeed_m_s=v,
-        ground_m_s=_undo(compiled, "airspeed_m_s", s.ground_m_s),
+        ground_m_s=ground,
         qbar_pa=0.5 * s.density_kg_m3 * v * v,
         theta_rad=theta,
         lift=lift,
@@ -166,6 +168,11 @@ def _remainder(record: TraceRecord, compiled: CompiledChange, points: int) -> Ar
 def _undo(compiled: CompiledChange, channel: str, x: Array) -> Array:
     errors = compiled.inputs.get(channel)
     return x if errors is None else errors.unscaled(x)
+
+
+def _airspeed(compiled: CompiledChange, s: Signals, x: Array) -> Array:
+    errors = compiled.inputs.get("airspeed_m_s")
+    return x if errors is None else errors.unscaled(x) / errors.slope(on_grid(s.y[:, 0], s.sub))
 
 
 def respond(
