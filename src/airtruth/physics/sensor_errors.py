@@ -2,7 +2,8 @@
 
 A reading y follows from the true motion in this order (`airtruth.physics.sensors.at_instrument` and `measure`):
 position of the instrument, slope over alpha, lag, delay, scale, bias, noise, hold, quantisation, limits. aircraft.toml
-declares these errors by their `ErrorKind.key`; an effect (`airtruth.physics.terms.SensorTerm`) adds to those of the kinds in `Kind`.
+declares these errors by their `ErrorKind.key`; an effect (`airtruth.physics.terms.SensorTerm`) adds to those of the kinds in
+`Kind`.
 """
 
 from __future__ import annotations

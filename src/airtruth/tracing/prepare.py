@@ -187,13 +187,16 @@ def undo_input_sensors(s: Signals, aircraft: Aircraft) -> Signals:
         if late > 0.0:
             at = np.arange(len(x))
             x = np.interp(at + late, at, x)
-        x = errors.unscaled(x)
-        return x / errors.slope(fine(s.y[:, 0], cells)) if errors.alpha_slope_per_rad != 0.0 else x
+        return errors.unscaled(x)
 
+    airspeed = true("airspeed_m_s", s.airspeed_m_s, s.sub)
+    declared = aircraft.file.sensors.get("airspeed_m_s", Sensor()).errors()
+    if declared.alpha_slope_per_rad != 0.0:
+        airspeed = airspeed / declared.slope(fine(s.y[:, 0], s.sub))
     return replace(
         s,
         elevator_rad=true("elevator_rad", s.elevator_rad, s.sub * FINE),
-        airspeed_m_s=true("airspeed_m_s", s.airspeed_m_s, s.sub),
+        airspeed_m_s=airspeed,
         ground_m_s=true("airspeed_m_s", s.ground_m_s, s.sub),
     )
 

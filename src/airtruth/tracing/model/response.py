@@ -115,13 +115,12 @@ def _inputs(record: TraceRecord, compiled: CompiledChange) -> FilterInputs:
     fine = _undo(compiled, "elevator_rad", s.elevator_rad)
     if compiled.surface:
         fine = through(compiled.surface, fine, s.dt_s / (s.sub * FINE), s.elevator_std_rad)
-    v, ground = (_airspeed(compiled, s, x) for x in (s.airspeed_m_s, s.ground_m_s))
-    elevator = nodes(fine)
+    elevator, v = nodes(fine), _airspeed(compiled, s)
     lift, moment = _remainder(record, compiled, elevator.size)
     grid = GridSignals(
         elevator_rad=elevator,
         airspeed_m_s=v,
-        ground_m_s=ground,
+        ground_m_s=_undo(compiled, "airspeed_m_s", s.ground_m_s),
         qbar_pa=0.5 * s.density_kg_m3 * v * v,
         theta_rad=theta,
         lift=lift,
@@ -170,9 +169,12 @@ def _undo(compiled: CompiledChange, channel: str, x: Array) -> Array:
     return x if errors is None else errors.unscaled(x)
 
 
-def _airspeed(compiled: CompiledChange, s: Signals, x: Array) -> Array:
+def _airspeed(compiled: CompiledChange, s: Signals) -> Array:
+    """Airspeed without its errors; the speed over ground has no slope over alpha, because accelerations give its changes."""
     errors = compiled.inputs.get("airspeed_m_s")
-    return x if errors is None else errors.unscaled(x) / errors.slope(on_grid(s.y[:, 0], s.sub))
+    if errors is None:
+        return s.airspeed_m_s
+    return errors.unscaled(s.airspeed_m_s) / errors.slope(on_grid(s.y[:, 0], s.sub))
 
 
 def respond(
