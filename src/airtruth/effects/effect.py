@@ -46,7 +46,7 @@ class Parameter:
     sign : sign of the size of every real aircraft, 0 where both occur. A campaign may fly the other; a trace does not
         accept it.
     spans : largest size in wing spans of a real aircraft; a trace accepts no larger one.
-    prior_std : standard deviation of a normal prior of the size about zero; infinite for none.
+    prior_std, prior_mean : of a normal prior of the size; an infinite standard deviation for none.
     scales_with : derivative with which ``material`` scales, which is that of the GTM; empty for none.
     """
 
@@ -66,6 +66,7 @@ class Parameter:
     sign: Literal[-1, 0, 1] = 0
     spans: float = math.inf
     prior_std: float = math.inf
+    prior_mean: float = 0.0
     scales_with: str = ""
 
     def for_aircraft(self, derivatives: Mapping[str, float]) -> Parameter:

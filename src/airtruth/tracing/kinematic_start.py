@@ -11,6 +11,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Final
 
+import numpy as np
+
 from airtruth.aircraft import Aircraft
 from airtruth.checks.kinematics import AIRSPEED, NAMED, check_kinematics, declared_errors
 from airtruth.checks.kinematics_model import ERRORS
@@ -26,6 +28,9 @@ from airtruth.units import printed
 _ERRORS: Final = 5.0
 """Standard errors of the kinematic check beyond which it excludes an error of a sensor [-] (judgement: its noise is not
 quite white)."""
+_MOST_ERRORS: Final = 6.0
+"""Standard errors at most by which the check's estimate differs from none where it is a prior [-] (judgement: more than this is
+certain, and less than the errors of a kinematic model that knows neither lags of the pneumatics nor bending)."""
 _FITS: Final = 0.05
 """Probability of the check's absolute test from which it fits the records [-] (convention)."""
 _IMPOSSIBLE: Final = 1e-6
@@ -69,7 +74,8 @@ def within_kinematics(effects: Sequence[Effect], check: CheckResult | None) -> t
     """The effects; errors of sensors have the range that a check allows, if the check needs none of them.
 
     A range ends `_ERRORS` standard errors from the estimate of the check, and contains the neutral value. A refit that ends at
-    an end of its range is not accepted. Errors that the records do not show keep their range.
+    an end of its range is not accepted. Errors that the records do not show keep their range. An error of the airspeed that the
+    check names has its estimate as a prior besides: the filter takes the airspeed as it is, and no output of it shows its error.
     """
     if check is None:
         return tuple(effects)
@@ -88,7 +94,11 @@ def _limited(effect: Effect, found: Finding) -> Effect:
         _beyond_declared(replace(found, value=x)) for x in (found.value - reach, found.value + reach)
     )
     low, high = max(only.low, min(low, only.neutral)), min(only.high, max(high, only.neutral))
-    return replace(effect, parameters=(replace(only, low=low, high=high),))
+    limited = replace(only, low=low, high=high)
+    if found.name in AIRSPEED and found.state in NAMED:
+        size = only.size(_beyond_declared(found))
+        limited = replace(limited, prior_mean=size, prior_std=float(np.hypot(found.std, size / _MOST_ERRORS)))
+    return replace(effect, parameters=(limited,))
 
 
 def _of_airspeed(check: CheckResult) -> list[Finding]:

@@ -55,7 +55,9 @@ def leave_one_out(problem: TraceProblem, fitted: PosteriorFit) -> LeftOut:
     nothing = np.zeros_like(priors.common)
 
     def one(i: int) -> Assessment:
-        alone = Priors(nothing, np.zeros_like(priors.sizes), priors.per_record[i : i + 1])
+        alone = Priors(
+            nothing, np.zeros_like(priors.sizes), np.zeros_like(priors.pull), priors.per_record[i : i + 1]
+        )
         there = Parameters(np.zeros(Common.size), point.per_record[i : i + 1], point.sizes)
         gradient, information, _ = marginal_information(
             alone, there, terms[i : i + 1], levels=True, fixed=fixed

@@ -114,8 +114,14 @@ class Hypothesis:
 
     @cached_property
     def size_precision(self) -> Array:
-        """(sizes,) precision of the normal prior of each size about zero; zero for none."""
+        """(sizes,) precision of the normal prior of each size; zero for none."""
         return np.array([self.parameter(k).prior_std for k in range(len(self.parameters))]) ** -2.0
+
+    @cached_property
+    def size_pull(self) -> Array:
+        """(sizes,) precision of the normal prior of each size times its mean."""
+        means = np.array([self.parameter(k).prior_mean for k in range(len(self.parameters))])
+        return np.asarray(self.size_precision * means)
 
     def plus(self, effect: Effect) -> Hypothesis:
         """The hypothesis with one effect more."""

@@ -57,12 +57,13 @@ class Priors(NamedTuple):
     Attributes
     ----------
     common : (common, common) precision of the common parameters about zero.
-    sizes : (sizes,) precision of each size about zero.
+    sizes, pull : (sizes,) precision of each size, and precision times mean.
     per_record : mean (per-record,) and precision (per-record, per-record) of each record.
     """
 
     common: Array
     sizes: Array
+    pull: Array
     per_record: tuple[tuple[Array, Array], ...]
 
 
@@ -79,7 +80,7 @@ class TraceProblem:
         free = hypothesis.unconstrained
         own = tuple(per_record_prior(r, self.settings, free) for r in self.records)
         common = common_prior(self.records, self.settings, free, hypothesis.spread)
-        return Priors(common, hypothesis.size_precision, own)
+        return Priors(common, hypothesis.size_precision, hypothesis.size_pull, own)
 
     @property
     def declared_derivatives(self) -> Array:
@@ -303,8 +304,9 @@ def likelihood_terms(sensitivities: Sensitivities, whitener: Whitener, levels: b
 
 
 def prior_cost(priors: Priors, point: Parameters) -> float:
-    """Negative logarithm of the prior density, without constants."""
+    """Negative logarithm of the prior density, without constants; that of a size is zero where its effect is absent."""
     total = 0.5 * float(point.common @ priors.common @ point.common + priors.sizes @ point.sizes**2)
+    total -= float(priors.pull @ point.sizes)
     for (mean, precision), own in zip(priors.per_record, point.per_record, strict=True):
         off = own - mean
         total += 0.5 * float(off @ precision @ off)
@@ -357,7 +359,7 @@ def marginal_information(
     gradient[common] = priors.common @ point.common
     sizes = np.arange(len(priors.sizes)) + common.stop
     information[sizes, sizes] = priors.sizes
-    gradient[sizes] = priors.sizes * point.sizes
+    gradient[sizes] = priors.sizes * point.sizes - priors.pull
     eliminated = []
     level = PerRecord.log_gust
     for (mean, precision), values, (_, g, h) in zip(priors.per_record, point.per_record, terms, strict=True):
