@@ -175,7 +175,8 @@ def tested_on_left_out(
     """Whether a fit worsens likelihood or free run of records left out.
 
     In a closed loop the likelihood alone counts where the gain in 2 log L is beyond doubt: there a free run is no valid test, and
-    refuses effects of little evidence all the same.
+    refuses effects of little evidence all the same. The same holds for an airspeed that follows the measured angle of attack:
+    uncorrected, it brings the gusts of the angle of attack into a free run.
     """
     for way, before in zip(_ways(problem), reference.left_out, strict=True):
         likelihood, after = way(problem, own)
@@ -187,15 +188,18 @@ def tested_on_left_out(
     free, covariance = _free_run_gain(problem, unaided, after, reference.weight)
     loses = free.sum() < -_FREE_ERRORS * np.sqrt(max(float(covariance.sum()), 0.0))
     in_channels = loses_in_two_channels(free.sum(axis=0), covariance)
+    in_loop = reference.in_loop or reads_alpha(own)
     reasons = (
         *([WORSE_LIKELIHOOD] if _is_loss(likelihood_gain) else []),
-        *(
-            [WORSE_FREE_RUN]
-            if (loses or in_channels) and not (reference.in_loop and gain >= _BEYOND_DOUBT)
-            else []
-        ),
+        *([WORSE_FREE_RUN] if (loses or in_channels) and not (in_loop and gain >= _BEYOND_DOUBT) else []),
     )
     return LeftOutTest(likelihood_gain, free.sum(axis=1), reasons)
+
+
+def reads_alpha(own: PosteriorFit) -> bool:
+    """Whether a fit corrects an input by the measured angle of attack."""
+    errors = own.hypothesis.compiled(own.point.sizes).inputs.values()
+    return any(e.alpha_slope_per_rad != 0.0 for e in errors)
 
 
 def predicts_records_left_out(problem: TraceProblem, null: PosteriorFit, fitted: PosteriorFit) -> bool:
