@@ -199,7 +199,12 @@ def records(paths, wanted, plane):
                 y = smooth(y, dt) if name == "airspeed_m_s" else y
                 y = np.interp(grid + late, np.arange(len(y)), y)
                 y = y - quantity(plane.sensors, name, "bias", 0.0)
-                inputs[name] = y / quantity(plane.sensors, name, "scale", 1.0)
+                y = y / quantity(plane.sensors, name, "scale", 1.0)
+                slope = quantity(plane.sensors, name, "alpha_slope", 0.0)
+                alpha = rows["alpha_rad"].to_numpy(float)
+                inputs[name] = y / (
+                    1.0 + slope * (np.interp(grid, np.arange(len(alpha)), alpha) - alpha.mean())
+                )
             density = float(rows["density_kg_m3"].mean())
             eas = float(inputs["airspeed_m_s"].mean()) * math.sqrt(density / 1.225)
             yield (

@@ -116,7 +116,13 @@ def measured(true, errors):
         "az_m_s2": late(az, e["sensor_delay:az_m_s2"], e["accelerometer_scale"]),
         "q_rad_s": late(true["q_rad_s"], e["sensor_delay:q_rad_s"], e["gyro_scale"]),
         "theta_rad": late(true["theta_rad"], e["sensor_delay:theta_rad"], 1.0, e["attitude_lag"]),
-        "airspeed_m_s": late(true["airspeed_m_s"], e["sensor_delay:airspeed_m_s"], e["airspeed_scale"]),
+        "airspeed_m_s": late(
+            sensors.at_instrument(
+                "airspeed_m_s", true, SensorErrors(alpha_slope_per_rad=e["airspeed_alpha_slope"])
+            ),
+            e["sensor_delay:airspeed_m_s"],
+            e["airspeed_scale"],
+        ),
     }
 
 
@@ -217,6 +223,7 @@ def problem(channels, equations=("theta", "alpha"), errors=None):
             {"gyro_scale": 2e-3, "sensor_delay:q_rad_s": 1e-3},
         ),
         ("airspeed", {"sensor_delay:airspeed_m_s": 0.2}, {"sensor_delay:airspeed_m_s": 0.02}),
+        ("airspeed", {"airspeed_alpha_slope": -0.4}, {"airspeed_alpha_slope": 5e-3}),
     ],
 )
 def test_errors_of_a_quiet_record_are_found(equation, errors, tolerance, true):

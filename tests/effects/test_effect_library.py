@@ -40,11 +40,12 @@ CONTRACT = {
     "gyro_scale": ["factor"],
     "accelerometer_scale": ["factor"],
     "airspeed_scale": ["factor"],
+    "airspeed_alpha_slope": ["slope_per_rad"],
     "vane_bias": ["value"],
     "gyro_bias": ["value"],
     "accelerometer_bias": ["value"],
     "accelerometer_arm": ["x_m"],
-    "sensor_delay": ["delay_s"] * 3,
+    "sensor_delay": ["delay_s"] * 4,
     "horizontal_gust": ["factor"],
     "gust_level": ["factor"],
 }
@@ -63,7 +64,12 @@ def test_units_of_biases():
 
 
 def test_variants():
-    assert {e.variant for e in library.named("sensor_delay")} == {"alpha_rad", "q_rad_s", "az_m_s2"}
+    assert {e.variant for e in library.named("sensor_delay")} == {
+        "alpha_rad",
+        "q_rad_s",
+        "az_m_s2",
+        "elevator_rad",
+    }
     assert library.chosen("sensor_delay", "q_rad_s").key == "sensor_delay:q_rad_s"
 
 

@@ -14,7 +14,7 @@ from airtruth.identification.store import write_estimates
 from airtruth.identification.stored import read_stored
 from airtruth.numerics.prefilter import butterworth, zero_phase
 from airtruth.physics.sensor_errors import SensorErrors
-from airtruth.physics.sensors import accelerometer_az, measure, vane_alpha
+from airtruth.physics.sensors import accelerometer_az, at_instrument, measure, vane_alpha
 from airtruth.physics.short_period import PARAMETERS, system
 from airtruth.quantity import Quantity
 from validation.linear_flight import DEG, GTM, THETA, as_log, fly, gtm_scale
@@ -120,6 +120,16 @@ def test_a_declared_scale_delay_or_lag_is_undone(fine, true, channel, errors, at
     reading = logged(replace(fine, channels={**fine.channels, channel: values}))
     ideal = percent(true, declaring(), "iv-f1")
     np.testing.assert_allclose(percent(reading, plane, "iv-f1"), ideal, atol=atol, rtol=0.0)
+
+
+def test_a_declared_position_error_is_undone(true):
+    """The reading divided by 1 + slope (alpha - mean alpha) is the airspeed itself, to rounding."""
+    plane = declaring(airspeed_m_s={"alpha_slope": -0.8})
+    taken = taken_out(plane)
+    assert taken == {"airspeed_m_s": {"alpha_slope_per_rad": -0.8}}
+    read = at_instrument("airspeed_m_s", true.channels, SensorErrors(alpha_slope_per_rad=-0.8))
+    made = as_ideal(replace(true, channels={**true.channels, "airspeed_m_s": read}), taken)
+    np.testing.assert_allclose(made.channels["airspeed_m_s"], true.channels["airspeed_m_s"], rtol=1e-14)
 
 
 def test_the_channels_themselves_are_the_true_ones(true):

@@ -233,6 +233,16 @@ def test_each_channel_is_moved_to_its_instrument(x: float, z: float) -> None:
         np.testing.assert_allclose(moved, expected[name], rtol=1e-14)
 
 
+def test_a_position_error_follows_the_angle_of_attack_about_its_mean() -> None:
+    """By hand: alpha of 0.02, 0.06, 0.10 about its mean 0.06, slope -0.5: 2 % too much, right, 2 % too little."""
+    truth = {
+        "airspeed_m_s": np.full((2, 3), 50.0),
+        "alpha_rad": np.array([[0.02, 0.06, 0.10], [0.1, 0.1, 0.1]]),
+    }
+    read = sensors.at_instrument("airspeed_m_s", truth, SensorErrors(alpha_slope_per_rad=-0.5))
+    np.testing.assert_allclose(read, [[51.0, 50.0, 49.0], [50.0, 50.0, 50.0]], rtol=1e-15)
+
+
 def test_an_instrument_at_the_centre_of_gravity_needs_no_rates() -> None:
     truth = {"alpha_rad": np.zeros((1, 3))}
     assert sensors.at_instrument("alpha_rad", truth, SensorErrors()) is truth["alpha_rad"]

@@ -41,6 +41,7 @@ FLOWN = {
     "gyro_scale": ({"factor": 1.1}, LIGHT),
     "accelerometer_scale": ({"factor": 1.1}, LIGHT),
     "airspeed_scale": ({"factor": 1.08}, LIGHT),
+    "airspeed_alpha_slope": ({"slope_per_rad": -0.6}, LIGHT),
     "vane_bias": ({"value": 3.0 * DEG}, LIGHT),
     "gyro_bias": ({"value": 3.0 * DEG}, LIGHT),
     "accelerometer_bias": ({"value": 1.0}, CALM),
@@ -48,6 +49,7 @@ FLOWN = {
     "sensor_delay:alpha_rad": ({"delay_s": 0.03}, LIGHT),
     "sensor_delay:q_rad_s": ({"delay_s": 0.03}, LIGHT),
     "sensor_delay:az_m_s2": ({"delay_s": 0.03}, LIGHT),
+    "sensor_delay:elevator_rad": ({"delay_s": 0.03}, LIGHT),
 }
 """Sizes several times what light or calm air lets be traced (noncentrality 16) from two fitted records."""
 ABSORBED = {

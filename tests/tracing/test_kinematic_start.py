@@ -103,6 +103,38 @@ def test_a_bias_of_the_check_is_compared_with_that_of_the_trace():
     assert with_contradictions(Answer((agrees,)), check, 0.02) == Answer((agrees,))
 
 
+def airspeed_check(state):
+    """A check whose equation of airspeed has a slope of -0.5 with a standard error of 0.02 [1/rad]."""
+    found = Finding("airspeed_alpha_slope", "1/rad", "", -0.5, 0.02, -0.54, -0.46, 0.0, 0.07, state)
+    return SimpleNamespace(
+        verdict="errors", possible=(SimpleNamespace(errors=()),), findings=(found,), p_value=0.4
+    )
+
+
+def test_a_position_error_of_the_check_is_a_start_and_a_prior():
+    """The prior has the check's estimate; it is no more than six standard errors from none: hypot(0.02, 0.5/6)."""
+    check, effect = airspeed_check("present"), EFFECTS["airspeed_alpha_slope"]
+    assert starts_of(check) == {"airspeed_alpha_slope": -0.5}
+    ((only,),) = (e.parameters for e in within_kinematics([effect], check))
+    assert (only.prior_mean, only.prior_std) == pytest.approx((-0.5, 0.0856997), abs=1e-6)
+    assert (only.low, only.high) == pytest.approx((-0.6, 0.0))
+    ((none,),) = (e.parameters for e in within_kinematics([effect], airspeed_check("not needed")))
+    assert none.prior_std == float("inf")
+
+
+def test_an_answer_without_the_position_error_of_the_check_is_provisional():
+    lift = AcceptedEffect("cl_alpha_nonlinear", {}, 1e-9, 5.0)
+    (note,) = disagreement(airspeed_check("present"), SimpleNamespace(effects=(lift,)), 0.02)
+    assert note.startswith(
+        "the airspeed contradicts ax, az and theta unless its reading changes with the angle"
+    )
+    assert disagreement(airspeed_check("not needed"), SimpleNamespace(effects=(lift,)), 0.02) == []
+    own = AcceptedEffect(
+        "airspeed_alpha_slope", {"slope_per_rad": ParameterEstimate(-0.5, 0.02, (-0.54, -0.46))}, 1e-9, 5.0
+    )
+    assert disagreement(airspeed_check("present"), SimpleNamespace(effects=(own,)), 0.02) == []
+
+
 def test_half_a_sample_is_no_contradiction():
     """A gyro late by 13 ms, which the trace does not name: of 20 Hz samples a quarter, of 50 Hz samples two thirds."""
     found = Finding("gyro_lag", "s", "", 0.013, 0.001, 0.011, 0.015, 0.0, 0.004, "present")

@@ -151,6 +151,14 @@ def test_a_name_of_a_declared_model_that_is_not_contradicted_is_provisional():
     assert reservations(effects("increment"), (), declared_p_value=0.013) == ()
 
 
+def test_a_name_of_weak_evidence_among_all_candidates_is_provisional():
+    """Unmodelled 33 of seed 20262217: a step of Cm was called a lag of lift, p = 0.013."""
+    weak = [replace(e, p_value=0.013) for e in effects("lift_alpha_dot")]
+    (reason,) = reservations(weak, ())
+    assert reason.startswith("the score of lift_alpha_dot alone is weak among all candidates (p above 0.01)")
+    assert reservations([replace(weak[0], p_value=0.01)], ()) == ()
+
+
 def test_an_error_of_the_vane_beside_a_friction_of_the_vane_is_provisional():
     for name in ("vane_lag", "vane_scale"):
         (reason,) = reservations(effects(name), (), friction_p_value=DOUBT)

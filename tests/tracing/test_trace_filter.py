@@ -13,7 +13,7 @@ from airtruth.physics.terms import AeroTerm, Change, ReadingTerm, SensorTerm, St
 from airtruth.tracing.inference.optimise import initial_parameters
 from airtruth.tracing.model.linearise import gain
 from airtruth.tracing.model.parameters import Common, PerRecord
-from airtruth.tracing.model.response import LOST, External, respond
+from airtruth.tracing.model.response import LOST, External, filter_inputs, respond
 from airtruth.units import DEG, G0
 
 
@@ -178,6 +178,29 @@ def test_scales_and_arms():
         [1.1 * (y[:, 0] - 0.8 / tr.V * y[:, 1]), 0.9 * y[:, 1], 1.05 * (y[:, 2] + 0.3 * q_dot)]
     )
     tr.close(tr.free(change), expected, 1e-6)
+
+
+def test_a_late_reading_of_the_surface_is_an_early_surface():
+    """An elevator that is recorded 40 ms late and acts 40 ms late is the recorded one; the reading alone is 40 ms ahead."""
+    sensor, surface = SensorTerm("elevator_rad", "delay", 0.04), SurfaceTerm("delay", 0.04)
+    np.testing.assert_allclose(
+        tr.free(Change(sensors=(sensor,), surface=(surface,))), tr.free(Change()), atol=1e-12
+    )
+    early = tr.free(Change(surface=(SurfaceTerm("delay", -0.04),)))
+    np.testing.assert_array_equal(tr.free(Change(sensors=(sensor,))), early)
+
+
+def test_the_position_error_of_the_airspeed_is_taken_out_of_the_dynamic_pressure():
+    """By hand: alpha of -0.1, 0, 0.1 rad about its mean and a slope of 0.5: readings of 0.95, 1, 1.05 V are V."""
+    y = np.zeros((3, 3))
+    y[:, 0] = 0.02 + np.array([-0.1, 0.0, 0.1])
+    speed = np.interp(np.arange(5) / 2, np.arange(3), tr.V * np.array([0.95, 1.0, 1.05]))
+    made = tr.record(y, 0.0)
+    made = replace(made, signals=replace(made.signals, airspeed_m_s=speed))
+    change = Change(sensors=(SensorTerm("airspeed_m_s", "alpha_slope", 0.5),))
+    grid = filter_inputs(made, change).grid
+    np.testing.assert_allclose(grid.airspeed_m_s, tr.V, rtol=1e-14)
+    np.testing.assert_allclose(grid.qbar_pa, 0.5 * tr.DENSITY * tr.V**2, rtol=1e-14)
 
 
 def test_bias_adds_after_all():

@@ -159,7 +159,7 @@ EFFECTS: Final = (
         "airspeed_m_s",
         "alpha_slope",
         Parameter(
-            "slope",
+            "slope_per_rad",
             "per_rad",
             "relative, of airspeed_m_s over alpha",
             low=-2.0,
@@ -182,6 +182,6 @@ EFFECTS: Final = (
         0.02,
         "Survey the position, or compare inertial alpha with the vane.",
     ),
-    *(_delay(channel) for channel in ("alpha_rad", "q_rad_s", "az_m_s2")),
+    *(_delay(channel) for channel in ("alpha_rad", "q_rad_s", "az_m_s2", "elevator_rad")),
 )
 """Effects of this module."""

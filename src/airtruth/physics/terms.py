@@ -28,6 +28,8 @@ MEASURED: Final = ("alpha", "elevator", "qhat", "qbar")
 """Signals that a log measures; a `ReadingTerm` names one of these or a state."""
 READINGS: Final = ("alpha_rad", "q_rad_s", "az_m_s2")
 """Channels of a `ReadingTerm`, the outputs of the filter."""
+ELEVATOR: Final = "elevator_rad"
+"""Channel of the measured surface."""
 SHAPES: Final = ("linear", "quadratic", "above", "below")
 """Functions f of an `AeroTerm` or a `ReadingTerm`, see `shape_of`; their order numbers them for compiled code."""
 FORMULAS: Final[Mapping[str, str]] = {
@@ -310,6 +312,18 @@ class Change:
     def in_aircraft(self) -> bool:
         """Whether it changes the JSBSim model itself, and not its sensors or the air alone."""
         return bool(self.surface or self.aero or self.declared or self.derivatives)
+
+    @property
+    def surface_path(self) -> tuple[SurfaceTerm, ...]:
+        """Elements between the reading of the elevator and the air: a late reading is a negative delay before `surface`.
+
+        Examples
+        --------
+        >>> Change(sensors=(SensorTerm(ELEVATOR, "delay", 0.02),)).surface_path
+        (SurfaceTerm(kind='delay', value=-0.02),)
+        """
+        late = sum(t.value for t in self.sensors if (t.channel, t.kind) == (ELEVATOR, "delay"))
+        return (SurfaceTerm("delay", -late), *self.surface) if late != 0.0 else self.surface
 
     @property
     def in_motion(self) -> Change:

@@ -14,6 +14,7 @@ from airtruth.physics.sensor_errors import KINDS, Kind, SensorErrors
 from airtruth.physics.terms import (
     DECLARED,
     DRIVERS,
+    ELEVATOR,
     FACTORS,
     READINGS,
     SHAPES,
@@ -45,7 +46,7 @@ class CompiledChange:
 
     Attributes
     ----------
-    surface : terms between the measured surface and the air.
+    surface : terms between the reading of the surface and the air, `Change.surface_path`.
     effects : terms and states, for the filter's kernel.
     effect_states, motion : first state of each effect with states; states up to the last of them.
     declared : quantity of `airtruth.physics.terms.DECLARED` -> all its terms together.
@@ -92,10 +93,10 @@ def compile_change(change: Change) -> CompiledChange:
             at = CHANNELS.index(sensor.channel)
             of_kind = outputs[sensor.kind]
             of_kind[at] = KINDS[sensor.kind].combined(float(of_kind[at]), sensor.value)
-        else:
+        elif (sensor.channel, sensor.kind) != (ELEVATOR, "delay"):
             inputs[sensor.channel] = _with_error(inputs.get(sensor.channel, SensorErrors()), sensor)
     return CompiledChange(
-        surface=change.surface,
+        surface=change.surface_path,
         effects=_effects(change, first),
         effect_states=first,
         motion=motion,
