@@ -16,6 +16,7 @@ from airtruth.physics.short_period import PARAMETERS
 from airtruth.tracing.answer import (
     ANOMALY_LEVEL,
     AcceptedEffect,
+    Alternative,
     CandidateScore,
     DeclaredModel,
     Derivatives,
@@ -41,6 +42,7 @@ from airtruth.tracing.declared_model import (
 from airtruth.tracing.friction import LATE_VANE, imitated_lag_s
 from airtruth.tracing.increment_table import in_physical_terms, increment_rows, least_certain
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, derivative_likelihood
+from airtruth.tracing.inference.homogeneity import Homogeneity, homogeneity
 from airtruth.tracing.inference.hypothesis import is_curvature
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.inference.robust import robust_covariance
@@ -48,6 +50,7 @@ from airtruth.tracing.intervals import at_measured_alpha, estimates, widened_by_
 from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.notes import notes
 from airtruth.tracing.prepare import Case
+from airtruth.tracing.record_differences import CERTAIN, DIFFERENCES, differences
 from airtruth.tracing.replay import worsened
 from airtruth.tracing.reservations import reservations
 from airtruth.tracing.selection.acceptance import SURPASSED, Candidate
@@ -102,29 +105,31 @@ def conclude(
     sets = alternatives(rounds)
     likelihood = derivative_likelihood(case.fitted, first.null)
     sizes = cause_sizes(likelihood, case.declared)
-    verdict = _verdict((*stated, *along), declared)
     confirmed = confirmation(stages)
-    late = any(e.key in LATE_VANE for e in stated)
-    lag_s = imitated_lag_s(case.fitted, last.reported) if late else 0.0
-    reserved = reservations((*stated, *along), sets, declared.p_value, last.p_value_of(FRICTION), lag_s)
+    shown = (*stated, *along)
+    agreement = homogeneity(case.fitted, last.reported)
+    reserved = _reserved(case.fitted, last, shown, sets, declared, agreement)
+    verdict = _verdict(shown, declared, agreement)
+    if verdict == "unexplained" and declared.consistent:
+        anomaly = remaining = Anomaly(DIFFERENCES, agreement.statistic, agreement.degrees, agreement.p_value)
     errors = stage_errors(stages)
     return TraceAnswer(
         verdict=verdict,
         provisional=case.held is None
         or confirmed is False
         or bool(case.left_out)
-        or bool(reserved)
+        or bool(shown and reserved)
         or bool(worsened(replay))
-        or (bool(stated or along) and remaining.p_value <= ANOMALY_LEVEL),
+        or (bool(shown) and remaining.p_value <= ANOMALY_LEVEL),
         anomaly=_evidence(anomaly),
         remaining=_evidence(remaining),
-        effects=(*stated, *along),
+        effects=shown,
         candidates=_candidates(case, rounds, stated, sizes),
         error=errors,
         derivatives=_derivatives(case, rounds, covariance),
         updated_aircraft=updated_aircraft,
         detectability=_detectability(case, rounds, likelihood, sizes),
-        next_flight=_next_flight(effects, verdict, remaining, list(least_certain((*stated, *along)))),
+        next_flight=_next_flight(effects, verdict, remaining, list(least_certain(shown))),
         model=case.model,
         records=RecordNames(
             tuple(dict.fromkeys(r.signals.record for r in case.fitted.records)),
@@ -147,6 +152,21 @@ def conclude(
     )
 
 
+def _reserved(
+    problem: TraceProblem,
+    last: SearchRound,
+    effects: Sequence[AcceptedEffect],
+    sets: Sequence[Alternative],
+    declared: DeclaredModel,
+    agreement: Homogeneity,
+) -> tuple[str, ...]:
+    """Each reason against relying on the effects, and how the records differ, in words."""
+    late = any(e.key in LATE_VANE for e in effects)
+    lag_s = imitated_lag_s(problem, last.reported) if late else 0.0
+    differ = differences(agreement, [r.signals.run_id for r in problem.records], bool(effects))
+    return (*reservations(effects, sets, declared.p_value, last.p_value_of(FRICTION), lag_s), *differ)
+
+
 def _unwritten(
     case: Case, effects: Sequence[AcceptedEffect], updated: str | None, replay: Replay | None
 ) -> Iterator[str]:
@@ -158,9 +178,11 @@ def _unwritten(
         )
 
 
-def _verdict(effects: Sequence[AcceptedEffect], declared: DeclaredModel) -> VerdictName:
+def _verdict(
+    effects: Sequence[AcceptedEffect], declared: DeclaredModel, agreement: Homogeneity
+) -> VerdictName:
     if not effects:
-        return "none" if declared.consistent else "unexplained"
+        return "none" if declared.consistent and agreement.p_value >= CERTAIN else "unexplained"
     if any(e.acts_on is not None for e in effects):
         return "learned"
     return "one_of" if any(e.indistinguishable_from for e in effects) else "traced"

@@ -12,7 +12,7 @@ Theory 21 (2005) 1130-1164; few clusters, C. B. Hansen, J. Econometrics 141 (200
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +76,32 @@ def scatter(problem: TraceProblem, fitted: PosteriorFit) -> Array:
     off = x - x.mean(axis=0)
     total = n / (n - 1.0) * off.T @ off + _prior_information(problem, fitted)
     return _ratio(problem, fitted, total)
+
+
+class MarginalSlope(NamedTuple):
+    """Slope (parameters,) of the negative log-likelihood of one record, and information (parameters, parameters).
+
+    The parameters are common parameters and sizes. The record's own are eliminated: ``own`` (per-record, parameters) times a step
+    of the others is the step that they take.
+    """
+
+    slope: Array
+    information: Array
+    own: Array
+
+
+def marginal_slopes(problem: TraceProblem, fitted: PosteriorFit) -> list[MarginalSlope]:
+    """Slope and information of common parameters and sizes in each record; no prior of theirs counts."""
+    marginal = fitted.layout.marginal
+    levels = fitted.whitener.order == 0
+    found = []
+    for at, (slopes, own, mixed) in zip(fitted.sensitivities, _slopes(problem, fitted), strict=True):
+        free = slopes[:, marginal.stop : marginal.stop + own.shape[0]]
+        x = (slopes[:, marginal] - free @ np.linalg.solve(own, mixed.T)).sum(axis=0)
+        plain = likelihood_terms(at, fitted.whitener, levels).information[marginal, marginal]
+        follow = np.linalg.solve(own, mixed.T)
+        found.append(MarginalSlope(x, plain - mixed @ follow, np.asarray(-follow)))
+    return found
 
 
 def _prior_information(problem: TraceProblem, fitted: PosteriorFit) -> Array:
@@ -144,4 +170,12 @@ def mean_share(samples: int, lags: int) -> float:
     return 1.0 - every / samples**2
 
 
-__all__ = ["MEMORY_S", "inflation", "long_run", "mean_share", "robust_covariance", "scatter"]
+__all__ = [
+    "MEMORY_S",
+    "inflation",
+    "long_run",
+    "marginal_slopes",
+    "mean_share",
+    "robust_covariance",
+    "scatter",
+]
