@@ -12,6 +12,7 @@ from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
 from airtruth.tracing.answer import TraceAnswer
 from airtruth.tracing.presentation.charts import chart_of_shifts, scores_chart
 from airtruth.tracing.presentation.effect_panel import learned_panel
+from airtruth.tracing.presentation.files import mark_provisional
 from airtruth.tracing.presentation.text import headline
 
 SAMPLE = json.loads((Path(__file__).resolve().parents[1] / "reporting" / "trace_sample.json").read_text())
@@ -71,3 +72,15 @@ def test_a_learned_increment_has_the_unit_of_what_it_changes(acts_on, by, label,
     panel = learned_panel(effect, table)
     assert (panel.x_label, panel.y_label) == ("alpha [deg]", label)
     np.testing.assert_allclose(panel.lines[0].y, np.multiply(factor, table.value), rtol=1e-12)
+
+
+def test_the_updated_aircraft_of_a_provisional_answer_says_so(answer, tmp_path):
+    stated = replace(answer, updated_aircraft=str(tmp_path), notes=("the records differ",))
+    assert mark_provisional(replace(stated, provisional=False)) is None
+    assert mark_provisional(replace(stated, provisional=True, updated_aircraft=None)) is None
+    assert not list(tmp_path.iterdir())
+    file = mark_provisional(replace(stated, provisional=True))
+    text = file.read_text()
+    assert file == tmp_path / "provisional.txt"
+    assert "Provisional:" in text
+    assert text.endswith("the records differ.\n")

@@ -80,9 +80,10 @@ class TraceResult:
         StoreError
             If a file cannot be written.
         """
-        from airtruth.tracing.presentation.files import write_evidence
+        from airtruth.tracing.presentation.files import mark_provisional, write_evidence
 
         write_evidence(self.answer, self.histories, out)
+        mark_provisional(self.answer)
         write_text(out / ANSWER, self.answer.to_json())
 
     def _repr_html_(self) -> str:
