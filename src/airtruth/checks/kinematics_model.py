@@ -28,7 +28,7 @@ from airtruth.checks.samples import derivative, earlier, integral, lagged
 from airtruth.numerics.prefilter import butterworth, zero_phase
 from airtruth.physics.sensor_errors import KINDS, Kind, error_name
 from airtruth.physics.sensors import vane_equation
-from airtruth.units import G0, UNITS
+from airtruth.units import G0, UNITS, printed
 
 Array = NDArray[np.float64]
 
@@ -123,8 +123,8 @@ class InstrumentError:
 
     @property
     def unit(self) -> str:
-        """Unit, "-" for none."""
-        return next(iter(UNITS[KINDS[self.kind].dimension])) or "-"
+        """Unit as it is printed, "-" for none."""
+        return printed(next(iter(UNITS[KINDS[self.kind].dimension]))) or "-"
 
     @property
     def neutral(self) -> float:

@@ -23,7 +23,6 @@ from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.sensor_errors import KINDS
 from airtruth.tracing.answer import Evidence, TraceAnswer
-from airtruth.units import printed
 
 _ERRORS: Final = 5.0
 """Standard errors of the kinematic check beyond which it excludes an error of a sensor [-] (judgement: its noise is not
@@ -131,7 +130,7 @@ def disagreement(check: CheckResult | None, answer: TraceAnswer, dt_s: float) ->
     ]
     result = [
         f"the airspeed contradicts ax, az and theta unless its reading changes with the angle of attack ({f.name} "
-        f"{f.lower:.2g} to {f.upper:.2g} {printed(f.unit)}), and the trace does not accept that error, so the answer is "
+        f"{f.lower:.2g} to {f.upper:.2g} {f.unit}), and the trace does not accept that error, so the answer is "
         "provisional; inspect `airtruth check`"
         for f in _of_airspeed(check)
         if f.name not in traced
