@@ -130,7 +130,7 @@ def test_dry_run_names_the_effects_and_the_copy_goes_with_its_plan(tmp_path):
         ({"name": "cm_alpha_nonlinear", "dCmalpha": 0.5}, "at_alpha_rad is missing"),
         (
             {"name": "sensor_delay", "delay_s": 0.02},
-            "state its variant; allowed: alpha_rad, az_m_s2, q_rad_s",
+            "state its variant; allowed: alpha_rad, az_m_s2, elevator_rad, q_rad_s",
         ),
         ({"name": "sensor_delay", "channel": "q_rads", "delay_s": 0.02}, "did you mean 'q_rad_s'"),
         (
