@@ -224,14 +224,22 @@ def test_whitener_filters_along_the_samples():
     """Two lags by hand."""
     rng = np.random.default_rng(9)
     a, root, x = rng.standard_normal((2, 3, 3)), rng.standard_normal((3, 3)), rng.standard_normal((5, 6, 3))
-    out = Whitener(a, root).apply(x)
+    start = rng.standard_normal((3, 3))
+    out = Whitener(a, root, start).apply(x)
     for n in range(5):
         for k in range(6):
-            left = x[n, k].copy()
-            for j in (1, 2):
-                if k >= j:
-                    left -= a[j - 1] @ x[n, k - j]
-            np.testing.assert_allclose(out[n, k], root @ left, rtol=1e-10, atol=1e-12)
+            past = [a[j - 1] @ x[n, k - j] for j in (1, 2) if k >= 2]
+            expected = root @ (x[n, k] - sum(past)) if past else start @ x[n, k]
+            np.testing.assert_allclose(out[n, k], expected, rtol=1e-10, atol=1e-12)
+
+
+def test_the_first_samples_of_a_smooth_record_do_not_outweigh_the_others():
+    """A pole of 0.999: the residual has a std of 0.045 times that of the series. The first sample counts as one sample of unit
+    variance (10.8 is the chi-square(1) quantile of 0.999); divided by the residual it counts some fifty times."""
+    records = innovations(np.random.default_rng(3), 0.999 * np.eye(3), 2000, 4)
+    found = autoregression(records)
+    first = np.concatenate([found.apply(r)[: found.order] for r in records])
+    assert np.square(first).max() < 10.8
 
 
 # -- the answer depends on the records alone

@@ -31,10 +31,12 @@ class Whitener:
     Attributes
     ----------
     coefficients : (order, 3, 3); root : (3, 3).
+    start : (3, 3) inverse root of the covariance of the innovations themselves, for the first samples, which have no past.
     """
 
     coefficients: Array
     root: Array
+    start: Array
 
     @property
     def order(self) -> int:
@@ -42,16 +44,22 @@ class Whitener:
         return int(self.coefficients.shape[0])
 
     def apply(self, x: Array) -> Array:
-        """Filter (..., samples, 3) along the samples; the first ones pass with the root alone."""
+        """Filter (..., samples, 3) along the samples.
+
+        The first ones are no residuals of the autoregression. A smooth record has residuals far smaller than its innovations, and
+        the first samples would outweigh all others if they were divided by them.
+        """
         if self.order == 0:
             return x
         out = x.copy()
         for j, a in enumerate(self.coefficients, start=1):
             out[..., j:, :] -= x[..., :-j, :] @ a.T
-        return np.asarray(out @ self.root.T)
+        out = out @ self.root.T
+        out[..., : self.order, :] = x[..., : self.order, :] @ self.start.T
+        return np.asarray(out)
 
 
-NO_WHITENER: Final = Whitener(np.zeros((0, OUTPUTS, OUTPUTS)), np.eye(OUTPUTS))
+NO_WHITENER: Final = Whitener(np.zeros((0, OUTPUTS, OUTPUTS)), np.eye(OUTPUTS), np.eye(OUTPUTS))
 """Leaves innovations as they are."""
 
 
@@ -65,6 +73,7 @@ def autoregression(innovations: Sequence[Array]) -> Whitener:
     y = np.concatenate([r[_ORDERS:] for r in innovations])
     square = np.mean(y**2, axis=0)
     lacking = np.where(square < _UNRESOLVED, 1.0 - square, 0.0)
+    start = np.linalg.inv(np.linalg.cholesky(y.T @ y / total + np.diag(lacking)))
     best, least = NO_WHITENER, np.inf
     for order in range(_ORDERS + 1):
         x = np.concatenate([_lagged(r, order) for r in innovations])
@@ -78,7 +87,7 @@ def autoregression(innovations: Sequence[Array]) -> Whitener:
             least, best = criterion, NO_WHITENER
             if order:
                 a = np.ascontiguousarray(b.T.reshape(OUTPUTS, order, OUTPUTS).transpose(1, 0, 2))
-                best = Whitener(a, np.linalg.inv(np.linalg.cholesky(sigma)))
+                best = Whitener(a, np.linalg.inv(np.linalg.cholesky(sigma)), start)
     return best
 
 
