@@ -52,7 +52,7 @@ EFFECTS: Final = (
         "transducer ahead of the linkage.",
         source="y(t) = x(t - delay). Material: 2 ms, a tenth of a sample at 50 Hz and 2 deg of phase at 3 Hz.",
         distinguished_by="A measured surface and a multisine up to 5 Hz distinguish it from a lag. If the surface is not "
-        "measured, an equal delay of every sensor looks the same, and so does one of all channels but the surface.",
+        "measured, an equal delay of every sensor looks the same.",
     ),
     Effect(
         name="actuator_lag",

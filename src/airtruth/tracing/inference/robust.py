@@ -54,8 +54,7 @@ def inflation(problem: TraceProblem, fitted: PosteriorFit, unbiased: bool = Fals
     marginal = fitted.layout.marginal
     total = _prior_information(problem, fitted)
     for record, (slopes, own, mixed) in zip(problem.records, _slopes(problem, fitted), strict=True):
-        free = slopes[:, marginal.stop : marginal.stop + own.shape[0]]
-        z = slopes[:, marginal] - free @ np.linalg.solve(own, mixed.T)
+        z, _ = _without_own(marginal, slopes, own, mixed)
         lags = round(MEMORY_S / record.signals.dt_s)
         total += long_run(z - z.mean(axis=0), lags) / (mean_share(len(z), lags) if unbiased else 1.0)
     return _ratio(problem, fitted, total)
@@ -96,12 +95,17 @@ def marginal_slopes(problem: TraceProblem, fitted: PosteriorFit) -> list[Margina
     levels = fitted.whitener.order == 0
     found = []
     for at, (slopes, own, mixed) in zip(fitted.sensitivities, _slopes(problem, fitted), strict=True):
-        free = slopes[:, marginal.stop : marginal.stop + own.shape[0]]
-        x = (slopes[:, marginal] - free @ np.linalg.solve(own, mixed.T)).sum(axis=0)
+        z, follow = _without_own(marginal, slopes, own, mixed)
         plain = likelihood_terms(at, fitted.whitener, levels).information[marginal, marginal]
-        follow = np.linalg.solve(own, mixed.T)
-        found.append(MarginalSlope(x, plain - mixed @ follow, np.asarray(-follow)))
+        found.append(MarginalSlope(z.sum(axis=0), plain - mixed @ follow, -follow))
     return found
+
+
+def _without_own(marginal: slice, slopes: Array, own: Array, mixed: Array) -> tuple[Array, Array]:
+    """Slopes (samples, parameters) with the record's own parameters eliminated, and what the elimination multiplies those by."""
+    follow = np.asarray(np.linalg.solve(own, mixed.T))
+    free = slopes[:, marginal.stop : marginal.stop + own.shape[0]]
+    return slopes[:, marginal] - free @ follow, follow
 
 
 def _prior_information(problem: TraceProblem, fitted: PosteriorFit) -> Array:
