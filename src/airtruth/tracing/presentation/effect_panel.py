@@ -208,7 +208,9 @@ def _estimates(answer: TraceAnswer) -> Panel:
                 Mark(len(rows), estimate.value, low, high, label="estimate, 95 %", colour="vermillion")
             )
             size = f"{significant(estimate.value)} {unit_of(effect.key, name)}".rstrip()
-            rows.append(f"{effect.name} {name} = {size}")
+            # the heading of the figure names a single effect; a long row would narrow the panels
+            of = f"{effect.key} " if len(answer.effects) > 1 else ""
+            rows.append(f"{of}{name} = {size}")
     known = (EFFECTS[e.key] for e in answer.effects if e.key in EFFECTS)
     neutral = {p.neutral for effect in known for p in effect.parameters if not p.is_location}
     return Panel(
