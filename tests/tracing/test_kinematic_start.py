@@ -14,6 +14,7 @@ from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.kinematic_start import (
     disagreement,
     kinematic_check,
+    sets_of,
     starts_of,
     with_contradictions,
     within_kinematics,
@@ -109,6 +110,23 @@ def airspeed_check(state):
     return SimpleNamespace(
         verdict="errors", possible=(SimpleNamespace(errors=()),), findings=(found,), p_value=0.4
     )
+
+
+def test_alternatives_of_a_check_are_sets_and_its_airspeed_belongs_to_each():
+    """Errors that the library lacks take no part: a lag of the attitude alone needs no effect."""
+    check = airspeed_check("not needed")
+    one, other, attitude = (
+        SimpleNamespace(name=n) for n in ("vane_arm", "accelerometer_arm", "attitude_lag")
+    )
+    check.possible = tuple(
+        SimpleNamespace(errors=errors) for errors in ((one,), (other, attitude), (attitude,))
+    )
+    arms = {"vane_arm"}, {"accelerometer_arm"}, set()
+    assert sets_of(check) == tuple(map(frozenset, arms))
+    check.findings = airspeed_check("present").findings
+    assert sets_of(check) == tuple(frozenset({*arm, "airspeed_alpha_slope"}) for arm in arms)
+    check.verdict = "failed"
+    assert sets_of(check) == sets_of(None) == ()
 
 
 def test_a_position_error_of_the_check_is_a_start_and_a_prior():

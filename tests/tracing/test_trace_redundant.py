@@ -10,8 +10,8 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.pruning import pruned
+from airtruth.tracing.selection.refit import redundant_effect
 from airtruth.tracing.selection.rounds import RoundStart, search_round, significant_gain
-from airtruth.tracing.selection.search import redundant_effect
 from airtruth.units import DEG
 
 EARLIER, LATER = EFFECTS["gyro_scale"], EFFECTS["accelerometer_scale"]

@@ -69,6 +69,17 @@ def starts_of(check: CheckResult | None) -> dict[str, float]:
     return {f.name: _beyond_declared(f) for f in check.findings if f.name in named and f.name in EFFECTS}
 
 
+def sets_of(check: CheckResult | None) -> tuple[frozenset[str], ...]:
+    """Sets of effects of the library that a check allows, the cheapest first; none where it names no error."""
+    if check is None or check.verdict not in ("errors", "one_of"):
+        return ()
+    airspeed = {f.name for f in _of_airspeed(check)}
+    sets = (
+        frozenset({f.name for f in cause.errors if f.name in EFFECTS} | airspeed) for cause in check.possible
+    )
+    return tuple(dict.fromkeys(sets))
+
+
 def within_kinematics(effects: Sequence[Effect], check: CheckResult | None) -> tuple[Effect, ...]:
     """The effects; errors of sensors have the range that a check allows, if the check needs none of them.
 
@@ -183,4 +194,11 @@ def _key(name: str, channel: str | None) -> str:
     return f"{name}:{channel}" if channel else name
 
 
-__all__ = ["disagreement", "kinematic_check", "starts_of", "with_contradictions", "within_kinematics"]
+__all__ = [
+    "disagreement",
+    "kinematic_check",
+    "sets_of",
+    "starts_of",
+    "with_contradictions",
+    "within_kinematics",
+]

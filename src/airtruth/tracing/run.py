@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from airtruth import __version__
 from airtruth import aircraft as planes
 from airtruth.aircraft import Aircraft
 from airtruth.checks import gate
+from airtruth.checks.result import CheckResult
 from airtruth.effects.effect import Effect
 from airtruth.effects.registry import EFFECTS
 from airtruth.errors import ConfigurationError, LogError, choices
@@ -26,6 +27,7 @@ from airtruth.tracing.conclude import conclude
 from airtruth.tracing.declared_model import declared_p_value
 from airtruth.tracing.kinematic_start import (
     kinematic_check,
+    sets_of,
     starts_of,
     with_contradictions,
     within_kinematics,
@@ -103,7 +105,7 @@ def _traced(
     # a reconstructed alpha agrees with q and az by construction
     kinematics = None if not case.has_vane else kinematic_check(checked, declared, held)
     case = replace(case, effects=within_kinematics(case.effects, kinematics))
-    case, rounds = _search(case, options, advance, starts_of(kinematics))
+    case, rounds = _search(case, options, advance, kinematics)
     advance("assess every stage on fitted and held-out records")
     stages = assess_stages(case, rounds)
     advance("compare ax with the declared axial force")
@@ -159,7 +161,7 @@ def _checked(logs: Logs, aircraft: Aircraft, force: bool) -> tuple[list[FlightLo
 
 
 def _search(
-    case: Case, options: TraceOptions, advance: Advance, known: Mapping[str, float]
+    case: Case, options: TraceOptions, advance: Advance, kinematics: CheckResult | None
 ) -> tuple[Case, tuple[SearchRound, ...]]:
     """The case with the correlated noise and the corners that its records show, and the rounds of the search."""
     advance("refit the declared aircraft")
@@ -167,9 +169,9 @@ def _search(
     steps = advance if limited is None else limited
     case, start = with_coloured_noise(case)
     case = with_corner_share(case, start)
-    rounds = _pruned_search(case, start, options, steps, known)
+    rounds = _pruned_search(case, start, options, steps, kinematics)
     if rounds and rounds[-1].null.hypothesis.effects and not case.fitted.settings.coloured:
-        case, rounds = _with_later_colour(case, rounds, options, steps, known)
+        case, rounds = _with_later_colour(case, rounds, options, steps, kinematics)
     if options.learns:
         rounds = with_increments(case.fitted, rounds, case.effects, options.seed, steps, case.declared)
     if rounds:
@@ -187,12 +189,21 @@ def _pruned_search(
     start: Parameters,
     options: TraceOptions,
     advance: Advance,
-    known: Mapping[str, float],
+    kinematics: CheckResult | None,
     other: Sequence[Effect] = (),
 ) -> tuple[SearchRound, ...]:
     """The rounds of a search without the names that later ones make unnecessary."""
     rounds = search(
-        case.fitted, case.hypothesis, start, case.effects, options.seed, advance, case.declared, known, other
+        case.fitted,
+        case.hypothesis,
+        start,
+        case.effects,
+        options.seed,
+        advance,
+        case.declared,
+        starts_of(kinematics),
+        other,
+        sets_of(kinematics),
     )
     return rounds and pruned(case.fitted, rounds, case.effects, options.seed, LEVEL, advance)
 
@@ -202,7 +213,7 @@ def _with_later_colour(
     rounds: tuple[SearchRound, ...],
     options: TraceOptions,
     advance: Advance,
-    known: Mapping[str, float],
+    kinematics: CheckResult | None,
 ) -> tuple[Case, tuple[SearchRound, ...]]:
     """The search again with correlated noise that shows beside what it explained, where that explains more.
 
@@ -216,7 +227,7 @@ def _with_later_colour(
         return case, rounds
     start = replace(point, sizes=np.empty(0))
     accepted = rounds[-1].null.hypothesis.effects
-    again = _pruned_search(coloured, start, options, advance, known, accepted)
+    again = _pruned_search(coloured, start, options, advance, kinematics, accepted)
     if again and total_cost(again[-1]) < total_cost(rounds[-1]):
         return coloured, again
     return case, rounds

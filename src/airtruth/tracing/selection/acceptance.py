@@ -139,10 +139,11 @@ def assess_candidate(
     s, own, gain : its score, its fit, and its gain in 2 log L.
     reference : the fit without it.
     least : gain in 2 log L that is significant for white innovations; for correlated ones it is multiplied by the
-        ratio of robust to plain variance (J. T. Kent, Biometrika 69 (1982)).
+        ratio of robust to plain variance (J. T. Kent, Biometrika 69 (1982)), unbiased where too few records show their scatter.
     """
     size, std = _size(s, own)
-    excess = float(inflation(problem, own)[size_index(_first_size(s, own))])
+    few = len(problem.records) < _SEVERAL
+    excess = float(inflation(problem, own, unbiased=few)[size_index(_first_size(s, own))])
     left_out = tested_on_left_out(problem, own, reference, gain)
     reasons = [
         *_fit_reasons(s, own, gain, least, excess),

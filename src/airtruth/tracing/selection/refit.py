@@ -229,6 +229,22 @@ def losses_without(
     return found
 
 
+def redundant_effect(problem: TraceProblem, fitted: PosteriorFit, least: float) -> int | None:
+    """Index of an earlier effect that the last one makes redundant; None where each is needed.
+
+    An effect is redundant if its size is immaterial, or if the fit without it loses less than ``least`` in 2 log L.
+    """
+    at = 0
+    for i, effect in enumerate(fitted.hypothesis.effects[:-1]):
+        if abs(fitted.point.sizes[at]) < effect.parameters[0].material:
+            return i
+        ((loss, _),) = losses_without(problem, fitted, (effect,))
+        if loss < least:
+            return i
+        at += len(effect.parameters)
+    return None
+
+
 def better_null(problem: TraceProblem, null: PosteriorFit, fits: Sequence[Refit]) -> PosteriorFit | None:
     """The null fitted again from the end of the best refit, if that is a better optimum."""
     if not fits:
@@ -293,6 +309,7 @@ __all__ = [
     "Refit",
     "better_null",
     "losses_without",
+    "redundant_effect",
     "refit_leaders",
     "refit_scored",
     "refit_without",

@@ -19,7 +19,7 @@ from airtruth.tracing.selection.acceptance import OUTDONE, Candidate, is_plausib
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import AHEAD, BETTER, better_set
 from airtruth.tracing.selection.explanation import AS_PROBABLE, events
-from airtruth.tracing.selection.refit import losses_without
+from airtruth.tracing.selection.refit import redundant_effect
 from airtruth.tracing.selection.release import DeclaredCauses, Release
 from airtruth.tracing.selection.rounds import (
     NOTHING_DECLARED,
@@ -63,6 +63,7 @@ def search(
     declared: DeclaredCauses = NOTHING_DECLARED,
     known: Mapping[str, float] = NOTHING_KNOWN,
     other: Sequence[Effect] = (),
+    causes: Sequence[frozenset[str]] = (),
 ) -> tuple[SearchRound, ...]:
     """Rounds of scoring, refitting and acceptance, until nothing more is accepted.
 
@@ -79,9 +80,10 @@ def search(
     declared : candidates that explain a contradiction of the declared derivatives.
     known : effects that are always refitted, with the value [SI] at which their refit begins.
     other : effects that another search accepted, in their order; they lead a further search where this one lacks any.
+    causes : sets of errors of sensors, each of which explains the kinematics of the records; none where nothing is known.
     """
     first = RoundStart(hypothesis, start, tuple(effects))
-    own = _Search(problem, seed, advance, declared, known)
+    own = _Search(problem, seed, advance, declared, known, tuple(causes))
     rounds = own.improved(first, own.rounds((first,), ()))
     if rounds and {e.key for e in other} - {e.key for e in rounds[-1].null.hypothesis.effects}:
         rounds = own.led(first, other, rounds)
@@ -97,6 +99,7 @@ class _Search:
     advance: Advance
     declared: DeclaredCauses
     known: Mapping[str, float]
+    causes: tuple[frozenset[str], ...]
 
     def rounds(
         self, starts: tuple[RoundStart, ...], before: tuple[SearchRound, ...]
@@ -116,10 +119,10 @@ class _Search:
         """The rounds, or those of a set that explains more: led by what the kinematic check names, or by an exchange."""
         if not rounds:
             return rounds
-        taken = {e.key for e in rounds[-1].null.hypothesis.effects}
-        missing = tuple(e for e in first.effects if e.key in self.known and e.key not in taken)
-        if missing and rounds[-1].anomaly.p_value < _FAILED:
-            rounds = self.led(first, missing, rounds)
+        for cause in self.causes:
+            members = tuple(e for e in first.effects if e.key in cause)
+            if len(members) == len(cause) and self._contradicts_kinematics(rounds[-1]):
+                rounds = self.led(first, members, rounds)
         weak = [r.tied[0].gain < _WEAK for r in rounds if r.tied]
         if (rounds[-1].anomaly.p_value < REMAINS or weak == [True]) and len(
             rounds[-1].null.hypothesis.effects
@@ -143,6 +146,15 @@ class _Search:
         if last is rounds[-1].null:
             rounds = (*rounds[:-1], replace(rounds[-1], exchanged=exchanged))
         return rounds
+
+    def _contradicts_kinematics(self, last: SearchRound) -> bool:
+        """Whether a search leaves an anomaly beyond doubt and accepts no set of errors that explains the kinematics.
+
+        The kinematics need no aerodynamics. Where the aerodynamics are wrong, they tell errors of sensors better than the filter.
+        """
+        accepted = {e.key for e in last.null.hypothesis.effects}
+        explained = not self.causes or any(cause <= accepted for cause in self.causes)
+        return last.anomaly.p_value < _FAILED and not explained
 
     def _with_absorbed(
         self, first: RoundStart, rounds: tuple[SearchRound, ...], beside: bool
@@ -197,6 +209,7 @@ class _Search:
         records left out.
 
         Fewer effects are enough unless the odds against them are strong, and so is as much where they alone leave no anomaly.
+        Where both leave an anomaly beyond doubt, the search that does not contradict the kinematics remains.
 
         Parameters
         ----------
@@ -218,9 +231,14 @@ class _Search:
             left = tuple(e for e in begin.effects if e.key not in accepted)
             starts = (*starts, RoundStart(fitted.hypothesis, fitted.point, left, settled=True, near=fitted))
         again = self.rounds(starts, again)
+        contradicts = [self._contradicts_kinematics(r[-1]) for r in (rounds, again)]
+        if contradicts == [False, True]:
+            return rounds
         simpler = len(_effects_of(again[-1])) < len(_effects_of(rounds[-1]))
         cleaner = again[-1].anomaly.p_value > _CLEAN and rounds[-1].anomaly.p_value < REMAINS
         needed = _STRONG_ODDS if simpler else 0.0 if cleaner else lead
+        if contradicts == [True, False]:
+            needed = -np.inf
         if total_cost(again[-1]) >= total_cost(rounds[-1]) - needed or not is_plausible(
             self.problem, again[-1].null
         ):
@@ -364,20 +382,4 @@ def _is_clean(rounds: Sequence[SearchRound], count: int) -> bool:
     return not any(r.tied for r in rounds[count:]) and rounds[-1].anomaly.p_value > _CLEAN
 
 
-def redundant_effect(problem: TraceProblem, fitted: PosteriorFit, least: float) -> int | None:
-    """Index of an earlier effect that the last one makes redundant; None where each is needed.
-
-    An effect is redundant if its size is immaterial, or if the fit without it loses less than ``least`` in 2 log L.
-    """
-    at = 0
-    for i, effect in enumerate(fitted.hypothesis.effects[:-1]):
-        if abs(fitted.point.sizes[at]) < effect.parameters[0].material:
-            return i
-        ((loss, _),) = losses_without(problem, fitted, (effect,))
-        if loss < least:
-            return i
-        at += len(effect.parameters)
-    return None
-
-
-__all__ = ["redundant_effect", "search"]
+__all__ = ["search"]
