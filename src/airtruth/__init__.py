@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from airtruth.effects.effect import Effect
     from airtruth.identification import IdentificationResult
     from airtruth.identification.options import Options as IdentificationOptions
-    from airtruth.importers import ManoeuvreResult
+    from airtruth.importers import Imported, ManoeuvreResult
     from airtruth.logs.flight_log import FlightLog
     from airtruth.logs.sources import Logs
     from airtruth.logs.store import write_log
@@ -63,6 +63,7 @@ _LAZY = {
     "ForecastResult": "airtruth.design",
     "IdentificationOptions": "airtruth.identification.options:Options",
     "IdentificationResult": "airtruth.identification",
+    "Imported": "airtruth.importers",
     "Logs": "airtruth.logs.sources",
     "Limits": "airtruth.design",
     "LoopResult": "airtruth.loop",
@@ -120,6 +121,7 @@ __all__ = [
     "ForecastResult",
     "IdentificationOptions",
     "IdentificationResult",
+    "Imported",
     "Limits",
     "LogError",
     "Logs",

@@ -1,9 +1,11 @@
-"""Arguments of functions that a caller in Python may get wrong: names and whole numbers."""
+"""Arguments of functions that a caller in Python may get wrong: names, whole numbers, paths and types."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from numbers import Integral
+from pathlib import Path
 
 from airtruth.errors import ConfigurationError
 
@@ -47,4 +49,36 @@ def require_whole(argument: str, value: object, least: int) -> None:
         raise ConfigurationError(f"{argument} = {value!r}: must be a whole number, {least} or more")
 
 
-__all__ = ["names", "require_whole"]
+def as_path(argument: str, value: object) -> Path:
+    """Return a path that is given as a string or a path.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the argument and its value.
+
+    Examples
+    --------
+    >>> as_path("out", "out/light").name
+    'light'
+    """
+    if not isinstance(value, str | os.PathLike):
+        raise ConfigurationError(f"{argument} = {value!r}: must be the path of a file or folder")
+    return Path(value)
+
+
+def require_type(argument: str, value: object, kind: type, public: str) -> None:
+    """Refuse what is neither None nor of a type; ``public`` is the public name of the type.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the argument, the type of its value and the type that it needs.
+    """
+    if value is not None and not isinstance(value, kind):
+        raise ConfigurationError(
+            f"{argument}: {type(value).__name__} is not {public}; give {public}(...) or None"
+        )
+
+
+__all__ = ["as_path", "names", "require_type", "require_whole"]

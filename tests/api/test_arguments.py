@@ -52,6 +52,24 @@ REFUSED = {
         "derivatives = [None]: must be a name or a seq",
     ),
     "derivative": (lambda: at.plan("light.toml", derivatives="C"), "'C'"),
+    "options": (
+        lambda: at.identify("out/light", "gtm", options={"order": 2}),
+        "options: dict is not IdentificationOptions; give IdentificationOptions(...) or None",
+    ),
+    "options of a trace": (lambda: at.trace("out/light", "gtm", {}), "options: dict is not TraceOptions"),
+    "options of a loop": (
+        lambda: at.close_loop("out/light", "gtm", options=1),
+        "options: int is not TraceOptions",
+    ),
+    "limits": (lambda: at.plan("light.toml", derivatives="Cmq", limits=3), "limits: int is not Limits"),
+    "campaign": (
+        lambda: at.fly(None, "out/new"),
+        "NoneType is not a campaign; give a campaign file, or a Campaign",
+    ),
+    "out": (lambda: at.fly("light.toml", 7), "out = 7: must be the path of a file or folder"),
+    "folder": (lambda: at.verify(None), "folder = None: must be the path"),
+    "file": (lambda: at.import_log([3], "map.toml"), "file = 3: must be the path"),
+    "mapping": (lambda: at.import_log("a.csv", None), "mapping = None: must be the path"),
     "split": (lambda: at.plan("light.toml", split="elevator_delay"), "two"),
 }
 

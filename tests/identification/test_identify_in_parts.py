@@ -137,10 +137,14 @@ def test_a_run_that_two_logs_hold_is_refused_in_any_order_of_names(folder):
     owners.add(LOG, ("q", "z"))  # a range of names that holds the others, and none of them
 
 
-def test_a_full_disk_is_one_sentence(whole, tmp_path):
+@pytest.mark.parametrize(
+    ("number", "step"),
+    [(errno.ENOSPC, "the disk is full: free some space"), (errno.EROFS, "read-only: choose another folder")],
+)
+def test_a_folder_that_cannot_be_written_is_one_sentence(whole, tmp_path, number, step):
     class Full:
         def write(self, content):
-            raise OSError(errno.ENOSPC, "No space left on device")
+            raise OSError(number, "words of the system")
 
         def close(self):
             return
@@ -149,14 +153,12 @@ def test_a_full_disk_is_one_sentence(whole, tmp_path):
         estimates._file.close()
         estimates._file = Full()
         estimates.add(whole.estimates)
-        with pytest.raises(
-            StoreError, match=r"temporary file of the estimates cannot be written .*free space"
-        ):
+        with pytest.raises(StoreError, match=f"temporary file of the estimates is not written; .*{step}"):
             list(estimates.parts())
     with pytest.raises(
-        StoreError, match="absent: does not exist; create the folder, or choose another --out"
+        StoreError, match=r"absent: .*; the folder does not exist: create it or choose another"
     ):
         Spool(tmp_path / "absent")
     (tmp_path / "file").touch()
-    with pytest.raises(StoreError, match="file: is a file and not a folder; choose another --out"):
+    with pytest.raises(StoreError, match=r"file: .*; a part of the path is a file, not a folder"):
         Spool(tmp_path / "file")

@@ -73,6 +73,7 @@ def test_select_of_nothing_is_an_empty_log(log: FlightLog) -> None:
         ({"run_ids": "A"}, r"no run 'A'; the log holds 3 runs, 'a' to 'c'"),
         ({"channels": ["alpha"]}, r"no channel 'alpha'; did you mean 'alpha_rad'"),
         ({"t_s": (0.6, 0.7)}, r"run 'a' has no sample from 0.6 to 0.7 s; it runs from 0 to 0.58 s"),
+        ({"t_s": (1.0,)}, r"t_s = \(1.0,\): must be the first and the last time to keep \[s\]"),
         ({"t_s": (0.5, 0.1)}, r"run 'a' has no sample from 0.5 to 0.1 s"),
     ],
 )

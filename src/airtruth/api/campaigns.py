@@ -80,9 +80,10 @@ def fly(
     >>> flown.runs, len(flown.failures)
     (6, 0)
     """
+    from airtruth.arguments import as_path
     from airtruth.simulation.campaign.run import fly
 
-    return fly(campaign_of(campaign), Path(out), jobs, seed, runs)
+    return fly(campaign_of(campaign), as_path("out", out), jobs, seed, runs)
 
 
 def verify(folder: FilePath) -> Verification:
@@ -108,9 +109,10 @@ def verify(folder: FilePath) -> Verification:
     >>> at.verify("out/verified").intact
     True
     """
+    from airtruth.arguments import as_path
     from airtruth.logs.verify import verify
 
-    return verify(Path(folder))
+    return verify(as_path("folder", folder))
 
 
 def list_effects(*names: str) -> tuple[Effect, ...]:
@@ -137,5 +139,20 @@ def list_effects(*names: str) -> tuple[Effect, ...]:
 
 
 def campaign_of(campaign: FilePath | Campaign) -> Path | Campaign:
-    """A path as a `Path`, a campaign as it is."""
-    return Path(campaign) if isinstance(campaign, str | os.PathLike) else campaign
+    """A path as a `Path`, a campaign as it is.
+
+    Raises
+    ------
+    ConfigurationError
+        If it is neither.
+    """
+    from airtruth.errors import ConfigurationError
+    from airtruth.simulation.campaign.file import Campaign
+
+    if isinstance(campaign, Campaign):
+        return campaign
+    if not isinstance(campaign, str | os.PathLike):
+        raise ConfigurationError(
+            f"{type(campaign).__name__} is not a campaign; give a campaign file, or a Campaign"
+        )
+    return Path(campaign)

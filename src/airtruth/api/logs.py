@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -71,7 +70,7 @@ def import_log(
     Returns
     -------
     Imported
-        The log, which `write_log` stores, and the problems that the checks found in it.
+        Its ``log`` is what `write_log` stores; its ``faults`` are what the checks found in it.
 
     Raises
     ------
@@ -91,9 +90,11 @@ def import_log(
     >>> at.write_log("flight.parquet", imported.log, dtype="float64")
     """
     from airtruth import importers
+    from airtruth.arguments import as_path
 
-    table = None if manoeuvres is None else Path(manoeuvres)
-    return importers.import_log(_paths(file), _paths(mapping), manoeuvres=table, force=force)
+    table = None if manoeuvres is None else as_path("manoeuvres", manoeuvres)
+    files, mappings = _paths("file", file), _paths("mapping", mapping)
+    return importers.import_log(files, mappings, manoeuvres=table, force=force)
 
 
 def find_manoeuvres(
@@ -133,13 +134,14 @@ def find_manoeuvres(
     >>> imported = at.import_log("flight.csv", "flight.toml", manoeuvres="manoeuvres.csv")
     """
     from airtruth import importers
+    from airtruth.arguments import as_path
     from airtruth.errors import ConfigurationError
     from airtruth.logs.outputs import writing
 
-    files, mappings = _paths(file), _paths(mapping)
+    files, mappings = _paths("file", file), _paths("mapping", mapping)
     if out is None:
         return importers.find_manoeuvres(files, mappings)
-    table = Path(out)
+    table = as_path("out", out)
     if table.suffix.lower() != ".csv":
         raise ConfigurationError(f"{table}: --find-manoeuvres writes a table; name it with the suffix .csv")
     with writing("import", [*files, *mappings], force=force) as outputs:
@@ -149,9 +151,12 @@ def find_manoeuvres(
     return found
 
 
-def _paths(files: FilePath | Sequence[FilePath]) -> list[Path]:
-    """One path, or several, as a list."""
-    return [Path(files)] if isinstance(files, str | os.PathLike) else [Path(one) for one in files]
+def _paths(argument: str, files: FilePath | Sequence[FilePath]) -> list[Path]:
+    """One path, or several, as a list; ``argument`` is the name in an error."""
+    from airtruth.arguments import as_path
+
+    several = files if isinstance(files, Sequence) and not isinstance(files, str) else [files]
+    return [as_path(argument, one) for one in several]
 
 
 def check(

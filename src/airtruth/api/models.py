@@ -62,8 +62,11 @@ def identify(
     >>> len(table), bool(table["converged"].all())
     (12, True)
     """
+    from airtruth.arguments import require_type
     from airtruth.identification import identify
+    from airtruth.identification.options import Options
 
+    require_type("options", options, Options, "IdentificationOptions")
     return identify(logs, load_aircraft(aircraft), methods, options, joint=joint, force=force)
 
 
@@ -106,9 +109,11 @@ def trace(
     ['elevator_delay']
     """
     from airtruth.api.writing import trace_outputs
-    from airtruth.tracing import trace
+    from airtruth.arguments import as_path, require_type
+    from airtruth.tracing import TraceOptions, trace
 
-    folder = None if out is None else Path(out)
+    require_type("options", options, TraceOptions, "TraceOptions")
+    folder = None if out is None else as_path("out", out)
     with trace_outputs("trace", logs, aircraft, folder, force=force) as declared:
         return trace(logs, declared, options, folder, force)
 
@@ -154,10 +159,13 @@ def close_loop(
     ['CLalpha', 'CLq', 'CLde', 'Cmalpha', 'Cmq', 'Cmde']
     """
     from airtruth.api.writing import trace_outputs
+    from airtruth.arguments import as_path, require_type
     from airtruth.logs.sources import sources
     from airtruth.loop import close_loop
+    from airtruth.tracing import TraceOptions
 
-    folder = None if out is None else Path(out)
+    require_type("options", options, TraceOptions, "TraceOptions")
+    folder = None if out is None else as_path("out", out)
     with trace_outputs("loop", logs, aircraft, folder, force=force) as declared:
         return close_loop(sources(logs), declared, folder, methods, trace_options=options, force=force)
 
@@ -203,6 +211,7 @@ def report(
     ['light-intervals.svg']
     """
     from airtruth import reporting
+    from airtruth.arguments import as_path
     from airtruth.errors import ConfigurationError
     from airtruth.logs.outputs import writing
     from airtruth.logs.sources import log_files
@@ -218,5 +227,5 @@ def report(
     declared = None if aircraft is None else load_aircraft(aircraft)
     with writing("report", inputs, force=force) as outputs:
         return reporting.report(
-            source, Path(out), format, logs, declared, lambda paths: outputs.require(*paths)
+            source, as_path("out", out), format, logs, declared, lambda paths: outputs.require(*paths)
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
@@ -119,10 +118,11 @@ def plan(
     >>> forecast.theta.shape, forecast.together.shape
     ((6,), (6,))
     """
-    from airtruth.arguments import names
-    from airtruth.design import forecast
+    from airtruth.arguments import as_path, names, require_type
+    from airtruth.design import Limits, forecast
     from airtruth.errors import ConfigurationError
 
+    require_type("limits", limits, Limits, "Limits")
     split, derivatives = names("split", split, "elevator_delay"), names("derivatives", derivatives, "Cmq")
     if not split and not derivatives and trace is None:
         if campaign is None:
@@ -137,12 +137,10 @@ def plan(
     from airtruth.design import PlanOptions
     from airtruth.design.from_files import Stated, planned_from
 
-    options = (
-        PlanOptions(records=records, seed=seed) if limits is None else PlanOptions(limits, records, seed)
-    )
+    options = PlanOptions(limits or Limits(), records, seed)
     source = base_campaign(None if campaign is None else campaign_of(campaign), trace is not None, aircraft)
-    target = None if out is None else Path(out)
-    answer = None if trace is None else Path(os.fspath(trace))
+    target = None if out is None else as_path("out", out)
+    answer = None if trace is None else as_path("trace", trace)
     stated = Stated(split, sizes or {}, derivatives, answer)
     return planned_from(source, stated, aircraft, options, target, force=force)
 

@@ -36,8 +36,8 @@ from airtruth.simulation.simulator import Condition
 Array = NDArray[np.float64]
 Step = Callable[[str], None]
 
-MOST_RECORDS: Final = 30
-"""Most records of a planned campaign of which the number is not stated [-] (judgement: an afternoon of flying)."""
+MOST_RECORDS: Final = 60
+"""Most records of a planned campaign of which the number is not stated [-] (judgement: an hour at one record a minute)."""
 ENOUGH: Final = 0.95
 """Probability of one name at which more records are not planned [-] (convention)."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import pickle
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -10,8 +9,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final
 
-from airtruth.errors import StoreError, reason
+from airtruth.errors import StoreError
 from airtruth.identification.estimates import Estimates, concatenated
+from airtruth.logs.atomic import next_step
 
 RUNS_PER_PART: Final = 1000
 """Least number of runs of a part [-] (judgement: 0.5 MB for each method; a frame of pandas costs 5 ms whatever it holds)."""
@@ -81,13 +81,7 @@ class Spool:
 
     def _error(self, error: OSError) -> StoreError:
         where = self._folder or tempfile.gettempdir()
-        if error.errno == errno.ENOENT:
-            return StoreError(f"{where}: does not exist; create the folder, or choose another --out")
-        if error.errno == errno.ENOTDIR:
-            return StoreError(f"{where}: is a file and not a folder; choose another --out")
-        return StoreError(
-            f"{where}: a temporary file of the estimates cannot be written ({reason(error)}); free space there and run again"
-        )
+        return StoreError(f"{where}: a temporary file of the estimates is not written; {next_step(error)}")
 
 
 __all__ = ["RUNS_PER_PART", "Spool"]

@@ -214,10 +214,14 @@ def sync_folder(folder: Path) -> None:
 
 def write_error(path: Path, error: OSError) -> StoreError:
     """Return the error for a failed write: the file, the reason and the next step."""
-    reason = error.strerror or str(error)
-    step = _NEXT_STEP.get(error.errno or 0, f"{reason}: make the folder writable and run again")
     kept = " (the existing file is unchanged)" if path.is_file() else ""
-    return StoreError(f"{path}: not written{kept}; {step}")
+    return StoreError(f"{path}: not written{kept}; {next_step(error)}")
+
+
+def next_step(error: OSError) -> str:
+    """Return the reason of a failed write and the next step."""
+    reason = error.strerror or str(error)
+    return _NEXT_STEP.get(error.errno or 0, f"{reason}: make the folder writable and run again")
 
 
 __all__ = [
@@ -226,6 +230,7 @@ __all__ = [
     "guard",
     "make_folder",
     "new_folder",
+    "next_step",
     "remove_file",
     "remove_folder",
     "sync_folder",

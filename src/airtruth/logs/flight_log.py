@@ -75,7 +75,7 @@ class FlightLog:
         Raises
         ------
         LogError
-            If a run or channel does not exist, or a run has no sample between the two times.
+            If a run or channel does not exist, the times are not two numbers, or a run has no sample between them.
 
         Examples
         --------
@@ -87,6 +87,10 @@ class FlightLog:
         """
         runs = _indices(self.run_ids, run_ids)
         names = _names(self.channels, channels)
+        if t_s is not None and np.shape(t_s) != (2,):
+            raise LogError(
+                f"t_s = {t_s!r}: must be the first and the last time to keep [s], such as (1.0, 3.0)"
+            )
         pieces = [_between(self, run, t_s) for run in runs]
         rows = np.concatenate([np.arange(0), *(np.arange(piece.start, piece.stop) for piece in pieces)])
         lengths = [piece.stop - piece.start for piece in pieces]
