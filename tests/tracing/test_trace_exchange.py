@@ -18,10 +18,11 @@ from airtruth.tracing.selection.acceptance import (
 )
 from airtruth.tracing.selection.exchange import better_set, other_kinds
 from airtruth.tracing.selection.refit import Refit
-from airtruth.tracing.selection.rounds import scored_round, significant_gain
+from airtruth.tracing.selection.rounds import scored_round
+from airtruth.tracing.selection.significance import MISFIT_FAMILY_LEVEL, significant_gain
 
 LIBRARY = tuple(e for e in EFFECTS.values() if not e.in_derivatives)
-LEAST = significant_gain(33, later=True)
+LEAST = significant_gain(33, MISFIT_FAMILY_LEVEL)
 
 
 @pytest.fixture(scope="module")

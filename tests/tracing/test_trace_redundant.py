@@ -11,7 +11,8 @@ from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.refit import redundant_effect
-from airtruth.tracing.selection.rounds import RoundStart, search_round, significant_gain
+from airtruth.tracing.selection.rounds import RoundStart, search_round
+from airtruth.tracing.selection.significance import significant_gain
 from airtruth.units import DEG
 
 EARLIER, LATER = EFFECTS["gyro_scale"], EFFECTS["accelerometer_scale"]

@@ -57,8 +57,9 @@ from airtruth.tracing.selection.acceptance import SURPASSED, Candidate
 from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.omnibus import FRICTION, advice
 from airtruth.tracing.selection.release import CONTRADICTED
-from airtruth.tracing.selection.rounds import LEVEL, SearchRound
+from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.selection.score_test import Table
+from airtruth.tracing.selection.significance import LEVEL
 from airtruth.tracing.selection.weights import alike_in_rivals
 from airtruth.tracing.stage_errors import Replay
 from airtruth.tracing.stages import Stages, accepted, before_fit, stage_errors

@@ -14,7 +14,8 @@ from airtruth.tracing.accepted import ParameterEstimate
 from airtruth.tracing.answer import Z95
 from airtruth.tracing.inference.profile import Profile, location_index
 from airtruth.tracing.selection.acceptance import Candidate, has_converged
-from airtruth.tracing.selection.rounds import REMAINS, SearchRound, significant_gain
+from airtruth.tracing.selection.rounds import SearchRound
+from airtruth.tracing.selection.significance import MISFIT_FAMILY_LEVEL, REMAINS, significant_gain
 
 Array = NDArray[np.float64]
 
@@ -86,7 +87,7 @@ def widened_by_rejected(
     """
     if last.anomaly.p_value >= REMAINS:
         return stated
-    least = significant_gain(len(last.table.scores) + len(last.null.hypothesis.effects), later=True)
+    least = significant_gain(len(last.table.scores) + len(last.null.hypothesis.effects), MISFIT_FAMILY_LEVEL)
     rejected = [c for c in last.candidates if c.reasons and c.gain >= least and has_converged(c.fit, c.gain)]
     widened = dict(stated)
     for candidate in rejected:

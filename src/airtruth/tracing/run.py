@@ -43,9 +43,10 @@ from airtruth.tracing.selection.learn import with_increments
 from airtruth.tracing.selection.look_alikes import with_look_alikes
 from airtruth.tracing.selection.noise_colour import beside, later_level, with_coloured_noise
 from airtruth.tracing.selection.pruning import pruned
-from airtruth.tracing.selection.rounds import LEVEL, SearchRound
+from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.selection.search import search
 from airtruth.tracing.selection.settled import total_cost
+from airtruth.tracing.selection.significance import LEVEL
 from airtruth.tracing.stages import assess_stages
 from airtruth.tracing.update import updated_folder, write_update
 

@@ -28,7 +28,8 @@ from airtruth.tracing.selection.acceptance import Candidate, is_plausible
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.late import late_signal
 from airtruth.tracing.selection.refit import losses_without, refit_scored
-from airtruth.tracing.selection.rounds import MOST_EFFECTS, REMAINS, SearchRound
+from airtruth.tracing.selection.rounds import MOST_EFFECTS, SearchRound
+from airtruth.tracing.selection.significance import REMAINS
 from airtruth.tracing.selection.subsets import Subset, subsets
 
 BETTER: Final = 5.0

@@ -36,14 +36,9 @@ from airtruth.tracing.selection.increments import Screened, screen, shapes, shar
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.ranking import TIE
 from airtruth.tracing.selection.release import CONTRADICTED, DeclaredCauses, explained
-from airtruth.tracing.selection.rounds import (
-    NOTHING_DECLARED,
-    REMAINS,
-    Rival,
-    SearchRound,
-    scored_round,
-)
+from airtruth.tracing.selection.rounds import NOTHING_DECLARED, Rival, SearchRound, scored_round
 from airtruth.tracing.selection.settled import settled, total_cost
+from airtruth.tracing.selection.significance import REMAINS
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,8 @@ from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.refit import losses_without
 from airtruth.tracing.selection.release import CONTRADICTED
-from airtruth.tracing.selection.rounds import SearchRound, scored_round, significant_gain
+from airtruth.tracing.selection.rounds import SearchRound, scored_round
+from airtruth.tracing.selection.significance import FAMILY_LEVEL, MISFIT_FAMILY_LEVEL, significant_gain
 
 _ALIKE: Final = 0.01
 """Ratio of two probabilities of an anomaly that is left from which they count as alike [-] (judgement: where something is
@@ -57,7 +58,7 @@ def pruned(
         return rounds
     learned = any(isinstance(e, Increment) for e in members)
     declared = _as_declared(problem, last.null) if learned else None
-    least = significant_gain(len(effects), later=learned)
+    least = significant_gain(len(effects), MISFIT_FAMILY_LEVEL if learned else FAMILY_LEVEL)
     fitted = _with_needed_names(problem, declared or last.null, least, _latest_causes(rounds))
     if fitted is last.null:
         return rounds

@@ -9,7 +9,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.derivative_likelihood import Contradiction, contradiction
@@ -37,25 +36,22 @@ from airtruth.tracing.selection.refit import (
 )
 from airtruth.tracing.selection.release import DeclaredCauses, Release, explained, release
 from airtruth.tracing.selection.score_test import Table
+from airtruth.tracing.selection.significance import (
+    BEYOND_DOUBT,
+    LATER_LEVEL,
+    LEVEL,
+    MISFIT_FAMILY_LEVEL,
+    MISFIT_LEVEL,
+    later_gain,
+    significant_gain,
+    strongest,
+)
 
 Array = NDArray[np.float64]
 
-LEVEL: Final = 0.05
-"""Significance level of the scores in the first round, after Holm's correction [-] (convention)."""
-REMAINS: Final = 0.01
-"""Probability of the remaining anomaly below which effects without a score are refitted and increments learned [-]; that of an
-unexplained verdict."""
-LATER_LEVEL: Final = 0.001
-"""The same in later rounds [-] (judgement: a misspecified model always leaves a small residual, and a stricter level
-adds fewer false effects at the price of small true ones)."""
 MOST_EFFECTS: Final = 3
 """Largest number of effects that a trace accepts [-] (judgement: each costs a round, and four in a few records have
 not been separable)."""
-FAMILY_LEVEL: Final = 0.05165827451
-"""Significance level of the gain in 2 log L of a refit over all candidates, by Bonferroni's rule [-]: a gain of 10.0
-where all 33 candidates of the library are tested (judgement: a round figure next to 5 %)."""
-LATER_FAMILY_LEVEL: Final = 1.8919003744e-5
-"""The same in later rounds [-]: a gain of 25.0 for 33 candidates (judgement: as `LATER_LEVEL`)."""
 _RESTARTS: Final = 2
 """Number of times that a round begins again at a better optimum of its null [-] (judgement: one has been enough)."""
 _GLS_ITERATIONS: Final = 6
@@ -72,15 +68,6 @@ _RELEASE_LEADS: Final = 30.0
 later effect may still add to it)."""
 _FAR: Final = 5.0
 """Distance in standard errors from which the refit under the autoregression is discarded [-] (judgement)."""
-
-
-def significant_gain(candidates: int, later: bool = False) -> float:
-    """Gain in 2 log L from which a refit is significant among so many candidates (Bonferroni, chi-square(1)).
-
-    Source: S. S. Wilks, Ann. Math. Statist. 9 (1938) 60-62.
-    """
-    level = LATER_FAMILY_LEVEL if later else FAMILY_LEVEL
-    return float(chi2.isf(level / max(candidates, 1), 1))
 
 
 @dataclass(frozen=True)
@@ -186,16 +173,7 @@ class SearchRound:
     @property
     def anomaly(self) -> Anomaly:
         """The strongest evidence of a missing effect, a score or an omnibus test; p-value by Bonferroni's rule."""
-        seen = list(self.omnibus)
-        if self.table.scores:
-            best = min(
-                range(len(self.adjusted)), key=lambda i: (self.adjusted[i], -abs(self.table.scores[i].z))
-            )
-            s = self.table.scores[best]
-            seen.append(Anomaly(s.effect.key, s.z**2, 1, float(self.adjusted[best])))
-        # among p-values that underflow to zero, the chi-square farthest out by R. A. Fisher's sqrt(2 x)
-        least = min(seen, key=lambda a: (a.p_value, np.sqrt(2.0 * a.degrees) - np.sqrt(2.0 * a.statistic)))
-        return replace(least, p_value=min(1.0, len(seen) * least.p_value))
+        return strongest(self.omnibus, self.table, self.adjusted)
 
     def p_value_of(self, where: str) -> float:
         """P-value of an omnibus test, 1 where it was not made [-]."""
@@ -235,11 +213,14 @@ def search_round(
         advance(f"round {count + 1}: score {len(begin.effects)} effects")
         table = score_test.table(gls, problem, begin.effects, whitener, seed)
         adjusted = score_test.holm([s.p_value for s in table.scores])
+        omnibus = anomalies(gls, problem, whitener)
+        anomaly = strongest(omnibus, table, adjusted)
         candidates: tuple[Candidate, ...] = ()
         test = contradiction(problem, null)
         free = release(problem, null, declared, test)
         if len(begin.hypothesis.effects) < MOST_EFFECTS and not begin.scores_only:
-            level = LATER_LEVEL if count else LEVEL
+            later = MISFIT_LEVEL if anomaly.p_value < BEYOND_DOUBT else LATER_LEVEL
+            level = later if count else LEVEL
             # the released derivatives contain these causes, alone and together
             skip = declared.keys if free is not None or begin.hypothesis.spread is not None else ()
             rival = free.cost if free is not None and free.strain < _STRAINED else np.inf
@@ -255,9 +236,8 @@ def search_round(
             if better is not None:
                 start, near, restarts = better.point, better, restarts - 1
                 continue
-            least = significant_gain(begin.tested, later=count > 0)
+            least = later_gain(begin.tested, anomaly) if count else significant_gain(begin.tested)
             candidates = rank(problem, null, fits, least, begin.replacement, begin.leader, begin.in_set)
-        omnibus = anomalies(gls, problem, whitener)
         sets = () if begin.hypothesis.spread is None else explained(problem, null, declared)
         own = SearchRound(
             null,
@@ -350,7 +330,9 @@ def _with_evidence(own: SearchRound, begin: RoundStart) -> SearchRound:
     """
     if begin.hypothesis.effects or begin.leader or own.release is not None or not own.tied:
         return own
-    if own.anomaly.p_value <= LEVEL or own.tied[0].gain >= significant_gain(begin.tested, later=True):
+    if own.anomaly.p_value <= LEVEL or own.tied[0].gain >= significant_gain(
+        begin.tested, MISFIT_FAMILY_LEVEL
+    ):
         return own
     weak = (replace(c, reasons=(*c.reasons, UNSUPPORTED)) for c in own.candidates)
     return replace(own, tied=(), candidates=tuple(weak))
@@ -368,11 +350,9 @@ def _tied(candidates: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
 
 
 __all__ = [
-    "LEVEL",
     "RoundStart",
     "SearchRound",
     "at_best_location",
     "scored_round",
     "search_round",
-    "significant_gain",
 ]

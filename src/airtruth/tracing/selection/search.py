@@ -24,14 +24,13 @@ from airtruth.tracing.selection.release import DeclaredCauses, Release
 from airtruth.tracing.selection.rounds import (
     NOTHING_DECLARED,
     NOTHING_KNOWN,
-    REMAINS,
     RoundStart,
     SearchRound,
     at_best_location,
     search_round,
-    significant_gain,
 )
 from airtruth.tracing.selection.settled import settled, total_cost
+from airtruth.tracing.selection.significance import BEYOND_DOUBT, REMAINS, later_gain, significant_gain
 from airtruth.tracing.selection.weights import rival_of
 
 _ALTERNATIVES: Final = 2
@@ -41,9 +40,6 @@ _EXCHANGES: Final = 2
 _CLEAN: Final = 0.05
 """Probability of the remaining anomaly from which a search explains the records, so that no tied effect is tried
 instead [-] (convention)."""
-_FAILED: Final = 1e-6
-"""Probability of the remaining anomaly below which a search has failed, and what the kinematic check names leads another
-[-] (judgement: an anomaly beyond doubt)."""
 _WEAK: Final = 40.0
 """Gain in 2 log L of a single effect below which one that refitted derivatives had absorbed may explain more [-] (judgement)."""
 _STRONG_ODDS: Final = float(np.log(AS_PROBABLE))
@@ -135,7 +131,7 @@ class _Search:
             last = self._declared(rounds[-1].null)
             if last is None:
                 return rounds
-            least = significant_gain(first.tested, later=True)
+            least = later_gain(first.tested, rounds[-1].anomaly)
             better, exchanged = better_set(self.problem, rounds, last, first.effects, least, self.advance)
             if better is None or count == _EXCHANGES:
                 break
@@ -154,7 +150,7 @@ class _Search:
         """
         accepted = {e.key for e in last.null.hypothesis.effects}
         explained = not self.causes or any(cause <= accepted for cause in self.causes)
-        return last.anomaly.p_value < _FAILED and not explained
+        return last.anomaly.p_value < BEYOND_DOUBT and not explained
 
     def _with_absorbed(
         self, first: RoundStart, rounds: tuple[SearchRound, ...], beside: bool
