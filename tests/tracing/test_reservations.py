@@ -155,8 +155,15 @@ def test_a_name_of_weak_evidence_among_all_candidates_is_provisional():
     """Unmodelled 33 of seed 20262217: a step of Cm was called a lag of lift, p = 0.013."""
     weak = [replace(e, p_value=0.013) for e in effects("lift_alpha_dot")]
     (reason,) = reservations(weak, ())
-    assert reason.startswith("the score of lift_alpha_dot alone is weak among all candidates (p above 0.01)")
+    assert reason.startswith("the evidence for lift_alpha_dot alone is weak among all candidates (p above 0.01)")
     assert reservations([replace(weak[0], p_value=0.01)], ()) == ()
+
+
+def test_of_several_names_each_needs_stronger_evidence():
+    one, other = (replace(e, p_value=1e-9) for e in effects("lift_alpha_dot", "vane_lag"))
+    assert reservations([one, replace(other, p_value=2e-5)], ()) == ()
+    (reason,) = reservations([one, replace(other, p_value=2.1e-5)], ())
+    assert reason.startswith("the evidence for vane_lag alone is weak among all candidates (p above 2e-05)")
 
 
 def test_an_error_of_the_vane_beside_a_friction_of_the_vane_is_provisional():
