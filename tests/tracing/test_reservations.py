@@ -155,7 +155,9 @@ def test_a_name_of_weak_evidence_among_all_candidates_is_provisional():
     """Unmodelled 33 of seed 20262217: a step of Cm was called a lag of lift, p = 0.013."""
     weak = [replace(e, p_value=0.013) for e in effects("lift_alpha_dot")]
     (reason,) = reservations(weak, ())
-    assert reason.startswith("the evidence for lift_alpha_dot alone is weak among all candidates (p above 0.01)")
+    assert reason.startswith(
+        "the evidence for lift_alpha_dot alone is weak among all candidates (p above 0.01)"
+    )
     assert reservations([replace(weak[0], p_value=0.01)], ()) == ()
 
 
