@@ -6,8 +6,8 @@ Each answered trial of ``python -m validation.blind`` whose names differ from th
 without a search: with the effects of the answer from their estimates, and with those of the truth from their true sizes, each
 also from where the other fit ended. Where
 the log-posterior of the answer is larger, no search that maximises it could name the truth first. Where that of the truth is
-larger, the search missed it or its evidence is too weak to be accepted. An answer with increments or changed derivatives is not
-compared.
+larger, the search missed it or its evidence is too weak to be accepted. A truth or an answer with increments, changed derivatives
+or effects that the library lacks is not compared. The ranges that the kinematic check sets do not count.
 """
 
 from __future__ import annotations
@@ -71,7 +71,8 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any], log: Path) -> C
     flown = {e["key"]: e["values"] for e in truth["trial"]["effects"]}
     named = {_key(e): {n: p["value"] for n, p in e["parameters"].items()} for e in answer["effects"]}
     found = Comparison(tuple(flown), tuple(named), None)
-    if found.right or not set(named) <= EFFECTS.keys() or any(EFFECTS[k].in_derivatives for k in named):
+    keys = {*flown, *named}
+    if found.right or not keys <= EFFECTS.keys() or any(EFFECTS[key].in_derivatives for key in keys):
         return found
     library = [e for e in EFFECTS.values() if not e.in_derivatives]
     case, start = with_coloured_noise(

@@ -83,6 +83,13 @@ def test_an_argument_that_cannot_be_used(case, workspace, monkeypatch):
     assert words in str(caught.value)
 
 
+@pytest.mark.parametrize("kind", [list, tuple, iter, lambda paths: (p for p in paths)])
+def test_several_files_in_any_iterable(kind, workspace):
+    """An import reads the mappings first, and these do not exist."""
+    with pytest.raises(ConfigurationError, match=r"absent\.toml: cannot be read"):
+        at.import_log(kind(["one.csv", "other.csv"]), kind([workspace / "absent.toml", "map.toml"]))
+
+
 def test_the_type_of_a_written_log(workspace, tmp_path):
     log = at.read_log(workspace / "out" / "light")
     with pytest.raises(ConfigurationError, match=r"dtype = 'int': allowed: float32, float64"):

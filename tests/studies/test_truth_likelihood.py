@@ -20,7 +20,9 @@ def flown(tmp_path_factory):
 
 
 def answer(*names):
-    return {"effects": [{"name": n, "parameters": {p: {"value": x} for p, x in own.items()}} for n, own in names]}
+    return {
+        "effects": [{"name": n, "parameters": {p: {"value": x} for p, x in own.items()}} for n, own in names]
+    }
 
 
 @pytest.mark.slow

@@ -112,21 +112,30 @@ def airspeed_check(state):
     )
 
 
+def error(name, value=1.0, unit="m"):
+    return SimpleNamespace(name=name, value=value, declared=0.0, unit=unit)
+
+
 def test_alternatives_of_a_check_are_sets_and_its_airspeed_belongs_to_each():
     """Errors that the library lacks take no part: a lag of the attitude alone needs no effect."""
     check = airspeed_check("not needed")
-    one, other, attitude = (
-        SimpleNamespace(name=n) for n in ("vane_arm", "accelerometer_arm", "attitude_lag")
-    )
+    one, other, attitude = map(error, ("vane_arm", "accelerometer_arm", "attitude_lag"))
     check.possible = tuple(
         SimpleNamespace(errors=errors) for errors in ((one,), (other, attitude), (attitude,))
     )
     arms = {"vane_arm"}, {"accelerometer_arm"}, set()
-    assert sets_of(check) == tuple(map(frozenset, arms))
+    assert sets_of(check, 0.02) == tuple(map(frozenset, arms))
     check.findings = airspeed_check("present").findings
-    assert sets_of(check) == tuple(frozenset({*arm, "airspeed_alpha_slope"}) for arm in arms)
+    assert sets_of(check, 0.02) == tuple(frozenset({*arm, "airspeed_alpha_slope"}) for arm in arms)
     check.verdict = "failed"
-    assert sets_of(check) == sets_of(None) == ()
+    assert sets_of(check, 0.02) == sets_of(None, 0.02) == ()
+
+
+@pytest.mark.parametrize(("lag_s", "names"), [(0.0099, set()), (0.0101, {"vane_lag"})])
+def test_a_time_of_half_a_sample_is_no_error(lag_s, names):
+    check = airspeed_check("not needed")
+    check.possible = (SimpleNamespace(errors=(error("vane_lag", lag_s, "s"),)),)
+    assert sets_of(check, 0.02) == (frozenset(names),)
 
 
 def test_a_position_error_of_the_check_is_a_start_and_a_prior():

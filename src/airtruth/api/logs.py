@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+import os
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -155,8 +156,9 @@ def _paths(argument: str, files: FilePath | Sequence[FilePath]) -> list[Path]:
     """One path, or several, as a list; ``argument`` is the name in an error."""
     from airtruth.arguments import as_path
 
-    several = files if isinstance(files, Sequence) and not isinstance(files, str) else [files]
-    return [as_path(argument, one) for one in several]
+    if isinstance(files, str | bytes | os.PathLike) or not isinstance(files, Iterable):
+        return [as_path(argument, files)]
+    return [as_path(argument, one) for one in files]
 
 
 def check(

@@ -87,11 +87,8 @@ class FlightLog:
         """
         runs = _indices(self.run_ids, run_ids)
         names = _names(self.channels, channels)
-        if t_s is not None and np.shape(t_s) != (2,):
-            raise LogError(
-                f"t_s = {t_s!r}: must be the first and the last time to keep [s], such as (1.0, 3.0)"
-            )
-        pieces = [_between(self, run, t_s) for run in runs]
+        between = None if t_s is None else _two_times(t_s)
+        pieces = [_between(self, run, between) for run in runs]
         rows = np.concatenate([np.arange(0), *(np.arange(piece.start, piece.stop) for piece in pieces)])
         lengths = [piece.stop - piece.start for piece in pieces]
         starts = np.array([0.0 if t_s is None else self.t_s[piece.start] for piece in pieces])
@@ -240,6 +237,16 @@ def _names(channels: Mapping[str, Array], wanted: str | Collection[str] | None) 
         if name not in channels:
             raise LogError(f"no channel {name!r}; {choices(name, channels)}")
     return names
+
+
+def _two_times(t_s: tuple[float, float]) -> tuple[float, float]:
+    try:
+        first, last = map(float, t_s)
+    except (TypeError, ValueError):
+        raise LogError(
+            f"t_s = {t_s!r}: must be the first and the last time to keep [s], such as (1.0, 3.0)"
+        ) from None
+    return first, last
 
 
 def _between(log: FlightLog, run: int, t_s: tuple[float, float] | None) -> slice:

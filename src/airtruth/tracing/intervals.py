@@ -76,8 +76,8 @@ def widened_by_rejected(
 ) -> dict[str, ParameterEstimate]:
     """Estimates whose intervals contain those beside effects that explain the remaining anomaly, and are not accepted.
 
-    Where an anomaly remains the model lacks something, which may have moved the estimates. An effect that gains as much as a
-    later effect has to, and fails another test, shows how far.
+    Where an anomaly remains the model lacks something, which may have moved the estimates. An effect that gains as much as one
+    beside an anomaly beyond doubt has to, and fails another test, shows how far.
 
     Parameters
     ----------

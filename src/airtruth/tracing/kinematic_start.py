@@ -16,7 +16,7 @@ import numpy as np
 from airtruth.aircraft import Aircraft
 from airtruth.checks.kinematics import AIRSPEED, NAMED, check_kinematics, declared_errors
 from airtruth.checks.kinematics_model import ERRORS
-from airtruth.checks.result import CheckResult, Finding
+from airtruth.checks.result import Cause, CheckResult, Finding
 from airtruth.effects.effect import Effect
 from airtruth.effects.registry import EFFECTS
 from airtruth.errors import LogError
@@ -69,15 +69,24 @@ def starts_of(check: CheckResult | None) -> dict[str, float]:
     return {f.name: _beyond_declared(f) for f in check.findings if f.name in named and f.name in EFFECTS}
 
 
-def sets_of(check: CheckResult | None) -> tuple[frozenset[str], ...]:
-    """Sets of effects of the library that a check allows, the cheapest first; none where it names no error."""
+def sets_of(check: CheckResult | None, dt_s: float) -> tuple[frozenset[str], ...]:
+    """Sets of effects of the library that a check allows, the cheapest first; none where it names no error.
+
+    Parameters
+    ----------
+    dt_s : longest sample period of the fitted records [s]; a time of up to half of it is no error.
+    """
     if check is None or check.verdict not in ("errors", "one_of"):
         return ()
     airspeed = {f.name for f in _of_airspeed(check)}
-    sets = (
-        frozenset({f.name for f in cause.errors if f.name in EFFECTS} | airspeed) for cause in check.possible
-    )
-    return tuple(dict.fromkeys(sets))
+    return tuple(dict.fromkeys(frozenset(_effects_of(cause, dt_s) | airspeed) for cause in check.possible))
+
+
+def _effects_of(cause: Cause, dt_s: float) -> set[str]:
+    """Effects of the library that a set of errors names; a share of a sample period is none."""
+    return {
+        f.name for f in cause.errors if f.name in EFFECTS and abs(f.value - f.declared) > _margin(f, dt_s)
+    }
 
 
 def within_kinematics(effects: Sequence[Effect], check: CheckResult | None) -> tuple[Effect, ...]:
@@ -135,10 +144,7 @@ def disagreement(check: CheckResult | None, answer: TraceAnswer, dt_s: float) ->
     if check is None or check.verdict not in ("errors", "one_of"):
         return []
     traced = {name for e in answer.effects for name in (_key(e.name, e.channel), *e.indistinguishable_from)}
-    sets = [
-        {f.name for f in cause.errors if f.name in EFFECTS and abs(f.value - f.declared) > _margin(f, dt_s)}
-        for cause in check.possible
-    ]
+    sets = [_effects_of(cause, dt_s) for cause in check.possible]
     result = [
         f"the airspeed contradicts ax, az and theta unless its reading changes with the angle of attack ({f.name} "
         f"{f.lower:.2g} to {f.upper:.2g} {f.unit}), and the trace does not accept that error, so the answer is "

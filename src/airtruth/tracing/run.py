@@ -204,7 +204,7 @@ def _pruned_search(
         case.declared,
         starts_of(kinematics),
         other,
-        sets_of(kinematics),
+        sets_of(kinematics, max(r.signals.dt_s for r in case.fitted.records)),
     )
     return rounds and pruned(case.fitted, rounds, case.effects, options.seed, LEVEL, advance)
 

@@ -43,8 +43,8 @@ def inflation(problem: TraceProblem, fitted: PosteriorFit, unbiased: bool = Fals
     Parameters
     ----------
     fitted : a fit to the problem's records, at its optimum.
-    unbiased : whether long-run variances are divided by `mean_share`: an interval needs it, and a test whose threshold is
-        calibrated does not.
+    unbiased : whether long-run variances are divided by `mean_share`: an interval needs it, and so does a test on one or two
+        records; a test whose threshold is calibrated with more records does not.
 
     Returns
     -------

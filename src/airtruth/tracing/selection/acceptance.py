@@ -57,7 +57,8 @@ _SMALL_SHORTFALL: Final = 0.02
 """Share of its gain that a refit may still lack and count as converged [-] (judgement: rate limits and backlash give no
 smooth cost)."""
 _BEYOND_DOUBT: Final = 25.0
-"""Gain in 2 log L from which the free run of a closed loop refuses no effect [-] (judgement: that of a later effect)."""
+"""Gain in 2 log L from which the free run of a closed loop refuses no effect [-] (judgement: that of a later effect
+beside an anomaly beyond doubt)."""
 _DIVERGED: Final = 1e6
 """Residual over the share that gusts and sensors explain, beyond which a free run has diverged [-] (judgement)."""
 _SEVERAL: Final = 3
@@ -139,7 +140,8 @@ def assess_candidate(
     s, own, gain : its score, its fit, and its gain in 2 log L.
     reference : the fit without it.
     least : gain in 2 log L that is significant for white innovations; for correlated ones it is multiplied by the
-        ratio of robust to plain variance (J. T. Kent, Biometrika 69 (1982)), unbiased where too few records show their scatter.
+        ratio of robust to plain variance (J. T. Kent, Biometrika 69 (1982)); the robust one is unbiased with fewer than three
+        records, whose scatter is not estimated.
     """
     size, std = _size(s, own)
     few = len(problem.records) < _SEVERAL

@@ -40,7 +40,7 @@ def pruned(
 ) -> tuple[SearchRound, ...]:
     """The rounds without the names, and beside increments the release, that the rest makes unnecessary.
 
-    Beside increments a name needs the gain of a later effect, otherwise that of a first one.
+    Beside increments a name needs the gain of an effect beside an anomaly beyond doubt, otherwise that of a first one.
 
     Parameters
     ----------

@@ -326,7 +326,8 @@ def _with_evidence(own: SearchRound, begin: RoundStart) -> SearchRound:
     """The round without an effect where no test of the declared aircraft is significant over all tests.
 
     The scores are tested at `LEVEL` among themselves; with the tests that name no effect they are a larger family. A refit that
-    gains as much as a later effect has to needs no such test: refitted derivatives may hide an effect from every score.
+    gains as much as one beside an anomaly beyond doubt has to needs no such test: refitted derivatives may hide an effect from
+    every score.
     """
     if begin.hypothesis.effects or begin.leader or own.release is not None or not own.tied:
         return own

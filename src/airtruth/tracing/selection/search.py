@@ -18,9 +18,10 @@ from airtruth.tracing.selection.absorbed import refit_absorbed
 from airtruth.tracing.selection.acceptance import OUTDONE, Candidate, is_plausible, predicts_records_left_out
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import AHEAD, BETTER, better_set
-from airtruth.tracing.selection.explanation import AS_PROBABLE, events
+from airtruth.tracing.selection.explanation import events
 from airtruth.tracing.selection.refit import redundant_effect
 from airtruth.tracing.selection.release import DeclaredCauses, Release
+from airtruth.tracing.selection.replacement import CLEAN, STRONG_ODDS, Outcome, required_lead
 from airtruth.tracing.selection.rounds import (
     NOTHING_DECLARED,
     NOTHING_KNOWN,
@@ -30,20 +31,15 @@ from airtruth.tracing.selection.rounds import (
     search_round,
 )
 from airtruth.tracing.selection.settled import settled, total_cost
-from airtruth.tracing.selection.significance import BEYOND_DOUBT, REMAINS, later_gain, significant_gain
+from airtruth.tracing.selection.significance import REMAINS, later_gain, significant_gain
 from airtruth.tracing.selection.weights import rival_of
 
 _ALTERNATIVES: Final = 2
 """Number of tied effects to try instead of the leader [-] (judgement: each costs the rounds that follow)."""
 _EXCHANGES: Final = 2
 """Number of better sets that a search follows, one after another [-] (judgement: each costs the rounds that lead to it)."""
-_CLEAN: Final = 0.05
-"""Probability of the remaining anomaly from which a search explains the records, so that no tied effect is tried
-instead [-] (convention)."""
 _WEAK: Final = 40.0
 """Gain in 2 log L of a single effect below which one that refitted derivatives had absorbed may explain more [-] (judgement)."""
-_STRONG_ODDS: Final = float(np.log(AS_PROBABLE))
-"""Log-posterior, negative, by which a set of fewer effects may be behind."""
 _EFFECT_LEADS: Final = 30.0
 """Gain in 2 log L by which an effect has to lead for the released derivatives not to be followed beside it [-]
 (judgement: what a later effect may still add to them)."""
@@ -117,7 +113,8 @@ class _Search:
             return rounds
         for cause in self.causes:
             members = tuple(e for e in first.effects if e.key in cause)
-            if len(members) == len(cause) and self._contradicts_kinematics(rounds[-1]):
+            reached = self._outcome(rounds[-1])
+            if len(members) == len(cause) and reached.is_misfit and not reached.agrees:
                 rounds = self.led(first, members, rounds)
         weak = [r.tied[0].gain < _WEAK for r in rounds if r.tied]
         if (rounds[-1].anomaly.p_value < REMAINS or weak == [True]) and len(
@@ -143,14 +140,10 @@ class _Search:
             rounds = (*rounds[:-1], replace(rounds[-1], exchanged=exchanged))
         return rounds
 
-    def _contradicts_kinematics(self, last: SearchRound) -> bool:
-        """Whether a search leaves an anomaly beyond doubt and accepts no set of errors that explains the kinematics.
-
-        The kinematics need no aerodynamics. Where the aerodynamics are wrong, they tell errors of sensors better than the filter.
-        """
+    def _outcome(self, last: SearchRound) -> Outcome:
         accepted = {e.key for e in last.null.hypothesis.effects}
-        explained = not self.causes or any(cause <= accepted for cause in self.causes)
-        return last.anomaly.p_value < BEYOND_DOUBT and not explained
+        agrees = not self.causes or any(cause <= accepted for cause in self.causes)
+        return Outcome(len(_effects_of(last)), last.anomaly.p_value, agrees)
 
     def _with_absorbed(
         self, first: RoundStart, rounds: tuple[SearchRound, ...], beside: bool
@@ -201,11 +194,8 @@ class _Search:
         lead: float = BETTER,
         as_set: bool = False,
     ) -> tuple[SearchRound, ...]:
-        """The rounds of a search that accepts these effects first, if they lead others by a log-posterior and predict the
-        records left out.
-
-        Fewer effects are enough unless the odds against them are strong, and so is as much where they alone leave no anomaly.
-        Where both leave an anomaly beyond doubt, the search that does not contradict the kinematics remains.
+        """The rounds of a search that accepts these effects first, if they lead others by a log-posterior (`required_lead`)
+        and predict the records left out.
 
         Parameters
         ----------
@@ -227,14 +217,7 @@ class _Search:
             left = tuple(e for e in begin.effects if e.key not in accepted)
             starts = (*starts, RoundStart(fitted.hypothesis, fitted.point, left, settled=True, near=fitted))
         again = self.rounds(starts, again)
-        contradicts = [self._contradicts_kinematics(r[-1]) for r in (rounds, again)]
-        if contradicts == [False, True]:
-            return rounds
-        simpler = len(_effects_of(again[-1])) < len(_effects_of(rounds[-1]))
-        cleaner = again[-1].anomaly.p_value > _CLEAN and rounds[-1].anomaly.p_value < REMAINS
-        needed = _STRONG_ODDS if simpler else 0.0 if cleaner else lead
-        if contradicts == [True, False]:
-            needed = -np.inf
+        needed = required_lead(self._outcome(rounds[-1]), self._outcome(again[-1]), lead)
         if total_cost(again[-1]) >= total_cost(rounds[-1]) - needed or not is_plausible(
             self.problem, again[-1].null
         ):
@@ -273,7 +256,7 @@ class _Search:
             handicap = BETTER * np.array([events(_names(r[-1])) for r in ends])
         else:
             counts = np.array([events(_effects_of(r[-1])) for r in ends])
-            handicap = -_STRONG_ODDS * (counts > counts.min())
+            handicap = -STRONG_ODDS * (counts > counts.min())
         best = int(np.argmin(costs + handicap))
         won, lost = ends[best], ends[1 - best]
         rival = rival_of(lost, float(costs[1 - best] - costs[best]))
@@ -331,7 +314,7 @@ class _Search:
             led = at_best_location(self.problem, replace(own, tied=(rival, *rest)), self.advance)
             tried = self._onwards(starts, (*rounds[:-1], led), True)
             leads = total_cost(tried[-1]) < total_cost(ends[-1]) - BETTER
-            leaves_more = tried[-1].anomaly.p_value < min(_CLEAN, ends[-1].anomaly.p_value)
+            leaves_more = tried[-1].anomaly.p_value < min(CLEAN, ends[-1].anomaly.p_value)
             if _is_clean(tried, len(rounds)) or (leads and not leaves_more):
                 return tried
         return ends
@@ -375,7 +358,7 @@ def _variants(own: SearchRound) -> tuple[Candidate, ...]:
 
 def _is_clean(rounds: Sequence[SearchRound], count: int) -> bool:
     """Whether the first ``count`` rounds explain the records: no later effect, and no anomaly that remains."""
-    return not any(r.tied for r in rounds[count:]) and rounds[-1].anomaly.p_value > _CLEAN
+    return not any(r.tied for r in rounds[count:]) and rounds[-1].anomaly.p_value > CLEAN
 
 
 __all__ = ["search"]

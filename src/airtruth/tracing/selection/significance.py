@@ -23,16 +23,16 @@ BEYOND_DOUBT: Final = 1e-6
 LATER_LEVEL: Final = 0.005
 """Significance level of the scores in later rounds [-] (judgement: a tenth of that of the first)."""
 MISFIT_LEVEL: Final = 0.001
-"""The same beside an anomaly beyond doubt [-] (judgement: a misspecified model always leaves a small residual, and a stricter
-level adds fewer false effects at the price of small true ones)."""
+"""Significance level of the scores beside an anomaly beyond doubt [-] (judgement: a misspecified model always leaves a small
+residual, and a stricter level adds fewer false effects at the price of small true ones)."""
 FAMILY_LEVEL: Final = 0.05165827451
 """Significance level of the gain in 2 log L of a refit over all candidates, by Bonferroni's rule [-]: a gain of 10.0
-where all 33 candidates of the library are tested (judgement: a round figure next to 5 %)."""
+where 33 candidates are tested, 10.1 for the 35 of the library (judgement: a round figure next to 5 %)."""
 LATER_FAMILY_LEVEL: Final = 2.090301960986e-3
-"""The same in later rounds [-]: a gain of 16.0 for 33 candidates (judgement: beside three true effects, the best false one gains
-less than 13 in the triples for which it was chosen)."""
+"""Level of that gain in later rounds [-]: a gain of 16.0 for 33 candidates (judgement: beside three true effects, the best false
+one gains less than 13 in the triples for which it was chosen)."""
 MISFIT_FAMILY_LEVEL: Final = 1.8919003744e-5
-"""The same beside an anomaly beyond doubt [-]: a gain of 25.0 for 33 candidates (judgement: as `MISFIT_LEVEL`)."""
+"""Level of that gain beside an anomaly beyond doubt [-]: a gain of 25.0 for 33 candidates (judgement: as `MISFIT_LEVEL`)."""
 
 
 def significant_gain(candidates: int, level: float = FAMILY_LEVEL) -> float:
