@@ -3,36 +3,21 @@
 A sinusoid of 4 Hz in az, 0.5 m/s2, is the anomaly beyond doubt that no effect explains.
 """
 
-from dataclasses import replace
-
-import numpy as np
 import pytest
 import trace_records as tr
+from scaled_records import disturbed_problem
 
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.inference.optimise import initial_parameters
 from airtruth.tracing.selection.search import search
-from airtruth.units import DEG
 
 CANDIDATES = tuple(EFFECTS[key] for key in ("gyro_scale", "vane_scale"))
 AGAIN = "round 1: refit without further effects"
 
 
-def wrong_gyro(sinusoid_m_s2):
-    rng = np.random.default_rng(4)
-    records = []
-    for amplitude in (2.0, -2.0, 1.5):
-        one = tr.fly(rng, amplitude=amplitude * DEG, sigma_w=0.05, name=str(amplitude))
-        t_s = np.arange(len(one.signals.y)) * one.signals.dt_s
-        y = one.signals.y * [1.0, 1.2, 1.0]
-        y[:, 2] += sinusoid_m_s2 * np.sin(2.0 * np.pi * 4.0 * t_s + amplitude)
-        records.append(replace(one, signals=replace(one.signals, y=y)))
-    return tr.problem(records)
-
-
 @pytest.fixture(scope="module", params=[0.0, 0.5], ids=["clean", "anomaly"])
 def problem(request):
-    return request.param > 0.0, wrong_gyro(request.param)
+    return request.param > 0.0, disturbed_problem([1.0, 1.2, 1.0], 2, request.param)
 
 
 def searched(problem, *causes):

@@ -3,9 +3,9 @@
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 import trace_records as tr
+from scaled_records import disturbed_problem
 
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.inference.optimise import initial_parameters
@@ -20,7 +20,6 @@ from airtruth.tracing.selection.significance import (
     later_gain,
     significant_gain,
 )
-from airtruth.units import DEG
 
 
 @pytest.mark.parametrize(
@@ -40,23 +39,10 @@ def test_beside_an_anomaly_beyond_doubt_a_later_effect_needs_more(p_value, gain)
 CANDIDATES = tuple(EFFECTS[key] for key in ("gyro_scale", "vane_scale", "accelerometer_scale"))
 
 
-def wrong_scales(gyro, sinusoid_rad):
-    """Three records of an accelerometer that reads 15 % too much, and of a gyro; a sinusoid of 4 Hz is in alpha."""
-    rng = np.random.default_rng(4)
-    records = []
-    for amplitude in (2.0, -2.0, 1.5):
-        one = tr.fly(rng, amplitude=amplitude * DEG, sigma_w=0.05, name=str(amplitude))
-        t_s = np.arange(len(one.signals.y)) * one.signals.dt_s
-        y = one.signals.y * [1.0, gyro, 1.15]
-        y[:, 0] += sinusoid_rad * np.sin(2.0 * np.pi * 4.0 * t_s + amplitude)
-        records.append(replace(one, signals=replace(one.signals, y=y)))
-    return tr.problem(records)
-
-
 @pytest.mark.parametrize(("gyro", "sinusoid_rad", "accepted"), [(1.027, 0.0, True), (1.04, 0.003, False)])
 def test_a_small_second_effect_is_accepted_unless_an_anomaly_is_beyond_doubt(gyro, sinusoid_rad, accepted):
     """Its gain is between the two limits of three candidates, 11.5 and 20.4."""
-    problem = wrong_scales(gyro, sinusoid_rad)
+    problem = disturbed_problem([1.0, gyro, 1.15], 0, sinusoid_rad)
     start = initial_parameters(problem, tr.NOTHING)
     rounds = search(problem, tr.NOTHING, start, CANDIDATES, 1)
     (gain,) = (c.gain for c in rounds[1].candidates if c.score.effect.key == "gyro_scale")
@@ -75,7 +61,7 @@ def test_with_one_or_two_records_the_variance_is_unbiased(count, unbiased, monke
         return inflation(problem, fitted, unbiased)
 
     monkeypatch.setattr(acceptance, "inflation", spy)
-    problem = wrong_scales(1.0, 0.0)
+    problem = disturbed_problem([1.0, 1.0, 1.15], 0, 0.0)
     problem = replace(problem, records=problem.records[:count])
     search(problem, tr.NOTHING, initial_parameters(problem, tr.NOTHING), CANDIDATES, 1)
     assert set(asked) == {unbiased}
