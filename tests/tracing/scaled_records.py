@@ -25,8 +25,8 @@ def scaled_problem(vane=1.3, gyro=1.1):
 
 
 def disturbed_problem(scales, channel, amplitude):
-    """Three records; vane, gyro and accelerometer read these factors of the truth, and one channel (0 to 2) has a sinusoid of 4 Hz
-    besides, of this amplitude [rad, rad/s or m/s2], which no effect explains.
+    """Three records; vane, gyro and accelerometer read these factors of the truth, and one channel (0 to 2) has a sinusoid
+    of 4 Hz besides, of this amplitude [rad, rad/s or m/s2], which no effect explains.
     """
     rng = np.random.default_rng(4)
     records = []
