@@ -34,7 +34,7 @@ _FITS: Final = 0.05
 """Probability of the check's absolute test from which it fits the records [-] (convention)."""
 _IMPOSSIBLE: Final = 1e-6
 """Probability of the check's absolute test below which an answer without a cause is not that nothing is missing [-] (judgement:
-the least of 60 flights without an effect is 6e-4)."""
+one of 140 null trials has 1.4e-7)."""
 _SAMPLES: Final = 0.5
 """Time over the sample period up to which the check does not contradict a trace [-] (judgement: between two samples it follows
 the motion by a polynomial, and a surface that steps bends it; ideal sensors logged at 20 Hz show a gyro late by a quarter of a
