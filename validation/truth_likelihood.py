@@ -2,12 +2,12 @@
 
     python -m validation.truth_likelihood --blind out/blind/triple-1
 
-Each answered trial of ``python -m validation.blind`` whose names differ from the truth is fitted twice with the tracer's filter,
-without a search: with the effects of the answer from their estimates, and with those of the truth from their true sizes, each
-also from where the other fit ended. Where
-the log-posterior of the answer is larger, no search that maximises it could name the truth first. Where that of the truth is
-larger, the search missed it or its evidence is too weak to be accepted. A truth or an answer with increments, changed derivatives
-or effects that the library lacks is not compared. The ranges that the kinematic check sets do not count.
+Each answered trial of ``python -m validation.blind`` whose names differ from the truth is fitted again with the tracer's filter,
+without a search. One fit has the effects of the answer and begins at their estimates. The other has those of the truth and begins
+at the true sizes. Both are repeated from where the other ended. Where the log-posterior of the answer is larger, no search that
+maximises it could name the truth first. Where that of the truth is larger, the search missed it, or its evidence is too weak to
+be accepted. A truth or an answer with increments, changed derivatives or effects that the library lacks is not compared. The
+ranges that the kinematic check sets do not count.
 """
 
 from __future__ import annotations

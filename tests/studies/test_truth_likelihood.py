@@ -25,6 +25,12 @@ def answer(*names):
     }
 
 
+def test_effects_outside_the_library_are_not_compared(tmp_path):
+    truth = {"trial": {"effects": [{"key": "fuel_slosh", "values": {}}]}}
+    found = compare(truth, answer(("vane_lag", {"tau_s": 0.1})), tmp_path / "absent.parquet")
+    assert (found.lead, found.right) == (None, False)
+
+
 @pytest.mark.slow
 def test_the_truth_is_more_probable_than_another_scale(flown):
     _, truth, log = flown

@@ -112,7 +112,7 @@ def _traced(
     advance("compare ax with the declared axial force")
     axial = axial_force(stages, checked, declared, rounds[-1].gls) if options.learns else None
     origin = provenance_of(logs, declared, options)
-    dt_s = max(r.signals.dt_s for r in case.fitted.records)
+    dt_s = _longest_period_s(case)
     if out is None:
         return TraceResult(
             with_contradictions(conclude(stages, rounds, forced=forced, axial=axial), kinematics, dt_s),
@@ -204,9 +204,14 @@ def _pruned_search(
         case.declared,
         starts_of(kinematics),
         other,
-        sets_of(kinematics, max(r.signals.dt_s for r in case.fitted.records)),
+        sets_of(kinematics, _longest_period_s(case)),
     )
     return rounds and pruned(case.fitted, rounds, case.effects, options.seed, LEVEL, advance)
+
+
+def _longest_period_s(case: Case) -> float:
+    """Longest sample period of the fitted records [s]."""
+    return max(r.signals.dt_s for r in case.fitted.records)
 
 
 def _with_later_colour(

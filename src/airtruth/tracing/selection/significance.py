@@ -48,7 +48,7 @@ def significant_gain(candidates: int, level: float = FAMILY_LEVEL) -> float:
 
 
 def later_gain(candidates: int, anomaly: Anomaly) -> float:
-    """The same of an effect beside others that leave an anomaly."""
+    """Gain in 2 log L from which an effect is significant beside others that leave an anomaly."""
     misfit = anomaly.p_value < BEYOND_DOUBT
     return significant_gain(candidates, MISFIT_FAMILY_LEVEL if misfit else LATER_FAMILY_LEVEL)
 
