@@ -1,7 +1,7 @@
 """Weights of the sets that a search leaves, on rounds whose costs are stated."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
 import pytest
@@ -11,7 +11,7 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.selection.acceptance import IMMATERIAL, OUTDONE
 from airtruth.tracing.selection.learn import chosen
 from airtruth.tracing.selection.rounds import Rival
-from airtruth.tracing.selection.weights import alike_in_rivals, rival_of, weights
+from airtruth.tracing.selection.weights import alike_in_rivals, rival_of, weights, with_rival
 
 
 def null(*names, spread=None, z=100.0):
@@ -280,3 +280,67 @@ def test_increments_alone_take_the_place_of_names_or_are_their_rival(beside, alo
     found = chosen(grown, rounds, lead, (EFFECTS["cm_alpha_nonlinear:quadratic"],), ())
     assert (found[0].tied == rounds[0].tied) == (lead > 5.0 or alone is None)
     assert (None if found[0].rival is None else found[0].rival.sets) == expected
+
+
+@dataclass(frozen=True)
+class Ended:
+    """What the sets of a finished search read of its only round."""
+
+    null: SimpleNamespace
+    tied: tuple[SimpleNamespace, ...] = ()
+    candidates: tuple[SimpleNamespace, ...] = ()
+    rival: Rival | None = None
+    release: None = None
+    sets: tuple[()] = ()
+    exchanged: tuple[()] = ()
+    table: SimpleNamespace = field(default_factory=lambda: NO_SCORES)
+
+
+def ended(cost, *names, rival=None):
+    """A search that ended with this cost after it accepted each of these effects for a gain of 100."""
+    rounds = [Ended(replaced(cost, *names), (candidate(name, 100.0),)) for name in names]
+    rounds = rounds or [Ended(replaced(cost))]
+    return (replace(rounds[0], rival=rival), *rounds[1:])
+
+
+def replaced(cost, *names):
+    own = null(*names)
+    own.cost = cost
+    return own
+
+
+def above(sets, least):
+    """Names of the sets that weigh at least so much, with the weight of each."""
+    return {names: weight for names, weight in sets.items() if weight >= least}
+
+
+@pytest.mark.parametrize(
+    ("won", "lost", "expected"),
+    [
+        (
+            ended(10.0, "vane_arm"),
+            ended(12.0, "vane_lag"),
+            {("vane_arm",): 1.0, ("vane_lag",): math.exp(-2.0)},
+        ),
+        (ended(10.0, "vane_arm"), ended(4.0, "vane_lag"), {("vane_arm",): 1.0, ("vane_lag",): 1.0}),
+        (ended(10.0, "vane_arm"), ended(12.0, "vane_arm"), {("vane_arm",): 1.0}),
+        (ended(10.0, "vane_arm"), ended(10.0), {("vane_arm",): 1.0}),
+        (ended(10.0), ended(12.0, "vane_lag"), {(): 1.0}),
+        (
+            ended(10.0, "vane_arm", rival=Rival({("backlash",): -3.0, ("vane_lag",): -1.0})),
+            ended(12.0, "vane_lag"),
+            {("vane_arm",): 1.0, ("vane_lag",): math.exp(-1.0), ("backlash",): math.exp(-3.0)},
+        ),
+    ],
+    ids=[
+        "behind",
+        "gave way to the kinematic check",
+        "the same set",
+        "names nothing",
+        "beside a search that names nothing",
+        "beside an earlier rival",
+    ],
+)
+def test_a_search_that_lost_leaves_its_sets(won, lost, expected):
+    """Weights by hand: the difference of the costs; what is removed from a set costs a gain of 100."""
+    assert above(weights(with_rival(won, lost)), 1e-9) == pytest.approx(expected, rel=1e-12)

@@ -47,6 +47,7 @@ from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.selection.search import search
 from airtruth.tracing.selection.settled import total_cost
 from airtruth.tracing.selection.significance import LEVEL
+from airtruth.tracing.selection.weights import with_rival
 from airtruth.tracing.stages import assess_stages
 from airtruth.tracing.update import updated_folder, write_update
 
@@ -234,9 +235,11 @@ def _with_later_colour(
     start = replace(point, sizes=np.empty(0))
     accepted = rounds[-1].null.hypothesis.effects
     again = _pruned_search(coloured, start, options, advance, kinematics, accepted)
-    if again and total_cost(again[-1]) < total_cost(rounds[-1]):
-        return coloured, again
-    return case, rounds
+    if not again:
+        return case, rounds
+    if total_cost(again[-1]) < total_cost(rounds[-1]):
+        return coloured, with_rival(again, rounds)
+    return case, with_rival(rounds, again)
 
 
 def _effects(options: TraceOptions) -> list[Effect]:

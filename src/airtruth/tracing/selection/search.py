@@ -32,7 +32,7 @@ from airtruth.tracing.selection.rounds import (
 )
 from airtruth.tracing.selection.settled import settled, total_cost
 from airtruth.tracing.selection.significance import REMAINS, later_gain, significant_gain
-from airtruth.tracing.selection.weights import rival_of
+from airtruth.tracing.selection.weights import rival_of, with_rival
 
 _ALTERNATIVES: Final = 2
 """Number of tied effects to try instead of the leader [-] (judgement: each costs the rounds that follow)."""
@@ -132,10 +132,9 @@ class _Search:
             better, exchanged = better_set(self.problem, rounds, last, first.effects, least, self.advance)
             if better is None or count == _EXCHANGES:
                 break
-            again = self.led(first, better, rounds, 0.5 * AHEAD, as_set=True)
-            if again is rounds:
+            before, rounds = rounds, self.led(first, better, rounds, 0.5 * AHEAD, as_set=True)
+            if rounds[-1].null is before[-1].null:
                 break
-            rounds = again
         if last is rounds[-1].null:
             rounds = (*rounds[:-1], replace(rounds[-1], exchanged=exchanged))
         return rounds
@@ -195,7 +194,7 @@ class _Search:
         as_set: bool = False,
     ) -> tuple[SearchRound, ...]:
         """The rounds of a search that accepts these effects first, if they lead others by a log-posterior (`required_lead`)
-        and predict the records left out.
+        and predict the records left out. The search that loses is a rival of the other one.
 
         Parameters
         ----------
@@ -217,12 +216,14 @@ class _Search:
             left = tuple(e for e in begin.effects if e.key not in accepted)
             starts = (*starts, RoundStart(fitted.hypothesis, fitted.point, left, settled=True, near=fitted))
         again = self.rounds(starts, again)
-        needed = required_lead(self._outcome(rounds[-1]), self._outcome(again[-1]), lead)
-        if total_cost(again[-1]) >= total_cost(rounds[-1]) - needed or not is_plausible(
-            self.problem, again[-1].null
-        ):
+        if not is_plausible(self.problem, again[-1].null):
             return rounds
-        return again if predicts_records_left_out(self.problem, again[0].null, again[-1].null) else rounds
+        needed = required_lead(self._outcome(rounds[-1]), self._outcome(again[-1]), lead)
+        if total_cost(again[-1]) >= total_cost(rounds[-1]) - needed:
+            return with_rival(rounds, again)
+        if not predicts_records_left_out(self.problem, again[0].null, again[-1].null):
+            return rounds
+        return with_rival(again, rounds)
 
     def _branches(
         self,

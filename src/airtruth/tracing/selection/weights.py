@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 from typing import Final
 
 from airtruth.effects.increment import Increment
@@ -13,6 +14,7 @@ from airtruth.tracing.selection.acceptance import OUTDONE, has_converged
 from airtruth.tracing.selection.explanation import REFERENCE
 from airtruth.tracing.selection.ranking import TIE
 from airtruth.tracing.selection.rounds import Rival, SearchRound
+from airtruth.tracing.selection.settled import total_cost
 
 _POINTS: Final = 2.0
 """Score in standard deviations from which the residual points to one more effect [-] (convention)."""
@@ -32,14 +34,15 @@ def weights(rounds: Sequence[SearchRound]) -> dict[tuple[str, ...], float]:
     """Names of each set -> its weight beside the set that the search accepted.
 
     The sets combine the effects that could lead each round with the sets that explain the derivatives, and contain those of
-    the branches that lost, those without one of the accepted effects, those that the search has tried instead, and those with
-    one effect more. An effect is accepted by a test, so that no set is empty for want of the only one.
+    the branches and searches that lost, those without one of the accepted effects, those that the search has tried instead, and
+    those with one effect more. A set that two searches reach has the larger of its weights. An effect is accepted by a test, so
+    that no set is empty for want of the only one.
     """
     found: dict[tuple[str, ...], float] = {}
 
     def add(names: Collection[str], log_weight: float) -> None:
         key = tuple(sorted(set(names)))
-        found[key] = found.get(key, 0.0) + math.exp(max(_LEAST_LOG, min(0.0, log_weight)))
+        found[key] = found.get(key, 0.0) + _weight(log_weight)
 
     accepted = {r.tied[0].score.effect.name for r in rounds if r.tied}
     leading = [list(_leading(r, accepted)) for r in rounds if r.tied]
@@ -54,13 +57,18 @@ def weights(rounds: Sequence[SearchRound]) -> dict[tuple[str, ...], float]:
                 add([*rest, *explaining, *carried], log_weight + lost)
     for r in rounds:
         for names, log_weight in () if r.rival is None else r.rival.sets.items():
-            add(names, log_weight)
+            key = tuple(sorted(set(names)))
+            found[key] = max(found.get(key, 0.0), _weight(log_weight))
     for tried in (_exchanged(rounds[-1]), _with_one_more(rounds[-1], combined)):
         known = set(found)
         for every, log_weight in tried:
             if tuple(sorted(set(every))) not in known:
                 add(every, log_weight)
     return found
+
+
+def _weight(log_weight: float) -> float:
+    return math.exp(max(_LEAST_LOG, min(0.0, log_weight)))
 
 
 def _exchanged(last: SearchRound) -> Iterator[tuple[list[str], float]]:
@@ -157,6 +165,21 @@ def rival_of(lost: Sequence[SearchRound], excess: float) -> Rival:
     return Rival({names: math.log(w) - max(0.0, excess) for names, w in weights(lost).items()})
 
 
+def with_rival(won: tuple[SearchRound, ...], lost: Sequence[SearchRound]) -> tuple[SearchRound, ...]:
+    """A finished search that names effects, with the sets of another one, which lost to it, as rivals in its first round.
+
+    A search that lost by another rule than its posterior counts as equally probable. The empty set of one that names nothing is
+    no rival, and a search that names nothing has none.
+    """
+    if () in weights(won):
+        return won
+    excess = total_cost(lost[-1]) - total_cost(won[-1])
+    sets = {names: log_weight for names, log_weight in rival_of(lost, excess).sets.items() if names}
+    for names, log_weight in () if won[0].rival is None else won[0].rival.sets.items():
+        sets[names] = max(sets.get(names, -math.inf), log_weight)
+    return (replace(won[0], rival=Rival(sets)), *won[1:])
+
+
 def alike_in_rivals(rounds: Sequence[SearchRound], key: str, accepted: Collection[str]) -> set[str]:
     """Effects that, in a set of a branch that lost, explain the records as well in place of one accepted effect.
 
@@ -190,4 +213,4 @@ def _explanations(rounds: Sequence[SearchRound]) -> Iterator[tuple[tuple[str, ..
         yield (), release.cost - null.cost + REFERENCE
 
 
-__all__ = ["alike_in_rivals", "rival_of", "weights"]
+__all__ = ["alike_in_rivals", "rival_of", "weights", "with_rival"]
