@@ -370,6 +370,19 @@ def test_the_time_that_remains_is_exact_where_steps_take_their_shares():
     assert remaining.left_s == 0.0
 
 
+def test_a_short_first_step_predicts_nothing():
+    """A step of 1 of 101 typical seconds scatters by more than its time; the first of the next ten seconds predicts the rest."""
+    clock = Clock()
+    remaining = Remaining((("a", 1.0), ("b", 10.0), ("c", 90.0)), clock)
+    remaining.enter("a")
+    clock.now = 3.0
+    remaining.enter("b")
+    assert remaining.left_s is None
+    clock.now = 11.0
+    remaining.enter("c")
+    assert remaining.left_s == pytest.approx(90.0)
+
+
 def test_the_steps_of_a_trace_are_those_of_a_loop_in_its_middle():
     clock = Clock()
     remaining = Remaining(TRACE_STEPS, clock)

@@ -97,7 +97,7 @@ def test_constants_alone_need_no_jsbsim(tmp_path):
 
 def test_neither_constants_nor_model(tmp_path):
     (tmp_path / "aircraft.toml").write_text('schema = 1\nname = "none"\n')
-    assert "without [jsbsim] it needs [geometry] and [mass]" in refusal(tmp_path)
+    assert "without a JSBSim model it needs [geometry] and [mass]" in refusal(tmp_path)
 
 
 SPOILT_TOML = {
@@ -251,3 +251,14 @@ def test_a_model_spoilt_after_it_was_read_is_not_flown_from_memory(copy):
     aircraft.load(copy)
     edit(copy / "gtm.xml", "<property>aero/ci2vel</property>", "<property>aero/ci2vell</property>")
     assert "ci2vell" in refusal(copy)
+
+
+def test_an_aircraft_file_alone_is_an_aircraft_without_a_model(tmp_path):
+    """That of the GTM states geometry and mass, which are all that the linear model needs beside the derivatives."""
+    declared = aircraft.load("gtm")
+    (tmp_path / "aircraft.toml").write_bytes((declared.folder / "aircraft.toml").read_bytes())
+    alone = aircraft.load(tmp_path)
+    assert declared.file.jsbsim is not None
+    assert alone.file.jsbsim is None
+    assert alone.constants.mass_kg == pytest.approx(declared.constants.mass_kg, rel=1e-3)
+    assert alone.file.derivatives == declared.file.derivatives

@@ -9,7 +9,7 @@ import trace_flights
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.store import read_log
 from airtruth.tracing import TraceOptions, trace
-from airtruth.tracing.model.airspeed import gust_cutoff_hz, low_passed
+from airtruth.tracing.model.airspeed import gust_cutoff_hz, low_passed, without_noise
 from airtruth.tracing.model.records import read
 from airtruth.units import G0
 from validation.blind import draw, trials
@@ -139,3 +139,31 @@ def test_noise_in_calm_air_is_low_passed_at_5_hz():
     drift = 40.0 + 0.5 * DT * np.arange(500)
     assert gust_cutoff_hz(drift + noise, DT) < 8.0
     assert gust_cutoff_hz(drift + 0.05 * np.tile([1.0, -1.0], 250), DT) == 5.0
+
+
+def test_a_noisy_airspeed_follows_the_speed_over_ground():
+    """Noise of 0.25 m/s at 22 m/s: 0.11 m/s remain after the low-pass at 5 Hz (a fifth of the variance), 0.02 m/s here."""
+    rng = np.random.default_rng(4)
+    ground = 22.0 + 1.5 * np.sin(0.7 * T)
+    airspeed = ground + 0.25 * rng.standard_normal(T.size)
+    assert np.std(low_passed(airspeed, DT) - ground) == pytest.approx(0.11, abs=0.03)
+    assert np.sqrt(np.mean((without_noise(airspeed, ground, DT) - ground) ** 2)) < 0.03
+
+
+def test_a_noisy_airspeed_keeps_its_gust():
+    """Steps of 0.03 m/s in noise of 0.25 m/s: the smoother's error is (q r / 4)^(1/4), 0.061 m/s."""
+    rng = np.random.default_rng(5)
+    ground = np.full(5000, 22.0)
+    gust = np.cumsum(0.03 * rng.standard_normal(5000))
+    error = without_noise(ground + gust + 0.25 * rng.standard_normal(5000), ground, DT) - ground - gust
+    assert np.sqrt(np.mean(error**2)) == pytest.approx(0.061, rel=0.15)
+
+
+def test_a_quiet_airspeed_is_low_passed_alone():
+    """The GTM's noise of 0.03 m/s is 0.0003 of its airspeed after the low-pass."""
+    rng = np.random.default_rng(6)
+    airspeed = 43.0 + np.sin(0.7 * T) + 0.031 * rng.standard_normal(T.size)
+    cutoff = gust_cutoff_hz(airspeed, DT)
+    np.testing.assert_array_equal(
+        without_noise(airspeed, airspeed + 5.0, DT), low_passed(airspeed, DT, cutoff)
+    )

@@ -347,6 +347,8 @@ def read_file(folder: Path) -> AircraftFile:
 def load(name: str | Path, near: Path | None = None) -> Aircraft:
     """Find, read and check an aircraft; its JSBSim model is first loaded in a child process.
 
+    An aircraft.toml that was copied without the files of its JSBSim model is an aircraft without one.
+
     Raises
     ------
     AircraftError
@@ -354,9 +356,13 @@ def load(name: str | Path, near: Path | None = None) -> Aircraft:
     """
     folder = find(name, near)
     file = read_file(folder)
+    if file.jsbsim and file.jsbsim.root == "." and not any(folder.rglob("*.xml")):
+        file = file.model_copy(update={"jsbsim": None})
     model_constants = probe(folder, file.jsbsim.model_dump_json()) if file.jsbsim else None
     if model_constants is None and (file.geometry is None or file.mass is None):
-        raise AircraftError(f"{folder / FILE}: without [jsbsim] it needs [geometry] and [mass]")
+        raise AircraftError(
+            f"{folder / FILE}: without a JSBSim model it needs [geometry] and [mass]; state them, or copy the model there"
+        )
     return Aircraft(folder=folder, file=file, constants=_constants(file, model_constants))
 
 

@@ -115,7 +115,7 @@ def changed(
     file = plane.file
     if file.jsbsim is None and change.in_aircraft:
         raise AircraftError(
-            f"{plane.folder}: aircraft.toml has no [jsbsim] table, so there is no model to write the change into; "
+            f"{plane.folder}: has no JSBSim model to write the change into, or no [jsbsim] table in aircraft.toml; "
             "`airtruth aircraft new` writes one"
         )
     require_new(out_folder)

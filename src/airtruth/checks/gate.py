@@ -89,7 +89,9 @@ def require(
     faults = inspect(log, aircraft)
     certain = [fault.sentence for fault in faults if fault.certain]
     if certain and not force:
-        heading = f"{source or 'flight log'}: contradicts physics; correct it, or continue with --force"
+        usable = any(fault.code != "constant" for fault in faults if fault.certain)
+        advice = "correct it, or continue with --force" if usable else "correct it"
+        heading = f"{source or 'flight log'}: contradicts physics; {advice}"
         raise LogError("\n  - ".join([heading, *certain]))
     return faults
 

@@ -32,6 +32,9 @@ TRACE_STEPS: Final = (
 data/undeclared/b.parquet, which accepts one effect. Only the ratios matter; those of a trace are a part of them."""
 AT_ONCE_S: Final = 0.5
 """Time within which work that is reported was done by an earlier command [s] (judgement)."""
+LEAST_DONE: Final = 0.04
+"""Share of the typical time after which the time that remains is stated [-] (judgement: shorter steps scatter by more than their
+time)."""
 EVERY_S: Final = 10.0
 """Least time between two lines of progress where stderr is no terminal [s] (judgement: a log stays readable)."""
 
@@ -80,14 +83,14 @@ class Remaining:
 
     @property
     def left_s(self) -> float | None:
-        """Estimate of the time that remains [s]; None before the first step has ended."""
+        """Estimate of the time that remains [s]; None before the first steps have ended, see `LEAST_DONE`."""
         if self._index is None:
             return None
         done = sum(weight for _, weight in self._steps[self._first : self._index])
         taken = self._entered - self._started
-        if done <= 0.0 or taken <= 0.0:
-            return None
         left = sum(weight for _, weight in self._steps[self._index :])
+        if done < LEAST_DONE * (done + left) or taken <= 0.0:
+            return None
         within = self._clock() - self._entered
         later = sum(weight for _, weight in self._steps[self._index + 1 :])
         return max(left * taken / done - within, later * taken / done)

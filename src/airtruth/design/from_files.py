@@ -173,7 +173,8 @@ def _default(declared: Aircraft, records: Histories | None) -> dict[str, object]
     if records is None:
         raise ConfigurationError(
             f"plan: no flight condition of {declared.name} is known; give a CAMPAIGN.toml "
-            f"(`airtruth new campaign --aircraft {declared.name} --out FILE.toml` writes one)"
+            f"(`airtruth new campaign --aircraft {declared.name} --eas-kt SPEED --altitude-ft ALTITUDE --out FILE.toml` "
+            "writes one)"
         )
     known = [r.conditions for r in records.records]
     speed = np.array([c["airspeed_m_s"] for c in known])

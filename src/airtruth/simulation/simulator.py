@@ -332,11 +332,11 @@ def jsbsim_model(aircraft: Aircraft) -> JsbsimModel:
     Raises
     ------
     AircraftError
-        If aircraft.toml has no [jsbsim] table.
+        If the aircraft has no JSBSim model.
     """
     if aircraft.file.jsbsim is None:
         raise AircraftError(
-            f"{aircraft.folder}: aircraft.toml has no [jsbsim] table, so there is no model to fly; "
+            f"{aircraft.folder}: has no JSBSim model to fly, or no [jsbsim] table in aircraft.toml; "
             "`airtruth aircraft new` writes one"
         )
     return aircraft.file.jsbsim

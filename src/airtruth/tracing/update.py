@@ -122,7 +122,7 @@ def write_update(
     note = f"Traced from measured records: {found}."
     corrections = None
     refitted = bool(np.isfinite(list(increments.values())).all())
-    if aircraft.file.jsbsim is None and refitted:
+    if refitted:
         aircraft = _with_derivatives(aircraft, increments)
     if aircraft.file.jsbsim is not None and refitted:
         alpha = float(np.mean([p.trim_alpha_rad for p in plants]))
@@ -137,7 +137,7 @@ def write_update(
 
 
 def _with_derivatives(aircraft: Aircraft, increments: Mapping[str, float]) -> Aircraft:
-    """The aircraft with other [derivatives], which are all that one without a JSBSim model has."""
+    """The aircraft with other [derivatives]: all that one without a JSBSim model has, and beside a model what it flies."""
     declared = aircraft.file.derivatives
     moved = {
         name: q.model_copy(

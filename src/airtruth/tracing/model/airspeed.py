@@ -1,4 +1,4 @@
-"""Airspeed as an input of the filter: the low-pass of its noise, and the speed over ground."""
+"""Airspeed as an input of the filter: its noise is removed; and the speed over ground."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.numerics.local_level import smoothed, walk_to_noise
 from airtruth.numerics.prefilter import butterworth
 from airtruth.units import G0
 
@@ -17,6 +18,9 @@ Array = NDArray[np.float64]
 _CUTOFF_HZ: Final = 5.0
 """Least cutoff of the low-pass of airspeed and density [Hz] (judgement): above the phugoid, below the noise of the
 sensors."""
+_NEGLIGIBLE: Final = 1e-3
+"""Standard deviation of the noise that a low-pass leaves in the airspeed, over the airspeed, up to which it is no disturbance [-]
+(judgement: 0.002 of the lift, 0.02 m/s2 in level flight, below the noise of accelerometers)."""
 _GROUND_SLOPE_M_S2: Final = 0.3
 """Largest error of the acceleration along the path that a longitudinal accelerometer leaves [m/s2] (judgement: a bias of
 0.02 g and an error in attitude of half a degree). A steeper trend of the airspeed is one of the wind."""
@@ -45,15 +49,42 @@ def gust_cutoff_hz(airspeed_m_s: Array, dt_s: float) -> float:
 
     Source: J. F. Muth, J. Amer. Statist. Assoc. 55 (1960) 299-306, for the random walk in noise.
     """
-    change = np.diff(np.asarray(airspeed_m_s, dtype=np.float64))
-    if change.size < 2:
-        return math.inf
-    change -= change.mean()
-    noise = -float((change[1:] * change[:-1]).mean())
+    noise, walk = _variances(airspeed_m_s)
     if noise <= 0.0:
         return math.inf
-    walk = max(float((change**2).mean()) - 2.0 * noise, 0.0)
     return max(_CUTOFF_HZ, math.sqrt(walk / noise) / (2.0 * math.pi * dt_s))
+
+
+def _variances(airspeed_m_s: Array) -> tuple[float, float]:
+    """Variances of the noise and of the steps of the walk [m2/s2], by moments; zero noise where none shows."""
+    change = np.diff(np.asarray(airspeed_m_s, dtype=np.float64))
+    if change.size < 2:
+        return 0.0, 0.0
+    change -= change.mean()
+    noise = max(-float((change[1:] * change[:-1]).mean()), 0.0)
+    return noise, max(float((change**2).mean()) - 2.0 * noise, 0.0)
+
+
+def without_noise(airspeed_m_s: Array, ground_m_s: Array, dt_s: float) -> Array:
+    """Airspeed without the noise of its sensor (samples,) [m/s].
+
+    A low-pass at `gust_cutoff_hz` is enough for most sensors. If it leaves more than a share of `_NEGLIGIBLE`, which changes the
+    lift as a gust does, the result is the speed over ground and the most probable random walk of what the airspeed has beside it.
+
+    Parameters
+    ----------
+    airspeed_m_s, ground_m_s : (samples,), the second as of `ground_speed`.
+    dt_s : sample period [s].
+    """
+    airspeed = np.asarray(airspeed_m_s, dtype=np.float64)
+    cutoff = gust_cutoff_hz(airspeed, dt_s)
+    noise = (
+        math.sqrt(_variances(airspeed)[0] * min(1.0, 2.0 * dt_s * cutoff)) if math.isfinite(cutoff) else 0.0
+    )
+    if noise <= _NEGLIGIBLE * float(airspeed.mean()):
+        return low_passed(airspeed, dt_s, cutoff)
+    gust = airspeed - ground_m_s
+    return np.asarray(ground_m_s + smoothed(gust, walk_to_noise(gust)))
 
 
 def ground_speed(channels: Mapping[str, Array], theta: Array, dt_s: float) -> Array:
@@ -75,4 +106,4 @@ def ground_speed(channels: Mapping[str, Array], theta: Array, dt_s: float) -> Ar
     return np.asarray(speed + float((v - speed).mean()) + slope * time)
 
 
-__all__ = ["ground_speed", "gust_cutoff_hz", "low_passed"]
+__all__ = ["ground_speed", "gust_cutoff_hz", "low_passed", "without_noise"]

@@ -15,7 +15,7 @@ from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
 from airtruth.numerics.whiteness import is_white
 from airtruth.physics.atmosphere import air_density, altitude_of_density_m
-from airtruth.tracing.model.airspeed import ground_speed, gust_cutoff_hz, low_passed
+from airtruth.tracing.model.airspeed import ground_speed, low_passed, without_noise
 from airtruth.tracing.model.compile import CHANNELS
 from airtruth.tracing.model.damper import damper_surface, find_damper
 from airtruth.tracing.model.elevator_path import LONGEST_STEP_S, Between, read_between
@@ -169,8 +169,8 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0) ->
     corners of a first-order servo where the record shows one (`airtruth.numerics.intersample`); in a coarse log it is
     that of the declared servo, or a spline (`airtruth.tracing.model.elevator`). What a pitch damper moves follows from the
     pitch rate (`airtruth.tracing.model.damper`). Airspeed
-    and density are inputs, and their noise is not motion: they are low-passed forward and backward, the density at 5 Hz and
-    the airspeed where its noise exceeds its gusts (`gust_cutoff_hz`).
+    and density are inputs, and their noise is not motion: the density is low-passed forward and backward at 5 Hz, and the
+    airspeed where its noise exceeds its gusts, or smoothed (`without_noise`).
     Attitude is measured, or the integral of the pitch rate from alpha at the start, level flight.
 
     Parameters
@@ -195,6 +195,7 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0) ->
         if theta is None:
             q = channels["q_rad_s"]
             theta = channels["alpha_rad"][0] + np.concatenate([[0.0], np.cumsum(0.5 * dt * (q[1:] + q[:-1]))])
+        ground = ground_speed(channels, theta, dt)
         between, remaining_rad = _surface(channels, dt, sub * FINE, elevator_std_rad, servo_s)
         found.append(
             Signals(
@@ -203,8 +204,8 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0) ->
                 sub=sub,
                 y=np.ascontiguousarray(y, dtype=np.float64),
                 elevator_rad=between.surface_rad,
-                airspeed_m_s=fine(low_passed(airspeed, dt, gust_cutoff_hz(airspeed, dt)), sub),
-                ground_m_s=fine(ground_speed(channels, theta, dt), sub),
+                airspeed_m_s=fine(without_noise(airspeed, ground, dt), sub),
+                ground_m_s=fine(ground, sub),
                 density_kg_m3=fine(low_passed(density, dt), sub),
                 theta_rad=fine(theta, sub),
                 altitude_m=float(np.mean(altitude)),
