@@ -258,6 +258,7 @@ def test_a_consistent_log_is_called_so(true):
     result = check_kinematics(as_log(noisy(true, 1)))
     assert result.verdict == "agrees"
     assert "The channels agree" in result.sentences[0]
+    assert "friction" not in " ".join(result.sentences)
     assert result.p_value > 0.05
     for name in ("gyro_scale", "sensor_delay:theta_rad"):
         one = result.finding(name)
@@ -319,6 +320,7 @@ def test_an_arm_longer_than_the_aircraft_is_no_cause(true):
     log = as_log(noisy(measured(true, {"vane_lag": 0.25}), 2))
     result = check_kinematics(log, None, 0.5)
     assert {c.name for c in result.possible} == {"vane_lag"}
+    assert "A friction of the vane" in result.sentences[1]
     assert not any("arm" in f.name and f.state in ("present", "one of") for f in result.findings)
 
 

@@ -17,7 +17,7 @@ from airtruth.checks.kinematics_bias import FIELDS, mean_of, ramps, ramps_of, rm
 from airtruth.checks.kinematics_fit import limits_of, problem_of
 from airtruth.checks.kinematics_model import ERRORS, Record, thinned
 from airtruth.checks.kinematics_search import Search, completed, price, search
-from airtruth.checks.kinematics_words import conclusions, verdict_of
+from airtruth.checks.kinematics_words import NAMED, conclusions, verdict_of
 from airtruth.checks.result import Cause, CheckResult, Finding, State
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
@@ -40,8 +40,6 @@ AIRSPEED: Final = ("sensor_delay:airspeed_m_s", "airspeed_alpha_slope")
 """Errors that the equation of airspeed shows."""
 ATTITUDE: Final = ("gyro_lag", "attitude_lag", "sensor_delay:theta_rad", "sensor_delay:q_rad_s", "gyro_scale")
 """Errors that need theta, because without it nothing predicts q but alpha, whose own errors are the same."""
-NAMED: Final = ("present", "one of")
-"""States of an error that an explanation has; a check that failed names none."""
 
 
 def check_log(

@@ -14,6 +14,10 @@ AGREES: Final = 0.05
 TELLING: Final = {"gyro_scale": 0.05, "vane_scale": 0.15, "vane_lag": 0.1}
 """Sizes that records have to show before the channels are called consistent [SI]: judgement; a smaller error does not
 change a derivative by more than its usual uncertainty."""
+NAMED: Final = ("present", "one of")
+"""States of an error that an explanation has; a check that failed names none."""
+_LIKE_FRICTION: Final = ("vane_lag", "sensor_delay:alpha_rad")
+"""Errors that a friction of the vane imitates: a play of 1.2 deg was a lag of 33 ms on a small aircraft in gusts."""
 
 
 def verdict_of(found: Search, findings: Sequence[Finding]) -> Verdict:
@@ -21,7 +25,7 @@ def verdict_of(found: Search, findings: Sequence[Finding]) -> Verdict:
     if limiting(found):
         return "failed"
     states = {f.state for f in findings if f.name != "forward_bias"}
-    if not found.best.names and not states & {"present", "one of"}:
+    if not found.best.names and not states & set(NAMED):
         telling = all(f.smallest <= TELLING.get(f.name, f.smallest) for f in findings)
         return "agrees" if telling and found.p_value > AGREES else "cannot_tell"
     return "one_of" if "one of" in states else "errors"
@@ -48,6 +52,11 @@ def conclusions(
             f"The errors do not explain all motion that follows the elevator (p = {found.p_value:.1g}), so the sensor noise is "
             f"multiplied by {found.enlargement**0.5:.2g}. The motion has terms outside this check (sideslip, roll, "
             "flexibility or other sensor errors)."
+        )
+    if any(f.name in _LIKE_FRICTION and f.state in NAMED for f in findings):
+        result.append(
+            "A friction of the vane, which this check does not model, looks like a lag or a delay of the vane: move the vane by "
+            "hand with the log running, or trace the records, which tests a friction."
         )
     if not found.stable:
         result.append("The estimate of the sensor noise did not converge, so the sizes are unreliable.")
@@ -128,4 +137,4 @@ def _named(findings: Sequence[Finding], causes: Sequence[Cause]) -> list[str]:
     return result
 
 
-__all__ = ["conclusions", "limiting", "verdict_of"]
+__all__ = ["NAMED", "conclusions", "limiting", "verdict_of"]

@@ -14,8 +14,9 @@ from typing import Final
 import numpy as np
 
 from airtruth.aircraft import Aircraft
-from airtruth.checks.kinematics import AIRSPEED, NAMED, check_kinematics, declared_errors
+from airtruth.checks.kinematics import AIRSPEED, check_kinematics, declared_errors
 from airtruth.checks.kinematics_model import ERRORS
+from airtruth.checks.kinematics_words import NAMED
 from airtruth.checks.result import Cause, CheckResult, Finding
 from airtruth.effects.effect import Effect
 from airtruth.effects.registry import EFFECTS

@@ -18,9 +18,10 @@ Array = NDArray[np.float64]
 _CUTOFF_HZ: Final = 5.0
 """Least cutoff of the low-pass of airspeed and density [Hz] (judgement): above the phugoid, below the noise of the
 sensors."""
-_NEGLIGIBLE: Final = 1e-3
+_NEGLIGIBLE: Final = 3e-3
 """Standard deviation of the noise that a low-pass leaves in the airspeed, over the airspeed, up to which it is no disturbance [-]
-(judgement: 0.002 of the lift, 0.02 m/s2 in level flight, below the noise of accelerometers)."""
+(judgement: 0.006 of the lift, 0.06 m/s2 in level flight, as the noise of accelerometers; and in strong gusts the estimate of the
+noise scatters by up to 0.0025 in the records of 6 s of data/undeclared)."""
 _GROUND_SLOPE_M_S2: Final = 0.3
 """Largest error of the acceleration along the path that a longitudinal accelerometer leaves [m/s2] (judgement: a bias of
 0.02 g and an error in attitude of half a degree). A steeper trend of the airspeed is one of the wind."""
