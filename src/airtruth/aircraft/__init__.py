@@ -7,12 +7,9 @@ from airtruth.aircraft.file import (
     AircraftFile,
     Dynamics,
     Sensor,
-    find,
-    load,
-    read_file,
     sensor_tables,
-    shipped_roots,
 )
+from airtruth.aircraft.loading import find, load, read_file, shipped_roots
 from airtruth.aircraft.model import ElevatorProperties, JsbsimModel, ThrottleProperties
 
 __all__ = [

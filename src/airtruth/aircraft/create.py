@@ -13,13 +13,9 @@ import numpy as np
 import pandas as pd
 
 from airtruth.aircraft import toml
-from airtruth.aircraft.file import (
-    FILE,
-    Aircraft,
-    AircraftFile,
-    load,
-)
+from airtruth.aircraft.file import FILE, Aircraft, AircraftFile
 from airtruth.aircraft.jsbsim.short_period import TrimPoint, model_xml
+from airtruth.aircraft.loading import load
 from airtruth.aircraft.model import ElevatorProperties, JsbsimModel, ThrottleProperties
 from airtruth.aircraft.write import require_new
 from airtruth.errors import ConfigurationError, choices

@@ -25,7 +25,8 @@ def complete_aircraft(incomplete: str) -> Iterator[str]:
     """Names of the shipped aircraft, and folders that hold aircraft.toml."""
     from pathlib import Path
 
-    from airtruth.aircraft.file import FILE, shipped_roots
+    from airtruth.aircraft.file import FILE
+    from airtruth.aircraft.loading import shipped_roots
 
     names = {file.parent.name for root in shipped_roots() for file in root.glob(f"*/{FILE}")}
     folders = {str(file.parent) for file in Path().glob(f"*/{FILE}")}
