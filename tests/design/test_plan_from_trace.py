@@ -8,7 +8,7 @@ import pytest
 from airtruth import aircraft
 from airtruth.design import from_files
 from airtruth.design.flight import PlanOptions
-from airtruth.errors import ConfigurationError
+from airtruth.errors import AircraftError, ConfigurationError
 from airtruth.logs.histories import FILE, Histories, History, write_histories
 from airtruth.logs.provenance import PROVENANCE, Provenance, aircraft_digests
 from airtruth.tracing.answer import ANSWER
@@ -98,3 +98,16 @@ def test_a_trace_at_any_rate_gives_a_campaign(tmp_path, planned, rate):
     base, _ = planned(traced(tmp_path / "t", aircraft.load("gtm"), rate))
     assert base.log_hz == rate
     assert base.simulation_hz >= 150.0
+
+
+def test_an_aircraft_without_a_model_is_told_so_before_a_campaign_is_asked_for(tmp_path):
+    """A campaign would be refused in the next step."""
+    shutil.copy(aircraft.load("gtm").folder / "aircraft.toml", tmp_path)
+    stated = from_files.Stated(derivatives=("Cmq",))
+    with pytest.raises(AircraftError, match="has no JSBSim model to fly.*`airtruth aircraft new` writes one"):
+        from_files.planned_from(None, stated, str(tmp_path), PlanOptions(), None)
+
+
+def test_a_condition_is_asked_for_with_every_option(tmp_path):
+    with pytest.raises(ConfigurationError, match="--aircraft gtm --eas-kt SPEED --altitude-ft ALTITUDE"):
+        from_files.planned_from(None, from_files.Stated(derivatives=("Cmq",)), "gtm", PlanOptions(), None)

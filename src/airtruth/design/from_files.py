@@ -30,6 +30,7 @@ from airtruth.logs.remote import location
 from airtruth.physics.atmosphere import RHO0_KG_M3
 from airtruth.simulation.campaign import file as campaign_file
 from airtruth.simulation.campaign.file import Campaign
+from airtruth.simulation.simulator import jsbsim_model
 from airtruth.tracing.answer import TraceAnswer, answer_path
 
 Step = Callable[[str], None]
@@ -170,6 +171,7 @@ def _traced(records: Histories | None) -> Aircraft:
 
 def _default(declared: Aircraft, records: Histories | None) -> dict[str, object]:
     """Condition, rates and air of a trace's records."""
+    jsbsim_model(declared)
     if records is None:
         raise ConfigurationError(
             f"plan: no flight condition of {declared.name} is known; give a CAMPAIGN.toml "
