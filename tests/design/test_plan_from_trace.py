@@ -104,7 +104,9 @@ def test_an_aircraft_without_a_model_is_told_so_before_a_campaign_is_asked_for(t
     """A campaign would be refused in the next step."""
     shutil.copy(aircraft.load("gtm").folder / "aircraft.toml", tmp_path)
     stated = from_files.Stated(derivatives=("Cmq",))
-    with pytest.raises(AircraftError, match=r"has no JSBSim model to fly.*`airtruth aircraft new` writes one"):
+    with pytest.raises(
+        AircraftError, match=r"has no JSBSim model to fly.*`airtruth aircraft new` writes one"
+    ):
         from_files.planned_from(None, stated, str(tmp_path), PlanOptions(), None)
 
 

@@ -13,7 +13,7 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import Change, SensorTerm, SurfaceTerm
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.model.elevator_path import corner_variance
+from airtruth.tracing.model.elevator_path import corner_variance, read_between
 from airtruth.tracing.model.parameters import PerRecord
 from airtruth.tracing.model.records import read
 from airtruth.tracing.model.response import filter_inputs, respond
@@ -63,6 +63,31 @@ def test_a_servo_that_the_samples_show_is_no_corner():
         channels |= {"airspeed_m_s": np.full(150, tr.V), "elevator_rad": elevator}
         log = FlightLog({}, ("a",), np.array([0, 150]), t, channels)
         assert (read(log)[0].corner_rad2.size == 0) == empty
+
+
+@pytest.mark.parametrize("rate_deg_s", [250.0, 1000.0])
+def test_a_servo_at_its_rate_limit_has_a_corner(rate_deg_s):
+    """A step of 10 deg of a servo of 25 ms asks for 400 deg/s. Beyond the limit the mean over a cell is uncertain."""
+    cells, dt, tau, fine = 16, 0.02, 0.025, 50
+    rate, step = rate_deg_s * DEG, 10.0 * DEG
+    path = np.zeros(100 * cells * fine + 1)
+    for k in range(path.size - 1):
+        command = step if k >= round(40.3 * cells * fine) else 0.0
+        path[k + 1] = path[k] + np.clip((command - path[k]) / tau, -rate, rate) * dt / (cells * fine)
+    samples = path[:: cells * fine]
+    unlimited = read_between(samples, dt, cells, 1e-5, tau)
+    assert unlimited.corner_rad2.size == 0
+    made = read_between(samples, dt, cells, 1e-5, tau, rate)
+    assert (made.corner_rad2.size == 0) == (rate_deg_s == 1000.0)
+    np.testing.assert_array_equal(made.surface_rad, unlimited.surface_rad)
+    error = (made.surface_rad - path[::fine])[:-1].reshape(100, cells).mean(axis=1)
+    if rate_deg_s == 1000.0:
+        assert np.abs(error[38:]).max() < 0.01 * step
+        return
+    limited = made.corner_rad2[1:] > 0.0
+    assert set(np.flatnonzero(limited)) <= {39, 40, 41, 42}
+    assert np.abs(error[40]) > 0.005 * step
+    assert (np.abs(error[limited]) < 3.0 * np.sqrt(made.corner_rad2[1:][limited])).all()
 
 
 def test_a_surface_at_rest_beside_a_step_stays_at_rest():

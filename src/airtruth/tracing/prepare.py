@@ -100,8 +100,10 @@ def prepare(
     _one_aircraft(logs, aircraft)
     pots = aircraft.file.sensors.get("elevator_rad")
     noise = pots.noise_std.value if pots else 0.0
+    servo = aircraft.file.elevator_actuator
+    rate = math.inf if servo is None else servo.rate_limit.value
     signals = [
-        undo_input_sensors(s, aircraft) for log in logs for s in read(log, noise, aircraft.servo_time_s)
+        undo_input_sensors(s, aircraft) for log in logs for s in read(log, noise, aircraft.servo_time_s, rate)
     ]
     signals.sort(key=lambda s: s.run_id)  # the answer does not depend on the order of the logs
     chosen = _hold_out([s.run_id for s in signals], options)

@@ -64,6 +64,19 @@ def is_held(elevator_rad: Array, dt_s: float, tau_s: float) -> bool:
     return _BEYOND * float(np.median(np.abs(_across(command)))) < _STEP * float(np.ptp(command))
 
 
+def is_limited(elevator_rad: Array, dt_s: float, tau_s: float, rate_rad_s: float) -> NDArray[np.bool_]:
+    """(samples - 1,) whether the servo may reach its rate limit in a cell: in or beside one where the command steps that far.
+
+    Parameters
+    ----------
+    elevator_rad : (samples,) measured surface [rad].
+    dt_s, tau_s : sample period and time constant of the servo [s]; rate_rad_s : rate limit [rad/s].
+    """
+    steps = np.abs(_across(implied_command(elevator_rad, dt_s, tau_s))) > rate_rad_s * tau_s
+    padded = np.pad(steps, 1, mode="edge")
+    return np.asarray(padded[:-2] | steps | padded[2:])
+
+
 def with_steps(
     elevator_rad: Array, smoothed_rad: Array, dt_s: float, tau_s: float, cells: int
 ) -> tuple[Array, NDArray[np.bool_]]:
@@ -182,6 +195,7 @@ __all__ = [
     "held_command",
     "implied_command",
     "is_held",
+    "is_limited",
     "servo_path",
     "shaped",
     "smooth",

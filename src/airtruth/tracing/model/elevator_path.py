@@ -12,6 +12,7 @@ from airtruth.numerics.intersample import servo_bend, servo_decay
 from airtruth.tracing.model.elevator import (
     held_command,
     is_held,
+    is_limited,
     shaped,
     smooth,
     with_steps,
@@ -40,13 +41,23 @@ class Between(NamedTuple):
     corner_rad2: Array = np.zeros(0)
 
 
-def read_between(elevator: Array, dt_s: float, cells: int, std_rad: float, servo_s: float) -> Between:
+def read_between(
+    elevator: Array,
+    dt_s: float,
+    cells: int,
+    std_rad: float,
+    servo_s: float,
+    rate_rad_s: float = math.inf,
+) -> Between:
     """The surface on a fine grid, and the variance of its mean over each cell.
+
+    The exponentials of a first-order servo do not hold where its rate is limited: the mean there is uncertain.
 
     Parameters
     ----------
     elevator : (samples,) [rad], every ``dt_s`` [s]; cells : cells of the fine grid per sample.
     std_rad : standard deviation of its noise [rad]; servo_s : declared time constant of its servo [s], 0 for none.
+    rate_rad_s : declared rate limit of the servo [rad/s].
     """
     if dt_s > LONGEST_STEP_S and servo_s > 0.0:  # a coarse log
         path = held_command(elevator, dt_s, servo_s, cells)
@@ -58,7 +69,11 @@ def read_between(elevator: Array, dt_s: float, cells: int, std_rad: float, servo
         if servo_s <= 0.0 or is_held(elevator, dt_s, tau_s):
             path = held_command(elevator, dt_s, tau_s, cells)
             mean = _elevator(elevator, bend, cells, none)
-            return Between(mean if path is None else shaped(mean, path, cells))
+            limited = is_limited(elevator, dt_s, tau_s, rate_rad_s)
+            corners = np.append(0.0, np.where(limited, np.diff(elevator) ** 2 / 12.0, 0.0))
+            return Between(
+                mean if path is None else shaped(mean, path, cells), corners if limited.any() else none
+            )
     corners = corner_variance(elevator, std_rad)
     if servo_s <= 0.0 or not corners.size:
         return Between(_elevator(elevator, np.zeros_like(bend), cells, corners), corners)

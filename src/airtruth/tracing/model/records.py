@@ -160,7 +160,9 @@ class TraceRecord:
         return int(self.signals.y.shape[0])
 
 
-def read(log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0) -> list[Signals]:
+def read(
+    log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0, rate_rad_s: float = math.inf
+) -> list[Signals]:
     """The runs of a validated log.
 
     Where the elevator is at rest but for the noise of its sensor it is smoothed, because the noise moves the model's aircraft,
@@ -178,6 +180,7 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0) ->
     log : the log.
     elevator_std_rad : declared noise of the measured surface.
     servo_s : declared time constant of the elevator's servo [s]; 0 for none.
+    rate_rad_s : its declared rate limit [rad/s].
     """
     found = []
     for run, run_id in enumerate(log.run_ids):
@@ -196,7 +199,7 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0) ->
             q = channels["q_rad_s"]
             theta = channels["alpha_rad"][0] + np.concatenate([[0.0], np.cumsum(0.5 * dt * (q[1:] + q[:-1]))])
         ground = ground_speed(channels, theta, dt)
-        between, remaining_rad = _surface(channels, dt, sub * FINE, elevator_std_rad, servo_s)
+        between, remaining_rad = _surface(channels, dt, sub * FINE, elevator_std_rad, servo_s, rate_rad_s)
         found.append(
             Signals(
                 run_id=run_id,
@@ -218,7 +221,7 @@ def read(log: FlightLog, elevator_std_rad: float = 0.0, servo_s: float = 0.0) ->
 
 
 def _surface(
-    channels: Mapping[str, Array], dt_s: float, cells: int, std_rad: float, servo_s: float
+    channels: Mapping[str, Array], dt_s: float, cells: int, std_rad: float, servo_s: float, rate_rad_s: float
 ) -> tuple[Between, float]:
     """The smoothed elevator between its samples, the damper's share included, and the noise that remains in it [rad]."""
     raw = np.asarray(channels["elevator_rad"], dtype=np.float64)
@@ -228,9 +231,10 @@ def _surface(
     if damper is None:
         quiet = _quiet(raw, dt_s, std_rad)
         remaining = std_rad * float(np.sqrt((quiet == raw).mean()))
-        return read_between(quiet, dt_s, cells, std_rad, servo_s), remaining
+        return read_between(quiet, dt_s, cells, std_rad, servo_s, rate_rad_s), remaining
     own = damper_surface(damper, q, dt_s, servo_s, cells)
-    pilot = read_between(_quiet(raw - own[::cells], dt_s, std_rad), dt_s, cells, std_rad, servo_s)
+    rest = _quiet(raw - own[::cells], dt_s, std_rad)
+    pilot = read_between(rest, dt_s, cells, std_rad, servo_s, rate_rad_s)
     return pilot._replace(surface_rad=pilot.surface_rad + own), 0.0
 
 
