@@ -19,11 +19,14 @@ from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.selection.acceptance import SUPERSEDED
 from airtruth.tracing.selection.budget import Advance, may_begin
-from airtruth.tracing.selection.explanation import CauseSet
+from airtruth.tracing.selection.explanation import REFERENCE, CauseSet
 from airtruth.tracing.selection.refit import losses_without
 from airtruth.tracing.selection.release import CONTRADICTED
+from airtruth.tracing.selection.replacement import STRONG_ODDS
 from airtruth.tracing.selection.rounds import SearchRound, scored_round
+from airtruth.tracing.selection.settled import total_cost
 from airtruth.tracing.selection.significance import FAMILY_LEVEL, MISFIT_FAMILY_LEVEL, significant_gain
+from airtruth.tracing.selection.weights import with_rival
 
 _ALIKE: Final = 0.01
 """Ratio of two probabilities of an anomaly that is left from which they count as alike [-] (judgement: where something is
@@ -38,9 +41,10 @@ def pruned(
     remains: float,
     advance: Advance,
 ) -> tuple[SearchRound, ...]:
-    """The rounds without the names, and beside increments the release, that the rest makes unnecessary.
+    """The rounds without the names, and without the release, that the rest makes unnecessary.
 
-    Beside increments a name needs the gain of an effect beside an anomaly beyond doubt, otherwise that of a first one.
+    Beside names alone the release remains where the odds for what explains it are strong. Where it is given up, its sets are
+    rivals. Beside increments a name needs the gain of an effect beside an anomaly beyond doubt, otherwise that of a first one.
 
     Parameters
     ----------
@@ -57,7 +61,7 @@ def pruned(
     if not may_begin(advance, "remove what later effects make unnecessary"):
         return rounds
     learned = any(isinstance(e, Increment) for e in members)
-    declared = _as_declared(problem, last.null) if learned else None
+    declared = _as_declared(problem, last, learned)
     least = significant_gain(len(effects), MISFIT_FAMILY_LEVEL if learned else FAMILY_LEVEL)
     fitted = _with_needed_names(problem, declared or last.null, least, _latest_causes(rounds))
     if fitted is last.null:
@@ -69,15 +73,25 @@ def pruned(
         end = replace(end, sets=last.sets, release=last.release)
     gone = {e.key for e in last.null.hypothesis.effects} - {e.key for e in fitted.hypothesis.effects}
     before = (_kept(r, gone, declared is not None) for r in rounds[:-1])
-    return (*before, end)
+    kept = (*before, end)
+    return kept if declared is None or learned else with_rival(kept, rounds)
 
 
-def _as_declared(problem: TraceProblem, last: PosteriorFit) -> PosteriorFit | None:
-    """A released fit under the declaration again; None where it was not released, or where the records contradict that."""
-    if last.hypothesis.spread is None:
+def _as_declared(problem: TraceProblem, last: SearchRound, learned: bool) -> PosteriorFit | None:
+    """A released fit under the declaration again; None where it was not released, where the records contradict that, or, beside
+    names alone, where the odds for what explains the release are strong.
+
+    Parameters
+    ----------
+    learned : whether increments are among the effects.
+    """
+    if last.null.hypothesis.spread is None:
         return None
-    own = fit(problem, replace(last.hypothesis, spread=None), last.point, near=last)
-    return own if own is not None and contradiction(problem, own).p_value > CONTRADICTED else None
+    own = fit(problem, replace(last.null.hypothesis, spread=None), last.null.point, near=last.null)
+    if own is None or contradiction(problem, own).p_value <= CONTRADICTED:
+        return None
+    behind = own.cost + len(own.point.sizes) - REFERENCE - total_cost(last)
+    return own if learned or behind <= -STRONG_ODDS else None
 
 
 def _latest_causes(rounds: Sequence[SearchRound]) -> Collection[str]:

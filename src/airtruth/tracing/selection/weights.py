@@ -168,13 +168,15 @@ def rival_of(lost: Sequence[SearchRound], excess: float) -> Rival:
 def with_rival(won: tuple[SearchRound, ...], lost: Sequence[SearchRound]) -> tuple[SearchRound, ...]:
     """A finished search that names effects, with the sets of another one, which lost to it, as rivals in its first round.
 
-    A search that lost by another rule than its posterior counts as equally probable. The empty set of one that names nothing is
-    no rival, and a search that names nothing has none.
+    Where it lost by another rule than its posterior, its most probable set counts as equally probable. The empty set of one
+    that names nothing is no rival, and a search that names nothing has none.
     """
     if () in weights(won):
         return won
     excess = total_cost(lost[-1]) - total_cost(won[-1])
-    sets = {names: log_weight for names, log_weight in rival_of(lost, excess).sets.items() if names}
+    left = {names: log_weight for names, log_weight in rival_of(lost, excess).sets.items() if names}
+    beyond = max([0.0, *left.values()])
+    sets = {names: log_weight - beyond for names, log_weight in left.items()}
     for names, log_weight in () if won[0].rival is None else won[0].rival.sets.items():
         sets[names] = max(sets.get(names, -math.inf), log_weight)
     return (replace(won[0], rival=Rival(sets)), *won[1:])
