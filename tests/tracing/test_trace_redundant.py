@@ -1,6 +1,7 @@
 """Earlier effects that a later one makes redundant, on records whose sensors' scales are known."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,8 +10,10 @@ import trace_records as tr
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.model.parameters import Parameters
+from airtruth.tracing.selection.explanation import REFERENCE, CauseSet
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.refit import redundant_effect
+from airtruth.tracing.selection.release import Release
 from airtruth.tracing.selection.rounds import RoundStart, search_round
 from airtruth.tracing.selection.significance import significant_gain
 from airtruth.units import DEG
@@ -64,3 +67,25 @@ def test_a_finished_search_gives_up_an_effect_that_is_not_there(gyro, expected):
     assert [e.key for e in kept[-1].null.hypothesis.effects] == expected
     alone = (replace(last, null=replace(last.null, hypothesis=tr.NOTHING.plus(LATER))),)
     assert pruned(problem, alone, candidates, 1, 0.05, lambda step: None) is alone
+
+
+@pytest.mark.parametrize(("odds", "is_kept"), [(5.0, False), (20.0, True)])
+def test_derivatives_beside_names_need_strong_odds(odds, is_kept):
+    """The derivatives are as declared, and were released. A further cause needs odds of ten to one; then it is a rival."""
+    problem, right = fitted(1.2, 1.1)
+    wide = replace(right.hypothesis, spread=9.0 * np.diag(np.diag(problem.declared_covariance)))
+    candidates = (EARLIER, LATER, EFFECTS["vane_scale"])
+    begin = RoundStart(wide, right.point, candidates[2:], scores_only=True)
+    last = search_round(problem, begin, 2, 1, lambda step: None)
+    cost = right.cost - REFERENCE - np.log(odds)
+    wrong = (CauseSet((), ("Cmq",), (), (), problem.declared_covariance, cost),)
+    last = replace(last, sets=wrong, release=Release(last.declared_test, last.null, wrong, 0.0))
+    accepted = (SimpleNamespace(score=SimpleNamespace(effect=e), gain=100.0) for e in (EARLIER, LATER))
+    before = tuple(replace(last, tied=(c,), candidates=()) for c in accepted)
+    kept = pruned(problem, (*before, last), candidates, 1, 0.05, lambda step: None)
+    assert (kept[-1] is last) == is_kept
+    if not is_kept:
+        assert kept[-1].null.hypothesis.spread is None
+        assert {e.key for e in kept[-1].null.hypothesis.effects} == {EARLIER.key, LATER.key}
+        assert kept[-1].release is None
+        assert ("accelerometer_scale", "derivatives", "gyro_scale") in kept[0].rival.sets
