@@ -1,0 +1,268 @@
+"""Flights of a small aircraft, traced as its user would: 12 kg, 22 m/s, a noisy airspeed and a servo with a rate limit.
+
+    python -m validation.small_aircraft --seed 1 --trials 10 [--gust 0.35] [--effect elevator_delay]
+
+The truth is a longitudinal simulation of its own: a rigid body, lift and moment linear in angle of attack, pitch rate and
+elevator, a parabolic drag polar, constant thrust, vertical and horizontal Dryden gusts, and Runge-Kutta steps of 2.5 ms. The
+tracer gets logs at 50 Hz and an aircraft.toml without a JSBSim model, whose values are those of the truth: nothing is missing, or
+the stated effect. A trial depends on its seed alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth import aircraft
+from airtruth.aircraft import Aircraft
+from airtruth.logs.flight_log import FlightLog
+from airtruth.tracing import TraceOptions, trace
+from airtruth.units import DEG, G0
+
+Array = NDArray[np.float64]
+
+MASS_KG, INERTIA_KG_M2, AREA_M2, CHORD_M = 12.0, 1.10, 0.96, 0.30
+LIFT: Final = (0.24, 5.2, 7.5, 0.36)
+"""CL at zero, and over alpha, q c/(2 V) and elevator."""
+MOMENT: Final = (0.035, -0.90, -14.0, -1.10)
+DRAG: Final = (0.028, 0.042)
+"""CD at zero lift, and over CL squared."""
+DENSITY_KG_M3, AIRSPEED_M_S = 1.2075, 22.0
+SERVO_S, RATE_RAD_S = 1.0 / (2.0 * np.pi * 7.0), 250.0 * DEG
+ACCELEROMETER_M = 0.05
+RECORDS, DURATION_S, STEP_S, EVERY = 6, 9.0, 0.0025, 8
+GUST_LENGTHS_M: Final = (80.0, 40.0)
+WARM: Final = 4000
+"""Steps of the gusts before a record."""
+NOISE: Final = {
+    "airspeed_m_s": 0.25,
+    "alpha_rad": 0.15 * DEG,
+    "q_rad_s": 0.2 * DEG,
+    "theta_rad": 0.15 * DEG,
+    "ax_m_s2": 0.015 * G0,
+    "az_m_s2": 0.02 * G0,
+    "elevator_rad": 0.04 * DEG,
+    "altitude_m": 0.3,
+}
+EFFECTS: Final = {"elevator_delay": 0.04, "vane_arm": 0.35, "gyro_scale": 0.9}
+"""Effects that may be flown, and the value of each [SI]."""
+DECLARED: Final = f"""
+schema = 1
+name = "small"
+[geometry]
+wing_area = {{ value = {AREA_M2}, unit = "m2" }}
+chord = {{ value = {CHORD_M}, unit = "m" }}
+span = {{ value = 3.2, unit = "m" }}
+[mass]
+mass = {{ value = {MASS_KG}, unit = "kg", std = 0.1 }}
+inertia_yy = {{ value = {INERTIA_KG_M2}, unit = "kg_m2", std = 0.033 }}
+cg = {{ value = 0.25, std = 0.005 }}
+[derivatives]
+CLalpha = {{ value = {LIFT[1]}, std = 0.26 }}
+CLq = {{ value = {LIFT[2]}, std = 1.5 }}
+CLde = {{ value = {LIFT[3]}, std = 0.036 }}
+Cmalpha = {{ value = {MOMENT[1]}, std = 0.05 }}
+Cmq = {{ value = {MOMENT[2]}, std = 1.4 }}
+Cmde = {{ value = {MOMENT[3]}, std = 0.055 }}
+[elevator_actuator]
+bandwidth = {{ value = 7.0, unit = "hz" }}
+rate_limit = {{ value = 250.0, unit = "deg_s" }}
+minimum = {{ value = -20.0, unit = "deg" }}
+maximum = {{ value = 20.0, unit = "deg" }}
+[sensors.airspeed_m_s]
+noise_std = {{ value = 0.25, unit = "m_s" }}
+[sensors.alpha_rad]
+noise_std = {{ value = 0.15, unit = "deg" }}
+[sensors.q_rad_s]
+noise_std = {{ value = 0.2, unit = "deg_s" }}
+[sensors.theta_rad]
+noise_std = {{ value = 0.15, unit = "deg" }}
+[sensors.ax_m_s2]
+noise_std = {{ value = 0.015, unit = "g" }}
+x = {{ value = {ACCELEROMETER_M}, unit = "m" }}
+[sensors.az_m_s2]
+noise_std = {{ value = 0.02, unit = "g" }}
+x = {{ value = {ACCELEROMETER_M}, unit = "m" }}
+[sensors.elevator_rad]
+noise_std = {{ value = 0.04, unit = "deg" }}
+"""
+
+
+def declared(folder: Path) -> Aircraft:
+    """The declared aircraft, whose file is written into a folder."""
+    (folder / aircraft.FILE).write_text(DECLARED, encoding="utf-8")
+    return aircraft.load(folder)
+
+
+def flight_log(seed: int, gust_m_s: float = 0.0, effect: str | None = None, noise: float = 1.0) -> FlightLog:
+    """Six records of a trial.
+
+    Parameters
+    ----------
+    gust_m_s : standard deviation of the vertical gust [m/s]; that of the horizontal one is 1.2 times as large.
+    effect : name of `EFFECTS`; None for none.
+    noise : multiple of the noise of the sensors [-].
+    """
+    rng = np.random.default_rng(seed)
+    steps = round(DURATION_S / STEP_S)
+    t = STEP_S * np.arange(steps + 1)
+    alpha, elevator, thrust = trimmed()
+    surface = _servo(elevator + _commands(rng, t), elevator)
+    late_s = EFFECTS["elevator_delay"] if effect == "elevator_delay" else 0.0
+    gusts = _gusts(rng, steps + 1, gust_m_s)
+    state = np.zeros((5, RECORDS))
+    state[0], state[1], state[3] = AIRSPEED_M_S * np.cos(alpha), AIRSPEED_M_S * np.sin(alpha), alpha
+    acting = np.stack([np.interp(t - late_s, t, one) for one in surface])
+    states, forces = np.empty((steps + 1, 5, RECORDS)), np.empty((steps + 1, 5, RECORDS))
+    for k in range(steps + 1):
+        states[k], forces[k] = state, _forces(state, acting[:, k], thrust, gusts[k])
+        if k < steps:
+            state = _stepped(state, acting[:, k : k + 2], thrust, gusts[k : k + 2])
+    u, w, q, theta, altitude = np.moveaxis(states, 1, 0)
+    ax, az, q_dot, airspeed, angle = np.moveaxis(forces, 1, 0)
+    if effect == "vane_arm":
+        angle = np.arctan2(w + gusts[:, 1] - q * EFFECTS["vane_arm"], u + gusts[:, 0])
+    exact = {
+        "airspeed_m_s": airspeed,
+        "alpha_rad": angle,
+        "q_rad_s": q * (EFFECTS["gyro_scale"] if effect == "gyro_scale" else 1.0),
+        "theta_rad": theta,
+        "ax_m_s2": ax - q**2 * ACCELEROMETER_M,
+        "az_m_s2": az - q_dot * ACCELEROMETER_M,
+        "elevator_rad": surface.T,
+        "altitude_m": 150.0 + altitude,
+    }
+    channels = {name: _measured(rng, x, noise * NOISE[name]) for name, x in exact.items()}
+    samples = steps // EVERY + 1
+    names = tuple(f"r{i + 1}" for i in range(RECORDS))
+    times = np.tile(t[::EVERY], RECORDS)
+    return FlightLog({"aircraft": "small"}, names, samples * np.arange(RECORDS + 1), times, channels)
+
+
+def _measured(rng: np.random.Generator, exact: Array, std: float) -> Array:
+    """Every eighth step of all records, one after another, with noise."""
+    picked = exact[::EVERY].T.ravel()
+    return np.asarray(picked + std * rng.standard_normal(picked.size))
+
+
+def _forces(state: Array, elevator: Array, thrust: Array | float, gust: Array) -> Array:
+    """(5, records) specific forces along x and z, q', airspeed and angle of attack."""
+    u, w, q = state[0] + gust[0], state[1] + gust[1], state[2]
+    airspeed, alpha = np.hypot(u, w), np.arctan2(w, u)
+    given = np.stack([np.ones_like(alpha), alpha, q * CHORD_M / (2.0 * airspeed), elevator + 0.0 * alpha])
+    lift, moment = np.array(LIFT) @ given, np.array(MOMENT) @ given
+    drag = DRAG[0] + DRAG[1] * lift**2
+    pressure = 0.5 * DENSITY_KG_M3 * airspeed**2 * AREA_M2
+    x = pressure * (lift * np.sin(alpha) - drag * np.cos(alpha)) + thrust
+    z = -pressure * (lift * np.cos(alpha) + drag * np.sin(alpha))
+    return np.stack([x / MASS_KG, z / MASS_KG, pressure * CHORD_M * moment / INERTIA_KG_M2, airspeed, alpha])
+
+
+def _rates(state: Array, elevator: Array, thrust: Array | float, gust: Array) -> Array:
+    u, w, q, theta = state[:4]
+    ax, az, q_dot = _forces(state, elevator, thrust, gust)[:3]
+    climb = u * np.sin(theta) - w * np.cos(theta)
+    return np.stack([ax - G0 * np.sin(theta) - q * w, az + G0 * np.cos(theta) + q * u, q_dot, q, climb])
+
+
+def _stepped(state: Array, elevator: Array, thrust: float, gust: Array) -> Array:
+    """The state after a step of the classical Runge-Kutta method; inputs are linear over it."""
+    middle, between = elevator.mean(axis=1), gust.mean(axis=0)
+    k1 = _rates(state, elevator[:, 0], thrust, gust[0])
+    k2 = _rates(state + 0.5 * STEP_S * k1, middle, thrust, between)
+    k3 = _rates(state + 0.5 * STEP_S * k2, middle, thrust, between)
+    k4 = _rates(state + STEP_S * k3, elevator[:, 1], thrust, gust[1])
+    return np.asarray(state + STEP_S / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4))
+
+
+def trimmed() -> tuple[float, float, float]:
+    """Angle of attack [rad], elevator [rad] and thrust [N] of level flight, by Newton's method."""
+    x = np.array([0.04, 0.0, 8.0])
+
+    def residual(x: Array) -> Array:
+        state = np.array([AIRSPEED_M_S * np.cos(x[0]), AIRSPEED_M_S * np.sin(x[0]), 0.0, x[0], 0.0])
+        return _rates(state, np.asarray(x[1]), float(x[2]), np.zeros(2))[:3]
+
+    for _ in range(20):
+        jacobian = np.stack([(residual(x + d) - residual(x - d)) / 2e-6 for d in 1e-6 * np.eye(3)], axis=1)
+        x = x - np.linalg.solve(jacobian, residual(x))
+    return float(x[0]), float(x[1]), float(x[2])
+
+
+def _commands(rng: np.random.Generator, t: Array) -> Array:
+    """(records, steps) 3-2-1-1 and doublets of 3 to 5 deg in both signs, from 1 s on [rad]."""
+    found = np.zeros((RECORDS, t.size))
+    for i in range(RECORDS):
+        steps = (
+            ((3, 1), (2, -1), (1, 1), (1, -1)) if i % 3 != 1 else ((1, 1), (1, -1), (3, 0), (1, -1), (1, 1))
+        )
+        amplitude = rng.uniform(3.0, 5.0) * DEG * (-1.0) ** i
+        unit, start = rng.uniform(0.25, 0.35), rng.uniform(1.0, 1.2)
+        for count, sign in steps:
+            found[i, (t >= start) & (t < start + count * unit)] = sign * amplitude
+            start += count * unit
+    return found
+
+
+def _servo(command: Array, start: float) -> Array:
+    """(records, steps) first order with a rate limit, in ten substeps."""
+    made, x = np.empty_like(command), np.full(len(command), start)
+    for k in range(command.shape[1]):
+        made[:, k] = x
+        for _ in range(10):
+            x = x + 0.1 * STEP_S * np.clip((command[:, k] - x) / SERVO_S, -RATE_RAD_S, RATE_RAD_S)
+    return made
+
+
+def _gusts(rng: np.random.Generator, steps: int, std: float) -> Array:
+    """(steps, 2, records) gusts along x and z [m/s] of Dryden's spectra (MIL-F-8785C, section 3.7.1.2), by Euler steps."""
+    made = np.zeros((steps, 2, RECORDS))
+    if std == 0.0:
+        return made
+    white = rng.standard_normal((steps + WARM, 2, RECORDS)) / np.sqrt(STEP_S)
+    time_u, time_w = (length / AIRSPEED_M_S for length in GUST_LENGTHS_M)
+    u, x, rate = (np.zeros(RECORDS) for _ in range(3))
+    for k in range(steps + WARM):
+        u = u + STEP_S * (-u / time_u + 1.2 * std * np.sqrt(2.0 / time_u) * white[k, 0])
+        x, rate = x + STEP_S * rate, rate + STEP_S * (-x / time_w**2 - 2.0 * rate / time_w + white[k, 1])
+        if k >= WARM:
+            made[k - WARM] = u, std * time_w**-1.5 * (x + np.sqrt(3.0) * time_w * rate)
+    return made
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Fly and trace the trials, and print one line for each."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--trials", type=int, default=10)
+    parser.add_argument(
+        "--gust", type=float, default=0.0, help="standard deviation of the vertical gust [m/s]"
+    )
+    parser.add_argument("--effect", choices=sorted(EFFECTS))
+    options = parser.parse_args(argv)
+    with tempfile.TemporaryDirectory() as folder:
+        plane = declared(Path(folder))
+        for seed in range(options.seed, options.seed + options.trials):
+            answer = trace([flight_log(seed, options.gust, options.effect)], plane, TraceOptions()).to_dict()
+            named = "; ".join(_shown(effect) for effect in answer["effects"]) or "-"
+            provisional = ", provisional" if answer["provisional"] else ""
+            p_value = answer["anomaly"]["p_value"]
+            sys.stdout.write(f"{seed}: {answer['verdict']}{provisional}, p = {p_value:.2g}: {named}\n")
+            sys.stdout.flush()
+
+
+def _shown(effect: dict[str, object]) -> str:
+    return f"{effect['name']} {effect['parameters']} or {effect['indistinguishable_from']}"
+
+
+if __name__ == "__main__":
+    main()
