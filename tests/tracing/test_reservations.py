@@ -149,6 +149,8 @@ def test_a_name_of_a_declared_model_that_is_not_contradicted_is_provisional():
     assert reason.startswith("the evidence against the declared model is weak (p = 0.0051)")
     assert reservations(effects("airspeed_scale"), (), declared_p_value=0.005) == ()
     assert reservations(effects("increment"), (), declared_p_value=0.013) == ()
+    (reason,) = reservations(effects("increment"), (), declared_p_value=0.06)
+    assert "(p = 0.06): what is learned is provisional" in reason
 
 
 def test_a_name_of_weak_evidence_among_all_candidates_is_provisional():

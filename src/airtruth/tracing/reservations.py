@@ -32,6 +32,9 @@ WEAK_OF_SEVERAL: Final = 2e-5
 of unequal evidence (judgement)."""
 UNNAMED: Final = 0.05
 """Posterior weight of increments without any name from which the names are provisional [-] (convention)."""
+UNSHOWN: Final = 0.05
+"""P-value of the declared model above which an increment without a name is provisional [-] (convention): without a missing
+effect, a mode was learned in one of 40 flights of a small aircraft."""
 DOUBT: Final = 0.05
 """Probability of the test of a friction of the vane below which a named error of the vane is provisional [-] (convention)."""
 UNUSUAL: Final = 3.0
@@ -78,7 +81,7 @@ def reservations(
             f"{listed} are {MANY} causes or more, and one effect that the library lacks can look like as many: the names are "
             "provisional until a flight of their own confirms each"
         )
-    found += _weak(named, declared_p_value)
+    found += _weak(named, bool(beside), declared_p_value)
     unsure = [e.key for e in named if _contains_neutral(e)]
     if unsure:
         found.append(
@@ -129,10 +132,11 @@ def _beside_derivatives(named: Sequence[AcceptedEffect]) -> Iterator[str]:
         )
 
 
-def _weak(named: Sequence[AcceptedEffect], declared_p_value: float) -> Iterator[str]:
-    if named and declared_p_value > DECLARED_LEVEL:
+def _weak(named: Sequence[AcceptedEffect], has_effects: bool, declared_p_value: float) -> Iterator[str]:
+    if has_effects and declared_p_value > (DECLARED_LEVEL if named else UNSHOWN):
+        meant = "the names are" if named else "what is learned is"
         yield (
-            f"the evidence against the declared model is weak (p = {declared_p_value:.2g}): the names are provisional until "
+            f"the evidence against the declared model is weak (p = {declared_p_value:.2g}): {meant} provisional until "
             "another flight shows it again"
         )
     level = WEAK if len(named) < 2 else WEAK_OF_SEVERAL
@@ -195,6 +199,7 @@ __all__ = [
     "LEAST_INCLUSION",
     "MANY",
     "UNNAMED",
+    "UNSHOWN",
     "UNUSUAL",
     "WEAK",
     "WEAK_OF_SEVERAL",
