@@ -11,9 +11,14 @@ from airtruth.numerics.hold import first_order_hold
 
 
 def augmented(a, b, dt):
-    """x' = A x + b u, u' = s, s' = 0: exp gives the response to the start and the slope of u."""
-    big = np.zeros((4, 4))
+    """x' = A x + b u, u' = s, s' = 0: exp gives the response to the start and the slope of u.
+
+    A rotation beside it keeps the matrix from being triangular. For a triangular one scipy divides differences of exponentials,
+    and its result has the wrong sign where two diagonal elements differ by 1e-20.
+    """
+    big = np.zeros((6, 6))
     big[:2, :2], big[:2, 2], big[2, 3] = a * dt, b * dt, 1.0
+    big[4, 5], big[5, 4] = 1.0, -1.0
     e = expm(big)
     return e[:2, :2], e[:2, 2] - e[:2, 3], e[:2, 3]
 
@@ -37,6 +42,13 @@ def test_equals_the_matrix_exponential(a, b, dt):
     np.testing.assert_allclose(np.reshape(e, (2, 2)), reference[0], rtol=0, atol=1e-13 * size)
     np.testing.assert_allclose(g, reference[1], rtol=0, atol=1e-13 * size)
     np.testing.assert_allclose(h, reference[2], rtol=0, atol=1e-13 * size)
+
+
+def test_a_pole_next_to_zero_by_hand():
+    """A = [[43, 0], [0, 6e-277]], b = [0, 1]: the second state gains dt/2 of the start and dt/2 of the end of a ramp."""
+    _, g, h = hold(43.0, 0.0, 0.0, 6e-277, 0.0, 1.0, 0.1)
+    np.testing.assert_allclose(g, [0.0, 0.05], rtol=1e-14)
+    np.testing.assert_allclose(h, [0.0, 0.05], rtol=1e-14)
 
 
 def test_double_integrator_by_hand():
