@@ -1,4 +1,4 @@
-"""Airspeed as an input of the filter: its noise is removed; and the speed over ground."""
+"""Airspeed as an input of the filter, without the noise of its sensor; and the speed over ground."""
 
 from __future__ import annotations
 
@@ -50,7 +50,10 @@ def gust_cutoff_hz(airspeed_m_s: Array, dt_s: float) -> float:
 
     Source: J. F. Muth, J. Amer. Statist. Assoc. 55 (1960) 299-306, for the random walk in noise.
     """
-    noise, walk = _variances(airspeed_m_s)
+    return _cutoff_hz(*_variances(airspeed_m_s), dt_s)
+
+
+def _cutoff_hz(noise: float, walk: float, dt_s: float) -> float:
     if noise <= 0.0:
         return math.inf
     return max(_CUTOFF_HZ, math.sqrt(walk / noise) / (2.0 * math.pi * dt_s))
@@ -78,11 +81,10 @@ def without_noise(airspeed_m_s: Array, ground_m_s: Array, dt_s: float) -> Array:
     dt_s : sample period [s].
     """
     airspeed = np.asarray(airspeed_m_s, dtype=np.float64)
-    cutoff = gust_cutoff_hz(airspeed, dt_s)
-    noise = (
-        math.sqrt(_variances(airspeed)[0] * min(1.0, 2.0 * dt_s * cutoff)) if math.isfinite(cutoff) else 0.0
-    )
-    if noise <= _NEGLIGIBLE * float(airspeed.mean()):
+    noise, walk = _variances(airspeed)
+    cutoff = _cutoff_hz(noise, walk, dt_s)
+    left = math.sqrt(noise * min(1.0, 2.0 * dt_s * cutoff)) if noise > 0.0 else 0.0
+    if left <= _NEGLIGIBLE * float(airspeed.mean()):
         return low_passed(airspeed, dt_s, cutoff)
     gust = airspeed - ground_m_s
     return np.asarray(ground_m_s + smoothed(gust, walk_to_noise(gust)))
