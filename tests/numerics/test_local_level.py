@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.fft import dct
 from scipy.optimize import minimize_scalar
 
-from airtruth.numerics.local_level import smoothed, walk_to_noise
+from airtruth.numerics.local_level import error_variances, smoothed, walk_to_noise
 
 
 def walk_in_noise(seed, count, step, noise):
@@ -58,3 +59,14 @@ def test_the_smoother_is_nearer_to_the_walk_than_the_samples_are():
     walk = np.cumsum(0.1 * rng.standard_normal(20000))
     error = smoothed(walk + rng.standard_normal(20000), 0.01) - walk
     assert float((error**2).mean()) == pytest.approx(0.05, rel=0.05)
+
+
+def test_errors_of_the_cosines_are_those_of_the_posterior():
+    """The posterior covariance is (I/r + D'D/q)^-1 with the differences D; here r = 1 and q = 0.03."""
+    count, ratio = 12, 0.03
+    d = differences(count)
+    covariance = np.linalg.inv(np.eye(count) + d.T @ d / ratio)
+    cosines = dct(np.eye(count), axis=0, norm="ortho")
+    assert np.diag(error_variances(count, ratio)) == pytest.approx(
+        cosines @ covariance @ cosines.T, abs=1e-12
+    )

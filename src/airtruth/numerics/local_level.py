@@ -2,7 +2,8 @@
 
 The differences of n samples have the covariance q I + r T, where T has 2 on its diagonal and -1 beside it. The sine transform
 diagonalises T: its eigenvalues are 2 - 2 cos(k pi/n), k = 1 to n - 1. So the likelihood is a sum over k, and exact. The smoother
-minimises |y - x|^2/r + |diff(x)|^2/q, and the cosine transform diagonalises it.
+minimises |y - x|^2/r + |diff(x)|^2/q, and the cosine transform diagonalises it. Its weights are the variances of its
+errors over r.
 
 Source: A. C. Harvey, Forecasting, Structural Time Series Models and the Kalman Filter, Cambridge, 1989, section 2.3 (local level
 model).
@@ -59,9 +60,24 @@ def smoothed(y: Array, ratio: float) -> Array:
     """
     from scipy.fft import dct, idct
 
-    count = len(y)
-    shape = 2.0 - 2.0 * np.cos(np.pi * np.arange(count) / count)
-    return np.asarray(idct(dct(y, norm="ortho") / (1.0 + shape / ratio), norm="ortho"))
+    return np.asarray(idct(dct(y, norm="ortho") * error_variances(len(y), ratio), norm="ortho"))
 
 
-__all__ = ["smoothed", "walk_to_noise"]
+def error_variances(count: int, ratio: float) -> Array:
+    """Variance of the error of each cosine of `smoothed` over that of the noise (count,) [-].
+
+    The cosines are those of the orthonormal transform (type 2), and their errors are independent.
+
+    Parameters
+    ----------
+    count : number of samples.
+    ratio : variance of a step over that of the noise [-], positive.
+    """
+    return np.asarray(1.0 / (1.0 + _cosine_shape(count) / ratio))
+
+
+def _cosine_shape(count: int) -> Array:
+    return np.asarray(2.0 - 2.0 * np.cos(np.pi * np.arange(count) / count))
+
+
+__all__ = ["error_variances", "smoothed", "walk_to_noise"]

@@ -37,6 +37,7 @@ from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.prepare import Case, prepare
 from airtruth.tracing.replay import flown_again
 from airtruth.tracing.result import TraceResult
+from airtruth.tracing.selection.airspeed_error import with_corrected_airspeed
 from airtruth.tracing.selection.budget import Advance, Budget, may_begin
 from airtruth.tracing.selection.corner_share import with_corner_share
 from airtruth.tracing.selection.learn import with_increments
@@ -170,7 +171,7 @@ def _search(
     limited = None if options.time_budget_s is None else Budget(options.time_budget_s, advance)
     steps = advance if limited is None else limited
     case, start = with_coloured_noise(case)
-    case = with_corner_share(case, start)
+    case = with_corrected_airspeed(with_corner_share(case, start), start)
     rounds = _pruned_search(case, start, options, steps, kinematics)
     if rounds and rounds[-1].null.hypothesis.effects and not case.fitted.settings.coloured:
         case, rounds = _with_later_colour(case, rounds, options, steps, kinematics)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,8 +69,27 @@ def _variances(airspeed_m_s: Array) -> tuple[float, float]:
     return noise, max(float((change**2).mean()) - 2.0 * noise, 0.0)
 
 
-def without_noise(airspeed_m_s: Array, ground_m_s: Array, dt_s: float) -> Array:
-    """Airspeed without the noise of its sensor (samples,) [m/s].
+class WalkInNoise(NamedTuple):
+    """Statistics of an airspeed that is the most probable random walk beside the speed over ground.
+
+    noise_m2_s2 : variance of the noise of the sensor [m2/s2]; ratio : variance of a step of the walk over it [-].
+    """
+
+    noise_m2_s2: float
+    ratio: float
+
+
+class QuietAirspeed(NamedTuple):
+    """Airspeed without the noise of its sensor (samples,) [m/s]; the walk that it was taken for, None behind a low-pass."""
+
+    speed_m_s: Array
+    walk: WalkInNoise | None
+
+
+def without_noise(
+    airspeed_m_s: Array, ground_m_s: Array, dt_s: float, ground_walk_m2_s2: float = 0.0
+) -> QuietAirspeed:
+    """Airspeed without the noise of its sensor.
 
     A low-pass at `gust_cutoff_hz` is enough for most sensors. If it leaves more than a share of `_NEGLIGIBLE`, which changes the
     lift as a gust does, the result is the speed over ground and the most probable random walk of what the airspeed has beside it.
@@ -79,15 +98,18 @@ def without_noise(airspeed_m_s: Array, ground_m_s: Array, dt_s: float) -> Array:
     ----------
     airspeed_m_s, ground_m_s : (samples,), the second as of `ground_speed`.
     dt_s : sample period [s].
+    ground_walk_m2_s2 : variance that the error of the speed over ground gains from one sample to the next, as of `ground_walk`;
+        the walk has at least that of it.
     """
     airspeed = np.asarray(airspeed_m_s, dtype=np.float64)
     noise, walk = _variances(airspeed)
     cutoff = _cutoff_hz(noise, walk, dt_s)
     left = math.sqrt(noise * min(1.0, 2.0 * dt_s * cutoff)) if noise > 0.0 else 0.0
     if left <= _NEGLIGIBLE * float(airspeed.mean()):
-        return low_passed(airspeed, dt_s, cutoff)
+        return QuietAirspeed(low_passed(airspeed, dt_s, cutoff), None)
     gust = airspeed - ground_m_s
-    return np.asarray(ground_m_s + smoothed(gust, walk_to_noise(gust)))
+    ratio = max(walk_to_noise(gust), ground_walk_m2_s2 / noise)
+    return QuietAirspeed(np.asarray(ground_m_s + smoothed(gust, ratio)), WalkInNoise(noise, ratio))
 
 
 def ground_speed(channels: Mapping[str, Array], theta: Array, dt_s: float) -> Array:
@@ -97,10 +119,8 @@ def ground_speed(channels: Mapping[str, Array], theta: Array, dt_s: float) -> Ar
     With ax its slope is limited to what the sensors err by, so that a wind that grows along the path does not accelerate the
     aircraft.
     """
-    alpha, v = channels["alpha_rad"], np.asarray(channels["airspeed_m_s"], dtype=np.float64)
-    along = -G0 * np.sin(theta - alpha)
-    if "ax_m_s2" in channels:
-        along = along + channels["ax_m_s2"] * np.cos(alpha) + channels["az_m_s2"] * np.sin(alpha)
+    v = np.asarray(channels["airspeed_m_s"], dtype=np.float64)
+    along = _path_acceleration(channels, theta)
     speed = np.concatenate([[0.0], np.cumsum(0.5 * dt_s * (along[1:] + along[:-1]))])
     time = dt_s * (np.arange(len(v)) - 0.5 * (len(v) - 1))
     slope = float(time @ (v - speed) / (time @ time))
@@ -109,4 +129,27 @@ def ground_speed(channels: Mapping[str, Array], theta: Array, dt_s: float) -> Ar
     return np.asarray(speed + float((v - speed).mean()) + slope * time)
 
 
-__all__ = ["ground_speed", "gust_cutoff_hz", "low_passed", "without_noise"]
+def ground_walk(channels: Mapping[str, Array], theta: Array, dt_s: float) -> float:
+    """Variance that the error of `ground_speed` gains from one sample to the next, from the noise of its sensors [m2/s2]."""
+    noise, _ = _variances(_path_acceleration(channels, theta))
+    return noise * dt_s**2
+
+
+def _path_acceleration(channels: Mapping[str, Array], theta: Array) -> Array:
+    """Acceleration along the path (samples,) [m/s2], without ax that of gravity."""
+    alpha = channels["alpha_rad"]
+    along = -G0 * np.sin(theta - alpha)
+    if "ax_m_s2" in channels:
+        along = along + channels["ax_m_s2"] * np.cos(alpha) + channels["az_m_s2"] * np.sin(alpha)
+    return np.asarray(along)
+
+
+__all__ = [
+    "QuietAirspeed",
+    "WalkInNoise",
+    "ground_speed",
+    "ground_walk",
+    "gust_cutoff_hz",
+    "low_passed",
+    "without_noise",
+]

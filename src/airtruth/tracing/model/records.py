@@ -15,7 +15,13 @@ from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
 from airtruth.numerics.whiteness import is_white
 from airtruth.physics.atmosphere import air_density, altitude_of_density_m
-from airtruth.tracing.model.airspeed import ground_speed, low_passed, without_noise
+from airtruth.tracing.model.airspeed import (
+    WalkInNoise,
+    ground_speed,
+    ground_walk,
+    low_passed,
+    without_noise,
+)
 from airtruth.tracing.model.compile import CHANNELS
 from airtruth.tracing.model.damper import damper_surface, find_damper
 from airtruth.tracing.model.elevator_path import LONGEST_STEP_S, Between, read_between
@@ -69,6 +75,7 @@ class Signals:
     throttle : its mean where it is logged, None elsewhere [0..1].
     corner_rad2 : (samples,) variance of the elevator's mean over the cell that ends at each sample, about that of
         ``elevator_rad``; empty where the samples show its motion.
+    airspeed_walk : statistics of an airspeed that is smoothed; None where a low-pass is enough.
     lead : what comes before a part of a run; None for a whole run. The filter starts there.
     part_of : name of the run of which it is a part; empty for a whole run.
     """
@@ -86,6 +93,7 @@ class Signals:
     throttle: float | None
     elevator_std_rad: float = 0.0
     corner_rad2: Array = field(default_factory=lambda: np.zeros(0))
+    airspeed_walk: WalkInNoise | None = None
     lead: Signals | None = None
     part_of: str = ""
 
@@ -103,6 +111,14 @@ class Signals:
             name: np.concatenate([getattr(self.lead, name), getattr(self, name)]) for name in _SERIES
         }
         return replace(self, lead=None, **both)
+
+    def with_airspeed(self, airspeed_m_s: Array) -> Signals:
+        """The run, or part of one with what comes before it, with another airspeed (points of `with_lead`,) [m/s]."""
+        if self.lead is None:
+            return replace(self, airspeed_m_s=airspeed_m_s)
+        first = len(self.lead.airspeed_m_s)
+        lead = replace(self.lead, airspeed_m_s=airspeed_m_s[:first])
+        return replace(self, lead=lead, airspeed_m_s=airspeed_m_s[first:])
 
     def part(self, name: str, start: int, first: int, last: int) -> Signals:
         """Samples ``first`` to before ``last``, with those from ``start`` on before them."""
@@ -199,6 +215,7 @@ def read(
             q = channels["q_rad_s"]
             theta = channels["alpha_rad"][0] + np.concatenate([[0.0], np.cumsum(0.5 * dt * (q[1:] + q[:-1]))])
         ground = ground_speed(channels, theta, dt)
+        quiet = without_noise(airspeed, ground, dt, ground_walk(channels, theta, dt))
         between, remaining_rad = _surface(channels, dt, sub * FINE, elevator_std_rad, servo_s, rate_rad_s)
         found.append(
             Signals(
@@ -207,7 +224,7 @@ def read(
                 sub=sub,
                 y=np.ascontiguousarray(y, dtype=np.float64),
                 elevator_rad=between.surface_rad,
-                airspeed_m_s=fine(without_noise(airspeed, ground, dt), sub),
+                airspeed_m_s=fine(quiet.speed_m_s, sub),
                 ground_m_s=fine(ground, sub),
                 density_kg_m3=fine(low_passed(density, dt), sub),
                 theta_rad=fine(theta, sub),
@@ -215,6 +232,7 @@ def read(
                 elevator_std_rad=remaining_rad,
                 throttle=float(channels["throttle"].mean()) if "throttle" in channels else None,
                 corner_rad2=between.corner_rad2,
+                airspeed_walk=quiet.walk,
             )
         )
     return found
