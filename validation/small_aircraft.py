@@ -1,11 +1,12 @@
 """Flights of a small aircraft, traced as its user would: 12 kg, 22 m/s, a noisy airspeed and a servo with a rate limit.
 
-    python -m validation.small_aircraft --seed 1 --trials 10 [--gust 0.35] [--effect elevator_delay]
+    python -m validation.small_aircraft --seed 1 --trials 10 [--gust 0.35] [--effect elevator_delay] [--drawn]
 
 The truth is a longitudinal simulation of its own: a rigid body, lift and moment linear in angle of attack, pitch rate and
 elevator, a parabolic drag polar, constant thrust, vertical and horizontal Dryden gusts, and Runge-Kutta steps of 2.5 ms. The
-tracer gets logs at 50 Hz and an aircraft.toml without a JSBSim model, whose values are those of the truth: nothing is missing, or
-the stated effect. A trial depends on its seed alone.
+tracer gets logs at 50 Hz and an aircraft.toml without a JSBSim model. Nothing is missing, or the stated effect. The values of the
+file are those of the truth, or with ``--drawn`` the truth has derivatives, mass and inertia from their declared uncertainty. A
+trial depends on its seed and the options alone.
 """
 
 from __future__ import annotations
@@ -14,11 +15,13 @@ import argparse
 import sys
 import tempfile
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from airtruth import aircraft
 from airtruth.aircraft import Aircraft
@@ -51,8 +54,21 @@ NOISE: Final = {
     "elevator_rad": 0.04 * DEG,
     "altitude_m": 0.3,
 }
-EFFECTS: Final = {"elevator_delay": 0.04, "vane_arm": 0.35, "gyro_scale": 0.9}
-"""Effects that may be flown, and the value of each [SI]."""
+EFFECTS: Final = {
+    "elevator_delay": 0.04,
+    "vane_arm": 0.35,
+    "gyro_scale": 0.9,
+    "vane_lag": 0.06,
+    "elevator_effectiveness": 0.75,
+    "cm_alpha_nonlinear": 0.5,
+    "elevator_fade": 3.0,
+}
+"""Effects that may be flown, and the value of each [SI]. The slope of the moment changes above `BREAK_RAD`. The elevator's effect
+fades by this share of its deflection [1/rad], which the library lacks."""
+BREAK_RAD: Final = 0.06
+STD: Final = ((0.0, 0.26, 1.5, 0.036), (0.0, 0.05, 1.4, 0.055))
+"""Declared uncertainty of `LIFT` and `MOMENT`, as in `DECLARED`."""
+MASS_STD_KG, INERTIA_STD_KG_M2 = 0.1, 0.033
 DECLARED: Final = f"""
 schema = 1
 name = "small"
@@ -95,44 +111,68 @@ noise_std = {{ value = 0.04, unit = "deg" }}
 """
 
 
+@dataclass(frozen=True)
+class Truth:
+    """The aircraft that flies: coefficients as `LIFT` and `MOMENT`, mass [kg] and inertia [kg m2], and the effect it has."""
+
+    lift: tuple[float, ...] = LIFT
+    moment: tuple[float, ...] = MOMENT
+    mass_kg: float = MASS_KG
+    inertia_kg_m2: float = INERTIA_KG_M2
+    effect: str | None = None
+
+
+def drawn(seed: int, effect: str | None = None) -> Truth:
+    """An aircraft whose derivatives, mass and inertia are drawn from their declared uncertainty."""
+    rng = np.random.default_rng([seed, 1])
+    lift, moment = (
+        tuple((np.array(mean) + np.array(std) * rng.standard_normal(4)).tolist())
+        for mean, std in zip((LIFT, MOMENT), STD, strict=True)
+    )
+    mass = MASS_KG + MASS_STD_KG * rng.standard_normal()
+    return Truth(lift, moment, mass, INERTIA_KG_M2 + INERTIA_STD_KG_M2 * rng.standard_normal(), effect)
+
+
 def declared(folder: Path) -> Aircraft:
     """The declared aircraft, whose file is written into a folder."""
     (folder / aircraft.FILE).write_text(DECLARED, encoding="utf-8")
     return aircraft.load(folder)
 
 
-def flight_log(seed: int, gust_m_s: float = 0.0, effect: str | None = None, noise: float = 1.0) -> FlightLog:
+def flight_log(seed: int, gust_m_s: float = 0.0, truth: Truth = Truth(), noise: float = 1.0) -> FlightLog:
     """Six records of a trial.
 
     Parameters
     ----------
     gust_m_s : standard deviation of the vertical gust [m/s]; that of the horizontal one is 1.2 times as large.
-    effect : name of `EFFECTS`; None for none.
+    truth : the aircraft that flies.
     noise : multiple of the noise of the sensors [-].
     """
     rng = np.random.default_rng(seed)
     steps = round(DURATION_S / STEP_S)
     t = STEP_S * np.arange(steps + 1)
-    alpha, elevator, thrust = trimmed()
+    alpha, elevator, thrust = trimmed(truth)
     surface = _servo(elevator + _commands(rng, t), elevator)
-    late_s = EFFECTS["elevator_delay"] if effect == "elevator_delay" else 0.0
+    late_s = EFFECTS["elevator_delay"] if truth.effect == "elevator_delay" else 0.0
     gusts = _gusts(rng, steps + 1, gust_m_s)
     state = np.zeros((5, RECORDS))
     state[0], state[1], state[3] = AIRSPEED_M_S * np.cos(alpha), AIRSPEED_M_S * np.sin(alpha), alpha
     acting = np.stack([np.interp(t - late_s, t, one) for one in surface])
     states, forces = np.empty((steps + 1, 5, RECORDS)), np.empty((steps + 1, 5, RECORDS))
     for k in range(steps + 1):
-        states[k], forces[k] = state, _forces(state, acting[:, k], thrust, gusts[k])
+        states[k], forces[k] = state, _forces(truth, state, acting[:, k], thrust, gusts[k])
         if k < steps:
-            state = _stepped(state, acting[:, k : k + 2], thrust, gusts[k : k + 2])
+            state = _stepped(truth, state, acting[:, k : k + 2], thrust, gusts[k : k + 2])
     u, w, q, theta, altitude = np.moveaxis(states, 1, 0)
     ax, az, q_dot, airspeed, angle = np.moveaxis(forces, 1, 0)
-    if effect == "vane_arm":
+    if truth.effect == "vane_lag":
+        angle = lfilter(*_lag(EFFECTS["vane_lag"]), angle - alpha, axis=0) + alpha
+    if truth.effect == "vane_arm":
         angle = np.arctan2(w + gusts[:, 1] - q * EFFECTS["vane_arm"], u + gusts[:, 0])
     exact = {
         "airspeed_m_s": airspeed,
         "alpha_rad": angle,
-        "q_rad_s": q * (EFFECTS["gyro_scale"] if effect == "gyro_scale" else 1.0),
+        "q_rad_s": q * (EFFECTS["gyro_scale"] if truth.effect == "gyro_scale" else 1.0),
         "theta_rad": theta,
         "ax_m_s2": ax - q**2 * ACCELEROMETER_M,
         "az_m_s2": az - q_dot * ACCELEROMETER_M,
@@ -146,49 +186,62 @@ def flight_log(seed: int, gust_m_s: float = 0.0, effect: str | None = None, nois
     return FlightLog({"aircraft": "small"}, names, samples * np.arange(RECORDS + 1), times, channels)
 
 
+def _lag(time_s: float) -> tuple[list[float], list[float]]:
+    """Numerator and denominator of a first-order lag by the bilinear transform."""
+    ratio = 2.0 * time_s / STEP_S
+    return [1.0 / (1.0 + ratio)] * 2, [1.0, (1.0 - ratio) / (1.0 + ratio)]
+
+
 def _measured(rng: np.random.Generator, exact: Array, std: float) -> Array:
     """Every eighth step of all records, one after another, with noise."""
     picked = exact[::EVERY].T.ravel()
     return np.asarray(picked + std * rng.standard_normal(picked.size))
 
 
-def _forces(state: Array, elevator: Array, thrust: Array | float, gust: Array) -> Array:
+def _forces(truth: Truth, state: Array, elevator: Array, thrust: Array | float, gust: Array) -> Array:
     """(5, records) specific forces along x and z, q', airspeed and angle of attack."""
     u, w, q = state[0] + gust[0], state[1] + gust[1], state[2]
     airspeed, alpha = np.hypot(u, w), np.arctan2(w, u)
+    if truth.effect == "elevator_effectiveness":
+        elevator = EFFECTS[truth.effect] * elevator
+    if truth.effect == "elevator_fade":
+        elevator = elevator * (1.0 - EFFECTS[truth.effect] * np.abs(elevator))
     given = np.stack([np.ones_like(alpha), alpha, q * CHORD_M / (2.0 * airspeed), elevator + 0.0 * alpha])
-    lift, moment = np.array(LIFT) @ given, np.array(MOMENT) @ given
+    lift, moment = np.array(truth.lift) @ given, np.array(truth.moment) @ given
+    if truth.effect == "cm_alpha_nonlinear":
+        moment = moment + EFFECTS[truth.effect] * np.maximum(alpha - BREAK_RAD, 0.0)
     drag = DRAG[0] + DRAG[1] * lift**2
     pressure = 0.5 * DENSITY_KG_M3 * airspeed**2 * AREA_M2
     x = pressure * (lift * np.sin(alpha) - drag * np.cos(alpha)) + thrust
     z = -pressure * (lift * np.cos(alpha) + drag * np.sin(alpha))
-    return np.stack([x / MASS_KG, z / MASS_KG, pressure * CHORD_M * moment / INERTIA_KG_M2, airspeed, alpha])
+    turning = pressure * CHORD_M * moment / truth.inertia_kg_m2
+    return np.stack([x / truth.mass_kg, z / truth.mass_kg, turning, airspeed, alpha])
 
 
-def _rates(state: Array, elevator: Array, thrust: Array | float, gust: Array) -> Array:
+def _rates(truth: Truth, state: Array, elevator: Array, thrust: Array | float, gust: Array) -> Array:
     u, w, q, theta = state[:4]
-    ax, az, q_dot = _forces(state, elevator, thrust, gust)[:3]
+    ax, az, q_dot = _forces(truth, state, elevator, thrust, gust)[:3]
     climb = u * np.sin(theta) - w * np.cos(theta)
     return np.stack([ax - G0 * np.sin(theta) - q * w, az + G0 * np.cos(theta) + q * u, q_dot, q, climb])
 
 
-def _stepped(state: Array, elevator: Array, thrust: float, gust: Array) -> Array:
+def _stepped(truth: Truth, state: Array, elevator: Array, thrust: float, gust: Array) -> Array:
     """The state after a step of the classical Runge-Kutta method; inputs are linear over it."""
     middle, between = elevator.mean(axis=1), gust.mean(axis=0)
-    k1 = _rates(state, elevator[:, 0], thrust, gust[0])
-    k2 = _rates(state + 0.5 * STEP_S * k1, middle, thrust, between)
-    k3 = _rates(state + 0.5 * STEP_S * k2, middle, thrust, between)
-    k4 = _rates(state + STEP_S * k3, elevator[:, 1], thrust, gust[1])
+    k1 = _rates(truth, state, elevator[:, 0], thrust, gust[0])
+    k2 = _rates(truth, state + 0.5 * STEP_S * k1, middle, thrust, between)
+    k3 = _rates(truth, state + 0.5 * STEP_S * k2, middle, thrust, between)
+    k4 = _rates(truth, state + STEP_S * k3, elevator[:, 1], thrust, gust[1])
     return np.asarray(state + STEP_S / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4))
 
 
-def trimmed() -> tuple[float, float, float]:
+def trimmed(truth: Truth = Truth()) -> tuple[float, float, float]:
     """Angle of attack [rad], elevator [rad] and thrust [N] of level flight, by Newton's method."""
     x = np.array([0.04, 0.0, 8.0])
 
     def residual(x: Array) -> Array:
         state = np.array([AIRSPEED_M_S * np.cos(x[0]), AIRSPEED_M_S * np.sin(x[0]), 0.0, x[0], 0.0])
-        return _rates(state, np.asarray(x[1]), float(x[2]), np.zeros(2))[:3]
+        return _rates(truth, state, np.asarray(x[1]), float(x[2]), np.zeros(2))[:3]
 
     for _ in range(20):
         jacobian = np.stack([(residual(x + d) - residual(x - d)) / 2e-6 for d in 1e-6 * np.eye(3)], axis=1)
@@ -248,11 +301,17 @@ def main(argv: Sequence[str] | None = None) -> None:
         "--gust", type=float, default=0.0, help="standard deviation of the vertical gust [m/s]"
     )
     parser.add_argument("--effect", choices=sorted(EFFECTS))
+    parser.add_argument(
+        "--drawn",
+        action="store_true",
+        help="draw derivatives, mass and inertia from their declared uncertainty",
+    )
     options = parser.parse_args(argv)
     with tempfile.TemporaryDirectory() as folder:
         plane = declared(Path(folder))
         for seed in range(options.seed, options.seed + options.trials):
-            answer = trace([flight_log(seed, options.gust, options.effect)], plane, TraceOptions()).to_dict()
+            truth = drawn(seed, options.effect) if options.drawn else Truth(effect=options.effect)
+            answer = trace([flight_log(seed, options.gust, truth)], plane, TraceOptions()).to_dict()
             named = "; ".join(_shown(effect) for effect in answer["effects"]) or "-"
             provisional = ", provisional" if answer["provisional"] else ""
             p_value = answer["anomaly"]["p_value"]
