@@ -25,6 +25,7 @@ from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, fine, read
 from airtruth.tracing.model.settings import VANE, declared_change, resolved, settings_of
+from airtruth.tracing.model.surface_noise import with_surface_noise
 from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.selection.explanation import DERIVATIVES, causes_of
 from airtruth.tracing.selection.release import DeclaredCauses
@@ -119,6 +120,8 @@ def prepare(
     thrust_std = _THRUST_STD if has_throttle else _THRUST_UNKNOWN_STD
     settings = settings_of(aircraft, thrust_std, has_vane=has_vane)
     settings = resolved(settings, fitted)
+    records = [with_surface_noise(r, settings) for r in records]
+    fitted = tuple(r for r in records if r.signals.run_id not in chosen)
     held = tuple(r for r in records if r.signals.run_id in chosen)
     if len(fitted) == 1:
         notes.append("one record is fitted: each of its halves is left out in turn")

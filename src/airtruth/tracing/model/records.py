@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,8 @@ _HEAD_SAMPLES: Final = 3
 """Least number of samples of that start [-] (judgement)."""
 _QUIET_S: Final = 0.2
 """Width of the median that replaces an elevator at rest [s] (judgement)."""
+_SHORT_REST_S: Final = 0.5
+"""Length of a rest of the elevator up to which the error of its mean counts as noise [s] (judgement: half of a short period)."""
 _QUIET_STD: Final = 3.0
 """Distance from that median up to which the elevator is at rest, in standard deviations of its noise [-] (convention)."""
 
@@ -48,6 +50,7 @@ _SERIES: Final = (
     "density_kg_m3",
     "theta_rad",
     "corner_rad2",
+    "surface_noise_rad2",
 )
 """Attributes of `Signals` that are series in time."""
 
@@ -75,6 +78,7 @@ class Signals:
     throttle : its mean where it is logged, None elsewhere [0..1].
     corner_rad2 : (samples,) variance of the elevator's mean over the cell that ends at each sample, about that of
         ``elevator_rad``; empty where the samples show its motion.
+    surface_noise_rad2 : (samples,) variance of the noise that remains in the elevator (`_remaining`); empty for none.
     airspeed_walk : statistics of an airspeed that is smoothed; None where a low-pass is enough.
     lead : what comes before a part of a run; None for a whole run. The filter starts there.
     part_of : name of the run of which it is a part; empty for a whole run.
@@ -93,6 +97,7 @@ class Signals:
     throttle: float | None
     elevator_std_rad: float = 0.0
     corner_rad2: Array = field(default_factory=lambda: np.zeros(0))
+    surface_noise_rad2: Array = field(default_factory=lambda: np.zeros(0))
     airspeed_walk: WalkInNoise | None = None
     lead: Signals | None = None
     part_of: str = ""
@@ -146,6 +151,7 @@ class Signals:
             density_kg_m3=self.density_kg_m3[points],
             theta_rad=self.theta_rad[points],
             corner_rad2=self.corner_rad2[samples],
+            surface_noise_rad2=self.surface_noise_rad2[samples],
             lead=None,
         )
 
@@ -216,44 +222,69 @@ def read(
             theta = channels["alpha_rad"][0] + np.concatenate([[0.0], np.cumsum(0.5 * dt * (q[1:] + q[:-1]))])
         ground = ground_speed(channels, theta, dt)
         quiet = without_noise(airspeed, ground, dt, ground_walk(channels, theta, dt))
-        between, remaining_rad = _surface(channels, dt, sub * FINE, elevator_std_rad, servo_s, rate_rad_s)
+        surface = _surface(channels, dt, sub * FINE, elevator_std_rad, servo_s, rate_rad_s)
         found.append(
             Signals(
                 run_id=run_id,
                 dt_s=dt,
                 sub=sub,
                 y=np.ascontiguousarray(y, dtype=np.float64),
-                elevator_rad=between.surface_rad,
+                elevator_rad=surface.between.surface_rad,
                 airspeed_m_s=fine(quiet.speed_m_s, sub),
                 ground_m_s=fine(ground, sub),
                 density_kg_m3=fine(low_passed(density, dt), sub),
                 theta_rad=fine(theta, sub),
                 altitude_m=float(np.mean(altitude)),
-                elevator_std_rad=remaining_rad,
+                elevator_std_rad=surface.noise_std_rad,
                 throttle=float(channels["throttle"].mean()) if "throttle" in channels else None,
-                corner_rad2=between.corner_rad2,
+                corner_rad2=surface.between.corner_rad2,
+                surface_noise_rad2=surface.noise_rad2,
                 airspeed_walk=quiet.walk,
             )
         )
     return found
 
 
+class _Surface(NamedTuple):
+    """The smoothed elevator between its samples, the damper's share included, and the noise that remains in it; see `Signals`."""
+
+    between: Between
+    noise_std_rad: float
+    noise_rad2: Array
+
+
 def _surface(
     channels: Mapping[str, Array], dt_s: float, cells: int, std_rad: float, servo_s: float, rate_rad_s: float
-) -> tuple[Between, float]:
-    """The smoothed elevator between its samples, the damper's share included, and the noise that remains in it [rad]."""
+) -> _Surface:
     raw = np.asarray(channels["elevator_rad"], dtype=np.float64)
     q = np.asarray(channels["q_rad_s"], dtype=np.float64)
     is_fast = servo_s > 0.0 and dt_s <= LONGEST_STEP_S
     damper = find_damper(raw, q, dt_s, servo_s, std_rad) if is_fast else None
     if damper is None:
         quiet = _quiet(raw, dt_s, std_rad)
-        remaining = std_rad * float(np.sqrt((quiet == raw).mean()))
-        return read_between(quiet, dt_s, cells, std_rad, servo_s, rate_rad_s), remaining
+        moving = quiet == raw
+        between = read_between(quiet, dt_s, cells, std_rad, servo_s, rate_rad_s)
+        return _Surface(between, std_rad * float(np.sqrt(moving.mean())), _remaining(moving, dt_s, std_rad))
     own = damper_surface(damper, q, dt_s, servo_s, cells)
     rest = _quiet(raw - own[::cells], dt_s, std_rad)
     pilot = read_between(rest, dt_s, cells, std_rad, servo_s, rate_rad_s)
-    return pilot._replace(surface_rad=pilot.surface_rad + own), 0.0
+    return _Surface(pilot._replace(surface_rad=pilot.surface_rad + own), 0.0, np.zeros(0))
+
+
+def _remaining(moving: NDArray[np.bool_], dt_s: float, std_rad: float) -> Array:
+    """Variance of the noise that remains in the elevator (samples,) [rad2]; empty without noise.
+
+    A mean over n samples at rest has an error that is sqrt(n) smaller, and acts for n samples in the same direction. Over a
+    short rest its impulse has the variance of n independent errors. Over a longer one the motion and the record's trim absorb it.
+    """
+    if std_rad <= 0.0:
+        return np.zeros(0)
+    noisy = moving.copy()
+    ends = np.flatnonzero(np.diff(moving)) + 1
+    for start, end in itertools.pairwise([0, *ends.tolist(), len(moving)]):
+        if start > 0 and end - start < _SHORT_REST_S / dt_s:
+            noisy[start:end] = True
+    return np.where(noisy, std_rad**2, 0.0)
 
 
 def _quiet(elevator: Array, dt_s: float, std: float) -> Array:

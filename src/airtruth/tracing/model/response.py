@@ -147,10 +147,12 @@ def _inputs(record: TraceRecord, compiled: CompiledChange) -> FilterInputs:
 def _corners(s: Signals, compiled: CompiledChange) -> Array:
     """Variance of the surface that the air sees, per sample; a delay or lag of the surface carries it to later cells."""
     late = tuple(term for term in compiled.surface if term.kind in ("delay", "lag"))
-    if s.corner_rad2.size == 0 or not late:
-        return s.corner_rad2
+    known = [own for own in (s.corner_rad2, s.surface_noise_rad2) if own.size]
+    total = np.asarray(sum(known[1:], known[0])) if known else s.corner_rad2
+    if total.size == 0 or not late:
+        return total
     cells = s.sub * FINE
-    fine = np.append(np.repeat(s.corner_rad2[1:], cells), 0.0)
+    fine = np.append(np.repeat(total[1:], cells), 0.0)
     moved = through(late, fine, s.dt_s / cells)
     return np.append(0.0, moved[:-1].reshape(-1, cells).mean(axis=1))
 
