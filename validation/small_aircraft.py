@@ -4,7 +4,7 @@
 
 The truth is a longitudinal simulation of its own: a rigid body, lift and moment linear in angle of attack, pitch rate and
 elevator, a parabolic drag polar, constant thrust, vertical and horizontal Dryden gusts, and Runge-Kutta steps of 2.5 ms. The
-tracer gets logs at 50 Hz and an aircraft.toml without a JSBSim model. Nothing is missing, or the stated effect. The values of the
+tracer gets logs at 50 Hz, or another rate, and an aircraft.toml without a JSBSim model. Nothing is missing, or the stated effect. The values of the
 file are those of the truth, or with ``--drawn`` the truth has derivatives, mass and inertia from their declared uncertainty. A
 trial depends on its seed and the options alone.
 """
@@ -139,7 +139,9 @@ def declared(folder: Path) -> Aircraft:
     return aircraft.load(folder)
 
 
-def flight_log(seed: int, gust_m_s: float = 0.0, truth: Truth = Truth(), noise: float = 1.0) -> FlightLog:
+def flight_log(
+    seed: int, gust_m_s: float = 0.0, truth: Truth = Truth(), noise: float = 1.0, every: int = EVERY
+) -> FlightLog:
     """Six records of a trial.
 
     Parameters
@@ -147,6 +149,7 @@ def flight_log(seed: int, gust_m_s: float = 0.0, truth: Truth = Truth(), noise: 
     gust_m_s : standard deviation of the vertical gust [m/s]; that of the horizontal one is 1.2 times as large.
     truth : the aircraft that flies.
     noise : multiple of the noise of the sensors [-].
+    every : steps to a sample of the log [-].
     """
     rng = np.random.default_rng(seed)
     steps = round(DURATION_S / STEP_S)
@@ -179,10 +182,10 @@ def flight_log(seed: int, gust_m_s: float = 0.0, truth: Truth = Truth(), noise: 
         "elevator_rad": surface.T,
         "altitude_m": 150.0 + altitude,
     }
-    channels = {name: _measured(rng, x, noise * NOISE[name]) for name, x in exact.items()}
-    samples = steps // EVERY + 1
+    channels = {name: _measured(rng, x[::every], noise * NOISE[name]) for name, x in exact.items()}
+    samples = steps // every + 1
     names = tuple(f"r{i + 1}" for i in range(RECORDS))
-    times = np.tile(t[::EVERY], RECORDS)
+    times = np.tile(t[::every], RECORDS)
     return FlightLog({"aircraft": "small"}, names, samples * np.arange(RECORDS + 1), times, channels)
 
 
@@ -193,8 +196,8 @@ def _lag(time_s: float) -> tuple[list[float], list[float]]:
 
 
 def _measured(rng: np.random.Generator, exact: Array, std: float) -> Array:
-    """Every eighth step of all records, one after another, with noise."""
-    picked = exact[::EVERY].T.ravel()
+    """Samples of all records, one after another, with noise."""
+    picked = exact.T.ravel()
     return np.asarray(picked + std * rng.standard_normal(picked.size))
 
 
@@ -306,12 +309,14 @@ def main(argv: Sequence[str] | None = None) -> None:
         action="store_true",
         help="draw derivatives, mass and inertia from their declared uncertainty",
     )
+    parser.add_argument("--every", type=int, default=EVERY, help="steps of 2.5 ms to a sample of the log")
     options = parser.parse_args(argv)
     with tempfile.TemporaryDirectory() as folder:
         plane = declared(Path(folder))
         for seed in range(options.seed, options.seed + options.trials):
             truth = drawn(seed, options.effect) if options.drawn else Truth(effect=options.effect)
-            answer = trace([flight_log(seed, options.gust, truth)], plane, TraceOptions()).to_dict()
+            log = flight_log(seed, options.gust, truth, every=options.every)
+            answer = trace([log], plane, TraceOptions()).to_dict()
             named = "; ".join(_shown(effect) for effect in answer["effects"]) or "-"
             provisional = ", provisional" if answer["provisional"] else ""
             p_value = answer["anomaly"]["p_value"]

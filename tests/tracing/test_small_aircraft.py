@@ -10,10 +10,9 @@ G0 = 9.80665
 
 
 @pytest.mark.parametrize("truth", [small.Truth(), small.drawn(3)])
-def test_least_squares_gives_its_coefficients_back(monkeypatch, truth):
+def test_least_squares_gives_its_coefficients_back(truth):
     """Every step of a flight without noise; pitch acceleration by central differences of 2.5 ms."""
-    monkeypatch.setattr(small, "EVERY", 1)
-    log = small.flight_log(3, truth=truth, noise=0.0)
+    log = small.flight_log(3, truth=truth, noise=0.0, every=1)
     rows = log.rows(0)
     c = {name: values[rows] for name, values in log.channels.items()}
     q_dot = np.gradient(c["q_rad_s"], small.STEP_S)
