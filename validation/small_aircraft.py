@@ -4,9 +4,9 @@
 
 The truth is a longitudinal simulation of its own: a rigid body, lift and moment linear in angle of attack, pitch rate and
 elevator, a parabolic drag polar, constant thrust, vertical and horizontal Dryden gusts, and Runge-Kutta steps of 2.5 ms. The
-tracer gets logs at 50 Hz, or another rate, and an aircraft.toml without a JSBSim model. Nothing is missing, or the stated effect. The values of the
-file are those of the truth, or with ``--drawn`` the truth has derivatives, mass and inertia from their declared uncertainty. A
-trial depends on its seed and the options alone.
+tracer gets logs at 50 Hz, or another rate, and an aircraft.toml without a JSBSim model. Nothing is missing, or the stated effect.
+The values of the file are those of the truth, or with ``--drawn`` the truth has derivatives, mass and inertia from their declared
+uncertainty. A trial depends on its seed and the options alone.
 """
 
 from __future__ import annotations
