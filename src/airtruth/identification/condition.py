@@ -32,6 +32,9 @@ from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
+_BLOCK_S: Final = 0.5
+"""Length of the means that `pressure_range` compares [s] (judgement: a mean of 25 samples of noise, and short for
+a phugoid)."""
 NO_LEFT: Final = np.empty((0, 4, 0))
 """Left sides at constant pressure: the estimators form them from the signals."""
 
@@ -131,6 +134,18 @@ def flight_condition(
     )
 
 
+def takes_constant(options: Options, has_default_constant: bool) -> bool:
+    """Whether a method takes the dynamic pressure for constant over a record.
+
+    Parameters
+    ----------
+    has_default_constant : whether it does where the option ``pressure`` leaves the choice to the method.
+    """
+    if options.airspeed_m_s is not None or options.pressure == "constant":
+        return True
+    return options.pressure == "method" and has_default_constant
+
+
 def window_samples(options: Options, dt_s: float) -> int:
     """Samples of the trim window, at least one."""
     return max(1, round(options.trim_window_s / dt_s))
@@ -141,6 +156,16 @@ def measured_unless_given(options: Options) -> Options:
     if options.pressure != "method":
         return options
     return replace(options, pressure="measured" if options.airspeed_m_s is None else "constant")
+
+
+def pressure_range(batch: Batch) -> Array:
+    """Largest less smallest dynamic pressure of each run over its mean (runs,) [-], in means over `_BLOCK_S`."""
+    pressure = air_density(batch.channels) * batch.channels["airspeed_m_s"] ** 2
+    samples = pressure.shape[1]
+    block = min(max(1, round(_BLOCK_S / batch.dt_s)), samples)
+    whole = samples // block * block
+    means = pressure[:, :whole].reshape(len(pressure), -1, block).mean(axis=2)
+    return np.asarray(np.ptp(means, axis=1) / pressure.mean(axis=1))
 
 
 def ratios_of(batch: Batch, constants: AircraftConstants, condition: Scale) -> tuple[Array, Array]:

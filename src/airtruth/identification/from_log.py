@@ -14,8 +14,9 @@ from airtruth.cluster import Cluster, LostWorkError
 from airtruth.errors import ConfigurationError, LogError, StoreError
 from airtruth.identification.batch import identify_batch
 from airtruth.identification.checks import airspeed_fault, check_batch, check_channels
-from airtruth.identification.condition import AircraftConstants
+from airtruth.identification.condition import AircraftConstants, pressure_range
 from airtruth.identification.declared_sensors import as_ideal, taken_out
+from airtruth.identification.doubts import CHANGES
 from airtruth.identification.estimates import Estimates, concatenated
 from airtruth.identification.methods import Method
 from airtruth.identification.options import Options
@@ -48,11 +49,12 @@ class LogTask:
 class FromLog:
     """What one log gives: its runs and notes, the estimates of each method, or the parts of a joint estimate.
 
-    ``dt_s`` is its longest sample period [s].
+    ``dt_s`` is its longest sample period [s]; ``changes`` are the runs whose `pressure_range` exceeds `CHANGES`, with it.
     """
 
     run_ids: tuple[str, ...]
     dt_s: float = 0.0
+    changes: list[tuple[str, float]] = field(default_factory=list)
     origin: Source | None = None
     parts: list[Part] = field(default_factory=list)
     estimates: dict[str, Estimates] = field(default_factory=dict)
@@ -126,6 +128,8 @@ def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made
         for part in parts:
             check_batch(part.batch, task.options)
             found.dt_s = max(found.dt_s, part.batch.dt_s)
+            ranges = zip(part.batch.run_ids, pressure_range(part.batch).tolist(), strict=True)
+            found.changes += [(run_id, changed) for run_id, changed in ranges if changed > CHANGES]
     except LogError as error:
         raise LogError(f"{task.source}: {error}" if isinstance(entry, Path) else str(error)) from None
     if isinstance(entry, Path):

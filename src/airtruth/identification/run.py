@@ -17,9 +17,9 @@ from airtruth.arguments import names
 from airtruth.cluster import Cluster
 from airtruth.errors import ConfigurationError
 from airtruth.identification.batch import identify_batch, identify_joint
-from airtruth.identification.condition import AircraftConstants
+from airtruth.identification.condition import AircraftConstants, takes_constant
 from airtruth.identification.declared_sensors import declared_words, taken_out
-from airtruth.identification.doubts import doubts
+from airtruth.identification.doubts import changing_pressure, doubts
 from airtruth.identification.estimates import Estimates, concatenated
 from airtruth.identification.from_log import FromLog, LogTask, results_of
 from airtruth.identification.loading import at_one_cg, mean_cg
@@ -216,6 +216,8 @@ class _Work:
     notes: list[str] = field(default_factory=list)
     forced: list[str] = field(default_factory=list)
     sources: list[Source] = field(default_factory=list)
+    changes: list[tuple[str, float]] = field(default_factory=list)
+    runs: int = 0
     failed: int = 0
     dt_s: float = 0.0
 
@@ -241,13 +243,20 @@ class _Work:
         self.notes += found.notes
         self.forced += found.forced
         self.dt_s = max(self.dt_s, found.dt_s)
+        self.changes += found.changes
+        self.runs += len(found.run_ids)
         if found.origin is not None:
             self.sources.append(found.origin)
 
     @property
     def noted(self) -> tuple[str, ...]:
-        """Notes of the logs, and constants that records state differently from the aircraft."""
-        return (*self.notes, *_stated(self.stated))
+        """Notes of the logs, constants that records state differently from the aircraft, and a pressure that is not constant."""
+        constant = [m.name for m in self.methods if takes_constant(self.options, m.pose is not None)]
+        return (
+            *self.notes,
+            *_stated(self.stated),
+            *changing_pressure(constant, self.changes, self.runs),
+        )
 
     def joint(self) -> Iterator[Estimates]:
         """One estimate of each method from all logs."""
