@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import trace_flights
 
+from airtruth.checks.airspeed import gust_cutoff_hz, low_passed, without_noise
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.store import read_log
 from airtruth.tracing import TraceOptions, trace
-from airtruth.tracing.model.airspeed import gust_cutoff_hz, low_passed, without_noise
 from airtruth.tracing.model.records import read
 from airtruth.units import G0
 from validation.blind import draw, trials

@@ -94,6 +94,21 @@ def doubts(parts: Parts, dt_s: float = 0.0) -> list[str]:
     return result + [sentence for one in contradictions for sentence in one.sentences()]
 
 
+def smoothed_airspeed(noisy: Sequence[str], runs: int) -> Iterator[str]:
+    """A sentence about runs whose airspeed is smoothed.
+
+    Parameters
+    ----------
+    noisy : their names; runs : number of all runs.
+    """
+    if noisy:
+        which = f"run {noisy[0]!r}" if len(noisy) == 1 else f"{len(noisy)} of {runs} runs"
+        yield (
+            f"the noise of the airspeed is taken out of {which}: it is the speed over ground by the accelerometers and the most "
+            "probable random walk of the rest"
+        )
+
+
 def changing_pressure(
     methods: Sequence[str], changes: Sequence[tuple[str, float]], runs: int
 ) -> Iterator[str]:

@@ -8,8 +8,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from airtruth.aircraft import Aircraft
 from airtruth.checks import gate
+from airtruth.checks.airspeed import attitude, ground_speed, ground_walk, is_noisy, without_noise
 from airtruth.cluster import Cluster, LostWorkError
 from airtruth.errors import ConfigurationError, LogError, StoreError
 from airtruth.identification.batch import identify_batch
@@ -22,7 +25,7 @@ from airtruth.identification.methods import Method
 from airtruth.identification.options import Options
 from airtruth.identification.record_constants import Part, differing, with_constants
 from airtruth.identification.result import Source
-from airtruth.logs.flight_log import FlightLog
+from airtruth.logs.flight_log import Batch, FlightLog
 from airtruth.logs.sources import IN_MEMORY
 from airtruth.logs.store import read_log
 
@@ -49,11 +52,13 @@ class LogTask:
 class FromLog:
     """What one log gives: its runs and notes, the estimates of each method, or the parts of a joint estimate.
 
-    ``dt_s`` is its longest sample period [s]; ``changes`` are the runs whose `pressure_range` exceeds `CHANGES`, with it.
+    ``dt_s`` is its longest sample period [s]; ``noisy`` are the runs whose airspeed is smoothed; ``changes`` are the runs whose
+    `pressure_range` exceeds `CHANGES`, with it.
     """
 
     run_ids: tuple[str, ...]
     dt_s: float = 0.0
+    noisy: list[str] = field(default_factory=list)
     changes: list[tuple[str, float]] = field(default_factory=list)
     origin: Source | None = None
     parts: list[Part] = field(default_factory=list)
@@ -122,7 +127,7 @@ def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made
         servo_s = task.plane.servo_time_s if isinstance(task.plane, Aircraft) else 0.0
         taken = taken_out(task.plane)
         parts = [
-            replace(p, batch=replace(as_ideal(p.batch, taken), servo_s=servo_s))
+            replace(p, batch=replace(as_ideal(_quiet(p.batch, found), taken), servo_s=servo_s))
             for p in with_constants(log, task.plane)
         ]
         for part in parts:
@@ -144,6 +149,22 @@ def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made
         found.estimates[chosen.name] = concatenated(made, log.run_ids)
         estimated(found.estimates[chosen.name])
     return found
+
+
+def _quiet(batch: Batch, found: FromLog) -> Batch:
+    """The runs with smoothed airspeeds where their noise would move the dynamic pressure."""
+    speeds = batch.channels["airspeed_m_s"]
+    noisy = np.flatnonzero(is_noisy(speeds, batch.dt_s)).tolist()
+    if not noisy:
+        return batch
+    speeds = speeds.copy()
+    for run in noisy:
+        own = {name: values[run] for name, values in batch.channels.items()}
+        theta = attitude(own, batch.dt_s)
+        ground, walk = ground_speed(own, theta, batch.dt_s), ground_walk(own, theta, batch.dt_s)
+        speeds[run] = without_noise(own["airspeed_m_s"], ground, batch.dt_s, walk).speed_m_s
+    found.noisy += [batch.run_ids[run] for run in noisy]
+    return replace(batch, channels={**batch.channels, "airspeed_m_s": speeds})
 
 
 def _check(log: FlightLog, task: LogTask, found: FromLog) -> None:

@@ -19,7 +19,7 @@ from airtruth.errors import ConfigurationError
 from airtruth.identification.batch import identify_batch, identify_joint
 from airtruth.identification.condition import AircraftConstants, takes_constant
 from airtruth.identification.declared_sensors import declared_words, taken_out
-from airtruth.identification.doubts import changing_pressure, doubts
+from airtruth.identification.doubts import changing_pressure, doubts, smoothed_airspeed
 from airtruth.identification.estimates import Estimates, concatenated
 from airtruth.identification.from_log import FromLog, LogTask, results_of
 from airtruth.identification.loading import at_one_cg, mean_cg
@@ -216,6 +216,7 @@ class _Work:
     notes: list[str] = field(default_factory=list)
     forced: list[str] = field(default_factory=list)
     sources: list[Source] = field(default_factory=list)
+    noisy: list[str] = field(default_factory=list)
     changes: list[tuple[str, float]] = field(default_factory=list)
     runs: int = 0
     failed: int = 0
@@ -243,6 +244,7 @@ class _Work:
         self.notes += found.notes
         self.forced += found.forced
         self.dt_s = max(self.dt_s, found.dt_s)
+        self.noisy += found.noisy
         self.changes += found.changes
         self.runs += len(found.run_ids)
         if found.origin is not None:
@@ -250,11 +252,12 @@ class _Work:
 
     @property
     def noted(self) -> tuple[str, ...]:
-        """Notes of the logs, constants that records state differently from the aircraft, and a pressure that is not constant."""
+        """Notes of the logs, constants that records state differently from the aircraft, and those on airspeed and pressure."""
         constant = [m.name for m in self.methods if takes_constant(self.options, m.pose is not None)]
         return (
             *self.notes,
             *_stated(self.stated),
+            *smoothed_airspeed(self.noisy, self.runs),
             *changing_pressure(constant, self.changes, self.runs),
         )
 

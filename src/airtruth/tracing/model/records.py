@@ -11,17 +11,18 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.errors import LogError
-from airtruth.logs.flight_log import FlightLog
-from airtruth.numerics.whiteness import is_white
-from airtruth.physics.atmosphere import air_density, altitude_of_density_m
-from airtruth.tracing.model.airspeed import (
+from airtruth.checks.airspeed import (
     WalkInNoise,
+    attitude,
     ground_speed,
     ground_walk,
     low_passed,
     without_noise,
 )
+from airtruth.errors import LogError
+from airtruth.logs.flight_log import FlightLog
+from airtruth.numerics.whiteness import is_white
+from airtruth.physics.atmosphere import air_density, altitude_of_density_m
 from airtruth.tracing.model.compile import CHANNELS
 from airtruth.tracing.model.damper import damper_surface, find_damper
 from airtruth.tracing.model.elevator_path import LONGEST_STEP_S, Between, read_between
@@ -216,10 +217,7 @@ def read(
         altitude = channels.get("altitude_m")
         if altitude is None:
             altitude = np.full(len(t), _altitude(float(density.mean())))
-        theta = channels.get("theta_rad")
-        if theta is None:
-            q = channels["q_rad_s"]
-            theta = channels["alpha_rad"][0] + np.concatenate([[0.0], np.cumsum(0.5 * dt * (q[1:] + q[:-1]))])
+        theta = attitude(channels, dt)
         ground = ground_speed(channels, theta, dt)
         quiet = without_noise(airspeed, ground, dt, ground_walk(channels, theta, dt))
         surface = _surface(channels, dt, sub * FINE, elevator_std_rad, servo_s, rate_rad_s)

@@ -1,6 +1,6 @@
 """The error that a smoothed airspeed keeps, as far as the records show it.
 
-The noise of a small aircraft's airspeed is smoothed (`airtruth.tracing.model.airspeed`), and the filter takes the result for
+The noise of a small aircraft's airspeed is smoothed (`airtruth.checks.airspeed`), and the filter takes the result for
 exact. Its error is slow and small: 0.02 m/s for a noise of 0.25 m/s. It moves the lift by twice its share of the airspeed, and
 six records of some seconds show that. The smoother states the variance of each cosine of its error. This module adds the most
 probable error, beside derivatives, biases and motion that are all free.

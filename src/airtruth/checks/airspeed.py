@@ -1,4 +1,4 @@
-"""Airspeed as an input of the filter, without the noise of its sensor; and the speed over ground."""
+"""Airspeed as an input of a model, without the noise of its sensor; and the speed over ground."""
 
 from __future__ import annotations
 
@@ -22,6 +22,8 @@ _NEGLIGIBLE: Final = 3e-3
 """Standard deviation of the noise that a low-pass leaves in the airspeed, over the airspeed, up to which it is no disturbance [-]
 (judgement: 0.006 of the lift, 0.06 m/s2 in level flight, as the noise of accelerometers; and in strong gusts the estimate of the
 noise scatters by up to 0.0025 in the records of 6 s of data/undeclared)."""
+_TINY_M2_S2: Final = 1e-12
+"""Variance of the noise that replaces zero in a quotient [m2/s2]: a micrometre per second."""
 _GROUND_SLOPE_M_S2: Final = 0.3
 """Largest error of the acceleration along the path that a longitudinal accelerometer leaves [m/s2] (judgement: a bias of
 0.02 g and an error in attitude of half a degree). A steeper trend of the airspeed is one of the wind."""
@@ -50,23 +52,39 @@ def gust_cutoff_hz(airspeed_m_s: Array, dt_s: float) -> float:
 
     Source: J. F. Muth, J. Amer. Statist. Assoc. 55 (1960) 299-306, for the random walk in noise.
     """
-    return _cutoff_hz(*_variances(airspeed_m_s), dt_s)
-
-
-def _cutoff_hz(noise: float, walk: float, dt_s: float) -> float:
+    noise, walk = _variances(airspeed_m_s)
     if noise <= 0.0:
         return math.inf
     return max(_CUTOFF_HZ, math.sqrt(walk / noise) / (2.0 * math.pi * dt_s))
 
 
-def _variances(airspeed_m_s: Array) -> tuple[float, float]:
-    """Variances of the noise and of the steps of the walk [m2/s2], by moments; zero noise where none shows."""
+def _variances(airspeed_m_s: Array) -> tuple[Array, Array]:
+    """Variances of the noise and of the steps of the walk [m2/s2] (...,), by moments; zero noise where none shows."""
     change = np.diff(np.asarray(airspeed_m_s, dtype=np.float64))
-    if change.size < 2:
-        return 0.0, 0.0
-    change -= change.mean()
-    noise = max(-float((change[1:] * change[:-1]).mean()), 0.0)
-    return noise, max(float((change**2).mean()) - 2.0 * noise, 0.0)
+    if change.shape[-1] < 2:
+        return np.zeros(change.shape[:-1]), np.zeros(change.shape[:-1])
+    count = change.shape[-1]
+    total = change.sum(axis=-1)
+    mean, ends = total / count, change[..., 0] + change[..., -1]
+    follows = np.einsum("...i,...i->...", change[..., 1:], change[..., :-1])
+    covariance = (follows - mean * (2.0 * total - ends)) / (count - 1) + mean**2
+    noise = np.maximum(-covariance, 0.0)
+    variance = np.einsum("...i,...i->...", change, change) / count - mean**2
+    return noise, np.maximum(variance - 2.0 * noise, 0.0)
+
+
+def is_noisy(airspeed_m_s: Array, dt_s: float) -> NDArray[np.bool_]:
+    """Whether a low-pass at `gust_cutoff_hz` leaves noise of more than `_NEGLIGIBLE` of the mean.
+
+    Parameters
+    ----------
+    airspeed_m_s : (..., samples); dt_s : sample period [s].
+    """
+    airspeed = np.asarray(airspeed_m_s, dtype=np.float64)
+    noise, walk = _variances(airspeed)
+    corner = np.sqrt(walk / np.maximum(noise, _TINY_M2_S2)) / (2.0 * np.pi * dt_s)
+    share = np.minimum(1.0, 2.0 * dt_s * np.maximum(_CUTOFF_HZ, corner))
+    return np.asarray(np.sqrt(noise * share) > _NEGLIGIBLE * airspeed.mean(axis=-1))
 
 
 class WalkInNoise(NamedTuple):
@@ -102,14 +120,23 @@ def without_noise(
         the walk has at least that of it.
     """
     airspeed = np.asarray(airspeed_m_s, dtype=np.float64)
-    noise, walk = _variances(airspeed)
-    cutoff = _cutoff_hz(noise, walk, dt_s)
-    left = math.sqrt(noise * min(1.0, 2.0 * dt_s * cutoff)) if noise > 0.0 else 0.0
-    if left <= _NEGLIGIBLE * float(airspeed.mean()):
-        return QuietAirspeed(low_passed(airspeed, dt_s, cutoff), None)
+    if not is_noisy(airspeed, dt_s):
+        return QuietAirspeed(low_passed(airspeed, dt_s, gust_cutoff_hz(airspeed, dt_s)), None)
+    noise = float(_variances(airspeed)[0])
     gust = airspeed - ground_m_s
     ratio = max(walk_to_noise(gust), ground_walk_m2_s2 / noise)
     return QuietAirspeed(np.asarray(ground_m_s + smoothed(gust, ratio)), WalkInNoise(noise, ratio))
+
+
+def attitude(channels: Mapping[str, Array], dt_s: float) -> Array:
+    """Pitch attitude (samples,) [rad]: measured, or the integral of the pitch rate from alpha at the start, level flight."""
+    theta = channels.get("theta_rad")
+    if theta is not None:
+        return np.asarray(theta)
+    q = channels["q_rad_s"]
+    return np.asarray(
+        channels["alpha_rad"][0] + np.concatenate([[0.0], np.cumsum(0.5 * dt_s * (q[1:] + q[:-1]))])
+    )
 
 
 def ground_speed(channels: Mapping[str, Array], theta: Array, dt_s: float) -> Array:
@@ -132,7 +159,7 @@ def ground_speed(channels: Mapping[str, Array], theta: Array, dt_s: float) -> Ar
 def ground_walk(channels: Mapping[str, Array], theta: Array, dt_s: float) -> float:
     """Variance that the error of `ground_speed` gains from one sample to the next, from the noise of its sensors [m2/s2]."""
     noise, _ = _variances(_path_acceleration(channels, theta))
-    return noise * dt_s**2
+    return float(noise) * dt_s**2
 
 
 def _path_acceleration(channels: Mapping[str, Array], theta: Array) -> Array:
@@ -147,9 +174,11 @@ def _path_acceleration(channels: Mapping[str, Array], theta: Array) -> Array:
 __all__ = [
     "QuietAirspeed",
     "WalkInNoise",
+    "attitude",
     "ground_speed",
     "ground_walk",
     "gust_cutoff_hz",
+    "is_noisy",
     "low_passed",
     "without_noise",
 ]
