@@ -79,3 +79,20 @@ def test_what_comes_before_a_part_of_a_record_is_corrected_too(plane, monkeypatc
     change = moved.records[1].signals.with_lead.airspeed_m_s - second.signals.with_lead.airspeed_m_s
     assert np.abs(change[: len(second.signals.lead.airspeed_m_s)]).max() > 1e-4
     assert np.abs(np.diff(change)).max() < 1e-2
+
+
+def test_records_with_a_quiet_airspeed_beside_noisy_ones_are_left_as_they_are(plane, monkeypatch):
+    """Runs r3 and r6 are held out; r1 and both of them have a steady airspeed."""
+    _, log = flown(plane, monkeypatch)
+    speed = log.channels["airspeed_m_s"].copy()
+    for run in (0, 2, 5):
+        speed[log.rows(run)] = 22.0
+    mixed = replace(log, channels={**log.channels, "airspeed_m_s": speed})
+    case = prepare([mixed], plane, [], TraceOptions())
+    moved = with_corrected_airspeed(case, initial_parameters(case.fitted, case.hypothesis))
+    assert moved.held is case.held
+    same = [
+        np.array_equal(a.signals.airspeed_m_s, b.signals.airspeed_m_s)
+        for a, b in zip(case.fitted.records, moved.fitted.records, strict=True)
+    ]
+    assert same == [True, False, False, False]

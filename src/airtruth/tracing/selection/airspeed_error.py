@@ -50,13 +50,16 @@ def with_corrected_airspeed(case: Case, start: Parameters) -> Case:
     ----------
     start : the fit of the declared aircraft.
     """
-    if all(r.signals.airspeed_walk is None for r in case.fitted.records):
-        return case
-    fitted = corrected(case.fitted, case.hypothesis, start)
-    held = case.held
-    if held is not None:
+    fitted, held = case.fitted, case.held
+    if _is_smoothed(fitted):
+        fitted = corrected(fitted, case.hypothesis, start)
+    if held is not None and _is_smoothed(held):
         held = corrected(held, case.hypothesis, initial_parameters(held, case.hypothesis))
-    return replace(case, fitted=fitted, held=held)
+    return case if fitted is case.fitted and held is case.held else replace(case, fitted=fitted, held=held)
+
+
+def _is_smoothed(problem: TraceProblem) -> bool:
+    return any(r.signals.airspeed_walk is not None for r in problem.records)
 
 
 def corrected(problem: TraceProblem, hypothesis: Hypothesis, start: Parameters) -> TraceProblem:
