@@ -37,13 +37,14 @@ def test_divided_equations_are_the_equations_at_the_measured_pressure():
     alpha, q = 0.03 * np.sin(3.0 * t), 0.1 * np.cos(2.0 * t)
     alpha_rate, q_rate = 0.09 * np.cos(3.0 * t), -0.2 * np.sin(2.0 * t)
     signals = np.stack([alpha, q, np.full_like(t, -1.0), np.zeros_like(t)])[None]
-    left = divide(signals, v[None], p[None], np.array([AIRSPEED_M_S]), dt)[0]
+    across = np.cos(0.2 * np.sin(0.9 * t))
+    left = divide(signals, v[None], p[None], np.array([AIRSPEED_M_S]), dt, across[None])[0]
     lift = np.gradient(left[0], dt) + left[2]
     moment = np.gradient(left[1], dt) + left[3]
     inner = slice(2, -2)
     # alpha is taken from its mean, which x' a of a constant a brings back
     constant = alpha.mean() * np.gradient(v / p, dt)
-    expected = (v / p) * (alpha_rate - q - G0 / (AIRSPEED_M_S * v))
+    expected = (v / p) * (alpha_rate - q - G0 * across / (AIRSPEED_M_S * v))
     np.testing.assert_allclose((lift + constant - constant)[inner], expected[inner], atol=2e-6)
     np.testing.assert_allclose(moment[inner], (q_rate / p)[inner], atol=2e-6)
     np.testing.assert_allclose(signals[0, 1], q / v, rtol=1e-14)

@@ -35,6 +35,9 @@ Array = NDArray[np.float64]
 _BLOCK_S: Final = 0.5
 """Length of the means that `pressure_range` compares [s] (judgement: a mean of 25 samples of noise, and short for
 a phugoid)."""
+_LEVEL: Final = 0.01
+"""Range of the cosine of the path angle in a record up to which gravity across the path is constant [-] (judgement: 0.1 m/s2, a
+path that turns by 8 deg; the noise of accelerometers)."""
 NO_LEFT: Final = np.empty((0, 4, 0))
 """Left sides at constant pressure: the estimators form them from the signals."""
 
@@ -161,11 +164,27 @@ def measured_unless_given(options: Options) -> Options:
 def pressure_range(batch: Batch) -> Array:
     """Largest less smallest dynamic pressure of each run over its mean (runs,) [-], in means over `_BLOCK_S`."""
     pressure = air_density(batch.channels) * batch.channels["airspeed_m_s"] ** 2
-    samples = pressure.shape[1]
-    block = min(max(1, round(_BLOCK_S / batch.dt_s)), samples)
+    return np.asarray(_range(pressure, batch.dt_s) / pressure.mean(axis=1))
+
+
+def across_path(batch: Batch) -> Array:
+    """Gravity across the path over that in level flight, (runs, samples) [-]: the cosine of the path angle theta - alpha.
+
+    One where theta is not measured, and in runs whose cosine changes by at most `_LEVEL`, in means over `_BLOCK_S`.
+    """
+    alpha, theta = batch.channels["alpha_rad"], batch.channels.get("theta_rad")
+    if theta is None:
+        return np.ones_like(alpha)
+    cosine = np.cos(theta - alpha)
+    return np.where(_range(cosine, batch.dt_s)[:, None] > _LEVEL, cosine, 1.0)
+
+
+def _range(x: Array, dt_s: float) -> Array:
+    """Largest less smallest mean over `_BLOCK_S` of each row of (runs, samples)."""
+    samples = x.shape[1]
+    block = min(max(1, round(_BLOCK_S / dt_s)), samples)
     whole = samples // block * block
-    means = pressure[:, :whole].reshape(len(pressure), -1, block).mean(axis=2)
-    return np.asarray(np.ptp(means, axis=1) / pressure.mean(axis=1))
+    return np.asarray(np.ptp(x[:, :whole].reshape(len(x), -1, block).mean(axis=2), axis=1))
 
 
 def ratios_of(batch: Batch, constants: AircraftConstants, condition: Scale) -> tuple[Array, Array]:
@@ -193,7 +212,7 @@ def ratios(
     return airspeed_m_s / scale.airspeed_m_s[:, None], force / scale.normal[:, None]
 
 
-def divide(signals: Array, v: Array, p: Array, airspeed_m_s: Array, dt_s: float) -> Array:
+def divide(signals: Array, v: Array, p: Array, airspeed_m_s: Array, dt_s: float, across: Array) -> Array:
     """Divide q and az of ``signals`` by v and p, in place, and return the left sides.
 
     Parameters
@@ -202,12 +221,13 @@ def divide(signals: Array, v: Array, p: Array, airspeed_m_s: Array, dt_s: float)
     v, p : (runs, samples) from `ratios`.
     airspeed_m_s : (runs,) V0.
     dt_s : sample period [s].
+    across : (runs, samples) from `across_path`.
 
     Returns
     -------
     (runs, 4, samples)
         The first two are to be differentiated, the last two to be added, to give the left sides of lift and
-        moment: x alpha [rad], q/p [rad/s], -x' alpha - x q - g/(V0 p) [rad/s], -(1/p)' q [rad/s2], with
+        moment: x alpha [rad], q/p [rad/s], -x' alpha - x q - g cos(gamma)/(V0 p) [rad/s], -(1/p)' q [rad/s2], with
         x = v/p and alpha relative to its mean.
     """
     by_lift, by_moment = v / p, 1.0 / p
@@ -216,7 +236,7 @@ def divide(signals: Array, v: Array, p: Array, airspeed_m_s: Array, dt_s: float)
     signals[:, Q] /= v
     signals[:, AZ] /= p
     slope_lift, slope_moment = (np.gradient(x, dt_s, axis=1) for x in (by_lift, by_moment))
-    added = -slope_lift * alpha - by_lift * q - G0 / airspeed_m_s[:, None] * by_moment
+    added = -slope_lift * alpha - by_lift * q - G0 / airspeed_m_s[:, None] * across * by_moment
     return np.stack([by_lift * alpha, by_moment * q, added, -slope_moment * q], axis=1)
 
 
@@ -233,7 +253,7 @@ def observe(batch: Batch, constants: AircraftConstants, options: Options) -> Obs
     left = left_smooth = NO_LEFT
     if options.pressure == "measured":
         v, p = ratios_of(batch, constants, condition)
-        left = divide(signals, v, p, condition.airspeed_m_s, batch.dt_s)
+        left = divide(signals, v, p, condition.airspeed_m_s, batch.dt_s, across_path(batch))
         smooth, left_smooth = zero_phase(signals, sos), zero_phase(left, sos)
     return Observation(
         dt_s=batch.dt_s,

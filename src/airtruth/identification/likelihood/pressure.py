@@ -4,7 +4,8 @@ With v = V(t)/V0 and p = q_bar(t)/q_bar0 the ratios to the reference condition o
 of eqs (2), (3) act on alpha and the elevator p times, on the rate p/v times; the lift turns the path by
 1/v of that. The surplus over the reference, such as (p - 1) alpha, is made of measured signals and enters
 like the elevator; its noise is that of the sensors times a few percent. Filter and gain stay those of the
-reference condition. Left out is gamma V'/V, by which a changing airspeed turns a path that is not level.
+reference condition. Gravity across a path that turns, (g/V) cos(gamma), is a known input as well. Left out is
+gamma V'/V, by which a changing airspeed turns a path that is not level.
 
 Source: M. Brunot, "An Instrumental Variable Approach for Aircraft Identification", eqs (2), (3).
 """
@@ -16,10 +17,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.identification.condition import AircraftConstants, ratios_of
+from airtruth.identification.condition import AircraftConstants, across_path, ratios_of
 from airtruth.identification.likelihood.predictor import Predictor, Term, extended
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.short_period import Scale
+from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
@@ -34,9 +36,10 @@ INPUTS: Final = (
     "moment_q",
     "moment_elevator",
     "normal_trim",
+    "gravity",
 )
-"""Measured alpha, q and elevator times the surplus: in alpha_dot, in q_dot and az; and the surplus itself,
-by which the lift of the trimmed aircraft grows."""
+"""Measured alpha, q and elevator times the surplus: in alpha_dot, in q_dot and az; the surplus itself,
+by which the lift of the trimmed aircraft grows; and the change of gravity across the path."""
 
 
 def products(batch: Batch, constants: AircraftConstants, scale: Scale) -> Array:
@@ -58,7 +61,9 @@ def products(batch: Batch, constants: AircraftConstants, scale: Scale) -> Array:
     path, rate, force = p / v - 1.0, p / v**2 - 1.0, p - 1.0
     lift = (path * alpha, rate * q, path * elevator, force / v)  # the weight turns the path by 1/v too
     moment = (force * alpha, path * q, force * elevator, force)
-    return np.stack([*lift, *moment], axis=2)
+    across = across_path(batch)
+    gravity = (across - across.mean(axis=1, keepdims=True)) / v
+    return np.stack([*lift, *moment, gravity], axis=2)
 
 
 def with_pressure(
@@ -73,7 +78,7 @@ def with_pressure(
     scale, batch, constants : as in `products`.
     """
     lift, moment, half, normal = scale.lift, scale.moment, scale.half_chord_time, scale.normal
-    terms = []
+    terms = [Term("B", "alpha", "gravity", G0 / scale.airspeed_m_s)]
     for source, factor, cl, cm in (
         ("alpha", 1.0, "CLalpha", "Cmalpha"),
         ("q", half, "CLq", "Cmq"),
