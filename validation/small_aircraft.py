@@ -14,7 +14,7 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -140,7 +140,12 @@ def declared(folder: Path) -> Aircraft:
 
 
 def flight_log(
-    seed: int, gust_m_s: float = 0.0, truth: Truth = Truth(), noise: float = 1.0, every: int = EVERY
+    seed: int,
+    gust_m_s: float = 0.0,
+    truth: Truth = Truth(),
+    noise: float = 1.0,
+    every: int = EVERY,
+    stds: Mapping[str, float] | None = None,
 ) -> FlightLog:
     """Six records of a trial.
 
@@ -150,6 +155,7 @@ def flight_log(
     truth : the aircraft that flies.
     noise : multiple of the noise of the sensors [-].
     every : steps to a sample of the log [-].
+    stds : noise of each channel; None for `NOISE`.
     """
     rng = np.random.default_rng(seed)
     steps = round(DURATION_S / STEP_S)
@@ -182,7 +188,7 @@ def flight_log(
         "elevator_rad": surface.T,
         "altitude_m": 150.0 + altitude,
     }
-    channels = {name: _measured(rng, x[::every], noise * NOISE[name]) for name, x in exact.items()}
+    channels = {name: _measured(rng, x[::every], noise * (stds or NOISE)[name]) for name, x in exact.items()}
     samples = steps // every + 1
     names = tuple(f"r{i + 1}" for i in range(RECORDS))
     times = np.tile(t[::every], RECORDS)

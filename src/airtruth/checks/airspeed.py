@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Final, NamedTuple
 
@@ -22,8 +21,6 @@ _NEGLIGIBLE: Final = 3e-3
 """Standard deviation of the noise that a low-pass leaves in the airspeed, over the airspeed, up to which it is no disturbance [-]
 (judgement: 0.006 of the lift, 0.06 m/s2 in level flight, as the noise of accelerometers; and in strong gusts the estimate of the
 noise scatters by up to 0.0025 in the records of 6 s of data/undeclared)."""
-_TINY_M2_S2: Final = 1e-12
-"""Variance of the noise that replaces zero in a quotient [m2/s2]: a micrometre per second."""
 _GROUND_SLOPE_M_S2: Final = 0.3
 """Largest error of the acceleration along the path that a longitudinal accelerometer leaves [m/s2] (judgement: a bias of
 0.02 g and an error in attitude of half a degree). A steeper trend of the airspeed is one of the wind."""
@@ -52,10 +49,13 @@ def gust_cutoff_hz(airspeed_m_s: Array, dt_s: float) -> float:
 
     Source: J. F. Muth, J. Amer. Statist. Assoc. 55 (1960) 299-306, for the random walk in noise.
     """
-    noise, walk = _variances(airspeed_m_s)
-    if noise <= 0.0:
-        return math.inf
-    return max(_CUTOFF_HZ, math.sqrt(walk / noise) / (2.0 * math.pi * dt_s))
+    return float(_cutoff_hz(*_variances(airspeed_m_s), dt_s))
+
+
+def _cutoff_hz(noise: Array, walk: Array, dt_s: float) -> Array:
+    """`gust_cutoff_hz` (...,) from the variances."""
+    ratio = np.divide(walk, noise, out=np.full(np.shape(noise), np.inf), where=noise > 0.0)
+    return np.asarray(np.maximum(_CUTOFF_HZ, np.sqrt(ratio) / (2.0 * np.pi * dt_s)))
 
 
 def _variances(airspeed_m_s: Array) -> tuple[Array, Array]:
@@ -82,8 +82,7 @@ def is_noisy(airspeed_m_s: Array, dt_s: float) -> NDArray[np.bool_]:
     """
     airspeed = np.asarray(airspeed_m_s, dtype=np.float64)
     noise, walk = _variances(airspeed)
-    corner = np.sqrt(walk / np.maximum(noise, _TINY_M2_S2)) / (2.0 * np.pi * dt_s)
-    share = np.minimum(1.0, 2.0 * dt_s * np.maximum(_CUTOFF_HZ, corner))
+    share = np.minimum(1.0, 2.0 * dt_s * _cutoff_hz(noise, walk, dt_s))
     return np.asarray(np.sqrt(noise * share) > _NEGLIGIBLE * airspeed.mean(axis=-1))
 
 
@@ -128,17 +127,6 @@ def without_noise(
     return QuietAirspeed(np.asarray(ground_m_s + smoothed(gust, ratio)), WalkInNoise(noise, ratio))
 
 
-def attitude(channels: Mapping[str, Array], dt_s: float) -> Array:
-    """Pitch attitude (samples,) [rad]: measured, or the integral of the pitch rate from alpha at the start, level flight."""
-    theta = channels.get("theta_rad")
-    if theta is not None:
-        return np.asarray(theta)
-    q = channels["q_rad_s"]
-    return np.asarray(
-        channels["alpha_rad"][0] + np.concatenate([[0.0], np.cumsum(0.5 * dt_s * (q[1:] + q[:-1]))])
-    )
-
-
 def ground_speed(channels: Mapping[str, Array], theta: Array, dt_s: float) -> Array:
     """Speed without gusts (samples,) [m/s]: the integral of the acceleration along the path, and a line.
 
@@ -154,6 +142,38 @@ def ground_speed(channels: Mapping[str, Array], theta: Array, dt_s: float) -> Ar
     if "ax_m_s2" in channels:
         slope = min(max(slope, -_GROUND_SLOPE_M_S2), _GROUND_SLOPE_M_S2)
     return np.asarray(speed + float((v - speed).mean()) + slope * time)
+
+
+def attitude(channels: Mapping[str, Array], dt_s: float) -> Array:
+    """Pitch attitude (samples,) [rad]: measured, or the integral of the pitch rate from alpha at the start, level flight."""
+    theta = channels.get("theta_rad")
+    if theta is not None:
+        return np.asarray(theta)
+    q = channels["q_rad_s"]
+    return np.asarray(
+        channels["alpha_rad"][0] + np.concatenate([[0.0], np.cumsum(0.5 * dt_s * (q[1:] + q[:-1]))])
+    )
+
+
+class Speeds(NamedTuple):
+    """Speeds of a run: pitch attitude and speed over ground that give them (samples,) [rad], [m/s], and the airspeed."""
+
+    theta_rad: Array
+    ground_m_s: Array
+    quiet: QuietAirspeed
+
+
+def speeds(channels: Mapping[str, Array], dt_s: float) -> Speeds:
+    """Airspeed of a run without the noise of its sensor, and what it follows from.
+
+    Parameters
+    ----------
+    channels : (samples,) each; dt_s : sample period [s].
+    """
+    theta = attitude(channels, dt_s)
+    ground = ground_speed(channels, theta, dt_s)
+    walk = ground_walk(channels, theta, dt_s)
+    return Speeds(theta, ground, without_noise(channels["airspeed_m_s"], ground, dt_s, walk))
 
 
 def ground_walk(channels: Mapping[str, Array], theta: Array, dt_s: float) -> float:
@@ -173,6 +193,7 @@ def _path_acceleration(channels: Mapping[str, Array], theta: Array) -> Array:
 
 __all__ = [
     "QuietAirspeed",
+    "Speeds",
     "WalkInNoise",
     "attitude",
     "ground_speed",
@@ -180,5 +201,6 @@ __all__ = [
     "gust_cutoff_hz",
     "is_noisy",
     "low_passed",
+    "speeds",
     "without_noise",
 ]

@@ -33,8 +33,8 @@ from airtruth.units import G0
 Array = NDArray[np.float64]
 
 _BLOCK_S: Final = 0.5
-"""Length of the means that `pressure_range` compares [s] (judgement: a mean of 25 samples of noise, and short for
-a phugoid)."""
+"""Length of the means that `pressure_range` and `across_path` compare [s] (judgement: 25 samples at 50 Hz, and short for a
+phugoid)."""
 _LEVEL: Final = 0.01
 """Range of the cosine of the path angle in a record up to which gravity across the path is constant [-] (judgement: 0.1 m/s2, a
 path that turns by 8 deg; the noise of accelerometers)."""
@@ -137,18 +137,6 @@ def flight_condition(
     )
 
 
-def takes_constant(options: Options, has_default_constant: bool) -> bool:
-    """Whether a method takes the dynamic pressure for constant over a record.
-
-    Parameters
-    ----------
-    has_default_constant : whether it does where the option ``pressure`` leaves the choice to the method.
-    """
-    if options.airspeed_m_s is not None or options.pressure == "constant":
-        return True
-    return options.pressure == "method" and has_default_constant
-
-
 def window_samples(options: Options, dt_s: float) -> int:
     """Samples of the trim window, at least one."""
     return max(1, round(options.trim_window_s / dt_s))
@@ -159,6 +147,17 @@ def measured_unless_given(options: Options) -> Options:
     if options.pressure != "method":
         return options
     return replace(options, pressure="measured" if options.airspeed_m_s is None else "constant")
+
+
+def takes_constant(options: Options, has_default_constant: bool) -> bool:
+    """Whether a method takes the dynamic pressure for constant over a record.
+
+    Parameters
+    ----------
+    has_default_constant : whether it does where the option ``pressure`` leaves the choice to the method.
+    """
+    resolved = options if has_default_constant else measured_unless_given(options)
+    return resolved.pressure != "measured"
 
 
 def pressure_range(batch: Batch) -> Array:

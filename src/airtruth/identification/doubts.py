@@ -58,8 +58,8 @@ DULLED: Final = 0.01
 that frequency, and in a doublet of the GTM at 20 or 25 Hz Cmq, Cmde and Cmalpha err by 5, 4 and 1.5 times the share)."""
 CHANGES: Final = 0.2
 """Range of the dynamic pressure in a record over its mean from which a method that takes it for constant is in doubt [-]. In 180
-records of `validation.small_aircraft` in calm air (seeds 600 to 629), the 95 % intervals of Cmalpha by iv-f1 contain the truth
-in 0.90 of those with a smaller range and in 0.28 of the others."""
+records of a small aircraft, the 95 % intervals of Cmalpha by iv-f1 contain the truth in 0.90 of those with a smaller range and in
+0.27 of the others (`python -m studies.small_aircraft_intervals --flights 30 --method iv-f1`)."""
 SOME: Final = 0.1
 """Least share of the records that the sentence about it needs [-] (judgement)."""
 LIKELY: Final = (
@@ -104,8 +104,8 @@ def smoothed_airspeed(noisy: Sequence[str], runs: int) -> Iterator[str]:
     if noisy:
         which = f"run {noisy[0]!r}" if len(noisy) == 1 else f"{len(noisy)} of {runs} runs"
         yield (
-            f"the noise of the airspeed is taken out of {which}: it is the speed over ground by the accelerometers and the most "
-            "probable random walk of the rest"
+            f"the noise of the airspeed is taken out of {which}: the airspeed is the speed over ground by the accelerometers and "
+            "the most probable random walk of the rest"
         )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from airtruth.aircraft import Aircraft
 from airtruth.checks import gate
-from airtruth.checks.airspeed import attitude, ground_speed, ground_walk, is_noisy, without_noise
+from airtruth.checks.airspeed import is_noisy, speeds
 from airtruth.cluster import Cluster, LostWorkError
 from airtruth.errors import ConfigurationError, LogError, StoreError
 from airtruth.identification.batch import identify_batch
@@ -153,18 +153,16 @@ def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made
 
 def _quiet(batch: Batch, found: FromLog) -> Batch:
     """The runs with smoothed airspeeds where their noise would move the dynamic pressure."""
-    speeds = batch.channels["airspeed_m_s"]
-    noisy = np.flatnonzero(is_noisy(speeds, batch.dt_s)).tolist()
+    airspeed = batch.channels["airspeed_m_s"]
+    noisy = np.flatnonzero(is_noisy(airspeed, batch.dt_s)).tolist()
     if not noisy:
         return batch
-    speeds = speeds.copy()
+    airspeed = airspeed.copy()
     for run in noisy:
         own = {name: values[run] for name, values in batch.channels.items()}
-        theta = attitude(own, batch.dt_s)
-        ground, walk = ground_speed(own, theta, batch.dt_s), ground_walk(own, theta, batch.dt_s)
-        speeds[run] = without_noise(own["airspeed_m_s"], ground, batch.dt_s, walk).speed_m_s
+        airspeed[run] = speeds(own, batch.dt_s).quiet.speed_m_s
     found.noisy += [batch.run_ids[run] for run in noisy]
-    return replace(batch, channels={**batch.channels, "airspeed_m_s": speeds})
+    return replace(batch, channels={**batch.channels, "airspeed_m_s": airspeed})
 
 
 def _check(log: FlightLog, task: LogTask, found: FromLog) -> None:

@@ -120,9 +120,8 @@ def prepare(
     thrust_std = _THRUST_STD if has_throttle else _THRUST_UNKNOWN_STD
     settings = settings_of(aircraft, thrust_std, has_vane=has_vane)
     settings = resolved(settings, fitted)
-    records = [with_surface_noise(r, settings) for r in records]
-    fitted = tuple(r for r in records if r.signals.run_id not in chosen)
-    held = tuple(r for r in records if r.signals.run_id in chosen)
+    fitted = tuple(with_surface_noise(r, settings) for r in fitted)
+    held = tuple(with_surface_noise(r, settings) for r in records if r.signals.run_id in chosen)
     if len(fitted) == 1:
         notes.append("one record is fitted: each of its halves is left out in turn")
         fitted = _halves(fitted[0])

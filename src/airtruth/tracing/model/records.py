@@ -11,14 +11,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.checks.airspeed import (
-    WalkInNoise,
-    attitude,
-    ground_speed,
-    ground_walk,
-    low_passed,
-    without_noise,
-)
+from airtruth.checks.airspeed import WalkInNoise, low_passed, speeds
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
 from airtruth.numerics.whiteness import is_white
@@ -213,13 +206,11 @@ def read(
         dt = float((t[-1] - t[0]) / (len(t) - 1))
         sub = 2 * math.ceil(dt / LONGEST_STEP_S - 1e-9)
         y = np.stack([channels[name] for name in CHANNELS], axis=1)
-        density, airspeed = air_density(channels), channels["airspeed_m_s"]
+        density = air_density(channels)
         altitude = channels.get("altitude_m")
         if altitude is None:
             altitude = np.full(len(t), _altitude(float(density.mean())))
-        theta = attitude(channels, dt)
-        ground = ground_speed(channels, theta, dt)
-        quiet = without_noise(airspeed, ground, dt, ground_walk(channels, theta, dt))
+        speed = speeds(channels, dt)
         surface = _surface(channels, dt, sub * FINE, elevator_std_rad, servo_s, rate_rad_s)
         found.append(
             Signals(
@@ -228,16 +219,16 @@ def read(
                 sub=sub,
                 y=np.ascontiguousarray(y, dtype=np.float64),
                 elevator_rad=surface.between.surface_rad,
-                airspeed_m_s=fine(quiet.speed_m_s, sub),
-                ground_m_s=fine(ground, sub),
+                airspeed_m_s=fine(speed.quiet.speed_m_s, sub),
+                ground_m_s=fine(speed.ground_m_s, sub),
                 density_kg_m3=fine(low_passed(density, dt), sub),
-                theta_rad=fine(theta, sub),
+                theta_rad=fine(speed.theta_rad, sub),
                 altitude_m=float(np.mean(altitude)),
                 elevator_std_rad=surface.noise_std_rad,
                 throttle=float(channels["throttle"].mean()) if "throttle" in channels else None,
                 corner_rad2=surface.between.corner_rad2,
                 surface_noise_rad2=surface.noise_rad2,
-                airspeed_walk=quiet.walk,
+                airspeed_walk=speed.quiet.walk,
             )
         )
     return found
