@@ -23,6 +23,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
@@ -279,14 +280,23 @@ class Shape:
         (points, coefficients) [-].
         """
         at = np.asarray(signal, dtype=np.float64)
-        columns = []
-        for name in self.coefficients:
-            unit = dict.fromkeys(self.coefficients, 0.0) | {name: 1.0}
-            terms = self._bends(unit, self.signal)
-            columns.append(
-                sum((t.amplitude * shape_of(AeroTerm("CL", *t), at) for t in terms), np.zeros(at.shape))
-            )
-        return np.stack(columns, axis=-1)
+        lines, amplitudes = _pieces_of(self)
+        values = np.stack(
+            [shape_of(AeroTerm("CL", "alpha", form, 1.0, at=x), at) for form, x in lines], axis=-1
+        )
+        return np.asarray(values @ amplitudes)
+
+
+@lru_cache(maxsize=1024)
+def _pieces_of(shape: Shape) -> tuple[tuple[tuple[Literal["linear", "above", "below"], float], ...], Array]:
+    """Lines that the basis of a shape consists of, and their amplitudes (lines, coefficients)."""
+    rows: dict[tuple[Literal["linear", "above", "below"], float], Array] = {}
+    names = shape.coefficients
+    for i, name in enumerate(names):
+        for piece in shape._bends(dict.fromkeys(names, 0.0) | {name: 1.0}, shape.signal):
+            if piece.amplitude != 0.0:
+                rows.setdefault((piece.shape, piece.at), np.zeros(len(names)))[i] += piece.amplitude
+    return tuple(rows), np.array(list(rows.values())).reshape(len(rows), len(names))
 
 
 def _bend(k: int) -> str:

@@ -1,10 +1,6 @@
 """Innovations of a record: the nonlinear motion, corrected with the steady gain of its linearisation, or with gains that
 follow the airspeed.
 
-Between samples the motion is integrated by the classical Runge-Kutta method, whose weights are Simpson's: the middle
-value of an input carries its area. The low-passed copies of the gust are integrated exactly for a signal that is linear over
-half a step, and the lags and the delays of sensors for one that is linear over a quarter.
-
 Source: R. E. Maine and K. W. Iliff, NASA RP-1138 (1985), for the filter.
 """
 
@@ -19,7 +15,7 @@ from numpy.typing import NDArray
 
 from airtruth.numerics.ahead import awaited
 from airtruth.numerics.compiled import inner
-from airtruth.numerics.discretise import step
+from airtruth.tracing.model.advance import Steps, Work, advance_motion, advance_sensors, steps_of, work_of
 from airtruth.tracing.model.corners import (
     corrected,
     gain_at,
@@ -30,89 +26,57 @@ from airtruth.tracing.model.equations import (
     air_at,
     effective_elevator,
     gust,
-    hold_plays,
-    lead_decay,
-    move_plays,
     outputs,
     rates,
     settle_effects,
 )
 from airtruth.tracing.model.gains import Gains, interpolate, scaled
-from airtruth.tracing.model.kernel_input import AirPoint, FilterModel, GridSignals, KernelInput
+from airtruth.tracing.model.kernel_input import AirPoint, FilterModel, KernelInput
 from airtruth.tracing.model.linearise import (
     FirstUpdate,
-    delay_system,
 )
-from airtruth.tracing.model.parameters import AZ, CORE, DELAY_ORDER, LEAD, LEAD_COUNT, OUTPUTS
+from airtruth.tracing.model.parameters import AZ, CORE, DELAY_ORDER, LEAD, OUTPUTS
 from airtruth.tracing.model.steady import SteadyFilter, without_update
 
 Array = NDArray[np.float64]
 
-_PARTS: Final = 4
-"""Parts of a step over which a signal is linear for the lag or the delay of its sensor [-]. With two parts, the error of a gyro
-delayed by 5.6 ms is 0.9 standard deviations of its noise, as root sum of squares over a record with 46 elevator steps."""
 _LOST: Final = 1e6
 """Magnitude of a state [its unit] beyond which the motion has left all bounds; judgement."""
 
 
-class Steps(NamedTuple):
-    """Exact steps of the linear states, over half a step of integration and a whole one.
+class Path(NamedTuple):
+    """What the filter used along a record; see `Gains` and `FirstUpdate`. Without samples nothing is kept.
 
     Attributes
     ----------
-    h : step of integration [s].
-    decay, mean : (2, leads) of the gust's low-passed copies [-].
-    phi, early, late : (outputs, order, order), (outputs, order) of the sensors' delays over a part of a step.
-    forget : decay of the correlated noise over a sample [-].
-    has_late_sensors : whether any sensor has a lag or a delay.
+    predicted, corrected : (samples, states) before and after the update; the last one has no update.
+    k_gain : (samples, states, outputs) gain of the update.
+    first, direct : (samples, states, 2) and (samples, 2), (samples, states).
+    scale : (samples, outputs, outputs), from the innovation to that of the common covariance.
     """
 
-    h: float
-    decay: Array
-    mean: Array
-    phi: Array
-    early: Array
-    late: Array
-    forget: float
-    has_late_sensors: bool
+    predicted: Array
+    corrected: Array
+    k_gain: Array
+    first: FirstUpdate
+    direct: Array
+    scale: Array
 
 
-class Work(NamedTuple):
-    """Arrays that one record reuses.
-
-    Attributes
-    ----------
-    rate : (4, states) of the stages; tried : (states,) at a stage.
-    out, last : (outputs,) at the end and the start of a step; first : (2,) rates of alpha and q at its start.
-    ends : (parts + 1,) a signal at the ends of the parts of a step; held : (order,) states of a delay.
-    """
-
-    rate: Array
-    tried: Array
-    out: Array
-    last: Array
-    first: Array
-    ends: Array
-    held: Array
+def path_of(samples: int, states: int) -> Path:
+    """An empty path of a number of samples."""
+    return Path(
+        predicted=np.zeros((samples, states)),
+        corrected=np.zeros((samples, states)),
+        k_gain=np.zeros((samples, states, OUTPUTS)),
+        first=FirstUpdate(np.zeros((samples, states, 2)), np.zeros((samples, 2))),
+        direct=np.zeros((samples, states)),
+        scale=np.zeros((samples, OUTPUTS, OUTPUTS)),
+    )
 
 
-def _steps(model: FilterModel, dt_s: float, sub: int) -> Steps:
-    h = 2.0 * dt_s / sub
-    decay, mean = np.empty((2, LEAD_COUNT)), np.empty((2, LEAD_COUNT))
-    for j in range(2):
-        for i in range(LEAD_COUNT):
-            decay[j, i], mean[j, i] = lead_decay(0.5 * (j + 1) * h, i)
-    phi = np.zeros((OUTPUTS, DELAY_ORDER, DELAY_ORDER))
-    early, late = np.zeros((OUTPUTS, DELAY_ORDER, 1)), np.zeros((OUTPUTS, DELAY_ORDER, 1))
-    unused = np.empty((DELAY_ORDER, DELAY_ORDER))
-    for i in range(OUTPUTS):
-        if model.states.delay[i] >= 0:
-            system = delay_system(model.sensors.delay_s[i])
-            step(system, np.zeros(DELAY_ORDER), DELAY_ORDER, h / _PARTS, phi[i], early[i], late[i], unused)
-    states = model.states
-    forget = math.exp(-dt_s / model.sensors.slow_time_s) if states.noise >= 0 else 0.0
-    has_late_sensors = states.size > states.motion + (OUTPUTS if states.noise >= 0 else 0)
-    return Steps(h, decay, mean, phi, early[:, :, 0].copy(), late[:, :, 0].copy(), forget, has_late_sensors)
+_NOT_KEPT: Final = path_of(0, 0)
+"""The path of a flight of which innovations alone are wanted."""
 
 
 def _initial_state(given: KernelInput) -> Array:
@@ -152,88 +116,6 @@ def _reading(x: Array, value: float, i: int, model: FilterModel) -> float:
 
 
 @inner
-def _advance_motion(
-    x: Array, point: int, grid: GridSignals, model: FilterModel, steps: Steps, work: Work
-) -> None:
-    """One Runge-Kutta step of motion, gusts and effects; the outputs at its start into ``work`` for late sensors."""
-    h, rate, tried, motion = steps.h, work.rate, work.tried, model.states.motion
-    for stage in range(4):
-        share = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
-        at = air_at(grid, point + (0 if stage == 0 else (2 if stage == 3 else 1)))
-        for m in range(motion):
-            tried[m] = x[m] + (share * h * rate[stage - 1, m] if stage > 0 else 0.0)
-        hold_plays(x, tried, model)
-        if stage > 0:
-            j = 1 if stage == 3 else 0
-            for i in range(LEAD_COUNT):
-                decay, mean = steps.decay[j, i], steps.mean[j, i]
-                tried[LEAD + i] = decay * x[LEAD + i] + (mean - decay) * x[2] + (1.0 - mean) * tried[2]
-        az = rates(tried, at, model, rate[stage])
-        if stage == 0 and steps.has_late_sensors:
-            outputs(tried, rate[0, 1], az, at, model, work.last)
-            work.first[0], work.first[1] = rate[0, 0], rate[0, 1]
-    for m in range(motion):
-        slope = rate[0, m] + 2.0 * rate[1, m] + 2.0 * rate[2, m] + rate[3, m]
-        x[m] += h / 6.0 * slope
-    hold_plays(tried, x, model)
-    for i in range(LEAD_COUNT):
-        x[LEAD + i] = tried[LEAD + i]
-    move_plays(x, air_at(grid, point + 2), model)
-
-
-@inner
-def _advance_sensors(
-    x: Array, point: int, grid: GridSignals, model: FilterModel, steps: Steps, work: Work
-) -> None:
-    """Lags and delays over the parts of the step that `_advance_motion` has made.
-
-    In between the signal has the motion's own curvature: a cubic through values and slopes.
-    """
-    at = air_at(grid, point + 2)
-    az = rates(x, at, model, work.rate[0])
-    outputs(x, work.rate[0, 1], az, at, model, work.out)
-    ends = work.ends
-    for i in range(OUTPUTS):
-        rise = work.out[i] - work.last[i]
-        early = late = 0.0  # slopes over the step beyond those of a straight line
-        if i < 2:
-            early = model.sensors.scale[i] * steps.h * work.first[i] - rise
-            late = model.sensors.scale[i] * steps.h * work.rate[0, i] - rise
-        for part in range(_PARTS + 1):
-            s = part / _PARTS
-            ends[part] = work.last[i] + s * rise + s * (1.0 - s) * ((1.0 - s) * early - s * late)
-        if model.states.lag[i] >= 0:
-            _advance_lag(x, model.states.lag[i], steps.h / (_PARTS * model.sensors.lag_s[i]), ends)
-        if model.states.delay[i] >= 0:
-            _advance_delay(x, model.states.delay[i], i, steps, work)
-
-
-@inner
-def _advance_lag(x: Array, at: int, r: float, ends: Array) -> None:
-    """A lag over the parts of a step of r time constants each; its output replaces its input in ``ends``."""
-    decay = math.exp(-r)
-    mean = (1.0 - decay) / r
-    before = ends[0]
-    ends[0] = x[at]
-    for part in range(1, _PARTS + 1):
-        x[at] = decay * x[at] + (mean - decay) * before + (1.0 - mean) * ends[part]
-        before, ends[part] = ends[part], x[at]
-
-
-@inner
-def _advance_delay(x: Array, at: int, i: int, steps: Steps, work: Work) -> None:
-    ends, held = work.ends, work.held
-    for part in range(_PARTS):
-        for row in range(DELAY_ORDER):
-            held[row] = x[at + row]
-        for row in range(DELAY_ORDER):
-            total = steps.early[i, row] * ends[part] + steps.late[i, row] * ends[part + 1]
-            for m in range(DELAY_ORDER):
-                total += steps.phi[i, row, m] * held[m]
-            x[at + row] = total
-
-
-@inner
 def _update(x: Array, k_gain: Array, e: Array) -> bool:
     """x += K e; False if the motion leaves all bounds."""
     for i in range(x.size):
@@ -261,7 +143,7 @@ def _residual(x: Array, i: int, k: int, given: KernelInput, work: Work) -> float
 
 
 @inner
-def _innovation(
+def innovation(
     x: Array,
     k: int,
     at: AirPoint,
@@ -302,15 +184,45 @@ def _innovation(
         raw[AZ] += (in_reading - shown) * bend
 
 
+@inner
+def _keep(
+    path: Path, k: int, x: Array, k_gain: Array, first: FirstUpdate, direct: Array, scale: Array, node: int
+) -> None:
+    """Keep what the filter uses at a sample, but for the corrected state."""
+    for i in range(x.size):
+        path.predicted[k, i], path.direct[k, i] = x[i], direct[i]
+        for m in range(OUTPUTS):
+            path.k_gain[k, i, m] = k_gain[i, m]
+        for m in range(2):
+            path.first.gain[k, i, m] = first.gain[i, m]
+    for m in range(2):
+        path.first.share[k, m] = first.share[m]
+    for i in range(OUTPUTS):
+        for m in range(OUTPUTS):
+            path.scale[k, i, m] = scale[node, i, m]
+
+
+@inner
+def _keep_scaled(path: Path, k: int, scale: Array) -> None:
+    """Put a further scale before the one that is kept."""
+    for i in range(OUTPUTS):
+        for m in range(OUTPUTS):
+            total = 0.0
+            for j in range(m, OUTPUTS):  # both are lower triangular
+                total += path.scale[k, i, j] * scale[j, m]
+            path.scale[k, i, m] = total
+
+
 @awaited
 @njit(cache=True, nogil=True, error_model="numpy")
 def _innovations(
-    given: KernelInput, steps: Steps, work: Work, x: Array, steady: SteadyFilter, e: Array
+    given: KernelInput, steps: Steps, work: Work, x: Array, steady: SteadyFilter, e: Array, path: Path
 ) -> tuple[bool, float]:
     """`innovations` from a state ``x``, which moves along the record."""
     model, grid, states = given.model, given.grid, given.model.states
     n, samples = states.size, given.y.shape[0]
     scheduled, node, corners = steady.lower.size > 0, 0, steady.corners
+    keeps = path.scale.shape[0] > 0
     uncertain, is_steady, more_logdet, away, p = False, True, 0.0, 0.0, corners.steady[0].copy()
     first = FirstUpdate(steady.first.gain[0].copy(), steady.first.share[0].copy())
     settled_gains = Gains(steady.k_gain[0].copy(), first, steady.direct[0].copy(), steady.scale[:1].copy())
@@ -328,7 +240,7 @@ def _innovations(
             more, away = gain_at(p, corners, node, own_gain, own_first, scale)
             if not math.isfinite(more):
                 return False, 0.0
-            _innovation(x, k, at, given, own_first, settled_gains.direct, steady.shown, work, raw)
+            innovation(x, k, at, given, own_first, settled_gains.direct, steady.shown, work, raw)
             for i in range(OUTPUTS):
                 turned[i] = 0.0
                 for m in range(OUTPUTS):
@@ -336,14 +248,22 @@ def _innovations(
             more_logdet += more + scaled(steady.scale, node, turned, e, k)
             uncertain, is_steady = not settled(away), False
             now = own_gain
+            if keeps:
+                _keep(path, k, x, now, own_first, settled_gains.direct, steady.scale, node)
+                _keep_scaled(path, k, scale)
         else:
-            _innovation(x, k, at, given, settled_gains.first, settled_gains.direct, steady.shown, work, raw)
+            innovation(x, k, at, given, settled_gains.first, settled_gains.direct, steady.shown, work, raw)
             more_logdet += scaled(settled_gains.scale, 0, raw, e, k)
             now, is_steady = settled_gains.k_gain, True
+            if keeps:
+                _keep(path, k, x, now, settled_gains.first, settled_gains.direct, settled_gains.scale, 0)
         if k + 1 == samples:
             break
         if not _update(x, now, raw):
             return False, 0.0
+        if keeps:
+            for i in range(n):
+                path.corrected[k, i] = x[i]
         if given.corner_rad2.size > 0 and (uncertain or given.corner_rad2[k + 1] > 0.0):
             if is_steady:
                 p = corners.steady[node].copy()
@@ -354,13 +274,15 @@ def _innovations(
                 x[i] *= steps.forget
         for pair in range(given.sub // 2):
             point = k * given.sub + 2 * pair
-            _advance_motion(x, point, grid, model, steps, work)
+            advance_motion(x, point, grid, model, steps, work)
             if steps.has_late_sensors:
-                _advance_sensors(x, point, grid, model, steps, work)
+                advance_sensors(x, point, grid, model, steps, work)
     return True, more_logdet
 
 
-def innovations(given: KernelInput, steady: SteadyFilter, e: Array) -> tuple[bool, float]:
+def innovations(
+    given: KernelInput, steady: SteadyFilter, e: Array, path: Path = _NOT_KEPT
+) -> tuple[bool, float]:
     """Innovations of one record into ``e`` (samples, outputs).
 
     Where the surface is uncertain or the airspeed is another one, they are scaled to the common covariance. The
@@ -370,18 +292,9 @@ def innovations(given: KernelInput, steady: SteadyFilter, e: Array) -> tuple[boo
     -------
     Whether the motion keeps its bounds, and the sum of log|S| beyond the common one.
     """
-    n = given.model.states.size
-    steps = _steps(given.model, given.dt_s, given.sub)
-    work = Work(
-        np.zeros((4, n)),
-        np.zeros(n),
-        np.zeros(OUTPUTS),
-        np.zeros(OUTPUTS),
-        np.zeros(2),
-        np.zeros(_PARTS + 1),
-        np.zeros(DELAY_ORDER),
-    )
-    sound, more = _innovations(given, steps, work, _initial_state(given), steady, e)
+    steps = steps_of(given.model, given.dt_s, given.sub)
+    work = work_of(given.model.states.size)
+    sound, more = _innovations(given, steps, work, _initial_state(given), steady, e, path)
     return bool(sound), float(more)
 
 
@@ -394,4 +307,4 @@ def free_run(given: KernelInput, e: Array) -> bool:
     return innovations(certain, without_update(given.model), e)[0]
 
 
-__all__ = ["free_run", "innovations"]
+__all__ = ["Path", "free_run", "innovation", "innovations", "path_of"]

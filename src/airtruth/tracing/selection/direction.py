@@ -59,13 +59,6 @@ def change_along(null: PosteriorFit, d: Direction) -> CompiledChange:
     return compile_change(null.hypothesis.plus(d.effect).change(sizes))
 
 
-def gradients(
-    null: PosteriorFit, problem: TraceProblem, tried: Sequence[Direction], whitener: Whitener
-) -> tuple[Array, Array]:
-    """`projected` of directions whose sensitivities are made here."""
-    return projected(null, problem, extended_by(null, problem, tried), whitener, len(tried))
-
-
 def extended_by(null: PosteriorFit, problem: TraceProblem, tried: Sequence[Direction]) -> list[Sensitivities]:
     """Sensitivities of each record at the null, with the directions as further common parameters."""
     plain = null.hypothesis.compiled(null.point.sizes)
@@ -188,7 +181,6 @@ __all__ = [
     "change_along",
     "eliminated",
     "extended_by",
-    "gradients",
     "inserted",
     "projected",
     "with_freedoms",

@@ -20,14 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from airtruth.effects.effect import Effect
 from airtruth.effects.increment import STEPS, Increment, Memory, Shape, increment
 from airtruth.numerics.rates import smooth_rate
 from airtruth.physics.terms import FACTORS, READINGS
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import Whitener
 from airtruth.tracing.model.records import TraceRecord
-from airtruth.tracing.selection.direction import Direction, gradients
+from airtruth.tracing.selection.direction import projected
+from airtruth.tracing.selection.increment_inputs import sensitivities_to
 
 Array = NDArray[np.float64]
 
@@ -246,9 +246,11 @@ def screen(
     problem: TraceProblem, null: PosteriorFit, whitener: Whitener, tried: Sequence[Shape]
 ) -> list[Screened]:
     """Shapes by their evidence at a null, best first; those that the records do not excite are left out."""
+    sensitivities = sensitivities_to(null, problem, tried)
+    if sensitivities is None:
+        return []
     effects = [increment(s) for s in tried]
-    directions = [d for e in effects for d in _directions(e)]
-    gradient, information = gradients(null, problem, directions, whitener)
+    gradient, information = projected(null, problem, sensitivities, whitener, sum(e.bends for e in effects))
     found, first = [], 0
     for e in effects:
         span = slice(first, first + e.bends)
@@ -322,24 +324,6 @@ def log_evidences(gradient: Array, information: Array, stds: Array) -> Array:
     spread = 1.0 + np.outer(stds**2, values)
     gain = (g**2 * stds[:, None] ** 2 / spread).sum(axis=1)
     return np.asarray(0.5 * gain - 0.5 * np.log(spread).sum(axis=1))
-
-
-def _directions(e: Increment) -> list[Direction]:
-    """One direction for each bend, the other bends at zero and the memory as the shape has it."""
-    zero = {p.name: e.shape.estimated_memory.get(p.name, 0.0) for p in e.parameters}
-    return [Direction(_single(e, p.name, zero), (), p.step) for p in e.parameters[: e.bends]]
-
-
-def _single(e: Increment, name: str, zero: dict[str, float]) -> Effect:
-    own = next(p for p in e.parameters if p.name == name)
-    return Effect(
-        name=f"{e.key} {name}",
-        where=e.where,
-        parameters=(own,),
-        describe=lambda values: e.describe(zero | dict(values)),
-        explanation="",
-        source="",
-    )
 
 
 __all__ = [
