@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.checks.kinematics_lines import Lines, Weight, lines_of, weigh, whitened
-from airtruth.checks.kinematics_model import ERRORS, Record, compare
+from airtruth.checks.kinematics_lines import Lines, Weight, lines_of, weigh
+from airtruth.checks.kinematics_model import ERRORS, Record, compare, stacked
 
 Array = NDArray[np.float64]
 
@@ -63,6 +64,46 @@ class Fit:
 
 
 @dataclass(frozen=True)
+class _Stack:
+    """Records of one length, so that one evaluation serves all of them.
+
+    Attributes
+    ----------
+    record, lines : the records as one, and the lines that they share.
+    equations : of each record.
+    std, ramp : (records, equations, lines) of `Weight`.
+    rows : (records, equations, lines) where each line is among all whitened ones.
+    """
+
+    record: Record
+    lines: Lines
+    equations: tuple[str, ...]
+    std: Array
+    ramp: Array
+    rows: NDArray[np.int64]
+
+
+def _stacks_of(records: Sequence[Record], lines: Sequence[Lines], weight: Weight) -> list[_Stack]:
+    sizes = [len(line.keep) * len(std) for line, std in zip(lines, weight.std, strict=True)]
+    first = np.concatenate([[0], np.cumsum(sizes)])
+    result = []
+    for numbers, record in stacked(records):
+        std = np.array([list(weight.std[i].values()) for i in numbers])
+        own = np.arange(std[0].size).reshape(std.shape[1:])
+        result.append(
+            _Stack(
+                record=record,
+                lines=lines[numbers[0]],
+                equations=tuple(weight.std[numbers[0]]),
+                std=std,
+                ramp=np.array([weight.ramps[i] for i in numbers]),
+                rows=np.array([first[i] + own for i in numbers]),
+            )
+        )
+    return result
+
+
+@dataclass(frozen=True)
 class Problem:
     """Records, their lines, the common weight, and the ranges of the errors.
 
@@ -82,13 +123,22 @@ class Problem:
     limits: Mapping[str, tuple[float, float]]
     weight: Weight
 
-    def differences(self, errors: Mapping[str, float]) -> list[dict[str, Array]]:
-        """Differences of every record at given errors; the others as declared."""
-        return [compare(r, {**self.known, **errors}, self.equations) for r in self.records]
+    @cached_property
+    def _stacks(self) -> list[_Stack]:
+        return _stacks_of(self.records, self.lines, self.weight)
 
     def white(self, errors: Mapping[str, float]) -> Array:
-        """(rows,) whitened lines at given errors."""
-        return whitened(self.lines, self.weight, self.differences(errors))
+        """(rows,) whitened lines at given errors, the others as declared; the ramp of each difference is taken out."""
+        white = np.empty(len(self.weight.span))
+        for stack in self._stacks:
+            every = compare(stack.record, {**self.known, **errors}, self.equations)
+            lines = (
+                stack.lines.of(np.stack([every[equation] for equation in stack.equations], axis=1))
+                / stack.std
+            )
+            along = np.einsum("...n,...n->...", lines, stack.ramp)
+            white[stack.rows] = lines - along[..., None] * stack.ramp
+        return white
 
     def start(self, name: str) -> float:
         """Value without a further error: the declared one, or none."""
@@ -171,7 +221,8 @@ def fit(problem: Problem, names: Sequence[str], start: Mapping[str, float] | Non
         fresh = close or not better
         if fresh:
             slopes = _slopes(problem, names, value, moments)
-    slopes = _slopes(problem, names, value, moments)
+    if not (fresh and not better):
+        slopes = _slopes(problem, names, value, moments)
     edge = EDGE * (high - low)
     least = np.array([ERRORS[n].kind in ("lag", "delay") for n in names])
     at = ((value <= low + edge) & ~least | (value >= high - edge)) & (

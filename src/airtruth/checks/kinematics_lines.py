@@ -219,14 +219,4 @@ def _orthonormal(rows: Array) -> Array:
     return np.asarray(right[singular > 1e-5 * singular[0]].T)
 
 
-def whitened(lines: Sequence[Lines], weight: Weight, differences: Sequence[Mapping[str, Array]]) -> Array:
-    """(rows,) whitened lines of all records and equations, the ramp of each taken out."""
-    parts = []
-    for line, std, ramps, difference in zip(lines, weight.std, weight.ramps, differences, strict=True):
-        for (equation, s), ramp in zip(std.items(), ramps, strict=True):
-            white = line.of(difference[equation]) / s
-            parts.append(white - (white @ ramp) * ramp)
-    return np.concatenate(parts)
-
-
-__all__ = ["Lines", "Weight", "lines_of", "noise_spectrum", "weigh", "whitened"]
+__all__ = ["Lines", "Weight", "lines_of", "noise_spectrum", "weigh"]

@@ -40,7 +40,7 @@ RATE_HZ: Final = 25.0
 
 @dataclass(frozen=True)
 class Record:
-    """One run, channels of one length.
+    """One run, channels of one length; or several runs of one length and period, channels (runs, samples).
 
     Attributes
     ----------
@@ -63,12 +63,12 @@ class Record:
     @property
     def duration_s(self) -> float:
         """Length of the record [s]."""
-        return self.dt_s * len(self.q)
+        return float(self.dt_s * self.q.shape[-1])
 
     @cached_property
     def t(self) -> Array:
         """(samples,) time from the first sample [s]."""
-        return np.asarray(np.arange(len(self.q)) * self.dt_s)
+        return np.asarray(np.arange(self.q.shape[-1]) * self.dt_s)
 
     @cached_property
     def turned(self) -> Array:
@@ -79,6 +79,26 @@ class Record:
     def q_dot(self) -> Array:
         """(samples,) derivative of the measured pitch rate [rad/s2]."""
         return derivative(self.q, self.dt_s)
+
+
+_CHANNELS: Final = ("airspeed", "alpha", "q", "az", "elevator", "ax", "theta")
+"""Channels of a record."""
+
+
+def stacked(records: Sequence[Record]) -> list[tuple[tuple[int, ...], Record]]:
+    """Records of one length, period and set of channels as one, each with the numbers of its runs."""
+    alike: dict[tuple[object, ...], list[int]] = {}
+    for i, r in enumerate(records):
+        alike.setdefault((r.dt_s, len(r.q), r.ax is None, r.theta is None), []).append(i)
+    result = []
+    for numbers in alike.values():
+        own = [records[i] for i in numbers]
+        joined = {
+            n: None if getattr(own[0], n) is None else np.stack([getattr(r, n) for r in own])
+            for n in _CHANNELS
+        }
+        result.append((tuple(numbers), replace(own[0], **joined)))  # type: ignore[arg-type]
+    return result
 
 
 def thinned(record: Record) -> Record:
@@ -92,9 +112,7 @@ def thinned(record: Record) -> Record:
     def thin(x: Array | None) -> Array | None:
         return None if x is None else np.ascontiguousarray(zero_phase(x[None], sos)[0, ::every])
 
-    channels = {
-        n: thin(getattr(record, n)) for n in ("airspeed", "alpha", "q", "az", "elevator", "ax", "theta")
-    }
+    channels = {n: thin(getattr(record, n)) for n in _CHANNELS}
     return replace(record, dt_s=period, **channels)  # type: ignore[arg-type]
 
 
@@ -166,7 +184,7 @@ ERRORS: Final[dict[str, InstrumentError]] = {error.name: error for error in _ALL
 def compare(
     record: Record, errors: Mapping[str, float], equations: Sequence[str] = EQUATIONS
 ) -> dict[str, Array]:
-    """Measured channel less the one that the other channels predict, (samples,) for each equation.
+    """Measured channel less the one that the other channels predict, of the shape of the channels, for each equation.
 
     The difference is a constant, a ramp (biases), moving air and noise.
 
@@ -182,27 +200,28 @@ def compare(
         return float(errors.get(error_name(channel, kind), KINDS[kind].neutral))
 
     q_lag, q_delay, q_scale = (error("q_rad_s", k) for k in ("lag", "delay", "scale"))
-    turned = earlier(record.turned + q_lag * (record.q - record.q[0]), dt, q_delay) / q_scale
+    turned = earlier(record.turned + q_lag * (record.q - record.q[..., :1]), dt, q_delay) / q_scale
     result = {}
     if record.theta is not None:
         attitude = _late(turned, dt, error("theta_rad", "delay"), error("theta_rad", "lag"))
         result["theta"] = record.theta - attitude
     q = earlier(record.q + q_lag * record.q_dot, dt, q_delay) / q_scale
     # the mean of alpha stays, because a constant of it is not determined
-    swing = (record.alpha - record.alpha.mean()) / error("alpha_rad", "scale")
+    middle = _mean(record.alpha)
+    swing = (record.alpha - middle) / error("alpha_rad", "scale")
     slope = 1.0 + error("airspeed_m_s", "alpha_slope") * swing
     airspeed = record.airspeed / (error("airspeed_m_s", "scale") * slope)
     az = earlier(record.az, dt, error("az_m_s2", "delay")) / error("az_m_s2", "scale")
     arm = error("az_m_s2", "arm")
     ax = record.ax if record.ax is not None else 0.0
     if record.theta is None:
-        theta = record.alpha.mean() + turned - turned.mean() - (q.mean() - record.q.mean()) * record.t
+        theta = middle + turned - _mean(turned) - (_mean(q) - _mean(record.q)) * record.t
     else:
         theta = earlier(record.theta, dt, error("theta_rad", "delay")) + error("theta_rad", "lag") * q
-    alpha = swing + record.alpha.mean() + error("alpha_rad", "arm") * q / record.airspeed
+    alpha = swing + middle + error("alpha_rad", "arm") * q / record.airspeed
     force = az * np.cos(alpha) - ax * np.sin(alpha) + G0 * np.cos(theta - alpha)
     # the integral of x q_dot/V is x q/V up to the change of V, which does not matter over a manoeuvre
-    turning = turned + arm * (q - q[0]) / airspeed + integral(force / airspeed, dt)
+    turning = turned + arm * (q - q[..., :1]) / airspeed + integral(force / airspeed, dt)
     vane = vane_equation(turning, q, error("alpha_rad", "arm"), airspeed)
     vane = _late(vane, dt, error("alpha_rad", "delay"), error("alpha_rad", "lag"))
     result["alpha"] = record.alpha - error("alpha_rad", "scale") * vane
@@ -215,8 +234,13 @@ def compare(
     return result
 
 
+def _mean(x: Array) -> Array:
+    """Mean along the last axis, which stays."""
+    return np.asarray(x.mean(axis=-1, keepdims=True))
+
+
 def _late(x: Array, dt_s: float, delay_s: float, lag_s: float) -> Array:
     return lagged(earlier(x, dt_s, -delay_s), dt_s, lag_s)
 
 
-__all__ = ["ERRORS", "InstrumentError", "Record", "compare", "thinned"]
+__all__ = ["ERRORS", "InstrumentError", "Record", "compare", "stacked", "thinned"]

@@ -18,7 +18,6 @@ from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from airtruth.checks.kinematics_fit import Fit, Problem, fit, problem_of
-from airtruth.checks.kinematics_lines import whitened
 from airtruth.checks.kinematics_model import ERRORS
 
 Array = NDArray[np.float64]
@@ -144,9 +143,7 @@ def search(problem: Problem, usual: Mapping[str, float]) -> Search:
 
 def absolute(problem: Problem, one: Fit) -> tuple[float, int]:
     """Energy of the elevator's motion that a fit leaves in each record and equation, and its degrees of freedom."""
-    white = whitened(
-        problem.lines, problem.weight, problem.differences(dict(zip(one.names, one.value, strict=True)))
-    )
+    white = problem.white(dict(zip(one.names, one.value, strict=True)))
     start, total, degrees = 0, 0.0, -len(one.names)
     for own in problem.weight.own:
         for columns in own:

@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import correlate1d
 from scipy.signal import lfilter
 
 Array = NDArray[np.float64]
@@ -23,35 +24,51 @@ _DERIVATIVE: Final = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
 _SHIFT: Final = np.array([-120.0, 24.0, -12.0, 12.0, -24.0, 120.0])
 """Denominators of Lagrange's weights of six samples [-]."""
 
+_ADDED: Final = np.array([[20.0, -45.0, 36.0, -10.0], [10.0, -20.0, 15.0, -4.0], [4.0, -6.0, 4.0, -1.0]]).T
+"""Weights of the first four samples for the third, the second and the first sample before them, on the cubic through them [-]."""
+
 
 def integral(x: Array, dt_s: float) -> Array:
-    """Integral from the first sample, (samples,); exact for polynomials of the third degree.
+    """Integral from the first sample along the last axis; exact for polynomials of the third degree.
 
     Examples
     --------
     >>> integral(np.array([0.0, 1.0, 4.0, 9.0, 16.0]), 1.0).round(6).tolist()
     [0.0, 0.333333, 2.666667, 9.0, 21.333333]
     """
-    steps = np.convolve(_extended(x, 2), _INTEGRAL, "valid")
-    return np.concatenate([[0.0], dt_s * np.cumsum(steps)])
+    steps = _weighed(_extended(x, 2), _INTEGRAL)
+    return np.concatenate([np.zeros_like(x[..., :1]), dt_s * np.cumsum(steps, axis=-1)], axis=-1)
 
 
 def derivative(x: Array, dt_s: float) -> Array:
-    """Derivative at the samples, (samples,); exact for polynomials of the third degree."""
-    return np.asarray(np.convolve(_extended(x, 3), _DERIVATIVE[::-1], "valid") / dt_s)
+    """Derivative at the samples along the last axis; exact for polynomials of the third degree."""
+    return _weighed(_extended(x, 3), _DERIVATIVE) / dt_s
+
+
+def _weighed(x: Array, weights: Array) -> Array:
+    """Weighted sums of neighbouring samples along the last axis, where all of them exist."""
+    first, count = len(weights) // 2, x.shape[-1] - len(weights) + 1
+    sums: Array = correlate1d(x, weights, axis=-1, mode="nearest")
+    return sums[..., first : first + count]
 
 
 def earlier(x: Array, dt_s: float, delay_s: float) -> Array:
-    """x(t + delay), the end values held outside; a negative delay takes the signal later."""
+    """x(t + delay) along the last axis, the end values held outside; a negative delay takes the signal later."""
     if delay_s == 0.0:
         return x
     whole = math.floor(delay_s / dt_s)
     part = delay_s / dt_s - whole
     weights = _shift_weights(part)
     reach = abs(whole) + 3
-    padded = np.concatenate([np.full(reach, x[0]), x, np.full(reach, x[-1])])
+    padded = _held(x, reach)
     first = reach + whole - 2
-    return np.asarray(np.convolve(padded[first : first + len(x) + 5], weights[::-1], "valid"))
+    return _weighed(padded[..., first : first + x.shape[-1] + 5], weights)
+
+
+def _held(x: Array, count: int) -> Array:
+    """Add samples at both ends that hold the end values."""
+    before, after = np.repeat(x[..., :1], count, axis=-1), np.repeat(x[..., -1:], count, axis=-1)
+    return np.concatenate([before, x, after], axis=-1)
 
 
 def _shift_weights(part: float) -> Array:
@@ -62,7 +79,7 @@ def _shift_weights(part: float) -> Array:
 
 
 def lagged(x: Array, dt_s: float, lag_s: float) -> Array:
-    """First-order lag, lag_s y' = x - y, from equilibrium.
+    """First-order lag along the last axis, lag_s y' = x - y, from equilibrium.
 
     The signal is a cubic on each interval, with the derivatives of its neighbours. There p = x - lag x' + lag^2 x"
     - lag^3 x"' solves the equation, and y - p decays with exp(-dt/lag). A signal that is linear between samples
@@ -73,25 +90,22 @@ def lagged(x: Array, dt_s: float, lag_s: float) -> Array:
         return x
     slope = derivative(x, dt_s)
     rise = np.diff(x) / dt_s
-    left, right = slope[:-1], slope[1:]
+    left, right = slope[..., :-1], slope[..., 1:]
     cubic = 6.0 * (left + right - 2.0 * rise) / dt_s**2
     curve = 2.0 * (3.0 * rise - 2.0 * left - right) / dt_s
-    at_left = x[:-1] - lag_s * (left - lag_s * (curve - lag_s * cubic))
-    at_right = x[1:] - lag_s * (right - lag_s * (curve + cubic * dt_s - lag_s * cubic))
+    at_left = x[..., :-1] - lag_s * (left - lag_s * (curve - lag_s * cubic))
+    at_right = x[..., 1:] - lag_s * (right - lag_s * (curve + cubic * dt_s - lag_s * cubic))
     decay = math.exp(-dt_s / lag_s)
-    y, _ = lfilter([1.0], [1.0, -decay], at_right - decay * at_left, zi=np.array([decay * x[0]]))
-    return np.concatenate([x[:1], y])
+    y, _ = lfilter([1.0], [1.0, -decay], at_right - decay * at_left, zi=decay * x[..., :1])
+    return np.concatenate([x[..., :1], y], axis=-1)
 
 
 def _extended(x: Array, count: int) -> Array:
     """Add samples at both ends by the cubics through the first and the last four samples."""
-    if len(x) < 4:
-        return np.concatenate([np.full(count, x[0]), x, np.full(count, x[-1])])
-    before, after = x[:4], x[-4:][::-1]
-    for _ in range(count):
-        before = np.concatenate([[4.0 * before[0] - 6.0 * before[1] + 4.0 * before[2] - before[3]], before])
-        after = np.concatenate([[4.0 * after[0] - 6.0 * after[1] + 4.0 * after[2] - after[3]], after])
-    return np.concatenate([before[:count], x, after[:count][::-1]])
+    if x.shape[-1] < 4:
+        return _held(x, count)
+    before, after = x[..., :4] @ _ADDED[:, -count:], x[..., -4:] @ _ADDED[::-1, : -count - 1 : -1]
+    return np.concatenate([before, x, after], axis=-1)
 
 
 __all__ = ["derivative", "earlier", "integral", "lagged"]
