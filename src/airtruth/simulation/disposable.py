@@ -36,6 +36,8 @@ needs 0.05 ms)."""
 _STEP_BYTES: Final = 25_000
 """Further address space for a step of a simulation [byte] (judgement: a chunk of 25 runs has 20 numbers for each, six
 times)."""
+_MODULES: Final = ("airtruth.simulation.disposable", "numpy.ma")
+"""Modules that the server imports once; numpy would import the second one in each process, at its first `np.unique`."""
 _kept: Final[list[BaseException]] = []
 """Exceptions of failed executives, kept because the destructor of such an executive aborts the process."""
 
@@ -81,7 +83,7 @@ def isolated_flight(
         "airtruth.simulation.disposable:perform",
         {"work": work, "content": content, "folder": folder},
         limits,
-        ("airtruth.simulation.disposable", function.__module__),
+        (*_MODULES, function.__module__),
     )
     try:
         (answer,) = call(task).arrays
