@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from airtruth.tracing.inference.hypothesis import Hypothesis
@@ -18,17 +20,24 @@ def nearby(fitted: PosteriorFit, hypothesis: Hypothesis) -> tuple[Sensitivities,
     ----------
     fitted : a fit of the same records under the same settings.
     """
-    old, new = fitted.layout, Layout(len(hypothesis.parameters))
+    return reordered(fitted.sensitivities, fitted.hypothesis, hypothesis)
+
+
+def reordered(
+    sensitivities: Sequence[Sensitivities], of: Hypothesis, hypothesis: Hypothesis
+) -> tuple[Sensitivities, ...]:
+    """`nearby` of the derivatives of each record under a hypothesis ``of``."""
+    old, new = Layout(len(of.parameters)), Layout(len(hypothesis.parameters))
     rows = np.full(new.total, -1)
     rows[new.common] = np.arange(old.total)[old.common]
     rows[new.per_record] = np.arange(old.total)[old.per_record]
-    known = {e.key for e in fitted.hypothesis.effects}
+    known = {e.key for e in of.effects}
     for effect in hypothesis.effects:
         if effect.key in known:
-            own, there = hypothesis.span(effect.key), fitted.hypothesis.span(effect.key)
+            own, there = hypothesis.span(effect.key), of.span(effect.key)
             first, last = new.sizes.start, old.sizes.start
             rows[first + own.start : first + own.stop] = np.arange(last + there.start, last + there.stop)
-    return tuple(_ordered(s, rows) for s in fitted.sensitivities)
+    return tuple(_ordered(s, rows) for s in sensitivities)
 
 
 def begins_at(fitted: PosteriorFit, hypothesis: Hypothesis, start: Parameters) -> bool:
@@ -46,4 +55,4 @@ def _ordered(s: Sensitivities, rows: np.ndarray[tuple[int], np.dtype[np.int64]])
     return Sensitivities(s.r, s.logdet, t, w, s.white, more)
 
 
-__all__ = ["begins_at", "nearby"]
+__all__ = ["begins_at", "nearby", "reordered"]

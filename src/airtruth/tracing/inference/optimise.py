@@ -13,7 +13,7 @@ from airtruth.numerics.levenberg_marquardt import Status, minimise
 from airtruth.numerics.levenberg_marquardt_options import Damping, Options, Stopping
 from airtruth.numerics.normal_equations import scaled_inverse, scaled_step
 from airtruth.tracing.inference.hypothesis import Hypothesis
-from airtruth.tracing.inference.nearby import begins_at, nearby
+from airtruth.tracing.inference.nearby import begins_at, nearby, reordered
 from airtruth.tracing.inference.posterior import (
     LikelihoodTerms,
     PosteriorFit,
@@ -27,7 +27,7 @@ from airtruth.tracing.inference.posterior import (
 )
 from airtruth.tracing.inference.whitening import NO_WHITENER, Whitener
 from airtruth.tracing.model.parameters import BOUNDS, Common, Layout, Parameters, PerRecord
-from airtruth.tracing.model.settings import initial_per_record
+from airtruth.tracing.model.settings import Settings, initial_per_record
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -64,6 +64,8 @@ _MOST_LOG_STEP: Final = 1.0
 (judgement)."""
 _MOST_SIZE_STEP: Final = 0.25
 """Largest step of a size over its range [-] (judgement)."""
+_START: Final = "start"
+"""Name of the derivatives at the start of a search, among what a record keeps."""
 _RIDGE: Final = 1e-12
 """Ridge on the scaled information before it is inverted [-]; far above rounding, far below any information."""
 
@@ -269,7 +271,27 @@ def initial_parameters(
         problem, hypothesis, priors, NO_WHITENER, levels=False, shape=point, with_levels=False
     )
     options = replace(_SEARCH, iterations=iterations, renewed_end=False)
-    return point.of_vector(minimise(search, point.vector[None, :], options).x[0])
+    near = None
+    if hypothesis.effects:
+        plain = replace(hypothesis, effects=())
+        made = [_without_effects(problem, i, plain, point) for i in range(len(problem.records))]
+        known = [m for m in made if m is not None]
+        if len(known) == len(made):
+            near = [Evaluated(np.inf, (), reordered(known, plain, hypothesis))]
+    return point.of_vector(minimise(search, point.vector[None, :], options, near=near).x[0])
+
+
+def _without_effects(
+    problem: TraceProblem, index: int, plain: Hypothesis, point: Parameters
+) -> Sensitivities | None:
+    """Derivatives of one record at the start without effects, which every start with effects shares."""
+    kept = problem.records[index].kept
+    known: tuple[Settings, Sensitivities | None] | None = kept.get(_START)
+    if known is None or known[0] is not problem.settings:
+        start = replace(point, sizes=np.zeros(0))
+        known = problem.settings, sensitivities_of(problem, index, plain, start, with_levels=False)
+        kept[_START] = known
+    return known[1]
 
 
 def _covariance(search: PosteriorSearch, at: Evaluated) -> Array:

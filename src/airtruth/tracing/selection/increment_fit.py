@@ -111,7 +111,7 @@ def converged(
         if not ranked or has_converged(ranked[0].fit, 2.0 * ranked[0].log_evidence):
             break
         effect, first = ranked[0].effect, ranked[0].fit
-        own = fit(problem, first.hypothesis, first.point)
+        own = fit(problem, first.hypothesis, first.point, near=first)
         if own is None:
             break
         ranked[0] = FittedIncrement(effect, own, log_evidence(null, own, effect, tried))
