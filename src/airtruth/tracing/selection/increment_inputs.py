@@ -39,7 +39,7 @@ _ANGLE_RAD: Final = 0.01
 
 
 @dataclass
-class _Motion:
+class Motion:
     """The flown motion of one record; memories are kept, because many shapes share them."""
 
     tangent: Tangent
@@ -107,7 +107,7 @@ def _late(values: Array, lag_s: float, delay_s: float, h_s: float) -> Array:
     return values
 
 
-def _along(shape: Shape, motion: _Motion) -> Array:
+def _along(shape: Shape, motion: Motion) -> Array:
     """(steps, points, coefficients) of an increment by a unit of each of its coefficients."""
     of_reading, memory = shape.of_reading, shape.memory
     named = "body_qhat" if of_reading and shape.signal == "qhat" else shape.signal
@@ -169,7 +169,7 @@ def _of_record(
     tangent = tangent_of(given, problem.settings, point.common, point.per_record[index])
     if tangent is None:
         return None
-    motion = _Motion(tangent)
+    motion = Motion(tangent)
     trims = {"alpha": record.plant.trim_alpha_rad, "qhat": 0.0, "elevator": record.plant.trim_elevator_rad}
     linear = np.stack([motion.signal(name) - trims[name] for name in _FACTORS], axis=-1)
     counts = [max(len(shape.coefficients), 1) for shape in tried]
@@ -207,4 +207,4 @@ def _of_record(
     return inserted(base, len(point.sizes), t, np.zeros((len(t), OUTPUTS, OUTPUTS)))
 
 
-__all__ = ["sensitivities_to"]
+__all__ = ["Motion", "sensitivities_to"]
