@@ -141,6 +141,16 @@ def test_shapes_change_the_innovations_as_refitted_filters_do(null, name):
         assert np.linalg.norm(found.t[own] - expected.t[own]) < limit * scale
 
 
+def test_many_shapes_pass_in_blocks(null, monkeypatch):
+    """With blocks of one shape, to rounding."""
+    problem, fitted = null
+    every = [shape for shape, _ in SHAPES.values()]
+    whole = sensitivities_to(fitted, problem, every)
+    monkeypatch.setattr("airtruth.tracing.selection.increment_inputs._BLOCK", 1)
+    for one, own in zip(whole, sensitivities_to(fitted, problem, every), strict=True):
+        np.testing.assert_allclose(own.t, one.t, rtol=1e-9, atol=1e-9 * np.abs(one.t).max())
+
+
 def test_memories_follow_the_motion():
     """A lag, a mode and a play of the elevator against `scipy.signal.lsim` and a loop, on the filter's own grid."""
     _, tangent = flown(*CASES["plain"])

@@ -409,3 +409,21 @@ def test_a_step_from_which_the_motion_diverges_has_no_derivative(monkeypatch):
 
     monkeypatch.setattr(posterior, "respond_to", diverging)
     assert sensitivities_of(problem, 0, tr.NOTHING, point) is None
+
+
+@pytest.mark.parametrize("other", ["settings", "declared"])
+def test_a_start_does_not_depend_on_what_was_started_before(other):
+    """Records keep derivatives at the start; those of other settings or another declaration do not serve, to the last bit."""
+    sizes = np.array([0.012, 0.2])
+
+    def start(after):
+        problem = tr.problem([tr.fly(np.random.default_rng(1), samples=150)])
+        if after:
+            settings = replace(tr.SETTINGS, noise=3.0 * tr.SETTINGS.noise)
+            term = AeroTerm("Cm", "alpha", "linear", 0.1)
+            before = replace(problem, settings=settings) if other == "settings" else problem
+            declared = Change(aero=(term,)) if other == "declared" else Change()
+            initial_parameters(before, Hypothesis(declared, (DELAY,)), sizes[:1])
+        return initial_parameters(problem, TWO, sizes).vector
+
+    assert np.array_equal(start(after=True), start(after=False))

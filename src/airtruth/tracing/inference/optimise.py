@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from airtruth.numerics.levenberg_marquardt import Status, minimise
 from airtruth.numerics.levenberg_marquardt_options import Damping, Options, Stopping
 from airtruth.numerics.normal_equations import scaled_inverse, scaled_step
+from airtruth.physics.terms import Change
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.nearby import begins_at, nearby, reordered
 from airtruth.tracing.inference.posterior import (
@@ -77,6 +78,14 @@ class Evaluated:
     cost: float
     terms: tuple[LikelihoodTerms, ...]
     sensitivities: tuple[Sensitivities, ...]
+
+
+class _Start(NamedTuple):
+    """Derivatives at the start of a search without effects, and what they depend on beside the record."""
+
+    settings: Settings
+    declared: Change
+    sensitivities: Sensitivities | None
 
 
 @dataclass(frozen=True)
@@ -286,12 +295,12 @@ def _without_effects(
 ) -> Sensitivities | None:
     """Derivatives of one record at the start without effects, which every start with effects shares."""
     kept = problem.records[index].kept
-    known: tuple[Settings, Sensitivities | None] | None = kept.get(_START)
-    if known is None or known[0] is not problem.settings:
+    known: _Start | None = kept.get(_START)
+    if known is None or known.settings is not problem.settings or known.declared != plain.declared:
         start = replace(point, sizes=np.zeros(0))
-        known = problem.settings, sensitivities_of(problem, index, plain, start, with_levels=False)
-        kept[_START] = known
-    return known[1]
+        made = sensitivities_of(problem, index, plain, start, with_levels=False)
+        known = kept[_START] = _Start(problem.settings, plain.declared, made)
+    return known.sensitivities
 
 
 def _covariance(search: PosteriorSearch, at: Evaluated) -> Array:

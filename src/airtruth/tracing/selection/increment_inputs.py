@@ -9,7 +9,7 @@ follow the motion and not the filter's updates of their own.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -36,6 +36,10 @@ _RATE_RAD_S: Final = 0.05
 linearisation."""
 _ANGLE_RAD: Final = 0.01
 """The same in an angle [rad]."""
+
+
+_BLOCK: Final = 200_000
+"""Coefficients times samples that pass through the tangent linear model at once [-] (judgement: 30 MB)."""
 
 
 @dataclass
@@ -125,7 +129,7 @@ def _along(shape: Shape, motion: Motion) -> Array:
 
 
 def _slopes(shape: Shape, reference: Mapping[str, float], half_s: float, alpha_dot: Array) -> Array:
-    """(coefficients, derivatives) of one coefficient with which an increment begins at the reference of a record.
+    """(coefficients, 2, derivatives of a coefficient) with which an increment begins at the reference of a record.
 
     Parameters
     ----------
@@ -133,12 +137,13 @@ def _slopes(shape: Shape, reference: Mapping[str, float], half_s: float, alpha_d
     half_s : chord over twice the airspeed [s].
     alpha_dot : slopes of alpha_dot_hat in the signals of the derivatives.
     """
-    slopes = np.zeros((max(len(shape.coefficients), 1), len(_FACTORS)))
-    if not shape.cells or shape.memory is not None:
-        return slopes
+    every = np.zeros((_size(shape), 2, len(_FACTORS)))
+    if shape.of_reading or not shape.cells or shape.memory is not None:
+        return every
+    slopes = every[:, _COEFFICIENTS.index(shape.acts_on)]
     if shape.factor:
         slopes[:, _FACTORS.index(shape.factor)] = shape.basis(reference[shape.signal])
-        return slopes
+        return every
     middle = reference.get(shape.signal, 0.0)
     h = _ANGLE_RAD if shape.signal in ("alpha", "elevator") else _RATE_RAD_S * half_s
     rise = (shape.basis(middle + h) - shape.basis(middle - h)) / (2.0 * h)
@@ -146,7 +151,7 @@ def _slopes(shape: Shape, reference: Mapping[str, float], half_s: float, alpha_d
         slopes[:, _FACTORS.index(shape.signal)] = rise
     elif shape.signal == "alpha_dot_hat":
         slopes[:] = np.outer(rise, alpha_dot)
-    return slopes
+    return every
 
 
 def sensitivities_to(
@@ -172,39 +177,63 @@ def _of_record(
     motion = Motion(tangent)
     trims = {"alpha": record.plant.trim_alpha_rad, "qhat": 0.0, "elevator": record.plant.trim_elevator_rad}
     linear = np.stack([motion.signal(name) - trims[name] for name in _FACTORS], axis=-1)
-    counts = [max(len(shape.coefficients), 1) for shape in tried]
-    first = 2 * len(_FACTORS)
-    stops = first + np.cumsum(counts)
-    steps, samples = linear.shape[0], len(tangent.path.scale)
-    force = np.zeros((steps, POINTS, 2, int(stops[-1]) if counts else first))
-    reading = np.zeros((samples, OUTPUTS, force.shape[-1]))
+    count, derivatives = len(_FACTORS), base.t[Common.derivatives]
+    force = np.zeros((*linear.shape[:2], 2, 2 * count))
     for k in range(2):
-        force[:, :, k, k * len(_FACTORS) : (k + 1) * len(_FACTORS)] = linear
-    at = given.reference
-    chord = record.plant.aircraft.constants.chord_m
+        force[:, :, k, k * count : (k + 1) * count] = linear
+    nothing = np.zeros((len(tangent.path.scale), OUTPUTS, 2 * count))
+    by_gain = derivatives - propagated(tangent, force, nothing) @ base.white.T
+    by_gain[~derivatives.any(axis=(1, 2))] = 0.0
+    at, chord = given.reference, record.plant.aircraft.constants.chord_m
     reference = {"alpha": given.reference_alpha_rad, "elevator": at.elevator_rad, "qbar": at.qbar_pa}
     alpha_dot = np.linalg.lstsq(
-        np.column_stack([linear.reshape(-1, len(_FACTORS)), np.ones(steps * POINTS)]),
+        np.column_stack([linear.reshape(-1, count), np.ones(linear.shape[0] * POINTS)]),
         motion.signal("alpha_dot_hat").ravel(),
         rcond=None,
-    )[0][: len(_FACTORS)]
-    slopes = np.zeros((force.shape[-1], 2, len(_FACTORS)))
-    for shape, stop, count in zip(tried, stops, counts, strict=True):
-        span, values = slice(stop - count, stop), _along(shape, motion)
+    )[0][:count]
+    parts = []
+    for block in _blocks(tried, len(base.r)):
+        slopes = [_slopes(shape, reference, 0.5 * chord / at.airspeed_m_s, alpha_dot) for shape in block]
+        e = _changes(block, motion) @ base.white.T
+        parts.append(e + np.tensordot(np.concatenate(slopes).reshape(-1, 2 * count), by_gain, axes=1))
+    t = np.concatenate(parts) if parts else np.zeros((0, *base.r.shape))
+    return inserted(base, len(point.sizes), t, np.zeros((len(t), OUTPUTS, OUTPUTS)))
+
+
+def _size(shape: Shape) -> int:
+    """Number of coefficients; one of a linear increment."""
+    return max(len(shape.coefficients), 1)
+
+
+def _blocks(tried: Sequence[Shape], samples: int) -> Iterator[list[Shape]]:
+    """Shapes of which no more than `_BLOCK` coefficients times samples are in memory at once."""
+    block: list[Shape] = []
+    held = 0
+    for shape in tried:
+        held += _size(shape)
+        if block and held * samples > _BLOCK:
+            yield block
+            block, held = [], _size(shape)
+        block.append(shape)
+    if block:
+        yield block
+
+
+def _changes(tried: Sequence[Shape], motion: Motion) -> Array:
+    """(coefficients, samples, outputs) changes of the innovations by a unit of each coefficient, at the gain of the filter."""
+    tangent, stops = motion.tangent, np.cumsum([_size(shape) for shape in tried])
+    force = np.zeros((len(tangent.matrices.phi), POINTS, 2, stops[-1]))
+    reading = np.zeros((len(tangent.path.scale), OUTPUTS, stops[-1]))
+    for shape, stop in zip(tried, stops.tolist(), strict=True):
+        span, values = slice(stop - _size(shape), stop), _along(shape, motion)
         if shape.of_reading:
             output, sensors = READINGS.index(shape.acts_on), tangent.sensors
             values = _late(values, sensors.lag_s[output], sensors.delay_s[output], tangent.h_s)
-            at_sample = np.concatenate([values[:1, 0], values[tangent.steps - 1 :: tangent.steps, -1]])
-            reading[:, output, span] = at_sample
+            ends = values[tangent.steps - 1 :: tangent.steps, -1]
+            reading[:, output, span] = np.concatenate([values[:1, 0], ends])
         else:
-            k = _COEFFICIENTS.index(shape.acts_on)
-            force[:, :, k, span] = values
-            slopes[span, k] = _slopes(shape, reference, 0.5 * chord / at.airspeed_m_s, alpha_dot)
-    e = propagated(tangent, force, reading) @ base.white.T
-    by_gain = base.t[Common.derivatives] - e[:first]
-    by_gain[~base.t[Common.derivatives].any(axis=(1, 2))] = 0.0
-    t = e[first:] + np.tensordot(slopes[first:].reshape(-1, first), by_gain, axes=1)
-    return inserted(base, len(point.sizes), t, np.zeros((len(t), OUTPUTS, OUTPUTS)))
+            force[:, :, _COEFFICIENTS.index(shape.acts_on), span] = values
+    return propagated(tangent, force, reading)
 
 
 __all__ = ["Motion", "sensitivities_to"]
