@@ -1,6 +1,6 @@
 """Increments along the motion that the filter flew, and the change of the innovations by a unit of each.
 
-The increments of all shapes pass through one tangent linear model of a record, so that a shape costs a hundredth of a
+The increments of all shapes pass through one tangent linear model of a record, so that each bend costs a sixth of a
 flight of the filter. The gain of the filter changes by an increment, too. That part is the one of the derivatives with which
 the increment begins at the record's mean, and is taken from their sensitivities, which are differences of flights. Memories
 follow the motion and not the filter's updates of their own.
@@ -36,8 +36,6 @@ _RATE_RAD_S: Final = 0.05
 linearisation."""
 _ANGLE_RAD: Final = 0.01
 """The same in an angle [rad]."""
-
-
 _BLOCK: Final = 200_000
 """Coefficients times samples that pass through the tangent linear model at once [-] (judgement: 30 MB)."""
 
