@@ -179,19 +179,15 @@ def _differences(
                 _advance(moved, point, given, steps, work, forgets)
                 for i in range(n):
                     out.phi[step, i, j] = (moved[i] - x[i]) / _H
-            for p in range(POINTS):
-                grid.lift[point + p] += _H
-                _copy(base, moved)
-                _advance(moved, point, given, steps, work, forgets)
-                grid.lift[point + p] -= _H
-                for i in range(n):
-                    out.force[step, i, 0, p] = (moved[i] - x[i]) / _H
-                grid.moment[point + p] += _H
-                _copy(base, moved)
-                _advance(moved, point, given, steps, work, forgets)
-                grid.moment[point + p] -= _H
-                for i in range(n):
-                    out.force[step, i, 1, p] = (moved[i] - x[i]) / _H
+            for m in range(2):
+                column = grid.lift if m == 0 else grid.moment
+                for p in range(POINTS):
+                    column[point + p] += _H
+                    _copy(base, moved)
+                    _advance(moved, point, given, steps, work, forgets)
+                    column[point + p] -= _H
+                    for i in range(n):
+                        out.force[step, i, m, p] = (moved[i] - x[i]) / _H
             _flown(x, air_at(grid, point + 2), given, work, out.flown[step, 2])
             middle = air_at(grid, point + 1)
             for i in range(out.flown.shape[2]):
