@@ -15,7 +15,7 @@ IDENTIFY: Final = Ahead(
     "airtruth.identification.regression.ahead", "airtruth.identification.regression.dynamic_kernel._filtered"
 )
 """Kernels of these methods."""
-TRACE: Final = Ahead("airtruth.tracing.model.ahead", "airtruth.tracing.model.filter._innovations")
+TRACE: Final = Ahead("airtruth.tracing.model.ahead", "airtruth.tracing.model.tangent._differences")
 """Kernels of the tracer's filter."""
 
 

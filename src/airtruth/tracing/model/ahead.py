@@ -1,4 +1,4 @@
-"""Calls that compile two of the filter's kernels: an aircraft without forces, and a record of one sample."""
+"""Calls that compile three of the filter's kernels: an aircraft without forces, and a record of two samples."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from airtruth.tracing.model.filter import innovations
+from airtruth.tracing.model.filter import innovations, path_of
 from airtruth.tracing.model.kernel_input import (
     AircraftArrays,
     AirPoint,
@@ -21,6 +21,7 @@ from airtruth.tracing.model.kernel_input import (
 from airtruth.tracing.model.linearise import linearise
 from airtruth.tracing.model.parameters import CORE, OUTPUTS, state_layout
 from airtruth.tracing.model.steady import without_update
+from airtruth.tracing.model.tangent import matrices_along
 
 _AT: Final = AirPoint(*[1.0] * len(AirPoint._fields))
 """Inputs at a point."""
@@ -44,16 +45,26 @@ def _linearise() -> None:
     linearise(np.zeros(CORE), _AT, _model(), np.empty((CORE, CORE)), np.empty((OUTPUTS, CORE)))
 
 
+def _given() -> KernelInput:
+    zeros = np.zeros((2, OUTPUTS))
+    grid = GridSignals(*[np.ones(3)] * len(GridSignals._fields))
+    return KernelInput(zeros, zeros, grid, np.empty(0), 1.0, 2, np.zeros(4), 0.0, _AT, _model())
+
+
 def _filter() -> None:
-    zeros = np.zeros((1, OUTPUTS))
-    grid = GridSignals(*[np.ones(1)] * len(GridSignals._fields))
-    given = KernelInput(zeros, zeros, grid, np.empty(0), 1.0, 2, np.zeros(4), 0.0, _AT, _model())
-    innovations(given, without_update(given.model), np.empty((1, OUTPUTS)))
+    given = _given()
+    innovations(given, without_update(given.model), np.empty((2, OUTPUTS)))
+
+
+def _tangent() -> None:
+    given = _given()
+    matrices_along(given, path_of(2, CORE), 1.0)
 
 
 KERNELS: Final[tuple[tuple[str, Callable[[], None]], ...]] = (
     ("airtruth.tracing.model.linearise._differences", _linearise),
     ("airtruth.tracing.model.filter._innovations", _filter),
+    ("airtruth.tracing.model.tangent._differences", _tangent),
 )
 """Full name of each kernel, and the call that compiles it."""
 

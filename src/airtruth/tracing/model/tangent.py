@@ -212,11 +212,21 @@ def tangent_of(given: FilterInputs, settings: Settings, common: Array, per_recor
     steady = steady_filter(kernel, given.along)
     if steady is None:
         return None
-    n, samples, count = kernel.model.states.size, len(kernel.y), kernel.sub // 2
+    n, samples = kernel.model.states.size, len(kernel.y)
     path, e = path_of(samples, n), np.full_like(kernel.y, LOST)
     if samples < 2 or not innovations(kernel, steady, e, path)[0]:
         return None
-    every = (samples - 1) * count
+    matrices = matrices_along(kernel, path, steady.shown)
+    surface = effective_elevator(float(kernel.grid.elevator_rad[0]), kernel.model.aircraft)
+    start = np.array([kernel.start[0], surface])
+    h_s = 2.0 * kernel.dt_s / kernel.sub
+    return Tangent(matrices, path, kernel.sub // 2, h_s, given.lead, kernel.model.sensors, start)
+
+
+def matrices_along(given: KernelInput, path: Path, shown: float) -> Matrices:
+    """Matrices along a path; ``shown`` as of `SteadyFilter`. The differences move coefficients and outputs, which return."""
+    n, samples = given.model.states.size, len(given.y)
+    every = (samples - 1) * (given.sub // 2)
     matrices = Matrices(
         phi=np.zeros((every, n, n)),
         force=np.zeros((every, n, 2, POINTS)),
@@ -225,11 +235,9 @@ def tangent_of(given: FilterInputs, settings: Settings, common: Array, per_recor
         reading=np.zeros((samples, OUTPUTS, OUTPUTS)),
         flown=np.zeros((every, POINTS, len(FLOWN))),
     )
-    steps = steps_of(kernel.model, kernel.dt_s, kernel.sub)
-    _differences(kernel, steps, work_of(n), path, steady.shown, matrices)
-    surface = effective_elevator(float(kernel.grid.elevator_rad[0]), kernel.model.aircraft)
-    start = np.array([kernel.start[0], surface])
-    return Tangent(matrices, path, count, steps.h, given.lead, kernel.model.sensors, start)
+    steps = steps_of(given.model, given.dt_s, given.sub)
+    _differences(given, steps, work_of(n), path, shown, matrices)
+    return matrices
 
 
 def propagated(tangent: Tangent, force: Array, reading: Array) -> Array:
@@ -276,4 +284,4 @@ def _whole_samples(phi: Array, driven: Array, count: int) -> tuple[Array, Array]
     return whole, total
 
 
-__all__ = ["FLOWN", "POINTS", "Tangent", "propagated", "tangent_of"]
+__all__ = ["FLOWN", "POINTS", "Tangent", "matrices_along", "propagated", "tangent_of"]
