@@ -109,9 +109,10 @@ def search(problem: Problem, usual: Mapping[str, float]) -> Search:
     chosen: Fit | None = None
     stable = False
     for _ in range(ROUNDS):
+        hints = _hints(problem, usual)
         ranked = _ranked(problem, best, usual) if best else []
         seeds = [dict(zip(e.fit.names, e.fit.value, strict=True)) for e in ranked[:BEAM]]
-        best = _pruned(problem, _sets(problem, usual, seeds), usual)
+        best = _pruned(problem, _sets(problem, usual, seeds, hints), usual, hints)
         before, chosen = chosen, _ranked(problem, best, usual)[0].fit
         if before is not None and before.names == chosen.names:
             stable = True
@@ -199,14 +200,16 @@ def _promised(moments: Array, slopes: Sequence[Array], hints: Sequence[_Hint]) -
 
 
 def _sets(
-    problem: Problem, usual: Mapping[str, float], seeds: Sequence[Mapping[str, float]]
+    problem: Problem,
+    usual: Mapping[str, float],
+    seeds: Sequence[Mapping[str, float]],
+    hints: Sequence[_Hint],
 ) -> dict[frozenset[str], Fit]:
     """Fits of all sets that were reached: seeds first, then ever larger ones; pairs at once, because two errors may
     hide each other.
     """
     known = {frozenset(s): fit(problem, tuple(s), s) for s in seeds}
     known[frozenset()] = fit(problem, ())
-    hints = _hints(problem, usual)
     _grow(problem, known, [known[frozenset()]], [(h,) for h in hints])
     pairs = [(a, b) for a, b in combinations(hints, 2) if a.name != b.name]
     _grow(problem, known, [known[frozenset()]], pairs)
@@ -259,11 +262,13 @@ def _doubled(names: frozenset[str]) -> bool:
 
 
 def _pruned(
-    problem: Problem, sets: dict[frozenset[str], Fit], usual: Mapping[str, float]
+    problem: Problem,
+    sets: dict[frozenset[str], Fit],
+    usual: Mapping[str, float],
+    hints: Sequence[_Hint],
 ) -> dict[frozenset[str], Fit]:
     """Add the leading sets less each of their errors, and the best one with each error exchanged for another."""
     sets = dict(sets)
-    hints = _hints(problem, usual)
     for _ in range(MOST):
         added = False
         best = _ranked(problem, sets, usual)[0]

@@ -258,7 +258,9 @@ def propagated(tangent: Tangent, force: Array, reading: Array) -> Array:
     # the first sample counts with the coefficients' increments at the start of its step
     at_sample = np.concatenate([force[:1, 0], force[count - 1 :: count, POINTS - 1]])
     seen = own.reading @ (tangent.sensors.scale[:, None] * reading) + own.d @ at_sample
-    driven = np.einsum("snqp,spqm->snm", own.force, force, optimize=True)
+    steps = len(own.phi)
+    by_force = own.force.transpose(0, 1, 3, 2).reshape(steps, n, 2 * POINTS)
+    driven = by_force @ force.reshape(steps, 2 * POINTS, -1)
     phi, driven = _whole_samples(own.phi, driven, count)
     k_gain = path.k_gain[:-1]
     closed = phi @ (np.eye(n) + k_gain @ own.c[:-1])
