@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from airtruth.checks.kinematics import check_kinematics, declared_biases, declared_errors
 from airtruth.checks.kinematics_fit import fit, limits_of, problem_of
 from airtruth.checks.kinematics_lines import lines_of
-from airtruth.checks.kinematics_model import ERRORS, Record, compare
+from airtruth.checks.kinematics_model import ERRORS, Record, compare, stacked
 from airtruth.checks.result import tables
 from airtruth.checks.samples import derivative, earlier, integral, lagged
 from airtruth.errors import LogError
@@ -167,6 +167,25 @@ def test_the_motion_itself_agrees_with_an_independent_integration(true):
     np.testing.assert_allclose(out.y[0], true["theta_rad"], atol=2e-4)
     np.testing.assert_allclose(np.arctan2(out.y[2], out.y[1]), true["alpha_rad"], atol=5e-4)
     np.testing.assert_allclose(np.hypot(out.y[1], out.y[2]), true["airspeed_m_s"], atol=0.02)
+
+
+def test_records_of_one_length_are_compared_as_one(true):
+    """Every equation with errors of each kind, to rounding; a longer record and one without theta are apart."""
+    one = record(true)
+    other = record({n: x[::-1].copy() for n, x in true.items()})
+    longer = record({n: np.concatenate([x, x]) for n, x in true.items()})
+    lacking = Record("r", DT, one.airspeed, one.alpha, one.q, one.az, one.elevator, one.ax)
+    records = [one, longer, other, lacking]
+    every = stacked(records)
+    assert [numbers for numbers, _ in every] == [(0, 2), (1,), (3,)]
+    errors = {n: error.neutral + 2.5 * error.step for n, error in ERRORS.items()}
+    for numbers, stack in every:
+        together = compare(stack, errors)
+        for row, i in enumerate(numbers):
+            alone = compare(records[i], errors)
+            assert together.keys() == alone.keys()
+            for equation, x in alone.items():
+                np.testing.assert_allclose(together[equation][row], x, rtol=1e-12, atol=1e-14)
 
 
 def test_the_integral_is_that_of_the_cubic():
