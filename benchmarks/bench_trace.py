@@ -3,7 +3,7 @@
 Six records of data/undeclared against the whole library, wall and CPU time of the search itself (the bar: 10 s
 on two cores), as a multiple of one refit without effects, for one and two threads; and a check that both give
 the same answer. First the time of one flight of the filter, as a multiple of one recursion of `scipy.signal.dlsim` with as many
-states.
+states, and the screen of increments, as a multiple of one flight for each bend.
 """
 
 from __future__ import annotations
@@ -21,8 +21,10 @@ from airtruth.logs.store import read_log
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.model.parameters import CORE, OUTPUTS, Common
-from airtruth.tracing.model.response import filter_inputs, respond_to
+from airtruth.tracing.model.response import filter_inputs, respond, respond_to
 from airtruth.tracing.prepare import Case, prepare
+from airtruth.tracing.selection.increment_inputs import sensitivities_to
+from airtruth.tracing.selection.increments import shapes
 
 FLIGHTS = 200
 """Flights of the filter that are timed."""
@@ -46,11 +48,32 @@ def flight(case: Case) -> str:
     return f"one flight of the filter: {1e3 * filtered:.2f} ms of {record.samples} samples, {filtered / linear:.2f} of dlsim"
 
 
+def screening(case: Case) -> str:
+    """The screen of increments against as many flights of the filter, each with a gain of its own, as it has bends."""
+    problem, hypothesis = case.fitted, case.hypothesis
+    null = fit(problem, hypothesis, initial_parameters(problem, hypothesis))
+    assert null is not None
+    tried = shapes(problem)
+    sensitivities_to(null, problem, tried)  # compiles
+    start = time.perf_counter()
+    made = sensitivities_to(null, problem, tried)
+    screened = time.perf_counter() - start
+    assert made is not None
+    bends = len(made[0].t) - null.layout.total
+    change = hypothesis.change(null.point.sizes)
+    start = time.perf_counter()
+    for _ in range(FLIGHTS):
+        respond(problem.records[0], problem.settings, change, null.point.common, null.point.per_record[0])
+    flown = (time.perf_counter() - start) / FLIGHTS * len(problem.records) * bends
+    return f"screen of {bends} bends: {screened:.2f} s, {screened / flown:.2f} of a flight of the filter for each"
+
+
 def main() -> None:
     """Print the table."""
     gtm = aircraft.load("gtm")
     trace([read_log(DATA / "f.parquet")], gtm, TraceOptions())  # compiles
     print(flight(prepare([read_log(DATA / "f.parquet")], gtm, [], TraceOptions())))
+    print(screening(prepare([read_log(DATA / "f.parquet")], gtm, [], TraceOptions())))
     print(f"{len(EFFECTS)} effects; s wall (CPU), refits without effects that would take as long")
     print(f"{'set':4} {'verdict':12} {'one thread':>18} {'two threads':>18} {'refits':>7} same answer")
     for path in sorted(DATA.glob("*.parquet")):

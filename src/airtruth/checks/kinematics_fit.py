@@ -221,7 +221,7 @@ def fit(problem: Problem, names: Sequence[str], start: Mapping[str, float] | Non
         fresh = close or not better
         if fresh:
             slopes = _slopes(problem, names, value, moments)
-    if not (fresh and not better):
+    if better or not fresh:
         slopes = _slopes(problem, names, value, moments)
     edge = EDGE * (high - low)
     least = np.array([ERRORS[n].kind in ("lag", "delay") for n in names])

@@ -23,7 +23,6 @@ _DERIVATIVE: Final = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
 """Weights of the derivative at the middle of seven samples, in periods [-]."""
 _SHIFT: Final = np.array([-120.0, 24.0, -12.0, 12.0, -24.0, 120.0])
 """Denominators of Lagrange's weights of six samples [-]."""
-
 _ADDED: Final = np.array([[20.0, -45.0, 36.0, -10.0], [10.0, -20.0, 15.0, -4.0], [4.0, -6.0, 4.0, -1.0]]).T
 """Weights of the first four samples for the third, the second and the first sample before them, on the cubic through them [-]."""
 

@@ -32,9 +32,7 @@ from airtruth.tracing.model.equations import (
 )
 from airtruth.tracing.model.gains import Gains, interpolate, scaled
 from airtruth.tracing.model.kernel_input import AirPoint, FilterModel, KernelInput
-from airtruth.tracing.model.linearise import (
-    FirstUpdate,
-)
+from airtruth.tracing.model.linearise import FirstUpdate
 from airtruth.tracing.model.parameters import AZ, CORE, DELAY_ORDER, LEAD, OUTPUTS
 from airtruth.tracing.model.steady import SteadyFilter, without_update
 

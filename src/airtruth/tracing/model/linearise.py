@@ -22,10 +22,10 @@ from airtruth.tracing.model.parameters import AZ, CORE, DELAY_ORDER, OUTPUTS
 
 Array = NDArray[np.float64]
 
-_ANGLE_RAD: Final = 0.01
+ANGLE_RAD: Final = 0.01
 """Half width of the central differences in angles [rad]. Judgement: wide enough to average a break of a table, so that
 the gain does not jump with the reference; the curvature of the sines over it is 2e-5."""
-_RATE_RAD_S: Final = 0.05
+RATE_RAD_S: Final = 0.05
 """The same in the pitch rate [rad/s]."""
 _GUST: Final = 0.1
 """The same in a gust state that does not move alpha [-]."""
@@ -69,14 +69,14 @@ def delay_system(delay_s: float) -> Array:
 def _half_width(state: int, at: AirPoint, model: FilterModel) -> float:
     """Half width of the central difference in a state of the motion."""
     if state == 1:
-        return _RATE_RAD_S
+        return RATE_RAD_S
     if state < 2 or state >= CORE:
-        return _ANGLE_RAD
+        return ANGLE_RAD
     # a gust that moves alpha as far as above, so that no level or rolloff shifts the breaks that are met
     unit = np.zeros(CORE)
     unit[state] = 1.0
     moves = abs(model.gusts.level_m_s * gust(unit, model.gusts.rolloff)) / at.airspeed_m_s
-    return _ANGLE_RAD / moves if moves > 1e-9 else _GUST
+    return ANGLE_RAD / moves if moves > 1e-9 else _GUST
 
 
 def linearise(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array) -> Array:
@@ -236,6 +236,8 @@ def gain_of(
 
 
 __all__ = [
+    "ANGLE_RAD",
+    "RATE_RAD_S",
     "FirstUpdate",
     "covariance_of",
     "delay_system",

@@ -1,9 +1,9 @@
 """Increments along the motion that the filter flew, and the change of the innovations by a unit of each.
 
-The increments of all shapes pass through one tangent linear model of a record, so that each bend costs a sixth of a
-flight of the filter. The gain of the filter changes by an increment, too. That part is the one of the derivatives with which
-the increment begins at the record's mean, and is taken from their sensitivities, which are differences of flights. Memories
-follow the motion and not the filter's updates of their own.
+The increments of all shapes pass through one tangent linear model of a record, so that each bend costs a quarter of a
+flight of the filter. An increment also changes the gain of the filter. At the record's mean it changes the derivatives, and
+their sensitivities, which are differences of flights, give this part. Memories follow the motion, without updates of
+their own by the filter.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from scipy.signal import lfilter
 from airtruth.effects.increment import Memory, Shape
 from airtruth.physics.terms import READINGS
 from airtruth.tracing.inference.posterior import PosteriorFit, Sensitivities, TraceProblem
+from airtruth.tracing.model.linearise import ANGLE_RAD, RATE_RAD_S
 from airtruth.tracing.model.parameters import OUTPUTS, Common
 from airtruth.tracing.model.response import filter_inputs
 from airtruth.tracing.model.tangent import FLOWN, POINTS, Tangent, propagated, tangent_of
@@ -31,11 +32,6 @@ _COEFFICIENTS: Final = ("CL", "Cm")
 """Coefficients that the filter has."""
 _FACTORS: Final = ("alpha", "qhat", "elevator")
 """Signals of the derivatives, in the order of `airtruth.physics.short_period.PARAMETERS`."""
-_RATE_RAD_S: Final = 0.05
-"""Half width of the central difference in the pitch rate that gives the slope at the reference [rad/s]; as in the filter's
-linearisation."""
-_ANGLE_RAD: Final = 0.01
-"""The same in an angle [rad]."""
 _BLOCK: Final = 200_000
 """Coefficients times samples that pass through the tangent linear model at once [-] (judgement: 30 MB)."""
 
@@ -143,7 +139,7 @@ def _slopes(shape: Shape, reference: Mapping[str, float], half_s: float, alpha_d
         slopes[:, _FACTORS.index(shape.factor)] = shape.basis(reference[shape.signal])
         return every
     middle = reference.get(shape.signal, 0.0)
-    h = _ANGLE_RAD if shape.signal in ("alpha", "elevator") else _RATE_RAD_S * half_s
+    h = ANGLE_RAD if shape.signal in ("alpha", "elevator") else RATE_RAD_S * half_s
     rise = (shape.basis(middle + h) - shape.basis(middle - h)) / (2.0 * h)
     if shape.signal in _FACTORS:
         slopes[:, _FACTORS.index(shape.signal)] = rise
