@@ -6,7 +6,7 @@ import pytest
 from airtruth import aircraft
 from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.manoeuvres import Manoeuvre, sample
-from airtruth.simulation.replay import Track, flown_through, replay, substeps
+from airtruth.simulation.replay import Track, each_flown_through, flown_through, replay, substeps
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import trim
 from airtruth.units import DEG
@@ -54,6 +54,19 @@ def test_a_flight_through_its_own_surface_comes_back(gtm, paper_trim, flown):
     for channel in CHANNELS:
         measured = flown[channel][::EVERY]
         assert np.sqrt(np.mean((again[channel] - measured) ** 2)) < 3e-3 * measured.std(), channel
+
+
+def test_a_record_that_departs_costs_the_others_nothing(gtm, paper_trim, flown):
+    """A surface of 25 deg down leaves the range after a second; the other records have the bits of a flight alone."""
+    sound = track(flown)
+    steps = np.arange(sound.elevator_rad.size) > 5 * EVERY
+    departs = track(flown, elevator_rad=paper_trim.elevator_rad + 25.0 * DEG * steps)
+    first, lost, last = each_flown_through(gtm, [(paper_trim, t) for t in (sound, departs, sound)])
+    assert lost is None
+    alone = flown_through(gtm, paper_trim, sound)
+    for channel in CHANNELS:
+        assert np.array_equal(first[channel], alone[channel]), channel
+        assert np.array_equal(last[channel], alone[channel]), channel
 
 
 def test_biases_initial_state_and_surface_offset_are_free(gtm, paper_trim, flown):

@@ -18,7 +18,7 @@ from airtruth.simulation.trim import trim
 from airtruth.tracing.model.parameters import Common, PerRecord
 from airtruth.tracing.model.plant import probed
 from airtruth.tracing.model.records import TraceRecord, read
-from airtruth.tracing.model.remainder import looked_up, remainder
+from airtruth.tracing.model.remainder import looked_up, remainders
 from airtruth.tracing.model.response import filter_inputs, respond
 from airtruth.tracing.model.settings import initial_per_record, settings_of
 from airtruth.units import DEG
@@ -72,7 +72,7 @@ def test_tables_are_read_trilinearly(plant):
 
 def test_an_aircraft_that_its_tables_hold_has_no_remainder(gtm, paper_trim, plant):
     """The GTM's forces are those of its state; the tables of whole degrees leave 1e-3 of the doublet's moment."""
-    found = remainder(record_of(gtm, paper_trim), plant)
+    found = remainders([record_of(gtm, paper_trim)], [plant])[0]
     moment = abs(plant.derivatives[PARAMETERS.index("Cmde")]) * 1.5 * DEG
     assert np.abs(found[1]).max() < 0.02 * moment
     assert np.abs(found[0]).max() < 0.02 * moment
@@ -84,7 +84,7 @@ def test_tables_that_the_declared_model_flies_beyond_leave_no_remainder(gtm, pap
     signals = record_of(gtm, paper_trim, 4.0 * DEG)
     narrow, wide = plant_of(gtm, paper_trim, 1.0 * DEG), plant_of(gtm, paper_trim, 12.0 * DEG)
     assert np.ptp(signals.y[:, 0]) > 1.5 * np.ptp(narrow.alpha_rad)
-    found, right = remainder(signals, narrow), remainder(signals, wide)
+    found, right = remainders([signals, signals], [narrow, wide])
     moment = abs(plant.derivatives[PARAMETERS.index("Cmde")]) * 4.0 * DEG
     assert np.abs(found - right).max() < 0.02 * moment
 
@@ -93,7 +93,7 @@ def test_a_delay_of_the_model_is_the_remainder(late):
     """dCm = Cmde (de(t - delay) - de(t)), dCL likewise."""
     plane, at, signals = late
     plant = plant_of(plane, at)
-    found = remainder(signals, plant)
+    found = remainders([signals], [plant])[0]
     points = np.arange(found.shape[1]) * DT_S / signals.sub
     fine = np.arange(signals.elevator_rad.size) * DT_S / (signals.sub * 8)
     moved = np.interp(points - DELAY_S, fine, signals.elevator_rad) - np.interp(
@@ -112,7 +112,7 @@ def test_with_the_remainder_the_filter_flies_the_model(late):
     settings = settings_of(plane, 0.05)
     own = initial_per_record(bare, settings)
     own[PerRecord.log_gust] = np.log(1e-3)
-    carried = replace(bare, remainder=remainder(signals, bare.plant))
+    carried = replace(bare, remainder=remainders([signals], [bare.plant])[0])
     sizes = [
         respond(r, settings, Change(), np.zeros(Common.size), own, free_run=True).e.std(axis=0)
         for r in (bare, carried)

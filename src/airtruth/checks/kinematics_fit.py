@@ -14,6 +14,7 @@ from airtruth.checks.kinematics_lines import Lines, Weight, lines_of, weigh
 from airtruth.checks.kinematics_model import ERRORS, Record, compare, stacked
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 STEPS: Final = 25
 """Largest number of Gauss-Newton steps of a fit [-]: judgement; a fit that needs more is reported as unconverged."""
@@ -177,17 +178,23 @@ def problem_of(
     return Problem(tuple(records), lines, tuple(equations), known, limits, weight)
 
 
-def fit(problem: Problem, names: Sequence[str], start: Mapping[str, float] | None = None) -> Fit:
+def fit(
+    problem: Problem,
+    names: Sequence[str],
+    start: Mapping[str, float] | None = None,
+    near: Sequence[Array] | None = None,
+) -> Fit:
     """Fit errors by Gauss-Newton steps, shortened where the statistic would grow.
 
     The derivatives are updated between steps (C. G. Broyden, *Mathematics of Computation* 19, 1965) and renewed where
-    a step fails and at the end.
+    a step fails and before the last step.
 
     Parameters
     ----------
     problem : records and weight.
     names : free errors; none gives the statistic as it is.
     start : values at which the search starts; an error without an entry starts at its declared value.
+    near : (m,) derivative of the moments by each error near the start; None makes those at the start.
     """
     names = tuple(names)
     low, high = (np.array([problem.limits[n][i] for n in names]) for i in (0, 1))
@@ -196,24 +203,21 @@ def fit(problem: Problem, names: Sequence[str], start: Mapping[str, float] | Non
     moments = problem.moments(dict(zip(names, value, strict=True)))
     if not names:
         return Fit((), value, value, np.zeros((0, 0)), float(moments @ moments), True)
-    slopes, fresh, converged = _slopes(problem, names, value, moments), True, False
+    slopes = _slopes(problem, names, value, moments) if near is None else np.array(near)
+    fresh, converged = near is None, False
     for _ in range(STEPS):
         covariance = _inverse(slopes @ slopes.T)
-        step = -covariance @ (slopes @ moments)
-        trial = np.clip(value + step, low, high)
+        trial = np.clip(value + _step(slopes, moments, value <= low, value >= high), low, high)
         after = problem.moments(dict(zip(names, trial, strict=True)))
         for _ in range(SHORTENED):
             if after @ after <= moments @ moments + 1e-9:
                 break
             trial = value + 0.3 * (trial - value)
             after = problem.moments(dict(zip(names, trial, strict=True)))
-        moved = trial - value
+        moved, rise = trial - value, after - moments
         close = bool((np.abs(moved) <= CLOSE * np.sqrt(np.diagonal(covariance))).all())
         better = after @ after <= moments @ moments + 1e-9
         if better:
-            slopes = slopes + np.outer(moved, after - moments - moved @ slopes) / max(
-                float(moved @ moved), 1e-300
-            )
             value, moments = trial, after
         if (close or not better) and fresh:
             converged = close
@@ -221,7 +225,9 @@ def fit(problem: Problem, names: Sequence[str], start: Mapping[str, float] | Non
         fresh = close or not better
         if fresh:
             slopes = _slopes(problem, names, value, moments)
-    if better or not fresh:
+        else:
+            slopes = slopes + np.outer(moved, rise - moved @ slopes) / max(float(moved @ moved), 1e-300)
+    if not fresh:
         slopes = _slopes(problem, names, value, moments)
     edge = EDGE * (high - low)
     least = np.array([ERRORS[n].kind in ("lag", "delay") for n in names])
@@ -243,6 +249,20 @@ def fit(problem: Problem, names: Sequence[str], start: Mapping[str, float] | Non
 def _slopes(problem: Problem, names: Sequence[str], value: Array, moments: Array) -> Array:
     errors = dict(zip(names, value, strict=True))
     return np.array([problem.slope(n, errors, moments) for n in names])
+
+
+def _step(slopes: Array, moments: Array, lowest: Bools, highest: Bools) -> Array:
+    """Gauss-Newton step of the errors that it does not move beyond the ends of their ranges, where the others stay."""
+    step, free = np.zeros(len(slopes)), np.ones(len(slopes), dtype=bool)
+    while free.any():
+        own = slopes[free]
+        step[free] = -_inverse(own @ own.T) @ (own @ moments)
+        beyond = free & (lowest & (step < 0.0) | highest & (step > 0.0))
+        if not beyond.any():
+            break
+        free &= ~beyond
+        step[beyond] = 0.0
+    return step
 
 
 def _inverse(normal: Array) -> Array:

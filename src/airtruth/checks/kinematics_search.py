@@ -248,7 +248,7 @@ def _grow(
             promises[names] = min(promised, promises.get(names, promised))
         for _, i in sorted(promises.values())[:TRIED]:
             start = {**errors, **{h.name: h.start for h in more[i]}}
-            better = fit(problem, tuple(start), start)
+            better = fit(problem, tuple(start), start, [*slopes, *(h.slope for h in more[i])])
             key = frozenset(start)
             if key not in known or (better.sound, -better.statistic) > (
                 known[key].sound,

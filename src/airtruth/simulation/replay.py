@@ -141,6 +141,30 @@ def flown_through(aircraft: Aircraft, at: Trim, track: Track) -> dict[str, Array
     return _run(executive, at, track, np.array([at.alpha_rad, 0.0, at.elevator_rad - first]))
 
 
+def each_flown_through(
+    aircraft: Aircraft, flights: Sequence[tuple[Trim, Track]]
+) -> list[dict[str, Array] | None]:
+    """`flown_through` of several records; None for one whose motion leaves the range.
+
+    Parameters
+    ----------
+    aircraft : aircraft to fly.
+    flights : trim about which each record starts, and the record.
+
+    Raises
+    ------
+    AircraftError
+        If the aircraft has no JSBSim model.
+    """
+    flown: list[dict[str, Array] | None] = []
+    for at, track in flights:
+        try:
+            flown.append(flown_through(aircraft, at, track))
+        except FlightError:
+            flown.append(None)
+    return flown
+
+
 def _residual(measured: Array, flown: Array, weight: Array) -> Array:
     difference = (measured - flown) / weight
     return np.asarray(difference - difference.mean(axis=1, keepdims=True))
@@ -259,4 +283,4 @@ def _stepped(
     return np.array(records).reshape(-1, len(gets)).T
 
 
-__all__ = ["STEP_S", "Track", "replay", "substeps"]
+__all__ = ["STEP_S", "Track", "each_flown_through", "flown_through", "replay", "substeps"]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.errors import FlightError, LogError, TrimError
+from airtruth.errors import LogError, TrimError
 from airtruth.physics.gust_figures import gust_scales
 from airtruth.simulation.trim import Trim
 from airtruth.tracing.model.plant import (
@@ -22,7 +22,7 @@ from airtruth.tracing.model.plant import (
     with_throttle,
 )
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, head_samples
-from airtruth.tracing.model.remainder import remainder
+from airtruth.tracing.model.remainder import remainders
 from airtruth.units import DEG
 
 Array = NDArray[np.float64]
@@ -67,8 +67,9 @@ def records_of(
         everyone = [signals[i] for i in group]
         members = [s for s in everyone if s.run_id not in held] or everyone
         length = gust_length_m(float(np.mean([s.altitude_m for s in members])))
-        for i, plant in zip(group, _plants(everyone, members, aircraft, model), strict=True):
-            records[i] = TraceRecord(signals[i], plant, length, _remainder(signals[i], plant))
+        plants = _plants(everyone, members, aircraft, model)
+        for i, plant, more in zip(group, plants, remainders(everyone, plants), strict=True):
+            records[i] = TraceRecord(signals[i], plant, length, more)
     return [records[i] for i in range(len(signals))]
 
 
@@ -103,16 +104,6 @@ def _plants(
     plant = _probed(aircraft, at, members)
     wider = plant if len(members) == len(everyone) else _probed(aircraft, at, everyone)
     return [plant if any(s is m for m in members) else wider for s in everyone]
-
-
-def _remainder(s: Signals, plant: Plant) -> Array | None:
-    """What the JSBSim model has beyond the tables along a run; None for the linear model, and where it diverges."""
-    if plant.trim is None:
-        return None
-    try:
-        return remainder(s, plant)
-    except FlightError:
-        return None
 
 
 def _start_of(s: Signals) -> tuple[float, float]:

@@ -13,15 +13,9 @@ from airtruth.aircraft import Aircraft
 from airtruth.errors import AircraftError, TrimError
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.simulation.disposable import isolated
-from airtruth.simulation.linearise import Linearisation, linearise
-from airtruth.simulation.probe import (
-    Grid,
-    alpha_dot_terms,
-    forces_at_speeds,
-    forces_over_alpha,
-    probe,
-    with_breaks,
-)
+from airtruth.simulation.linearise import linearise
+from airtruth.simulation.operating_point import operating_point
+from airtruth.simulation.probe import Grid, alpha_dot_terms, forces_at_speeds
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim, trim
 from airtruth.units import DEG, G0
@@ -155,13 +149,11 @@ def probed(
     rates = np.linspace(-1.0, 1.0, _RATES) * max(q * _RATE_MARGIN, _LEAST_RATE_RAD_S)
     commands = whole(elevator[0] + offset, elevator[1] + offset, DEG)
     grid = Grid(whole(alpha[0], alpha[1], DEG), commands, rates, np.ones(1))
-    grid = isolated(f"the breaks of the forces of {aircraft.name}", with_breaks, aircraft, at, grid)
-    tables = isolated(f"the table of forces of {aircraft.name}", probe, aircraft, at, grid).tables
-    power = engines(aircraft, at)
-    constant = power.constant + _constants_over_alpha(aircraft, at, tables.alpha_rad)
+    point = isolated(f"the table of forces of {aircraft.name}", operating_point, aircraft, at, grid, _SPEEDS)
+    tables, declared, constants = point.tables, point.derivatives, aircraft.constants
+    power = _engines_of(at, point.at_speeds)
+    constant = power.constant + _constants_over_alpha(at, tables.alpha_rad, point.over_alpha)
     pressure = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2
-    declared = _linearised(aircraft, at)
-    constants = aircraft.constants
     return Plant(
         aircraft=aircraft,
         alpha_rad=tables.alpha_rad,
@@ -181,14 +173,20 @@ def probed(
     )
 
 
-def _constants_over_alpha(aircraft: Aircraft, at: Trim, alpha_rad: Array) -> Array:
-    """(alpha, 3) X, Z [N] and M [N m] that do not go with the dynamic pressure, less those at the trim's angle of attack."""
-    work = f"the forces of {aircraft.name} at other airspeeds"
-    forces = isolated(work, forces_over_alpha, aircraft, at, alpha_rad, _SPEEDS)
-    pressures = 0.5 * at.density_kg_m3 * (at.airspeed_m_s * _SPEEDS) ** 2
-    line = np.column_stack([np.ones_like(pressures), pressures])
-    constant = np.linalg.lstsq(line, forces.reshape(len(pressures), -1), rcond=None)[0][0].reshape(-1, 3)
+def _constants_over_alpha(at: Trim, alpha_rad: Array, forces: Array) -> Array:
+    """(alpha, 3) X, Z [N] and M [N m] that do not go with the dynamic pressure, less those at the trim's angle of attack.
+
+    ``forces`` (speeds, alpha, 3) are those at `_SPEEDS`.
+    """
+    constant = _lines(at, forces.reshape(_SPEEDS.size, -1))[0].reshape(-1, 3)
     return np.asarray(constant - constant[int(np.argmin(np.abs(alpha_rad - at.alpha_rad)))])
+
+
+def _lines(at: Trim, rows: Array) -> Array:
+    """(2, n) values at no dynamic pressure, and slopes over it, of (speeds, n) values at `_SPEEDS`."""
+    pressures = 0.5 * at.density_kg_m3 * (at.airspeed_m_s * _SPEEDS) ** 2
+    basis = np.column_stack([np.ones_like(pressures), pressures])
+    return np.asarray(np.linalg.lstsq(basis, rows, rcond=None)[0], dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -207,10 +205,12 @@ class Engines:
 
 def engines(aircraft: Aircraft, at: Trim) -> Engines:
     """The engines of the JSBSim aircraft, from three airspeeds about a trim."""
-    rows = isolated(f"the forces of the engines of {aircraft.name}", forces_at_speeds, aircraft, at, _SPEEDS)
-    pressures = 0.5 * at.density_kg_m3 * (at.airspeed_m_s * _SPEEDS) ** 2
-    basis = np.column_stack([np.ones_like(pressures), pressures])
-    fitted = np.linalg.lstsq(basis, rows, rcond=None)[0]
+    work = f"the forces of the engines of {aircraft.name}"
+    return _engines_of(at, isolated(work, forces_at_speeds, aircraft, at, _SPEEDS))
+
+
+def _engines_of(at: Trim, at_speeds: Array) -> Engines:
+    fitted = _lines(at, at_speeds)
     return Engines(np.ascontiguousarray(fitted[0, :3]), np.ascontiguousarray(fitted[:, 3]))
 
 
@@ -220,10 +220,6 @@ def alpha_dot(plant: Plant) -> Array:
         return np.zeros(2)
     aircraft = plant.aircraft
     return isolated(f"the terms in alpha_dot of {aircraft.name}", alpha_dot_terms, aircraft, plant.trim)
-
-
-def _linearised(aircraft: Aircraft, at: Trim) -> Linearisation:
-    return isolated(f"the derivatives of {aircraft.name}", linearise, aircraft, at)
 
 
 def linear(
@@ -285,7 +281,7 @@ def declared_derivatives(aircraft: Aircraft, at: Trim | None) -> Array:
         If neither is there.
     """
     if at is not None:
-        return _linearised(aircraft, at).central
+        return isolated(f"the derivatives of {aircraft.name}", linearise, aircraft, at).central
     stated = aircraft.file.derivatives
     missing = [name for name in PARAMETERS if name not in stated]
     if missing:

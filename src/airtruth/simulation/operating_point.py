@@ -1,0 +1,63 @@
+"""What JSBSim tells of an aircraft about one trim: tables of its forces, its engines and its derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.aircraft import Aircraft
+from airtruth.physics.longitudinal import ForceTables
+from airtruth.simulation.linearise import Linearisation, linearise
+from airtruth.simulation.probe import Grid, forces_at_speeds, forces_over_alpha, probe, with_breaks
+from airtruth.simulation.trim import Trim
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """An aircraft about a trim.
+
+    Attributes
+    ----------
+    tables : forces and moment over the states of a grid.
+    at_speeds : (speeds, 4) see `airtruth.simulation.probe.forces_at_speeds`.
+    over_alpha : (speeds, alpha, 3) at the angles of attack of the tables, see
+        `airtruth.simulation.probe.forces_over_alpha`.
+    derivatives : about the trim.
+    """
+
+    tables: ForceTables
+    at_speeds: Array
+    over_alpha: Array
+    derivatives: Linearisation
+
+
+def operating_point(aircraft: Aircraft, trim: Trim, grid: Grid, ratios: Array) -> OperatingPoint:
+    """Probe an aircraft about a trim.
+
+    Parameters
+    ----------
+    aircraft, trim : the aircraft and its equilibrium.
+    grid : states of the tables; breaks of the forces over the angle of attack are added.
+    ratios : (speeds,) airspeed over that of the trim, of the forces at other airspeeds [-].
+
+    Raises
+    ------
+    AircraftError
+        If the surface does not rise with its command, or moves with alpha, q or airspeed.
+    TrimError
+        If the elevator surface does not follow its command at the trim.
+    """
+    tables = probe(aircraft, trim, with_breaks(aircraft, trim, grid)).tables
+    return OperatingPoint(
+        tables=tables,
+        at_speeds=forces_at_speeds(aircraft, trim, ratios),
+        over_alpha=forces_over_alpha(aircraft, trim, tables.alpha_rad, ratios),
+        derivatives=linearise(aircraft, trim),
+    )
+
+
+__all__ = ["OperatingPoint", "operating_point"]
