@@ -10,6 +10,7 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.errors import LogError
 from airtruth.simulation.trim import trim
 from airtruth.tracing import TraceOptions
+from airtruth.tracing.conditions import condition_notes
 from airtruth.tracing.prepare import prepare
 
 SLOW_M_S = 26.0
@@ -51,5 +52,24 @@ def test_no_airspeed_of_the_record_has_a_trim(log, gtm):
         prepared(with_airspeed(log, SLOW_M_S - 1.0, SLOW_M_S + 1.0), gtm)
 
 
+def test_a_record_that_leaves_the_dynamic_pressure_of_its_trim(log, gtm):
+    """26 m/s after 54 m/s: 0.42 of the dynamic pressure at their mean of 40 m/s, and (54/40)^2 = 1.8 is nearer to it."""
+    notes = [
+        note for note in prepared(with_airspeed(log, 26.0, 54.0), gtm).notes if "dynamic pressure" in note
+    ]
+    assert [note.split()[0] for note in notes] == list(log.run_ids)
+    assert "reaches 26 m/s and 0.42 of the dynamic pressure of its trim at 40 m/s" in notes[0]
+
+
+def test_a_record_along_which_the_declared_aircraft_departs(log, gtm):
+    """The record that departs is named; a record of the linear model has no flight in JSBSim."""
+    first, second = prepared(log, gtm).fitted.records
+    (note,) = condition_notes([first, replace(second, remainder=None)])
+    assert note.startswith(f"along {second.signals.run_id} the declared aircraft departs in JSBSim")
+    linear = replace(second, remainder=None, plant=replace(second.plant, trim=None))
+    assert condition_notes([first, linear]) == []
+
+
 def test_no_note_where_the_aircraft_flies(log, gtm):
-    assert not [note for note in prepared(log, gtm).notes if "cannot fly steadily" in note]
+    case = prepared(log, gtm)
+    assert condition_notes([*case.fitted.records, *case.held.records]) == []

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from airtruth.aircraft import Aircraft
 from airtruth.errors import LogError, TrimError
 from airtruth.physics.gust_figures import gust_scales
+from airtruth.simulation.readings import MOST_ALPHA_RAD
 from airtruth.simulation.trim import Trim
 from airtruth.tracing.model.plant import (
     Plant,
@@ -41,6 +42,9 @@ _TRIM_SPEEDS: Final = 25
 in a record that loses half of 43 m/s)."""
 _OTHER_TRIM: Final = 2.0 * _SAME_SPEED
 """Relative difference between trim and mean airspeed that is reported [-]: records of one condition differ by less."""
+_FAR: Final = 2.0
+"""Ratio of dynamic pressures, up or down, from which a record is reported to leave its trim [-] (judgement: the engines are
+probed within 6 % and extrapolated as a line)."""
 _GUST_ALTITUDE_M: Final = (30.0, 20000.0)
 """Altitudes between which the gust scales are evaluated [m] (judgement: within the range of MIL-F-8785C)."""
 
@@ -161,19 +165,41 @@ def _reached_speeds(members: Sequence[Signals], speed: float) -> list[float]:
     return sorted(np.linspace(low, high, _TRIM_SPEEDS).tolist(), key=lambda v: abs(v - speed))
 
 
-def other_trims(records: Sequence[TraceRecord]) -> list[str]:
-    """Notes on records at whose mean airspeed the declared aircraft cannot fly steadily, without a final period."""
-    notes = []
-    for record in records:
-        at = record.plant.trim
-        mean = float(record.signals.airspeed_m_s.mean())
-        if at is not None and abs(at.airspeed_m_s / mean - 1.0) > _OTHER_TRIM:
-            notes.append(
-                f"{record.signals.run_id} has a mean airspeed of {mean:.3g} m/s, where the declared aircraft cannot fly "
-                f"steadily: its forces are those about a trim at {at.airspeed_m_s:.3g} m/s, evaluated at the airspeeds of the "
-                "record"
-            )
-    return notes
+def condition_notes(records: Sequence[TraceRecord]) -> list[str]:
+    """Notes on records that leave the flight condition about which the declared aircraft is probed, without a final period."""
+    return [note for record in records for note in (*_away(record), *_departs(record))]
+
+
+def _away(record: TraceRecord) -> list[str]:
+    """A record that has no trim at its mean airspeed, or that leaves the dynamic pressure of its trim."""
+    s, at = record.signals, record.plant.trim
+    if at is None:
+        return []
+    mean = float(s.airspeed_m_s.mean())
+    if abs(at.airspeed_m_s / mean - 1.0) > _OTHER_TRIM:
+        return [
+            f"{s.run_id} has a mean airspeed of {mean:.3g} m/s, where the declared aircraft cannot fly steadily: its forces are "
+            f"those about a trim at {at.airspeed_m_s:.3g} m/s, evaluated at the airspeeds of the record"
+        ]
+    ratio = s.density_kg_m3 * s.airspeed_m_s**2 / (at.density_kg_m3 * at.airspeed_m_s**2)
+    farthest = int(np.argmax(np.abs(np.log(ratio))))
+    if abs(np.log(ratio[farthest])) < np.log(_FAR):
+        return []
+    return [
+        f"{s.run_id} reaches {float(s.airspeed_m_s[farthest]):.3g} m/s and {ratio[farthest]:.2g} of the dynamic pressure of its "
+        f"trim at {at.airspeed_m_s:.3g} m/s, about which the declared aircraft is probed: what engines and Mach number add is "
+        "not probed there; trace without this record as well, and compare the answers"
+    ]
+
+
+def _departs(record: TraceRecord) -> list[str]:
+    """A record along which the declared aircraft leaves the range of the simulation."""
+    if record.plant.trim is None or record.remainder is not None:
+        return []
+    return [
+        f"along {record.signals.run_id} the declared aircraft departs in JSBSim (angle of attack above "
+        f"{MOST_ALPHA_RAD / DEG:.0f} deg): the servos, lags and terms in alpha_dot of its model are left out for this record"
+    ]
 
 
 def gust_length_m(altitude_m: float) -> float:
@@ -182,4 +208,4 @@ def gust_length_m(altitude_m: float) -> float:
     return gust_scales("mil-f-8785c", "light", min(max(altitude_m, lowest), highest)).length_w_m
 
 
-__all__ = ["gust_length_m", "other_trims", "records_of"]
+__all__ = ["condition_notes", "gust_length_m", "records_of"]

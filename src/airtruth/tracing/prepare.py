@@ -20,7 +20,7 @@ from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.composition import directions
 from airtruth.physics.reconstruction import is_reconstructed
 from airtruth.physics.short_period import PARAMETERS
-from airtruth.tracing.conditions import other_trims, records_of
+from airtruth.tracing.conditions import condition_notes, records_of
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, fine, read
@@ -125,7 +125,7 @@ def prepare(
     if len(fitted) == 1:
         notes.append("one record is fitted: each of its halves is left out in turn")
         fitted = _halves(fitted[0])
-    notes.extend(other_trims(records))
+    notes.extend(condition_notes(records))
     if not held:
         notes.append("nothing is held out: the verdict is provisional")
     if not has_vane:
