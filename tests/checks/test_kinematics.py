@@ -265,6 +265,29 @@ def test_a_lag_far_beyond_half_a_second_is_reached_from_zero(true):
     assert found.value[0] == pytest.approx(0.9, abs=0.05)
 
 
+def test_a_lag_at_zero_leaves_the_others_at_their_least(true):
+    """A late accelerometer makes alpha lead, and no lag is negative: the arm is that of a fit without the lag."""
+    late = problem(noisy(measured(true, {"sensor_delay:az_m_s2": 0.04}), 6, 0.3))
+    alone = fit(late, ("vane_arm",))
+    found = fit(late, ("vane_lag", "vane_arm"), {"vane_lag": 0.1})
+    assert found.converged
+    assert found.value[0] == 0.0
+    assert found.value[1] == pytest.approx(alone.value[0], abs=0.05 * float(alone.std[0]))
+    assert found.statistic == pytest.approx(alone.statistic, rel=1e-3)
+
+
+def test_derivatives_from_nearby_lead_to_the_same_fit(true):
+    """A start with the derivatives of another point ends where one with its own does, within a fraction of the standard error."""
+    given = problem(noisy(measured(true, {"vane_arm": 1.5, "vane_lag": 0.05}), 7, 0.3))
+    base = given.moments({})
+    near = [given.slope(name, {}, base) for name in ("vane_lag", "vane_arm")]
+    own, other = (fit(given, ("vane_lag", "vane_arm"), {"vane_lag": 0.1}, n) for n in (None, near))
+    assert own.converged
+    assert other.converged
+    assert (np.abs(own.value - other.value) < 0.05 * own.std).all()
+    np.testing.assert_allclose(other.std, own.std, rtol=0.01)
+
+
 def test_motions_of_the_elevator_know_nothing_of_noise(true):
     """Principal angles between the spans of a quiet and of a noisy record near zero."""
     quiet, loud = (lines_of(record(x)).basis for x in (true, noisy(true, 0, 1.0)))

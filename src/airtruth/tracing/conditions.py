@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from airtruth.aircraft import Aircraft
 from airtruth.errors import LogError, TrimError
 from airtruth.physics.gust_figures import gust_scales
-from airtruth.simulation.readings import MOST_ALPHA_RAD
 from airtruth.simulation.trim import Trim
 from airtruth.tracing.model.plant import (
     Plant,
@@ -197,8 +196,8 @@ def _departs(record: TraceRecord) -> list[str]:
     if record.plant.trim is None or record.remainder is not None:
         return []
     return [
-        f"along {record.signals.run_id} the declared aircraft departs in JSBSim (angle of attack above "
-        f"{MOST_ALPHA_RAD / DEG:.0f} deg): the servos, lags and terms in alpha_dot of its model are left out for this record"
+        f"along {record.signals.run_id} the declared aircraft departs in JSBSim, or its model ends the simulation: the servos, "
+        "lags and terms in alpha_dot of the model are left out for this record"
     ]
 
 
