@@ -41,7 +41,7 @@ Ints = NDArray[np.int64]
 _SEARCH: Final = Options(
     iterations=30,
     damping=Damping(initial=1e-6, least=1e-6, most=np.inf, poor=0.1, fair=0.1),
-    stopping=Stopping(decrease=0.01),
+    stopping=Stopping(decrease=0.01, decrease_confirm=0.05),
 )
 """How a record's own parameters are searched; judgement: ten parameters that are well determined, so that steps are
 nearly undamped. A search ends once a step gains 0.01 in log-likelihood, 0.14 standard errors. Derivatives that serve several
