@@ -206,8 +206,10 @@ def fit(
     slopes = _slopes(problem, names, value, moments) if near is None else np.array(near)
     fresh, converged = near is None, False
     for _ in range(STEPS):
-        covariance = _inverse(slopes @ slopes.T)
-        trial = np.clip(value + _step(slopes, moments, value <= low, value >= high), low, high)
+        normal = slopes @ slopes.T
+        covariance = _inverse(normal)
+        step = _step(normal, covariance, slopes @ moments, value <= low, value >= high)
+        trial = np.clip(value + step, low, high)
         after = problem.moments(dict(zip(names, trial, strict=True)))
         for _ in range(SHORTENED):
             if after @ after <= moments @ moments + 1e-9:
@@ -251,17 +253,13 @@ def _slopes(problem: Problem, names: Sequence[str], value: Array, moments: Array
     return np.array([problem.slope(n, errors, moments) for n in names])
 
 
-def _step(slopes: Array, moments: Array, lowest: Bools, highest: Bools) -> Array:
-    """Gauss-Newton step of the errors that it does not move beyond the ends of their ranges, where the others stay."""
-    step, free = np.zeros(len(slopes)), np.ones(len(slopes), dtype=bool)
-    while free.any():
-        own = slopes[free]
-        step[free] = -_inverse(own @ own.T) @ (own @ moments)
-        beyond = free & (lowest & (step < 0.0) | highest & (step > 0.0))
-        if not beyond.any():
-            break
+def _step(normal: Array, covariance: Array, gradient: Array, lowest: Bools, highest: Bools) -> Array:
+    """Gauss-Newton step; an error at an end of its range that the step would move beyond it stays, and the others follow."""
+    step, free = -covariance @ gradient, np.ones(len(gradient), dtype=bool)
+    while (beyond := lowest & (step < 0.0) | highest & (step > 0.0)).any():
         free &= ~beyond
-        step[beyond] = 0.0
+        step = np.zeros(len(gradient))
+        step[free] = -_inverse(normal[np.ix_(free, free)]) @ gradient[free]
     return step
 
 

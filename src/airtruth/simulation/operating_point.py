@@ -1,4 +1,4 @@
-"""What JSBSim tells of an aircraft about one trim: tables of its forces, its engines and its derivatives."""
+"""Forces, engines and derivatives of a JSBSim aircraft about one trim."""
 
 from __future__ import annotations
 

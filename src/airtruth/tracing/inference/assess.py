@@ -44,8 +44,9 @@ _SEARCH: Final = Options(
     stopping=Stopping(decrease=0.01, decrease_confirm=0.05),
 )
 """How a record's own parameters are searched; judgement: ten parameters that are well determined, so that steps are
-nearly undamped. A search ends once a step gains 0.01 in log-likelihood, 0.14 standard errors. Derivatives that serve several
-steps end it early, by hundreds in log-likelihood, where it begins without knowledge of the gusts."""
+nearly undamped. A search ends once a step gains less than 0.01 in log-likelihood, 0.14 standard errors, and an undamped step
+promises less than 0.05. Derivatives that serve several steps end it early, by hundreds in log-likelihood, where it begins without
+knowledge of the gusts."""
 _MOST_LOG_STEP: Final = 1.0
 """Largest step of the logarithm of the gust level [-]: a factor of e (judgement)."""
 _FREE_RUN_ITERATIONS: Final = 3
