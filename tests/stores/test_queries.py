@@ -104,7 +104,7 @@ def test_bias_is_that_of_pandas(campaigns: Path, results: dict[int, Any]) -> Non
 
 def test_failed_runs_are_those_of_the_truth(campaigns: Path, results: dict[int, Any]) -> None:
     truth = pd.concat(pd.read_parquet(p) for p in sorted((campaigns / "out").glob("*/truth.parquet")))
-    failed = results[block("json_each(failed)")]
+    failed = results[block("json_each(line.json -> 'failed')")]
     assert list(failed["run_id"]) == sorted(truth.loc[truth["status"] == "failed", "run_id"])
     assert len(failed)
     assert failed["reason"].str.startswith("gtm cannot be trimmed").all()
