@@ -19,7 +19,7 @@ AT := $(if $(STORE),--store $(STORE))
 LATE := elevator_delay actuator_lag gyro_lag sensor_delay
 CAMPAIGNS := light light-fit moderate moderate-fit
 
-.PHONY: planned planned-ties check-study help setup setup-dev lock installed docs docs-links campaign campaign-quick loop study blind test test-slow test-long test-all fuzz robustness mutants lint kernels browser bench clean
+.PHONY: planned planned-ties check-study help setup setup-dev lock installed docs docs-links campaign campaign-further campaign-quick loop study blind test test-slow test-long test-all fuzz robustness mutants lint kernels browser bench clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -60,7 +60,10 @@ $(VENV)/.docs: requirements-docs.lock $(READY)
 campaign: $(READY) ## fly data/campaigns, identify, print the paper's tables, close the loop (into out/)
 	$(BIN)/python -m scripts.campaign --out $(OUT) $(AT) --jobs $(JOBS)
 
-campaign-quick: $(READY) ## the same with a tenth of the runs
+campaign-further: $(READY) ## the same with six more methods, and a trace of each log of data/undeclared (about half an hour)
+	$(BIN)/python -m scripts.campaign --out $(OUT) $(AT) --jobs $(JOBS) --further --undeclared
+
+campaign-quick: $(READY) ## make campaign with a tenth of the runs
 	$(BIN)/python -m scripts.campaign --out $(OUT)/quick $(AT) --jobs $(JOBS) --quick
 
 loop: $(READY) ## the paper's experiment through the loop: 2000 runs, every method before and after (six minutes)

@@ -1,9 +1,10 @@
 """make campaign: fly data/campaigns, identify, print the paper's tables, draw the figures, close the loop.
 
-    python -m scripts.campaign [--out DIR] [--store URL] [--jobs N] [--quick]
+    python -m scripts.campaign [--out DIR] [--store URL] [--jobs N] [--quick] [--further] [--undeclared]
 
-The loop traces the first runs of light-fit and identifies the others before and after (studies/paper_loop.py). At the
-end, each flight test of data/undeclared is traced. An interrupted campaign resumes.
+The loop traces the first runs of light-fit and identifies the others before and after (studies/paper_loop.py). An
+interrupted campaign resumes. `make campaign-further` also identifies by the six methods that the paper does not have,
+and traces each flight test of data/undeclared.
 """
 
 from __future__ import annotations
@@ -16,9 +17,8 @@ from typing import Final
 
 from airtruth import aircraft, style
 from airtruth.errors import AirtruthError
-from airtruth.identification import Options, identify, write_estimates
 from airtruth.logs.remote import location
-from airtruth.logs.store import read_table
+from airtruth.logs.store import log_paths, read_table, write_table
 from airtruth.reporting import write_tables
 from airtruth.reporting.loop_figures import traces_page
 from airtruth.reporting.paper.tables import FURTHER, methods_of
@@ -26,7 +26,7 @@ from airtruth.simulation.campaign import plan
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.presentation.overview import write_traces
 from studies import paper_loop
-from studies.campaign_figures import CAMPAIGN_FILES, PAPER, write_figures
+from studies.campaign_figures import CAMPAIGN_FILES, write_figures
 
 CAMPAIGNS: Final = ("light", "light-fit", "moderate", "moderate-fit")
 """Campaigns of data/campaigns that the paper's tables show."""
@@ -61,6 +61,8 @@ def main() -> int:
     )
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--quick", action="store_true", help="a tenth of the runs")
+    parser.add_argument("--further", action="store_true", help="also the methods that the paper does not have")
+    parser.add_argument("--undeclared", action="store_true", help="also trace the logs of data/undeclared")
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
     store = location(arguments.store or arguments.out)
@@ -69,11 +71,13 @@ def main() -> int:
         if code:
             return code
     try:
-        identify_campaigns(store)
+        identify_campaigns(store, arguments.jobs, arguments.further)
         close_loop(
             store, arguments.out, arguments.jobs, QUICK_TRACED if arguments.quick else paper_loop.TRACED
         )
-        trace_undeclared(arguments.out / "trace", arguments.jobs, QUICK_LOGS if arguments.quick else None)
+        if arguments.undeclared:
+            logs = QUICK_LOGS if arguments.quick else None
+            trace_undeclared(arguments.out / "trace", arguments.jobs, logs)
     except AirtruthError as error:
         print(f"campaign: {error}", file=sys.stderr)
         return error.exit_code
@@ -89,15 +93,14 @@ def fly(name: str, out: Path, jobs: int, quick: bool) -> int:
     return subprocess.run(command, check=False).returncode
 
 
-def identify_campaigns(out: Path) -> None:
+def identify_campaigns(out: Path, jobs: int, further: bool) -> None:
     """Identify the flown campaigns; print and write their tables and figures."""
     gtm = aircraft.load(GTM)
     for name in CAMPAIGNS:
         print(f"identify {name}", file=sys.stderr)
-        # the paper's methods at the airspeed of the trim, the methods beyond the paper as they are
-        for methods, options in ((methods_of(name), PAPER), (FURTHER, Options())):
-            estimates = identify(out / name, gtm, methods, options)
-            write_estimates(out / name / "estimates.parquet", estimates, force=True)
+        methods = methods_of(name) + (FURTHER if further else ())
+        estimates = paper_loop.identify_all(log_paths(out / name), None, jobs, methods)
+        write_table(out / name / "estimates.parquet", estimates)
     tables = write_tables([out / name for name in CAMPAIGNS], out / "tables")
     print(tables.text)
     print("Written: " + ", ".join(map(str, [*tables.paths, *write_figures(out, CAMPAIGNS, gtm)])))

@@ -11,8 +11,15 @@ from airtruth import aircraft
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import trim
 from airtruth.units import FT, KT
+from tests.tiers import divide_grids
 
 ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Divide the grids before pytest deselects by marker."""
+    divide_grids(items)
 
 
 @pytest.fixture(scope="session")

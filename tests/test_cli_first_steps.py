@@ -57,6 +57,7 @@ def airtruth(tmp_path):
     return run
 
 
+@pytest.mark.slow
 def test_a_new_campaign_works_as_written(airtruth, tmp_path):
     code, out, _ = airtruth("new", "campaign", "--out", "first test.toml")
     assert code == 0
@@ -122,6 +123,7 @@ def test_the_file_of_a_new_aircraft_has_one_name(airtruth, tmp_path):
     assert (tmp_path / "mine" / "aircraft.toml").is_file()
 
 
+@pytest.mark.slow
 def test_a_new_mapping_imports_the_example(airtruth, tmp_path):
     code, out, _ = airtruth("new", "mapping", "--out", "map.toml")
     assert code == 0
@@ -144,6 +146,7 @@ def test_a_new_mapping_of_a_file_is_the_guess(airtruth, tmp_path):
     assert "state sign = -1" in err
 
 
+@pytest.mark.slow
 def test_new_replaces_no_file_of_the_user(airtruth, tmp_path):
     (tmp_path / "c.toml").write_text("# mine\n")
     code, _, err = airtruth("new", "campaign", "--out", "c.toml")
@@ -153,6 +156,7 @@ def test_new_replaces_no_file_of_the_user(airtruth, tmp_path):
     assert airtruth("new", "campaign", "--out", "c.toml", "--force")[0] == 0
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("kind", FILES)
 def test_new_names_the_missing_option(airtruth, kind):
     code, _, err = airtruth("new", kind)
@@ -160,6 +164,7 @@ def test_new_names_the_missing_option(airtruth, kind):
     assert "--out" in err
 
 
+@pytest.mark.slow
 def test_examples_are_listed_and_copied(airtruth, tmp_path):
     code, out, _ = airtruth("example")
     assert code == 0
@@ -170,6 +175,7 @@ def test_examples_are_listed_and_copied(airtruth, tmp_path):
             assert (tmp_path / "copies" / file).read_bytes() == (ROOT / file).read_bytes()
 
 
+@pytest.mark.slow
 def test_an_example_keeps_a_file_that_the_user_changed(airtruth, tmp_path):
     assert airtruth("example", "paper")[0] == airtruth("example", "paper")[0] == 0
     file = tmp_path / "data/campaigns/light.toml"
@@ -278,6 +284,7 @@ def test_the_schema_knows_every_effect_and_the_names_that_validators_test():
             model.model_validate(required | {field: "bogus"})
 
 
+@pytest.mark.slow
 def test_an_unknown_schema_names_the_kinds(airtruth):
     with pytest.raises(ConfigurationError, match="did you mean 'campaign'"):
         schema("campain")
@@ -286,6 +293,7 @@ def test_an_unknown_schema_names_the_kinds(airtruth):
     assert json.loads(out)["title"] == "airtruth aircraft file"
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_shells_complete_methods(airtruth, shell):
     line = "airtruth identify LOG --method iv-f"
@@ -314,6 +322,7 @@ def test_names_that_shells_complete(tmp_path, monkeypatch):
     assert "cm_alpha_nonlinear:break" in list(complete_effect("cm_"))
 
 
+@pytest.mark.slow
 def test_verbose_and_the_log_file_state_what_was_done(airtruth, tmp_path):
     code, out, err = airtruth("new", "campaign", "--out", "c.toml", "--verbose", "--log-file", "logs/a.txt")
     assert code == 0
@@ -329,6 +338,7 @@ def test_verbose_and_the_log_file_state_what_was_done(airtruth, tmp_path):
     assert "ERROR   ended by exit code 2 (example 'bogus' does not exist" in text
 
 
+@pytest.mark.slow
 def test_a_log_file_extends_no_other_file(airtruth, tmp_path):
     (tmp_path / "mine.txt").write_text("mine\n")
     code, _, err = airtruth("example", "--log-file", "mine.txt")

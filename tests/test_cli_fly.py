@@ -102,6 +102,7 @@ def test_dry_run_prints_the_plan_and_writes_nothing(command, tmp_path):
     assert not (tmp_path / "x").exists()
 
 
+@pytest.mark.slow
 def test_short_work_leaves_stderr_silent_where_it_is_no_terminal(command, tmp_path, monkeypatch):
     """A line of progress appears every ten seconds, which a busy machine may take."""
     monkeypatch.setattr("airtruth.cli.progress.EVERY_S", math.inf)
@@ -113,6 +114,7 @@ def test_short_work_leaves_stderr_silent_where_it_is_no_terminal(command, tmp_pa
 FULL = Path("/dev/full")
 
 
+@pytest.mark.grid
 @pytest.mark.skipif(not FULL.exists(), reason="no device that is always full")
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 @pytest.mark.parametrize("arguments", [("effects", "--json"), ("--version",)])

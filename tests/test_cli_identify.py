@@ -37,6 +37,7 @@ def flown(tmp_path_factory):
     return out
 
 
+@pytest.mark.slow
 def test_identify_writes_contract_2(flown, tmp_path):
     out = tmp_path / "estimates.parquet"
     done = run("identify", flown, "--aircraft", "gtm", "--method", "ls", "--method", "iv-f1", "--out", out)
@@ -52,6 +53,7 @@ def test_identify_writes_contract_2(flown, tmp_path):
         assert (table[name] < table[f"{name}_upper"]).all()
 
 
+@pytest.mark.slow
 def test_json_on_stdout_is_the_table(flown):
     done = run(
         "identify", flown / "logs" / "00000.parquet", "--aircraft", ROOT / "aircraft" / "gtm", "--json"
@@ -89,6 +91,7 @@ def test_identify_never_reads_what_tells_the_truth(flown, tmp_path):
     assert outputs[0] == outputs[1]
 
 
+@pytest.mark.slow
 def test_files_and_folders_and_chunks_give_the_same_estimates(flown):
     gtm = aircraft.load("gtm")
     whole = identify(flown, gtm, ["iv-f1"]).to_frame()
@@ -116,6 +119,7 @@ def test_a_run_in_two_files_is_refused(flown, tmp_path):
         identify([log_paths(flown)[0], copy], aircraft.load("gtm"), ["ls"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -140,6 +144,7 @@ def test_tables_stand_beside_the_published_figures(flown, tmp_path):
     assert {p.suffix for p in (tmp_path / "tables").glob("[!.]*")} == {".md", ".csv", ".tex"}
 
 
+@pytest.mark.slow
 def test_tables_of_an_unidentified_campaign_name_the_command(flown, tmp_path):
     copy = tmp_path / "light"
     shutil.copytree(flown, copy, ignore=shutil.ignore_patterns("estimates.parquet"))

@@ -42,6 +42,7 @@ def test_the_settings_are_restored_after_an_error():
     assert dict(matplotlib.rcParams) == before
 
 
+@pytest.mark.slow
 def test_a_figure_is_embedded_with_its_caption_escaped():
     png = style.as_png(drawing(2.0))
     assert png.startswith(b"\x89PNG")

@@ -227,6 +227,7 @@ def test_a_copy_of_a_model_of_the_wheel_does_not_control_the_simulation(tmp_path
     assert len(model_files(tmp_path / "f104" / "f104.xml")) > 3
 
 
+@pytest.mark.slow
 def test_code_in_the_working_folder_is_not_run(plane, tmp_path):
     """A file named like a module of the standard library in the working folder must not be imported by the probe."""
     for name in ("subprocess", "json", "pathlib"):

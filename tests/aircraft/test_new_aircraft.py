@@ -191,6 +191,7 @@ def test_bad_input_is_refused_before_anything_is_written(written, tmp_path):
         write_new(plane, stated, at, tmp_path / "full")
 
 
+@pytest.mark.slow
 def test_the_command_writes_and_flies_it(tmp_path):
     (tmp_path / "aircraft.toml").write_text(BARE.format(**CASES["big"][0]), encoding="utf-8")
     command = [sys.executable, "-m", "airtruth", "aircraft", "new", tmp_path, "--out", tmp_path / "fresh"]

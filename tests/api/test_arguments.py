@@ -74,6 +74,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", REFUSED)
 def test_an_argument_that_cannot_be_used(case, workspace, monkeypatch):
     monkeypatch.chdir(workspace)

@@ -16,6 +16,7 @@ EXAMPLES = FUNCTIONS | METHODS
 SLOW = ("trace", "close_loop")
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in EXAMPLES]
 )

@@ -28,6 +28,7 @@ VERBS: dict[str, Callable[[Path], at.Result]] = {
 SLOW = ("trace", "close_loop")
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     "verb", [pytest.param(verb, marks=[pytest.mark.slow] * (verb in SLOW)) for verb in VERBS]
 )

@@ -43,6 +43,7 @@ def still(log, seed, samples=47):
     )
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("seed", [0, 10, 24, 35, 39])
 def test_noise_of_the_elevator_has_no_sign(seed, gtm):
     """With each of these seeds noise alone was certainly a swapped column, or an elevator of opposite sign."""

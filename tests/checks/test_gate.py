@@ -36,6 +36,7 @@ def certain(faults):
     return [fault for fault in faults if fault.certain]
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("name", sampled(FAULTS, 3))
 def test_every_fault_is_named(name, log, gtm):
     fault = certain(inspect(FAULTS[name](log), gtm))[0]
@@ -71,6 +72,7 @@ SHARED = {
 """Mistakes that several channels share: factor of each channel, and the kind."""
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("path", sampled(UNDECLARED[:4], 4), ids=lambda path: path.stem)
 @pytest.mark.parametrize("mistake", SHARED)
 def test_a_mistake_that_channels_share_is_named_for_each(mistake, path, gtm):
@@ -86,6 +88,7 @@ def test_a_mistake_that_channels_share_is_named_for_each(mistake, path, gtm):
         assert f"under [channels.{fault.channel}]" in fault.sentence
 
 
+@pytest.mark.slow
 def test_a_shared_unit_and_a_shared_sign_are_both_named(log, gtm):
     """Everything in degrees, and the surface positive with its trailing edge up."""
     factors = dict.fromkeys((*ANGLES, "q_rad_s"), D) | dict.fromkeys(SURFACE, -D)
@@ -121,6 +124,7 @@ def test_a_fast_oscillation_is_no_outlier():
     assert list(spikes(SimpleNamespace(channels={"q_rad_s": x}, dt_s=0.04))) == []
 
 
+@pytest.mark.slow
 def test_a_late_vane_and_a_wrong_airspeed_that_fit_alike_are_both_named(log):
     """Kinematics alone cannot tell a vane that is 0.8 s late from a fifth of the airspeed in these gusts."""
     fault = next(f for f in inspect(FAULTS["airspeed times 0.2"](log)) if f.code == "lag")
@@ -169,6 +173,7 @@ def check_clean(flight, folder):
             assert certain(inspect(picked(flown, rate_hz), aircraft)) == [], (flight.name, rate_hz)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "flight",
     [f for f in table() if f.manoeuvre == "3211" and (f.aircraft, f.level, f.noisy) in FEW],
@@ -333,6 +338,7 @@ def test_a_sample_of_zero_that_comes_back_is_a_dropout():
     assert (name, bad.tolist(), count) == ("q_rad_s", [True], int((x == 0.0).sum()))
 
 
+@pytest.mark.slow
 def test_a_surface_that_moves_nothing_is_no_wrong_unit(log, gtm):
     """Doublets of 2 deg beside motion of gusts alone: in degrees they would be 0.03 deg."""
     pulse = np.where((log.t_s > 1.0) & (log.t_s < 3.0), np.sign(2.0 - log.t_s), 0.0) * np.radians(2.0)

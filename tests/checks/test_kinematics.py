@@ -309,6 +309,7 @@ def test_a_consistent_log_is_called_so(true):
     assert set(result.residual_rms) == {"theta_rad", "alpha_rad", "airspeed_m_s"}
 
 
+@pytest.mark.slow
 def test_biases(true):
     shifted = {n: v.copy() for n, v in measured(true, {"vane_arm": 2.0}).items()}
     shifted["q_rad_s"] += 0.004
@@ -324,6 +325,7 @@ def test_biases(true):
         assert found[name].upper - found[name].lower < 2.0 * most, name
 
 
+@pytest.mark.slow
 def test_declared_biases_are_not_found_again(true):
     """Biases of every channel: each row states the sum that they make there, and only a further one is named."""
     biases = {"q_rad_s": 0.004, "az_m_s2": 0.2, "ax_m_s2": 0.3, "theta_rad": -0.02, "airspeed_m_s": 0.5}
@@ -357,6 +359,7 @@ def test_an_arm_is_found_and_its_twin_named(true):
     assert "do not tell them apart" in " ".join(result.sentences)
 
 
+@pytest.mark.slow
 def test_an_arm_longer_than_the_aircraft_is_no_cause(true):
     """A lag of 0.25 s at 60 m/s resembles an arm of 15 m, which an aircraft of 0.5 m chord has no place for."""
     log = as_log(noisy(measured(true, {"vane_lag": 0.25}), 2))
@@ -384,6 +387,7 @@ def test_a_lag_beyond_the_range_is_a_failed_check(true):
     assert "The check failed" in result.sentences[0]
 
 
+@pytest.mark.slow
 def test_a_failed_check_names_no_error(true):
     """A lag of 2 s: the best set holds another error, of which nothing may be said."""
     result = check_kinematics(as_log(noisy(measured(true, {"vane_lag": 2.0}), 2, 0.3)), None, 0.5)
@@ -402,6 +406,7 @@ def test_a_weak_manoeuvre_cannot_tell(true):
     assert "agree (" not in " ".join(result.sentences)
 
 
+@pytest.mark.slow
 def test_runs_of_unequal_noise_are_weighed_by_their_own(true):
     """A loud run beside a quiet one leaves the interval that the quiet one has alone."""
     with_arm = measured(true, {"vane_lag": 0.1})

@@ -30,6 +30,7 @@ def transport(seed, rate_hz=10.0, gust_m_s=0.3, duration_s=40.0):
     return flights.read(flown, {"vane_lag": LAG_S}, rate_hz, 1.0, rng)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", sampled([10.0, 25.0], 2))
 def test_the_lag_is_named_with_an_interval(rate_hz):
     for seed in range(3):

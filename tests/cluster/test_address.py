@@ -52,6 +52,7 @@ def test_a_file_that_is_no_scheduler_file(tmp_path, content):
         parse(str(file))
 
 
+@pytest.mark.slow
 def test_nothing_answers(monkeypatch):
     monkeypatch.setattr("airtruth.cluster.client.CONNECT_S", 0.5)
     with (

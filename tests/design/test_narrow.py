@@ -130,6 +130,7 @@ def test_standard_errors_are_those_of_a_dense_fisher_information(gtm, bench, flo
     np.testing.assert_allclose(np.sqrt(np.diag(found)), np.sqrt(np.diag(expected)), rtol=0.03)
 
 
+@pytest.mark.slow
 def test_a_band_is_that_of_the_tracers_fit(bench, campaign, flown):
     """Two equal records fitted by the tracer's optimiser from the truth: the covariance of the bends at its end."""
     band = BandQuestion((accepted(),)).at(bench, campaign, 2, 0)

@@ -54,6 +54,7 @@ def flown(bench, unit=0.3, sign=1.0):
     return bench.fly(multistep((3.0, 2.0, 1.0, 1.0), unit, 0.0, bench.dt_s, sign))
 
 
+@pytest.mark.slow
 def test_separation_is_that_of_two_fits_of_the_tracer(bench, model):
     """Twice the difference of the costs of both hypotheses, each fitted by the tracer's optimiser, levels held."""
     record = flown(bench).record

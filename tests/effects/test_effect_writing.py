@@ -34,6 +34,7 @@ def foreign(request):
     return plane, at, amplitude, flown, linearise(plane, start).central
 
 
+@pytest.mark.grid
 def test_copy_of_a_wheel_model_stands_alone_and_flies_the_same_bits(foreign, tmp_path):
     plane, at, amplitude, flown, _ = foreign
     copy = flights.changed(plane, Change(), tmp_path)

@@ -72,6 +72,7 @@ def test_campaigns(content):
         files.plan_campaign(folder / "c.toml")
 
 
+@pytest.mark.slow
 @examples(60)
 @given(strategies.mappings())
 def test_mappings(content):
@@ -103,6 +104,7 @@ def test_loops(content):
         report(folder, folder / "page.html")
 
 
+@pytest.mark.slow
 @examples(30)
 @given(strategies.estimates(), strategies.RANDOM)
 def test_estimates(content, rng):
@@ -124,6 +126,7 @@ def end_somehow(rng, folder):
         pass
 
 
+@pytest.mark.slow
 def test_the_harness_counts_every_ending_and_repeats_it(monkeypatch):
     monkeypatch.setattr(harness, "HANG_S", 0.2)
     case = harness.Case("self", 12, end_somehow)

@@ -34,6 +34,7 @@ def started(batch):
     return np.where(estimates[0].converged[:, None], estimates[0].theta, estimates[1].theta)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("delay_s", "tolerance"), [(0.0, 1e-4), (0.005, 1e-3), (0.01, 1e-3)])
 def test_noise_free_record_gives_the_truth_by_output_error(delay_s, tolerance):
     """The elevator's motion between samples is rebuilt; of edges inside a cell its area, not its shape."""

@@ -58,6 +58,7 @@ def test_levels_unknown_from_calm_to_severe(gust):
     assert (covered(estimates) > 0.88).all(), covered(estimates)
 
 
+@pytest.mark.slow
 def test_measured_airspeed_explains_the_gust_u():
     """Dynamic pressure follows the gust: near the bound of a filter with airspeed as an output."""
     batch = fly(runs=150, gust=2.0, noise=1.0, seed=82, acting=True, airspeed_std_m_s=AIRSPEED_STD_M_S)
@@ -111,6 +112,7 @@ def test_measured_pressure_gives_the_truth_without_noise():
     assert (np.abs(fit(batch, GTM, start, options).theta[0] / THETA - 1.0) > 0.02).any()
 
 
+@pytest.mark.slow
 def test_an_airspeed_that_shows_no_gust_costs_nothing():
     """The log's airspeed is constant while u acts on lift: the gust u stays in the model and explains it."""
     batch = fly(runs=60, gust=2.0, noise=1.0, seed=84)

@@ -51,6 +51,7 @@ def test_divided_equations_are_the_equations_at_the_measured_pressure():
     np.testing.assert_allclose(signals[0, 2], -1.0 / p, rtol=1e-14)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("name", [*REGRESSIONS, *OWN])
 @pytest.mark.parametrize("trim", ["intercept", "mean"])
 def test_a_constant_airspeed_gives_the_constant_form(name, trim):
@@ -89,6 +90,7 @@ def test_airspeed_narrows_the_spread_of_the_lift(name):
     assert (measured[3:] < constant[3:]).all()
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("name", REGRESSIONS)
 def test_the_methods_of_the_paper_hold_the_pressure_constant(name):
     few = fly(runs=2, gust=2.0, noise=1.0, seed=93, acting=True, airspeed_std_m_s=0.0309)

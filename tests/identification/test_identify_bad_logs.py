@@ -102,6 +102,7 @@ CASES = {
 }
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("case", list(CASES))
 def test_a_bad_log_is_refused_by_name(case):
     make, message = CASES[case]

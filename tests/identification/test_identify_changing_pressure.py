@@ -34,6 +34,7 @@ def test_the_range_is_that_of_means_over_half_a_second():
     assert pressure_range(batch) == pytest.approx([0.3 * 0.95], rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_changing_pressure_is_noted_for_methods_that_take_it_for_constant(plane, log):
     """The airspeed of run r4 falls from 24.4 to 18.9 m/s."""
     (note,) = said(identify(log, plane, ["ls", "iv-f1", "iv-refined"]))
@@ -59,5 +60,6 @@ def test_the_measured_pressure_removes_the_error(plane, log):
     assert errors["measured"] < 2.0
 
 
+@pytest.mark.slow
 def test_every_batch_of_a_log_counts(log):
     assert sum(len(pressure_range(batch)) for batch in batches(log)) == len(log.run_ids)

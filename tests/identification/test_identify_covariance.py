@@ -118,6 +118,7 @@ def spectrum(c):
     return np.fft.rfft(wide).real
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(("name", "covariance"), sampled(product(METHODS, COVARIANCES), 3))
 def test_every_covariance_is_symmetric_and_positive(name, covariance):
     p = identify_batch(BATCH, GTM, name, Options(covariance=covariance)).covariance
@@ -155,6 +156,7 @@ def test_a_joint_fit_takes_its_degrees_of_freedom_once():
     assert np.all(std["corrected"] > 0.95 * std["coloured"])
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("name", ["ls", "iv-f1"])
 def test_a_joint_fit_of_one_record_is_that_of_the_record(name):
     batch = fly(runs=1, noise=1.0, gust=0.5, seed=8)

@@ -32,6 +32,7 @@ def hold(a00, a01, a10, a11, b0, b1, dt):
 entry = st.floats(-60.0, 60.0)
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(st.tuples(entry, entry, entry, entry), st.tuples(entry, entry), st.sampled_from([0.005, 0.02, 0.1]))
 def test_equals_the_matrix_exponential(a, b, dt):

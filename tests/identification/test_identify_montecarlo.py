@@ -34,6 +34,7 @@ def test_least_squares_is_biased_by_the_u_gust_and_not_by_the_w_gust():
     assert abs(bias_w) < 0.3 * bias
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("gust", ["BATCH", "KNOWN_AIR"])
 @pytest.mark.parametrize("name", ["iv-f1", "iv-f2"])
 def test_default_intervals_cover(name, gust):

@@ -23,6 +23,7 @@ def scatter(logs, plane, name):
     return float(np.sqrt(np.mean((error / std) ** 2))), float(np.sqrt(np.mean(error**2)))
 
 
+@pytest.mark.slow
 def test_its_noise_hardly_moves_the_estimates(plane, monkeypatch):
     """24 records with and without 0.25 m/s. As measured, the noise had doubled the scatter of Cmde (0.010 for 0.005)."""
     noisy = [small.flight_log(seed) for seed in range(600, 604)]
@@ -33,6 +34,7 @@ def test_its_noise_hardly_moves_the_estimates(plane, monkeypatch):
     assert relative < 1.6
 
 
+@pytest.mark.slow
 def test_a_note_counts_the_runs(plane):
     (note,) = [
         n for n in identify(small.flight_log(600), plane, ["ls"]).notes if "noise of the airspeed" in n
@@ -52,6 +54,7 @@ def test_the_limit_is_a_share_of_the_airspeed():
     assert list(is_noisy(20.0 + np.outer([0.125, 0.145], noise), 0.02)) == [False, True]
 
 
+@pytest.mark.slow
 def test_a_run_without_noise_beside_a_noisy_one_is_left_as_it_is(plane):
     log = small.flight_log(600)
     speed = log.channels["airspeed_m_s"].copy()

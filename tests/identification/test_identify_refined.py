@@ -167,6 +167,7 @@ def test_records_that_start_in_motion_and_unstable_aircraft():
     np.testing.assert_allclose(unstable.theta[0], theta, rtol=2e-3)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(("name", "batch"), [("constant", GUSTS), ("measured", AIR)])
 def test_spread_comes_near_the_bound_and_intervals_cover(name, batch):
     """3000 runs gave 79 to 96 % and 92.5 to 96.4 %; 600 runs have standard errors of 5 and 1 points."""

@@ -75,6 +75,7 @@ def test_the_servo_of_a_flight_log():
     assert found.b[0, 0] == pytest.approx(SERVO_RAD_S, rel=1e-5)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("late", [0, 15])
 def test_a_step_between_slow_samples_has_a_servo(late):
     """Steps 10 ms after a sample at 20 Hz: the surface leads any servo behind a command that is held from the next sample."""

@@ -48,6 +48,7 @@ def without_attitude(log):
     return replace(log, channels={k: v for k, v in log.channels.items() if k != "theta_rad"})
 
 
+@pytest.mark.slow
 def test_errors_are_those_of_the_noise_alone(plane, logs):
     """Cmalpha of output-error in 24 records: its relative error has a root mean square of one if the intervals are true."""
     relative = []

@@ -75,6 +75,7 @@ def test_a_wrong_sign_ends_with_2_and_writes_nothing_unless_forced(folder):
     assert (folder / "bad.parquet").exists()
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [

@@ -181,6 +181,7 @@ def test_px4_topics_with_clocks_of_their_own(tmp_path):
     np.testing.assert_allclose(made.channels["airspeed_m_s"], 20.0 + made.t_s / 4.0, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_guess_from_names_with_units_imports_as_it_stands(tmp_path):
     log = flown(tmp_path, runs=1)
     columns = foreign(log)
@@ -218,6 +219,7 @@ def test_a_guess_from_names_with_units_imports_as_it_stands(tmp_path):
     assert import_log(tmp_path / "f.csv", tmp_path / "m.toml").faults == ()
 
 
+@pytest.mark.slow
 def test_a_guess_says_what_it_did_not_find(tmp_path):
     columns = foreign(flown(tmp_path, runs=1))
     write_csv(tmp_path / "f.csv", columns)

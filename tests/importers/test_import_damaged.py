@@ -115,6 +115,7 @@ def test_a_clock_that_asks_for_too_many_samples(tmp_path):
         import_log(tmp_path / "f.csv", tmp_path / "m.toml")
 
 
+@pytest.mark.slow
 def test_a_reader_that_does_not_start(tmp_path, monkeypatch):
     (tmp_path / "f.csv").write_text("a,b\n1,2\n")
     client.close()

@@ -154,6 +154,7 @@ def test_a_log_without_a_vane_is_imported_and_identified_with_wider_intervals(lo
     assert joint["CLalpha_std"][0] > narrow["CLalpha_std"][0]
 
 
+@pytest.mark.slow
 def test_the_reconstruction_names_what_it_lacks(log, tmp_path):
     names = [n for n in UNITS if n not in ("alpha_rad", "az_m_s2")]
     with pytest.raises(LogError, match=r"\[reconstruct\] alpha needs az_m_s2"):

@@ -24,6 +24,7 @@ def guessed(path, **more):
     return text, MappingFile.model_validate(tomllib.loads(text))
 
 
+@pytest.mark.slow
 def test_headers_of_flight_test_centres(log, tmp_path):
     c = log.channels
     columns = {
@@ -129,6 +130,7 @@ def guessed_channels(path):
     return text, tomllib.loads(text)
 
 
+@pytest.mark.slow
 def test_recorders_state_their_units_and_their_own_clocks(log, tmp_path):
     c, half = log.channels, slice(0, None, 2)
     fast = {"Pitch": c["theta_rad"], "GyrY": c["q_rad_s"], "AccZ": c["az_m_s2"], "AOA": c["alpha_rad"] / DEG}

@@ -157,6 +157,7 @@ def two_files(log, folder, lag=17.31):
     return [folder / "imu.csv", folder / "air.csv"]
 
 
+@pytest.mark.slow
 def test_two_files_become_the_log_that_was_flown(log, tmp_path):
     files = two_files(log, tmp_path)
     (tmp_path / "air.toml").write_text(AIR.format(align=""))
@@ -178,6 +179,7 @@ def test_two_files_become_the_log_that_was_flown(log, tmp_path):
         assert error.max() < share * np.ptp(flownvalues) + 1e-12, name
 
 
+@pytest.mark.slow
 def test_a_declared_offset(log, tmp_path):
     files = two_files(log, tmp_path)
     (tmp_path / "air.toml").write_text(AIR.format(align="[align]\noffset_s = 17.31\nstd_s = 0.002"))

@@ -27,12 +27,14 @@ def single(log, run, **factors):
     return FlightLog(log.metadata, (log.run_ids[run],), np.array([0, len(t)]), t, channels)
 
 
+@pytest.mark.slow
 def test_a_right_mapping_is_left_alone(gusty):
     assert not [f for f in inspect(gusty) if f.certain]
     for run in range(8):
         assert not [f for f in inspect(single(gusty, run)) if f.certain]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("factors", "channel", "parts"),
     sampled(
@@ -72,6 +74,7 @@ def test_wrong_units_and_signs_are_certain_and_named(factors, channel, parts, gu
     assert channel in certain[0].sentence
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("name", ["q_rad_s", "alpha_rad", "az_m_s2"])
 def test_signs_are_found_without_theta(name, gusty):
     channels = {n: -v if n == name else v for n, v in gusty.channels.items() if n != "theta_rad"}
@@ -79,6 +82,7 @@ def test_signs_are_found_without_theta(name, gusty):
     assert [p.channel for p in certain] == [name]
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("pair", "part"),
     [
@@ -94,6 +98,7 @@ def test_swapped_axes(pair, part, gusty):
     assert part in certain[0].sentence
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(("name", "certain"), [("q_rad_s", True), ("alpha_rad", False)])
 def test_another_axis_in_place_of_the_channel(name, certain, gusty):
     """Certain against theta, which gusts leave alone; a warning for alpha, which they can drown."""
@@ -109,6 +114,7 @@ def test_gravity_taken_out(gusty):
     assert "no gravity" in inspect(log)[0].sentence
 
 
+@pytest.mark.slow
 def test_strong_gusts_on_a_weak_manoeuvre_are_no_certain_mistake(tmp_path):
     log = flown(tmp_path, runs=20, gust=4.3, duration_s=5.0)
     for run in range(20):
@@ -134,6 +140,7 @@ def test_import_refuses_a_flipped_sign_and_force_keeps_it(gusty, tmp_path):
     assert [f.channel for f in kept.faults] == ["elevator_rad"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lag_s", sampled([0.3, 0.4, 0.5, 0.8], 4))
 def test_a_slow_vane_is_a_late_alpha_and_no_wrong_airspeed(lag_s, tmp_path):
     """A first-order lag, whose weak response once passed for an airspeed in another unit."""
@@ -150,6 +157,7 @@ def test_a_slow_vane_is_a_late_alpha_and_no_wrong_airspeed(lag_s, tmp_path):
     assert "s late" in faults[0].sentence
 
 
+@pytest.mark.slow
 def test_an_axial_load_factor_in_g_is_refused_and_both_readings_are_named(gusty):
     """Without gravity or in g: a trimmed record cannot tell, so that neither is stated alone."""
     log = replace(gusty, channels={**gusty.channels, "ax_m_s2": gusty.channels["ax_m_s2"] / 9.80665})

@@ -54,6 +54,7 @@ def export(kind, folder, log):
     return folder / "f.mat", mapping_by_number("fdata")
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     "kind", sampled(["csv", "semicolon", "table", "parquet", "mat", "mat struct", "mat 7.3"], 4)
 )
@@ -78,6 +79,7 @@ def test_every_format_gives_the_same_log_and_estimates(kind, log, gtm, tmp_path)
         np.testing.assert_allclose(after[name], before[name], rtol=1e-9, err_msg=name)
 
 
+@pytest.mark.slow
 def test_a_campaign_in_one_table_divides_by_the_run_column(tmp_path):
     log = flown(tmp_path, runs=3, duration_s=5.0)
     parts = [foreign(log, run) for run in range(3)]

@@ -40,6 +40,7 @@ def call(name, limits=SHORT, **arguments):
     return client.call(Task(f"isolated_tasks:{name}", arguments, limits))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("way")
 def test_a_reply_keeps_facts_and_arrays():
     reply = call("echo", word="größe", value=float("inf"))
@@ -49,6 +50,7 @@ def test_a_reply_keeps_facts_and_arrays():
     assert reply.arrays[2].shape == (0, 2)
 
 
+@pytest.mark.grid
 @pytest.mark.usefixtures("way")
 @pytest.mark.parametrize(
     ("name", "kind", "detail"),

@@ -123,6 +123,7 @@ with writing("report"):
 """
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("moment", [("1", "before"), ("1", "after"), ("2", "before"), ("2", "after")])
 @pytest.mark.parametrize("earlier", ["", "old", "new"])
 def test_a_command_that_is_killed_recognises_its_files(

@@ -405,6 +405,7 @@ except StoreError as error:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="needs resource limits")
 def test_a_real_write_that_runs_out_of_room(tmp_path: Path) -> None:
     path = tmp_path / "log.parquet"

@@ -86,6 +86,7 @@ def reference(command: Array, rate: float, low: float, high: float, delay: float
     return np.array([values[t] for t in T])
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("rate", "low", "high", "delay"),
     [

@@ -47,6 +47,7 @@ def doublet(samples=251):
     return 1.0 * (t >= 1.0) - 2.0 * (t >= 1.5) + 1.0 * (t >= 2.0)
 
 
+@pytest.mark.slow
 def test_small_motion_is_the_linear_short_period():
     u = 1e-6 * doublet()
     motion = simulate(planes(), u[None], 0.02)
@@ -89,6 +90,7 @@ def test_runge_kutta_is_of_fourth_order():
     assert errors[0] > 12.0 * errors[1] > 144.0 * errors[2]  # 16 in the limit
 
 
+@pytest.mark.slow
 def test_phugoid_has_lanchester_s_period():
     """Lift ~ V^2 along the wind's normal, no drag: period = sqrt(2) pi V/g (Lanchester 1908; Etkin and Reid,
     Dynamics of Flight, 3rd ed., eq. 6.3,5)."""

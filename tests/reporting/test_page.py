@@ -211,6 +211,7 @@ Cmde = { value = -1.787, std = 0.09 }
 """
 
 
+@pytest.mark.slow
 def test_the_declared_aircraft_stands_beside_the_estimates(identified, tmp_path):
     (tmp_path / "aircraft.toml").write_text(LINEAR)
     aircraft = load(tmp_path / "aircraft.toml")

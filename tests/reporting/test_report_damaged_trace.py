@@ -25,6 +25,7 @@ def test_the_sample_is_a_page(tmp_path):
     assert page_or_error(tmp_path, tmp_path)
 
 
+@pytest.mark.slow
 @EXAMPLES
 @given(at=st.sampled_from(PATHS), value=st.one_of(st.just(DELETE), VALUES))
 def test_an_entry_of_the_answer_is_wrong(tmp_path, at, value):
@@ -79,6 +80,7 @@ def damaged(traced, folder, change):
     return folder
 
 
+@pytest.mark.slow
 @FEWER
 @given(at=st.sampled_from(sorted(paths(RECORDS), key=str)), value=st.one_of(st.just(DELETE), VALUES))
 def test_an_entry_about_the_records_is_wrong(traced, tmp_path, at, value):
@@ -88,6 +90,7 @@ def test_an_entry_about_the_records_is_wrong(traced, tmp_path, at, value):
     )
 
 
+@pytest.mark.slow
 @FEWER
 @given(values=st.lists(NUMBERS, min_size=8, max_size=8), column=st.integers(1, 24))
 def test_records_are_of_any_size(traced, tmp_path, values, column):

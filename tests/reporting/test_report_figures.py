@@ -159,6 +159,7 @@ def test_estimates_with_no_finite_run_leave_their_row_empty(tmp_path):
     assert [len(ax.patches) for ax in figure.axes] == [1] * 6
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("kind", ["flight", "filters", "outputs", "estimates"])
 def test_the_legend_hides_no_data_and_no_text_is_cut(kind, matrices, campaign):
     figure = {
@@ -186,6 +187,7 @@ def test_the_legend_hides_no_data_and_no_text_is_cut(kind, matrices, campaign):
         assert box.y1 <= page.y1 + 1
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("suffix", ["png", "svg"])
 def test_saved_figures_are_the_same_bytes_each_time(tmp_path, suffix, matrices):
     for name in ("one", "two"):

@@ -56,6 +56,7 @@ def test_something_else_is_refused(tmp_path, text):
     assert not page_or_error(tmp_path, tmp_path)
 
 
+@pytest.mark.slow
 @EXAMPLES
 @given(at=st.sampled_from(PATHS), value=st.one_of(st.just(DELETE), VALUES))
 def test_an_entry_is_wrong(tmp_path, at, value):

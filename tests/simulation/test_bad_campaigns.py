@@ -176,6 +176,7 @@ def test_all_problems_of_a_plan_at_once(tmp_path):
         assert word in said
 
 
+@pytest.mark.slow
 def test_saturation_is_flown_when_asked_for(tmp_path):
     hard = [DOUBLET | {"amplitude_deg": 25.0, "saturate": True}]
     out = fly(tmp_path, runs=1, gust=None, manoeuvre=hard, sensors={"ideal": True})

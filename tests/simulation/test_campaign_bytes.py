@@ -32,6 +32,7 @@ def once(tmp_path_factory):
     return fly(tmp_path_factory.mktemp("once"), **MIXED)
 
 
+@pytest.mark.slow
 def test_two_processes_write_the_bytes_of_one(once, tmp_path):
     assert results(fly(tmp_path, jobs=2, **MIXED)) == results(once)
 
@@ -102,6 +103,7 @@ def test_runs_and_seeds_differ(once, tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_a_finished_campaign_is_left_alone(once):
     before = results(once)
     summary = campaign.fly(plan.make(once.parent / "campaign.toml"), once)
@@ -109,6 +111,7 @@ def test_a_finished_campaign_is_left_alone(once):
     assert results(once) == before
 
 
+@pytest.mark.slow
 def test_seed_and_runs_of_the_command_line_replace_those_of_the_file(once, tmp_path):
     file = write(tmp_path / "campaign.toml", **MIXED | {"seed": 99, "runs": 1})
     ended = command("fly", file, "--out", tmp_path / "out", "--jobs", 1, "--seed", 3, "--runs", 7)

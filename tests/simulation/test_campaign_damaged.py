@@ -28,6 +28,7 @@ def damaged(whole: Path, tmp_path: Path) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_an_intact_campaign(whole):
     result = verify(whole)
     assert result.intact
@@ -62,6 +63,7 @@ def test_the_command_line_names_and_restores(whole, tmp_path):
     assert results(out) == results(whole)
 
 
+@pytest.mark.slow
 def test_states_and_extra_files(whole, tmp_path):
     out = damaged(whole, tmp_path)
     (out / "logs" / "00001.parquet").unlink()
@@ -80,6 +82,7 @@ def test_states_and_extra_files(whole, tmp_path):
     assert "1 damaged, 1 missing, 2 extra" in verify(out).summary()
 
 
+@pytest.mark.slow
 def test_a_resume_restores_what_is_damaged_and_flies_no_other_run(whole, tmp_path):
     out = damaged(whole, tmp_path)
     flip(out / "logs" / "00003.parquet", random.Random(1))

@@ -30,6 +30,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> CampaignResult:
     return fly(path, folder / "out")
 
 
+@pytest.mark.slow
 def test_it_is_a_result(flown: CampaignResult) -> None:
     assert isinstance(flown, Result)
     assert "<table" in flown._repr_html_()
@@ -56,6 +57,7 @@ def test_summary_and_facts(flown: CampaignResult) -> None:
     assert len(facts["failures"]) == failed
 
 
+@pytest.mark.slow
 def test_a_run_is_drawn_as_it_was_logged(flown: CampaignResult) -> None:
     good = next(o.run_id for o in flown.outcomes if o.status == "ok")
     figure = flown.plot()

@@ -40,6 +40,7 @@ def test_damper_moves_the_elevator_with_q_and_its_noise_of_the_same_sample(gtm, 
     np.testing.assert_allclose(flown["elevator_rad"], expected, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "gains",
     sampled(
@@ -120,6 +121,7 @@ def replayed(folder, log, channel_name, **changes):
     return fly(folder, runs=1, gust=None, sensors={"ideal": True}, manoeuvre=[entry], **changes)
 
 
+@pytest.mark.slow
 def test_replayed_command_flies_the_flight_again(recorded, tmp_path):
     again = replayed(tmp_path, recorded / "logs" / "00000.parquet", "elevator_command_rad", **FINE)
     for name, unit in (("elevator_rad", 0.02), ("q_rad_s", 0.3), ("alpha_rad", 0.05), ("az_m_s2", 5.0)):
@@ -127,6 +129,7 @@ def test_replayed_command_flies_the_flight_again(recorded, tmp_path):
         np.testing.assert_allclose(channel(again, name), channel(recorded, name), atol=2e-6 * unit)
 
 
+@pytest.mark.slow
 def test_replayed_surface_is_the_surface(recorded, tmp_path):
     again = replayed(tmp_path, recorded / "logs" / "00000.parquet", "elevator_rad", **FINE)
     np.testing.assert_allclose(channel(again, "elevator_rad"), channel(recorded, "elevator_rad"), atol=1e-8)

@@ -123,6 +123,7 @@ def test_wind_that_keeps_the_ground_speed_takes_airspeed(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_calm_air_stays_in_trim(tmp_path):
     log = read(fly(tmp_path, runs=1, gust=None, duration_s=5.0, **CALM))
     assert np.ptp(log["alpha_rad"]) < 1e-7

@@ -114,6 +114,7 @@ def test_a_trim_that_fills_the_memory(tmp_path, plane):
     )
 
 
+@pytest.mark.slow
 def test_a_trim_that_ends_its_process_with_exit_code_0(tmp_path, plane, doubles):
     doubles("ENDS_IN", "trim")
     said = refused("fly", campaign(tmp_path, plane), "--out", tmp_path / "out")

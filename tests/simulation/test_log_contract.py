@@ -28,6 +28,7 @@ def files(out):
     return sorted((out / "logs").glob("*.parquet"))
 
 
+@pytest.mark.slow
 def test_folder_holds_the_files_of_the_contract(out):
     assert {p.name for p in out.iterdir()} >= {"logs", "plan.parquet", "truth.parquet", "manifest.jsonl"}
     assert all(p.suffix == ".parquet" for p in (out / "logs").iterdir())
@@ -52,6 +53,7 @@ def test_rows_are_sorted_by_run_and_time_within_and_across_files(out, files):
     assert not log.isna().to_numpy().any()
 
 
+@pytest.mark.slow
 def test_metadata_says_what_is_logged_and_nothing_of_gusts_or_truth(files):
     for path in files:
         raw = pq.read_schema(path).metadata
@@ -61,6 +63,7 @@ def test_metadata_says_what_is_logged_and_nothing_of_gusts_or_truth(files):
         assert not [word for word in FORBIDDEN if word in everything]
 
 
+@pytest.mark.slow
 def test_signs_and_units_of_a_pulse(tmp_path):
     """Trailing edge down pitches the nose down; in level flight az is -g cos(theta) at first."""
     pulse = {"kind": "pulse", "amplitude_deg": 2.0, "start_s": 0.5, "step_s": 0.5}
@@ -87,6 +90,7 @@ def test_plan_and_truth_have_a_row_per_run(out):
         np.testing.assert_allclose(truth[name], value, rtol=5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("simulation_hz", "log_hz"), sampled([(100.0, 25.0), (200.0, 200.0), (400.0, 50.0)], 3)
 )
@@ -95,6 +99,7 @@ def test_rates_are_free(tmp_path, simulation_hz, log_hz):
     np.testing.assert_allclose(log["t_s"], np.arange(2.0 * log_hz + 1) / log_hz, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_logs_are_every_fourth_sample_without_a_filter(tmp_path):
     """White noise and all: 50 Hz logs are those at 200 Hz, picked."""
     fine = read(fly(tmp_path / "fine", runs=1, log_hz=200.0)).iloc[::4].reset_index(drop=True)

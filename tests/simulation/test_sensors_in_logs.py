@@ -49,6 +49,7 @@ GTM = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", GTM)
 def test_noise_is_white_and_of_the_stated_size(ideal, shipped, name):
     std, bias = GTM[name]
@@ -75,6 +76,7 @@ def test_channels_without_a_sensor_are_logged_as_they_are(ideal, shipped):
         np.testing.assert_array_equal(channel(shipped, name), channel(ideal, name))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("entries", "expected"),
     sampled(
@@ -127,12 +129,14 @@ def test_lag_in_coarse_logs_is_that_of_the_simulation(tmp_path):
     np.testing.assert_array_equal(slow, fine[:, ::4])
 
 
+@pytest.mark.slow
 def test_vane_ahead_of_the_cg(ideal, tmp_path):
     got = logged(tmp_path, "alpha_rad", x=0.5)
     expected = channel(ideal, "alpha_rad") - channel(ideal, "q_rad_s") * 0.5 / channel(ideal, "airspeed_m_s")
     np.testing.assert_allclose(got, expected, atol=2e-8)
 
 
+@pytest.mark.slow
 def test_accelerometer_ahead_of_the_cg(ideal, tmp_path):
     """az - az_cg = -x q_dot; its integral is -x (q - q0), by the trapezoidal rule over 5 ms."""
     got = logged(tmp_path, "az_m_s2", x=0.5) - channel(ideal, "az_m_s2")

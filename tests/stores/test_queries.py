@@ -102,6 +102,7 @@ def test_bias_is_that_of_pandas(campaigns: Path, results: dict[int, Any]) -> Non
     np.testing.assert_allclose(by_polars["bias"], expected, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_failed_runs_are_those_of_the_truth(campaigns: Path, results: dict[int, Any]) -> None:
     truth = pd.concat(pd.read_parquet(p) for p in sorted((campaigns / "out").glob("*/truth.parquet")))
     failed = results[block("json_each(line.json -> 'failed')")]

@@ -16,6 +16,8 @@ def test_quick_campaign_ends_in_tables_and_figures_and_resumes(tmp_path):
         "-m",
         "scripts.campaign",
         "--quick",
+        "--further",
+        "--undeclared",
         "--out",
         str(tmp_path / "out"),
     ]

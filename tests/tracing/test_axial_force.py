@@ -81,6 +81,7 @@ def test_written_terms_are_a_force_along_x_through_the_cg(name, tmp_path):
     np.testing.assert_allclose(after[:, 1:], before[:, 1:], rtol=0, atol=tolerance * force)
 
 
+@pytest.mark.slow
 def test_an_undeclared_drag_is_learned_over_alpha(dragged):
     """The band has to contain the truth at 95 % of the flown angles, counted by samples; exact is -0.8 (alpha - 0.11)."""
     found = shown(flights.log_of(dragged))
@@ -96,6 +97,7 @@ def test_an_undeclared_drag_is_learned_over_alpha(dragged):
     assert errors.after.held_out < 2.0 * NOISE_M_S2
 
 
+@pytest.mark.slow
 def test_the_declared_aircraft_lacks_nothing_along_x(clean):
     """What remains is the noise of ax and of the vane: dX/dalpha of 25 m/s2 at 0.031 deg is 0.013 m/s2."""
     found = shown(flights.log_of(clean))
@@ -105,6 +107,7 @@ def test_the_declared_aircraft_lacks_nothing_along_x(clean):
     assert NOISE_M_S2 < found.errors.declared.held_out < 1.4 * NOISE_M_S2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("term", "state"),
     [

@@ -128,6 +128,7 @@ def test_a_damper_damps_and_its_reading_acts_after_its_delay(calm):
     assert damper.measured == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_the_log_of_a_loop_holds_the_readings_that_the_damper_saw(tmp_path):
     """Noise of the gyro moves the surface: its rate of change follows the noise of the logged reading before."""
     trial = replace(

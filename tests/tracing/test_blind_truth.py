@@ -99,6 +99,7 @@ def test_von_karman_in_the_inertial_range_is_isotropic():
     assert w / u == pytest.approx(4.0 / 3.0, rel=1e-6)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("kind", gusts.KINDS)
 def test_synthesised_gusts_have_the_spectrum_and_the_rotation(kind):
     n = 2**18
@@ -120,6 +121,7 @@ def test_synthesised_gusts_have_the_spectrum_and_the_rotation(kind):
     assert np.fft.rfft(rotation)[1:-1] == pytest.approx(np.fft.rfft(w)[1:-1] * expected, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_gust_variance_over_an_ensemble():
     rng = np.random.default_rng(9)
     values = [
@@ -244,6 +246,7 @@ def test_a_process_that_knows_the_tracer_flies_nothing(monkeypatch):
         draw.fly(draw.draw(1, 0, "null"))
 
 
+@pytest.mark.slow
 def test_the_truth_side_imports_nothing_of_the_tracers():
     names = [
         p.stem

@@ -84,6 +84,7 @@ def test_no_damper_in_open_loop(pilot):
         assert find_damper(surface, pitch_rate(seed), DT, TAU, NOISE) is None
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("pilot", [stepped, multisine])
 @pytest.mark.parametrize("noise", [0.0, NOISE])
 def test_an_ideal_gyro_in_open_loop_shows_no_damper(pilot, noise):

@@ -36,6 +36,7 @@ def likelihood(shift, told=TOLD):
     )
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("shift", "effects"),
     [

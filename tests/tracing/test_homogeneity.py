@@ -44,6 +44,7 @@ def test_a_direction_that_a_record_does_not_show_counts_for_no_degree():
     assert spread(np.array([[1.0, 0.0], [-1.0, 0.0]]), information) == (pytest.approx(2.0), 1)
 
 
+@pytest.mark.slow
 def test_alike_records_agree_as_often_as_chance_says():
     """Twenty sets of four records: the mean of chi-square is its degrees of freedom, to three standard errors."""
     found = [agreement(flown(seed)) for seed in range(20)]

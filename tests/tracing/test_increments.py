@@ -398,6 +398,7 @@ def varying(share):
     return replace(one, signals=replace(one.signals, airspeed_m_s=rising))
 
 
+@pytest.mark.slow
 def test_a_step_behind_a_play_is_sharpened_to_its_location_and_half_width():
     """A reading of the vane that jumps by 0.3 deg where a play of 0.4 deg passes 0.9 deg, to within half a cell of the grid."""
     low, high, half, at = -3.0 * DEG, 3.0 * DEG, 0.4 * DEG, 0.9 * DEG
@@ -447,6 +448,7 @@ def beyond_one_degree(one):
     return replace(one, signals=replace(one.signals, elevator_rad=measured))
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(("order", "expected"), [((NEEDED, IDLE), None), ((IDLE, NEEDED), IDLE.key)])
 def test_an_increment_that_a_later_one_makes_redundant_is_named(order, expected):
     rng = np.random.default_rng(5)
@@ -464,6 +466,7 @@ def test_an_increment_that_a_later_one_makes_redundant_is_named(order, expected)
     assert (named.key if named else None) == expected
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("released", [False, True])
 def test_a_name_and_a_release_that_an_increment_makes_unnecessary_are_given_up(released):
     rng = np.random.default_rng(5)

@@ -30,6 +30,7 @@ def searched(problem, *causes):
     return keys, rounds[-1].anomaly.p_value, steps.count(AGAIN)
 
 
+@pytest.mark.grid
 def test_a_search_follows_the_kinematics_where_it_leaves_an_anomaly_beyond_doubt(problem):
     """The vane that the kinematics are made to name explains nothing beside the gyro, and is not accepted."""
     anomaly, records = problem
@@ -39,6 +40,7 @@ def test_a_search_follows_the_kinematics_where_it_leaves_an_anomaly_beyond_doubt
     assert begun == searched(records)[2] + (1 if anomaly else 0)
 
 
+@pytest.mark.slow
 def test_one_of_several_sets_is_enough(problem):
     _, records = problem
     assert searched(records, ["vane_scale"], ["gyro_scale"]) == searched(records)

@@ -44,6 +44,7 @@ def candidate(problem, own, gain, reasons, *effects):
     return Candidate(score, fitted(problem, *effects), gain, NONE, NONE, 0.1, 0.01, reasons)
 
 
+@pytest.mark.slow
 def test_ties_are_those_beside_the_other_effects(problem):
     """A twin that a set surpassed in its round is as good at the end; a tie of the first round is none any more."""
     first, second, last = scored(problem), scored(problem, VANE), scored(problem, VANE, GYRO)
@@ -100,6 +101,7 @@ def test_every_release_that_was_followed_states_its_causes(problem):
     assert stated[1].parameters["factor"].value == inertia.parameters[0].value(last.null.point.sizes[span][0])
 
 
+@pytest.mark.slow
 def test_a_break_finds_its_angle_again_beside_a_later_effect(problem):
     """The declared aircraft has a break of Cm that the flown one lacks: the effect has to cancel it, where it is."""
     at, slope = 0.015, -1.5
@@ -119,6 +121,7 @@ def test_a_break_finds_its_angle_again_beside_a_later_effect(problem):
     assert relocated(problem, found, placed="cm_alpha_nonlinear:break") is found
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("near", [True, False])
 def test_a_late_rival_is_followed_by_its_own_twin(problem, monkeypatch, near):
     """A gyro lag that explains nearly as much as the member may be a gyro delay as well."""

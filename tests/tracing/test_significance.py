@@ -39,6 +39,7 @@ def test_beside_an_anomaly_beyond_doubt_a_later_effect_needs_more(p_value, gain)
 CANDIDATES = tuple(EFFECTS[key] for key in ("gyro_scale", "vane_scale", "accelerometer_scale"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("gyro", "sinusoid_rad", "accepted"), [(1.027, 0.0, True), (1.04, 0.003, False)])
 def test_a_small_second_effect_is_accepted_unless_an_anomaly_is_beyond_doubt(gyro, sinusoid_rad, accepted):
     """Its gain is between the two limits of three candidates, 11.5 and 20.4."""
@@ -52,6 +53,7 @@ def test_a_small_second_effect_is_accepted_unless_an_anomaly_is_beyond_doubt(gyr
     assert keys == ["accelerometer_scale", *(["gyro_scale"] if accepted else [])]
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(("count", "unbiased"), [(2, True), (3, False)])
 def test_with_one_or_two_records_the_variance_is_unbiased(count, unbiased, monkeypatch):
     asked = []

@@ -9,6 +9,7 @@ from validation import small_aircraft as small
 G0 = 9.80665
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("truth", [small.Truth(), small.drawn(3)])
 def test_least_squares_gives_its_coefficients_back(truth):
     """Every step of a flight without noise; pitch acceleration by central differences of 2.5 ms."""
@@ -37,6 +38,7 @@ def test_least_squares_gives_its_coefficients_back(truth):
         np.testing.assert_allclose(found, expected, rtol=rtol)
 
 
+@pytest.mark.slow
 def test_sensors_and_surface_have_the_stated_effects():
     """A lagged ramp is late by the time constant; the trims of a weak elevator are those of the others over its share."""
     plain, late, weak = (
@@ -51,6 +53,7 @@ def test_sensors_and_surface_have_the_stated_effects():
     assert trims[1] * small.EFFECTS["elevator_effectiveness"] == pytest.approx(trims[0], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_it_begins_in_level_flight():
     log = small.flight_log(3, noise=0.0)
     for run in range(small.RECORDS):

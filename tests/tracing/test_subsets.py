@@ -92,6 +92,7 @@ def test_sizes_are_within_the_plausible_range(problem):
             at += len(e.parameters)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("members", "further", "number"), [((), (), 0), ((), (VANE,), 1), ((VANE,), (), 1), ((VANE,), (GYRO,), 3)]
 )

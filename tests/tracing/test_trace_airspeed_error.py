@@ -34,6 +34,7 @@ def errors(problem, exact):
         yield r.signals.airspeed_m_s - truth
 
 
+@pytest.mark.slow
 def test_the_error_has_the_stated_variances_and_the_correction_reduces_it(plane, monkeypatch):
     """Twenty records: the mean of 120 squares of standard normal amounts scatters by 0.13 about 1."""
     before, after, amounts = [], [], []
@@ -58,6 +59,7 @@ def test_an_airspeed_with_little_noise_is_left_as_it_is(plane, monkeypatch):
     assert with_corrected_airspeed(case, initial_parameters(case.fitted, case.hypothesis)) is case
 
 
+@pytest.mark.slow
 def test_a_missing_effect_does_not_move_the_airspeed_beyond_its_noise(plane, monkeypatch):
     """An aircraft of half of the declared mass has an acceleration of twice the declared one."""
     case, _ = flown(plane, monkeypatch)
@@ -70,6 +72,7 @@ def test_a_missing_effect_does_not_move_the_airspeed_beyond_its_noise(plane, mon
         assert np.std(new.signals.airspeed_m_s - old.signals.airspeed_m_s) < 0.1
 
 
+@pytest.mark.slow
 def test_what_comes_before_a_part_of_a_record_is_corrected_too(plane, monkeypatch):
     case, _ = flown(plane, monkeypatch, options=TraceOptions(hold_out=("r2", "r3", "r4", "r5", "r6")))
     first, second = case.fitted.records
@@ -81,6 +84,7 @@ def test_what_comes_before_a_part_of_a_record_is_corrected_too(plane, monkeypatc
     assert np.abs(np.diff(change)).max() < 1e-2
 
 
+@pytest.mark.slow
 def test_records_with_a_quiet_airspeed_beside_noisy_ones_are_left_as_they_are(plane, monkeypatch):
     """Runs r3 and r6 are held out; r1 and both of them have a steady airspeed."""
     _, log = flown(plane, monkeypatch)

@@ -88,6 +88,7 @@ def refused(command, path, tmp_path, *more):
     return " ".join(lines)
 
 
+@pytest.mark.slow
 def test_one_record_works_and_is_provisional(command, log, tmp_path):
     path = stored(tmp_path, one(log))
     code, out, err = command(
@@ -174,6 +175,7 @@ def test_an_aircraft_that_cannot_fly_there(command, log, tmp_path):
     assert "Traceback" not in err
 
 
+@pytest.mark.slow
 def test_an_effect_whose_channel_the_log_lacks_is_untestable(log, monkeypatch):
     asking = replace(
         EFFECTS["vane_scale"],
@@ -188,6 +190,7 @@ def test_an_effect_whose_channel_the_log_lacks_is_untestable(log, monkeypatch):
     assert "needs_flaps" not in answer["detectability"]
 
 
+@pytest.mark.slow
 def test_effects_of_the_air_are_untestable_and_say_why(log):
     answer = trace(log, "gtm", TraceOptions(effects=("gust_level", *FEW))).to_dict()
     row = next(c for c in answer["candidates"] if c["name"] == "gust_level")
@@ -243,6 +246,7 @@ def test_density_in_another_unit(command, log, tmp_path, altitude):
     assert "unit" in message
 
 
+@pytest.mark.slow
 def test_an_accelerometer_whose_z_points_up(command, log, tmp_path):
     up = with_channel(log, "az_m_s2", -log.channels["az_m_s2"])
     message = refused(command, stored(tmp_path, up), tmp_path)

@@ -52,12 +52,14 @@ def better_of(problem, *search):
     return better_set(problem, rounds, rounds[-1].null, LIBRARY, LEAST, lambda step: None)[0]
 
 
+@pytest.mark.slow
 def test_a_wrong_member_gives_way_to_its_rival(problem):
     better = better_of(problem, GYRO, ACCELEROMETER, [VANE])
     assert better is not None
     assert {e.key for e in better} == {"vane_scale", "gyro_scale"}
 
 
+@pytest.mark.slow
 def test_the_residual_of_the_other_members_points_to_a_rival(problem):
     """No rival was refitted in the round of the wrong member, and no effect has a score beside both."""
     better = better_of(problem, GYRO, ACCELEROMETER, [])
@@ -65,22 +67,26 @@ def test_the_residual_of_the_other_members_points_to_a_rival(problem):
     assert {e.key for e in better} == {"vane_scale", "gyro_scale"}
 
 
+@pytest.mark.slow
 def test_what_explains_most_comes_first(problem):
     better = better_of(problem, GYRO, ACCELEROMETER, [VANE])
     without = {e.key: fitted(problem, *(o for o in better if o is not e)).cost for e in better}
     assert without[better[0].key] > without[better[1].key]
 
 
+@pytest.mark.slow
 def test_a_right_set_stays(problem):
     assert better_of(problem, GYRO, VANE, [ACCELEROMETER]) is None
 
 
+@pytest.mark.slow
 def test_what_remains_points_to_an_effect_that_makes_another_redundant(problem):
     better = better_of(problem, GYRO, ACCELEROMETER, [], [VANE])
     assert better is not None
     assert {e.key for e in better} == {"vane_scale", "gyro_scale"}
 
 
+@pytest.mark.slow
 def test_every_exchange_is_kept_for_the_look_alikes(problem):
     rounds = reached(problem, GYRO, VANE, [ACCELEROMETER])
     better, fits = better_set(problem, rounds, rounds[-1].null, LIBRARY, LEAST, lambda step: None)
@@ -111,6 +117,7 @@ def test_one_late_member_has_its_rival_alone():
     assert list(other_kinds(LIBRARY, last)) == []
 
 
+@pytest.mark.slow
 def test_records_left_out_do_not_refuse_the_effect_that_leads(problem, monkeypatch):
     """Another effect that the set still lacks may make them worse; the other reasons remain."""
     last = scored_round(problem, fitted(problem, GYRO), [VANE, ACCELEROMETER], 1, 1, lambda step: None)

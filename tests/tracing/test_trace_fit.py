@@ -79,6 +79,7 @@ def moved(point, i, h):
     return Parameters(common, per_record, sizes)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("name", [*Common.names, "delay", "arm", *PerRecord.names])
 def test_gradient_is_that_of_the_likelihood(off_optimum, name):
     """Central differences of the negative log-likelihood itself; the fit's are one-sided, steps as in the model."""
@@ -302,6 +303,7 @@ def test_precision_without_a_declared_slope():
     np.testing.assert_allclose(free, tight + more, rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(("about", "slope"), [(0.1, 0.0), (0.0, 2.0)])
 def test_a_curvature_is_found_whatever_angle_it_is_about(about, slope):
     """At a trim of 0.1 rad 10 alpha^2 is 10 (alpha - 0.1)^2 and a slope of 2 that nobody declared, eight standard

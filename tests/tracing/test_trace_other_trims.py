@@ -32,6 +32,7 @@ def prepared(log, gtm):
     return prepare([log], gtm, [EFFECTS["gyro_scale"]], TraceOptions())
 
 
+@pytest.mark.slow
 def test_a_trim_at_an_airspeed_that_the_record_passes(log, gtm):
     """The trim is the nearest that exists, and a note states both airspeeds."""
     case = prepared(with_airspeed(log, SLOW_M_S - 10.0, SLOW_M_S + 10.0), gtm)
@@ -52,6 +53,7 @@ def test_no_airspeed_of_the_record_has_a_trim(log, gtm):
         prepared(with_airspeed(log, SLOW_M_S - 1.0, SLOW_M_S + 1.0), gtm)
 
 
+@pytest.mark.slow
 def test_a_record_that_leaves_the_dynamic_pressure_of_its_trim(log, gtm):
     """26 m/s after 54 m/s: 0.42 of the dynamic pressure at their mean of 40 m/s, and (54/40)^2 = 1.8 is nearer to it."""
     notes = [

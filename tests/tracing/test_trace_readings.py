@@ -83,6 +83,7 @@ def test_the_filter_changes_the_lag_of_the_vane_with_the_dynamic_pressure():
     assert np.abs(moved[:, 1:]).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_the_flown_log_and_the_updated_aircraft_have_the_increment(tmp_path):
     """A campaign of the written aircraft less one of the declared aircraft, both without noise."""
     folder = write_aircraft(aircraft.load("gtm"), BENDING, tmp_path / "bending")

@@ -37,6 +37,7 @@ def fitted(gyro, accelerometer):
     return problem, fit(problem, hypothesis, Parameters(start.common, start.per_record, np.zeros(2)))
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(("gyro", "expected"), [(1.2, None), (1.0, 0)])
 def test_an_effect_that_is_there_stays_and_one_that_is_not_goes(gyro, expected):
     problem, found = fitted(gyro, 1.1)
@@ -54,6 +55,7 @@ def test_an_immaterial_effect_goes_however_sure():
         assert redundant_effect(problem, moved, LEAST) == expected
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("gyro", "expected"), [(1.2, ["gyro_scale", "accelerometer_scale"]), (1.0, ["accelerometer_scale"])]
 )
@@ -69,6 +71,7 @@ def test_a_finished_search_gives_up_an_effect_that_is_not_there(gyro, expected):
     assert pruned(problem, alone, candidates, 1, 0.05, lambda step: None) is alone
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(("odds", "is_kept"), [(5.0, False), (20.0, True)])
 def test_derivatives_beside_names_need_strong_odds(odds, is_kept):
     """The derivatives are as declared, and were released. A further cause needs odds of ten to one; then it is a rival."""

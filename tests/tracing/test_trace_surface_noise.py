@@ -22,6 +22,7 @@ def plane(tmp_path_factory):
     return small.declared(tmp_path_factory.mktemp("small"))
 
 
+@pytest.mark.slow
 def test_the_noise_remains_where_the_surface_moves_and_in_short_rests():
     """A step at 2 s, one back after 0.3 s, and none after that: only long rests are without noise."""
     log = small.flight_log(5)
@@ -41,6 +42,7 @@ def test_a_surface_without_noise_has_none():
     assert first.surface_noise_rad2.size == 0
 
 
+@pytest.mark.slow
 def test_it_counts_where_it_turns_the_aircraft_as_much_as_the_gyro_shows(plane):
     """0.04 deg changes the pitch rate of the small aircraft by 0.34 of the gyro's noise in a sample, and that of the GTM at
     0.01 deg by 0.02.
@@ -52,6 +54,7 @@ def test_it_counts_where_it_turns_the_aircraft_as_much_as_the_gyro_shows(plane):
     assert all(r.signals.surface_noise_rad2.size == 0 for r in gtm.fitted.records)
 
 
+@pytest.mark.slow
 def test_innovations_of_the_gyro_are_as_large_in_motion_as_at_rest(plane):
     """Twenty-four records of a flight without a missing effect; the ratio of 2000 squares to 9000 scatters by 0.035."""
     ratios = {True: [], False: []}

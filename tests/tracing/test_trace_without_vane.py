@@ -46,6 +46,7 @@ def test_without_a_vane_alpha_is_no_output():
     assert not any(term.channel == "alpha_rad" for term in declared_change(GTM, has_vane=False).sensors)
 
 
+@pytest.mark.slow
 def test_the_filter_is_that_of_two_outputs():
     """Innovations of q and az have the covariance C P C' + R of the Kalman filter whose outputs are these two (SciPy)."""
     one = noisy(1)
@@ -61,6 +62,7 @@ def test_the_filter_is_that_of_two_outputs():
     np.testing.assert_allclose(made.covariance[1:, 1:], two @ p @ two.T + r, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_reconstructed_alpha_has_no_say():
     """Another alpha of the same mean changes neither the innovations of q and az nor the likelihood.
 

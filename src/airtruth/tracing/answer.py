@@ -179,22 +179,28 @@ class TraceAnswer:
 
     Attributes
     ----------
-    verdict : conclusion; provisional : whether there is a reservation, see docs/trace.md.
-    anomaly, remaining : evidence before anything is added, and after.
+    verdict : conclusion; provisional : whether there is a reservation, which the verdict in words or a note states.
+    anomaly, remaining : strongest evidence of a missing effect, before any effect is accepted and with the accepted effects.
     effects : accepted effects, in the order in which they were accepted.
     candidates : every candidate, most significant first.
-    error : errors per stage; derivatives : at the trim.
-    updated_aircraft : folder, None where none was written.
-    detectability : effect -> smallest size that these records can trace, in the unit of its first parameter.
-    next_flight : which flight to make next.
-    model : "aircraft" or "linear"; records : names; notes : sentences without a final period.
-    tolerances : None in old files; replay : None where nothing was written to disk.
-    forced : faults of the logs that the gate found and the caller overruled.
+    error : root mean square errors of each stage, for the fitted and the held-out records; in `channels` the standard
+        deviation of each channel. Stages *after* and *control* are absent if no effect is accepted.
+    derivatives : at the trim [1/rad, rates as q c/(2V)]: `declared`, `before`, `after` and `after_std`.
+    updated_aircraft : folder of the updated aircraft, None where none was written.
+    detectability : effect -> smallest size that is material and that these records can trace, in the unit of its first
+        parameter.
+    next_flight : recommended next flight.
+    model : "aircraft" or "linear"; records : names of the `fitted` and of the `held_out` records.
+    notes : reservations and remarks, sentences without a final period.
+    tolerances : free runs of each stage against the tolerances of a training simulator, with `source` and `limits`; None in
+        old files.
+    replay : root mean square errors of JSBSim with the `declared` and the `updated` aircraft; None where none was flown.
+    forced : faults of the logs that the caller overrode (`--force`).
     declared_model : test of the declared model; None in old files.
     confirmed : whether the held-out records are no worse after than before; None where nothing can be compared.
     credit : effect -> log-likelihood of the held-out records that is lost without it, over the step from *declared* to
         *after* [-].
-    alternatives, inclusion : sets of effects with their weights; effect -> its probability.
+    alternatives : sets of effects, each with its posterior weight; inclusion : effect -> its probability.
     axial_force : errors of ax as declared, and with the increments of CX; None where ax was not compared.
     """
 

@@ -8,8 +8,8 @@ from typing import Final
 from airtruth.tracing.inference.homogeneity import Homogeneity
 
 LEVEL: Final = 1e-4
-"""Probability of the agreement of the records below which names are provisional [-] (judgement: none of the 80 nulls of
-seed 20262219 is below)."""
+"""Probability of the agreement of the records below which names are provisional [-] (judgement: none of 80 nulls of the
+blind trials is below)."""
 CERTAIN: Final = 1e-6
 """The same below which an answer without a cause is not that nothing is missing [-] (judgement: beyond doubt)."""
 DIFFERENCES: Final = "the differences between the records"
