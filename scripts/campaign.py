@@ -61,7 +61,9 @@ def main() -> int:
     )
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--quick", action="store_true", help="a tenth of the runs")
-    parser.add_argument("--further", action="store_true", help="also the methods that the paper does not have")
+    parser.add_argument(
+        "--further", action="store_true", help="also the methods that the paper does not have"
+    )
     parser.add_argument("--undeclared", action="store_true", help="also trace the logs of data/undeclared")
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)

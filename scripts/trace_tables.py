@@ -74,8 +74,13 @@ def keys() -> str:
     """Tables of the keys, a heading for each part."""
     parts = []
     for part, documented in CLASSES.items():
-        rows = [f"| `{names.replace(', ', '`, `')}` | {_cell(meaning)} |" for names, meaning in attributes(documented)]
-        parts.append("\n".join([f"## {part[0].upper()}{part[1:]}", "", "| key | content |", "|---|---|", *rows]))
+        rows = [
+            f"| `{names.replace(', ', '`, `')}` | {_cell(meaning)} |"
+            for names, meaning in attributes(documented)
+        ]
+        parts.append(
+            "\n".join([f"## {part[0].upper()}{part[1:]}", "", "| key | content |", "|---|---|", *rows])
+        )
     return "\n\n".join(parts) + "\n"
 
 
@@ -89,7 +94,9 @@ def rules() -> str:
             module = path.relative_to(ROOT / "src").with_suffix("").as_posix().replace("/", ".")
             head = (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition("\n\n")[0]
             table = ["| constant | value | meaning |", "|---|---|---|", *rows]
-            parts.append("\n".join([f"## {path.stem}", "", f"`{module}`: {' '.join(head.split())}", "", *table]))
+            parts.append(
+                "\n".join([f"## {path.stem}", "", f"`{module}`: {' '.join(head.split())}", "", *table])
+            )
     return "\n\n".join(parts) + "\n"
 
 
@@ -97,10 +104,14 @@ def _numbers(path: Path) -> Iterator[tuple[str, str, str]]:
     """Name, source text and docstring of each documented constant of a module that is a number or a tuple of numbers."""
     body = ast.parse(path.read_text(encoding="utf-8")).body
     for node, after in zip(body, body[1:], strict=False):
-        if not (isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and node.value is not None):
+        if not (
+            isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and node.value is not None
+        ):
             continue
         leaves = [n for n in ast.walk(node.value) if isinstance(n, ast.Constant)]
-        if not leaves or not all(isinstance(n.value, int | float) and not isinstance(n.value, bool) for n in leaves):
+        if not leaves or not all(
+            isinstance(n.value, int | float) and not isinstance(n.value, bool) for n in leaves
+        ):
             continue
         if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant):
             yield node.target.id.strip("_"), ast.unparse(node.value), str(after.value.value)

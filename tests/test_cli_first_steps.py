@@ -20,6 +20,7 @@ from airtruth.cli.progress import TRACE_STEPS, Remaining
 from airtruth.effects.registry import EFFECTS
 from airtruth.errors import ConfigurationError
 from airtruth.importers import guess_mapping
+from airtruth.reporting.paper.tables import methods_of
 from airtruth.schemas import FILES, schema
 from airtruth.schemas.generate import NAMES
 from airtruth.simulation.campaign.file import Campaign, read
@@ -173,6 +174,13 @@ def test_examples_are_listed_and_copied(airtruth, tmp_path):
         assert airtruth("example", name, "--out", "copies")[0] == 0
         for file in example.files:
             assert (tmp_path / "copies" / file).read_bytes() == (ROOT / file).read_bytes()
+
+
+def test_the_commands_of_the_paper_have_the_methods_of_its_tables():
+    identify = next(line for line in EXAMPLES["paper"].commands if " identify " in line).split()
+    methods = [word for option, word in zip(identify, identify[1:], strict=False) if option == "--method"]
+    assert tuple(methods) == methods_of("light-fit")
+    assert "--airspeed-m-s 42.852" in " ".join(identify)
 
 
 @pytest.mark.slow

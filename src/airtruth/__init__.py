@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from airtruth.tracing.options import TraceOptions
     from airtruth.tracing.result import TraceResult
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _LAZY = {
     "Aircraft": "airtruth.aircraft",

@@ -17,7 +17,9 @@ def test_every_table_has_rows_of_each_of_its_modes() -> None:
     sums = added(runs())
     for table in TABLES.values():
         for mode in table.modes:
-            assert sums[mode, PRESENT].scored[table.scores[0].key] + sums[mode, PRESENT].scored["reported"] > 0
+            assert (
+                sums[mode, PRESENT].scored[table.scores[0].key] + sums[mode, PRESENT].scored["reported"] > 0
+            )
 
 
 def test_rows_of_a_group_are_added() -> None:

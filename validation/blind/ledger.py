@@ -244,7 +244,9 @@ def with_tables(page: str, rows: Iterable[Run]) -> str:
         if begin not in page or end not in page:
             raise ValueError(f"{PAGE.name}: no mark of the table {name!r}")
         text = f"{begin}{rendered(table, sums)}\n{end}"
-        page = re.sub(re.escape(begin) + ".*?" + re.escape(end), lambda _, text=text: text, page, flags=re.DOTALL)
+        page = re.sub(
+            re.escape(begin) + ".*?" + re.escape(end), lambda _, text=text: text, page, flags=re.DOTALL
+        )
     return page
 
 

@@ -29,15 +29,24 @@ class Example:
     commands: tuple[str, ...]
 
 
+_METHODS: Final = "".join(
+    f" --method {name}"
+    for name in (
+        *("ls", "iv-lowpass", "iv-reference", "iv-reference-regressor"),
+        *("iv-actuator", "iv-actuator-regressor", "iv-f1", "iv-f2"),
+    )
+)
+"""Options for the estimators in Tables 1 and 2 of the paper."""
+
 _ALL: Final = (
     Example(
         "paper",
-        "doublets in light turbulence as in M. Brunot's paper: 300 runs of 5 s",
-        ("data/campaigns/light.toml",),
+        "doublets in light turbulence: 300 runs of 15 s that reproduce Tables 1 and 2 of M. Brunot's paper",
+        ("data/campaigns/light-fit.toml", "data/campaigns/light.toml"),
         (
-            "airtruth fly data/campaigns/light.toml --runs 30 --out out/light",
-            "airtruth identify out/light --aircraft gtm --method ls --method iv-f1",
-            "airtruth report out/light --out out/light.html",
+            "airtruth fly data/campaigns/light-fit.toml --out out/light-fit",
+            f"airtruth identify out/light-fit --aircraft gtm --airspeed-m-s 42.852{_METHODS}",
+            "airtruth tables out/light-fit",
         ),
     ),
     Example(
