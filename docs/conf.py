@@ -23,6 +23,7 @@ version = release = airtruth.__version__
 
 extensions = [
     "mathml",
+    "parameters",
     "myst_nb",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",

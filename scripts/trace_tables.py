@@ -12,6 +12,7 @@ import ast
 import inspect
 import re
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
@@ -103,7 +104,7 @@ def rules() -> str:
 def _numbers(path: Path) -> Iterator[tuple[str, str, str]]:
     """Name, source text and docstring of each documented constant of a module that is a number or a tuple of numbers."""
     body = ast.parse(path.read_text(encoding="utf-8")).body
-    for node, after in zip(body, body[1:], strict=False):
+    for node, after in pairwise(body):
         if not (
             isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and node.value is not None
         ):

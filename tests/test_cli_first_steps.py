@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import tomllib
+from itertools import pairwise
 from pathlib import Path
 
 import jsonschema
@@ -178,7 +179,7 @@ def test_examples_are_listed_and_copied(airtruth, tmp_path):
 
 def test_the_commands_of_the_paper_have_the_methods_of_its_tables():
     identify = next(line for line in EXAMPLES["paper"].commands if " identify " in line).split()
-    methods = [word for option, word in zip(identify, identify[1:], strict=False) if option == "--method"]
+    methods = [word for option, word in pairwise(identify) if option == "--method"]
     assert tuple(methods) == methods_of("light-fit")
     assert "--airspeed-m-s 42.852" in " ".join(identify)
 

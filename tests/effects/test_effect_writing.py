@@ -160,6 +160,7 @@ def test_a_changed_aircraft_can_be_renamed_and_changed_again(gtm, paper_conditio
     renamed = aircraft.load(shutil.copytree(changed.folder, tmp_path / "v2"))
     again = flights.changed(renamed, Change(), tmp_path / "second")
     expected, *flown = (flights.fly(plane, paper_condition)[1] for plane in (changed, renamed, again))
+    assert len(flown) == 2
     for other in flown:
         np.testing.assert_array_equal(other["q_rad_s"], expected["q_rad_s"])
 

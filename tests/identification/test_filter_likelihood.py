@@ -133,6 +133,7 @@ def test_gradient_is_that_of_the_cost(make):
     y, u, bend = data(len(p.inputs))
     z = start_z(p)
     free = np.arange(z.size)
+    assert z.size >= 6
     gradient, information = evaluate(p, z, free, y, u, bend)[1:3]
     scale = 1.0 / np.sqrt(np.diag(information))
     for i in free:

@@ -56,7 +56,9 @@ def autocovariance(e, n):
 @pytest.mark.parametrize("trim", ["intercept", "mean"])
 def test_coloured_is_morelli_and_kleins_double_sum(name, trim):
     options = Options(covariance="coloured", trim=trim, trim_window_s=0.9)
-    for z, x, e, n, covariance in dense(BATCH, name, options):
+    cases = list(dense(BATCH, name, options))
+    assert cases
+    for z, x, e, n, covariance in cases:
         bread = np.linalg.inv(z.T @ x)
         expected = bread @ (z.T @ autocovariance(e, n) @ z) @ bread.T
         size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))

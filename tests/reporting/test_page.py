@@ -71,7 +71,9 @@ def pages(tmp_path):
 
 
 def test_every_page_is_whole_and_needs_nothing_else(tmp_path):
-    for name, path in pages(tmp_path).items():
+    made = pages(tmp_path)
+    assert made
+    for name, path in made.items():
         page = read_page(path)
         assert page.links == [], name
         assert page.anchors == page.targets, name

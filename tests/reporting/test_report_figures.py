@@ -172,6 +172,7 @@ def test_the_legend_hides_no_data_and_no_text_is_cut(kind, matrices, campaign):
     }[kind]()
     renderer = drawn(figure)
     legend = figure.legends[0].get_window_extent(renderer)
+    assert figure.axes
     for ax in figure.axes:
         assert not legend.overlaps(ax.get_tightbbox(renderer))
         ticks = [label.get_window_extent(renderer) for label in ax.get_xticklabels() if label.get_visible()]

@@ -55,7 +55,9 @@ def test_chunks_flown_backwards_by_one_pilot_are_the_same(once, tmp_path):
     truths.mkdir()
     for order in reversed(list(orders_of(planned, range(7)))):
         pilot.fly_chunk(order, logs, truths)
-    for path in sorted((once / "logs").iterdir()):
+    paths = sorted((once / "logs").iterdir())
+    assert paths
+    for path in paths:
         assert (logs / path.name).read_bytes() == path.read_bytes()
 
 

@@ -120,7 +120,9 @@ def test_every_page_is_in_the_navigation():
 
 
 def test_the_notebook_holds_no_outputs():
-    for cell in json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]:
+    cells = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
+    assert cells
+    for cell in cells:
         assert not cell.get("outputs")
         assert cell.get("execution_count") is None
 
@@ -135,6 +137,7 @@ def test_the_locks_hold_what_pyproject_asks_for():
         "requirements-docs.lock": [*project["dependencies"], *extras["build"], *extras["docs"]],
     }
     locked = {name: locks(ROOT / name) for name in asked}
+    assert all(locked.values())
     for name, wanted in asked.items():
         for requirement in wanted:
             package = re.match(r"[A-Za-z0-9_.-]+", requirement)[0].lower().replace("_", "-")

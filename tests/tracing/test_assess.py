@@ -19,6 +19,7 @@ def test_own_parameters_of_the_declared_model_are_at_their_best(gtm):
     """
     stages = trace([read_log(DATA / "b.parquet")], gtm, TraceOptions()).stages
     model, problem = stages.models["declared"], stages.case.fitted
+    assert len(stages.fitted["declared"]) == len(problem.records) > 0
     for i, first in enumerate(stages.fitted["declared"]):
         again = assess(problem, i, model.hypothesis, model.common, model.sizes, first.per_record)
         assert abs(first.likelihood - again.likelihood) < 0.2, i

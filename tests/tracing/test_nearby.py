@@ -36,7 +36,9 @@ def beside(own, *effects, **sizes):
 def test_kept_derivatives_are_those_of_a_renewal(problem, vane):
     """The vane's changes its position, and the gyro's is made."""
     hypothesis, point = beside(vane, GYRO, VANE, gyro_scale=0.0)
-    for i, old in enumerate(nearby(vane, hypothesis)):
+    known = list(nearby(vane, hypothesis))
+    assert len(known) == len(problem.records)
+    for i, old in enumerate(known):
         kept = sensitivities_of(problem, i, hypothesis, point, old=old)
         made = sensitivities_of(problem, i, hypothesis, point)
         scale = np.abs(made.t).max(axis=(1, 2), keepdims=True) + 1e-300

@@ -84,12 +84,15 @@ def test_no_set_has_two_variants_of_an_effect_but_delays_of_two_channels(problem
 
 
 def test_sizes_are_within_the_plausible_range(problem):
-    for s in subsets(problem, fitted(problem, ACCELEROMETER), LIBRARY, 2):
-        at = 0
-        for e in s.effects:
-            low, high = e.parameters[0].reach
-            assert low <= s.start.sizes[at] <= high
-            at += len(e.parameters)
+    """Sizes are limited, and locations are those of the score."""
+    sets = list(subsets(problem, fitted(problem, ACCELEROMETER), LIBRARY, 2))
+    assert any(len(s.effects) == 2 for s in sets)
+    for s in sets:
+        parameters = [p for e in s.effects for p in e.parameters]
+        assert len(parameters) == len(s.start.sizes)
+        for parameter, value in zip(parameters, s.start.sizes, strict=True):
+            low, high = parameter.reach
+            assert low <= value <= high
 
 
 @pytest.mark.grid

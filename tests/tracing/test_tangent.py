@@ -147,6 +147,7 @@ def test_many_shapes_pass_in_blocks(null, monkeypatch):
     every = [shape for shape, _ in SHAPES.values()]
     whole = sensitivities_to(fitted, problem, every)
     monkeypatch.setattr("airtruth.tracing.selection.increment_inputs._BLOCK", 1)
+    assert len(whole)
     for one, own in zip(whole, sensitivities_to(fitted, problem, every), strict=True):
         np.testing.assert_allclose(own.t, one.t, rtol=1e-9, atol=1e-9 * np.abs(one.t).max())
 

@@ -68,6 +68,7 @@ def test_a_missing_effect_does_not_move_the_airspeed_beyond_its_noise(plane, mon
     )
     problem = replace(case.fitted, records=heavy)
     moved = corrected(problem, case.hypothesis, initial_parameters(problem, case.hypothesis))
+    assert problem.records
     for old, new in zip(problem.records, moved.records, strict=True):
         assert np.std(new.signals.airspeed_m_s - old.signals.airspeed_m_s) < 0.1
 

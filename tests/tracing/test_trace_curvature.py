@@ -67,6 +67,7 @@ def test_the_update_flies_what_was_fitted(found):
     thrust and inertia, shows.
     """
     after = found.to_dict()["error"]["after"]["held_out"]["free_run"]
+    assert found.to_dict()["replay"]["updated"].keys() == after.keys()
     for channel, error in found.to_dict()["replay"]["updated"].items():
         assert error < 1.2 * after[channel]
         assert error < 0.2 * found.to_dict()["replay"]["declared"][channel]

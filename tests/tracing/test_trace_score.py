@@ -45,7 +45,9 @@ def null():
 def test_p_value_of_one_direction(null):
     """Two-sided for a scale, one-sided for a delay: scipy's normal distribution."""
     problem, found = null
-    for score in table(found, problem, effects("vane_scale", "elevator_delay"), NO_WHITENER, 0).scores:
+    scores = table(found, problem, effects("vane_scale", "elevator_delay"), NO_WHITENER, 0).scores
+    assert len(scores) == 2
+    for score in scores:
         one_sided = score.effect.name == "elevator_delay"
         expected = norm.sf(score.z) if one_sided else 2.0 * norm.sf(abs(score.z))
         assert score.p_value == pytest.approx(expected, rel=1e-12)
@@ -162,7 +164,9 @@ def test_one_step_agrees_with_the_refit_in_noise():
     records = [tr.fly(rng, amplitude=a * DEG, name=str(a)) for a in (2.0, -2.0, 1.0)]
     problem = tr.problem(records)
     null = fit(problem, tr.NOTHING, initial_parameters(problem, tr.NOTHING))
-    for score in table(null, problem, effects("vane_arm", "gyro_scale"), NO_WHITENER, 0).scores:
+    scores = table(null, problem, effects("vane_arm", "gyro_scale"), NO_WHITENER, 0).scores
+    assert len(scores) == 2
+    for score in scores:
         found = fit(
             problem, null.hypothesis.plus(score.effect), replace(null.point, sizes=np.array([score.size]))
         )
