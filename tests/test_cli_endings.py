@@ -132,7 +132,7 @@ def run(*arguments, **options):
     return subprocess.run(command, capture_output=True, text=True, encoding="utf-8", check=False, **options)
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.parametrize("environment", ENVIRONMENTS, ids=["ioencoding", "locale"])
 def test_a_name_outside_the_encoding_of_the_terminal_is_escaped(tmp_path, environment):
     done = run("effects", "Größe-α", cwd=tmp_path, env=os.environ | environment)

@@ -117,6 +117,7 @@ def test_a_new_aircraft_loads(airtruth, tmp_path):
     assert set(aircraft.file.derivatives) == {"CLalpha", "CLq", "CLde", "Cmalpha", "Cmq", "Cmde"}
 
 
+@pytest.mark.slow
 def test_the_file_of_a_new_aircraft_has_one_name(airtruth, tmp_path):
     code, _, err = airtruth("new", "aircraft", "--out", "mine.toml")
     assert (code, "state the folder, for example --out mine" in err) == (2, True)
@@ -202,6 +203,7 @@ def test_every_file_of_the_data_belongs_to_an_example():
     assert {name for name in there if not Path(name).name.startswith(".")} == shown
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("kind", FILES)
 def test_shipped_files_fit_their_schema(kind):
     generated = json.loads(schema(kind))
@@ -302,7 +304,7 @@ def test_an_unknown_schema_names_the_kinds(airtruth):
     assert json.loads(out)["title"] == "airtruth aircraft file"
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_shells_complete_methods(airtruth, shell):
     line = "airtruth identify LOG --method iv-f"

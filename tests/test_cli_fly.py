@@ -114,7 +114,7 @@ def test_short_work_leaves_stderr_silent_where_it_is_no_terminal(command, tmp_pa
 FULL = Path("/dev/full")
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.skipif(not FULL.exists(), reason="no device that is always full")
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 @pytest.mark.parametrize("arguments", [("effects", "--json"), ("--version",)])

@@ -132,7 +132,7 @@ def check_endings(name, home):
     assert end(name, "ascii", home)[0] in (0, USAGE)
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sampled(QUICK, 3))
 def test_streams_of_quick_commands(name, home):
     check_endings(name, home)

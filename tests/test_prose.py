@@ -124,7 +124,6 @@ def test_links_and_anchors_resolve(page):
     assert not broken
 
 
-@pytest.mark.grid
 @each_page
 def test_commands_and_options_exist(page):
     wrong = []

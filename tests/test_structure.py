@@ -26,7 +26,6 @@ def is_command(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
     return any("command" in ast.unparse(d) or "callback" in ast.unparse(d) for d in function.decorator_list)
 
 
-@pytest.mark.grid
 @pytest.mark.parametrize("path", FILES, ids=name_of)
 def test_sizes(path):
     text = path.read_text(encoding="utf-8")
@@ -39,7 +38,6 @@ def test_sizes(path):
     assert not long
 
 
-@pytest.mark.grid
 @pytest.mark.parametrize("path", FILES, ids=name_of)
 def test_arguments(path):
     tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -57,7 +55,6 @@ def test_arguments(path):
     assert not calls
 
 
-@pytest.mark.grid
 @pytest.mark.parametrize("path", FILES, ids=name_of)
 def test_constants_have_docstrings(path):
     """A module constant states its unit and its source; a family of constants may share one docstring."""
@@ -76,7 +73,6 @@ def test_constants_have_docstrings(path):
     assert not bare
 
 
-@pytest.mark.grid
 @pytest.mark.parametrize("path", FILES, ids=name_of)
 def test_no_private_imports(path):
     tree = ast.parse(path.read_text(encoding="utf-8"))

@@ -84,6 +84,7 @@ def test_an_argument_that_cannot_be_used(case, workspace, monkeypatch):
     assert words in str(caught.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [list, tuple, iter, lambda paths: (p for p in paths)])
 def test_several_files_in_any_iterable(kind, workspace):
     """An import reads the mappings first, and these do not exist."""

@@ -36,7 +36,7 @@ def certain(faults):
     return [fault for fault in faults if fault.certain]
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sampled(FAULTS, 3))
 def test_every_fault_is_named(name, log, gtm):
     fault = certain(inspect(FAULTS[name](log), gtm))[0]
@@ -72,7 +72,7 @@ SHARED = {
 """Mistakes that several channels share: factor of each channel, and the kind."""
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.parametrize("path", sampled(UNDECLARED[:4], 4), ids=lambda path: path.stem)
 @pytest.mark.parametrize("mistake", SHARED)
 def test_a_mistake_that_channels_share_is_named_for_each(mistake, path, gtm):
@@ -208,6 +208,7 @@ def test_a_fault_of_one_run_names_that_run(log):
     assert f"in 1 of 6 runs ({log.run_ids[2]!r})" in fault.sentence
 
 
+@pytest.mark.slow
 def test_two_faults_are_both_named(log, gtm):
     changed = {n: v / np.deg2rad(1.0) for n, v in log.channels.items() if n in ("alpha_rad", "theta_rad")}
     faults = certain(inspect(replace(log, channels={**log.channels, **changed}), gtm))

@@ -83,7 +83,7 @@ def arguments(verb, path):
 VERBS = ("identify", "check", "trace", "import")
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.parametrize(("verb", "name"), sampled(product(VERBS, NAMED), 3))
 def test_every_verb_refuses_and_names_the_channel(verb, name, stored, command, monkeypatch):
     monkeypatch.setattr(tracing, "prepare", lambda *a: pytest.fail("went on behind the gate"))

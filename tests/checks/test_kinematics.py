@@ -348,6 +348,7 @@ def test_declared_biases_are_not_found_again(true):
     assert [plain.finding(n).value for n in names] == [result.finding(n).value for n in names]
 
 
+@pytest.mark.slow
 def test_an_arm_is_found_and_its_twin_named(true):
     result = check_kinematics(as_log(noisy(measured(true, {"vane_arm": 4.0}), 2)))
     names = {c.name for c in result.possible}
@@ -369,6 +370,7 @@ def test_an_arm_longer_than_the_aircraft_is_no_cause(true):
     assert not any("arm" in f.name and f.state in ("present", "one of") for f in result.findings)
 
 
+@pytest.mark.slow
 def test_an_attitude_that_lags_is_not_a_scale_of_the_gyro(true):
     """The gain of the lag falls with frequency; a scale's does not."""
     result = check_kinematics(as_log(*(noisy(measured(true, {"attitude_lag": 0.1}), i) for i in range(2))))
@@ -427,6 +429,7 @@ def test_what_is_declared_is_not_found_again(true):
     assert delay.lower < 0.04 < delay.upper
 
 
+@pytest.mark.slow
 def test_a_declared_delay_that_is_absent_is_found(true):
     """The delay ends at zero, which no search limits."""
     result = check_kinematics(as_log(noisy(true, 2)), {"sensor_delay:theta_rad": 0.04})

@@ -44,6 +44,7 @@ def test_copy_of_a_wheel_model_stands_alone_and_flies_the_same_bits(foreign, tmp
         np.testing.assert_array_equal(again[name], channel)
 
 
+@pytest.mark.grid
 def test_surface_effect_on_a_foreign_aircraft_is_felt_late(foreign, tmp_path):
     plane, at, amplitude, flown, _ = foreign
     late = flights.changed(plane, Change(surface=(SurfaceTerm("delay", 0.05),)), tmp_path)

@@ -88,6 +88,7 @@ def test_aircraft_files(content):
         files.load_aircraft(content, folder)
 
 
+@pytest.mark.slow
 @examples(60)
 @given(strategies.traces())
 def test_traces(content):

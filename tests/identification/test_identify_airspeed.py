@@ -79,6 +79,7 @@ def test_a_climbing_airspeed_is_followed(name, cl_percent, cm_percent):
     assert off.max() > 2.0
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("name", ["ls", "iv-lowpass", "iv-f1", "iv-f2"])
 def test_airspeed_narrows_the_spread_of_the_lift(name):
     """Standard deviations over 500 runs fall in CL by 1.9 to 3.5 (iv-f1: CLq from 17.9 to 6.5), none rises."""

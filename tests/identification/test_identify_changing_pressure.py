@@ -44,6 +44,7 @@ def test_a_changing_pressure_is_noted_for_methods_that_take_it_for_constant(plan
     assert note.startswith("iv-refined: ")
 
 
+@pytest.mark.slow
 def test_measured_pressure_and_steady_records_have_no_note(plane, log):
     assert not said(identify(log, plane, ["ls"], Options(pressure="measured")))
     assert not said(identify("data/undeclared/c.parquet", "gtm", ["ls"]))

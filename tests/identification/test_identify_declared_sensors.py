@@ -219,6 +219,7 @@ def test_every_method_takes_the_corrected_records(true):
         assert row["CLq"] == pytest.approx(THETA[1], rel=0.05), name
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("method", "percent_of_truth"), [("filter-error", 2.5), ("iv-refined", 2.5), ("frequency", 0.5)]
 )

@@ -102,6 +102,7 @@ def test_three_endogenous_regressors_where_the_elevator_has_an_instrument():
     assert np.isnan(ls.kleibergen_paap).all()
 
 
+@pytest.mark.slow
 def test_cross_correlation_bands_are_honest():
     """Correct model, 200 runs in gusts: 5 % of the lags outside +-1.96, within 2 to 9 %."""
     batch = fly(runs=200, gust=1.0, noise=1.0, seed=43)

@@ -127,6 +127,7 @@ def test_the_band_follows_the_signal():
     assert (high > SURE * wn_hz - 0.1).all()
 
 
+@pytest.mark.slow
 def test_a_band_may_be_stated():
     options = replace(PLAIN, band_hz=(0.6, 2.4))
     low, high = band_hz(GUSTS, options)
@@ -140,6 +141,7 @@ def test_a_band_may_be_stated():
         Options(band_hz=(2.0, 1.0))
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(("name", "batch"), [("constant", GUSTS), ("measured", AIR)])
 def test_spread_and_coverage(name, batch):
     """3000 runs gave 52 to 92 % and 92.9 to 94.7 %; 600 runs have standard errors of 5 and 1 points."""

@@ -53,6 +53,7 @@ def test_the_file_has_the_bytes_of_an_identification_in_memory(folder, whole, ru
     assert (tmp_path / "parts.parquet").read_bytes() == (tmp_path / "memory.parquet").read_bytes()
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("options", [Options(), Options(tolerance=0.02)], ids=["kept", "replaced"])
 def test_a_merge_in_parts_has_the_bytes_of_a_merge_of_all_rows(folder, whole, options, tmp_path, monkeypatch):
     """Into a file of two methods: one of them again, and a third; row groups of five rows, parts of one log."""

@@ -179,6 +179,7 @@ def test_spread_comes_near_the_bound_and_intervals_cover(name, batch):
     assert (cover < 0.985).all(), cover
 
 
+@pytest.mark.slow
 def test_joint_estimate_is_the_truth_within_its_error():
     joint = identify_joint([AIR, fly(runs=5, rate_hz=100, gust=2.0, noise=1.0, seed=63)], GTM, NAME)
     assert joint.status[0] == Status.CONVERGED

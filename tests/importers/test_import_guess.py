@@ -102,6 +102,7 @@ def test_labels_twice_longer_than_the_matrix_and_beside_units(more, log, tmp_pat
     assert "do not contradict" in text
 
 
+@pytest.mark.slow
 def test_label_arrays_that_contradict_each_other_are_left_alone(log, tmp_path):
     other = [*LABELS[:2], LABELS[3], LABELS[2], *LABELS[4:]]
     cells = {n: np.array(t, dtype=object) for n, t in (("a", LABELS), ("b", other))}
@@ -168,6 +169,7 @@ def test_recorders_state_their_units_and_their_own_clocks(log, tmp_path):
         assert import_log(tmp_path / name, tmp_path / "m.toml").log.metadata["sample_rate_hz"] == 50.0
 
 
+@pytest.mark.slow
 def test_a_dictionary_of_the_users_own(log, tmp_path):
     c = log.channels
     columns = {

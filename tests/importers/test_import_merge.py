@@ -188,6 +188,7 @@ def test_a_declared_offset(log, tmp_path):
     assert "(declared)" in made.notes[0]
 
 
+@pytest.mark.slow
 def test_one_mapping_for_several_files_makes_a_run_of_each(log, tmp_path):
     c = log.channels
     columns = {name: values for name, values in c.items() if name != "elevator_command_rad"}
@@ -215,6 +216,7 @@ def test_single_precision_times_become_even_where_they_still_count_samples():
     np.testing.assert_array_equal(even_times(lost, 2.0**-11), lost)
 
 
+@pytest.mark.slow
 def test_single_precision_times_in_a_file(log, tmp_path):
     files = two_files(replace(log, t_s=log.t_s), tmp_path, lag=0.0)
     columns = {"t": (log.t_s + 9000.0).astype(np.float32).astype(np.float64)}

@@ -74,7 +74,7 @@ def test_wrong_units_and_signs_are_certain_and_named(factors, channel, parts, gu
     assert channel in certain[0].sentence
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["q_rad_s", "alpha_rad", "az_m_s2"])
 def test_signs_are_found_without_theta(name, gusty):
     channels = {n: -v if n == name else v for n, v in gusty.channels.items() if n != "theta_rad"}
@@ -82,7 +82,7 @@ def test_signs_are_found_without_theta(name, gusty):
     assert [p.channel for p in certain] == [name]
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("pair", "part"),
     [
@@ -98,7 +98,7 @@ def test_swapped_axes(pair, part, gusty):
     assert part in certain[0].sentence
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "certain"), [("q_rad_s", True), ("alpha_rad", False)])
 def test_another_axis_in_place_of_the_channel(name, certain, gusty):
     """Certain against theta, which gusts leave alone; a warning for alpha, which they can drown."""
@@ -109,6 +109,7 @@ def test_another_axis_in_place_of_the_channel(name, certain, gusty):
     assert name in [f.channel for f in found]
 
 
+@pytest.mark.slow
 def test_gravity_taken_out(gusty):
     log = replace(gusty, channels={**gusty.channels, "az_m_s2": gusty.channels["az_m_s2"] + 9.80665})
     assert "no gravity" in inspect(log)[0].sentence
@@ -126,6 +127,7 @@ def test_records_in_which_nothing_moves_are_not_judged_by_motion(gusty):
     assert inspect(replace(gusty, channels=still)) == ()
 
 
+@pytest.mark.slow
 def test_import_refuses_a_flipped_sign_and_force_keeps_it(gusty, tmp_path):
     write_csv(tmp_path / "f.csv", foreign(gusty))
     text = mapping_by_name()

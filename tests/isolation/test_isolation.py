@@ -50,7 +50,7 @@ def test_a_reply_keeps_facts_and_arrays():
     assert reply.arrays[2].shape == (0, 2)
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.usefixtures("way")
 @pytest.mark.parametrize(
     ("name", "kind", "detail"),
@@ -69,6 +69,7 @@ def test_an_ending_without_a_reply_has_a_kind_and_the_next_call_works(name, kind
     assert call("echo", n=1).facts == {"n": 1}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("way")
 def test_exceptions_arrive():
     with pytest.raises(StoreError, match=r"f\.csv: is refused"):

@@ -13,6 +13,7 @@ def solved(matrix, right):
     eliminate(matrix, right)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("size", [1, 2, 5, 16])
 def test_equals_lapack(size):
     rng = np.random.default_rng(size)

@@ -238,6 +238,7 @@ def test_the_declared_aircraft_stands_beside_the_estimates(identified, tmp_path)
     assert [p.name for p in files] == ["paper-intervals.svg", "paper-shifts.svg"]
 
 
+@pytest.mark.slow
 def test_a_campaign_in_parts_has_the_page_of_the_whole(tmp_path, monkeypatch):
     """Parts of two runs; the first eleven of 13 runs in the table of runs, twelve among the records."""
     monkeypatch.setattr(stored_campaign, "RUNS_PER_PART", 2)

@@ -23,6 +23,7 @@ def light(tmp_path_factory):
     )
 
 
+@pytest.mark.slow
 @EXAMPLES
 @given(damage=BYTES, name=st.sampled_from(["estimates.parquet", "truth.parquet"]), alone=st.booleans())
 def test_bytes_of_a_table_are_wrong(tmp_path, light, damage, name, alone):

@@ -188,7 +188,7 @@ def test_the_legend_hides_no_data_and_no_text_is_cut(kind, matrices, campaign):
         assert box.y1 <= page.y1 + 1
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["png", "svg"])
 def test_saved_figures_are_the_same_bytes_each_time(tmp_path, suffix, matrices):
     for name in ("one", "two"):

@@ -49,6 +49,7 @@ def light(tmp_path):
     return synthetic.paper_campaign(tmp_path / "light", "light", "table1", synthetic.TABLE_1, 40, 1)
 
 
+@pytest.mark.slow
 def test_a_result_in_memory_gives_summary_figure_and_table(tmp_path):
     result = FlownResult(2)
     assert isinstance(result, Result)

@@ -27,7 +27,7 @@ def reference(paper_trim):
     return oracle.doublet(start, np.deg2rad(2.0), 1.0, 0.5, np.arange(251) / 50.0)
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.parametrize("hz", [200, 1000])
 def test_doublet_matches_an_independent_integration(gtm, paper_trim, reference, hz):
     flown = fly(gtm, paper_trim, hz, np.deg2rad(2.0))

@@ -127,6 +127,7 @@ BAD = {
 }
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("case", BAD)
 def test_message_and_exit_code(tmp_path, case):
     changes, words = BAD[case]

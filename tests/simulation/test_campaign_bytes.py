@@ -37,6 +37,7 @@ def test_two_processes_write_the_bytes_of_one(once, tmp_path):
     assert results(fly(tmp_path, jobs=2, **MIXED)) == results(once)
 
 
+@pytest.mark.slow
 def test_manifest_holds_a_line_for_each_chunk_and_the_digest_of_every_file(once):
     records = [json.loads(line) for line in (once / "manifest.jsonl").read_text().splitlines()]
     assert len(records) == 1 + 7 + 1

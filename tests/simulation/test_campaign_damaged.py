@@ -116,6 +116,7 @@ def test_verify_of_other_folders(tmp_path):
         assert (ended.code, words in ended.err) == (2, True)
 
 
+@pytest.mark.slow
 def test_a_parent_of_campaigns(whole, tmp_path):
     """Each manifest belongs to its own folder, at any depth."""
     parent = tmp_path / "out"

@@ -36,6 +36,7 @@ def test_it_is_a_result(flown: CampaignResult) -> None:
     assert "<table" in flown._repr_html_()
 
 
+@pytest.mark.slow
 def test_one_row_per_run_with_its_plan_and_its_end(flown: CampaignResult) -> None:
     frame = flown.to_frame()
     assert list(frame["run_id"]) == [f"small-{k:06d}" for k in range(8)]

@@ -34,6 +34,7 @@ def test_folder_holds_the_files_of_the_contract(out):
     assert all(p.suffix == ".parquet" for p in (out / "logs").iterdir())
 
 
+@pytest.mark.slow
 def test_columns_and_types(files):
     assert files
     for path in files:

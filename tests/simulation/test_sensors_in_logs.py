@@ -64,6 +64,7 @@ def test_noise_is_white_and_of_the_stated_size(ideal, shipped, name):
     assert np.abs(centred).max() / std < norm.isf(0.5e-4 / n)
 
 
+@pytest.mark.slow
 def test_noises_of_channels_and_runs_are_independent(ideal, shipped):
     noise = np.concatenate([(channel(shipped, n) - channel(ideal, n) - b) / s for n, (s, b) in GTM.items()])
     correlation = noise @ noise.T / noise.shape[1]

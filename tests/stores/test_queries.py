@@ -122,6 +122,7 @@ def test_the_partition_holds_the_runs_in_moderate_gusts(campaigns: Path, results
     assert moderate["run_id"].item() == len(own)
 
 
+@pytest.mark.slow
 def test_one_run_is_read_in_order(results: dict[int, Any]) -> None:
     samples = results[block("WHERE run_id = 'light-000007'")]
     assert len(samples) == 151

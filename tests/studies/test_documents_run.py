@@ -46,6 +46,7 @@ def test_the_readme_leads_from_an_empty_folder_to_a_report():
     assert words[:2] == ["example", "loop"]
 
 
+@pytest.mark.slow
 def test_a_wrong_line_is_reported(tmp_path):
     import os
     import sys

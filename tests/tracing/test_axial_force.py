@@ -136,6 +136,7 @@ def test_readings_that_a_trace_learned_are_undone(clean, term, state):
     assert np.abs(more["alpha_rad"]).max() > 1e-4
 
 
+@pytest.mark.slow
 def test_an_accepted_error_of_the_airspeed_is_undone(clean):
     """An airspeed that reads 10 % more: the same series as that of the right one, where the effect is accepted."""
     log, plane = flights.log_of(clean, [0]), planes.load("gtm")
@@ -186,6 +187,7 @@ def test_noise_of_the_vane_is_no_axial_force(clean):
     assert found.increments == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("missing", ["ax", "throttle at rest", "records"])
 def test_nothing_is_compared_where_ax_says_nothing(clean, missing):
     log = flights.log_of(clean, [0, 1, 2] if missing == "records" else None)

@@ -83,6 +83,7 @@ def test_a_shear_changes_the_airspeed_and_not_the_speed_over_ground(calm):
     assert abs(along[:25].mean()) < 0.1  # the airspeed changes by 0.86 m/s2
 
 
+@pytest.mark.slow
 def test_the_damper_steps_what_the_open_loop_computes_at_once(calm):
     """The same surface, flown in open loop, is the same flight to rounding; so are the readings of the gyro."""
     trial = replace(draw.draw(1, 1, "loop"), effects=FAULTY, air="calm", noise="white", duration_s=3.0)

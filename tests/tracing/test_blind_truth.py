@@ -215,6 +215,7 @@ def test_downwash_lag_is_a_moment_by_alpha_dot():
     assert (late["q_dot_rad_s2"] - plain["q_dot_rad_s2"])[3] == pytest.approx(expected, rel=0.03)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("key", sampled(EFFECTS, 4))
 def test_every_effect_flies_from_its_own_trim_and_vanishes_with_its_size(key):
     trial = draw.draw(3, 0, "null")

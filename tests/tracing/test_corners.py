@@ -125,7 +125,7 @@ def test_a_step_that_two_cells_share_is_in_the_middle_of_a_ramp_and_a_step():
     assert means == pytest.approx([0.0, 0.0, 0.125, 0.875, 1.0, 1.0], abs=0.01)
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.parametrize(("late", "low", "high"), [("at the samples", 0.0, 0.01), ("anywhere", 0.3, 1.0)])
 def test_the_records_show_their_share_of_a_corner(late, low, high):
     """Surfaces that move in straight lines between samples, and surfaces that step once anywhere between them."""

@@ -36,7 +36,7 @@ def likelihood(shift, told=TOLD):
     )
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("shift", "effects"),
     [
@@ -151,6 +151,7 @@ def test_a_set_without_a_cause_keeps_the_sizes_of_the_others():
     assert (less.wrong, less.cost) == (whole.wrong, whole.cost)
 
 
+@pytest.mark.slow
 def test_what_a_refit_shows_beyond_first_order_is_kept(monkeypatch):
     """Also beside other effects, where the sets are explained again; sets of other causes and wrong declarations keep theirs."""
     monkeypatch.setattr(

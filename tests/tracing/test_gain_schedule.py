@@ -111,6 +111,7 @@ def test_equal_conditions_are_as_one():
     assert found.logdet == pytest.approx(single.logdet, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_innovations_keep_their_stated_size_while_the_airspeed_halves():
     """15 records in gusts of 1 m/s: mean squares of 0.8 s at either end are 1 within 10 %, and 4 standard deviations more.
 

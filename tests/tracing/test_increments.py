@@ -448,7 +448,7 @@ def beyond_one_degree(one):
     return replace(one, signals=replace(one.signals, elevator_rad=measured))
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.parametrize(("order", "expected"), [((NEEDED, IDLE), None), ((IDLE, NEEDED), IDLE.key)])
 def test_an_increment_that_a_later_one_makes_redundant_is_named(order, expected):
     rng = np.random.default_rng(5)
@@ -466,7 +466,7 @@ def test_an_increment_that_a_later_one_makes_redundant_is_named(order, expected)
     assert (named.key if named else None) == expected
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.parametrize("released", [False, True])
 def test_a_name_and_a_release_that_an_increment_makes_unnecessary_are_given_up(released):
     rng = np.random.default_rng(5)

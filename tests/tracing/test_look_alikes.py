@@ -73,6 +73,7 @@ def test_ties_are_those_beside_the_other_effects(problem):
     ]
 
 
+@pytest.mark.slow
 def test_a_single_effect_keeps_the_ties_of_its_round(problem):
     first, last = scored(problem), scored(problem, VANE)
     vane = candidate(problem, first, 60.0, (), VANE)
@@ -121,7 +122,7 @@ def test_a_break_finds_its_angle_again_beside_a_later_effect(problem):
     assert relocated(problem, found, placed="cm_alpha_nonlinear:break") is found
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.parametrize("near", [True, False])
 def test_a_late_rival_is_followed_by_its_own_twin(problem, monkeypatch, near):
     """A gyro lag that explains nearly as much as the member may be a gyro delay as well."""

@@ -53,7 +53,7 @@ def test_a_small_second_effect_is_accepted_unless_an_anomaly_is_beyond_doubt(gyr
     assert keys == ["accelerometer_scale", *(["gyro_scale"] if accepted else [])]
 
 
-@pytest.mark.grid
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "unbiased"), [(2, True), (3, False)])
 def test_with_one_or_two_records_the_variance_is_unbiased(count, unbiased, monkeypatch):
     asked = []

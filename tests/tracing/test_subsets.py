@@ -44,6 +44,7 @@ def test_dependent_variables_have_no_minimum():
     assert least == pytest.approx([np.inf])
 
 
+@pytest.mark.slow
 def test_two_effects_at_once_in_place_of_another():
     """Vane and gyro read 1.2 of the truth. A wrong scale of the accelerometer imitates both, and either alone explains less."""
     problem = scaled_problem(1.2, 1.2)

@@ -124,6 +124,7 @@ def test_json_on_a_full_stdout_is_one_message(log, tmp_path):
     assert (tmp_path / "out" / "trace.json").exists()
 
 
+@pytest.mark.slow
 def test_no_elevator_movement(command, log, tmp_path):
     still = with_channel(log, "elevator_rad", np.full_like(log.t_s, 0.002))
     message = refused(command, stored(tmp_path, still), tmp_path)
@@ -198,6 +199,7 @@ def test_effects_of_the_air_are_untestable_and_say_why(log):
     assert "each record has its own gust level" in row["why_not"]
 
 
+@pytest.mark.slow
 def test_unknown_hold_out(command, log, tmp_path):
     message = refused(command, stored(tmp_path, log), tmp_path, "--hold-out", "blind-000009")
     assert "--hold-out 'blind-000009': no such run" in message
@@ -254,6 +256,7 @@ def test_an_accelerometer_whose_z_points_up(command, log, tmp_path):
     assert "state sign = -1 under [channels.az_m_s2]" in message
 
 
+@pytest.mark.slow
 def test_an_acceleration_without_gravity(command, log, tmp_path):
     z = log.channels["az_m_s2"].copy()
     last = log.rows(2)

@@ -138,6 +138,7 @@ def rates_at(change, x=(0.04, 0.3), de=0.05, common=None):
 VALUES = {"alpha": 0.04, "elevator": 0.05, "qhat": 0.3 * tr.HALF}
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("signal", sorted(VALUES))
 @pytest.mark.parametrize("shape", ["linear", "quadratic", "above", "below"])
 @pytest.mark.parametrize("side", [-0.5, 0.5])

@@ -138,6 +138,7 @@ def test_records_left_out_do_not_refuse_the_effect_that_leads(problem, monkeypat
     assert led.reasons == (UNCONVERGED,)
 
 
+@pytest.mark.slow
 def test_a_set_predicts_the_records_left_out_or_does_not(problem):
     """The scales of gyro and vane are in the records."""
     null, right = fitted(problem), fitted(problem, GYRO, VANE)

@@ -46,6 +46,7 @@ def test_a_trim_at_an_airspeed_that_the_record_passes(log, gtm):
     assert trim(gtm, at.condition).alpha_rad == pytest.approx(at.alpha_rad, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_no_airspeed_of_the_record_has_a_trim(log, gtm):
     with pytest.raises(
         LogError, match=r"gtm cannot fly steadily at the 26 m/s .* nor at another airspeed that it reaches"
@@ -63,6 +64,7 @@ def test_a_record_that_leaves_the_dynamic_pressure_of_its_trim(log, gtm):
     assert "reaches 26 m/s and 0.42 of the dynamic pressure of its trim at 40 m/s" in notes[0]
 
 
+@pytest.mark.slow
 def test_a_record_along_which_the_declared_aircraft_departs(log, gtm):
     """The record that departs is named; a record of the linear model has no flight in JSBSim."""
     first, second = prepared(log, gtm).fitted.records

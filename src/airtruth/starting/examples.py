@@ -46,7 +46,7 @@ _ALL: Final = (
         (
             "airtruth fly data/campaigns/light-fit.toml --out out/light-fit",
             f"airtruth identify out/light-fit --aircraft gtm --airspeed-m-s 42.852{_METHODS}",
-            "airtruth tables out/light-fit",
+            "airtruth tables out/light-fit --out out/tables",
         ),
     ),
     Example(
