@@ -12,13 +12,17 @@ from __future__ import annotations
 import argparse
 import subprocess
 import sys
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Final
 
 from airtruth import aircraft, style
 from airtruth.errors import AirtruthError
+from airtruth.identification import Options, identify, write_estimates
 from airtruth.logs.remote import location
-from airtruth.logs.store import log_paths, read_table, write_table
+from airtruth.logs.store import read_table
 from airtruth.reporting import write_tables
 from airtruth.reporting.loop_figures import traces_page
 from airtruth.reporting.paper.tables import FURTHER, methods_of
@@ -26,7 +30,7 @@ from airtruth.simulation.campaign import plan
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.presentation.overview import write_traces
 from studies import paper_loop
-from studies.campaign_figures import CAMPAIGN_FILES, write_figures
+from studies.campaign_figures import CAMPAIGN_FILES, PAPER, write_figures
 
 CAMPAIGNS: Final = ("light", "light-fit", "moderate", "moderate-fit")
 """Campaigns of data/campaigns that the paper's tables show."""
@@ -39,6 +43,9 @@ QUICK_DIVISOR: Final = 10
 
 QUICK_LOGS: Final = ("d",)
 """Flight tests of data/undeclared that --quick traces."""
+
+TRACED: Final = 6
+"""Runs in which the effects of the loop are traced [-]; the paper_loop study takes twice as many."""
 
 QUICK_TRACED: Final = 4
 """Runs in which --quick traces the effects of the loop [-]."""
@@ -74,9 +81,7 @@ def main() -> int:
             return code
     try:
         identify_campaigns(store, arguments.jobs, arguments.further)
-        close_loop(
-            store, arguments.out, arguments.jobs, QUICK_TRACED if arguments.quick else paper_loop.TRACED
-        )
+        close_loop(store, arguments.out, arguments.jobs, QUICK_TRACED if arguments.quick else TRACED)
         if arguments.undeclared:
             logs = QUICK_LOGS if arguments.quick else None
             trace_undeclared(arguments.out / "trace", arguments.jobs, logs)
@@ -96,16 +101,24 @@ def fly(name: str, out: Path, jobs: int, quick: bool) -> int:
 
 
 def identify_campaigns(out: Path, jobs: int, further: bool) -> None:
-    """Identify the flown campaigns; print and write their tables and figures."""
+    """Identify the flown campaigns, one process for each; print and write their tables and figures."""
+    print(f"identify {', '.join(CAMPAIGNS)}", file=sys.stderr)
+    work = partial(_identify, out=out, further=further)
+    with ProcessPoolExecutor(min(jobs, len(CAMPAIGNS)), get_context("spawn")) as pool:
+        list(pool.map(work, reversed(CAMPAIGNS)))  # the largest first
     gtm = aircraft.load(GTM)
-    for name in CAMPAIGNS:
-        print(f"identify {name}", file=sys.stderr)
-        methods = methods_of(name) + (FURTHER if further else ())
-        estimates = paper_loop.identify_all(log_paths(out / name), None, jobs, methods)
-        write_table(out / name / "estimates.parquet", estimates)
     tables = write_tables([out / name for name in CAMPAIGNS], out / "tables")
     print(tables.text)
     print("Written: " + ", ".join(map(str, [*tables.paths, *write_figures(out, CAMPAIGNS, gtm)])))
+
+
+def _identify(name: str, out: Path, further: bool) -> None:
+    """Write the estimates of one campaign: the paper's methods at the airspeed of the trim, further ones as they are."""
+    gtm = aircraft.load(GTM)
+    for methods, options in ((methods_of(name), PAPER), (FURTHER if further else (), Options())):
+        if methods:
+            estimates = identify(out / name, gtm, methods, options)
+            write_estimates(out / name / "estimates.parquet", estimates, force=True)
 
 
 def close_loop(flown: Path, out: Path, jobs: int, traced: int) -> None:
