@@ -46,5 +46,6 @@ def _process(app: Sphinx, what: str, name: str, thing: object, options: object, 
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Register the listener."""
+    app.setup_extension("sphinx.ext.autodoc")
     app.connect("autodoc-process-docstring", _process, priority=BEFORE_NAPOLEON)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
