@@ -26,10 +26,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from airtruth.channels import SIGNALS
 from airtruth.documents import read_toml
 from airtruth.errors import ConfigurationError, choices
-from airtruth.importers.mapping import DERIVED, TIME_UNITS
+from airtruth.importers.mapping import MAPPED, TIME_UNITS
 from airtruth.units import UNITS
 
 TIME: Final = "t_s"
@@ -39,22 +38,15 @@ QUATERNION: Final = ("quaternion_w", "quaternion_x", "quaternion_y", "quaternion
 VELOCITY: Final = ("u_m_s", "v_m_s", "w_m_s")
 """Components of the velocity relative to the air in body axes."""
 OTHERS: Final[dict[str, str]] = {
+    TIME: "time",
     **dict.fromkeys(QUATERNION, "ratio"),
     **dict.fromkeys(VELOCITY, "speed"),
-    "beta_rad": "angle",
-    "indicated_airspeed_m_s": "speed",
-    "height_m": "length",
+    "elevon_rad": "angle",
     "gps_altitude_m": "length",
-    "static_pressure_pa": "pressure",
     "ground_speed_m_s": "speed",
 }
 """Quantities that a guess knows beside channels, because channels follow from them or are tested against them."""
-DIMENSIONS: Final[dict[str, str]] = {
-    TIME: "time",
-    **OTHERS,
-    **{name: signal.dimension for name, signal in SIGNALS.items()},
-    **DERIVED,
-}
+DIMENSIONS: Final[dict[str, str]] = {**OTHERS, **MAPPED}
 """Everything that a column may be -> dimension."""
 _KNOWN: Final = Path(__file__).parent / "known"
 """Folder of the files of the package, one for each source."""
