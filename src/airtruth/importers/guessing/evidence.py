@@ -43,7 +43,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Relation:
-    """A relation between slots: those that it needs and is evidence for, its test, and those that it uses where they are filled."""
+    """Slots that a relation needs and is evidence for, its test, and slots that it uses where they are filled."""
 
     needs: tuple[str, ...]
     test: Callable[[Mapping[str, Array], float], Finding]
