@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self, cast
 
 from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
 
@@ -12,9 +12,10 @@ from airtruth.units import UNITS
 TIME_UNITS: Final = {**UNITS["time"], "us": 1e-6, "ns": 1e-9}
 """Units of a time column -> factor to seconds [s]."""
 _SPELLINGS: Final = {
-    "1": "", "-": "", "%": "pct", "feet": "ft", "fps": "ft_s", "knots": "kt", "kts": "kt", "kn": "kt", "meters": "m", "metres": "m",
-    "°": "deg", "°_s": "deg_s", "degrees": "deg", "radians": "rad", "centideg": "cdeg", "centidegrees": "cdeg", "°c": "degc",
-    "°f": "degf", "seconds": "s", "milliseconds": "ms", "microseconds": "us", "µs": "us", "mb": "mbar", "millibar": "mbar",
+    "1": "", "-": "", "%": "pct",
+    "feet": "ft", "fps": "ft_s", "knots": "kt", "kts": "kt", "kn": "kt", "meters": "m", "metres": "m",
+    "°": "deg", "°_s": "deg_s", "degrees": "deg", "radians": "rad", "centideg": "cdeg", "°c": "degc", "°f": "degf",
+    "seconds": "s", "milliseconds": "ms", "microseconds": "us", "µs": "us", "mb": "mbar", "millibar": "mbar",
 }  # fmt: skip
 """Other spelling of a unit -> its key in `airtruth.units.UNITS`."""
 
@@ -156,8 +157,8 @@ class Channel(Strict):
         """Points for each column, by increasing raw value; () without a calibration."""
         if not self.calibration:
             return ()
-        each = self.calibration if self._several else (self.calibration,) * len(self.places)
-        return tuple(tuple(sorted((float(raw), float(v)) for raw, v in points)) for points in each)  # type: ignore[misc]
+        one, each = cast(Points, self.calibration), cast(tuple[Points, ...], self.calibration)
+        return tuple(tuple(sorted(p)) for p in (each if self._several else (one,) * len(self.places)))
 
     @property
     def _several(self) -> bool:
