@@ -72,6 +72,8 @@ class Writer:
         body = [line for slot in _ORDER for line in self._slot(slot)]
         body += self._velocity()
         body += self._missing()
+        if not any(line.startswith("\n[channels.") for line in body):
+            body.insert(0, "\n[channels]")
         return Proposal((*self._time(), *body), frozenset(self.mapped), tuple(self.doubts))
 
     def _slot(self, slot: str) -> Iterator[str]:
