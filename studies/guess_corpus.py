@@ -80,7 +80,7 @@ def scored(layout: Layout, folder: Path, seed: int = 1) -> Score:
     except AirtruthError as error:
         imported, error_text = False, str(error)
     lost = tuple(sorted(expected - mapped))
-    needs = layout.missing - {"alpha_rad"}
+    needs = (layout.missing & set(REQUIRED)) - {"alpha_rad"}
     named = all(
         any(c in line for line in text.splitlines() if line.startswith("# Not mapped")) for c in needs
     )

@@ -173,6 +173,7 @@ def ulog_bytes(listed: Sequence[Topic]) -> bytes:
     def message(kind: str, body: bytes) -> bytes:
         return struct.pack("<HB", len(body), ord(kind)) + body
 
+    heads: list[bytes] = []
     parts = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0), message("B", bytes(40))]
     data: list[tuple[int, bytes]] = []
     for number, topic in enumerate(listed):
@@ -185,12 +186,12 @@ def ulog_bytes(listed: Sequence[Topic]) -> bytes:
             for name, size in sizes.items()
         )
         parts.append(message("F", f"{topic.name}:uint64_t timestamp;{kinds}".encode()))
-        parts.append(message("A", struct.pack("<BH", 0, number) + topic.name.encode()))
+        heads.append(message("A", struct.pack("<BH", 0, number) + topic.name.encode()))
         columns = np.stack(list(topic.fields.values()), axis=1)
         for t, row in zip(topic.t_s, columns, strict=True):
             stamp = round(1e6 * t)
             data.append((stamp, message("D", struct.pack(f"<HQ{len(row)}f", number, stamp, *row))))
-    return b"".join([*parts, *(body for _, body in sorted(data, key=lambda one: one[0]))])
+    return b"".join([*parts, *heads, *(body for _, body in sorted(data, key=lambda one: one[0]))])
 
 
 def quaternion(
@@ -564,12 +565,12 @@ LAYOUTS: Final = (
                 ("GndSpd", "airspeed_m_s", "kt"),
                 ("Pitch", "theta_rad", "deg"),
                 ("Roll", "phi", "deg"),
-                ("NormAc", "az_m_s2", "g", -1),
+                ("NormAc", "norm_acc", ""),
                 ("TAS", "airspeed_m_s", "kt"),
             ],
             rate_hz=8.0,
         ),
-        frozenset({"elevator_rad", "q_rad_s", "alpha_rad", "az_m_s2"}),
+        frozenset({"elevator_rad", "q_rad_s", "alpha_rad", "ax_m_s2"}),
     ),
     # Held out from here on.
     Layout(

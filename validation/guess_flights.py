@@ -121,6 +121,7 @@ def flown(name: str) -> dict[str, Array]:
         "ias_m_s": speed * np.sqrt(density / 1.225),
         "climb_m_s": u * np.sin(theta) - w * np.cos(theta),
         "throttle": 0.6 + 0.0 * t,
+        "norm_acc": -forces[:, 1] / G0 - 1.0,
     }
 
 
@@ -141,6 +142,7 @@ NOISE: Final = {
     "w_m_s": 0.0015,
     "climb_m_s": 0.05,
     "throttle": 0.0,
+    "norm_acc": 0.012,
 }
 """Standard deviation of the noise [SI]; of speeds it is a share of the airspeed."""
 

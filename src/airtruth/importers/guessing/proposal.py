@@ -295,7 +295,11 @@ class Writer:
         yield '# calibration = [[..., ...], [..., ...]] # value, deflection [deg], where they are no angles\n# unit = "deg"'
 
     def _effects(self) -> Iterator[tuple[Column, str, float]]:
-        values = {s: d.reading.values for s, d in self.decisions.items() if s in ("q", "az", "alpha")}
+        values = {
+            s: d.reading.values
+            for s, d in self.decisions.items()
+            if s in ("q", "az", "alpha", "airspeed", "theta")
+        }
         for column, why in self.found.surfaces:
             x = self.grid.of(column, self.clocks)
             if x is None or np.ptp(x) == 0.0:
