@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.channels import REQUIRED
-from airtruth.checks.gate import require
+from airtruth.checks.gate import admit
 from airtruth.checks.kinematics_average import averaged
 from airtruth.checks.kinematics_bias import FIELDS, mean_of, ramps, ramps_of, rms
 from airtruth.checks.kinematics_fit import limits_of, problem_of
@@ -63,16 +63,18 @@ def check_logs(
     Raises
     ------
     LogError
-        As `airtruth.checks.gate.require` and `check_kinematics`.
+        As `airtruth.checks.gate.admit` and `check_kinematics`.
     """
-    faults = [fault for name, log in logs for fault in require(log, aircraft, source=name, force=force)]
-    parts = [log for _, log in logs]
+    admitted = [admit(log, aircraft, source=name, force=force) for name, log in logs]
+    parts = [one.log for one in admitted]
     result = (
         check_kinematics(parts)
         if aircraft is None
         else check_kinematics(parts, declared_errors(aircraft), aircraft.chord_m, declared_biases(aircraft))
     )
-    return replace(result, forced=tuple(fault.sentence for fault in faults if fault.certain))
+    remarks = dict.fromkeys(sentence for one in admitted for sentence in one.remarks)
+    forced = tuple(sentence for one in admitted for sentence in one.forced)
+    return replace(result, sentences=(*result.sentences, *remarks), forced=forced)
 
 
 def check_kinematics(
