@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from airtruth.aircraft import Aircraft
 from airtruth.checks.corrections import Correction, catalogue
 from airtruth.checks.evidence import relations
+from airtruth.checks.means import LIMITS, ranges
 from airtruth.checks.relation import Relation
 from airtruth.checks.stated import Stated
 from airtruth.checks.together import Runs
@@ -135,7 +136,7 @@ def _trials(
         if any(_excludes(one, correction) for one in made):
             continue
         changed = runs.changed(correction.apply)
-        if _stills(changed, correction):
+        if _stills(changed, correction) or _leaves(changed, correction, results):
             continue
         after = relations(changed, aircraft)
         found.append(Trial(correction, after, total(after, results) + correction.penalty))
@@ -214,6 +215,14 @@ def _stills(changed: Runs, correction: Correction) -> bool:
     if name not in correction.channels:
         return False
     return float(changed.each(lambda c, dt_s: np.ptp(c[name], axis=1)).max()) < LEAST_INPUT_RAD
+
+
+def _leaves(changed: Runs, correction: Correction, results: Sequence[Relation]) -> bool:
+    """Whether a correction moves one of its channels out of the range of flight, which no other test makes good."""
+    outside = {t.channels for t in results if t.name == "range"}
+    others = (n for n in changed.channels if n not in correction.channels or n not in LIMITS)
+    left = [t for t in ranges(changed.without(*others)) if t.channels not in outside]
+    return any(t.distance.min() > 0.0 for t in left)
 
 
 def _excludes(made: Correction, other: Correction) -> bool:

@@ -172,32 +172,48 @@ def _motion_faults(
     suspect = distances > SUSPECT
     if not suspect.any():
         return list(_drift(several, count)) if reconstructed else []
-    each, found = suspect[:-1], []
-    if suspect[-1]:
+    each, everyone = suspect[:-1], np.ones(len(tested), dtype=np.bool_)
+    few, found = 2 * each.sum() < len(tested), []
+    odd = _odd(tested, each, aircraft, stated) if few and each.any() else []
+    if not odd and suspect[-1]:
         found = explain(tested, aircraft, stated, partial=len(tested) < count)
         helped = _helped(tested, found, aircraft, distances)
         if _certain(tested, found) and 2 * helped.sum() >= len(tested):
-            affected = helped if any(e.correction for e in found) else each
-            return list(_explained(tested, affected, found, aircraft, count))
-    if len(tested) > 1 and each.any():
-        places = np.flatnonzero(each)
-        odd = {places[run]: one for run, one in odd_ones(tested.some(each), aircraft, stated).items()}
-        if not odd and not each.all():
-            some = explain(tested.some(each), aircraft, stated, partial=True)
-            if _certain(tested.some(each), some):
-                faults = list(_explained(tested, each, some, aircraft, count))
-                return [*faults, *_motion_faults(several.some(~each), aircraft, stated, count)]
-            found = found or some
-        if odd:
-            rest = np.ones(len(tested), dtype=np.bool_)
-            rest[list(odd)] = False
-            faults = list(_odd_faults(tested, odd, aircraft, count))
-            return [
-                *faults,
-                *(_motion_faults(several.some(rest), aircraft, stated, count) if rest.any() else []),
-            ]
-    affected = each if each.any() and not suspect[-1] else np.ones(len(tested), dtype=np.bool_)
-    return list(_explained(tested, affected, found, aircraft, count))
+            return list(_explained(tested, helped, found, aircraft, count))
+        found = [replace(one, certain=False) for one in found]
+    if not odd and not few and len(tested) > 1:
+        odd = _odd(tested, each, aircraft, stated)
+    if not odd:
+        found = found or explain(tested.some(each), aircraft, stated, partial=True)
+        return list(_explained(tested, everyone if suspect[-1] else each, found, aircraft, count))
+    faults: list[Fault] = []
+    rest = everyone.copy()
+    for (
+        which,
+        one,
+    ) in odd:  # a mistake of the mapping makes hardly any run worse, one of a run makes the others worse
+        helped = which | _helped(tested, one, aircraft, distances)
+        affected = helped if 2 * helped.sum() >= len(tested) else which
+        faults += _explained(tested, affected, one, aircraft, count)
+        rest &= ~affected
+    return [*faults, *(_motion_faults(several.some(rest), aircraft, stated, count) if rest.any() else [])]
+
+
+def _odd(
+    several: Runs, suspect: Bools, aircraft: Aircraft | None, stated: Mapping[str, Stated]
+) -> list[tuple[Bools, list[Explanation]]]:
+    """Runs of some that show a mistake with certainty, each by itself or else all of them together."""
+    places, some = np.flatnonzero(suspect), several.some(suspect)
+    alike: dict[tuple[str, ...], tuple[Bools, list[Explanation]]] = {}
+    for run, one in odd_ones(some, aircraft, stated).items():
+        assert one.correction is not None
+        key = (*one.correction.channels, one.correction.mistake)
+        which, _ = alike.setdefault(key, (np.zeros(len(several), dtype=np.bool_), [one]))
+        which[places[run]] = True
+    if alike:
+        return list(alike.values())
+    together = explain(some, aircraft, stated, partial=True)
+    return [(suspect, together)] if _certain(some, together) else []
 
 
 def _drift(several: Runs, count: int) -> Iterator[Fault]:
@@ -232,20 +248,6 @@ def _helped(several: Runs, found: Sequence[Explanation], aircraft: Aircraft | No
         if one.correction is not None:
             changed = changed.changed(one.correction.apply)
     return np.asarray(total(relations(changed, aircraft))[:-1] <= before[:-1])
-
-
-def _odd_faults(
-    several: Runs, odd: Mapping[int, Explanation], aircraft: Aircraft | None, count: int
-) -> Iterator[Fault]:
-    """One fault for the odd runs that show the same mistake; the other runs exclude it for the mapping."""
-    alike: dict[tuple[str, ...], list[int]] = {}
-    for run, one in odd.items():
-        assert one.correction is not None
-        alike.setdefault((*one.correction.channels, one.correction.mistake), []).append(run)
-    for places in alike.values():
-        which = np.zeros(len(several), dtype=np.bool_)
-        which[places] = True
-        yield from _sentences(several, which, odd[places[0]], aircraft, count)
 
 
 def _explained(

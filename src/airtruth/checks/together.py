@@ -102,13 +102,17 @@ class Runs:
 
 def _padded(parts: Sequence[Array]) -> Array:
     """Real and imaginary halves, each padded with zeros to the longest."""
+    if len(parts) == 1:
+        return parts[0]
     longest = max(part.shape[-1] for part in parts) // 2
-    halves = []
+    result = np.zeros((sum(map(len, parts)), *parts[0].shape[1:-1], 2 * longest))
+    first = 0
     for part in parts:
-        half = part.shape[-1] // 2
-        width = [(0, 0)] * (part.ndim - 1) + [(0, longest - half)]
-        halves.append(np.concatenate([np.pad(part[..., :half], width), np.pad(part[..., half:], width)], -1))
-    return np.concatenate(halves)
+        rows, half = slice(first, first + len(part)), part.shape[-1] // 2
+        result[rows, ..., :half] = part[..., :half]
+        result[rows, ..., longest : longest + half] = part[..., half:]
+        first += len(part)
+    return result
 
 
 __all__ = ["Runs"]
