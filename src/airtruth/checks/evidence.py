@@ -84,7 +84,7 @@ def motion(runs: Runs, aircraft: Aircraft | None) -> list[Relation]:
         result += slopes_near_trim(runs, aircraft)
     if "elevator_command_rad" in names:
         result.append(_command_test(runs, lines))
-    moving = runs.each(lambda c, dt_s: 1.0 * moves(c["elevator_rad"], dt_s)) > 0.0
+    moving = runs.each(lambda c, dt_s: moves(c["elevator_rad"], dt_s).astype(np.float64)) > 0.0
     return [_of_moving(test, moving) if test.name in OF_ELEVATOR else test for test in result]
 
 

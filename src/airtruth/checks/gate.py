@@ -111,11 +111,9 @@ class Admitted:
         """Sentences of the certain faults that ``force`` overruled."""
         return tuple(fault.sentence for fault in self.faults if fault.certain)
 
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """What every result records beside its answer: runs that were left out, and what limits the log as a whole."""
-        whole = [fault.sentence for fault in self.faults if fault.code in ("aircraft", "reconstructed")]
-        return (*self.left_out, *whole)
+    def remarks(self, *codes: str) -> tuple[str, ...]:
+        """What a result records beside its answer: runs that were left out, and uncertain faults of some codes."""
+        return (*self.left_out, *(f.sentence for f in self.faults if f.code in codes and not f.certain))
 
 
 def admit(
@@ -287,7 +285,9 @@ def _sentences(
         name = part.channels[0]
         others = [other.channels[0] for other in made.parts if other is not part]
         cure = part.cure if others else one.cure
-        if one.declared and aircraft is not None:
+        if 2 * len(ids) < count:
+            cure = f"the other {count - len(ids)} runs exclude it as a mistake of the mapping"
+        elif one.declared and aircraft is not None:
             cure += f"; or the declared {declared_names(one.declared)} of {aircraft.name} is wrong"
         mistake = (one.mistake if one.certain else f"possibly {one.mistake}") + _like(others)
         sentence = f"{name}: {mistake} in {runs(ids, count)}: {evidence(failed, one.row)}; {cure}"

@@ -157,7 +157,8 @@ def find_manoeuvres(
             "--find-manoeuvres: [time] run divides the file into runs already; leave it out"
         )
     merged = _opened(paths, mappings)
-    return find(str(paths[0]), merged.series)
+    rate_hz = merged.resample.rate_hz if merged.resample else None
+    return find(str(paths[0]), merged.series, rate_hz)
 
 
 def _given(

@@ -157,7 +157,7 @@ def _checked(
     """The logs behind the gate, the faults that ``force`` overruled, and remarks for the answer."""
     admitted = [gate.admit(log, aircraft, source=name, force=force) for name, log in named_logs(logs)]
     forced = [sentence for one in admitted for sentence in one.forced]
-    remarks = dict.fromkeys(sentence for one in admitted for sentence in one.remarks)
+    remarks = dict.fromkeys(sentence for one in admitted for sentence in one.remarks("aircraft"))
     return [one.log for one in admitted], forced, tuple(remarks)
 
 
