@@ -16,8 +16,10 @@ from airtruth import aircraft as planes
 from airtruth.checks.columns import dropouts, spikes
 from airtruth.checks.corrections import catalogue
 from airtruth.checks.fault import CODES
-from airtruth.checks.gate import inspect, require
+from airtruth.checks.gate import admit, inspect
+from airtruth.checks.together import Runs
 from airtruth.errors import LogError
+from airtruth.logs.flight_log import batches
 from airtruth.logs.store import read_log, write_log
 from airtruth.units import G0
 
@@ -220,19 +222,19 @@ def test_a_fault_raises_one_sentence_with_the_cure(log):
     with pytest.raises(
         LogError, match=r"^flight-7: contradicts physics; correct it, or .* --force\n"
     ) as caught:
-        require(bad, source="flight-7")
+        admit(bad, source="flight-7")
     line = str(caught.value).splitlines()[1]
     assert line.startswith("  - az_m_s2: opposite sign in all 6 runs: ")
     assert line.endswith("; state sign = -1 under [channels.az_m_s2] in the import mapping")
 
 
 def test_force_returns_the_faults(log):
-    assert [f.channel for f in require(FAULTS["az sign"](log), force=True)] == ["az_m_s2"]
+    assert [f.channel for f in admit(FAULTS["az sign"](log), force=True).faults] == ["az_m_s2"]
 
 
 def test_a_breach_of_the_contract_cannot_be_forced(log):
     with pytest.raises(LogError, match="q_rad_s: required channel is missing"):
-        require(replace(log, channels={n: v for n, v in log.channels.items() if n != "q_rad_s"}), force=True)
+        admit(replace(log, channels={n: v for n, v in log.channels.items() if n != "q_rad_s"}), force=True)
 
 
 @pytest.mark.parametrize(
@@ -296,9 +298,9 @@ def test_a_copy_is_told_from_an_actuator_that_is_not_declared(log, gtm):
 
 def test_every_correction_has_words_of_its_own(log):
     """Two mistakes with the same words and cure could not be told apart by a reader."""
-    entries = [(c.channels, c.mistake, c.cure) for c in catalogue(tuple(log.channels), 0.02)]
+    entries = [(c.channels, c.mistake, c.cure) for c in catalogue(Runs(tuple(batches(log))))]
     assert len(set(entries)) == len(entries)
-    assert {c.code for c in catalogue(tuple(log.channels), 0.02)} <= set(CODES)
+    assert {c.code for c in catalogue(Runs(tuple(batches(log))))} <= set(CODES)
 
 
 def test_a_record_at_rest_has_no_fault(log):

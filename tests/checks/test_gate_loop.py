@@ -7,6 +7,7 @@ import pytest
 
 from airtruth import aircraft
 from airtruth.checks import evidence, gate
+from airtruth.checks.together import Runs
 from airtruth.logs.flight_log import batches
 from airtruth.logs.store import log_paths, read_log
 from airtruth.simulation.campaign import plan
@@ -49,7 +50,7 @@ def test_a_damped_log_passes(log):
     """Without the feedback in the relation, the surface leads the command and some runs are refused."""
     assert [fault.sentence for fault in gate.inspect(log, aircraft.load("gtm")) if fault.certain] == []
     for batch in batches(log):
-        command = next(t for t in evidence.relations(batch) if t.name == "command")
+        command = next(t for t in evidence.relations(Runs((batch,))) if t.name == "command")
         assert (command.distance < 4.0).all()
 
 

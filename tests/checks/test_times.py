@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from airtruth.checks.gate import inspect, require
+from airtruth.checks.gate import admit, inspect
 from airtruth.errors import LogError
 from airtruth.logs.store import read_log
 
@@ -30,7 +30,7 @@ def test_times_in_another_unit_are_the_only_fault(log, gtm, factor, unit):
 
 def test_times_in_another_unit_are_refused(log):
     with pytest.raises(LogError, match=r"t_s: 0\.05 samples per second in all 6 runs"):
-        require(replace(log, t_s=1e3 * log.t_s, metadata={}))
+        admit(replace(log, t_s=1e3 * log.t_s, metadata={}))
 
 
 def test_interpolated_channels_are_named(log, gtm):

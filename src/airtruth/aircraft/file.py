@@ -90,6 +90,11 @@ class Geometry(Strict):
     chord: qt.Length
     span: qt.Length
 
+    @model_validator(mode="after")
+    def _positive(self) -> Geometry:
+        qt.require_positive(self, type(self).model_fields)
+        return self
+
 
 class MassProperties(Strict):
     """Mass, pitch inertia about the CG, and CG behind the leading edge of the MAC as a fraction of it."""
@@ -97,6 +102,11 @@ class MassProperties(Strict):
     mass: qt.Mass
     inertia_yy: qt.Inertia
     cg: qt.Ratio = Quantity(value=0.25)
+
+    @model_validator(mode="after")
+    def _positive(self) -> MassProperties:
+        qt.require_positive(self, ("mass", "inertia_yy"))
+        return self
 
 
 class Tail(Strict):
@@ -196,6 +206,12 @@ class AircraftFile(Strict):
         for name in value:
             if name not in PARAMETERS:
                 raise ValueError(f"{name!r} is not a derivative; {choices(name, PARAMETERS)}")
+        control = value.get("Cmde")
+        if control is not None and control.value > 0.0:
+            raise ValueError(
+                f"Cmde has to be below 0 (is {control.value:g}): a trailing edge down, which is positive, pitches the nose down; "
+                "for a canard state elevator_rad and its derivatives positive with the trailing edge up"
+            )
         return value
 
     @field_validator("sensors", mode="before")

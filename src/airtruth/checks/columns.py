@@ -75,7 +75,7 @@ def names(log: FlightLog) -> Iterator[Fault]:
             continue
         name, likeness = near
         yield Fault(
-            name, log.run_ids[0], "name",
+            name, log.run_ids, "name",
             f"{column}: no channel has this name, and the log lacks {name}, which it resembles: the column would "
             f"be ignored; rename it to {name} if it is that channel, in {SIGNALS[name].unit}, or leave it out",
             True, likeness,
@@ -111,7 +111,7 @@ def units(log: FlightLog) -> Iterator[Fault]:
             else "rename the column"
         )
         yield Fault(
-            name, log.run_ids[0], "metadata",
+            name, log.run_ids, "metadata",
             f"{name}: the file's metadata state the unit {unit}, the column's name states {own.unit}; {cure}, or "
             "correct the metadata", True, 1.0,
         )  # fmt: skip
@@ -122,7 +122,7 @@ def reconstructed(log: FlightLog) -> Iterator[Fault]:
     if not is_reconstructed(log.channels):
         return
     yield Fault(
-        "alpha_rad", log.run_ids[0], "reconstructed",
+        "alpha_rad", log.run_ids, "reconstructed",
         "alpha_rad: reconstructed from inertial measurements and airspeed, no vane was recorded: gusts are not in it, it "
         "agrees with q_rad_s and az_m_s2 by construction, and no error of a vane can be estimated; identify adds its "
         "uncertainty to the intervals, trace takes q_rad_s and az_m_s2 as outputs and alpha as a state", False, 1.0,
@@ -145,7 +145,7 @@ def repeated(log: FlightLog) -> Iterator[Fault]:
         run_id, earlier = copies[0]
         more = f", and {len(copies) - 1} further runs repeat others" if len(copies) > 1 else ""
         yield Fault(
-            "run_id", run_id, "copy",
+            "run_id", tuple(run for run, _ in copies), "copy",
             f"run_id: run {run_id!r} has the samples of run {earlier!r}{more}: copies count as independent evidence, and "
             "intervals become too narrow; leave them out", False, float(len(copies)),
         )  # fmt: skip
@@ -167,14 +167,17 @@ def _plain(unit: str) -> str:
     return "" if text in ("-", "1") else "_".join(parts)
 
 
-def copies(batch: Batch, aircraft: Aircraft | None) -> Iterator[tuple[str, str]]:
-    """Pairs of channels that hold the same values, up to a factor and a constant, in every run."""
+def copies(batch: Batch, aircraft: Aircraft | None, prescribed: bool = False) -> Iterator[tuple[str, str]]:
+    """Pairs of channels that hold the same values, up to a factor and a constant, in every run.
+
+    The elevator and its command differ by the declared actuator, unless the surface was prescribed.
+    """
     moving = {n: v for n, v in batch.channels.items() if n in SIGNALS and (v.std(axis=1) > MOVED).all()}
     actuator = aircraft.file.elevator_actuator if aircraft is not None else None
     for one, other in combinations(moving, 2):
         pair = {one, other}
         if pair == {"altitude_m", "density_kg_m3"} or (
-            pair == {"elevator_rad", "elevator_command_rad"} and actuator is None
+            pair == {"elevator_rad", "elevator_command_rad"} and (actuator is None or prescribed)
         ):
             continue
         a, b = (moving[n] - moving[n].mean(axis=1, keepdims=True) for n in (one, other))
@@ -184,8 +187,8 @@ def copies(batch: Batch, aircraft: Aircraft | None) -> Iterator[tuple[str, str]]
             yield one, other
 
 
-def constant(batch: Batch) -> Iterator[tuple[str, Bools]]:
-    """Channels that keep one value in runs in which the others move."""
+def constant(batch: Batch) -> Iterator[tuple[str, Bools, float]]:
+    """Channels that keep one value in runs in which the others move, the runs, and their number."""
     c = batch.channels
     judged = [
         n for n in ("alpha_rad", "q_rad_s", "az_m_s2", "theta_rad", "ax_m_s2", "elevator_rad") if n in c
@@ -195,7 +198,7 @@ def constant(batch: Batch) -> Iterator[tuple[str, Bools]]:
     for name in judged:
         bad = still[name] & (moving > 0)
         if bad.any():
-            yield name, np.asarray(bad)
+            yield name, np.asarray(bad), float(bad.sum())
 
 
 def dropouts(batch: Batch) -> Iterator[tuple[str, Bools, int]]:

@@ -12,11 +12,14 @@ from numpy.typing import NDArray
 
 from airtruth.channels import SIGNALS
 from airtruth.checks.relation import ATMOSPHERE_M
+from airtruth.checks.stated import Stated
+from airtruth.checks.together import Runs
 from airtruth.physics.atmosphere import density_kg_m3
-from airtruth.units import DEG, FT, G0, KT, SLUG
+from airtruth.units import DEG, FT, G0, KT, SLUG, UNITS
 
 Array = NDArray[np.float64]
 Channels = Mapping[str, Array]
+Change = Callable[[Channels, float], Channels]
 
 
 @dataclass(frozen=True)
@@ -29,7 +32,7 @@ class Correction:
     code : kind of fault, see `airtruth.checks.fault.CODES`.
     mistake : the mistake in words.
     cure : what to write in the import mapping.
-    apply : channels (runs, samples) -> those that change.
+    apply : channels (runs, samples) and sample period [s] -> the channels that change.
     sensor : whether it is an error of a sensor and none of the mapping; such an error never refuses a log.
     parts : the corrections of the single channels, if several channels share the mistake.
     penalty : what it adds to the sum: minus twice the logarithm of how often the mistake is made,
@@ -40,84 +43,153 @@ class Correction:
     code: str
     mistake: str
     cure: str
-    apply: Callable[[Channels], Channels]
+    apply: Change
     penalty: float = 0.0
     sensor: bool = False
     parts: tuple[Correction, ...] = ()
 
 
-def _scaled(name: str, factor: float) -> Callable[[Channels], Channels]:
-    return lambda c: {name: factor * c[name]}
+def _scaled(name: str, factor: float) -> Change:
+    return lambda c, dt_s: {name: factor * c[name]}
 
 
-def _setting(name: str, unit: str = "", sign: bool = False) -> str:
-    parts = [f'unit = "{unit}"'] if unit else []
-    parts += ["sign = -1"] if sign else []
+def _setting(name: str, stated: Stated | None, unit: str = "", sign: bool = False, scale: float = 1.0) -> str:
+    """What to write in the mapping, beside what it states."""
+    parts = []
+    if unit and (stated is None or unit != stated.unit):
+        instead = f' in place of "{stated.unit}"' if stated is not None else ""
+        parts.append(f'unit = "{unit}"{instead}')
+    if scale != 1.0:
+        parts.append(f"scale = {scale * (1.0 if stated is None else stated.scale):g}")
+    if sign:
+        parts.append("sign = -1" if stated is None or stated.sign > 0 else "sign = 1 in place of -1")
     return f"state {' and '.join(parts)} under [channels.{name}] in the import mapping"
 
 
-def _unit_corrections(name: str, units: Mapping[str, tuple[float, str]]) -> Iterator[Correction]:
-    """The other sign, each other unit, and both."""
-    yield Correction((name,), "sign", "opposite sign", _setting(name, sign=True), _scaled(name, -1.0))
-    for unit, (factor, mistake) in units.items():
-        cure = _setting(name, unit)
-        yield Correction((name,), "unit", mistake, cure, _scaled(name, factor), 1.0)
-        both = f"{mistake} and opposite sign"
-        cure = _setting(name, unit, sign=True)
-        yield Correction((name,), "unit_and_sign", both, cure, _scaled(name, -factor), 2.0)
-
-
-_ANGLE: Final = {"deg": (DEG, "degrees taken as radians"), "rad": (1.0 / DEG, "radians taken as degrees")}
-"""Unit to state in a mapping -> factor that undoes the mistake [-], and the mistake, for angles."""
-_RATE: Final = {"deg_s": _ANGLE["deg"], "rad_s": _ANGLE["rad"]}
-"""The same for angular rates."""
-_FORCE: Final = {
-    "g": (G0, "g taken as m/s2"),
-    "ft_s2": (FT, "ft/s2 taken as m/s2"),
-    "m_s2": (1.0 / G0, "m/s2 taken as g"),
-}
-"""The same for specific forces."""
 _FEET_OR_KM_H: Final = 0.5 * (FT + 1.0 / 3.6)
 """Mean of ft/s and km/h in m/s [-]: the two differ by 10 %, less than a log can tell."""
-_SPEED: Final = {
-    "kt": (KT, "knots taken as m/s"),
-    'ft_s" or "km_h': (_FEET_OR_KM_H, "ft/s or km/h taken as m/s"),
-    "m_s": (1.0 / KT, "m/s taken as knots"),
-    'm_s" (no longer "ft_s" or "km_h")': (1.0 / _FEET_OR_KM_H, "m/s taken as ft/s or km/h"),
+_UNITS: Final[dict[str, dict[str, tuple[float, str]]]] = {
+    "angle": {"rad": (1.0, "radians"), "deg": (DEG, "degrees")},
+    "angular_rate": {"rad_s": (1.0, "radians"), "deg_s": (DEG, "degrees")},
+    "acceleration": {"m_s2": (1.0, "m/s2"), "g": (G0, "g"), "ft_s2": (FT, "ft/s2")},
+    "speed": {"m_s": (1.0, "m/s"), "kt": (KT, "knots"), 'ft_s" or "km_h': (_FEET_OR_KM_H, "ft/s or km/h")},
+    "length": {"m": (1.0, "metres"), "ft": (FT, "feet"), "mm": (1e-3, "mm")},
+    "density": {"kg_m3": (1.0, "kg/m3"), "slug_ft3": (SLUG / FT**3, "slug/ft3")},
+    "ratio": {"": (1.0, "a share"), "pct": (0.01, "per cent")},
 }
-"""The same as `_ANGLE` for airspeeds."""
+"""Dimension -> unit of a mapping -> factor to SI and its name in sentences; the first one is that of the channel."""
+_PARTS: Final[dict[str, tuple[tuple[str, str, float], ...]]] = {
+    "angle": (("1/100 deg", "deg", 0.01),),
+    "angular_rate": (("1/100 deg/s", "deg_s", 0.01),),
+    "acceleration": (("1/1000 g", "g", 1e-3),),
+    "speed": (("cm/s", "m_s", 0.01),),
+    "length": (("km", "m", 1000.0), ("cm", "m", 0.01)),
+}
+"""Dimension -> unit that recorders write and no mapping names, as a multiple of one that it names."""
+_REVERSED: Final = ("angle", "angular_rate", "acceleration", "speed")
+"""Dimensions whose log may have been converted from a unit that its column did not have, where no mapping is known."""
+_SIGNED: Final = ("angle", "angular_rate", "acceleration")
+"""Dimensions whose positive sense a recorder may have the other way round."""
 _SCALES: Final = (0.1, 0.2, 0.5, 2.0, 5.0, 10.0)
 """Factors by which an airspeed or density of no known unit may be wrong [-]."""
+_PULSE_US: Final = (700.0, 2300.0)
+"""Pulse widths of servos [microseconds]: 1000 to 2000 usually, and up to 2300 with extended travel."""
+_PULSE_RAD: Final = 0.05 * DEG
+"""Deflection by microsecond that stands for the unknown one [rad]: 25 deg in 500 (judgement)."""
 
 
-_PITCH: Final = ("alpha_rad", "theta_rad", "q_rad_s")
-"""Channels of the motion about the pitch axis, whose positive sense a recorder may have the other way round."""
-_SURFACE: Final = ("elevator_rad", "elevator_command_rad")
-"""Channels of the elevator."""
-_FORCES: Final = ("az_m_s2", "ax_m_s2")
-"""Channels of the specific force."""
+def _unit_corrections(name: str, stated: Stated | None) -> Iterator[Correction]:
+    """Each unit that the column may have in place of the one that it was taken for, the other sign, and both.
+
+    Without a mapping the column was taken for SI, or a column in SI for something else.
+    """
+    dimension = SIGNALS[name].dimension
+    units = _UNITS[dimension]
+    own = next(iter(units))
+    signed = dimension in _SIGNED
+    if signed:
+        yield Correction(
+            (name,), "sign", "opposite sign", _setting(name, stated, sign=True), _scaled(name, -1.0)
+        )
+    taken = own if stated is None else stated.unit
+    to_si, taken_words = units.get(taken, (UNITS[dimension].get(taken, 1.0), taken.replace("_", "/")))
+    found = [
+        (f"{words} taken as {taken_words}", factor / to_si, unit, 1.0, 1.0)
+        for unit, (factor, words) in units.items()
+        if unit != taken and not np.isclose(factor, to_si, rtol=0.15)
+    ]
+    if stated is None and dimension in _REVERSED:
+        found += [
+            (f"{units[own][1]} taken as {words}", 1.0 / factor, own, 1.0, 1.0)
+            for unit, (factor, words) in units.items()
+            if unit not in (own, "ft_s2")
+        ]
+    for words, unit, scale in _PARTS.get(dimension, ()):
+        factor = scale * units[unit][0] / to_si
+        found.append((f"{words} taken as {taken_words}", factor, unit, scale, 2.0))
+    for mistake, factor, unit, scale, penalty in found:
+        cure = _setting(name, stated, unit, scale=scale)
+        yield Correction((name,), "unit", mistake, cure, _scaled(name, factor), penalty)
+        if signed and scale == 1.0:
+            cure = _setting(name, stated, unit, sign=True)
+            both = f"{mistake} and opposite sign"
+            yield Correction((name,), "unit_and_sign", both, cure, _scaled(name, -factor), penalty + 1.0)
+
+
+def _pulses(name: str, runs: Runs, stated: Stated | None) -> Iterator[Correction]:
+    """Pulse widths of a servo that were taken for an angle."""
+    if stated is not None and not stated.is_plain:
+        return
+    units = ("rad", "deg") if stated is None else (stated.unit,)
+    for unit in units:
+        to_si = UNITS["angle"][unit]
+        raw = runs.each(lambda c, dt_s: np.stack([c[name].min(axis=1), c[name].max(axis=1)])[None]) / to_si
+        size = np.abs(raw)
+        if size.min() < _PULSE_US[0] or size.max() > _PULSE_US[1]:
+            continue
+
+        def change(c: Channels, dt_s: float, to_si: float = to_si) -> Channels:
+            x = c[name] / to_si
+            return {name: _PULSE_RAD * (x - np.median(x, axis=1, keepdims=True))}
+
+        yield Correction(
+            (name,),
+            "unit",
+            f"pulse widths of a servo in microseconds taken as {_UNITS['angle'][unit][1]}",
+            f'state the degrees per microsecond as scale, less their product with the centre as offset, and unit = "deg" under '
+            f"[channels.{name}] in the import mapping",
+            change,
+            2.0,
+        )
+
+
+_SENSES: Final = (
+    ("alpha_rad", "theta_rad", "q_rad_s"),
+    ("elevator_rad", "elevator_command_rad"),
+    ("az_m_s2", "ax_m_s2"),
+)
+"""Groups of channels whose positive sense a recorder may have the other way round: pitch axis, elevator, specific force."""
 
 
 def _shared(names: tuple[str, ...], single: Sequence[Correction]) -> Iterator[Correction]:
-    """Mistakes that several channels share: a recorder has one unit for its angles, and one positive sense for an axis.
+    """Mistakes that several channels share: any of the angles and rates has one unit, and an axis one positive sense.
 
     Parameters
     ----------
     names : channels of the log.
     single : corrections of single channels.
     """
-    angles = tuple(n for n in names if SIGNALS[n].dimension == "angle")
-    rates = tuple(n for n in names if SIGNALS[n].dimension == "angular_rate")
-    in_units = ((*angles, *rates), angles, _PITCH, _PITCH[:2], _SURFACE, _FORCES)
-    in_sense = (_PITCH, _SURFACE, _FORCES)
-    tried: set[frozenset[Correction]] = set()
-    for code, groups in (("unit", in_units), ("sign", in_sense)):
-        for group in groups:
-            members = [c for c in single if c.code == code and c.channels[0] in group]
-            for mistake in dict.fromkeys(c.mistake for c in members):
-                parts = tuple(c for c in members if c.mistake == mistake)
-                if len(parts) > 1 and frozenset(parts) not in tried:
-                    tried.add(frozenset(parts))
+    turns = tuple(n for n in names if SIGNALS[n].dimension in ("angle", "angular_rate"))
+    groups = [*(g for k in range(2, len(turns) + 1) for g in combinations(turns, k)), _SENSES[-1]]
+    for code, tried in (("unit", groups), ("sign", list(_SENSES))):
+        by_mistake: dict[str, dict[str, Correction]] = {}
+        for one in single:
+            if one.code == code and one.penalty <= 1.0:
+                by_mistake.setdefault(one.mistake, {})[one.channels[0]] = one
+        for group in tried:
+            for of_channel in by_mistake.values():
+                parts = tuple(of_channel[n] for n in group if n in of_channel)
+                if len(parts) > 1 and (code == "sign" or len(parts) == len(group)):
                     yield _together(parts)
 
 
@@ -127,7 +199,7 @@ def _together(parts: tuple[Correction, ...]) -> Correction:
         parts[0].code,
         parts[0].mistake,
         "; ".join(c.cure for c in parts),
-        lambda c: {name: values for part in parts for name, values in part.apply(c).items()},
+        lambda c, dt_s: {name: values for part in parts for name, values in part.apply(c, dt_s).items()},
         0.5 * len(parts),
         parts=parts,
     )
@@ -142,13 +214,15 @@ def _gravity(c: Channels, name: str) -> Array:
 def _gravity_corrections(name: str) -> Iterator[Correction]:
     missing = "no gravity"
     cure = f"map the specific force that an accelerometer feels, gravity included, to {name}"
-    yield Correction((name,), "gravity", missing, cure, lambda c: {name: c[name] + _gravity(c, name)}, 1.0)
+    yield Correction(
+        (name,), "gravity", missing, cure, lambda c, dt_s: {name: c[name] + _gravity(c, name)}, 1.0
+    )
     yield Correction(
         (name,),
         "gravity",
         f"{missing} and opposite sign",
         cure,
-        lambda c: {name: -c[name] + _gravity(c, name)},
+        lambda c, dt_s: {name: -c[name] + _gravity(c, name)},
         2.0,
     )
     yield Correction(
@@ -156,11 +230,11 @@ def _gravity_corrections(name: str) -> Iterator[Correction]:
         "gravity",
         f"{missing} and g taken as m/s2",
         cure,
-        lambda c: {name: G0 * c[name] + _gravity(c, name)},
+        lambda c, dt_s: {name: G0 * c[name] + _gravity(c, name)},
         2.0,
     )
     yield Correction(
-        (name,), "gravity", "gravity twice", cure, lambda c: {name: c[name] - _gravity(c, name)}, 1.0
+        (name,), "gravity", "gravity twice", cure, lambda c, dt_s: {name: c[name] - _gravity(c, name)}, 1.0
     )
 
 
@@ -180,37 +254,16 @@ def _swaps(names: tuple[str, ...]) -> Iterator[Correction]:
             "swapped",
             f"swapped with {other}",
             f"exchange the columns of {one} and {other} in the import mapping",
-            lambda c, one=one, other=other: {one: c[other], other: c[one]},  # type: ignore[misc]
+            lambda c, dt_s, one=one, other=other: {one: c[other], other: c[one]},  # type: ignore[misc]
             3.0,
         )
-
-
-def _air_corrections(names: tuple[str, ...]) -> Iterator[Correction]:
-    if "altitude_m" in names:
-        for unit, factor, mistake in (("ft", FT, "feet taken as metres"), ("km", 1e3, "km taken as metres")):
-            cure = _setting("altitude_m", unit)
-            yield Correction(("altitude_m",), "unit", mistake, cure, _scaled("altitude_m", factor), 1.0)
-    if "density_kg_m3" in names:
-        name = "density_kg_m3"
-        cure = _setting(name, "slug_ft3")
-        slug = SLUG / FT**3
-        yield Correction((name,), "unit", "slug/ft3 taken as kg/m3", cure, _scaled(name, slug), 1.0)
-        if "altitude_m" in names:
-            yield Correction(
-                (name,),
-                "scale",
-                "unknown factor",
-                f"state the unit of {name}, or leave it out: altitude_m is enough",
-                lambda c: {name: _standard(c) + 0.0 * c[name]},
-                4.0,
-            )
 
 
 def _standard(c: Channels) -> Array:
     return np.asarray(density_kg_m3(np.clip(c["altitude_m"], *ATMOSPHERE_M)))
 
 
-def _lags(names: tuple[str, ...], dt_s: float) -> Iterator[Correction]:
+def _lags(names: tuple[str, ...]) -> Iterator[Correction]:
     """Lags of a slow vane: without them its weak response passes for a wrong airspeed."""
     if "alpha_rad" not in names:
         return
@@ -220,7 +273,7 @@ def _lags(names: tuple[str, ...], dt_s: float) -> Iterator[Correction]:
             "lag",
             f"about {lag:g} s late",
             "`airtruth check` measures the lag; declare it under [sensors] of the aircraft",
-            lambda c, lag=lag: {  # type: ignore[misc]
+            lambda c, dt_s, lag=lag: {  # type: ignore[misc]
                 "alpha_rad": c["alpha_rad"] + lag * np.gradient(c["alpha_rad"], dt_s, axis=1)
             },
             2.0,
@@ -228,34 +281,44 @@ def _lags(names: tuple[str, ...], dt_s: float) -> Iterator[Correction]:
         )
 
 
-def catalogue(names: tuple[str, ...], dt_s: float) -> list[Correction]:
-    """Every known mistake in a log of these channels and this sample period [s], and lags of its vane."""
+def _scales(names: tuple[str, ...]) -> Iterator[Correction]:
+    """Factors of no known unit."""
+    name = "airspeed_m_s"
+    for factor in _SCALES if name in names else ():
+        mistake = f"factor of about {1.0 / factor:g}"
+        cure = f"state the unit and scale of {name} in the import mapping"
+        yield Correction((name,), "scale", mistake, cure, _scaled(name, factor), 2.0)
+    name = "density_kg_m3"
+    if {name, "altitude_m"} <= set(names):
+        yield Correction(
+            (name,),
+            "scale",
+            "unknown factor",
+            f"state the unit of {name}, or leave it out: altitude_m is enough",
+            lambda c, dt_s: {name: _standard(c) + 0.0 * c[name]},
+            4.0,
+        )
+
+
+def catalogue(runs: Runs, stated: Mapping[str, Stated] | None = None) -> list[Correction]:
+    """Every known mistake in a log, and lags of its vane.
+
+    Parameters
+    ----------
+    runs : runs of the log.
+    stated : what the mapping states of the channels: a mistake is a difference from that. Empty if no mapping is known.
+    """
+    stated = stated or {}
+    names = tuple(name for name in runs.channels if name in SIGNALS)
     result: list[Correction] = []
     for name in names:
-        dimension = SIGNALS[name].dimension
-        if dimension == "angle":
-            result += _unit_corrections(name, _ANGLE)
-        elif dimension == "angular_rate":
-            result += _unit_corrections(name, _RATE)
-        elif dimension == "acceleration":
-            result += [*_unit_corrections(name, _FORCE), *_gravity_corrections(name)]
-    result += [*_shared(names, result)]
-    name = "airspeed_m_s"
-    if name in names:
-        for unit, (factor, mistake) in _SPEED.items():
-            cure = _setting(name, unit)
-            result.append(Correction((name,), "unit", mistake, cure, _scaled(name, factor), 1.0))
-        for factor in _SCALES:
-            mistake, cure = (
-                f"factor of about {1.0 / factor:g}",
-                f"state the unit and scale of {name} in the import mapping",
-            )
-            result.append(Correction((name,), "scale", mistake, cure, _scaled(name, factor), 2.0))
-    if "throttle" in names:
-        cure = _setting("throttle", "pct")
-        scaled = _scaled("throttle", 0.01)
-        result.append(Correction(("throttle",), "unit", "per cent taken as a share", cure, scaled, 1.0))
-    return [*result, *_air_corrections(names), *_swaps(names), *_lags(names, dt_s)]
+        if SIGNALS[name].dimension in _UNITS:
+            result += _unit_corrections(name, stated.get(name))
+        if SIGNALS[name].dimension == "acceleration":
+            result += _gravity_corrections(name)
+        if name in _SENSES[1]:
+            result += _pulses(name, runs, stated.get(name))
+    return [*result, *_shared(names, result), *_scales(names), *_swaps(names), *_lags(names)]
 
 
 __all__ = ["Correction", "catalogue"]

@@ -4,6 +4,9 @@ A log that fails its tests is corrected for each known mistake in turn and teste
 squared distances is minus twice a log likelihood, so its decrease is the likelihood ratio of "this mistake was
 made" against "none was". A mistake is certain if it explains nearly everything that failed; a log that no
 mistake explains (a gust, a turn, an unstable aircraft) is not refused.
+
+A sign or a unit belongs to the mapping, which serves every run, so the evidence of all runs is combined (`explain`). A run
+that alone shows a mistake, beside runs that do not, is odd (`odd_ones`).
 """
 
 from __future__ import annotations
@@ -17,11 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.channels import SIGNALS
 from airtruth.checks.corrections import Correction, catalogue
 from airtruth.checks.evidence import relations
+from airtruth.checks.means import LIMITS, ranges
 from airtruth.checks.relation import Relation
-from airtruth.logs.flight_log import Batch
+from airtruth.checks.stated import Stated
+from airtruth.checks.together import Runs
+
+Array = NDArray[np.float64]
 
 SUSPECT: Final = 9.0
 """Sum of squared distances above which corrections are tried; the clean logs of the tests are mostly below it."""
@@ -30,10 +36,15 @@ GAIN: Final = 7.0
 REST: Final = 0.4
 """Largest share of the sum that a certain mistake may leave."""
 PARTIAL: Final = 6.0
-"""Decrease of the sum beyond `GAIN` that a mistake in a part of the runs has to bring: a likelihood ratio of exp(3).
+"""Decrease of the sum beyond `GAIN` that a mistake in one of several runs has to bring: a likelihood ratio of exp(3).
 
 Columns are mapped once for all runs of a log (judgement), and gusts shift the estimates of a single run.
 """
+DECLARED: Final = {
+    "CLalpha": ("mass", "wing_area", "CLalpha"),
+    "Cmde": ("inertia_yy", "wing_area", "chord", "Cmde"),
+}
+"""Tests that compare a record with declared numbers -> those numbers in aircraft.toml."""
 AERODYNAMIC: Final = ("elevator", "ax_slope")
 """Tests that take alpha and q as right; the others are kinematic."""
 MOST_RUNS: Final = 12
@@ -48,6 +59,15 @@ RIVAL: Final = 2.0
 
 
 @dataclass(frozen=True)
+class Trial:
+    """A correction that was tried: the tests behind it, and their sums in each run and in all together (runs + 1,)."""
+
+    correction: Correction
+    after: list[Relation]
+    sums: Array
+
+
+@dataclass(frozen=True)
 class Explanation:
     """A mistake that explains failed tests.
 
@@ -58,6 +78,8 @@ class Explanation:
     gain : decrease of the sum of squared distances.
     certain : whether hardly anything is left, see `GAIN` and `REST`.
     rival : the inverse of another mistake that explains the tests nearly as well, see `RIVAL`.
+    row : row of the tests that the evidence is from: a run, or -1 for all together.
+    declared : tests against declared numbers of the aircraft without which the mistake would not be certain.
     """
 
     correction: Correction | None
@@ -65,6 +87,8 @@ class Explanation:
     gain: float
     certain: bool
     rival: Correction | None = None
+    row: int = -1
+    declared: tuple[str, ...] = ()
 
     @property
     def mistake(self) -> str:
@@ -82,59 +106,77 @@ class Explanation:
         return "; or ".join(words)
 
 
-def total(results: list[Relation], before: list[Relation] | None = None) -> float:
-    """Sum of the squared distances of all runs together.
+def total(results: list[Relation], before: list[Relation] | None = None) -> Array:
+    """Sums of the squared distances (runs + 1,) of each run and of all together.
 
     With ``before``, a test that a correction leaves without information counts as before the correction: to
     hide the evidence is no explanation.
     """
     own = {t.name: t for t in before or () if t.name != "range"}
-    return float(
+    return np.asarray(
         sum(
-            max(t.distance[-1], own[t.name].distance[-1])
-            if t.name in own and not t.informed
-            else t.distance[-1]
+            np.where(t.informed, t.distance, np.maximum(t.distance, own[t.name].distance))
+            if t.name in own
+            else t.distance
             for t in results
         )
     )
 
 
-def explain(batch: Batch, aircraft: Aircraft | None = None, *, partial: bool = False) -> list[Explanation]:
-    """Mistakes that were made in a batch, the clearest first; empty if its tests pass.
+def _trials(
+    runs: Runs,
+    results: list[Relation],
+    aircraft: Aircraft | None,
+    stated: Mapping[str, Stated],
+    made: Sequence[Correction] = (),
+) -> list[Trial]:
+    """Every correction that may be made beside those that were made already."""
+    found = []
+    for correction in catalogue(runs, stated):
+        if any(_excludes(one, correction) for one in made):
+            continue
+        changed = runs.changed(correction.apply)
+        if _stills(changed, correction) or _leaves(changed, correction, results):
+            continue
+        after = relations(changed, aircraft)
+        found.append(Trial(correction, after, total(after, results) + correction.penalty))
+    return found
+
+
+def explain(
+    runs: Runs,
+    aircraft: Aircraft | None = None,
+    stated: Mapping[str, Stated] | None = None,
+    *,
+    partial: bool = False,
+) -> list[Explanation]:
+    """Mistakes that the mapping of all these runs made, the clearest first; empty if their tests pass.
 
     Parameters
     ----------
-    partial : whether the batch is a part of the runs of a log, see `PARTIAL`.
+    stated : what the mapping states of the channels, as of `airtruth.checks.stated.stated_of`.
+    partial : whether these are some runs of a log, see `PARTIAL`.
     """
-    batch = _first(batch, MOST_RUNS)
+    runs = runs.some(np.arange(min(len(runs), MOST_RUNS)))
     least = GAIN + (PARTIAL if partial else 0.0)
-    results = relations(batch, aircraft)
-    now = total(results)
+    results = relations(runs, aircraft)
+    now = float(total(results)[-1])
     found: list[Explanation] = []
     while now > SUSPECT and len(found) < MOST_FAULTS:
-        names = tuple(n for n in batch.channels if n in SIGNALS)
         made = [e.correction for e in found if e.correction]
-        best: tuple[float, Correction, Batch, list[Relation]] | None = None
-        values: list[tuple[float, Correction]] = []
-        for correction in catalogue(names, batch.dt_s):
-            if any(_excludes(one, correction) for one in made):
-                continue
-            corrected = correction.apply(batch.channels)
-            if _stills(corrected):
-                continue
-            changed = replace(batch, channels={**batch.channels, **corrected})
-            after = relations(changed, aircraft)
-            value = total(after, results) + correction.penalty
-            values.append((value, correction))
-            if best is None or value < best[0]:
-                best = value, correction, changed, after
-        failed = _first_failed(results)
-        if best is None or now - best[0] < least:
-            found.append(Explanation(None, (failed,), 0.0, False))
+        trials = _trials(runs, results, aircraft, stated or {}, made)
+        best = min(trials, key=lambda trial: float(trial.sums[-1]), default=None)
+        if best is None or now - best.sums[-1] < least:
+            found.append(Explanation(None, (_first_failed(results),), 0.0, False))
             break
-        helped = _helped(best[1], results, best[3])
-        found.append(Explanation(best[1], helped, now - best[0], False, _rival(best[1], best[0], values)))
-        batch, results, now = best[2], best[3], best[0] - best[1].penalty
+        helped = _helped(best.correction, results, best.after)
+        gain = now - float(best.sums[-1])
+        resting = _resting(best, results, gain, least)
+        found.append(
+            Explanation(best.correction, helped, gain, False, _rival(best, trials), declared=resting)
+        )
+        runs, results = runs.changed(best.correction.apply), best.after
+        now = float(best.sums[-1]) - best.correction.penalty
     explained = sum(e.gain for e in found)
     certain = now < max(SUSPECT, REST * explained)
     return [
@@ -142,10 +184,45 @@ def explain(batch: Batch, aircraft: Aircraft | None = None, *, partial: bool = F
     ]
 
 
-def _stills(corrected: Mapping[str, NDArray[np.float64]]) -> bool:
+def odd_ones(
+    runs: Runs, aircraft: Aircraft | None = None, stated: Mapping[str, Stated] | None = None
+) -> dict[int, Explanation]:
+    """Runs of several that alone show a mistake with certainty: index of the run -> the mistake.
+
+    At most `MOST_RUNS` runs are looked at.
+    """
+    runs = runs.some(np.arange(min(len(runs), MOST_RUNS)))
+    results = relations(runs, aircraft)
+    now = total(results)
+    trials = _trials(runs, results, aircraft, stated or {})
+    found = {}
+    for run in np.flatnonzero(now[:-1] > SUSPECT).tolist():
+        best = min(trials, key=lambda trial: float(trial.sums[run]), default=None)
+        if best is None or best.correction.sensor:
+            continue
+        gain = float(now[run] - best.sums[run])
+        rest = float(best.sums[run]) - best.correction.penalty
+        if gain >= GAIN + PARTIAL and rest < max(SUSPECT, REST * gain):
+            helped = _helped(best.correction, results, best.after, run)
+            resting = _resting(best, results, gain, GAIN + PARTIAL, run)
+            found[run] = Explanation(best.correction, helped, gain, True, row=run, declared=resting)
+    return found
+
+
+def _stills(changed: Runs, correction: Correction) -> bool:
     """Whether a correction makes a surface too small to have moved the aircraft."""
-    surface = corrected.get("elevator_rad")
-    return surface is not None and float(np.ptp(surface, axis=1).max()) < LEAST_INPUT_RAD
+    name = "elevator_rad"
+    if name not in correction.channels:
+        return False
+    return float(changed.each(lambda c, dt_s: np.ptp(c[name], axis=1)).max()) < LEAST_INPUT_RAD
+
+
+def _leaves(changed: Runs, correction: Correction, results: Sequence[Relation]) -> bool:
+    """Whether a correction moves one of its channels out of the range of flight, which no other test makes good."""
+    outside = {t.channels for t in results if t.name == "range"}
+    others = (n for n in changed.channels if n not in correction.channels or n not in LIMITS)
+    left = [t for t in ranges(changed.without(*others)) if t.channels not in outside]
+    return any(t.distance.min() > 0.0 for t in left)
 
 
 def _excludes(made: Correction, other: Correction) -> bool:
@@ -153,27 +230,44 @@ def _excludes(made: Correction, other: Correction) -> bool:
     return bool(set(made.channels) & set(other.channels)) and {made.code, other.code} != {"unit", "sign"}
 
 
-def _helped(best: Correction, results: Sequence[Relation], after: list[Relation]) -> tuple[Relation, ...]:
+def _helped(
+    best: Correction, results: Sequence[Relation], after: list[Relation], run: int = -1
+) -> tuple[Relation, ...]:
     """The tests that a correction improves most, for each of its parts one of the part's channel if there is one."""
+
+    def decrease(test: Relation) -> float:
+        return _decrease(test, after, run)
+
     if not best.parts:
-        return (max(results, key=lambda t: _decrease(t, after)),)
-    own = [[t for t in results if part.channels[0] in t.channels] for part in best.parts]
-    return tuple(max(tests or results, key=lambda t: _decrease(t, after)) for tests in own)
+        own = [t for t in results if set(best.channels) & set(t.channels)]
+        return (max(own or results, key=decrease),)
+    owns = [[t for t in results if part.channels[0] in t.channels] for part in best.parts]
+    return tuple(max(tests or results, key=decrease) for tests in owns)
 
 
-def _rival(best: Correction, value: float, values: list[tuple[float, Correction]]) -> Correction | None:
+def _resting(
+    best: Trial, results: Sequence[Relation], gain: float, least: float, run: int = -1
+) -> tuple[str, ...]:
+    """Tests against declared numbers, if the others alone gain less than is needed."""
+    shares = {t.name: _decrease(t, best.after, run) for t in results if t.name in DECLARED}
+    if gain - sum(shares.values()) >= least:
+        return ()
+    return tuple(name for name, share in shares.items() if share > 0.0)
+
+
+def _rival(best: Trial, trials: Sequence[Trial]) -> Correction | None:
     """Another mistake that fits about as well: another unit or gravity of the channel, or a mistake beside a late sensor."""
-    kinds = {"unit", "gravity"}
+    kinds, chosen = {"unit", "gravity"}, best.correction
     near = [
-        (v, one)
-        for v, one in values
-        if v - value < RIVAL
+        trial
+        for trial in trials
+        if trial.sums[-1] - best.sums[-1] < RIVAL
         and (
-            (one.channels == best.channels and {one.code, best.code} == kinds)
-            or (best.sensor and not one.sensor)
+            (trial.correction.channels == chosen.channels and {trial.correction.code, chosen.code} == kinds)
+            or (chosen.sensor and not trial.correction.sensor)
         )
     ]
-    return min(near, key=lambda pair: pair[0])[1] if near else None
+    return min(near, key=lambda trial: float(trial.sums[-1])).correction if near else None
 
 
 def _first_failed(results: list[Relation]) -> Relation:
@@ -182,20 +276,13 @@ def _first_failed(results: list[Relation]) -> Relation:
     return max(clear or results, key=lambda t: float(t.distance[-1]))
 
 
-def _decrease(test: Relation, after: list[Relation]) -> float:
+def _decrease(test: Relation, after: list[Relation], run: int) -> float:
     now = sum(
-        float(t.distance[-1])
+        float(t.distance[run])
         for t in after
         if t.name == test.name and (t.name != "range" or t.channels == test.channels)
     )
-    return float(test.distance[-1]) - now
+    return float(test.distance[run]) - now
 
 
-def _first(batch: Batch, count: int) -> Batch:
-    if len(batch.run_ids) <= count:
-        return batch
-    channels = {name: values[:count] for name, values in batch.channels.items()}
-    return replace(batch, run_ids=batch.run_ids[:count], t_s=batch.t_s[:count], channels=channels)
-
-
-__all__ = ["SUSPECT", "Explanation", "explain", "total"]
+__all__ = ["DECLARED", "SUSPECT", "Explanation", "explain", "odd_ones", "total"]

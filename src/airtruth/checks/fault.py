@@ -13,7 +13,7 @@ class Fault:
     Attributes
     ----------
     channel : name of the channel at fault.
-    run_id : first run that shows the fault.
+    run_ids : runs that show the fault.
     code : kind of fault, one of `airtruth.checks.fault.CODES`.
     sentence : channel, runs, evidence with figures, and the cure.
     certain : whether no flight could produce these values; a log with a certain fault is refused.
@@ -21,11 +21,16 @@ class Fault:
     """
 
     channel: str
-    run_id: str
+    run_ids: tuple[str, ...]
     code: str
     sentence: str
     certain: bool
     statistic: float
+
+    @property
+    def run_id(self) -> str:
+        """First run that shows the fault."""
+        return self.run_ids[0]
 
 
 CODES: Final = {
@@ -45,6 +50,7 @@ CODES: Final = {
     "lag": "the channel is late relative to the others",
     "reconstructed": "the channel was computed from others, and agrees with them by construction",
     "interpolated": "the channel has fewer samples of its own than the log",
+    "aircraft": "the log is of another aircraft than the declared one",
     "metadata": "the unit in the file's metadata contradicts the column's name",
 }
 """Kinds of fault and their meanings."""

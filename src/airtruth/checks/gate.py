@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -11,17 +11,21 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.checks import columns, times
-from airtruth.checks.corrections import Correction
-from airtruth.checks.evidence import OUTSIDE, relations
-from airtruth.checks.explanation import SUSPECT, Explanation, explain
+from airtruth.checks.evidence import relations
+from airtruth.checks.explanation import DECLARED, SUSPECT, Explanation, explain, odd_ones, total
 from airtruth.checks.fault import Fault
+from airtruth.checks.means import OUTSIDE, ranges
 from airtruth.checks.relation import Relation
 from airtruth.checks.sentences import culprit, evidence, runs
+from airtruth.checks.stated import Stated, stated_of
+from airtruth.checks.together import Runs
 from airtruth.errors import LogError
-from airtruth.logs.flight_log import Batch, FlightLog, batches
+from airtruth.logs.flight_log import PRESCRIBED, Batch, FlightLog, batches
 from airtruth.logs.validate import validate
+from airtruth.physics.reconstruction import is_reconstructed
 from airtruth.units import G0
 
+Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 UNRELATED: Final = 0.1
@@ -35,10 +39,11 @@ LEVEL_LOAD: Final = 1.15
 def inspect(log: FlightLog, aircraft: Aircraft | None = None) -> tuple[Fault, ...]:
     """Relation a structurally valid log against physics.
 
-    The tests and their tolerances are those of `airtruth.checks.evidence` and `airtruth.checks.columns`; the
-    mistakes that are told apart are those of `airtruth.checks.corrections.catalogue`. Not detectable: an
-    indicated airspeed in place of the true one, a density without an altitude, an elevator command in place
-    of the surface where the log or the aircraft has no command or actuator, and whatever gusts hide.
+    The tests and their tolerances are those of `airtruth.checks.evidence`, `airtruth.checks.means` and
+    `airtruth.checks.columns`; the mistakes that are told apart are those of `airtruth.checks.corrections.catalogue`. The evidence
+    of all runs is combined, whatever their lengths: a sign or a unit belongs to the mapping. Not detectable: an indicated
+    airspeed in place of the true one, a density without an altitude, an elevator command in place of the surface where the log
+    or the aircraft has no command or actuator, and whatever gusts hide.
 
     Parameters
     ----------
@@ -53,185 +58,335 @@ def inspect(log: FlightLog, aircraft: Aircraft | None = None) -> tuple[Fault, ..
     wrong = tuple(times.clock(log))
     if wrong:  # every other test compares rates of change
         return wrong
-    faults = [*columns.names(log), *columns.units(log), *columns.reconstructed(log)]
+    runs = Runs(tuple(batches(log)))
+    faults = [
+        *columns.names(log),
+        *columns.units(log),
+        *columns.reconstructed(log),
+        *another_aircraft(log, aircraft),
+    ]
     faults += [*columns.repeated(log), *times.interpolated(log)]
-    for batch in batches(log):
-        faults += _batch_faults(batch, aircraft, len(log.run_ids))
-    merged: dict[tuple[str, str], Fault] = {}
+    single = list(_column_faults(runs, aircraft, bool(log.metadata.get(PRESCRIBED))))
+    faults += single
+    if not any(fault.certain for fault in single):  # which spoil the tests of motion
+        still = any(fault.channel == "elevator_rad" for fault in single)
+        faults += _motion_faults(
+            runs.without("elevator_rad") if still else runs, aircraft, stated_of(log.metadata), len(runs)
+        )
+    merged: dict[tuple[str, str, tuple[str, ...]], Fault] = {}
     for fault in faults:
-        merged.setdefault((fault.channel, fault.code), fault)
+        merged.setdefault((fault.channel, fault.code, fault.run_ids), fault)
     return tuple(sorted(merged.values(), key=lambda f: not f.certain))
 
 
-def require(
+def another_aircraft(log: FlightLog, aircraft: Aircraft | None) -> Iterator[Fault]:
+    """An aircraft whose name is not that of the log's metadata."""
+    named = log.metadata.get("aircraft")
+    if aircraft is None or not isinstance(named, str) or named == aircraft.name:
+        return
+    yield Fault(
+        "aircraft", log.run_ids, "aircraft",
+        f"the log's metadata name the aircraft {named!r}, and the declared one is {aircraft.name!r}: use --aircraft {named}, "
+        "unless both are the same aircraft", False, 1.0,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Admitted:
+    """A log that passed the gate.
+
+    Attributes
+    ----------
+    log : its runs without the odd ones.
+    faults : uncertain faults; with ``force`` the certain ones first.
+    left_out : a sentence for each fault whose runs were left out.
+    """
+
+    log: FlightLog
+    faults: tuple[Fault, ...]
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def forced(self) -> tuple[str, ...]:
+        """Sentences of the certain faults that ``force`` overruled."""
+        return tuple(fault.sentence for fault in self.faults if fault.certain)
+
+    def remarks(self, *codes: str) -> tuple[str, ...]:
+        """What a result records beside its answer: runs that were left out, and uncertain faults of some codes."""
+        return (*self.left_out, *(f.sentence for f in self.faults if f.code in codes and not f.certain))
+
+
+def admit(
     log: FlightLog, aircraft: Aircraft | None = None, *, source: str = "", force: bool = False
-) -> tuple[Fault, ...]:
-    """Refuse a log that breaks the log contract or contradicts physics.
+) -> Admitted:
+    """Refuse a log that breaks the log contract or contradicts physics; leave out a minority of odd runs.
 
     Parameters
     ----------
     log : flight log.
     aircraft : as in `inspect`.
     source : name of the log in the message, usually its file.
-    force : return the certain faults and do not raise; a breach of the contract raises nevertheless.
-
-    Returns
-    -------
-    tuple of Fault
-        The uncertain faults; with ``force`` the certain ones first.
+    force : keep all runs and return the certain faults; a breach of the contract raises nevertheless.
 
     Raises
     ------
     LogError
-        One sentence per breach of the contract, or per certain fault.
+        One sentence per breach of the contract, or per certain fault that concerns half of the runs or more.
     """
     validate(log, source=source or "flight log")
     faults = inspect(log, aircraft)
-    certain = [fault.sentence for fault in faults if fault.certain]
-    if certain and not force:
-        usable = any(fault.code != "constant" for fault in faults if fault.certain)
-        advice = "correct it, or continue with --force" if usable else "correct it"
-        heading = f"{source or 'flight log'}: contradicts physics; {advice}"
-        raise LogError("\n  - ".join([heading, *certain]))
-    return faults
+    certain = [fault for fault in faults if fault.certain]
+    if not certain or force:
+        return Admitted(log, faults)
+    odd = {run_id for fault in certain for run_id in fault.run_ids}
+    if 2 * len(odd) < len(log):
+        rest = log.select([run_id for run_id in log.run_ids if run_id not in odd])
+        kept = admit(rest, aircraft, source=source)
+        heading = f"{source}: " if source else ""
+        sentences = tuple(
+            f"{heading}left out {runs(fault.run_ids, len(log))}, the other {len(rest)} are used: {fault.sentence}"
+            for fault in certain
+        )
+        return replace(kept, left_out=(*sentences, *kept.left_out))
+    usable = any(fault.code != "constant" for fault in certain)
+    advice = "correct it, or continue with --force" if usable else "correct it"
+    heading = f"{source or 'flight log'}: contradicts physics; {advice}"
+    raise LogError("\n  - ".join([heading, *(fault.sentence for fault in certain)]))
 
 
-def _batch_faults(batch: Batch, aircraft: Aircraft | None, total: int) -> list[Fault]:
-    """Faults of runs of one length: first those of single columns, which spoil the tests of motion."""
-    faults = list(_column_faults(batch, aircraft, total))
-    if any(fault.certain for fault in faults):
-        return faults
-    if any(fault.channel == "elevator_rad" for fault in faults):
-        batch = replace(batch, channels={n: v for n, v in batch.channels.items() if n != "elevator_rad"})
-    results = relations(batch, aircraft)
-    suspect = np.asarray(sum(test.distance for test in results) > SUSPECT)
+def _motion_faults(
+    several: Runs, aircraft: Aircraft | None, stated: Mapping[str, Stated], count: int
+) -> list[Fault]:
+    """Faults that relations between channels show: of the mapping, which all runs share, then of odd runs.
+
+    Parameters
+    ----------
+    count : number of runs of the log.
+    """
+    reconstructed = is_reconstructed(several.channels)
+    tested = several.without("alpha_rad") if reconstructed else several
+    aircraft = None if reconstructed else aircraft
+    distances = total(relations(tested, aircraft))
+    suspect = distances > SUSPECT
     if not suspect.any():
-        return faults
-    each = suspect[:-1]
-    parts = [*_groups(results, each)] if each.any() and not each.all() else []
-    if suspect[-1]:
-        parts.append(np.ones(len(each), dtype=np.bool_))
-    for which in parts:
-        found = explain(_some(batch, which), aircraft, partial=not which.all())
-        faults += _explained(batch, which, found, aircraft, total)
-        if any(fault.certain for fault in faults):
-            return faults
-    return faults
+        return list(_drift(several, count)) if reconstructed else []
+    each, everyone = suspect[:-1], np.ones(len(tested), dtype=np.bool_)
+    few, found = 2 * each.sum() < len(tested), []
+    odd = _odd(tested, each, aircraft, stated) if few and each.any() else []
+    if not odd and suspect[-1]:
+        found = explain(tested, aircraft, stated, partial=len(tested) < count)
+        helped = _helped(tested, found, aircraft, distances)
+        if _certain(tested, found) and 2 * helped.sum() >= len(tested):
+            return list(_explained(tested, helped, found, aircraft, count))
+        found = [replace(one, certain=False) for one in found]
+    if not odd and not few and len(tested) > 1:
+        odd = _odd(tested, each, aircraft, stated)
+    if not odd:
+        found = found or explain(tested.some(each), aircraft, stated, partial=True)
+        return list(_explained(tested, everyone if suspect[-1] else each, found, aircraft, count))
+    faults: list[Fault] = []
+    rest = everyone.copy()
+    for (
+        which,
+        one,
+    ) in odd:  # a mistake of the mapping makes hardly any run worse, one of a run makes the others worse
+        helped = which | _helped(tested, one, aircraft, distances)
+        affected = helped if 2 * helped.sum() >= len(tested) else which
+        faults += _explained(tested, affected, one, aircraft, count)
+        rest &= ~affected
+    return [*faults, *(_motion_faults(several.some(rest), aircraft, stated, count) if rest.any() else [])]
 
 
-def _groups(results: list[Relation], suspect: Bools) -> Iterator[Bools]:
-    """Suspect runs that fail the same test most."""
-    distances = np.stack([test.distance[:-1] for test in results])
-    worst = distances.argmax(axis=0)
-    for test in np.unique(worst[suspect]):
-        yield suspect & (worst == test)
+def _odd(
+    several: Runs, suspect: Bools, aircraft: Aircraft | None, stated: Mapping[str, Stated]
+) -> list[tuple[Bools, list[Explanation]]]:
+    """Runs of some that show a mistake with certainty, each by itself or else all of them together."""
+    places, some = np.flatnonzero(suspect), several.some(suspect)
+    alike: dict[tuple[str, ...], tuple[Bools, list[Explanation]]] = {}
+    for run, one in odd_ones(some, aircraft, stated).items():
+        assert one.correction is not None
+        key = (*one.correction.channels, one.correction.mistake)
+        which, _ = alike.setdefault(key, (np.zeros(len(several), dtype=np.bool_), [one]))
+        which[places[run]] = True
+    if alike:
+        return list(alike.values())
+    together = explain(some, aircraft, stated, partial=True)
+    return [(suspect, together)] if _certain(some, together) else []
+
+
+def _drift(several: Runs, count: int) -> Iterator[Fault]:
+    """A reconstruction that leaves the range of an angle of attack."""
+    alpha = Runs(tuple(replace(p, channels={"alpha_rad": p.channels["alpha_rad"]}) for p in several.parts))
+    for test in ranges(alpha):
+        ids = tuple(several.run_ids[i] for i in np.flatnonzero(test.distance[:-1]))
+        yield Fault(
+            "alpha_rad", ids, "impossible",
+            f"alpha_rad: reconstructed, in {runs(ids, count)}: {evidence(test)}: the channels that it was computed from "
+            "(airspeed_m_s, q_rad_s, az_m_s2, and where mapped ax_m_s2, theta_rad, altitude_m) contradict each other, or the "
+            "record is too long for their errors; cut it to one manoeuvre, and check their units and signs", True, OUTSIDE,
+        )  # fmt: skip
+
+
+def _certain(several: Runs, found: Sequence[Explanation]) -> bool:
+    """Whether explanations refuse their runs."""
+    return any(
+        one.certain if one.correction is not None else _refuses(several, one.failed[0]) for one in found
+    )
+
+
+def _refuses(several: Runs, failed: Relation) -> bool:
+    """Whether a test that no mistake explains rules out a flight."""
+    return (failed.name == "range" and float(failed.distance[-1]) >= OUTSIDE) or _unrelated(several, failed)
+
+
+def _helped(several: Runs, found: Sequence[Explanation], aircraft: Aircraft | None, before: Array) -> Bools:
+    """Runs whose distances the corrections together do not increase."""
+    changed = several
+    for one in found:
+        if one.correction is not None:
+            changed = changed.changed(one.correction.apply)
+    return np.asarray(total(relations(changed, aircraft))[:-1] <= before[:-1])
 
 
 def _explained(
-    batch: Batch, which: Bools, found: list[Explanation], aircraft: Aircraft | None, total: int
+    several: Runs, which: Bools, found: Sequence[Explanation], aircraft: Aircraft | None, count: int
 ) -> Iterator[Fault]:
-    """The faults of some runs; a mistake is reported for every run that its correction does not make worse."""
+    """The faults of some runs."""
     for one in found:
         if one.correction is not None:
-            affected = which | _helped(batch, one.correction, aircraft) if one.certain else which
-            ids = [batch.run_ids[i] for i in np.flatnonzero(affected)]
-            for part, failed in zip(one.correction.parts or (one.correction,), one.failed, strict=True):
-                name = part.channels[0]
-                others = [other.channels[0] for other in one.correction.parts if other is not part]
-                cure = part.cure if others else one.cure
-                mistake = (one.mistake if one.certain else f"possibly {one.mistake}") + _like(others)
-                sentence = f"{name}: {mistake} in {runs(ids, total)}: {evidence(failed)}; {cure}"
-                yield Fault(name, ids[0], part.code, sentence, one.certain, one.gain)
+            yield from _sentences(several, which, one, aircraft, count)
             continue
-        ids = [batch.run_ids[i] for i in np.flatnonzero(which)]
+        ids = tuple(several.run_ids[i] for i in np.flatnonzero(which))
         (failed,) = one.failed
-        name, outside = failed.channels[0], failed.name == "range"
+        if failed.name == "range":
+            ids = tuple(several.run_ids[i] for i in np.flatnonzero(_range_of(several, failed))) or ids
+        name = failed.channels[0]
         sentence = (
-            f"{name}: inconsistent in {runs(ids, total)}: {evidence(failed)}; check its unit, sign and axis"
+            f"{name}: inconsistent in {runs(ids, count)}: {evidence(failed)}; check its unit, sign and axis"
         )
-        code = "impossible" if outside else "inconsistent"
-        distance = float(failed.distance[-1])
-        certain = (outside and distance >= OUTSIDE) or _unrelated(batch, failed)
-        yield Fault(name, ids[0], code, sentence, certain, distance)
+        code = "impossible" if failed.name == "range" else "inconsistent"
+        yield Fault(name, ids, code, sentence, _refuses(several, failed), float(failed.distance[-1]))
+
+
+def _range_of(several: Runs, failed: Relation) -> Bools:
+    """Runs that leave the range of a channel."""
+    own = next((t for t in ranges(several) if t.channels == failed.channels), None)
+    return np.zeros(len(several), dtype=np.bool_) if own is None else np.asarray(own.distance[:-1] > 0.0)
+
+
+def _sentences(
+    several: Runs, which: Bools, one: Explanation, aircraft: Aircraft | None, count: int
+) -> Iterator[Fault]:
+    """A mistake in some runs, a fault for each channel that shares it."""
+    made = one.correction
+    assert made is not None
+    ids = tuple(several.run_ids[i] for i in np.flatnonzero(which))
+    for part, failed in zip(made.parts or (made,), one.failed, strict=True):
+        name = part.channels[0]
+        others = [other.channels[0] for other in made.parts if other is not part]
+        cure = part.cure if others else one.cure
+        if 2 * len(ids) < count:
+            cure = f"the other {count - len(ids)} runs exclude it as a mistake of the mapping"
+        elif one.declared and aircraft is not None:
+            cure += f"; or the declared {declared_names(one.declared)} of {aircraft.name} is wrong"
+        mistake = (one.mistake if one.certain else f"possibly {one.mistake}") + _like(others)
+        sentence = f"{name}: {mistake} in {runs(ids, count)}: {evidence(failed, one.row)}; {cure}"
+        yield Fault(name, ids, part.code, sentence, one.certain, one.gain)
+
+
+def declared_names(tests: Sequence[str]) -> str:
+    """The numbers of aircraft.toml behind tests, "mass, wing_area or CLalpha"."""
+    names = list(dict.fromkeys(name for test in tests for name in DECLARED[test]))
+    return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 def _like(others: Sequence[str]) -> str:
     return f", like {' and '.join(others)}," if others else ""
 
 
-def _helped(batch: Batch, correction: Correction, aircraft: Aircraft | None) -> Bools:
-    """Runs whose distances a correction does not increase."""
-    changed = replace(batch, channels={**batch.channels, **correction.apply(batch.channels)})
-    before, after = (
-        np.asarray(sum(test.distance[:-1] for test in relations(one, aircraft))) for one in (batch, changed)
-    )
-    return np.asarray(after <= before)
+def _column_faults(several: Runs, aircraft: Aircraft | None, prescribed: bool) -> Iterator[Fault]:
+    """Faults of single columns, each of all runs that show it."""
+    count = len(several)
 
+    def named(bad: Bools) -> tuple[tuple[str, ...], str]:
+        ids = tuple(several.run_ids[i] for i in np.flatnonzero(bad))
+        return ids, runs(ids, count)
 
-def _column_faults(batch: Batch, aircraft: Aircraft | None, total: int) -> Iterator[Fault]:
-    def named(bad: Bools) -> tuple[str, str]:
-        ids = [batch.run_ids[i] for i in np.flatnonzero(bad)]
-        return ids[0], runs(ids, total)
-
-    for name, bad in columns.constant(batch):
-        first, where = named(bad)
-        certain = name != "elevator_rad" or _commanded(batch, bad)
+    for name, bad, _ in _over(several, columns.constant):
+        ids, where = named(bad)
+        certain = name != "elevator_rad" or _commanded(several.some(bad))
         yield Fault(
-            name, first, "constant",
+            name, ids, "constant",
             f"{name}: constant in {where}, while other channels move: the sensor was not recorded; leave these "
             "runs or the channel out", certain, float(bad.sum()),
         )  # fmt: skip
-    for name, bad, count in columns.dropouts(batch):
-        first, where = named(bad)
+    for name, bad, figures in _over(several, columns.dropouts):
+        ids, where = named(bad)
+        zeros = sum(map(int, figures))
         yield Fault(
-            name, first, "dropout",
-            f"{name}: zero in {count} samples of {where}, amid others that are not: dropouts; cut the runs "
-            "there, or interpolate them before the import", True, float(count),
+            name, ids, "dropout",
+            f"{name}: zero in {zeros} samples of {where}, amid others that are not: dropouts; cut the runs "
+            "there, or interpolate them before the import", True, float(zeros),
         )  # fmt: skip
-    for name, bad, count in columns.spikes(batch):
-        first, where = named(bad)
+    for name, bad, figures in _over(several, columns.spikes):
+        ids, where = named(bad)
+        outliers = sum(map(int, figures))
         yield Fault(
-            name, first, "spike",
-            f"{name}: isolated outliers in {count} samples of {where}: errors of the recording; replace them by "
-            "interpolated values before the import, or cut the runs there", True, float(count),
+            name, ids, "spike",
+            f"{name}: isolated outliers in {outliers} samples of {where}: errors of the recording; replace them by "
+            "interpolated values before the import, or cut the runs there", True, float(outliers),
         )  # fmt: skip
-    for name, bad, longest in columns.frozen(batch):
-        first, where = named(bad)
+    for name, bad, figures in _over(several, columns.frozen):
+        ids, where = named(bad)
+        longest = max(figures)
         yield Fault(
-            name, first, "dropout",
+            name, ids, "dropout",
             f"{name}: one value for up to {longest:.3g} s in {where}, while the other channels require a "
             "change: the sensor was stuck; cut the runs there", True, longest,
         )  # fmt: skip
-    for one, other in columns.copies(batch, aircraft):
+    pairs = [set(columns.copies(part, aircraft, prescribed)) for part in several.parts]
+    for one, other in sorted(set.intersection(*pairs)):
         commanded = {one, other} == {"elevator_rad", "elevator_command_rad"}
-        wrong = "elevator_rad" if commanded else culprit(relations(batch, aircraft), one, other)
+        wrong = "elevator_rad" if commanded else culprit(relations(several, aircraft), one, other)
         right = other if wrong == one else one
         yield Fault(
-            wrong, batch.run_ids[0], "copy",
-            f"{wrong}: the values of {right} in {runs(batch.run_ids, total)}: one column was mapped twice; "
+            wrong, several.run_ids, "copy",
+            f"{wrong}: the values of {right} in {runs(several.run_ids, count)}: one column was mapped twice; "
             f"map the column of {wrong}, or leave it out", True, 1.0,
         )  # fmt: skip
 
 
-def _unrelated(batch: Batch, failed: Relation) -> bool:
+def _over(
+    several: Runs, test: Callable[[Batch], Iterable[tuple[str, Bools, float]]]
+) -> list[tuple[str, Bools, list[float]]]:
+    """Channels that a test of one batch finds, with all their runs and the figure of each batch."""
+    found: dict[str, tuple[Bools, list[float]]] = {}
+    first = 0
+    for part in several.parts:
+        for name, bad, figure in test(part):
+            whole, figures = found.setdefault(name, (np.zeros(len(several), dtype=np.bool_), []))
+            whole[first : first + len(part.run_ids)] |= bad
+            figures.append(figure)
+        first += len(part.run_ids)
+    return [(name, whole, figures) for name, (whole, figures) in found.items()]
+
+
+def _unrelated(several: Runs, failed: Relation) -> bool:
     """Whether theta and q have nothing in common although the wings are level: a turn has more load."""
-    load = float(np.median(batch.channels["az_m_s2"])) / -G0 if "az_m_s2" in batch.channels else np.inf
-    if failed.name != "theta" or load > LEVEL_LOAD:
+    if failed.name != "theta" or "az_m_s2" not in several.channels:
+        return False
+    load = float(np.median(several.each(lambda c, dt_s: np.median(c["az_m_s2"], axis=1)))) / -G0
+    if load > LEVEL_LOAD:
         return False
     _, std, share, _ = failed.figures[-1]
     return bool(share < UNRELATED and std < UNRELATED_STD)
 
 
-def _commanded(batch: Batch, which: Bools) -> bool:
-    command = batch.channels.get("elevator_command_rad")
-    return command is not None and bool((np.ptp(command[which], axis=1) > 0.0).all())
+def _commanded(several: Runs) -> bool:
+    name = "elevator_command_rad"
+    return name in several.channels and bool(
+        (several.each(lambda c, dt_s: np.ptp(c[name], axis=1)) > 0.0).all()
+    )
 
 
-def _some(batch: Batch, which: Bools) -> Batch:
-    index = np.flatnonzero(which)
-    channels = {name: values[index] for name, values in batch.channels.items()}
-    ids = tuple(batch.run_ids[i] for i in index)
-    return replace(batch, run_ids=ids, t_s=batch.t_s[index], channels=channels)
-
-
-__all__ = ["inspect", "require"]
+__all__ = ["Admitted", "admit", "inspect"]

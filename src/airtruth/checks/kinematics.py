@@ -11,18 +11,20 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.channels import REQUIRED
-from airtruth.checks.gate import require
+from airtruth.checks.gate import admit
 from airtruth.checks.kinematics_average import averaged
 from airtruth.checks.kinematics_bias import FIELDS, mean_of, ramps, ramps_of, rms
 from airtruth.checks.kinematics_fit import limits_of, problem_of
 from airtruth.checks.kinematics_model import ERRORS, Record, thinned
 from airtruth.checks.kinematics_search import Search, completed, price, search
+from airtruth.checks.kinematics_vaneless import untestable, without_vane
 from airtruth.checks.kinematics_words import NAMED, conclusions, verdict_of
 from airtruth.checks.result import Cause, CheckResult, Finding, State
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.validate import validate
 from airtruth.numerics.prefilter import butterworth, edge_samples
+from airtruth.physics.reconstruction import is_reconstructed
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
@@ -63,16 +65,18 @@ def check_logs(
     Raises
     ------
     LogError
-        As `airtruth.checks.gate.require` and `check_kinematics`.
+        As `airtruth.checks.gate.admit` and `check_kinematics`.
     """
-    faults = [fault for name, log in logs for fault in require(log, aircraft, source=name, force=force)]
-    parts = [log for _, log in logs]
+    admitted = [admit(log, aircraft, source=name, force=force) for name, log in logs]
+    parts = [one.log for one in admitted]
     result = (
         check_kinematics(parts)
         if aircraft is None
         else check_kinematics(parts, declared_errors(aircraft), aircraft.chord_m, declared_biases(aircraft))
     )
-    return replace(result, forced=tuple(fault.sentence for fault in faults if fault.certain))
+    remarks = dict.fromkeys(sentence for one in admitted for sentence in one.remarks("aircraft"))
+    forced = tuple(sentence for one in admitted for sentence in one.forced)
+    return replace(result, sentences=(*result.sentences, *remarks), forced=forced)
 
 
 def check_kinematics(
@@ -106,15 +110,24 @@ def check_kinematics(
     usual = _candidates(records, chord)
     limits = limits_of(records, LONGEST_ARM_M if chord is None else LONGEST_ARM_CHORDS * chord)
     known = {n: v for n, v in (declared or {}).items() if n in ERRORS}
-    equations = ("alpha",) if records[0].theta is None else ("theta", "alpha")
+    computed = any(is_reconstructed(one.channels) for one in logs)
+    if computed and records[0].theta is None:
+        return untestable(tuple(r.run_id for r in records))
+    equations = ("alpha",) if records[0].theta is None else ("theta",) if computed else ("theta", "alpha")
+    if computed:
+        usual = {name: size for name, size in usual.items() if name in ATTITUDE}
     found = completed(search(problem_of(records, equations, known, limits), usual), usual)
-    findings = (*_errors(found, usual), *_airspeed(found), *_biases(found, biases or {}))
+    airspeed = () if computed else _airspeed(found)
+    findings = (*_errors(found, usual), *airspeed, *_biases(found, biases or {}))
     findings = _scale_or_bias(findings)
     verdict = verdict_of(found, findings)
     if verdict == "failed":
         findings = tuple(replace(f, state="not assessed") if f.state in NAMED else f for f in findings)
     causes = tuple(_cause(found, i, findings) for i in range(len(found.tried)))
-    if chord is None:
+    words = conclusions(verdict, found, findings, causes)
+    if computed:
+        verdict, words = without_vane(verdict, words)
+    elif chord is None:
         remarks.append(
             f"No chord is known: arms up to {LONGEST_ARM_M:g} m are allowed; --aircraft narrows them."
         )
@@ -128,7 +141,7 @@ def check_kinematics(
         p_value=found.p_value,
         enlargement=found.enlargement,
         residual_rms=rms(found.problem, found.best.fit),
-        sentences=(*conclusions(verdict, found, findings, causes), *remarks),
+        sentences=(*words, *remarks),
     )
 
 
@@ -253,6 +266,10 @@ def _biases(found: Search, known: Mapping[str, float]) -> list[Finding]:
     """Biases of gyro, az and ax from the ramps of the equations, beside the sums that known ones make there."""
     problem, one = found.problem, found.best.fit
     scale = dict(zip(one.names, one.value, strict=True)).get("vane_scale", problem.start("vane_scale"))
+    if "alpha" not in problem.equations:
+        turn, turn_std = _drift(found, "theta", known)
+        meaning = "constant in q, by the drift of its integral from theta"
+        return [_bias(found, "gyro_bias", "rad/s", meaning, -turn, turn_std)]
     ramp, std = _drift(found, "alpha", known)
     ramp, std = -ramp / scale, std / scale
     if "theta" not in problem.equations:

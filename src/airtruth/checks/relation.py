@@ -24,14 +24,19 @@ class Relation:
     channels : all channels that enter, the likeliest culprit first.
     distance : (runs + 1,) squared distance from the required value; 0 where nothing can be tested.
     figures : (runs + 1, k) figures of the estimate, see `airtruth.checks.sentences`.
-    informed : whether all runs together tell a right value from a wrong one.
+    informed : (runs + 1,) whether each run, and all together, tell a right value from a wrong one.
     """
 
     name: str
     channels: tuple[str, ...]
     distance: Array
     figures: Array
-    informed: bool = True
+    informed: NDArray[np.bool_]
+
+
+def informed_everywhere(distance: Array) -> NDArray[np.bool_]:
+    """A test that always tells a right value from a wrong one."""
+    return np.ones(len(distance), dtype=np.bool_)
 
 
 def finite(x: Array) -> Array:
@@ -39,4 +44,4 @@ def finite(x: Array) -> Array:
     return np.asarray(np.where(np.isfinite(x), x, 0.0))
 
 
-__all__ = ["ATMOSPHERE_M", "Relation", "finite"]
+__all__ = ["ATMOSPHERE_M", "Relation", "finite", "informed_everywhere"]

@@ -121,7 +121,8 @@ class CheckResult:
 
     def summary(self) -> str:
         """Conclusion and both tables, as text."""
-        return "\n\n".join(["\n".join(self.sentences), *(as_text(table) for table in tables(self))])
+        shown_tables = tables(self) if self.causes else ()
+        return "\n\n".join(["\n".join(self.sentences), *(as_text(table) for table in shown_tables)])
 
     def to_frame(self) -> pd.DataFrame:
         """One row per error of a sensor: estimate, std, 95 % interval, declared value."""

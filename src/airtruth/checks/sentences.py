@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from airtruth.channels import SIGNALS
-from airtruth.checks.evidence import LIMITS, MEANS
+from airtruth.checks.means import LIMITS, MEANS
 from airtruth.checks.relation import Relation
 
 SHOWN: Final = 3
@@ -19,9 +19,9 @@ FAILED: Final = 50.0
 """Squared distance above which a test has failed as clearly as it can."""
 
 
-def evidence(test: Relation) -> str:
-    """What a test measured and what physics requires, for all runs together."""
-    f = [float(x) for x in test.figures[-1]]
+def evidence(test: Relation, row: int = -1) -> str:
+    """What a test measured and what physics requires, for one run, or with -1 for all together."""
+    f = [float(x) for x in test.figures[row]]
     name = test.channels[0]
     if test.name == "range":
         unit = SIGNALS[name].unit

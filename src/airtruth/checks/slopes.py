@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.checks.relation import ATMOSPHERE_M, Relation, finite
-from airtruth.checks.spectra import Factors, integral, regress, spectrum
+from airtruth.checks.relation import ATMOSPHERE_M, Relation, finite, informed_everywhere
+from airtruth.checks.spectra import Factors, integral, regress
+from airtruth.checks.together import Runs
 from airtruth.physics.atmosphere import density_kg_m3
 from airtruth.units import DEG, G0
 
@@ -43,20 +44,34 @@ TYPICAL: Final = {"CLalpha": 4.5, "Cmde": -1.2}
 """Derivatives of conventional aircraft [1/rad], for those that declare none (shipped aircraft: 3 to 6, -0.5 to -2)."""
 
 
-def slopes_near_trim(c: Channels, dt_s: float, aircraft: Aircraft | None) -> list[Relation]:
+def slopes_near_trim(runs: Runs, aircraft: Aircraft | None) -> list[Relation]:
     """Tests of aerodynamic slopes in the runs that keep to one trim; the other runs have no distance."""
-    speed, alpha = c["airspeed_m_s"], c["alpha_rad"]
-    most_speed, most_alpha = NEAR_TRIM
-    near = (np.ptp(speed, axis=1) < most_speed * np.abs(speed.mean(axis=1))) & (
-        np.ptp(alpha, axis=1) < most_alpha
-    )
+
+    def keeps(c: Channels, dt_s: float) -> Array:
+        speed, alpha = c["airspeed_m_s"], c["alpha_rad"]
+        most_speed, most_alpha = NEAR_TRIM
+        return np.asarray(
+            (np.ptp(speed, axis=1) < most_speed * np.abs(speed.mean(axis=1)))
+            & (np.ptp(alpha, axis=1) < most_alpha)
+        )
+
+    near = runs.each(keeps).astype(np.bool_)
     rows = np.flatnonzero(near) if near.any() else np.arange(len(near))
-    c = {name: values[rows] for name, values in c.items()}
-    result = [] if aircraft is None else _aerodynamic_tests(c, dt_s, aircraft)
-    if "ax_m_s2" in c:
-        regressors = [spectrum(c[n], dt_s) for n in ("alpha_rad", "elevator_rad", "q_rad_s")]
-        result.append(_axial_test(regress(spectrum(c["ax_m_s2"], dt_s), np.stack(regressors, axis=1))))
+    chosen = runs.some(rows)
+    result = [] if aircraft is None else _aerodynamic_tests(chosen, aircraft)
+    if "ax_m_s2" in runs.channels:
+        regressors = [chosen.spectra(_channel(n)) for n in ("alpha_rad", "elevator_rad", "q_rad_s")]
+        axial = chosen.spectra(_channel("ax_m_s2"))
+        result.append(_axial_test(regress(axial, np.stack(regressors, axis=1), lines=chosen.lines())))
     return [_spread(test, rows, near) for test in result]
+
+
+def _channel(name: str) -> Callable[[Channels, float], Array]:
+    return lambda c, dt_s: c[name]
+
+
+def _integral(name: str) -> Callable[[Channels, float], Array]:
+    return lambda c, dt_s: integral(c[name], dt_s)
 
 
 def _spread(test: Relation, rows: NDArray[np.intp], near: NDArray[np.bool_]) -> Relation:
@@ -66,7 +81,9 @@ def _spread(test: Relation, rows: NDArray[np.intp], near: NDArray[np.bool_]) -> 
     figures = np.zeros((len(near) + 1, test.figures.shape[1]))
     distance[at] = test.distance * near.any()
     figures[at] = test.figures
-    return replace(test, distance=distance, figures=figures, informed=bool(near.any()))
+    informed = np.append(near, near.any())
+    informed[at] &= test.informed
+    return replace(test, distance=distance, figures=figures, informed=informed)
 
 
 def _axial_test(factors: Factors) -> Relation:
@@ -75,24 +92,28 @@ def _axial_test(factors: Factors) -> Relation:
     usual, tolerance = AXIAL_SLOPE
     distance = (value - usual) ** 2 / (std**2 + tolerance**2) * (factors.share > AXIAL_SHARE)
     figures = np.stack([value, std, factors.share], axis=1)
-    return Relation(
-        "ax_slope", ("ax_m_s2", "alpha_rad", "elevator_rad", "q_rad_s"), finite(distance), figures
-    )
+    distance = finite(distance)
+    channels = ("ax_m_s2", "alpha_rad", "elevator_rad", "q_rad_s")
+    return Relation("ax_slope", channels, distance, figures, informed_everywhere(distance))
 
 
-def _aerodynamic_tests(c: Channels, dt_s: float, aircraft: Aircraft) -> list[Relation]:
+def _aerodynamic_tests(runs: Runs, aircraft: Aircraft) -> list[Relation]:
     """CLalpha and Cmde from the slopes of az on alpha and of q' on the elevator, against the declared ones."""
-    density = c.get("density_kg_m3")
-    if density is None:
-        if "altitude_m" not in c:
-            return []
-        density = density_kg_m3(np.clip(c["altitude_m"], *ATMOSPHERE_M))
-    pressure = 0.5 * (density * c["airspeed_m_s"] ** 2).mean(axis=1)
+    if not {"density_kg_m3", "altitude_m"} & set(runs.channels):
+        return []
+
+    def dynamic(c: Channels, dt_s: float) -> Array:
+        density = c.get("density_kg_m3")
+        if density is None:
+            density = density_kg_m3(np.clip(c["altitude_m"], *ATMOSPHERE_M))
+        return np.asarray(0.5 * (density * c["airspeed_m_s"] ** 2).mean(axis=1))
+
+    pressure, lines = runs.each(dynamic), runs.lines()
     pressure = np.append(pressure, pressure.mean())
-    causes = [spectrum(c[n], dt_s) for n in ("alpha_rad", "elevator_rad", "q_rad_s")]
-    lift = regress(spectrum(c["az_m_s2"], dt_s), np.stack(causes, axis=1))
-    causes = [spectrum(integral(c[n], dt_s), dt_s) for n in ("elevator_rad", "alpha_rad", "q_rad_s")]
-    control = regress(spectrum(c["q_rad_s"], dt_s), np.stack(causes, axis=1))
+    causes = [runs.spectra(_channel(n)) for n in ("alpha_rad", "elevator_rad", "q_rad_s")]
+    lift = regress(runs.spectra(_channel("az_m_s2")), np.stack(causes, axis=1), lines=lines)
+    causes = [runs.spectra(_integral(n)) for n in ("elevator_rad", "alpha_rad", "q_rad_s")]
+    control = regress(runs.spectra(_channel("q_rad_s")), np.stack(causes, axis=1), lines=lines)
     area, chord = aircraft.wing_area_m2, aircraft.chord_m
     to_lift = -aircraft.mass_kg / (pressure * area)
     to_moment = aircraft.inertia_yy_kg_m2 / (pressure * area * chord)
@@ -120,7 +141,7 @@ def _aerodynamic_tests(c: Channels, dt_s: float, aircraft: Aircraft) -> list[Rel
         std = np.sqrt(factors.covariance[:, 0, 0]) * np.abs(scale)
         distance = _ratio_distance(value / reference, std / abs(reference), tolerance[0 if known else 1])
         figures = np.stack([value, std, np.full_like(value, reference)], axis=1)
-        result.append(Relation(name, channels, distance, figures))
+        result.append(Relation(name, channels, distance, figures, informed_everywhere(distance)))
     return result
 
 

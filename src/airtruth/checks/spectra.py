@@ -86,7 +86,7 @@ def instruments(elevator: Array, dt_s: float) -> Array:
     return spectrum(np.stack(rows, axis=-2), dt_s)
 
 
-def regress(y: Array, x: Array, z: Array | None = None) -> Factors:
+def regress(y: Array, x: Array, z: Array | None = None, lines: NDArray[np.int64] | None = None) -> Factors:
     """Factors of y on x by least squares, or with instruments z by two-stage least squares.
 
     The covariance allows for any spectrum of the residual (H. White, *Econometrica* 48(4), 1980, eq. 1, on the
@@ -97,26 +97,27 @@ def regress(y: Array, x: Array, z: Array | None = None) -> Factors:
     y : (runs, lines) spectra of the left side, as `spectrum` returns them.
     x : (runs, k, lines) spectra of the regressors.
     z : (runs, m, lines) spectra of the instruments; None uses the regressors.
+    lines : (runs,) numbers that each spectrum has of its own, the others being zero; None for all of them.
     """
     projected = x if z is None else _projected(x, z)
-    count = y.shape[-1]
+    own = np.full(len(y), y.shape[-1]) if lines is None else lines
     normal = projected @ np.swapaxes(projected, 1, 2)
     moment = np.einsum("rkn,rn->rk", projected, y)
     normal = np.concatenate([normal, normal.sum(axis=0, keepdims=True)])
     moment = np.concatenate([moment, moment.sum(axis=0, keepdims=True)])
-    degrees = np.append(np.full(len(y), count), count * len(y))
+    degrees = np.append(own, own.sum())
     inverse = _inverse(normal)
     inverse[degrees < x.shape[1] + 2] = np.nan  # too few lines to leave a residual
     value = np.einsum("rkl,rl->rk", inverse, moment)
-    each = _meat(y - np.einsum("rk,rkn->rn", value[:-1], x), projected)
-    pooled = _meat(y - np.einsum("k,rkn->rn", value[-1], x), projected).sum(axis=0, keepdims=True)
+    each = _meat(y - np.einsum("rk,rkn->rn", value[:-1], x), projected, own)
+    pooled = _meat(y - np.einsum("k,rkn->rn", value[-1], x), projected, own).sum(axis=0, keepdims=True)
     correction = degrees / np.maximum(degrees - x.shape[1] - 1.0, 1.0)
     covariance = inverse @ np.concatenate([each, pooled]) @ inverse * correction[:, None, None]
     rest = np.append(_power(y - np.einsum("rk,rkn->rn", value[:-1], x)), 0.0)
     rest[-1] = _power(y - np.einsum("k,rkn->rn", value[-1], x)).sum()
     power = _power(y)
     share = 1.0 - rest / np.maximum(np.append(power, power.sum()), 1e-300)
-    strength = np.full(len(y) + 1, np.inf) if z is None else _strength(x, projected, z.shape[1])
+    strength = np.full(len(y) + 1, np.inf) if z is None else _strength(x, projected, z.shape[1], own)
     return Factors(value, covariance, share, strength)
 
 
@@ -124,7 +125,7 @@ def _power(x: Array) -> Array:
     return np.asarray(np.einsum("rn,rn->r", x, x))
 
 
-def _strength(x: Array, projected: Array, count: int) -> Array:
+def _strength(x: Array, projected: Array, count: int, lines: NDArray[np.int64]) -> Array:
     """Smallest F of the instruments in each regressor, the others' share taken out of its projection."""
     smallest = np.full(len(x) + 1, np.inf)
     for i in range(x.shape[1]):
@@ -138,7 +139,7 @@ def _strength(x: Array, projected: Array, count: int) -> Array:
             own = own - np.einsum("rkl,rkl->r", weight, moment)
         noise = _power(x[:, i] - projected[:, i])
         noise = np.append(noise, noise.sum())
-        degrees = np.append(np.full(len(x), x.shape[2] - count), len(x) * (x.shape[2] - count))
+        degrees = np.append(lines - count, (lines - count).sum())
         counts = np.append(np.full(len(x), count), len(x) * count)
         f = (own / counts) / np.maximum(noise / np.maximum(degrees, 1), 1e-300)
         smallest = np.minimum(smallest, f)
@@ -168,11 +169,12 @@ def _inverse(normal: Array) -> Array:
     return np.where(ok[:, None, None], result, np.nan)
 
 
-def _meat(residual: Array, projected: Array) -> Array:
+def _meat(residual: Array, projected: Array, lines: NDArray[np.int64]) -> Array:
     """Sum over the lines of the squared residual, averaged over three lines, times the regressors' products."""
     half = residual.shape[1] // 2
     power = 0.5 * (residual[:, :half] ** 2 + residual[:, half:] ** 2)
-    edge = np.concatenate([power[:, :1], power, power[:, -1:]], axis=1)
+    last = np.minimum(np.arange(half + 1), np.maximum(lines[:, None] // 2 - 1, 0))
+    edge = np.concatenate([power[:, :1], np.take_along_axis(power, last, axis=1)], axis=1)
     power = (edge[:, :-2] + edge[:, 1:-1] + edge[:, 2:]) / 3.0
     weighted = projected * np.concatenate([power, power], axis=1)[:, None, :]
     return np.asarray(weighted @ np.swapaxes(projected, 1, 2))

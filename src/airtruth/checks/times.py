@@ -35,7 +35,7 @@ def clock(log: FlightLog) -> Iterator[Fault]:
     wrong = [(run, hz) for run, hz in rates if not SLOWEST_HZ <= hz <= FASTEST_HZ]
     if not wrong:
         return
-    run, hz = wrong[0]
+    _, hz = wrong[0]
     likely = next(
         (
             f"; the rate would be {hz * factor:.3g} Hz if the times are in {unit}"
@@ -45,7 +45,7 @@ def clock(log: FlightLog) -> Iterator[Fault]:
         "",
     )
     yield Fault(
-        "t_s", run, "unit",
+        "t_s", tuple(one for one, _ in wrong), "unit",
         f"t_s: {hz:.3g} samples per second in {runs([one for one, _ in wrong], len(log))}, where a flight test has "
         f"{SLOWEST_HZ:g} to {FASTEST_HZ:g}{likely}; correct the unit of the times: t_s counts seconds, and a mapping states "
         "[time] unit", True, 1.0,
@@ -71,7 +71,7 @@ def interpolated(log: FlightLog) -> Iterator[Fault]:
         return
     listed = ", ".join(f"{name} from {hz:.4g} Hz" for name, hz in slow.items())
     yield Fault(
-        next(iter(slow)), log.run_ids[0], "interpolated",
+        next(iter(slow)), log.run_ids, "interpolated",
         f"{listed}: interpolated to {float(stated['rate_hz']):.4g} Hz: the samples between were not measured, and estimates "
         f"can be biased by more than their intervals; import at {min(slow.values()):.4g} Hz or less, or record faster",
         False, float(stated["rate_hz"]) / min(slow.values()),

@@ -89,8 +89,8 @@ def doubts(parts: Parts, dt_s: float = 0.0) -> list[str]:
     for i, method in enumerate(own):
         result += method.missing()
         result += method.undetermined(_variances(parts, i))
-        result += method.wrong_signs()
         result += method.dulled(dt_s)
+    result = [sentence for method in own for sentence in method.wrong_signs()] + result
     return result + [sentence for one in contradictions for sentence in one.sentences()]
 
 
@@ -152,8 +152,18 @@ def _some(count: int, runs: int) -> str:
 
 _SIZE: Final = np.array([SIZES[name] for name in PARAMETERS])
 """`SIZES` in the order of the derivatives [-]."""
-_SIGNS: Final = (("Cmalpha", "pitch stiffness"), ("Cmq", "pitch damping"))
-"""Derivatives that are negative on a stable aircraft, with their meaning."""
+_SIGNS: Final = {
+    "CLalpha": (1.0, "lift slope of the wrong sign, which no aircraft has below the stall"),
+    "CLde": (1.0, "lift of the elevator of the wrong sign, which no elevator behind the CG has"),
+    "Cmalpha": (-1.0, "pitch stiffness of the wrong sign, which no stable aircraft has"),
+    "Cmq": (-1.0, "pitch damping of the wrong sign, which no tail gives"),
+    "Cmde": (-1.0, "moment of the elevator of the wrong sign, which no elevator behind the CG has"),
+}
+"""Sign of each derivative, and what the other one is (B. Etkin and L. D. Reid, *Dynamics of Flight*, 3rd ed., 1996, chapters 2
+and 5).
+
+A canard is declared with the sign of its deflection turned. CLq is left out: it is small and of either sign without a tail.
+"""
 
 
 class _Method:
@@ -166,7 +176,7 @@ class _Method:
         self.periodic, self.summed_rad_s = 0, 0.0
         self.open_ones = np.zeros(len(PARAMETERS))
         self.relative = np.zeros((len(PARAMETERS),) * 2)
-        self.wrong = dict.fromkeys((name for name, _ in _SIGNS), 0)
+        self.wrong = dict.fromkeys(_SIGNS, 0)
         self.example: dict[str, tuple[float, float, float]] = {}
 
     def add(self, one: Estimates) -> None:
@@ -189,11 +199,11 @@ class _Method:
         chosen = np.flatnonzero(known)[open_ones.any(axis=1)]
         self.relative += (one.covariance[chosen] / np.outer(_SIZE, _SIZE)).sum(axis=0)
         half = half_width(one.confidence) * deviations(one)
-        for name, _ in _SIGNS:
+        for name, (sign, _) in _SIGNS.items():
             i = PARAMETERS.index(name)
             value, width = one.theta[:, i], half[:, i]
             with np.errstate(invalid="ignore"):
-                wrong = value - width > 0.0
+                wrong = sign * value + width < 0.0
             self.wrong[name] += int(wrong.sum())
             if wrong.any():
                 k = int(np.argmax(wrong))
@@ -240,14 +250,13 @@ class _Method:
         )
 
     def wrong_signs(self) -> Iterator[str]:
-        """Stiffness or damping of the wrong sign whose interval excludes the right one."""
-        for name, word in _SIGNS:
+        """Derivatives whose interval excludes the sign that physics requires: the reason first, then the number."""
+        for name, (_, words) in _SIGNS.items():
             if name in self.example:
                 value, lower, upper = self.example[name]
                 yield (
-                    f"Warning: {self.name}: {name} = {value:.3g} ({lower:.3g} to {upper:.3g})"
-                    f"{_some(self.wrong[name], self.runs)}: a {word} of the wrong sign, whose interval excludes zero; "
-                    f"{LIKELY}."
+                    f"Warning: {self.name}: not credible{_some(self.wrong[name], self.runs)}: a {words}: "
+                    f"{name} = {value:.3g} ({lower:.3g} to {upper:.3g}); {LIKELY}."
                 )
 
     def dulled(self, dt_s: float) -> Iterator[str]:

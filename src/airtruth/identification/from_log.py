@@ -120,7 +120,8 @@ def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made
     entry = task.entry
     log = read_log(task.folder / entry) if isinstance(entry, Path) else entry
     found = FromLog(tuple(log.run_ids))
-    _check(log, task, found)
+    log = _checked(log, task, found)
+    found.run_ids = tuple(log.run_ids)
     try:
         for run_id, name, own, declared in differing(log.metadata, log.run_ids, task.plane):
             found.stated.setdefault(name, []).append((run_id, own, declared))
@@ -165,10 +166,14 @@ def _quiet(batch: Batch, found: FromLog) -> Batch:
     return replace(batch, channels={**batch.channels, "airspeed_m_s": airspeed})
 
 
-def _check(log: FlightLog, task: LogTask, found: FromLog) -> None:
+def _checked(log: FlightLog, task: LogTask, found: FromLog) -> FlightLog:
+    """The log behind the gate and the checks of the methods, without odd runs."""
     source = task.source if isinstance(task.entry, Path) else ""
     known = task.plane if isinstance(task.plane, Aircraft) else None
-    for fault in gate.require(log, known, source=source, force=task.force):
+    admitted = gate.admit(log, known, source=source, force=task.force)
+    log = admitted.log
+    found.notes += admitted.left_out
+    for fault in admitted.faults:
         (found.forced if fault.certain else found.notes).append(fault.sentence)
     prefix = f"{source}: " if source else ""
     try:
@@ -180,6 +185,7 @@ def _check(log: FlightLog, task: LogTask, found: FromLog) -> None:
         if not task.force:
             raise ConfigurationError(f"{prefix}{sentence}")
         found.forced.append(f"{prefix}{sentence}")
+    return log
 
 
 __all__ = ["FromLog", "LogTask", "from_log", "results_of"]

@@ -10,8 +10,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.channels import SIGNALS
 from airtruth.checks.fault import Fault
-from airtruth.checks.gate import require
+from airtruth.checks.gate import admit
+from airtruth.checks.stated import KEY as STATED
 from airtruth.errors import ConfigurationError, LogError
 from airtruth.importers.align import Alignment, aligned
 from airtruth.importers.clock import with_increasing_times
@@ -123,11 +125,10 @@ def import_log(
         parts = _opened(paths, mappings)
         log = built(parts)
         notes = (*parts.notes, *_lost(log))
-    faults = require(log, source=", ".join(map(str, paths)), force=force)
-    forced = [fault.sentence for fault in faults if fault.certain]
-    if forced:
-        log = replace(log, metadata={**log.metadata, "forced": forced})
-    return Imported(log, faults, notes)
+    admitted = admit(log, source=", ".join(map(str, paths)), force=force)
+    recorded = {"forced": list(admitted.forced), "left_out": list(admitted.left_out)}
+    metadata = {**log.metadata, **{key: value for key, value in recorded.items() if value}}
+    return Imported(replace(admitted.log, metadata=metadata), admitted.faults, (*notes, *admitted.left_out))
 
 
 def _lost(log: FlightLog) -> Sequence[str]:
@@ -161,7 +162,8 @@ def find_manoeuvres(
             "--find-manoeuvres: [time] run divides the file into runs already; leave it out"
         )
     merged = _opened(paths, mappings)
-    return find(str(paths[0]), merged.series)
+    rate_hz = merged.resample.rate_hz if merged.resample else None
+    return find(str(paths[0]), merged.series, rate_hz)
 
 
 def _given(
@@ -339,6 +341,12 @@ def _metadata(merged: Merged, times: Sequence[Array]) -> dict[str, object]:
     metadata: dict[str, object] = {"source": ", ".join(p.source.path.name for p in merged.pieces)}
     if mapping.aircraft:
         metadata["aircraft"] = mapping.aircraft
+    metadata[STATED] = {
+        name: {"unit": one.unit, "sign": one.sign, "scale": one.scale, "offset": one.offset}
+        for piece in reversed(merged.pieces)
+        for name, one in piece.mapping.channels.items()
+        if name in SIGNALS
+    }
     moved = [
         {
             "file": p.source.path.name,

@@ -17,12 +17,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.checks.means import LIMITS, MEANS
 from airtruth.documents import read_plain
 from airtruth.errors import ConfigurationError, LogError, StoreError
 from airtruth.importers.manoeuvre_result import Candidate, ManoeuvreResult
 from airtruth.importers.mapping import Manoeuvre, Resample
 from airtruth.importers.series import Series
 from airtruth.importers.uniform import gaps, resampled
+from airtruth.numerics.prefilter import butterworth, edge_samples
 from airtruth.units import DEG, G0
 
 Array = NDArray[np.float64]
@@ -59,13 +61,27 @@ TURNING: Final = 1.15
 """Mean load factor above which the aircraft turns [-]: a bank of 30 deg."""
 
 
-def find(where: str, series: Mapping[str, Series]) -> ManoeuvreResult:
+FLYING_M_S: Final = MEANS["airspeed_m_s"][0]
+"""Mean airspeed below which an aircraft is on the ground [m/s]: no log of a flight has less."""
+DEFLECTED_RAD: Final = LIMITS["elevator_rad"][1]
+"""Deflection beyond which a column holds no elevator [rad]: no log of a flight has more."""
+FILTER: Final = (5.0, 0.2, 4)
+"""Cutoff of the low-pass of `airtruth check` [Hz], its largest share of the sample rate [-], and its order: the longest filter
+of all commands."""
+LENGTHS: Final = 4
+"""Least length of a record over the extension of that filter [-], as `check` and `identify` demand it."""
+
+
+def find(where: str, series: Mapping[str, Series], rate_hz: float | None = None) -> ManoeuvreResult:
     """Search a flight for manoeuvres.
+
+    A manoeuvre is accepted if it was flown, its surface is possible, and it is long enough for every command.
 
     Parameters
     ----------
     where : name of the file in messages.
     series : elevator_rad and q_rad_s, and airspeed_m_s and az_m_s2 where they are measured.
+    rate_hz : rate to which the import resamples [Hz]; None for that of q_rad_s.
 
     Raises
     ------
@@ -88,15 +104,29 @@ def find(where: str, series: Mapping[str, Series]) -> ManoeuvreResult:
     deviation, threshold = _deviation(c["elevator_rad"])
     background = _background(c["q_rad_s"])
     spans = _spans(deviation, threshold)
+    least_s = shortest_s(rate_hz or 1.0 / float(np.median(np.diff(used["q_rad_s"].t_s))))
     candidates = []
     for number, (first, last) in enumerate(spans):
         before = spans[number - 1][1] if number else 0
         after = spans[number + 1][0] if number + 1 < len(spans) else count - 1
         low = max(first - round(TRIM_S * RATE_HZ), before)
         high = _settled(c["q_rad_s"], last, min(after, count - 1), background)
-        one = _candidate(f"m{number + 1:02d}", c, deviation, (low, first, last, high), background, t)
+        high = min(max(high, low + math.ceil(least_s * RATE_HZ) + 1), after, count - 1)
+        one = _candidate(f"m{number + 1:02d}", c, deviation, (low, first, last, high), background, t, least_s)
         candidates.append(_without_gaps(one, used))
     return ManoeuvreResult(tuple(candidates), t, c["elevator_rad"], c["q_rad_s"], threshold)
+
+
+def shortest_s(rate_hz: float) -> float:
+    """Length of the shortest record that `check` and `identify` accept at a sample rate [s].
+
+    Parameters
+    ----------
+    rate_hz : sample rate [Hz].
+    """
+    cutoff_hz, share, order = FILTER
+    sos = butterworth(min(cutoff_hz, share * rate_hz), order, 1.0 / rate_hz)
+    return LENGTHS * edge_samples(sos) / rate_hz
 
 
 def _without_gaps(candidate: Candidate, used: Mapping[str, Series]) -> Candidate:
@@ -164,6 +194,7 @@ def _candidate(
     at: tuple[int, int, int, int],
     background: float,
     t: Array,
+    least_s: float,
 ) -> Candidate:
     """Measures of one candidate: start, first and last sample of the input, and end."""
     low, first, last, high = at
@@ -179,6 +210,17 @@ def _candidate(
     )
     load = float(np.median(c["az_m_s2"][part])) / -G0 if "az_m_s2" in c else np.nan
     reasons = []
+    if speed.mean() < FLYING_M_S:
+        reasons.append(f"on the ground: airspeed of {speed.mean():.1f} m/s")
+    deflected = float(np.abs(elevator[part]).max())
+    if deflected > DEFLECTED_RAD:
+        reasons.append(
+            f"elevator of {deflected / DEG:.0f} deg, beyond {DEFLECTED_RAD / DEG:.0f} deg: another unit or column"
+        )
+    if (high - low) / RATE_HZ < least_s:
+        reasons.append(
+            f"lasts {(high - low) / RATE_HZ:.1f} s, check and identify need {least_s:.1f} s at this rate"
+        )
     if (last - first) / RATE_HZ > LONGEST_S:
         reasons.append(f"input of {(last - first) / RATE_HZ:.0f} s, longer than a manoeuvre")
     if response < EXCITED:
@@ -258,4 +300,4 @@ def read_table(path: Path | str) -> tuple[Manoeuvre, ...]:
     return tuple(result)
 
 
-__all__ = ["find", "read_table"]
+__all__ = ["find", "read_table", "shortest_s"]

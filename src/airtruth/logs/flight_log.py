@@ -289,6 +289,8 @@ def _common_metadata(logs: Sequence[FlightLog]) -> dict[str, object]:
 
 RESAMPLED = "resampled"
 """Key of the metadata with the rate to which an import resampled a log, the method, and the lower rates of its channels."""
+PRESCRIBED = "surface_prescribed"
+"""Key of the metadata of a flown log whose surface followed its command without an actuator."""
 RECORD_CONSTANTS = "record_constants"
 """Metadata entry with the mass, inertia and reference lengths of single runs: run -> name -> value in SI."""
 

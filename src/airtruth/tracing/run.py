@@ -97,7 +97,7 @@ def _traced(
 ) -> TraceResult:
     declared = aircraft if isinstance(aircraft, Aircraft) else planes.load(aircraft)
     effects = _effects(options)
-    checked, forced = _checked(logs, declared, force)
+    checked, forced, remarks = _checked(logs, declared, force)
     if out is not None:  # both before the search, which takes minutes
         updated_folder(declared, out)
         atomic.make_folder(out)
@@ -116,18 +116,16 @@ def _traced(
     origin = provenance_of(logs, declared, options)
     dt_s = _longest_period_s(case)
     if out is None:
-        return TraceResult(
-            with_contradictions(conclude(stages, rounds, forced=forced, axial=axial), kinematics, dt_s),
-            rounds,
-            stages,
-            origin,
-        )
+        answer = with_contradictions(conclude(stages, rounds, forced=forced, axial=axial), kinematics, dt_s)
+        answer = replace(answer, notes=(*remarks, *answer.notes))
+        return TraceResult(answer, rounds, stages, origin)
     advance("write the updated aircraft")
     atomic.remove_file(out / ANSWER)  # an interrupted trace has no answer, not one of another trace
     contradicted = declared_p_value(rounds) <= DECLARED_LEVEL
     updated = write_update(case, rounds, declared, out, contradicted, axial)
     replay = flown_again(stages, declared, updated)
     answer = with_contradictions(conclude(stages, rounds, updated, replay, forced, axial), kinematics, dt_s)
+    answer = replace(answer, notes=(*remarks, *answer.notes))
     result = TraceResult(answer, rounds, stages, origin)
     result.write(out)
     return result
@@ -153,14 +151,14 @@ def _words(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
-def _checked(logs: Logs, aircraft: Aircraft, force: bool) -> tuple[list[FlightLog], list[str]]:
-    """The logs behind the gate, and the faults that ``force`` overruled."""
-    checked, forced = [], []
-    for name, log in named_logs(logs):
-        faults = gate.require(log, aircraft, source=name, force=force)
-        forced += [fault.sentence for fault in faults if fault.certain]
-        checked.append(log)
-    return checked, forced
+def _checked(
+    logs: Logs, aircraft: Aircraft, force: bool
+) -> tuple[list[FlightLog], list[str], tuple[str, ...]]:
+    """The logs behind the gate, the faults that ``force`` overruled, and remarks for the answer."""
+    admitted = [gate.admit(log, aircraft, source=name, force=force) for name, log in named_logs(logs)]
+    forced = [sentence for one in admitted for sentence in one.forced]
+    remarks = dict.fromkeys(sentence for one in admitted for sentence in one.remarks("aircraft"))
+    return [one.log for one in admitted], forced, tuple(remarks)
 
 
 def _search(

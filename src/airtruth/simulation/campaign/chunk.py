@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from airtruth.errors import AirtruthError, reason
 from airtruth.logs import store
 from airtruth.logs.digest import sha256_of
-from airtruth.logs.flight_log import FlightLog
+from airtruth.logs.flight_log import PRESCRIBED, FlightLog
 from airtruth.logs.names import chunk_file
 from airtruth.physics import dryden
 from airtruth.physics.short_period import MODAL, PARAMETERS
@@ -291,7 +291,10 @@ def _unit_gust(
 
 def _log_metadata(plan: Plan) -> Mapping[str, object]:
     """Metadata of a log, without gusts, draws or the truth."""
-    return {"aircraft": plan.aircraft.name, "sample_rate_hz": plan.campaign.log_hz}
+    known: dict[str, object] = {"aircraft": plan.aircraft.name, "sample_rate_hz": plan.campaign.log_hz}
+    if all(manoeuvre.surface for manoeuvre in plan.manoeuvres):
+        known[PRESCRIBED] = True
+    return known
 
 
 def truth_row(run: PlannedRun, prepared: Prepared | None) -> dict[str, object]:

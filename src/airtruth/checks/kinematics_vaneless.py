@@ -1,0 +1,43 @@
+"""What a kinematic check says where alpha was computed from the channels that it would be compared with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from airtruth.checks.result import CheckResult, Verdict
+
+COMPUTED: Final = (
+    "alpha_rad was computed from airspeed_m_s, q_rad_s, az_m_s2 and, where they are recorded, ax_m_s2, theta_rad and altitude_m: "
+    "it fits them by construction, which is no evidence, so errors of airspeed_m_s, az_m_s2 and ax_m_s2 are not assessed."
+)
+"""The first sentence of a check without a vane."""
+REMEDY: Final = "Compare the airspeed with ground speed on opposite headings and az_m_s2 with gravity at rest, or record a vane."
+"""What shows the errors that remain."""
+
+
+def untestable(run_ids: Sequence[str]) -> CheckResult:
+    """Return the result of a check in which no channel is left to compare with another."""
+    return CheckResult(
+        verdict="cannot_tell",
+        run_ids=tuple(run_ids),
+        findings=(),
+        causes=(),
+        statistic=0.0,
+        degrees=0,
+        p_value=1.0,
+        enlargement=1.0,
+        residual_rms={},
+        sentences=(COMPUTED, f"Without theta_rad q_rad_s is not assessed either. {REMEDY}"),
+    )
+
+
+def without_vane(verdict: Verdict, words: Sequence[str]) -> tuple[Verdict, list[str]]:
+    """Return verdict and conclusions of a comparison of theta and q alone: it says nothing of the other channels."""
+    if verdict != "agrees":
+        return verdict, [COMPUTED, "theta_rad and q_rad_s were compared with each other.", *words, REMEDY]
+    found = "theta_rad follows the integral of q_rad_s; this alone was tested."
+    return "cannot_tell", [COMPUTED, found, *words[1:], REMEDY]
+
+
+__all__ = ["COMPUTED", "REMEDY", "untestable", "without_vane"]
