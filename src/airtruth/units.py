@@ -27,14 +27,18 @@ SLUG: Final = LBF / FT
 """Slug [kg]: the mass that one pound-force accelerates by 1 ft/s2."""
 PSF: Final = LBF / FT**2
 """Pound-force per square foot [Pa]."""
+MMHG: Final = 133.322387415
+"""Conventional millimetre of mercury [Pa] (NIST SP 811, B.8: 133.3224)."""
+INHG: Final = 25.4 * MMHG
+"""Conventional inch of mercury [Pa] (NIST SP 811, B.8: 3386.389)."""
 
 UNITS: Final[dict[str, dict[str, float]]] = {
-    "angle": {"rad": 1.0, "deg": DEG},
-    "angular_rate": {"rad_s": 1.0, "deg_s": DEG},
+    "angle": {"rad": 1.0, "deg": DEG, "cdeg": 0.01 * DEG, "mrad": 1e-3},
+    "angular_rate": {"rad_s": 1.0, "deg_s": DEG, "cdeg_s": 0.01 * DEG, "mrad_s": 1e-3},
     "angular_acceleration": {"rad_s2": 1.0, "deg_s2": DEG},
-    "speed": {"m_s": 1.0, "kt": KT, "ft_s": FT, "km_h": 1.0 / 3.6},
-    "acceleration": {"m_s2": 1.0, "g": G0, "ft_s2": FT},
-    "length": {"m": 1.0, "ft": FT, "in": INCH, "mm": 1e-3},
+    "speed": {"m_s": 1.0, "kt": KT, "ft_s": FT, "km_h": 1.0 / 3.6, "cm_s": 0.01, "mm_s": 1e-3},
+    "acceleration": {"m_s2": 1.0, "g": G0, "ft_s2": FT, "mg": 1e-3 * G0, "cm_s2": 0.01},
+    "length": {"m": 1.0, "ft": FT, "in": INCH, "mm": 1e-3, "cm": 0.01, "km": 1e3},
     "area": {"m2": 1.0, "ft2": FT**2},
     "time": {"s": 1.0, "ms": 1e-3},
     "frequency": {"hz": 1.0},
@@ -42,12 +46,24 @@ UNITS: Final[dict[str, dict[str, float]]] = {
     "inertia": {"kg_m2": 1.0, "slug_ft2": SLUG * FT**2},
     "force": {"n": 1.0, "lbf": LBF},
     "moment": {"n_m": 1.0, "lbf_ft": LBF * FT},
-    "pressure": {"pa": 1.0, "hpa": 100.0, "kpa": 1e3, "psf": PSF, "psi": LBF / INCH**2},
+    "pressure": {
+        "pa": 1.0,
+        "hpa": 100.0,
+        "mbar": 100.0,
+        "kpa": 1e3,
+        "psf": PSF,
+        "psi": LBF / INCH**2,
+        "inhg": INHG,
+        "mmhg": MMHG,
+    },
+    "temperature": {"k": 1.0, "degc": 1.0, "degf": 5.0 / 9.0},
     "density": {"kg_m3": 1.0, "slug_ft3": SLUG / FT**3},
     "ratio": {"": 1.0, "pct": 0.01},
     "per_angle": {"per_rad": 1.0, "per_deg": 1.0 / DEG},
 }
-"""Dimension -> suffix of a unit -> factor to SI."""
+"""Dimension -> suffix of a unit -> factor to SI; "cdeg" is 1/100 deg."""
+ZEROS: Final[dict[str, float]] = {"degc": 273.15, "degf": 459.67}
+"""Unit whose zero is not that of SI -> its value at the zero of SI, with the opposite sign (NIST SP 811, B.8)."""
 
 _PRINTED: Final = {
     "-": "",

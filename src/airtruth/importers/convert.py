@@ -14,7 +14,7 @@ from airtruth.checks.fault import Fault
 from airtruth.checks.gate import require
 from airtruth.errors import ConfigurationError, LogError
 from airtruth.importers.align import Alignment, aligned
-from airtruth.importers.derived import airspeed_from_pressure, with_alpha
+from airtruth.importers.derived import with_air_data, with_alpha
 from airtruth.importers.manoeuvre_result import ManoeuvreResult
 from airtruth.importers.manoeuvres import find, read_table
 from airtruth.importers.mapping import CONSTANTS, MappingFile, Place, Resample, read_mapping, unit_factor
@@ -278,7 +278,7 @@ def built(merged: Merged) -> FlightLog:
         lost += [f"run {run_id!r}: {sentence}" for sentence in [*shortened(cut), *beyond(cut, start, end)]]
         if merged.resample is not None:
             slow.append(slower(cut, merged.resample.rate_hz))
-        values = airspeed_from_pressure(where, values)
+        values = with_air_data(where, values)
         if mapping.reconstruct.alpha:
             values, drift = with_alpha(where, values, (t[-1] - t[0]) / (len(t) - 1), mapping.reconstruct)
             drifts.append(drift)

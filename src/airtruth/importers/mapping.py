@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Any, Final, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from airtruth.channels import SIGNALS
 from airtruth.documents import read_toml
 from airtruth.errors import ConfigurationError, choices
+from airtruth.importers.channel_table import (
+    TIME_UNITS,
+    Attitude,
+    BodyVelocity,
+    Channel,
+    Clock,
+    ColumnKey,
+    Constant,
+    Place,
+    Unit,
+    unit_factor,
+)
 from airtruth.quantity import Strict, explain
-from airtruth.units import UNITS
 
 CONSTANTS: Final[dict[str, str]] = {
     "mass_kg": "mass",
@@ -21,141 +32,63 @@ CONSTANTS: Final[dict[str, str]] = {
     "cg_mac": "ratio",
 }
 """Facts of a record that a mapping may state: name -> dimension."""
-DERIVED: Final[dict[str, str]] = {"dynamic_pressure_pa": "pressure"}
+AIRSPEEDS: Final = (
+    "dynamic_pressure_pa",
+    "indicated_airspeed_m_s",
+    "calibrated_airspeed_m_s",
+    "equivalent_airspeed_m_s",
+)
+"""Quantities from which the true airspeed is computed."""
+DERIVED: Final[dict[str, str]] = {
+    "dynamic_pressure_pa": "pressure",
+    "indicated_airspeed_m_s": "speed",
+    "calibrated_airspeed_m_s": "speed",
+    "equivalent_airspeed_m_s": "speed",
+    "height_m": "length",
+    "static_pressure_pa": "pressure",
+    "air_temperature_k": "temperature",
+}
 """Quantities that a mapping may state instead of a channel, which is computed from them: name -> dimension."""
-TIME_UNITS: Final = {**UNITS["time"], "us": 1e-6}
-"""Units of a time column -> factor to seconds [s]."""
+FURTHER: Final[dict[str, str]] = {
+    "beta_rad": "angle",
+    "p_rad_s": "angular_rate",
+    "r_rad_s": "angular_rate",
+    "phi_rad": "angle",
+    "psi_rad": "angle",
+    "ay_m_s2": "acceleration",
+    "aileron_rad": "angle",
+    "rudder_rad": "angle",
+    "aileron_command_rad": "angle",
+    "rudder_command_rad": "angle",
+}
+"""Columns of a log of the lateral motion that a mapping may state too: name -> dimension."""
+MAPPED: Final[dict[str, str]] = {
+    **{name: signal.dimension for name, signal in SIGNALS.items()},
+    **FURTHER,
+    **DERIVED,
+}
+"""Every name below [channels] -> dimension."""
 METHODS: Final = ("linear", "cubic", "previous")
 """Interpolations onto a uniform time base that a mapping may choose."""
-
-
-def _from_one(column: str | int) -> str | int:
-    if isinstance(column, int) and column < 1:
-        raise ValueError("columns are counted from 1")
-    return column
-
-
-ColumnKey = Annotated[str | int, Field(union_mode="left_to_right"), AfterValidator(_from_one)]
-
-
-def _without_slashes(unit: Any) -> Any:
-    """ "deg/s", "m/s^2" as "deg_s", "m_s2"; "1" and "-" as no unit."""
-    if not isinstance(unit, str):
-        return unit
-    plain = unit.strip().lower().replace("^", "").replace("**", "").replace("²", "2").replace("³", "3")
-    for sign in ("/", " ", "*", "·"):
-        plain = plain.replace(sign, "_")
-    return {"1": "", "-": "", "%": "pct", "feet": "ft", "knots": "kt", "kts": "kt", "kn": "kt"}.get(
-        plain, plain
-    )
-
-
-Unit = Annotated[str, BeforeValidator(_without_slashes)]
-
-
-def unit_factor(dimension: str, unit: str) -> float:
-    """Factor from a unit to SI.
-
-    Raises
-    ------
-    ValueError
-        Listing the units of the dimension.
-    """
-    units = TIME_UNITS if dimension == "time" else UNITS[dimension]
-    if unit not in units:
-        owner = next((d for d, table in UNITS.items() if unit in table), None)
-        what = f"a unit of {owner.replace('_', ' ')}" if owner else "not a known unit"
-        raise ValueError(
-            f"unit {unit!r} is {what}, where {dimension.replace('_', ' ')} is wanted; "
-            f"use one of {', '.join(u or '(none)' for u in units)}"
-        )
-    return units[unit]
-
-
-class Place(Strict):
-    """Where values lie in a file.
-
-    column: a name, or a number counted from 1; a struct field is a path, "imu.q". variable: the matrix
-    whose column is meant (.mat, or [source] variable).
-    """
-
-    column: ColumnKey
-    variable: str | None = None
-
-
-class Clock(Place):
-    """Times of samples; offset_s is added to them."""
-
-    unit: Unit = "s"
-    offset_s: float = 0.0
-
-    @field_validator("unit")
-    @classmethod
-    def _time_unit(cls, value: str) -> str:
-        unit_factor("time", value)
-        return value
-
-
-class Channel(Strict):
-    """One channel: sign * factor(unit) * (scale * raw + offset), offset in the unit of the file.
-
-    columns : several columns, of which the mean is taken (surfaces), in place of column.
-    value : a constant in place of a column.
-    clock : times of this channel where they are not those of [time]; asks for [resample].
-    """
-
-    column: ColumnKey | None = None
-    columns: tuple[ColumnKey, ...] = ()
-    variable: str | None = None
-    value: float | None = None
-    unit: Unit
-    sign: Literal[1, -1] = 1
-    scale: float = 1.0
-    offset: float = 0.0
-    clock: Clock | None = None
-
-    @model_validator(mode="after")
-    def _one_origin(self) -> Self:
-        given = (self.column is not None) + bool(self.columns) + (self.value is not None)
-        if given != 1:
-            raise ValueError("state one of column, columns or value")
-        return self
-
-    @property
-    def places(self) -> tuple[Place, ...]:
-        """Columns that are read."""
-        keys = self.columns or ((self.column,) if self.column is not None else ())
-        return tuple(Place(column=key, variable=self.variable) for key in keys)
-
-
-class Constant(Strict):
-    """A fact of a record: a number above 0, or a column whose mean over the run is taken."""
-
-    column: ColumnKey | None = None
-    variable: str | None = None
-    value: float | None = Field(default=None, gt=0.0)
-    unit: Unit
-
-    @model_validator(mode="after")
-    def _one_origin(self) -> Self:
-        if (self.column is None) == (self.value is None):
-            raise ValueError("state one of column or value")
-        return self
 
 
 class SourceSection(Strict):
     """How the file is read; only what its format has use for.
 
     format : left out, the suffix says it. variable : matrix that column numbers refer to (.mat).
-    delimiter, decimal, skip_rows, header : of text; header = false numbers the columns.
+    structs : structs of a .mat file or groups of an HDF5 file that are a run each; a pattern with * is allowed, and the
+        columns are then those inside a struct. delimiter, decimal, skip_rows, header, encoding : of text; header = false
+        numbers the columns, an encoding that is left out is recognised.
     """
 
     format: Literal["csv", "table", "mat", "parquet", "ulg", "dataflash", "mdf", "hdf5"] | None = None
     variable: str | None = None
+    structs: tuple[str, ...] = ()
     delimiter: str = ","
     decimal: Literal[".", ","] = "."
     skip_rows: int = Field(default=0, ge=0)
     header: bool | None = None
+    encoding: Literal["utf-8", "utf-16", "windows-1252"] | None = None
 
     @field_validator("delimiter")
     @classmethod
@@ -248,6 +181,8 @@ class MappingFile(Strict):
     resample: Resample | None = None
     align: Align | None = None
     reconstruct: Reconstruct = Reconstruct()
+    attitude: Attitude | None = None
+    body_velocity: BodyVelocity | None = None
     channels: dict[str, Channel]
     constants: dict[str, Constant] = Field(default_factory=dict)
     manoeuvre: tuple[Manoeuvre, ...] = ()
@@ -255,9 +190,15 @@ class MappingFile(Strict):
     @field_validator("channels")
     @classmethod
     def _known_channels(cls, value: dict[str, Channel]) -> dict[str, Channel]:
-        _units_of(
-            value, {**{name: signal.dimension for name, signal in SIGNALS.items()}, **DERIVED}, "channel"
-        )
+        _units_of(value, MAPPED, "channel")
+        for name, channel in value.items():
+            if name == "height_m" and channel.reference_m is None:
+                raise ValueError(
+                    "height_m: state reference_m, the elevation above sea level of the point from which it counts [m] (0 "
+                    "for a height above sea level); the density is 1 % wrong for each 100 m"
+                )
+            if name != "height_m" and channel.reference_m is not None:
+                raise ValueError(f"{name}: reference_m belongs to height_m; leave it out")
         return value
 
     @field_validator("constants")
@@ -274,21 +215,49 @@ class MappingFile(Strict):
             raise ValueError(f"manoeuvre: run_id {', '.join(map(repr, repeated))} is given twice")
         if self.manoeuvre and self.time.run is not None:
             raise ValueError("[time] run and [[manoeuvre]] both divide the file into runs; keep one")
-        if "dynamic_pressure_pa" in self.channels and "airspeed_m_s" in self.channels:
-            raise ValueError(
-                "channels.dynamic_pressure_pa is used instead of airspeed_m_s; keep one of the two"
-            )
-        if self.reconstruct.alpha and "alpha_rad" in self.channels:
-            raise ValueError(
-                "[reconstruct] alpha replaces a missing vane; leave channels.alpha_rad out, or it"
-            )
-        clocked = [name for name, channel in self.channels.items() if channel.clock]
+        self._require_one_origin()
+        clocked = [f"channels.{name}" for name, channel in self.channels.items() if channel.clock]
+        clocked += ["attitude"] if self.attitude and self.attitude.clock else []
+        clocked += ["body_velocity"] if self.body_velocity and self.body_velocity.clock else []
         if clocked and self.resample is None:
             raise ValueError(
-                f"channels.{clocked[0]} has a clock of its own; state [resample] rate_hz and method "
+                f"{clocked[0]} has a clock of its own; state [resample] rate_hz and method "
                 f"({', '.join(METHODS)})"
             )
         return self
+
+    def _require_one_origin(self) -> None:
+        """Refuse a channel that the mapping states in two ways."""
+        given = self.channels.keys()
+        speeds = [name for name in ("airspeed_m_s", *AIRSPEEDS) if name in given]
+        if len(speeds) > 1:
+            raise ValueError(f"channels.{speeds[1]} is used instead of {speeds[0]}; keep one of the two")
+        if "height_m" in given and "altitude_m" in given:
+            raise ValueError("channels.height_m is used instead of altitude_m; keep one of the two")
+        if "static_pressure_pa" in given and {"height_m", "altitude_m"} & given:
+            raise ValueError(
+                "channels.static_pressure_pa gives altitude_m; keep it, or altitude_m (height_m)"
+            )
+        if "air_temperature_k" in given and "density_kg_m3" in given:
+            raise ValueError("channels.air_temperature_k gives density_kg_m3; keep one of the two")
+        if self.reconstruct.alpha and "alpha_rad" in given:
+            raise ValueError(
+                "[reconstruct] alpha replaces a missing vane; leave channels.alpha_rad out, or it"
+            )
+        angles = [name for name in ("theta_rad", "phi_rad", "psi_rad") if name in given]
+        if self.attitude is not None and angles:
+            raise ValueError(f"channels.{angles[0]} is computed from [attitude]; keep one of the two")
+        if self.body_velocity is None:
+            return
+        if speeds and "alpha_rad" in given:
+            raise ValueError(
+                f"[body_velocity] gives airspeed_m_s and alpha_rad, and channels.{speeds[0]} and channels.alpha_rad are "
+                "stated; leave one out"
+            )
+        if self.reconstruct.alpha:
+            raise ValueError(
+                "[reconstruct] alpha and [body_velocity] both give alpha_rad; keep one of the two"
+            )
 
 
 def _units_of(table: dict[str, Any], dimensions: dict[str, str], what: str) -> None:
@@ -323,10 +292,15 @@ def read_mapping(path: Path | str) -> MappingFile:
 
 
 __all__ = [
+    "AIRSPEEDS",
     "CONSTANTS",
     "DERIVED",
+    "FURTHER",
+    "MAPPED",
     "TIME_UNITS",
     "Align",
+    "Attitude",
+    "BodyVelocity",
     "Channel",
     "Clock",
     "Constant",

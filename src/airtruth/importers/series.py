@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import SIGNALS
 from airtruth.errors import ConfigurationError, LogError
-from airtruth.importers.mapping import DERIVED, Channel, MappingFile, Place, unit_factor
+from airtruth.importers.attitude import LEAST_NORM, air_angles, euler_angles
+from airtruth.importers.channel_table import Points
+from airtruth.importers.mapping import (
+    AIRSPEEDS,
+    MAPPED,
+    Attitude,
+    BodyVelocity,
+    Channel,
+    Clock,
+    MappingFile,
+    Place,
+    unit_factor,
+)
 from airtruth.importers.sources import Source, numbers
 from airtruth.logs.validate import JITTER, single_precision_s
+from airtruth.units import ZEROS
 
 Array = NDArray[np.float64]
 
@@ -64,6 +77,13 @@ def read_series(source: Source, mapping: MappingFile) -> dict[str, Series]:
     """
     clock = base_clock(source, mapping)
     series = {name: _series(source, mapping, name, one, clock) for name, one in mapping.channels.items()}
+    if mapping.attitude is not None:
+        series |= _attitude(source, mapping, mapping.attitude, clock)
+    if mapping.body_velocity is not None:
+        made = _body_velocity(source, mapping, mapping.body_velocity, clock)
+        if any(name in series for name in AIRSPEEDS):
+            del made["airspeed_m_s"]
+        series = made | series
     if not series:
         raise ConfigurationError(
             f"{source.path}: the mapping names no channel; state [channels.alpha_rad] ..."
@@ -83,46 +103,132 @@ def base_clock(source: Source, mapping: MappingFile) -> Series | None:
             _check_precision(f"{source.path}: time column {time.column!r}", values, time.unit)
         return Series(_seconds(values, time.unit), empty, _rounding(values, time.unit))
     if time.rate_hz is not None:
-        first = next((p for c in mapping.channels.values() for p in c.places), None)
+        first = next(iter(_places(mapping)), None)
         if first is None:
             raise ConfigurationError(f"{source.path}: no channel reads a column of the file")
         count = len(numbers(source, first, mapping.source.variable)[0])
         return Series(np.arange(count) / time.rate_hz, empty)
-    if source.clocks or all(c.clock is not None or c.value is not None for c in mapping.channels.values()):
+    tables = [one for one in (mapping.attitude, mapping.body_velocity) if one is not None]
+    own = [c.clock is not None or c.value is not None for c in mapping.channels.values()]
+    if source.clocks or all([*own, *(table.clock is not None for table in tables)]):
         return None
     raise ConfigurationError(f"{source.path}: no times; state [time] column (and unit), or rate_hz")
 
 
+def _places(mapping: MappingFile) -> list[Place]:
+    """Columns that a mapping reads as channels."""
+    places = [place for channel in mapping.channels.values() for place in channel.places]
+    attitude, velocity = mapping.attitude, mapping.body_velocity
+    if attitude is not None:
+        places += [Place(column=key, variable=attitude.variable) for key in attitude.quaternion]
+    if velocity is not None:
+        places += [Place(column=key, variable=velocity.variable) for key in (velocity.u, velocity.w)]
+    return places
+
+
 def _series(source: Source, mapping: MappingFile, name: str, one: Channel, clock: Series | None) -> Series:
-    dimension = SIGNALS[name].dimension if name in SIGNALS else DERIVED[name]
-    factor = one.sign * unit_factor(dimension, one.unit)
-    variable = mapping.source.variable
+    factor = one.sign * unit_factor(MAPPED[name], one.unit)
+    zero = one.offset + ZEROS.get(one.unit, 0.0)
+    above = one.reference_m or 0.0
     if one.value is not None:
         always = clock.t_s if clock is not None else np.array([-np.inf, np.inf])
-        return Series(always, np.full(len(always), factor * (one.scale * one.value + one.offset)))
+        return Series(always, np.full(len(always), factor * (one.scale * one.value + zero) + above))
+    times, read = _read(source, mapping, one.places, f"channels.{name}", one.clock, clock)
+    with np.errstate(invalid="ignore", over="ignore"):  # the gate names what is not finite
+        if one.calibrations:
+            read = np.stack([calibrated(*pair) for pair in zip(read, one.calibrations, strict=True)])
+        combined = np.array(one.weights) @ read if one.weights else read.mean(axis=0)
+        return replace(times, values=factor * (one.scale * combined + zero) + above)
+
+
+def _attitude(source: Source, mapping: MappingFile, one: Attitude, clock: Series | None) -> dict[str, Series]:
+    """theta_rad, phi_rad and psi_rad of a quaternion; phi and psi do not jump by a turn."""
+    places = [Place(column=key, variable=one.variable) for key in one.quaternion]
+    times, read = _read(source, mapping, places, "attitude", one.clock, clock)
+    with np.errstate(invalid="ignore", over="ignore"):
+        norm = np.sqrt((read**2).sum(axis=0))
+    short = np.flatnonzero(norm < LEAST_NORM)
+    if len(short):
+        raise LogError(
+            f"{source.path}: [attitude] quaternion has a norm of {norm[short[0]]:.3g} in row {int(short[0]) + 1}, where an "
+            "attitude has 1; name its four columns in their order"
+        )
+    scalar_first = read if one.order == "wxyz" else read[[3, 0, 1, 2]]
+    phi, theta, psi = euler_angles(scalar_first, frame=one.frame, rotates=one.rotates)
+    values = {"theta_rad": theta, "phi_rad": _unwrapped(phi), "psi_rad": _unwrapped(psi)}
+    return {name: replace(times, values=angle) for name, angle in values.items()}
+
+
+def _unwrapped(angle_rad: Array) -> Array:
+    """An angle without jumps of a turn, which interpolation would fill; what is not finite stays."""
+    result = angle_rad.copy()
+    known = np.isfinite(result)
+    result[known] = np.unwrap(result[known])
+    return result
+
+
+def _body_velocity(
+    source: Source, mapping: MappingFile, one: BodyVelocity, clock: Series | None
+) -> dict[str, Series]:
+    """airspeed_m_s, alpha_rad, and beta_rad where v is known."""
+    places = [Place(column=key, variable=one.variable) for key in (one.u, one.v, one.w) if key is not None]
+    times, read = _read(source, mapping, places, "body_velocity", one.clock, clock)
+    read = read * unit_factor("speed", one.unit)
+    v = read[1] if one.v is not None else np.zeros(len(times.t_s))
+    speed, alpha, beta = air_angles(read[0], v, read[-1])
+    values = {"airspeed_m_s": speed, "alpha_rad": alpha} | ({"beta_rad": beta} if one.v is not None else {})
+    return {name: replace(times, values=value) for name, value in values.items()}
+
+
+def _read(
+    source: Source,
+    mapping: MappingFile,
+    places: Sequence[Place],
+    table: str,
+    stated: Clock | None,
+    clock: Series | None,
+) -> tuple[Series, Array]:
+    """Times (values are empty) and raw values (columns, samples) of the columns of one table of a mapping."""
+    variable = mapping.source.variable
     own = None
-    if one.clock is not None:
-        _check_date(source, one.clock, one.clock.unit, f"channels.{name}.clock")
-        raw, _ = numbers(source, one.clock, variable)
+    if stated is not None:
+        _check_date(source, stated, stated.unit, f"{table}.clock")
+        raw, _ = numbers(source, stated, variable)
         with np.errstate(invalid="ignore", over="ignore"):
-            shifted = _seconds(raw, one.clock.unit) + one.clock.offset_s
-        own = Series(shifted, np.empty(0), _rounding(raw, one.clock.unit))
-    read = [numbers(source, place, variable) for place in one.places]
+            shifted = _seconds(raw, stated.unit) + stated.offset_s
+        own = Series(shifted, np.empty(0), _rounding(raw, stated.unit))
+    read = [numbers(source, place, variable) for place in places]
     recorded = Series(read[0][1], np.empty(0)) if read[0][1] is not None else None
     times = next((x for x in (own, clock, recorded) if x is not None), None)
     if times is None:
         raise ConfigurationError(
-            f"{source.path}: {name} has no times; state [time] column, or channels.{name}.clock"
+            f"{source.path}: {table} has no times; state [time] column, or {table}.clock"
         )
-    for values, _ in read:
+    for place, (values, t) in zip(places, read, strict=True):
         if len(values) != len(times.t_s):
             raise LogError(
-                f"{source.path}: {name} has {len(values)} values and its clock {len(times.t_s)}; "
-                f"state channels.{name}.clock, or another column"
+                f"{source.path}: {table} has {len(values)} values and its clock {len(times.t_s)}; "
+                f"state {table}.clock, or another column"
             )
-    with np.errstate(invalid="ignore", over="ignore"):  # the gate names what is not finite
-        mean = np.stack([values for values, _ in read]).mean(axis=0)
-        return replace(times, values=factor * (one.scale * mean + one.offset))
+        if times is recorded and t is not None and not np.array_equal(t, times.t_s):
+            raise LogError(
+                f"{source.path}: {table}: columns {places[0].column!r} and {place.column!r} are recorded at other times; "
+                "combine columns of one message or topic"
+            )
+    return times, np.stack([values for values, _ in read])
+
+
+def calibrated(raw: Array, points: Points) -> Array:
+    """Piecewise linear through points (raw, value), which continues beyond the first and the last one.
+
+    Parameters
+    ----------
+    raw : (samples,)
+    points : two or more, by increasing raw value.
+    """
+    x, y = np.array(points).T
+    left = np.clip(np.searchsorted(x, raw, side="right") - 1, 0, len(x) - 2)
+    return np.asarray(y[left] + (raw - x[left]) * (np.diff(y) / np.diff(x))[left])
 
 
 def _seconds(values: Array, unit: str) -> Array:
@@ -158,4 +264,4 @@ def _check_precision(where: str, t: Array, unit: str) -> None:
         )
 
 
-__all__ = ["Series", "base_clock", "read_series"]
+__all__ = ["Series", "base_clock", "calibrated", "read_series"]

@@ -1,4 +1,4 @@
-"""The standard atmosphere up to 20 km, and equivalent and true airspeed.
+"""The standard atmosphere up to 20 km, and calibrated, equivalent and true airspeed.
 
 Source: U.S. Standard Atmosphere, 1976 (NOAA-S/T 76-1562), part 1; identical to the ICAO standard atmosphere
 (Doc 7488) in this range. Altitude is geopotential pressure altitude, as an altimeter set to 1013.25 hPa shows it. Two
@@ -26,6 +26,9 @@ GAS_CONSTANT_J_KG_K: Final = 8314.32 / 28.9644
 """R*/M0 of dry air (table 2) [J/(kg K)]; the 1976 value, not today's."""
 RHO0_KG_M3: Final = P0_PA / (GAS_CONSTANT_J_KG_K * T0_K)
 """Density at sea level, eq. (42) [kg/m3]."""
+
+HEAT_RATIO: Final = 1.4
+"""Ratio of the specific heats of air (table 2) [-]."""
 
 EARTH_RADIUS_M: Final = 6356766.0
 """Effective earth's radius of eq. (18) [m]."""
@@ -127,6 +130,32 @@ def altitude_of_density_m(density_kg_m3: ArrayLike) -> Array:
     return _inside(np.where(rho > _RHO11_KG_M3, troposphere, isothermal))
 
 
+def altitude_of_pressure_m(pressure_pa: ArrayLike) -> Array:
+    """Pressure altitude [m] of a static pressure [Pa]; the inverse of `pressure_pa` in closed form, any shape."""
+    p = np.asarray(pressure_pa, dtype=np.float64)
+    p = np.where(p > 0.0, p, np.nan)
+    troposphere = T0_K / _LAPSE_K_M * ((p / P0_PA) ** (1.0 / _EXPONENT) - 1.0)
+    isothermal = TROPOPAUSE_M - _SCALE_HEIGHT_M * np.log(p / _P11_PA)
+    return _inside(np.where(p > _P11_PA, troposphere, isothermal))
+
+
+def true_airspeed_of_calibrated_m_s(
+    calibrated_airspeed_m_s: ArrayLike, pressure_pa: ArrayLike, density_kg_m3: ArrayLike
+) -> Array:
+    """True airspeed [m/s] of a calibrated airspeed [m/s] at a static pressure [Pa] and a density [kg/m3].
+
+    The impact pressure is that of the calibrated airspeed at sea level, and that of the true airspeed at the static
+    pressure: q_c = p ((1 + (k - 1)/2 M^2)^(k/(k - 1)) - 1), isentropic and below Mach 1 (NACA Report 1135, 1953, eq.
+    44), with M^2 = V^2 rho/(k p). At small M it becomes rho0 CAS^2 = rho TAS^2. Shapes broadcast.
+    """
+    half, power = 0.5 * (HEAT_RATIO - 1.0), HEAT_RATIO / (HEAT_RATIO - 1.0)
+    p = np.asarray(pressure_pa, dtype=np.float64)
+    square = np.square(np.asarray(calibrated_airspeed_m_s, dtype=np.float64))
+    impact = P0_PA * np.expm1(power * np.log1p(half * square * RHO0_KG_M3 / (HEAT_RATIO * P0_PA)))
+    mach_square = np.expm1(np.log1p(impact / p) / power) / half
+    return np.sqrt(mach_square * HEAT_RATIO * p / np.asarray(density_kg_m3, dtype=np.float64))
+
+
 def true_airspeed_m_s(equivalent_airspeed_m_s: ArrayLike, density_kg_m3: ArrayLike) -> Array:
     """True airspeed [m/s] of an equivalent airspeed [m/s]: rho0 EAS^2 = rho TAS^2, shapes broadcast."""
     rho = np.asarray(density_kg_m3, dtype=np.float64)
@@ -151,6 +180,7 @@ def _isothermal(h: Array) -> Array:
 __all__ = [
     "EARTH_RADIUS_M",
     "GAS_CONSTANT_J_KG_K",
+    "HEAT_RATIO",
     "HIGHEST_M",
     "LOWEST_M",
     "P0_PA",
@@ -159,6 +189,7 @@ __all__ = [
     "TROPOPAUSE_M",
     "air_density",
     "altitude_of_density_m",
+    "altitude_of_pressure_m",
     "density_kg_m3",
     "equivalent_airspeed_m_s",
     "geometric_m",
@@ -166,4 +197,5 @@ __all__ = [
     "pressure_pa",
     "temperature_k",
     "true_airspeed_m_s",
+    "true_airspeed_of_calibrated_m_s",
 ]

@@ -16,8 +16,9 @@ from airtruth.effects.effect import Effect, Parameter
 from airtruth.effects.registry import EFFECTS
 from airtruth.importers.mapping import (
     CONSTANTS,
-    DERIVED,
+    MAPPED,
     TIME_UNITS,
+    BodyVelocity,
     Channel,
     Clock,
     MappingFile,
@@ -105,13 +106,12 @@ def _complete(model: type[BaseModel], described: Schema) -> None:
         properties["sensors"] = sensors()
         properties["derivatives"] = _table({name: quantity("ratio") for name in PARAMETERS})
     elif model is MappingFile:
-        properties["channels"] = _by_dimension(
-            properties["channels"],
-            {**{name: signal.dimension for name, signal in SIGNALS.items()}, **DERIVED},
-        )
+        properties["channels"] = _by_dimension(properties["channels"], MAPPED)
         properties["constants"] = _by_dimension(properties["constants"], CONSTANTS)
     elif model in (Clock, TimeSection):
         properties["unit"] = unit_text(TIME_UNITS)
+    elif model is BodyVelocity:
+        properties["unit"] = unit_text(UNITS["speed"])
     elif model in (Channel, RecordConstant):
         properties["unit"] = {"type": "string"}
 

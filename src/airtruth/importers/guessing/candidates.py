@@ -1,0 +1,385 @@
+"""What each column may be: readings with the evidence of their name, unit and size."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.checks.evidence import LIMITS, MEANS
+from airtruth.importers.attitude import euler_angles
+from airtruth.importers.dictionary import DIMENSIONS, QUATERNION, VELOCITY, Entry, Lexicon, Words, compact
+from airtruth.importers.guessing.columns import Clock, Column
+from airtruth.physics.atmosphere import altitude_of_pressure_m
+from airtruth.units import UNITS
+
+Array = NDArray[np.float64]
+
+SLOTS: Final[dict[str, tuple[str, ...]]] = {
+    "az": ("az_m_s2",),
+    "q": ("q_rad_s",),
+    "theta": ("theta_rad",),
+    "airspeed": (
+        "airspeed_m_s",
+        "calibrated_airspeed_m_s",
+        "equivalent_airspeed_m_s",
+        "indicated_airspeed_m_s",
+        "dynamic_pressure_pa",
+    ),
+    "alpha": ("alpha_rad",),
+    "ax": ("ax_m_s2",),
+    "elevator": ("elevator_rad",),
+    "ground_speed": ("ground_speed_m_s",),
+    "gps_altitude": ("gps_altitude_m",),
+    "altitude": ("altitude_m", "static_pressure_pa", "height_m"),
+    "density": ("density_kg_m3",),
+    "elevator_command": ("elevator_command_rad",),
+    "throttle": ("throttle",),
+}
+"""Slot of an assignment -> what may fill it, the best first."""
+_SLOT_OF: Final = {name: slot for slot, names in SLOTS.items() for name in names}
+"""Channel -> its slot."""
+_SIZE: Final = {
+    "airspeed": (40.0, 0.9), "alpha": (0.08, 0.9), "theta": (0.12, 1.1), "q": (0.2, 1.3), "az": (9.81, 0.15), "ax": (1.5, 1.1),
+    "elevator": (0.1, 1.1), "elevator_command": (0.1, 1.1), "altitude": (800.0, 1.6), "density": (1.1, 0.25),
+    "throttle": (0.5, 0.8), "ground_speed": (40.0, 0.9), "gps_altitude": (800.0, 1.6),
+}  # fmt: skip
+"""Slot -> median and standard deviation of the logarithm of a usual size [SI] (judgement: from a 1 kg model to an airliner)."""
+_CENTRED: Final = frozenset({"airspeed", "az", "altitude", "density", "ground_speed", "gps_altitude"})
+"""Slots whose size is that of the median; of the others it is the 95th percentile of the magnitude."""
+_RARE: Final = {
+    **dict.fromkeys(("cdeg", "cdeg_s", "cm", "cm_s"), 0.03),
+    **dict.fromkeys(("mm", "mg"), 0.02),
+    **dict.fromkeys(("km", "in", "cm_s2", "mm_s"), 0.01),
+    **dict.fromkeys(("mrad", "mrad_s"), 0.003),
+    "km_h": 0.1,
+    **dict.fromkeys(("kt", "ft"), 0.5),
+    "ft_s": 0.4,
+    "ft_s2": 0.2,
+    "pct": 0.3,
+}
+"""Unit that nobody states -> its frequency over that of the usual ones [-] (judgement)."""
+FORMAT, EXACT, TRIMMED, PER_WORD = 12.0, 6.0, 5.0, 0.3
+"""Logarithm of the evidence of a column that the format defines, of a name, of one among known words, and the loss for each of
+them (judgement: one column of 150 000, of 400, of 150 has it by chance)."""
+_RANK, _SECOND, OWN = 0.7, 0.3, 10.0
+"""Loss for each rank of a column, and of a channel within its slot; evidence of a name of the user's own (judgement)."""
+_SIGN: Final = {"az": 0.5, "elevator": 0.3, "elevator_command": 0.3, "ax": 0.04}
+"""Slot -> probability of the sign opposite to the contract's (judgement)."""
+_OPPOSITE: Final = 0.02
+"""The same of other angles and rates."""
+_SIGNED: Final = frozenset({"az", "ax", "q", "theta", "alpha", "elevator", "elevator_command"})
+"""Slots that have a sign."""
+MIXED: Final = "one of several surfaces that are elevator and aileron together"
+"""Why an elevon is no elevator."""
+OUTSIDE: Final = 20.0
+"""Loss of a reading that leaves the range of flight (judgement)."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A column as a channel, in a unit and with a sign.
+
+    Attributes
+    ----------
+    slot, channel : what it fills.
+    columns : its columns; several of a quaternion or a velocity.
+    unit, sign, offset : as in a mapping.
+    values : (samples,) on the common grid [SI].
+    evidence : logarithm of the evidence of name, unit and size.
+    named : "format PX4" or "named".
+    unit_from : "stated", "by its size".
+    rank : preference among columns of one channel.
+    kind : "column", "attitude" or "velocity".
+    order, frame : of a quaternion, as in a mapping.
+    """
+
+    slot: str
+    channel: str
+    columns: tuple[Column, ...]
+    unit: str
+    sign: int
+    values: Array
+    evidence: float
+    named: str
+    unit_from: str
+    offset: float = 0.0
+    rank: int = 1
+    kind: str = "column"
+    order: str = ""
+    frame: str = ""
+
+    @property
+    def column(self) -> Column:
+        """Its first column."""
+        return self.columns[0]
+
+
+@dataclass
+class Candidates:
+    """Readings of each slot, and columns that are not taken.
+
+    refused : (column, what it is, channel that its name resembles).
+    surfaces : columns that move with the elevator, without the throw of the surface, and why.
+    synthetic : columns with an angle of attack that no vane measured.
+    zero : channels whose column is zero throughout.
+    """
+
+    readings: dict[str, list[Reading]] = field(default_factory=dict)
+    refused: list[tuple[Column, str, str]] = field(default_factory=list)
+    surfaces: list[tuple[Column, str]] = field(default_factory=list)
+    synthetic: list[tuple[Column, str]] = field(default_factory=list)
+    zero: list[tuple[str, Column]] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Common times on which readings are compared [s]; the step is 0 where the file has no times, and t_s counts rows."""
+
+    t_s: Array
+    dt_s: float
+
+    def of(self, column: Column, clocks: Mapping[str, Clock]) -> Array | None:
+        """Values of a column on the grid; None where it has no times or hardly any value."""
+        t = times_of(column, clocks) if self.dt_s else np.arange(float(len(column.values)))
+        if t is None or len(t) != len(column.values):
+            return None
+        ok = np.isfinite(t) & np.isfinite(column.values)
+        if ok.sum() < 4:
+            return None
+        t, x = t[ok], column.values[ok]
+        order = np.argsort(t, kind="stable")
+        return np.asarray(np.interp(self.t_s, t[order], x[order]))
+
+
+def times_of(column: Column, clocks: Mapping[str, Clock]) -> Array | None:
+    """Times of a column [s]: its own, those of its group, or those of the file."""
+    if column.t_s is not None:
+        return column.t_s
+    clock = clocks.get(column.group) or clocks.get("")
+    if clock is None and len(clocks) == 1:
+        clock = next(iter(clocks.values()))
+    return clock.t_s if clock is not None and len(clock.t_s) == len(column.values) else None
+
+
+def candidates(
+    columns: Sequence[Column], words: Lexicon, grid: Grid, clocks: Mapping[str, Clock]
+) -> Candidates:
+    """Every reading that names, units and ranges allow."""
+    found = Candidates()
+    parts: dict[tuple[str, str], Column] = {}
+    turned: dict[tuple[str, Entry, str], dict[int, Column]] = {}
+    velocities = {
+        c.group for c in columns if compact(c.name) in ("w", "wbody") for d in columns
+        if d.group == c.group and compact(d.name) in ("u", "ubody")
+    }  # fmt: skip
+    for column in columns:
+        known = words.entry(column.full)
+        if known is not None:
+            entry, part = known
+            if entry.quaternion:
+                numbers = [i for i, one in enumerate(entry.match) if Entry((one,)).matches(column.full)]
+                turned.setdefault((column.group, entry, part.title), {})[numbers[0]] = column
+            elif entry.synthetic:
+                found.synthetic.append((column, entry.refuse or ""))
+            elif entry.surface:
+                found.surfaces.append((column, entry.surface))
+            elif entry.refuse is not None:
+                if entry.refuse:
+                    found.refused.append((column, entry.refuse, ""))
+            elif entry.channel != "t_s":
+                evidence = FORMAT - _RANK * (entry.rank - 1)
+                _read(found, column, entry.channel, evidence, f"format {part.title}", grid, clocks, entry)
+            continue
+        for channel, evidence, reason in _meanings(column, words):
+            if channel == "elevon_rad":
+                found.surfaces.append((column, MIXED))
+            elif channel in (*QUATERNION, *VELOCITY):
+                parts.setdefault((column.group, channel), column)
+                if channel != "v_m_s" or column.group in velocities:
+                    break
+            elif reason and channel.startswith("elevator") and reason[1]:
+                found.surfaces.append((column, reason[0]))
+            elif reason:
+                found.refused.append((column, reason[0], channel))
+            elif channel != "t_s" and not (compact(column.name) == "v" and column.group in velocities):
+                _read(found, column, channel, evidence, "named", grid, clocks, None)
+    for (_, entry, title), components in turned.items():
+        if len(components) == 4:
+            four = tuple(components[i] for i in range(4))
+            _attitude(found, four, entry.quaternion, title, grid, clocks)
+    for group in {group for group, _ in parts}:
+        four = tuple(parts[group, name] for name in QUATERNION if (group, name) in parts)
+        if len(four) == 4:
+            _attitude(found, four, "wxyz", "", grid, clocks)
+        if (group, "u_m_s") in parts and (group, "w_m_s") in parts:
+            three = tuple(parts[group, name] for name in VELOCITY if (group, name) in parts)
+            _velocity(found, three, grid, clocks)
+    return found
+
+
+def _tokens(name: str) -> Iterator[list[str]]:
+    """Words of a name: by camel case, and by punctuation alone."""
+    rough = [w for w in re.split(r"[\W_]+", name) if w]
+    camel = [t for w in rough for t in re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+", w)]
+    yield [t.lower() for w in rough for t in re.findall(r"[^\W\d]+|\d+", w)]
+    yield [t.lower() for t in camel]
+
+
+def _meanings(column: Column, words: Lexicon) -> Iterator[tuple[str, float, tuple[str, bool] | None]]:
+    """What a name may mean, its evidence, and why it is something else (and whether it still is a surface's motion)."""
+    whole = compact(column.name)
+    exact = words.meanings(whole)
+    topic = [t for t in re.split(r"[\W_]+", column.group.lower()) if t] if not column.variable else []
+    context, refused = words.context, words.refused
+    spoiled = next((refused[t] for t in topic if t in refused), None)
+    if exact:
+        own = words.parts[0].title == Words.title and whole in words.parts[0].names
+        for channel in exact:
+            yield channel, OWN if own else EXACT, (spoiled, False) if spoiled else None
+        return
+    best: dict[str, tuple[float, tuple[str, bool] | None]] = {}
+    for tokens in _tokens(column.name):
+        for start in range(len(tokens)):
+            for end in range(len(tokens), start, -1):
+                outside = tokens[:start] + tokens[end:]
+                channels = words.meanings("".join(tokens[start:end]))
+                if not channels:
+                    continue
+                other = [t for t in outside if t not in context and not t.isdigit() and t not in refused]
+                reason = next((refused[t] for t in outside if t in refused), spoiled)
+                if other and not reason:
+                    continue
+                is_surface = bool({"pwm", "norm"} & set(outside))
+                for channel in channels:
+                    evidence = TRIMMED - PER_WORD * len(outside)
+                    if channel not in best or evidence > best[channel][0]:
+                        best[channel] = (evidence, (reason, is_surface) if reason else None)
+    for channel, (evidence, why) in best.items():
+        yield channel, evidence, why
+
+
+def _read(
+    found: Candidates,
+    column: Column,
+    channel: str,
+    evidence: float,
+    named: str,
+    grid: Grid,
+    clocks: Mapping[str, Clock],
+    entry: Entry | None,
+) -> None:
+    """Add the readings of a column as a channel: units that are not excluded, and both signs."""
+    slot = _SLOT_OF.get(channel)
+    if slot is None:
+        return
+    finite = column.values[np.isfinite(column.values)]
+    if not len(finite):
+        return
+    if not finite.any():
+        if channel not in ("height_m", "throttle"):
+            found.zero.append((channel, column))
+        return
+    raw = grid.of(column, clocks)
+    if raw is None:
+        return
+    table = UNITS[DIMENSIONS[channel]]
+    stated = entry.unit if entry is not None else column.unit.name if column.unit else ""
+    if column.unit is not None and entry is None and stated not in table:
+        return
+    fixed = (
+        column.unit.sign if column.unit is not None and column.unit.sign < 0 else entry.sign if entry else 0
+    )
+    evidence -= _SECOND * SLOTS[slot].index(channel)
+    units = [stated] if stated else [unit for unit in table if unit not in ("k", "degc", "degf")]
+    signs = (fixed,) if fixed else (1, -1) if slot in _SIGNED else (1,)
+    offset = entry.offset if entry is not None else 0.0
+    total = sum(_RARE.get(unit, 1.0) for unit in units)
+    for unit in units:
+        likely = 0.0 if stated else float(np.log(_RARE.get(unit, 1.0) / total))
+        for sign in signs:
+            values = _physical(channel, sign * table[unit] * (raw + offset))
+            turned = _SIGN.get(slot, _OPPOSITE)
+            signed = (
+                0.0
+                if fixed
+                else float(np.log(turned if sign < 0 else 1.0 - turned))
+                if len(signs) > 1
+                else 0.0
+            )
+            where = stated if not stated else ("format" if entry else "stated")
+            found.readings.setdefault(slot, []).append(
+                Reading(slot, channel, (column,), unit, sign, values, evidence + likely + signed + _size(slot, values),
+                        named, where, offset, entry.rank if entry else 1)
+            )  # fmt: skip
+
+
+def _physical(channel: str, values: Array) -> Array:
+    """Values as those of the slot: an airspeed of a dynamic pressure, an altitude of a static one."""
+    if channel == "dynamic_pressure_pa":
+        return np.sqrt(2.0 * np.maximum(values, 0.0) / 1.225)
+    if channel == "static_pressure_pa":
+        return np.asarray(altitude_of_pressure_m(np.clip(values, 5500.0, 110000.0)))
+    return values
+
+
+def _size(slot: str, values: Array) -> float:
+    """Logarithm of the density of a size over that of the usual one, and the loss of a reading outside the range of flight."""
+    name = SLOTS[slot][0]
+    low, high = LIMITS.get(name, (-np.inf, np.inf))
+    least, most = MEANS.get(name, (-np.inf, np.inf))
+    inner = np.quantile(values, [0.02, 0.98])
+    loss = OUTSIDE * float(inner[0] < low or inner[1] > high or not least <= np.median(values) <= most)
+    middle, spread = _SIZE[slot]
+    size = abs(float(np.median(values))) if slot in _CENTRED else float(np.quantile(np.abs(values), 0.95))
+    return -0.5 * (np.log(max(size, 1e-9) / middle) / spread) ** 2 - loss if size > 0.0 else -loss
+
+
+def _attitude(
+    found: Candidates,
+    four: tuple[Column, ...],
+    order: str,
+    title: str,
+    grid: Grid,
+    clocks: Mapping[str, Clock],
+) -> None:
+    evidence = FORMAT if title else EXACT
+    parts = [grid.of(column, clocks) for column in four]
+    if any(p is None for p in parts):
+        return
+    rows = np.stack([p for p in parts if p is not None])
+    stacked = rows if order == "wxyz" else rows[[3, 0, 1, 2]]
+    if not (np.abs(np.sqrt((stacked**2).sum(axis=0)) - 1.0) < 0.05).all():
+        return
+    for frame, loss in (("ned", 0.0),) if title else (("ned", 0.3), ("enu", 1.4)):
+        theta = euler_angles(stacked, frame=frame)[1]  # type: ignore[arg-type]
+        reading = Reading(
+            "theta", "theta_rad", four, "rad", 1, theta, evidence - loss, f"format {title}" if title else "named", "stated",
+            kind="attitude", order=order, frame=frame,
+        )  # fmt: skip
+        found.readings.setdefault("theta", []).append(reading)
+
+
+def _velocity(found: Candidates, three: tuple[Column, ...], grid: Grid, clocks: Mapping[str, Clock]) -> None:
+    u, w = grid.of(three[0], clocks), grid.of(three[-1], clocks)
+    if u is None or w is None:
+        return
+    table = UNITS["speed"]
+    stated = three[0].unit.name if three[0].unit and three[0].unit.name in table else ""
+    for unit in [stated] if stated else table:
+        likely = 0.0 if stated else float(np.log(_RARE.get(unit, 1.0) / 3.0))
+        for slot, channel, values in (
+            ("airspeed", "airspeed_m_s", np.hypot(u, w) * table[unit]),
+            ("alpha", "alpha_rad", np.arctan2(w, u)),
+        ):
+            found.readings.setdefault(slot, []).append(
+                Reading(slot, channel, three, unit, 1, values, EXACT - 1.0 + likely + _size(slot, values), "named",
+                        "stated" if stated else "", kind="velocity")
+            )  # fmt: skip
+
+
+__all__ = ["MIXED", "OUTSIDE", "SLOTS", "Candidates", "Grid", "Reading", "candidates", "times_of"]

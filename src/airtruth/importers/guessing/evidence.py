@@ -1,0 +1,261 @@
+"""What physics says of an assignment: logarithms of likelihood ratios, with the figure that each rests on.
+
+A relation y = x between a measured channel and what others require of it is compared with "unrelated". Both sides are divided
+into blocks, and a polynomial is taken out of each, which stands for biases and the start of an integral. With n independent
+samples the ratio is (n/2) ln(P(y)/max(P(y - x), tau^2 P(x))), P the power, tau the tolerance of the relation. A wrong unit, sign
+or axis makes P(y - x) larger than P(y).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import log_ndtr
+
+from airtruth.checks.spectra import integral, regress, spectrum
+from airtruth.physics.atmosphere import density_kg_m3
+from airtruth.units import G0
+
+Array = NDArray[np.float64]
+
+BLOCK_S: Final = 8.0
+"""Length of a block [s] (judgement: some periods of the short period, shorter than drifts)."""
+BAND_HZ: Final = 1.0
+"""Band of the motion, which gives the number of independent samples [Hz] (judgement)."""
+TOLERANCE: Final = 0.15
+"""Relative error of a relation that scales, lags and positions of sensors explain [-] (judgement)."""
+MOST: Final = 10.0
+"""Largest logarithm of a likelihood ratio that one relation may give [-]: a model is never surer of itself."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A relation that was tested: logarithm of its likelihood ratio, and the figure in words."""
+
+    log_ratio: float
+    words: str
+
+
+@dataclass(frozen=True)
+class Relation:
+    """Slots that a relation needs and is evidence for, its test, and slots that it uses where they are filled."""
+
+    needs: tuple[str, ...]
+    test: Callable[[Mapping[str, Array], float], Finding]
+    uses: tuple[str, ...] = ()
+
+
+@cache
+def _basis(samples: int, degree: int) -> Array:
+    """Orthonormal polynomials up to a degree (samples, degree + 1)."""
+    return np.asarray(np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, samples), degree + 1))[0])
+
+
+def _rest(x: Array, dt_s: float, degree: int) -> Array:
+    length = max(degree + 3, min(len(x), round(BLOCK_S / dt_s)))
+    count = max(1, len(x) // length)
+    blocks = x[: count * length].reshape(count, -1)
+    basis = _basis(blocks.shape[1], degree)
+    return np.asarray(blocks - (blocks @ basis) @ basis.T)
+
+
+def compared(
+    y: Array, x: Array, dt_s: float, degree: int, tolerance: float = TOLERANCE
+) -> tuple[float, float, float]:
+    """Logarithm of the likelihood ratio of y = x, factor of y on x, and squared correlation."""
+    with np.errstate(all="ignore"):
+        a, b = _rest(y, dt_s, degree), _rest(x, dt_s, degree)
+        own, given, left = (a**2).sum(), (b**2).sum(), ((a - b) ** 2).sum()
+        product = (a * b).sum()
+        samples = 2.0 * BAND_HZ * dt_s * a.size
+        ratio = 0.5 * samples * np.log(own / max(left, tolerance**2 * given, 1e-300))
+        share = product**2 / max(own * given, 1e-300)
+        factor = product / max(given, 1e-300)
+    if not np.isfinite([ratio, share, factor]).all():
+        return 0.0, np.nan, 0.0
+    return float(np.clip(ratio, -MOST, MOST)), float(factor), float(share)
+
+
+def _moved(
+    name: str, words: str, degree: int, y: Callable[..., Array], x: Callable[..., Array]
+) -> Callable[..., Finding]:
+    def test(c: Mapping[str, Array], dt_s: float) -> Finding:
+        ratio, factor, share = compared(y(c), x(c, dt_s), dt_s, degree)
+        return Finding(ratio, f"{name} is {factor:.3g} of {words} (R2 {share:.2f})")
+
+    return test
+
+
+def _near(deviation: float, std: float, broad: float, words: str) -> Finding:
+    """Normal density of a deviation over a broad one that knows nothing."""
+    if not np.isfinite(deviation):
+        return Finding(0.0, words)
+    ratio = -0.5 * (deviation / std) ** 2 + 0.5 * (deviation / broad) ** 2 + np.log(broad / std)
+    return Finding(float(np.clip(ratio, -MOST, MOST)), words)
+
+
+def _attitude(c: Mapping[str, Array], dt_s: float) -> Array:
+    if "theta" in c:
+        return c["theta"]
+    turned = integral(c["q"], dt_s)
+    return np.asarray(turned - turned.mean() + c["alpha"].mean())
+
+
+def _heave(c: Mapping[str, Array], dt_s: float) -> Array:
+    theta, alpha, ax = _attitude(c, dt_s), c["alpha"], c.get("ax", 0.0)
+    force = c["az"] * np.cos(alpha) - ax * np.sin(alpha) + G0 * np.cos(theta - alpha)
+    return integral(c["q"] + force / np.maximum(np.abs(c["airspeed"]), 1.0), dt_s)
+
+
+def _along(c: Mapping[str, Array], dt_s: float) -> Array:
+    alpha = c["alpha"]
+    pull = c["ax"] * np.cos(alpha) + c["az"] * np.sin(alpha) - G0 * np.sin(c["theta"] - alpha)
+    return integral(pull, dt_s)
+
+
+def _risen(c: Mapping[str, Array], dt_s: float) -> Array:
+    up = -c["az"] * np.cos(c["theta"]) - G0
+    if "ax" in c:
+        up = up + c["ax"] * np.sin(c["theta"])
+    return integral(integral(up, dt_s), dt_s)
+
+
+def _climbed(c: Mapping[str, Array], dt_s: float) -> Array:
+    return integral(c["airspeed"] * np.sin(c["theta"] - c["alpha"]), dt_s)
+
+
+def _weight(c: Mapping[str, Array], dt_s: float) -> Finding:
+    mean = float(np.median(c["az"]))
+    return _near(mean / G0 + 1.0, 0.12, 2.0, f"the median of az is {mean / G0:.2f} g")
+
+
+def _axial(c: Mapping[str, Array], dt_s: float) -> Finding:
+    lean = G0 * np.sin(np.clip(c["theta"], -1.5, 1.5))
+    ratio, _, _ = compared(c["ax"], lean, dt_s, 0, 0.5)
+    off = float(np.median(c["ax"] - lean)) / G0
+    near = _near(off, 0.05, 0.5, "")
+    return Finding(
+        float(np.clip(near.log_ratio + 0.3 * max(ratio, -MOST), -MOST, MOST)),
+        f"the median of ax departs by {off:+.3f} g from g sin(theta)",
+    )
+
+
+def _level(c: Mapping[str, Array], dt_s: float) -> Finding:
+    off = float(np.median(c["theta"] - c["alpha"]))
+    return _near(off, 0.12, 1.0, f"the median of theta - alpha is {np.degrees(off):.1f} deg")
+
+
+def control(c: Mapping[str, Array], dt_s: float) -> tuple[float, float]:
+    """Change of q' with the elevator, with q and alpha (or the load) held, and its standard deviation [1/s2]."""
+    causes = [
+        integral(c["elevator"], dt_s),
+        integral(c["alpha"] if "alpha" in c else c["az"], dt_s),
+        integral(c["q"], dt_s),
+    ]
+    with np.errstate(all="ignore"):
+        factors = regress(
+            spectrum(c["q"][None], dt_s), np.stack([spectrum(x[None], dt_s) for x in causes], axis=1)
+        )
+        return float(factors.value[0, 0]), float(np.sqrt(factors.covariance[0, 0, 0]))
+
+
+def _pitches(c: Mapping[str, Array], dt_s: float) -> Finding:
+    value, std = control(c, dt_s)
+    if not (np.isfinite(value) and std > 0.0):
+        return Finding(0.0, "it does not move")
+    t = value / std
+    signed = float(np.clip(log_ndtr(-t) - log_ndtr(t), -MOST, MOST))
+    size = (
+        float(np.clip(-0.5 * (np.log(max(abs(value), 1e-9) / 15.0) / 1.5) ** 2, -MOST, 0.0))
+        if abs(t) > 3
+        else 0.0
+    )
+    return Finding(signed + size, f"the elevator changes q' by {value:+.3g} +- {std:.2g} 1/s2")
+
+
+def _lifts(c: Mapping[str, Array], dt_s: float) -> Finding:
+    """Lift follows alpha = theta - gamma, gamma the integral of the load over V: az = -a (theta + integral(az + g)/V)."""
+    theta, load = c["theta"] if "theta" in c else integral(c["q"], dt_s), c["az"] + G0
+    causes = (
+        [theta, integral(load, dt_s), c["elevator"]] if "elevator" in c else [theta, integral(load, dt_s)]
+    )
+    with np.errstate(all="ignore"):
+        factors = regress(
+            spectrum(load[None], dt_s), np.stack([spectrum(x[None], dt_s) for x in causes], axis=1)
+        )
+        value, covariance = factors.value[0], factors.covariance[0]
+        slope, speed = -value[0], value[0] / value[1]
+        variance = (
+            covariance[0, 0] / value[0] ** 2
+            + covariance[1, 1] / value[1] ** 2
+            - 2 * covariance[0, 1] / value[0] / value[1]
+        )
+        std = float(np.sqrt(max(variance, 0.0) + 0.2**2))
+    if not (np.isfinite([slope, speed, std]).all() and slope > 0.0 and speed > 0.0 and std < 0.6):
+        return Finding(0.0, "the lift does not show it")
+    off = float(np.log(max(float(np.mean(c["airspeed"])), 1e-3) / speed))
+    return _near(
+        off, std, 2.0, f"the airspeed is {np.exp(off):.2f} of that which lift and pitch rate require"
+    )
+
+
+def _ground(c: Mapping[str, Array], dt_s: float) -> Finding:
+    ratio = float(np.median(c["airspeed"])) / max(float(np.median(c["ground_speed"])), 1e-3)
+    return _near(
+        float(np.log(max(ratio, 1e-6))), 0.3, 2.0, f"the airspeed is {ratio:.2f} of the speed over ground"
+    )
+
+
+def _air(c: Mapping[str, Array], dt_s: float) -> Finding:
+    standard = density_kg_m3(np.clip(np.median(c["altitude"]), -500.0, 20000.0))
+    ratio = float(np.median(c["density"]) / standard)
+    return _near(
+        float(np.log(max(ratio, 1e-6))),
+        0.05,
+        2.0,
+        f"the density is {ratio:.3f} of the standard atmosphere's there",
+    )
+
+
+def _pressure_height(c: Mapping[str, Array], dt_s: float) -> Finding:
+    off = float(np.median(c["altitude"] - c["gps_altitude"]))
+    return _near(off / 250.0, 1.0, 40.0, f"the altitude is {off:+.0f} m from the satellites' altitude")
+
+
+_TURNED: Final = _moved(
+    "theta", "the integral of q", 2, lambda c: c["theta"], lambda c, dt: integral(c["q"], dt)
+)
+_HEAVED: Final = _moved("alpha", "the integral of q + (az + g)/V", 2, lambda c: c["alpha"], _heave)
+_DRAWN: Final = _moved(
+    "the airspeed", "the integral of the force along the path", 2, lambda c: c["airspeed"], _along
+)
+_LIFTED: Final = _moved(
+    "the altitude", "the double integral of the vertical force", 3, lambda c: c["altitude"], _risen
+)
+_FLOWN: Final = _moved(
+    "the altitude", "the integral of V sin(theta - alpha)", 2, lambda c: c["altitude"], _climbed
+)
+"""Tests of changes; the module states the equations."""
+RELATIONS: Final = (
+    Relation(("az",), _weight),
+    Relation(("theta", "q"), _TURNED),
+    Relation(("ax", "theta"), _axial),
+    Relation(("alpha", "theta"), _level),
+    Relation(("alpha", "q", "az", "airspeed"), _HEAVED, ("theta", "ax")),
+    Relation(("airspeed", "theta", "az", "ax", "alpha"), _DRAWN),
+    Relation(("airspeed", "az", "q"), _lifts, ("theta", "elevator")),
+    Relation(("altitude", "theta", "az"), _LIFTED, ("ax",)),
+    Relation(("altitude", "theta", "alpha", "airspeed"), _FLOWN),
+    Relation(("elevator", "q", "az"), _pitches, ("alpha",)),
+    Relation(("airspeed", "ground_speed"), _ground),
+    Relation(("density", "altitude"), _air),
+    Relation(("altitude", "gps_altitude"), _pressure_height),
+)
+"""Everything that is tested. A relation uses further slots where they are assigned."""
+
+__all__ = ["MOST", "RELATIONS", "Finding", "Relation", "compared", "control"]
