@@ -4,7 +4,8 @@
 
 Wing and tail of a model are those of its <metrics>; its reference point of the forces counts as the quarter chord. What
 the metrics do not state is assumed: a tail with an aspect ratio of 4.5, and an elevator of 0.38 of its chord. The reference
-are the central differences of JSBSim's accelerations at the condition of the model's first campaign.
+are the central differences of JSBSim's accelerations at the condition of the model's first campaign. A model without CLq is
+a generic one whose other terms are defaults: it is printed and does not count.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 from airtruth.errors import AircraftError, AirtruthError
 from airtruth.physics import handbook
 from airtruth.physics.handbook import Planform
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.short_period import CL_Q, PARAMETERS
 from airtruth.simulation.campaign import file as campaign_file
 from airtruth.simulation.foreign_aircraft import CAMPAIGN, new_from_jsbsim
 from airtruth.simulation.resolution import trimmed_and_linear
@@ -38,6 +39,8 @@ NAMES: Final = (
 """Models of JSBSim's package with a tail behind a wing of little sweep or a transport's, whose metrics state the tail."""
 TAIL_ASPECT: Final = 4.5
 ELEVATOR: Final = 0.38
+_SHARE: Final = 0.68
+_NO_TERM: Final = 1e-3
 
 
 def planform_of(name: str) -> Planform:
@@ -80,8 +83,8 @@ def reference(name: str, folder: Path) -> Array:
 def main(argv: Sequence[str] | None = None) -> None:
     """Print each model and the statistics of all."""
     names = list(sys.argv[1:] if argv is None else argv) or NAMES
-    rows, points = [], []
-    sys.stdout.write("model      " + " ".join(f"{n:>16}" for n in PARAMETERS) + "\n")
+    errors = []
+    sys.stdout.write("flown/proposed " + " ".join(PARAMETERS) + "\n")
     for name in names:
         try:
             with tempfile.TemporaryDirectory() as folder:
@@ -89,29 +92,22 @@ def main(argv: Sequence[str] | None = None) -> None:
         except AirtruthError as error:  # the study goes on without a model that cannot be flown
             sys.stdout.write(f"{name}: {str(error).splitlines()[0][:100]}\n")
             continue
-        plan = planform_of(name)
-        proposed = handbook.derivatives(plan)
-        value = np.array([proposed[n] for n in PARAMETERS])
-        rows.append(flown / value)
-        # distance of the neutral point behind the CG [chords], flown less proposed
-        points.append(-flown[3] / flown[0] + value[3] / value[0])
-        pairs = " ".join(f"{f:7.3g}/{v:8.3g}" for f, v in zip(flown, value, strict=True))
-        sys.stdout.write(f"{name:10s} {pairs}  cg {plan.cg:.3f}\n")
+        proposed = handbook.derivatives(planform_of(name))
+        value = np.array([proposed[key] for key in PARAMETERS])
+        margin = value[3] / value[0] - flown[3] / flown[0]  # flown less proposed [chords]
+        is_complete = abs(flown[CL_Q]) > _NO_TERM
+        if is_complete:
+            errors.append([*np.abs(flown / value - 1.0), abs(margin)])
+        pairs = " ".join(f"{f:.3g}/{v:.3g}" for f, v in zip(flown, value, strict=True))
+        sys.stdout.write(
+            f"{name:10s} {pairs} margin {margin:+.3f}{'' if is_complete else ' (not counted)'}\n"
+        )
         sys.stdout.flush()
-    logs = np.log(np.abs(rows))
-    for title, figures in (
-        ("median", np.exp(np.median(logs, axis=0))),
-        ("rms of the relative error", np.sqrt(np.mean((np.array(rows) - 1.0) ** 2, axis=0))),
-        (
-            "half of the middle 68 %",
-            np.diff(np.quantile(np.array(rows), (0.16, 0.84), axis=0), axis=0)[0] / 2,
-        ),
-    ):
-        sys.stdout.write(f"{title}: " + " ".join(f"{x:.3f}" for x in figures) + "\n")
-    sys.stdout.write(
-        f"static margin, flown less proposed [chords]: mean {np.mean(points):.3f}, std {np.std(points):.3f}, median "
-        f"{np.median(points):.3f}\n"
-    )
+    if errors:
+        scatter = " ".join(f"{x:.2f}" for x in np.quantile(errors, _SHARE, axis=0))
+        sys.stdout.write(
+            f"relative errors that 68 % of {len(errors)} models do not exceed, and margin: {scatter}\n"
+        )
 
 
 if __name__ == "__main__":

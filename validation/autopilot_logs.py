@@ -170,13 +170,14 @@ def write_ardupilot(path: Path, flight: Flight) -> None:
                 "AccY": none(t_imu),
                 "AccZ": imu["az"],
             },
-            {n: "rad/s" for n in ("GyrX", "GyrY", "GyrZ")} | {n: "m/s/s" for n in ("AccX", "AccY", "AccZ")},
+            dict.fromkeys(("GyrX", "GyrY", "GyrZ"), "rad/s")
+            | dict.fromkeys(("AccX", "AccY", "AccZ"), "m/s/s"),
         ),
         Topic(
             "ATT",
             t_att,
             {"Roll": none(t_att), "Pitch": attitude["theta"] / DEG, "Yaw": none(t_att)},
-            {n: "deg" for n in ("Roll", "Pitch", "Yaw")},
+            dict.fromkeys(("Roll", "Pitch", "Yaw"), "deg"),
         ),
         Topic("ARSP", t_air, {"Airspeed": air["airspeed"]}, {"Airspeed": "m/s"}),
         Topic("BARO", t_baro, {"Alt": baro["altitude"]}, {"Alt": "m"}),
