@@ -27,7 +27,7 @@ _SYSTEM: Final = {
 """Unit -> system of units."""
 _MIXED: Final = 1.2
 """Loss of a file that mixes degrees and radians, or metres and feet, where it does not state them (judgement)."""
-_ONE_SENSOR: Final = 4.0
+_ONE_SENSOR: Final = 6.0
 """Loss where the axes of one accelerometer have different units (judgement)."""
 _SAME: Final = (0.9, 0.15, 0.15)
 """Least correlation, and largest departures of factor and level, of two sensors of one quantity [-] (judgement)."""

@@ -56,7 +56,7 @@ _RARE: Final = {
     **dict.fromkeys(("mm", "mg"), 0.02),
     **dict.fromkeys(("km", "in", "cm_s2", "mm_s"), 0.01),
     **dict.fromkeys(("mrad", "mrad_s"), 0.003),
-    "km_h": 0.1,
+    "km_h": 0.05,
     **dict.fromkeys(("kt", "ft"), 0.5),
     "ft_s": 0.4,
     "ft_s2": 0.2,

@@ -1,9 +1,10 @@
 """What physics says of an assignment: logarithms of likelihood ratios, with the figure that each rests on.
 
-A relation y = x between a measured channel and what others require of it is compared with "unrelated". Both sides are divided
-into blocks, and a polynomial is taken out of each, which stands for biases and the start of an integral. With n independent
-samples the ratio is (n/2) ln(P(y)/max(P(y - x), tau^2 P(x))), P the power, tau the tolerance of the relation. A wrong unit, sign
-or axis makes P(y - x) larger than P(y).
+A relation y = x between a measured channel and what others require of it is compared with "unrelated, and of any size". Both
+sides are divided into blocks, and a polynomial is taken out of each, which stands for biases and the start of an integral. With n
+independent samples and the squared correlation R2 a common motion has the logarithm -(n/2) ln(1 - R2). The factor k of y on x has
+the variance (1 - R2)/(n R2) + tau^2 of its logarithm, tau the tolerance of the relation; its density at 1 is compared with a
+broad one. A wrong unit moves k, a wrong sign makes it negative, a wrong axis takes R2 away.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import detrend
 from scipy.special import log_ndtr
 
 from airtruth.checks.spectra import integral, regress, spectrum
@@ -27,8 +29,9 @@ BLOCK_S: Final = 8.0
 """Length of a block [s] (judgement: some periods of the short period, shorter than drifts)."""
 BAND_HZ: Final = 1.0
 """Band of the motion, which gives the number of independent samples [Hz] (judgement)."""
-TOLERANCE: Final = 0.15
-"""Relative error of a relation that scales, lags and positions of sensors explain [-] (judgement)."""
+TOLERANCE, BROAD = 0.2, 2.0
+"""Standard deviation of the logarithm of a factor that scales, lags and positions of sensors explain, and of one of which nothing is
+known [-] (judgement)."""
 MOST: Final = 10.0
 """Largest logarithm of a likelihood ratio that one relation may give [-]: a model is never surer of itself."""
 
@@ -64,21 +67,27 @@ def _rest(x: Array, dt_s: float, degree: int) -> Array:
     return np.asarray(blocks - (blocks @ basis) @ basis.T)
 
 
-def compared(
-    y: Array, x: Array, dt_s: float, degree: int, tolerance: float = TOLERANCE
-) -> tuple[float, float, float]:
+def compared(y: Array, x: Array, dt_s: float, degree: int) -> tuple[float, float, float]:
     """Logarithm of the likelihood ratio of y = x, factor of y on x, and squared correlation."""
     with np.errstate(all="ignore"):
         a, b = _rest(y, dt_s, degree), _rest(x, dt_s, degree)
-        own, given, left = (a**2).sum(), (b**2).sum(), ((a - b) ** 2).sum()
-        product = (a * b).sum()
+        own, given, product = (a**2).sum(), (b**2).sum(), (a * b).sum()
         samples = 2.0 * BAND_HZ * dt_s * a.size
-        ratio = 0.5 * samples * np.log(own / max(left, tolerance**2 * given, 1e-300))
         share = product**2 / max(own * given, 1e-300)
         factor = product / max(given, 1e-300)
-    if not np.isfinite([ratio, share, factor]).all():
-        return 0.0, np.nan, 0.0
-    return float(np.clip(ratio, -MOST, MOST)), float(factor), float(share)
+    if not np.isfinite([share, factor]).all() or samples * share < 9.0:
+        return 0.0, float(factor) if np.isfinite(factor) else np.nan, 0.0
+    if factor < 0.0:
+        return -MOST, float(factor), float(share)
+    common = min(-0.5 * samples * np.log(max(1.0 - share, 1e-9)), 0.5 * MOST)
+    std = np.hypot(np.sqrt((1.0 - share) / (samples * share)), TOLERANCE)
+    return float(common + _density(float(np.log(factor)), float(std), BROAD)), float(factor), float(share)
+
+
+def _density(deviation: float, std: float, broad: float) -> float:
+    """Logarithm of a normal density of a deviation over that of a broad one that knows nothing."""
+    ratio = -0.5 * (deviation / std) ** 2 + 0.5 * (deviation / broad) ** 2 + np.log(broad / std)
+    return float(np.clip(ratio, -MOST, MOST))
 
 
 def _moved(
@@ -92,11 +101,7 @@ def _moved(
 
 
 def _near(deviation: float, std: float, broad: float, words: str) -> Finding:
-    """Normal density of a deviation over a broad one that knows nothing."""
-    if not np.isfinite(deviation):
-        return Finding(0.0, words)
-    ratio = -0.5 * (deviation / std) ** 2 + 0.5 * (deviation / broad) ** 2 + np.log(broad / std)
-    return Finding(float(np.clip(ratio, -MOST, MOST)), words)
+    return Finding(_density(deviation, std, broad) if np.isfinite(deviation) else 0.0, words)
 
 
 def _attitude(c: Mapping[str, Array], dt_s: float) -> Array:
@@ -113,9 +118,20 @@ def _heave(c: Mapping[str, Array], dt_s: float) -> Array:
 
 
 def _along(c: Mapping[str, Array], dt_s: float) -> Array:
-    alpha = c["alpha"]
+    alpha = incidence(c, dt_s)
     pull = c["ax"] * np.cos(alpha) + c["az"] * np.sin(alpha) - G0 * np.sin(c["theta"] - alpha)
     return integral(pull, dt_s)
+
+
+def incidence(c: Mapping[str, Array], dt_s: float) -> Array:
+    """Angle of attack: measured, or but for a line the integral of q + (az + g)/V about theta, or theta [rad]."""
+    if "alpha" in c:
+        return c["alpha"]
+    theta = c["theta"] if "theta" in c else np.zeros_like(c["q"])
+    if "airspeed" not in c:
+        return theta
+    turned = integral(c["q"] + (c["az"] + G0) / np.maximum(np.abs(c["airspeed"]), 1.0), dt_s)
+    return np.asarray(detrend(turned) + theta.mean())
 
 
 def _risen(c: Mapping[str, Array], dt_s: float) -> Array:
@@ -135,14 +151,8 @@ def _weight(c: Mapping[str, Array], dt_s: float) -> Finding:
 
 
 def _axial(c: Mapping[str, Array], dt_s: float) -> Finding:
-    lean = G0 * np.sin(np.clip(c["theta"], -1.5, 1.5))
-    ratio, _, _ = compared(c["ax"], lean, dt_s, 0, 0.5)
-    off = float(np.median(c["ax"] - lean)) / G0
-    near = _near(off, 0.05, 0.5, "")
-    return Finding(
-        float(np.clip(near.log_ratio + 0.3 * max(ratio, -MOST), -MOST, MOST)),
-        f"the median of ax departs by {off:+.3f} g from g sin(theta)",
-    )
+    off = float(np.median(c["ax"] - G0 * np.sin(np.clip(c["theta"], -1.5, 1.5)))) / G0
+    return _near(off, 0.05, 0.5, f"the median of ax departs by {off:+.3f} g from g sin(theta)")
 
 
 def _level(c: Mapping[str, Array], dt_s: float) -> Finding:
@@ -151,12 +161,8 @@ def _level(c: Mapping[str, Array], dt_s: float) -> Finding:
 
 
 def control(c: Mapping[str, Array], dt_s: float) -> tuple[float, float]:
-    """Change of q' with the elevator, with q and alpha (or the load) held, and its standard deviation [1/s2]."""
-    causes = [
-        integral(c["elevator"], dt_s),
-        integral(c["alpha"] if "alpha" in c else c["az"], dt_s),
-        integral(c["q"], dt_s),
-    ]
+    """Change of q' with the elevator, with q and alpha held, and its standard deviation [1/s2]."""
+    causes = [integral(x, dt_s) for x in (c["elevator"], incidence(c, dt_s), c["q"])]
     with np.errstate(all="ignore"):
         factors = regress(
             spectrum(c["q"][None], dt_s), np.stack([spectrum(x[None], dt_s) for x in causes], axis=1)
@@ -247,11 +253,11 @@ RELATIONS: Final = (
     Relation(("ax", "theta"), _axial),
     Relation(("alpha", "theta"), _level),
     Relation(("alpha", "q", "az", "airspeed"), _HEAVED, ("theta", "ax")),
-    Relation(("airspeed", "theta", "az", "ax", "alpha"), _DRAWN),
+    Relation(("airspeed", "theta", "q", "az", "ax"), _DRAWN, ("alpha",)),
     Relation(("airspeed", "az", "q"), _lifts, ("theta", "elevator")),
     Relation(("altitude", "theta", "az"), _LIFTED, ("ax",)),
     Relation(("altitude", "theta", "alpha", "airspeed"), _FLOWN),
-    Relation(("elevator", "q", "az"), _pitches, ("alpha",)),
+    Relation(("elevator", "q", "az"), _pitches, ("alpha", "airspeed", "theta")),
     Relation(("airspeed", "ground_speed"), _ground),
     Relation(("density", "altitude"), _air),
     Relation(("altitude", "gps_altitude"), _pressure_height),

@@ -72,6 +72,8 @@ class Writer:
         body = [line for slot in _ORDER for line in self._slot(slot)]
         body += self._velocity()
         body += self._missing()
+        if not any(line.startswith("\n[channels.") for line in body):
+            body.insert(0, "\n[channels]")
         return Proposal((*self._time(), *body), frozenset(self.mapped), tuple(self.doubts))
 
     def _slot(self, slot: str) -> Iterator[str]:
@@ -293,7 +295,11 @@ class Writer:
         yield '# calibration = [[..., ...], [..., ...]] # value, deflection [deg], where they are no angles\n# unit = "deg"'
 
     def _effects(self) -> Iterator[tuple[Column, str, float]]:
-        values = {s: d.reading.values for s, d in self.decisions.items() if s in ("q", "az", "alpha")}
+        values = {
+            s: d.reading.values
+            for s, d in self.decisions.items()
+            if s in ("q", "az", "alpha", "airspeed", "theta")
+        }
         for column, why in self.found.surfaces:
             x = self.grid.of(column, self.clocks)
             if x is None or np.ptp(x) == 0.0:
