@@ -6,12 +6,17 @@ import numpy as np
 import pytest
 
 from airtruth import aircraft
+from airtruth.aircraft.corrected import write_corrected
+from airtruth.aircraft.jsbsim.short_period import TrimPoint
 from airtruth.design import from_files
 from airtruth.design.flight import PlanOptions
 from airtruth.errors import AircraftError, ConfigurationError
 from airtruth.logs.histories import FILE, Histories, History, write_histories
 from airtruth.logs.provenance import PROVENANCE, Provenance, aircraft_digests
+from airtruth.physics.terms import Change
 from airtruth.tracing.answer import ANSWER
+from airtruth.tracing.update import WITHOUT_EFFECTS
+from validation import small_aircraft as small
 
 CHANNELS = ("alpha_rad", "q_rad_s", "az_m_s2")
 
@@ -98,6 +103,18 @@ def test_a_trace_at_any_rate_gives_a_campaign(tmp_path, planned, rate):
     base, _ = planned(traced(tmp_path / "t", aircraft.load("gtm"), rate))
     assert base.log_hz == rate
     assert base.simulation_hz >= 150.0
+
+
+def test_an_aircraft_without_a_model_flies_in_the_form_that_its_trace_wrote(tmp_path, planned):
+    (tmp_path / "small").mkdir()
+    plane = small.declared(tmp_path / "small")
+    folder = traced(tmp_path / "t", plane)
+    at = TrimPoint(small.AIRSPEED_M_S, small.DENSITY_KG_M3, 0.05, -0.02)
+    flying = folder / WITHOUT_EFFECTS / plane.name
+    write_corrected(plane, plane.file.derivatives, at, Change(), flying)
+    base, declared = planned(folder)
+    assert declared.file.jsbsim is not None
+    assert base.aircraft == str(flying.resolve())
 
 
 def test_an_aircraft_without_a_model_is_told_so_before_a_campaign_is_asked_for(tmp_path):

@@ -50,11 +50,16 @@ def with_change(declared: Dynamics | None, change: Change) -> Dynamics | None:
     return None if result == Dynamics() else result
 
 
-def declared_dynamics(dynamics: Dynamics | None) -> Change:
+def declared_dynamics(dynamics: Dynamics | None, prefix: str = _DECLARED) -> Change:
     """Return an aircraft's dynamics as a change of its steady forces.
 
     In steady flight a state equals its input, and the tables of steady forces hold its increment at that value:
     the increment of the input itself is subtracted.
+
+    Parameters
+    ----------
+    dynamics : of an aircraft.toml; None for none.
+    prefix : before the name of each state; by default one that no effect uses.
     """
     if dynamics is None:
         return Change()
@@ -65,18 +70,18 @@ def declared_dynamics(dynamics: Dynamics | None) -> Change:
         if source is None:
             aero.append(term)
             continue
-        aero.append(replace(term, signal=_DECLARED + term.signal))
+        aero.append(replace(term, signal=prefix + term.signal))
         if source != ALPHA_DOT:
             aero.append(replace(term, signal=source, amplitude=-term.amplitude))
     return Change(
         surface=dynamics.surface,
-        states=tuple(replace(state, name=_DECLARED + state.name) for state in dynamics.states),
+        states=tuple(replace(state, name=prefix + state.name) for state in dynamics.states),
         aero=tuple(aero),
         readings=tuple(
             replace(
                 t,
-                signal=_DECLARED + t.signal if t.signal in inputs else t.signal,
-                behind=_DECLARED + t.behind if t.behind else "",
+                signal=prefix + t.signal if t.signal in inputs else t.signal,
+                behind=prefix + t.behind if t.behind else "",
             )
             for t in dynamics.readings
         ),

@@ -26,6 +26,14 @@ def new(
     method: Annotated[
         str | None, typer.Option(metavar="NAME", help="Method whose estimates are used.")
     ] = None,
+    late_ms: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            help="Undeclared delay of the elevator that the standard deviations of the estimates allow for [ms]; 0 if the "
+            "surface itself is measured.",
+        ),
+    ] = 50.0,
     derivative: Annotated[
         list[str] | None,
         typer.Option(
@@ -51,5 +59,9 @@ def new(
         else creation.stated_trim(airspeed_m_s, altitude_m, alpha_deg, elevator_deg)
     )
     derivatives = {} if estimates is None else creation.estimated_derivatives(estimates, method)
+    if derivatives and late_ms:
+        widened = creation.allowing_for_delay(aircraft, derivatives, at, 1e-3 * late_ms)
+        derivatives = widened.derivatives
+        print_result(widened.sentence)
     derivatives |= dict(creation.stated_derivative(text) for text in derivative or [])
     print_result(creation.new_aircraft(aircraft, out, at, derivatives).summary())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from shlex import quote
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -71,6 +71,10 @@ def mapping(
     _write(out, text, [*steps, command], force)
 
 
+def _measure(text: str) -> Any:
+    return typer.Option(help=text, rich_help_panel="Geometry of an aircraft without a JSBSim model")
+
+
 @new_app.command("aircraft", epilog="Example: airtruth new aircraft --jsbsim c182 --out aircraft/mine")
 def aircraft(
     out: Annotated[
@@ -82,9 +86,31 @@ def aircraft(
             metavar="NAME|PATH", help="JSBSim model: a name that JSBSim ships, an XML file, or its folder."
         ),
     ] = None,
+    span_m: Annotated[float | None, _measure("Wing span [m].")] = None,
+    wing_area_m2: Annotated[float | None, _measure("Wing area [m2].")] = None,
+    chord_m: Annotated[float | None, _measure("Mean aerodynamic chord [m]; default: area over span.")] = None,
+    tail_area_m2: Annotated[
+        float | None, _measure("Area of the horizontal tail with its elevator [m2].")
+    ] = None,
+    tail_arm_m: Annotated[float | None, _measure("CG to the quarter chord of the tail [m].")] = None,
+    tail_span_m: Annotated[
+        float | None, _measure("Span of the tail [m]; default: an aspect ratio of 4.5.")
+    ] = None,
+    elevator_share: Annotated[
+        float | None, _measure("Chord of the elevator over that of the tail; default: 0.35, all-moving: 1.")
+    ] = None,
+    cg: Annotated[
+        float | None,
+        _measure("CG behind the leading edge of the mean aerodynamic chord [chords]; default: 0.25."),
+    ] = None,
+    mass_kg: Annotated[float | None, _measure("Mass [kg].")] = None,
+    inertia_kg_m2: Annotated[float | None, _measure("Pitch inertia about the CG [kg m2].")] = None,
+    length_m: Annotated[
+        float | None, _measure("Length of the fuselage [m], which estimates the inertia.")
+    ] = None,
     force: Replace = False,
 ) -> None:
-    """Write an aircraft from a JSBSim model, which is surveyed and trimmed, or a commented aircraft.toml without a model."""
+    """Write an aircraft: from a JSBSim model, from its geometry, or a commented aircraft.toml to fill in."""
     if out.suffix == ".toml" and out.name != "aircraft.toml":
         raise ConfigurationError(
             f"--out {out}: the file of an aircraft is aircraft.toml in a folder of its own; state the folder, for example "
@@ -96,15 +122,34 @@ def aircraft(
         print_result(new_from_jsbsim(jsbsim, out, force=force).summary())
         return
     from airtruth.logs.names import name_of
-    from airtruth.starting import aircraft_text
+    from airtruth.starting import Measured, aircraft_text, proposed_aircraft
 
+    known = Measured(
+        span_m=span_m,
+        wing_area_m2=wing_area_m2,
+        tail_area_m2=tail_area_m2,
+        tail_arm_m=tail_arm_m,
+        mass_kg=mass_kg,
+        inertia_kg_m2=inertia_kg_m2,
+        length_m=length_m,
+        chord_m=chord_m,
+        tail_span_m=tail_span_m,
+        elevator_share=elevator_share,
+        cg=cg,
+    )
     folder = out.parent if out.name == "aircraft.toml" else out
     file = folder / "aircraft.toml"
     steps = [
-        f"airtruth identify LOG.parquet --aircraft {quote(str(folder))}",
         f"airtruth check LOG.parquet --aircraft {quote(str(folder))}",
+        f"airtruth trace LOG.parquet --aircraft {quote(str(folder))} --out out/{quote(folder.absolute().name)}",
     ]
-    _write(file, aircraft_text(name_of(folder.absolute())), steps, force)
+    name = name_of(folder.absolute())
+    if known.is_empty:
+        _write(file, aircraft_text(name), steps, force)
+        return
+    proposal = proposed_aircraft(name, known)
+    print_result(proposal.summary + "\n")
+    _write(file, proposal.text, steps, force)
 
 
 @app.command(epilog="Example: airtruth example vane")

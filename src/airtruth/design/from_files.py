@@ -32,6 +32,7 @@ from airtruth.simulation.campaign import file as campaign_file
 from airtruth.simulation.campaign.file import Campaign
 from airtruth.simulation.simulator import jsbsim_model
 from airtruth.tracing.answer import TraceAnswer, answer_path
+from airtruth.tracing.update import WITHOUT_EFFECTS
 
 Step = Callable[[str], None]
 
@@ -92,7 +93,7 @@ def planned_from(
     answer_file = None if trace is None else answer_path(trace)
     question = _question(stated, answer_file)
     records = _records(answer_file)
-    declared, base = _base(campaign, aircraft, records, "" if out is None else name_of(out))
+    declared, base = _base(campaign, aircraft, records, answer_file, "" if out is None else name_of(out))
     inputs = [p for p in (campaign, answer_file) if isinstance(p, Path)]
     with writing("plan", inputs, force=force) as outputs:
         if out is not None:
@@ -130,18 +131,30 @@ def _records(answer_file: Path | None) -> Histories | None:
 
 
 def _base(
-    campaign: Path | Campaign | None, aircraft: str | None, records: Histories | None, name: str
+    campaign: Path | Campaign | None,
+    aircraft: str | None,
+    records: Histories | None,
+    answer_file: Path | None,
+    name: str,
 ) -> tuple[Aircraft, Campaign]:
     """The declared aircraft and the campaign whose manoeuvres are replaced."""
     if campaign is not None:
         read = campaign if isinstance(campaign, Campaign) else campaign_file.read(campaign)
         near = campaign.parent if isinstance(campaign, Path) else None
-        declared = planes.load(aircraft or read.aircraft, near=near)
+        declared = _flying(planes.load(aircraft or read.aircraft, near=near), answer_file)
         own = name or read.name
         return declared, read.model_copy(update={"name": own, "aircraft": _stated(declared)})
-    declared = _traced(records) if aircraft is None else planes.load(aircraft)
+    declared = _flying(_traced(records) if aircraft is None else planes.load(aircraft), answer_file)
     raw = _default(declared, records) | {"name": name or _NAME, "aircraft": _stated(declared)}
     return declared, Campaign.model_validate(raw)
+
+
+def _flying(declared: Aircraft, answer_file: Path | None) -> Aircraft:
+    """The aircraft; of one without a JSBSim model the form that its trace wrote, without the accepted effects."""
+    if declared.file.jsbsim is not None or answer_file is None:
+        return declared
+    written = answer_file.parent / WITHOUT_EFFECTS / declared.name
+    return planes.load(written) if (written / planes.FILE).is_file() else declared
 
 
 def _traced(records: Histories | None) -> Aircraft:

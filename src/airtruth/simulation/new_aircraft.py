@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from airtruth.aircraft import Aircraft, load
 from airtruth.aircraft.create import TrimPoint, from_estimates, trim_point, write_new
 from airtruth.errors import ConfigurationError, TrimError, choices
@@ -15,7 +17,8 @@ from airtruth.logs.store import read_log, read_table
 from airtruth.logs.tables import Kind, require_kinds
 from airtruth.logs.validate import validate
 from airtruth.physics import atmosphere
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.late_surface import shift_of_a_delay
+from airtruth.physics.short_period import PARAMETERS, scale
 from airtruth.quantity import Quantity
 from airtruth.simulation.linearise import Linearisation
 from airtruth.simulation.resolution import trimmed_and_linear
@@ -110,6 +113,59 @@ def estimated_derivatives(table: Path, method: str | None = None) -> dict[str, Q
     return from_estimates(frame, method)
 
 
+@dataclass(frozen=True)
+class Widened:
+    """Estimates whose standard deviations allow for a late elevator.
+
+    Attributes
+    ----------
+    derivatives : estimates with wider standard deviations [1/rad].
+    sentence : how far the delay moves each estimate.
+    """
+
+    derivatives: dict[str, Quantity]
+    sentence: str
+
+
+def allowing_for_delay(
+    aircraft: str | Path, estimates: Mapping[str, Quantity], at: TrimPoint, delay_s: float
+) -> Widened:
+    """Add what an undeclared delay of the elevator does to estimates to their standard deviations.
+
+    The delay counts as a normal random number with this standard deviation, so that its shift of each estimate
+    (`airtruth.physics.late_surface`) adds in squares.
+
+    Parameters
+    ----------
+    aircraft : source of mass and geometry.
+    estimates : all six derivatives [1/rad].
+    at : trim of the records.
+    delay_s : standard deviation of the delay [s].
+
+    Raises
+    ------
+    AircraftError
+        If the aircraft does not exist or cannot be loaded.
+    ConfigurationError
+        If the estimates have no stable short period.
+    """
+    c = load(aircraft).constants
+    factors = scale(
+        c.wing_area_m2, c.chord_m, c.mass_kg, c.inertia_yy_kg_m2, at.airspeed_m_s, at.density_kg_m3
+    )
+    theta = np.array([estimates[name].value for name in PARAMETERS])
+    shifts = dict(zip(PARAMETERS, shift_of_a_delay(theta, factors, delay_s).tolist(), strict=True))
+    widened = {
+        name: q.model_copy(update={"std": math.hypot(q.std, shifts[name])}) for name, q in estimates.items()
+    }
+    moved = ", ".join(f"{name} by {shift:+.3g}" for name, shift in shifts.items())
+    return Widened(
+        widened,
+        f"A delay of the elevator of {1e3 * delay_s:g} ms that is neither declared nor recorded moves these estimates: {moved}; "
+        "their standard deviations contain it. `airtruth trace` tells a delay from the derivatives.",
+    )
+
+
 def stated_derivative(text: str) -> tuple[str, Quantity]:
     """Read NAME=VALUE.
 
@@ -179,6 +235,8 @@ def stated_trim(
 
 __all__ = [
     "NewAircraft",
+    "Widened",
+    "allowing_for_delay",
     "estimated_derivatives",
     "logged_trim",
     "new_aircraft",

@@ -43,7 +43,7 @@ def campaign_text(
             f"({choices(aircraft, CONDITIONS)})"
         )
     eas, altitude, amplitude, figures = CONDITIONS.get(aircraft, (0.0, 0.0, 1.0, "mil-f-8785c"))
-    return _filled(
+    return filled(
         "campaign",
         name=name,
         aircraft=aircraft.replace("\\", "\\\\").replace('"', '\\"'),
@@ -61,19 +61,25 @@ def aircraft_text(name: str) -> str:
     ----------
     name : name of the aircraft, as logs state it.
     """
-    return _filled("aircraft", name=name)
+    return filled("aircraft", name=name)
 
 
 def mapping_text() -> str:
     """A commented mapping; `airtruth.importers.guess_mapping` writes one for a given file."""
-    return _filled("mapping")
+    return filled("mapping")
 
 
-def _filled(kind: str, **values: str) -> str:
+def filled(kind: str, **values: str) -> str:
+    """A template with its placeholders replaced.
+
+    Parameters
+    ----------
+    kind : name of the template; values : placeholder -> text.
+    """
     text = resources.files("airtruth.starting").joinpath(f"templates/{kind}.toml").read_text(encoding="utf-8")
     for key, value in values.items():
         text = text.replace(f"@{key}@", value)
     return text
 
 
-__all__ = ["CONDITIONS", "aircraft_text", "campaign_text", "mapping_text"]
+__all__ = ["CONDITIONS", "aircraft_text", "campaign_text", "filled", "mapping_text"]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from airtruth.effects.increment import Increment
+from airtruth.physics.atmosphere import RHO0_KG_M3
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.tracing.answer import (
     ANOMALY_LEVEL,
@@ -64,6 +65,7 @@ from airtruth.tracing.selection.weights import alike_in_rivals
 from airtruth.tracing.stage_errors import Replay
 from airtruth.tracing.stages import Stages, accepted, before_fit, stage_errors
 from airtruth.tracing.tolerances import tolerances
+from airtruth.units import FT, KT
 
 Array = NDArray[np.float64]
 
@@ -139,7 +141,7 @@ def conclude(
         notes=(
             *reserved,
             *notes(stages, last, declared, errors, replay, forced),
-            *_unwritten(case, stated, updated_aircraft, replay),
+            *_generated(case, updated_aircraft),
         ),
         tolerances=tolerances(stages),
         replay=replay,
@@ -168,15 +170,19 @@ def _reserved(
     return (*reservations(effects, sets, declared.p_value, last.p_value_of(FRICTION), lag_s), *differ)
 
 
-def _unwritten(
-    case: Case, effects: Sequence[AcceptedEffect], updated: str | None, replay: Replay | None
-) -> Iterator[str]:
-    """Why a trace that writes files has accepted effects and no updated aircraft."""
-    if effects and updated is None and replay is not None:
-        name = case.fitted.records[0].plant.aircraft.name
-        yield (
-            f"no updated aircraft is written: {name} has no JSBSim model that could hold {', '.join(e.key for e in effects)}"
-        )
+def _generated(case: Case, updated: str | None) -> Iterator[str]:
+    """How to fly the updated aircraft of one that has no JSBSim model."""
+    if updated is None or case.fitted.records[0].plant.aircraft.file.jsbsim is not None:
+        return
+    signals = [record.signals for record in case.fitted.records]
+    pressure = np.mean([0.5 * s.density_kg_m3[0] * s.airspeed_m_s[0] ** 2 for s in signals])
+    eas_kt = math.sqrt(2.0 * float(pressure) / RHO0_KG_M3) / KT
+    altitude_ft = float(np.mean([s.altitude_m for s in signals])) / FT
+    yield (
+        "the updated aircraft has a generated JSBSim model, linear about the trim of the records, with a placeholder for the "
+        f"drag and a thrust line through the CG; `airtruth new campaign --aircraft {updated} --eas-kt {eas_kt:.1f} "
+        f"--altitude-ft {altitude_ft:.0f} --out first.toml` and `airtruth fly first.toml --out first` fly it"
+    )
 
 
 def _verdict(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +11,8 @@ from typing import Final, TypeVar
 import numpy as np
 
 from airtruth.aircraft import FILE, Aircraft
+from airtruth.aircraft.corrected import write_corrected
+from airtruth.aircraft.jsbsim.short_period import TrimPoint
 from airtruth.aircraft.write import MARK, Corrections, write_aircraft
 from airtruth.effects.increment import Increment
 from airtruth.errors import StoreError
@@ -26,7 +29,10 @@ from airtruth.tracing.model.response import moved_past_sensors_m
 from airtruth.tracing.model.settings import VANE
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.rounds import SearchRound
+from airtruth.units import G0
 
+WITHOUT_EFFECTS: Final = "without_effects"
+"""Folder beside that of the updated aircraft: one without a JSBSim model, as it flies without the accepted effects."""
 _WITH_ARM: Final = (VANE, "az_m_s2")
 """Channels whose reading depends on where their sensor is."""
 _Term = TypeVar("_Term", AeroTerm, ReadingTerm)
@@ -50,12 +56,18 @@ def updated_folder(aircraft: Aircraft, out: Path) -> Path:
     Raises
     ------
     StoreError
-        If the folder contains the declared aircraft, lies inside it, or holds anything but an earlier update: no
-        file of the user is ever replaced.
+        If it, or `WITHOUT_EFFECTS` beside it, contains the declared aircraft, lies inside it, or holds anything but an
+        earlier update: no file of the user is ever replaced.
     """
-    folder = out / "aircraft" / aircraft.name
     if aircraft.name in (".", ".."):
         raise StoreError(f"{aircraft.folder}: {aircraft.name!r} names no folder; give the aircraft a name")
+    folder, without = (out / name / aircraft.name for name in ("aircraft", WITHOUT_EFFECTS))
+    for each in (folder, *([without] if aircraft.file.jsbsim is None else [])):
+        _require_free(each, aircraft)
+    return folder
+
+
+def _require_free(folder: Path, aircraft: Aircraft) -> None:
     here, declared = folder.resolve(), aircraft.folder.resolve()
     if here == declared or here in declared.parents:
         raise StoreError(f"{folder}: holds the declared aircraft itself; choose another --out")
@@ -63,7 +75,6 @@ def updated_folder(aircraft: Aircraft, out: Path) -> Path:
         raise StoreError(f"{folder}: lies inside the folder of the declared aircraft; choose another --out")
     if folder.exists() and any(folder.iterdir() if folder.is_dir() else [folder]) and not _is_update(folder):
         raise StoreError(f"{folder}: exists and is not an earlier update of a trace; choose another --out")
-    return folder
 
 
 def _is_update(folder: Path) -> bool:
@@ -83,8 +94,9 @@ def write_update(
 ) -> str | None:
     """Write the aircraft with the accepted effects and the refitted derivatives to OUT/aircraft/NAME.
 
-    A complete new folder replaces an earlier update, or nothing changes. An aircraft without a JSBSim model takes
-    effects of its sensors only; for others, write a model first (`airtruth aircraft new`).
+    A complete new folder replaces an earlier update, or nothing changes. An aircraft without a JSBSim model is written
+    in any case, with a JSBSim model of the refitted derivatives; OUT/without_effects/NAME is the same without the effects,
+    which a plan flies.
 
     Parameters
     ----------
@@ -94,7 +106,7 @@ def write_update(
 
     Returns
     -------
-    The folder; None where nothing is to be changed, or nothing that the aircraft can take.
+    The folder; None where nothing of an aircraft with a JSBSim model is to be changed.
 
     Raises
     ------
@@ -107,7 +119,7 @@ def write_update(
     change += Change() if axial is None else axial.change
     released = rounds[-1].null.hypothesis.spread is not None
     refits = released or contradicted
-    if (change == Change() and not refits) or (aircraft.file.jsbsim is None and change.in_aircraft):
+    if change == Change() and not refits and aircraft.file.jsbsim is not None:
         atomic.remove_folder(folder)
         return None
     fit = rounds[-1].reported
@@ -122,18 +134,50 @@ def write_update(
     note = f"Traced from measured records: {found}."
     corrections = None
     refitted = bool(np.isfinite(list(increments.values())).all())
+    alpha = float(np.mean([p.trim_alpha_rad for p in plants])) + shift
+    elevator = float(np.mean([p.trim_elevator_rad for p in plants]))
     if refitted:
         aircraft = _with_derivatives(aircraft, increments)
-    if aircraft.file.jsbsim is not None and refitted:
-        alpha = float(np.mean([p.trim_alpha_rad for p in plants]))
-        elevator = float(np.mean([p.trim_elevator_rad for p in plants]))
-        corrections = Corrections(increments, alpha + shift, elevator)
-    if refitted:
         note += " Derivatives refitted: " + ", ".join(f"{k} {v:+.4g}" for k, v in increments.items()) + "."
     note += "".join(f"\n{line}" for line in (*_bands(case, fit), *map(_band, along)))
+    if aircraft.file.jsbsim is None:
+        at = _measured_trim(case, alpha, elevator)
+        _write_flying(_with_std(aircraft, case, fit), at, change, folder, note)
+        _write_flying(aircraft, at, Change(), folder.parents[1] / WITHOUT_EFFECTS / aircraft.name, note)
+        return str(folder)
+    if refitted:
+        corrections = Corrections(increments, alpha, elevator)
     with atomic.new_folder(folder) as new:
         write_aircraft(aircraft, change, new, note, corrections)
     return str(folder)
+
+
+def _measured_trim(case: Case, alpha_rad: float, elevator_rad: float) -> TrimPoint:
+    """The trim of the fitted records, in level flight."""
+    signals = [record.signals for record in case.fitted.records]
+    return TrimPoint(
+        airspeed_m_s=float(np.mean([s.airspeed_m_s[0] for s in signals])),
+        density_kg_m3=float(np.mean([s.density_kg_m3[0] for s in signals])),
+        alpha_rad=alpha_rad,
+        elevator_rad=elevator_rad,
+        az_m_s2=-G0 * math.cos(alpha_rad),
+    )
+
+
+def _write_flying(aircraft: Aircraft, at: TrimPoint, change: Change, folder: Path, note: str) -> None:
+    with atomic.new_folder(folder) as new:
+        write_corrected(aircraft, aircraft.file.derivatives, at, change, new, note)
+
+
+def _with_std(aircraft: Aircraft, case: Case, fit: PosteriorFit) -> Aircraft:
+    """The aircraft with the standard deviations of the refitted derivatives, which contain the declared ones."""
+    std = np.sqrt(np.diag(robust_covariance(case.fitted, fit))[Common.derivatives])
+    refitted = {
+        name: aircraft.file.derivatives[name].model_copy(update={"std": float(value)})
+        for name, value in zip(PARAMETERS, std, strict=True)
+    }
+    file = aircraft.file.model_copy(update={"derivatives": refitted})
+    return aircraft.model_copy(update={"file": file})
 
 
 def _with_derivatives(aircraft: Aircraft, increments: Mapping[str, float]) -> Aircraft:
@@ -191,4 +235,4 @@ def from_zero_alpha(change: Change, shift_rad: float) -> Change:
     )
 
 
-__all__ = ["accepted_change", "from_zero_alpha", "updated_folder", "write_update"]
+__all__ = ["WITHOUT_EFFECTS", "accepted_change", "from_zero_alpha", "updated_folder", "write_update"]
