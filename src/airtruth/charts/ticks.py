@@ -19,9 +19,22 @@ def ticks(low: float, high: float, most: int = 5) -> list[float]:
     """
     rough = (high - low) / most
     power = 10.0 ** math.floor(math.log10(rough))
-    step = next(s for s in _STEPS if s * power >= rough * (1.0 - 1e-9)) * power
+    at = next(i for i, s in enumerate(_STEPS) if s * power >= rough * (1.0 - 1e-9))
+    found = _multiples(low, high, _STEPS[at] * power)
+    # a single tick gives no scale
+    return found if len(found) > 1 else _multiples(low, high, (_STEPS[at - 1] if at else 0.5) * power)
+
+
+def _multiples(low: float, high: float, step: float) -> list[float]:
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     return [k * step for k in range(first, last + 1)]
+
+
+def log_ticks(low: float, high: float) -> list[float]:
+    """Return log10 of the numbers 1, 2 and 5 times a power of ten between two ends, which are log10 as well."""
+    powers = range(math.floor(low), math.ceil(high) + 1)
+    found = (k + math.log10(s) for k in powers for s in _STEPS[:3])
+    return [at for at in found if low - 1e-9 <= at <= high + 1e-9]
 
 
 def label(value: float, step: float) -> str:

@@ -91,10 +91,10 @@ def frequency_response(
         whole = values.mean(axis=0)[band >= 0]
         return np.bincount(band[band >= 0], weights=whole) / np.maximum(count, 1)
 
-    cross = averaged(sxy.real) + 1j * averaged(sxy.imag)
+    cross = np.asarray(averaged(sxy.real) + 1j * averaged(sxy.imag), dtype=np.complex128)
     power_x, power_y, centre = averaged(sxx), averaged(syy), averaged(f[None])
-    with np.errstate(invalid="ignore", divide="ignore"):
-        response = cross / power_x
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        response = np.asarray(cross / power_x, dtype=np.complex128)
         coherence = np.abs(cross) ** 2 / (power_x * power_y)
         averages = count * len(inputs)
         error = np.sqrt(np.maximum(1.0 - coherence, 0.0) / (2.0 * averages * coherence))

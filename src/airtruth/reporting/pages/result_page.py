@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import html
 import re
 
 from airtruth import style
 from airtruth.reporting.pages.page import Report, Section, data_table, page_of, preformatted
 from airtruth.result import Result
-from airtruth.table import as_csv, as_latex, from_frame
+from airtruth.table import as_csv, as_latex, escaped, from_frame
 
 
 def result_report(result: Result) -> Report:
@@ -18,7 +17,7 @@ def result_report(result: Result) -> Report:
     first, *rest = result.summary().splitlines() or [""]
     figure = result.plot()
     picture = style.as_html(style.as_png(figure), title)
-    answer = f'<p class="verdict">{html.escape(first)}</p>\n{preformatted(rest) if rest else ""}\n{picture}'
+    answer = f'<p class="verdict">{escaped(first)}</p>\n{preformatted(rest) if rest else ""}\n{picture}'
     sections = [Section("Table", "table", data_table(table, "result"))]
     return Report(
         page=page_of(title, answer, None, sections),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -17,7 +18,7 @@ from airtruth.table import significant
 from airtruth.tracing.answer import CandidateScore, TraceAnswer
 from airtruth.tracing.presentation.candidates import ranked
 from airtruth.tracing.presentation.effect_panel import line
-from airtruth.tracing.presentation.error_table import stages_of
+from airtruth.tracing.presentation.error_table import MEANING, stages_of
 from airtruth.tracing.presentation.text import FAR_SIGMA, headline
 from airtruth.tracing.presentation.trace_histories import panel_of
 
@@ -33,6 +34,12 @@ _SMALLEST: Final = 1e-290
 """Probability up to which a p-value is converted to a normal variable [-] (above underflow)."""
 _LARGEST_SIGMA: Final = 36.0
 """Size of a normal variable with that probability [-], as norm.isf(0.5e-290) = 36.4."""
+_MODEL_COLOURS: Final[tuple[Colour, ...]] = ("vermillion", "blue", "green")
+"""Colours of the declared and of further models, in their order."""
+_MODEL_STROKES: Final[tuple[Stroke, ...]] = ("dashed", "solid", "dotted")
+"""Strokes beside these colours."""
+_LETTERS: Final = 64
+"""Most characters of a reason beside a bar [-] (judgement: half of the figure)."""
 _POINTS: Final = 600
 """Most points of a curve of a chart [-]; judgement: two per pixel of a panel."""
 _LAGS: Final = 50
@@ -42,9 +49,12 @@ _LAGS: Final = 50
 def trace_chart(answer: TraceAnswer, histories: Histories) -> Chart:
     """Residuals of one record's free run: as declared; the effect; before and after.
 
-    The first column shows the declared model alone, and the third has the same scales.
+    The first column shows the declared model alone, and the third has the same scales. Without an accepted effect, the
+    record beside its simulations, and the residuals.
     """
     record = histories.first
+    if not record.effect:
+        return _without_effect(answer, histories)
     channels = list(record.measured)
     best = histories.models[-1]
     left = [_residuals(record, channel, histories.models[:1]) for channel in channels]
@@ -69,9 +79,52 @@ def trace_chart(answer: TraceAnswer, histories: Histories) -> Chart:
         panels=tuple(panels),
         columns=3,
         caption=f"Free runs of record {record.run_id}{group}. Shaded: two standard deviations of the response to gusts "
-        "and sensor noise.",
+        f"and sensor noise. {_meanings(stages_of(answer))}",
         legend=False,
     )
+
+
+def _without_effect(answer: TraceAnswer, histories: Histories) -> Chart:
+    """One record beside its simulations, and their residuals, where no effect was accepted."""
+    record = histories.first
+    step = max(1, -(-len(record.t_s) // _POINTS))
+    panels = []
+    for i, channel in enumerate(record.measured):
+        name, factor = shown(channel)
+        measured = line(record.t_s[::step], record.measured[channel][::step] * factor)
+        lines = [replace(measured, label="measured", colour="ink", stroke="points")]
+        residuals = []
+        for model, colour, stroke in zip(histories.models, _MODEL_COLOURS, _MODEL_STROKES, strict=False):
+            y = record.models[model][channel][::step] * factor
+            lines.append(replace(line(record.t_s[::step], y), label=model, colour=colour, stroke=stroke))
+            residual = record.residual(model, channel)[::step] * factor
+            residuals.append(replace(line(record.t_s[::step], residual), colour=colour, stroke=stroke))
+        floor = 2.0 * record.floor.get(channel, np.nan) * factor
+        time = "time [s]" if i == len(record.measured) - 1 else ""
+        titles = ("measured and simulated", "residual") if i == 0 else ("", "")
+        panels += [
+            Panel(titles[0], time, name, tuple(lines)),
+            Panel(
+                titles[1],
+                time,
+                name.replace(" [", " residual ["),
+                tuple(residuals),
+                bands=(Band(-floor, floor, label="two standard deviations of gusts and noise"),),
+            ),
+        ]
+    group = f", {record.group}" if record.group else ""
+    return Chart(
+        name="trace",
+        title=f"{headline(answer)}. No effect accepted: the record beside the declared and the refitted model",
+        panels=tuple(panels),
+        columns=2,
+        caption=f"Free runs of record {record.run_id}{group}. {_meanings(histories.models)}",
+    )
+
+
+def _meanings(stages: Iterable[str]) -> str:
+    """What the stages are, as a sentence."""
+    return "; ".join(MEANING[name] for name in stages if name in MEANING).capitalize() + "."
 
 
 def _residuals(record: History, channel: str, models: Sequence[str]) -> Panel:
@@ -94,7 +147,7 @@ def _contribution(record: History) -> Panel:
     """The effects' part of the outputs, over the floor."""
     title = "effect on the outputs"
     if not record.effect:
-        return Panel(title=title, words="no effect accepted")
+        return Panel(title=title, words="no effect on this record")
     step = max(1, -(-len(record.t_s) // _POINTS))
     return Panel(
         title=title,
@@ -151,18 +204,17 @@ def scores_chart(answer: TraceAnswer) -> Chart:
     leading = {e.key for e in answer.effects}
     alike = {name for e in answer.effects for name in e.indistinguishable_from}
     sigma = [_sigma(r.candidate) for r in rows]
+    needed = _needed(sigma)
     bars = []
     for at, r in enumerate(rows):
         accepted, same = r.candidate.key in leading, r.candidate.name in alike
         colour: Colour = "vermillion" if accepted else "orange" if same else "blue"
         label = "accepted" if accepted else "looks the same" if same else "not accepted"
         words = [] if colour == "blue" else [label]
+        if colour == "blue" and sigma[at] > needed[at]:
+            words = [f"not accepted: {textwrap.shorten(r.outcome, _LETTERS, placeholder=' ...')}"]
         words += [] if r.gain is None else [f"refit gains {significant(r.gain)} in 2 log L"]
         bars.append(Bar(at, sigma[at], label, colour, ": ".join(words)))
-    # Holm's rule goes by significance, whatever the order of the rows
-    order = np.argsort(-np.array(sigma), kind="stable")
-    needed = np.empty(len(rows))
-    needed[order] = norm.isf(0.5 * LEVEL / (len(rows) - np.arange(len(rows))))
     holm = replace(
         line(needed, np.arange(len(rows))),
         label=f"Holm, {100.0 * LEVEL:g} % over all",
@@ -183,6 +235,14 @@ def scores_chart(answer: TraceAnswer) -> Chart:
         columns=1,
         caption="An effect is accepted on the gain of its refit, which can be large although its score is small.",
     )
+
+
+def _needed(sigma: Sequence[float]) -> Array:
+    """Significance that Holm's rule asks for in each row; it goes by significance, whatever the order of the rows."""
+    order = np.argsort(-np.array(sigma), kind="stable")
+    needed = np.empty(len(sigma))
+    needed[order] = norm.isf(0.5 * LEVEL / (len(sigma) - np.arange(len(sigma))))
+    return needed
 
 
 def _sigma(candidate: CandidateScore) -> float:
@@ -239,43 +299,55 @@ def _is_far(mark: Mark) -> bool:
 
 
 def innovations_chart(histories: Histories) -> Chart:
-    """Whitened innovations of one record and their autocorrelation, as declared and of the last stage."""
+    """Whitened innovations of one record as declared and of the last stage, and the autocorrelation of both."""
     record = histories.first
     models = list(dict.fromkeys((histories.models[0], histories.models[-1])))
     return Chart(
         name="innovations",
         title=f"Whitened innovations and their autocorrelation, {' and '.join(models)}",
         panels=tuple(p for channel in record.measured for p in _whiteness(record, channel, models)),
-        columns=2,
-        caption=f"Record {record.run_id}. Shaded: 95 % of white noise.",
+        columns=len(models) + 1,
+        caption=f"Record {record.run_id}. {_meanings(models)}",
     )
 
 
 def _whiteness(record: History, channel: str, models: Sequence[str]) -> Iterator[Panel]:
+    """A panel of innovations for each model with one scale, so that none hides another; then the autocorrelations."""
     n = len(record.t_s)
     step = max(1, -(-n // _POINTS))
     lags = np.arange(1, min(_LAGS + 1, max(2, n // 4)))
     dt = float(record.t_s[1] - record.t_s[0]) if n > 1 else np.nan
     bound = float(norm.isf(0.025) / np.sqrt(n))
     series, correlations = [], []
-    for model in models:
+    for model, colour, stroke in zip(models, _MODEL_COLOURS, _MODEL_STROKES, strict=False):
         e = record.innovations.get(model, {}).get(channel)
         if e is None:
             continue
-        colour: Colour = "blue" if model == models[-1] else "grey"
         series.append(replace(line(record.t_s[::step], e[::step]), label=model, colour=colour))
-        correlations.append(replace(line(lags * dt, _correlation(e, lags)), label=model, colour=colour))
+        correlations.append(
+            replace(line(lags * dt, _correlation(e, lags)), label=model, colour=colour, stroke=stroke)
+        )
+    white = "95 % of white noise"
+    panels = [
+        Panel(
+            title=own.label,
+            x_label="time [s]",
+            y_label=f"{_short(channel)} [\u03c3]",
+            lines=(own,),
+            bands=(Band(-1.96, 1.96, label=white),),
+        )
+        for own in series
+    ]
+    ends = [panel.y_range() for panel in panels]
+    for panel in panels:
+        both = (min(low for low, _ in ends), max(high for _, high in ends))
+        yield replace(panel, y_limits=both)
     yield Panel(
-        x_label="time [s]",
-        y_label=f"{_short(channel)} [σ]",
-        lines=tuple(series),
-        bands=(Band(-1.96, 1.96),),
-    )
-    yield Panel(
+        title="autocorrelation",
         x_label="lag [s]",
-        y_label=f"{_short(channel)} autocorrelation",
+        y_label=f"{_short(channel)} [-]",
         lines=tuple(correlations),
-        bands=(Band(-bound, bound),),
+        bands=(Band(-bound, bound, label=white),),
     )
 
 
