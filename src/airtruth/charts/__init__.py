@@ -13,6 +13,7 @@ from airtruth.charts.model import (
     Panel,
     Rule,
     Stroke,
+    colours_of,
     share_x,
 )
 from airtruth.charts.svg import as_html
@@ -31,5 +32,6 @@ __all__ = [
     "Stroke",
     "as_figure",
     "as_html",
+    "colours_of",
     "share_x",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
@@ -25,6 +25,15 @@ SHAPES: Final[Mapping[Colour, Shape]] = {
     "grey": "triangle",
 }
 """Shape of the marks of each colour: print without colours, and readers who do not see them, tell marks apart."""
+
+MODELS: Final[tuple[Colour, ...]] = ("blue", "vermillion", "green", "purple", "orange", "sky")
+"""Colours of several models, the last model first: it is the answer."""
+
+
+def colours_of(models: Sequence[str]) -> dict[str, Colour]:
+    """Model -> its colour, the same in every chart of a page."""
+    return {name: MODELS[k % len(MODELS)] for k, name in enumerate(reversed(models))}
+
 
 LARGEST: Final = 1e30
 """Largest magnitude that is drawn [-]; judgement: beyond any quantity, and its square does not overflow."""
@@ -292,6 +301,7 @@ def _range(values: Iterable[float], margin: float) -> tuple[float, float]:
 
 __all__ = [
     "LARGEST",
+    "MODELS",
     "SHAPES",
     "SMALLEST",
     "Area",
@@ -307,6 +317,7 @@ __all__ = [
     "Rule",
     "Shape",
     "Stroke",
+    "colours_of",
     "drawable",
     "share_x",
 ]

@@ -19,15 +19,10 @@ def ticks(low: float, high: float, most: int = 5) -> list[float]:
     """
     rough = (high - low) / most
     power = 10.0 ** math.floor(math.log10(rough))
-    at = next(i for i, s in enumerate(_STEPS) if s * power >= rough * (1.0 - 1e-9))
-    found = _multiples(low, high, _STEPS[at] * power)
-    # a single tick gives no scale
-    return found if len(found) > 1 else _multiples(low, high, (_STEPS[at - 1] if at else 0.5) * power)
-
-
-def _multiples(low: float, high: float, step: float) -> list[float]:
+    step = next(s for s in _STEPS if s * power >= rough * (1.0 - 1e-9)) * power
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
-    return [k * step for k in range(first, last + 1)]
+    # a single tick gives no scale
+    return [k * step for k in range(first, last + 1)] if last > first else ticks(low, high, 2 * most)
 
 
 def log_ticks(low: float, high: float) -> list[float]:

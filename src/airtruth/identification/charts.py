@@ -70,11 +70,7 @@ def intervals_chart(
             x_label=f"{name.removesuffix('_rad_s')} [{UNITS[name]}]",
             rows=tuple(methods),
             marks=tuple(row[name] for row in marks if name in row),
-            rules=tuple(
-                Rule(values[name], label=label, colour="ink")
-                for label, values in (references or {}).items()
-                if name in values
-            ),
+            rules=_rules(references, name),
         )
         for name in _NAMES
     )
@@ -89,12 +85,17 @@ def intervals_chart(
     return Chart("intervals", title, panels, _COLUMNS, words)
 
 
-def runs_chart(estimates: pd.DataFrame, confidence: float = 0.95) -> Chart:
+def runs_chart(
+    estimates: pd.DataFrame,
+    references: Mapping[str, Mapping[str, float]] | None = None,
+    confidence: float = 0.95,
+) -> Chart:
     """Draw the estimate of each run with its interval: a panel for each derivative, a row for each run.
 
     Parameters
     ----------
     estimates : rows of contract 2 of several runs, converged or not; only the converged ones are drawn.
+    references : label -> parameter -> value of a rule beside the estimates.
     confidence : probability of the intervals [-].
     """
     runs = list(dict.fromkeys(map(str, estimates["run_id"])))
@@ -121,14 +122,25 @@ def runs_chart(estimates: pd.DataFrame, confidence: float = 0.95) -> Chart:
             )
             for colour in [COLOURS[methods.index(method) % len(COLOURS)]]
         ]
-        panels.append(Panel(x_label=f"{name} [{UNITS[name]}]", rows=tuple(runs), marks=tuple(marks)))
-    title = "Estimates of each record"
+        rules = _rules(references, name)
+        panels.append(
+            Panel(x_label=f"{name} [{UNITS[name]}]", rows=tuple(runs), marks=tuple(marks), rules=rules)
+        )
+    title = "Estimates of each run"
     return Chart(
         "runs",
         title,
         tuple(panels),
         3,
         f"Estimate and {100.0 * confidence:g} % interval of each converged run.",
+    )
+
+
+def _rules(references: Mapping[str, Mapping[str, float]] | None, name: str) -> tuple[Rule, ...]:
+    return tuple(
+        Rule(values[name], label=label, colour="ink")
+        for label, values in (references or {}).items()
+        if name in values
     )
 
 

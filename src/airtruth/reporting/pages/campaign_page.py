@@ -62,7 +62,7 @@ def campaign_report(campaign: Parted, logs: Logs | None = None, aircraft: Aircra
     statistics = {m: s for table in shown for m, s in table.statistics.items()}
     facts = [f"Gust: {campaign.gust}."] if campaign.gust else []
     confidence = identified.confidence
-    runs, runs_drawn = runs_section(_with_std(first, confidence), flown, confidence)
+    runs, runs_drawn = runs_section(_with_std(first, confidence), flown, {"truth": truth}, confidence)
     correlation, correlated = correlation_section(
         {m: s.correlation for m, s in statistics.items() if s.counts.used >= LEAST_RUNS},
         "Correlation over the converged runs.",

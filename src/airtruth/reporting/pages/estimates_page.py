@@ -58,7 +58,7 @@ def estimates_report(title: str, identified: Identified) -> Report:
     notes += [
         f"Overridden by --force: {s}" for record in identified.records.values() for s in record["forced"]
     ]
-    runs, runs_drawn = runs_section(frame, confidence=identified.confidence)
+    runs, runs_drawn = runs_section(frame, None, references, identified.confidence)
     if identified.correlations is None:
         correlation, correlated = correlation_section(scattered_correlations(frame), _OVER_RUNS)
     else:

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.charts import Area, Chart, Colour, Line, Panel, Rule, Stroke
+from airtruth.charts import Area, Chart, Colour, Line, Panel, Rule, Stroke, colours_of
 from airtruth.charts import as_html as chart_html
 from airtruth.logs.histories import Histories, History
 from airtruth.numerics.frequency_response import LEAST_COHERENCE, FrequencyResponse, frequency_response
@@ -19,12 +19,10 @@ Array = NDArray[np.float64]
 
 HIGHEST_HZ: Final = 5.0
 """End of the scale of frequency [Hz] (judgement: beyond the short period of a small aircraft)."""
-OUTPUTS: Final = {"q_rad_s": "q/elevator [dB, 1/s]", "az_m_s2": "az/elevator [dB, m/s2 per rad]"}
+OUTPUTS: Final = {"q_rad_s": "q/elevator [dB]", "az_m_s2": "az/elevator [dB]"}
 """Output -> label of the magnitude of its response."""
 MOST_MODELS: Final = 4
 """Most models in the figure [-] (judgement: lines that a reader can follow)."""
-_COLOURS: Final[tuple[Colour, ...]] = ("blue", "vermillion", "green", "purple")
-"""Colours of the models, the last model first, as in the plots of the records."""
 _STROKES: Final[tuple[Stroke, ...]] = ("solid", "dashed", "dotted", "solid")
 """Strokes beside the colours."""
 _Z: Final = 1.959963984540054
@@ -70,7 +68,7 @@ def response_chart(histories: Histories) -> Chart | None:
             for m in models
             if all(_usable(r.models[m][channel]) for r in records)
         }
-        columns.append(_panels(channel, measured, simulated))
+        columns.append(_panels(channel, measured, simulated, colours_of(histories.models)))
     if not permitted:
         return None
     left = len(histories.models) - len(models)
@@ -120,7 +118,10 @@ def _response(records: list[History], outputs: list[Array], dt_s: float) -> Freq
 
 
 def _panels(
-    channel: str, measured: FrequencyResponse, models: Mapping[str, FrequencyResponse]
+    channel: str,
+    measured: FrequencyResponse,
+    models: Mapping[str, FrequencyResponse],
+    colours: Mapping[str, Colour],
 ) -> list[Panel]:
     """Magnitude, phase and coherence."""
     at = np.log10(measured.frequency_hz)
@@ -135,17 +136,17 @@ def _panels(
         own_db, own_phase = _polar(own, shown)
         # the turn that lies next to the measurement
         turn = np.round(np.nan_to_num(np.nanmedian(phase - own_phase) if shown.any() else 0.0) / 360.0)
-        lines_db.append(_line(at, own_db, name, _COLOURS[k], _STROKES[k]))
-        lines_phase.append(_line(at, own_phase + 360.0 * turn, name, _COLOURS[k], _STROKES[k]))
+        lines_db.append(_line(at, own_db, name, colours[name], _STROKES[k]))
+        lines_phase.append(_line(at, own_phase + 360.0 * turn, name, colours[name], _STROKES[k]))
     wide = np.degrees(spread)
     ends = (float(at[0]), float(np.log10(HIGHEST_HZ)))
     base = Panel(x_limits=ends, x_log=True)
-    name = OUTPUTS[channel]
+    label = OUTPUTS[channel]
     words = "" if shown.any() else "coherence too low"
     return [
         replace(
             base,
-            y_label=name,
+            y_label=label,
             lines=tuple(lines_db),
             areas=(_area(at, db + low, db + high),),
             words=words,

@@ -110,8 +110,8 @@ def _failing(known: Mapping[str, MethodStatistics], confidence: float) -> Iterat
             parts.append(f"{method}: {', '.join(found)}")
     if parts:
         yield (
-            f"The {100.0 * confidence:g} % intervals hold the truth in too few runs ({'; '.join(parts)}): the model "
-            "class, not noise, makes these errors."
+            f"The {100.0 * confidence:g} % intervals hold the truth in too few runs ({'; '.join(parts)}): they "
+            "count noise, and not errors of the model."
         )
 
 

@@ -101,7 +101,7 @@ def _report(
     names = tuple(asdict(changes[0])) if changes else ("method", "derivative")
     long = flat(table.title, names, [tuple(asdict(change).values()) for change in changes])
     chart = loop_chart(changes)
-    intervals = _intervals(frames)
+    intervals = _intervals(frames, {c.derivative: c.declared for c in changes})
     origin = of_trace(Provenance.read(histories.facts.get(PROVENANCE) if histories else None))
     records, *others = trace_sections(answer, histories)
     sections = [
@@ -119,7 +119,7 @@ def _report(
     )
 
 
-def _intervals(frames: Mapping[str, pd.DataFrame]) -> list[Chart]:
+def _intervals(frames: Mapping[str, pd.DataFrame], declared: Mapping[str, float]) -> list[Chart]:
     """One chart of the intervals before and after, in which each method has two rows; one row if they are the same."""
     import pandas as pd
 
@@ -127,14 +127,14 @@ def _intervals(frames: Mapping[str, pd.DataFrame]) -> list[Chart]:
         return []
     first = next(iter(frames.values()))
     if all(frame.equals(first) for frame in frames.values()):
-        return [intervals_chart(first)]
+        return [intervals_chart(first, {"declared": declared})]
     parts = [
         frame.assign(method=[f"{m}, {stage}" for m in frame["method"]]) for stage, frame in frames.items()
     ]
     both = pd.concat(parts, ignore_index=True)
     methods = [f"{m}, {stage}" for m in dict.fromkeys(first["method"]) for stage in frames]
     ordered = both.sort_values("method", kind="stable", key=lambda names: names.map(methods.index))
-    drawn = intervals_chart(ordered)
+    drawn = intervals_chart(ordered, {"declared": declared})
     title = "Derivatives without the traced effects (before) and with them (after)"
     return [replace(drawn, title=title)]
 

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.channels import shown
+from airtruth.charts import colours_of
+from airtruth.charts.model import MODELS
 from airtruth.logs.histories import Histories, History
 from airtruth.physics.proof_of_match import NORMAL_M_S2, OF_CHANNEL, PITCH_RAD, RATE_RAD_S, SOURCE
 from airtruth.reporting.pages.agreement import agreement_of_records, agreement_table
@@ -29,8 +31,6 @@ _LEAST: Final = 200
 """Least samples of a record on a page [-]; judgement: a doublet remains visible."""
 _BYTES: Final = 16.0 / 3.0
 """Size of a number as base64 of float32 [byte]."""
-_COLOURS: Final = ("blue", "vermillion", "green", "purple", "orange", "sky")
-"""Colours of the models, the last model first: it is the answer."""
 _DASHES: Final = ((), (7, 3), (2, 3))
 """Dashes of the first six models, of the next six, and of the rest [px]."""
 _QUANTITIES: Final = (
@@ -133,7 +133,7 @@ def records_section(histories: Histories | None, reason: str = "", note: str = "
 
 def _keys(chosen: Extract) -> list[tuple[str, str]]:
     """Words and style of what the plots show beside the models."""
-    keys = [("measured", "measured"), ("tolerance of a training simulator", "tolerance")]
+    keys = [("measured", "measured"), ("tolerance of a training simulator (dashed about zero)", "tolerance")]
     return keys + ([("two standard deviations of gusts and noise", "band")] if _floors(chosen) else [])
 
 
@@ -143,8 +143,8 @@ def _floors(chosen: Extract) -> bool:
 
 def _data(histories: Histories, chosen: Extract) -> dict[str, object]:
     first = chosen.records[0]
-    colours = dict(zip(reversed(histories.models), _COLOURS * len(histories.models), strict=False))
-    ranks = {name: k // len(_COLOURS) for k, name in enumerate(reversed(histories.models))}
+    colours = colours_of(histories.models)
+    ranks = {name: k // len(MODELS) for k, name in enumerate(reversed(histories.models))}
     return {
         "first": [r.run_id for r in chosen.records].index(histories.first.run_id),
         "channels": [shown(c)[0] for c in first.measured],

@@ -33,7 +33,10 @@ OF_METHOD: Final = "Correlation by the covariance that the method states, mean o
 
 
 def runs_section(
-    frame: pd.DataFrame, of_runs: int | None = None, confidence: float = 0.95
+    frame: pd.DataFrame,
+    of_runs: int | None = None,
+    references: Mapping[str, Mapping[str, float]] | None = None,
+    confidence: float = 0.95,
 ) -> tuple[tuple[Chart, ...], Section]:
     """Return chart and section of every run and method; of many runs, the first `MOST_RUNS` alone.
 
@@ -41,6 +44,7 @@ def runs_section(
     ----------
     frame : rows of contract 2, of at least the first `MOST_RUNS` runs.
     of_runs : number of all runs; None for those of ``frame``.
+    references : label -> parameter -> value of a rule beside the estimates.
     confidence : probability of the intervals [-].
     """
     heading, anchor = "Estimates of each run", "runs"
@@ -51,7 +55,7 @@ def runs_section(
     kept = frame[frame["run_id"].isin(runs[:MOST_RUNS])]
     methods = list(dict.fromkeys(kept["method"]))
     few = max(1, MOST_MARKS // len(runs[:MOST_RUNS]))
-    drawn = runs_chart(kept[kept["method"].isin(methods[:few])], confidence)
+    drawn = runs_chart(kept[kept["method"].isin(methods[:few])], references, confidence)
     if few < len(methods):
         drawn = replace(drawn, caption=f"{drawn.caption} The first {few} of {len(methods)} methods.")
     table = data_table(_runs_table(kept, total), "runs")

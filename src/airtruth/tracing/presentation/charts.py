@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from airtruth.channels import shown
-from airtruth.charts import Band, Bar, Chart, Colour, Mark, Panel, Rule, Stroke
+from airtruth.charts import Band, Bar, Chart, Colour, Mark, Panel, Rule, Stroke, colours_of
 from airtruth.logs.histories import Histories, History
 from airtruth.table import significant
 from airtruth.tracing.answer import CandidateScore, TraceAnswer
@@ -34,12 +33,8 @@ _SMALLEST: Final = 1e-290
 """Probability up to which a p-value is converted to a normal variable [-] (above underflow)."""
 _LARGEST_SIGMA: Final = 36.0
 """Size of a normal variable with that probability [-], as norm.isf(0.5e-290) = 36.4."""
-_MODEL_COLOURS: Final[tuple[Colour, ...]] = ("vermillion", "blue", "green")
-"""Colours of the declared and of further models, in their order."""
 _MODEL_STROKES: Final[tuple[Stroke, ...]] = ("dashed", "solid", "dotted")
-"""Strokes beside these colours."""
-_LETTERS: Final = 64
-"""Most characters of a reason beside a bar [-] (judgement: half of the figure)."""
+"""Strokes beside the colours of the models, in their order."""
 _POINTS: Final = 600
 """Most points of a curve of a chart [-]; judgement: two per pixel of a panel."""
 _LAGS: Final = 50
@@ -55,10 +50,10 @@ def trace_chart(answer: TraceAnswer, histories: Histories) -> Chart:
     record = histories.first
     if not record.effect:
         return _without_effect(answer, histories)
-    channels = list(record.measured)
+    channels, colours = list(record.measured), colours_of(histories.models)
     best = histories.models[-1]
-    left = [_residuals(record, channel, histories.models[:1]) for channel in channels]
-    right = [_residuals(record, channel, histories.models[1:]) for channel in channels]
+    left = [_residuals(record, channel, histories.models[:1], colours) for channel in channels]
+    right = [_residuals(record, channel, histories.models[1:], colours) for channel in channels]
     middle = [panel_of(histories), _contribution(record), _stages(answer)]
     panels = []
     for i, (first, centre, last) in enumerate(zip(left, middle, right, strict=True)):
@@ -88,13 +83,15 @@ def _without_effect(answer: TraceAnswer, histories: Histories) -> Chart:
     """One record beside its simulations, and their residuals, where no effect was accepted."""
     record = histories.first
     step = max(1, -(-len(record.t_s) // _POINTS))
+    colours = colours_of(histories.models)
     panels = []
     for i, channel in enumerate(record.measured):
         name, factor = shown(channel)
         measured = line(record.t_s[::step], record.measured[channel][::step] * factor)
         lines = [replace(measured, label="measured", colour="ink", stroke="points")]
         residuals = []
-        for model, colour, stroke in zip(histories.models, _MODEL_COLOURS, _MODEL_STROKES, strict=False):
+        for model, stroke in zip(histories.models, _MODEL_STROKES, strict=False):
+            colour = colours[model]
             y = record.models[model][channel][::step] * factor
             lines.append(replace(line(record.t_s[::step], y), label=model, colour=colour, stroke=stroke))
             residual = record.residual(model, channel)[::step] * factor
@@ -127,16 +124,15 @@ def _meanings(stages: Iterable[str]) -> str:
     return "; ".join(MEANING[name] for name in stages if name in MEANING).capitalize() + "."
 
 
-def _residuals(record: History, channel: str, models: Sequence[str]) -> Panel:
+def _residuals(record: History, channel: str, models: Sequence[str], colours: Mapping[str, Colour]) -> Panel:
     name, factor = shown(channel)
     floor = 2.0 * record.floor.get(channel, np.nan) * factor
     step = max(1, -(-len(record.t_s) // _POINTS))
     lines = []
     for model in models:
-        colour: Colour = "grey" if model != models[-1] else "blue"
         residual = record.residual(model, channel)[::step] * factor
-        label = model if len(models) > 1 and channel == next(iter(record.measured)) else ""
-        lines.append(replace(line(record.t_s[::step], residual), label=label, colour=colour))
+        label = model if channel == next(iter(record.measured)) else ""
+        lines.append(replace(line(record.t_s[::step], residual), label=label, colour=colours[model]))
     last = channel == list(record.measured)[-1]
     return Panel(
         x_label="time [s]" if last else "", y_label=name, lines=tuple(lines), bands=(Band(-floor, floor),)
@@ -205,14 +201,14 @@ def scores_chart(answer: TraceAnswer) -> Chart:
     alike = {name for e in answer.effects for name in e.indistinguishable_from}
     sigma = [_sigma(r.candidate) for r in rows]
     needed = _needed(sigma)
-    bars = []
+    bars, refused = [], []
     for at, r in enumerate(rows):
         accepted, same = r.candidate.key in leading, r.candidate.name in alike
         colour: Colour = "vermillion" if accepted else "orange" if same else "blue"
         label = "accepted" if accepted else "looks the same" if same else "not accepted"
         words = [] if colour == "blue" else [label]
         if colour == "blue" and sigma[at] > needed[at]:
-            words = [f"not accepted: {textwrap.shorten(r.outcome, _LETTERS, placeholder=' ...')}"]
+            refused.append(f"{r.candidate.key} ({r.outcome})")
         words += [] if r.gain is None else [f"refit gains {significant(r.gain)} in 2 log L"]
         bars.append(Bar(at, sigma[at], label, colour, ": ".join(words)))
     holm = replace(
@@ -233,7 +229,8 @@ def scores_chart(answer: TraceAnswer) -> Chart:
         title=f"{headline(answer)}. Candidates at the refitted aircraft without effects",
         panels=(panel,),
         columns=1,
-        caption="An effect is accepted on the gain of its refit, which can be large although its score is small.",
+        caption="An effect is accepted on the gain of its refit, which can be large although its score is small."
+        + (f" Beyond the line and not accepted: {', '.join(refused)}." if refused else ""),
     )
 
 
@@ -305,13 +302,19 @@ def innovations_chart(histories: Histories) -> Chart:
     return Chart(
         name="innovations",
         title=f"Whitened innovations and their autocorrelation, {' and '.join(models)}",
-        panels=tuple(p for channel in record.measured for p in _whiteness(record, channel, models)),
+        panels=tuple(
+            p
+            for channel in record.measured
+            for p in _whiteness(record, channel, models, colours_of(histories.models))
+        ),
         columns=len(models) + 1,
         caption=f"Record {record.run_id}. {_meanings(models)}",
     )
 
 
-def _whiteness(record: History, channel: str, models: Sequence[str]) -> Iterator[Panel]:
+def _whiteness(
+    record: History, channel: str, models: Sequence[str], colours: Mapping[str, Colour]
+) -> Iterator[Panel]:
     """A panel of innovations for each model with one scale, so that none hides another; then the autocorrelations."""
     n = len(record.t_s)
     step = max(1, -(-n // _POINTS))
@@ -319,7 +322,8 @@ def _whiteness(record: History, channel: str, models: Sequence[str]) -> Iterator
     dt = float(record.t_s[1] - record.t_s[0]) if n > 1 else np.nan
     bound = float(norm.isf(0.025) / np.sqrt(n))
     series, correlations = [], []
-    for model, colour, stroke in zip(models, _MODEL_COLOURS, _MODEL_STROKES, strict=False):
+    for model, stroke in zip(models, _MODEL_STROKES, strict=False):
+        colour = colours[model]
         e = record.innovations.get(model, {}).get(channel)
         if e is None:
             continue

@@ -135,17 +135,33 @@
     context.beginPath();
     context.rect(left, top, width, height);
     context.clip();
+    if (!centre) { // lines, because a second shade would hide that of the gusts
+      context.strokeStyle = shade("green");
+      context.setLineDash([6, 4]);
+      for (const side of [-1, 1]) {
+        const y = plot.valToPos(side * half, "y", true);
+        context.beginPath();
+        context.moveTo(left, y);
+        context.lineTo(left + width, y);
+        context.stroke();
+      }
+      context.restore();
+      return;
+    }
     context.fillStyle = shade("tolerance");
     context.beginPath();
-    const at = (k, side) => [plot.valToPos(time[k], "x", true), plot.valToPos((centre ? centre[k] || 0 : 0) + side * half, "y", true)];
+    const at = (k, side) => [plot.valToPos(time[k], "x", true), plot.valToPos((centre[k] || 0) + side * half, "y", true)];
     for (let k = 0; k < time.length; k += 1) context.lineTo(...at(k, 1));
     for (let k = time.length - 1; k >= 0; k -= 1) context.lineTo(...at(k, -1));
     context.fill();
     context.restore();
   } } });
-  const fitted = (half) => (plot, low, high) => {
+  const fitted = (half, tolerance, centre) => (plot, low, high) => {
     if (low === null || high === null) return [-1, 1];
-    const ends = half > 0 ? [Math.min(low, -half), Math.max(high, half)] : [low, high];
+    const about = centre ? centre.filter((x) => x !== null) : [0];
+    const least = (tolerance > 0 ? about : []).reduce((a, x) => Math.min(a, x - tolerance), -half || low);
+    const most = (tolerance > 0 ? about : []).reduce((a, x) => Math.max(a, x + tolerance), half || high);
+    const ends = [Math.min(low, least), Math.max(high, most)];
     const margin = 0.06 * (ends[1] - ends[0]) || 0.5 * Math.abs(ends[0]) || 1;
     return [ends[0] - margin, ends[1] + margin];
   };
@@ -156,7 +172,7 @@
     const shown = (x) => (x === null || x === undefined ? "-" : Number(x).toPrecision(4));
     const plot = new uPlot({
       width: plotsBox.clientWidth, height, legend: { show: false },
-      scales: { x: { time: false }, y: { range: fitted(half) } },
+      scales: { x: { time: false }, y: { range: fitted(half, tolerance, centre) } },
       axes: [axis({ size: last ? 30 : 18, label: last ? "time [s]" : undefined, labelSize: 14, labelFont: "11px system-ui" }),
         axis({ size: 52, space: 16 })],
       series: [{}, ...series],
