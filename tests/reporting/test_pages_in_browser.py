@@ -1,6 +1,6 @@
 """Pages as people see them, in headless Chromium: no complaint, zoom, selector, tables, themes, and their looks.
 
-`python tests/reporting/test_pages_in_browser.py` writes the pictures that the looks are compared with.
+`PYTHONPATH=. python tests/reporting/test_pages_in_browser.py` writes the pictures that the looks are compared with.
 """
 
 import io

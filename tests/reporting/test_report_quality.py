@@ -168,7 +168,7 @@ def test_a_none_answer_shows_the_record_and_its_residuals():
     assert drawn.columns == 2
     assert len(drawn.panels) == 6
     assert not any(panel.words for panel in drawn.panels)
-    assert [label for label, _ in drawn.entries()][:3] == ["measured", "declared", "before"]
+    assert [label for label, _ in drawn.entries()][:3] == ["measured", "before", "declared"]
     assert "derivatives and noise levels refitted" in drawn.caption
 
 

@@ -130,7 +130,7 @@ def _frame(panel: Panel, width: float) -> _Frame:
     right = 12.0
     if panel.rows:
         longest = max(len(row) for row in panel.rows)
-        left = min(10.0 + _CHARACTER * longest, width - right - _LEAST_PLOT)
+        left = min(16.0 + _CHARACTER * longest, width - right - _LEAST_PLOT)
         return _Frame(
             left=left,
             top=top,

@@ -35,7 +35,7 @@ COLOURS: Final[tuple[Colour, ...]] = (
     "grey",
 )
 """Colours of the methods, in their order."""
-_SPREAD: Final = 0.32
+_SPREAD: Final = 0.36
 """Half of the height of a row that the methods share [-] (judgement: rows stay apart)."""
 
 Frames = Callable[[], Iterable["pd.DataFrame"]]
@@ -101,7 +101,8 @@ def runs_chart(
     runs = list(dict.fromkeys(map(str, estimates["run_id"])))
     methods = list(dict.fromkeys(map(str, estimates["method"])))
     good = estimates[estimates["converged"]]
-    offsets = np.linspace(-_SPREAD, _SPREAD, len(methods)) if len(methods) > 1 else np.zeros(1)
+    spread = _SPREAD * (1.0 - 1.0 / max(len(methods), 1))  # marks of one run stay nearer than those of two
+    offsets = np.linspace(-spread, spread, len(methods))
     panels = []
     for name in PARAMETERS:
         marks = [

@@ -25,6 +25,7 @@ _NOTE: Final = (
     "square error that come from different means, different amplitudes, and a lack of correlation. Each record counts "
     "about its measured mean."
 )
+"""Meaning of the figures."""
 
 
 def agreement_table(histories: Histories) -> Table:

@@ -122,7 +122,8 @@ def records_section(histories: Histories | None, reason: str = "", note: str = "
         + notes_html(
             [
                 "Drag over a plot to zoom all of them; a double click shows the whole record.",
-                f"Tolerance: {SOURCE}: q within {RATE_RAD_S / DEG:g} deg/s, or pitch within {PITCH_RAD / DEG:g} deg (not "
+                f"Tolerance of a training simulator ({SOURCE}), dashed in a residual: "
+                f"q within {RATE_RAD_S / DEG:g} deg/s, or pitch within {PITCH_RAD / DEG:g} deg (not "
                 f"drawn), and az within {NORMAL_M_S2 / G0:.2f} g of the measurement.",
                 *([note] if note else []),
                 *chosen.notes,
@@ -133,8 +134,8 @@ def records_section(histories: Histories | None, reason: str = "", note: str = "
 
 def _keys(chosen: Extract) -> list[tuple[str, str]]:
     """Words and style of what the plots show beside the models."""
-    keys = [("measured", "measured"), ("tolerance of a training simulator (dashed about zero)", "tolerance")]
-    return keys + ([("two standard deviations of gusts and noise", "band")] if _floors(chosen) else [])
+    keys = [("measured", "measured"), ("tolerance of a simulator", "tolerance")]
+    return keys + ([("2 \u03c3 of gusts and noise", "band")] if _floors(chosen) else [])
 
 
 def _floors(chosen: Extract) -> bool:

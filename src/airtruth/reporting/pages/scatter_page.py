@@ -81,7 +81,7 @@ def _runs_table(kept: pd.DataFrame, total: int) -> Table:
         )
     ]
     columns = ["run", "method", "converged", *(c.replace("_std", " std") for c in shown)]
-    notes = ("std: standard error that the method states for the run.",)
+    notes: tuple[str, ...] = ("std: standard error that the method states for the run.",)
     if total > MOST_RUNS:
         notes += (
             f"The first {MOST_RUNS} of {total} runs; estimates.parquet holds all, the table above counts all.",
@@ -122,6 +122,13 @@ def _correlation(covariance: Array) -> Array | None:
     return np.asarray(np.clip(covariance / np.outer(std, std), -1.0, 1.0))
 
 
+def _with_ones(matrix: Array) -> Array:
+    """The matrix with exactly 1 on its diagonal, whatever the order of the sums behind it."""
+    exact = matrix.copy()
+    np.fill_diagonal(exact, 1.0)
+    return exact
+
+
 def correlation_section(
     correlations: Mapping[str, Array], of: str = OF_METHOD
 ) -> tuple[tuple[Chart, ...], Section]:
@@ -135,6 +142,7 @@ def correlation_section(
     heading, anchor = "Correlation of the estimates", "correlation"
     if not correlations:
         return (), Section(heading, anchor, "")
+    correlations = {method: _with_ones(matrix) for method, matrix in correlations.items()}
     chart = correlation_chart(correlations, of)
     groups = tuple(
         Group(

@@ -90,7 +90,8 @@ def _without_effect(answer: TraceAnswer, histories: Histories) -> Chart:
         measured = line(record.t_s[::step], record.measured[channel][::step] * factor)
         lines = [replace(measured, label="measured", colour="ink", stroke="points")]
         residuals = []
-        for model, stroke in zip(histories.models, _MODEL_STROKES, strict=False):
+        # the declared model last and dashed: a refitted one that is the same would hide it
+        for model, stroke in reversed(list(zip(histories.models, _MODEL_STROKES, strict=False))):
             colour = colours[model]
             y = record.models[model][channel][::step] * factor
             lines.append(replace(line(record.t_s[::step], y), label=model, colour=colour, stroke=stroke))
@@ -112,7 +113,7 @@ def _without_effect(answer: TraceAnswer, histories: Histories) -> Chart:
     group = f", {record.group}" if record.group else ""
     return Chart(
         name="trace",
-        title=f"{headline(answer)}. No effect accepted: the record beside the declared and the refitted model",
+        title=f"{headline(answer)}. One record beside the declared and the refitted model",
         panels=tuple(panels),
         columns=2,
         caption=f"Free runs of record {record.run_id}{group}. {_meanings(histories.models)}",

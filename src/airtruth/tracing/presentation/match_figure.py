@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 
 from airtruth import style
@@ -52,8 +53,11 @@ def match_figure(histories: Histories) -> Figure:
         _residuals(axes[2, column], record, models, channel, span)
         axes[2, column].set_xlabel("time [s]")
     axes[0, 1].set_ylabel("")
+    for ax in axes.flat:
+        ax.xaxis.set_major_locator(MultipleLocator(1.0))
     _words(axes, record, models, span)
-    figure.align_ylabels(axes[:, 0])
+    for column in axes.T:
+        figure.align_ylabels(column)
     return figure
 
 
