@@ -28,7 +28,7 @@ SCHEMES: Final = ("light", "dark")
 """Themes."""
 SLICE_PX: Final = 2200
 """Height of a picture [px]; a longer page is cut into several, so that its type stays legible."""
-LOGS: Final = {"traced": "b", "learned": "g", "one-of": "c"}
+LOGS: Final = {"traced": "b", "learned": "g", "one-of": "a"}
 """Kind of a trace -> its log in data/undeclared."""
 
 
