@@ -5,7 +5,9 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 from report_records import GTM, METHODS, answer, histories, log
 from scipy.stats import binom, t
 
@@ -15,6 +17,7 @@ from airtruth.reporting.pages.agreement import agreement_table
 from airtruth.reporting.pages.frequency_page import frequency_section, response_chart
 from airtruth.reporting.pages.headline import headline
 from airtruth.reporting.pages.records import records_section
+from airtruth.reporting.pages.result_page import result_report
 from airtruth.reporting.pages.scatter_page import (
     correlation_section,
     scattered_correlations,
@@ -29,6 +32,7 @@ from airtruth.reporting.statistics import (
     influence,
     relative_error,
 )
+from airtruth.table import WIDTH
 from airtruth.tracing.presentation.charts import innovations_chart, scores_chart, trace_chart
 
 TRUTH = np.array([4.8, 30.0, 0.5, -1.8, -41.0, -1.9])
@@ -185,3 +189,26 @@ def test_the_figure_states_why_a_passed_line_is_not_enough():
     passed = [c for c in whole.candidates if c.why_not and c.p_value_alone < 1e-6]
     caption = scores_chart(whole).caption
     assert all(f"{c.key} ({c.why_not})" in caption for c in passed)
+
+
+class Plain:
+    """A result with a summary of every kind of line."""
+
+    def summary(self):
+        return "\n".join(["Heading +- 1", "=======", "word " * 40, "a  " * 60])
+
+    def to_frame(self):
+        return pd.DataFrame({"x": [1.0]})
+
+    def plot(self):
+        return Figure()
+
+
+def test_the_page_of_a_result_shows_its_picture_first_and_cuts_no_sentence():
+    page = result_report(Plain()).page
+    assert "Heading \u00b1 1" in page
+    assert page.index("<img") < page.index("<pre>")
+    text = page.split("<pre>")[1].split("</pre>")[0].splitlines()
+    assert max(len(line) for line in text[:-1]) <= WIDTH
+    assert text[-1].startswith("a  a  a")
+    assert not any(set(line) == {"="} for line in text)
