@@ -32,8 +32,9 @@ from airtruth.reporting.statistics import (
     influence,
     relative_error,
 )
-from airtruth.table import WIDTH
+from airtruth.table import WIDTH, significant
 from airtruth.tracing.presentation.charts import innovations_chart, scores_chart, trace_chart
+from airtruth.tracing.presentation.match_figure import match_figure
 
 TRUTH = np.array([4.8, 30.0, 0.5, -1.8, -41.0, -1.9])
 
@@ -212,3 +213,17 @@ def test_the_page_of_a_result_shows_its_picture_first_and_cuts_no_sentence():
     assert max(len(line) for line in text[:-1]) <= WIDTH
     assert text[-1].startswith("a  a  a")
     assert not any(set(line) == {"="} for line in text)
+
+
+def test_the_picture_of_readme_shows_measurement_models_and_residuals():
+    whole = histories()
+    figure = match_figure(whole)
+    assert len(figure.axes) == 6
+    record = whole.first
+    signals = figure.axes[2].lines
+    assert len(signals) == 3
+    shown = np.asarray(signals[1].get_ydata()) * math.pi / 180.0
+    assert np.isin(np.round(shown, 9), np.round(record.models["declared"]["alpha_rad"], 9)).all()
+    words = [t.get_text() for ax in figure.axes for t in ax.texts]
+    before, after = (math.degrees(record.rms(m, "q_rad_s")) for m in ("declared", "after"))
+    assert f"rms {significant(before, 2)} \u2192 {significant(after, 2)} deg/s" in words
