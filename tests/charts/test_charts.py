@@ -21,7 +21,6 @@ from airtruth.charts import (
     as_figure,
     as_html,
     colours_of,
-    share_x,
 )
 from airtruth.charts.ticks import label, log_ticks, ticks
 
@@ -204,13 +203,6 @@ def test_a_matrix_states_its_numbers_in_both_media():
     ax = as_figure(drawn).axes[0]
     assert [t.get_text() for t in ax.texts] == ["1.00", "\u22120.50", "\u22120.50"]
     assert [t.get_text() for t in ax.get_xticklabels()] == ["a", "b"]
-
-
-def test_panels_share_a_scale_of_x():
-    one, two = share_x(Panel(rows=("r",), marks=(Mark(0, x, x - 1.0, x + 1.0),)) for x in (0.0, 9.0))
-    assert one.x_range() == two.x_range()
-    assert one.x_range()[0] < -1.0
-    assert one.x_range()[1] > 10.0
 
 
 def test_the_last_model_has_the_first_colour():

@@ -14,7 +14,6 @@ from airtruth.charts.model import (
     Rule,
     Stroke,
     colours_of,
-    share_x,
 )
 from airtruth.charts.svg import as_html
 
@@ -33,5 +32,4 @@ __all__ = [
     "as_figure",
     "as_html",
     "colours_of",
-    "share_x",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Final, Literal
 
 Colour = Literal["blue", "vermillion", "green", "purple", "orange", "sky", "ink", "grey"]
@@ -274,14 +274,6 @@ class Chart:
         return list(found.items())
 
 
-def share_x(panels: Iterable[Panel]) -> tuple[Panel, ...]:
-    """Return panels with one scale of x, which holds the data of all of them."""
-    own = tuple(panels)
-    ends = [panel.x_range() for panel in own]
-    both = (min(low for low, _ in ends), max(high for _, high in ends)) if ends else None
-    return tuple(replace(panel, x_limits=both) for panel in own)
-
-
 def drawable(value: float) -> bool:
     """Whether a number can be drawn."""
     return math.isfinite(value) and abs(value) < LARGEST
@@ -319,5 +311,4 @@ __all__ = [
     "Stroke",
     "colours_of",
     "drawable",
-    "share_x",
 ]
