@@ -19,7 +19,7 @@ AT := $(if $(STORE),--store $(STORE))
 LATE := elevator_delay actuator_lag gyro_lag sensor_delay
 CAMPAIGNS := light light-fit moderate moderate-fit
 
-.PHONY: planned planned-ties check-study help setup setup-dev lock installed docs docs-links campaign campaign-further campaign-quick loop study blind test test-slow test-long test-all fuzz robustness mutants lint kernels browser bench clean
+.PHONY: planned planned-ties check-study help setup setup-dev lock installed docs docs-links campaign campaign-further campaign-quick loop study blind test test-slow test-long test-all fuzz robustness mutants lint kernels picture screenshots browser bench clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -115,6 +115,12 @@ mutants: $(DEVELOP) ## mutation testing of physics, regression, covariance, camp
 
 kernels: $(DEVELOP) ## compile the numba kernels once, so that parallel tests do not each compile them
 	$(BIN)/python -m scripts.compile_kernels
+
+picture: $(READY) ## draw the picture of README, docs/images/trace.png (a minute)
+	$(BIN)/python -m scripts.picture
+
+screenshots: $(READY) ## make a page of each kind and take its pictures in headless Chromium (minutes)
+	$(BIN)/python -m scripts.screenshots --out $(OUT)/screenshots
 
 browser: ## install Debian's headless Chromium, in which the slow tests open the pages (needs root)
 	apt-get update -qq

@@ -55,6 +55,12 @@ BLACK: Final = "#222222"
 GREY: Final = "#9A9A9A"
 """Grey of measured points behind a model's line (judgement)."""
 
+GREY_TEXT: Final = "#6A6A6A"
+"""Grey of words beside grey points: 5.4 to 1 against white (WCAG asks for 4.5)."""
+
+SKY_TEXT: Final = "#1F6FA0"
+"""Blue of words in a sky-blue band: 5.1 to 1 against white."""
+
 PALETTE: Final = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 """Colours of several curves, in this order."""
 
@@ -202,10 +208,12 @@ __all__ = [
     "FORMATS",
     "GREEN",
     "GREY",
+    "GREY_TEXT",
     "ORANGE",
     "PALETTE",
     "PURPLE",
     "SKY",
+    "SKY_TEXT",
     "VERMILLION",
     "applied",
     "as_html",

@@ -8,8 +8,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airtruth.charts import Band, Bar, Chart, Line, Mark, Panel, Rule, as_figure, as_html
-from airtruth.charts.ticks import label, ticks
+from airtruth.charts import (
+    Area,
+    Band,
+    Bar,
+    Cells,
+    Chart,
+    Line,
+    Mark,
+    Panel,
+    Rule,
+    as_figure,
+    as_html,
+    colours_of,
+)
+from airtruth.charts.ticks import label, log_ticks, ticks
 
 WILD = st.one_of(st.floats(), st.sampled_from([math.nan, math.inf, -math.inf, 1e308, -1e308, 5e-324, 0.0]))
 
@@ -41,7 +54,7 @@ def test_ticks_lie_within_any_scale(low, width):
     if high - low <= 1e-9 * abs(low):
         return
     found = ticks(low, high)
-    assert 1 <= len(found) <= 7
+    assert 2 <= len(found) <= 12
     slack = 1e-6 * (high - low)
     assert all(low - slack <= t <= high + slack for t in found)
 
@@ -159,3 +172,42 @@ def test_the_labels_of_a_narrow_panel_stay_apart():
     ax = as_figure(Chart("n", "t", (panel,) * 4, 4)).axes[0]
     low, high = ax.get_xlim()
     assert sum(low <= at <= high for at in ax.get_xticks()) <= 6
+
+
+def test_log_ticks_are_one_two_and_five():
+    np.testing.assert_allclose(
+        10.0 ** np.array(log_ticks(math.log10(0.15), math.log10(6.0))), [0.2, 0.5, 1, 2, 5]
+    )
+
+
+def test_a_scale_never_has_a_single_tick():
+    """A range about zero whose round numbers are all outside but zero itself."""
+    assert len(ticks(-0.9, 0.95, most=1)) >= 2
+
+
+def test_an_area_has_a_gap_where_a_value_is_missing():
+    area = Area((0.0, 1.0, 2.0, 3.0, 4.0), (0.0, 0.0, math.nan, 0.0, 0.0), (1.0,) * 5, "band")
+    assert [len(piece) for piece in area.pieces()] == [2, 2]
+    page = as_html(chart(areas=(area,), lines=(Line((0.0, 4.0), (0.0, 1.0)),)))
+    assert re.search(r'<path d="M[^Z]+ZM[^Z]+Z" class="area"', page)
+    figure = as_figure(chart(areas=(area,), lines=(Line((0.0, 4.0), (0.0, 1.0)),)))
+    assert len(figure.axes[0].collections) == 2
+
+
+def test_a_matrix_states_its_numbers_in_both_media():
+    cells = Cells(("a", "b"), ((1.0, -0.5), (-0.5, math.nan)))
+    drawn = Chart("m", "Matrix", (Panel(rows=("a", "b"), cells=cells),), 1)
+    page = as_html(drawn)
+    assert re.findall(r'class="cell"[^>]*>([^<]+)<', page) == ["1.00", "\u22120.50", "\u22120.50"]
+    assert page.count('fill="var(--vermillion)"') == 2
+    ax = as_figure(drawn).axes[0]
+    assert [t.get_text() for t in ax.texts] == ["1.00", "\u22120.50", "\u22120.50"]
+    assert [t.get_text() for t in ax.get_xticklabels()] == ["a", "b"]
+
+
+def test_the_last_model_has_the_first_colour():
+    assert colours_of(("declared", "before", "after")) == {
+        "after": "blue",
+        "before": "vermillion",
+        "declared": "green",
+    }

@@ -1,6 +1,6 @@
 """Pages as people see them, in headless Chromium: no complaint, zoom, selector, tables, themes, and their looks.
 
-`python tests/reporting/test_pages_in_browser.py` writes the pictures that the looks are compared with.
+`PYTHONPATH=. python tests/reporting/test_pages_in_browser.py` writes the pictures that the looks are compared with.
 """
 
 import io
@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import MISSING, browser, program
 from PIL import Image
 from report_records import GTM, METHODS, log, loop_folder, trace_folder
 from report_synthetic import TABLE_1, paper_campaign
@@ -19,6 +18,7 @@ from report_synthetic import TABLE_1, paper_campaign
 from airtruth.identification import identify, write_estimates
 from airtruth.logs.store import write_log
 from airtruth.reporting import report
+from scripts.browser import MISSING, browser, program
 
 pytestmark = [
     pytest.mark.slow,

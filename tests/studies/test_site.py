@@ -46,7 +46,7 @@ json.dump(shown, open("shown.json", "w"))
 
 def pages() -> list[Path]:
     listed = re.search(
-        r"```\{toctree\}\n:maxdepth: 1\n\n(.*?)```", (GALLERY / "index.md").read_text(), re.DOTALL
+        r"```\{toctree\}\n(?::\w+:.*?\n)+\n(.*?)```", (GALLERY / "index.md").read_text(), re.DOTALL
     )
     assert listed
     names = listed[1].split()
@@ -67,6 +67,16 @@ def test_every_example_of_the_gallery_is_listed_and_runs_code():
         p.stem for p in GALLERY.iterdir() if p.suffix in (".md", ".ipynb")
     } - {"index"}
     assert all(cells(page) for page in listed)
+
+
+def test_every_example_of_the_gallery_has_a_card_with_its_picture():
+    index = (GALLERY / "index.md").read_text()
+    cards = re.findall(r":link: (\w+)\n(?::.*\n)+\n```\{glue\} (\w+)\n:doc: (\S+)\n```\n\n(.+)\n", index)
+    assert {link for link, *_ in cards} == {p.stem for p in pages()}
+    for link, key, document, words in cards:
+        assert document.split(".")[0] == link
+        assert any(f'glue("{key}"' in cell for cell in cells(GALLERY / document))
+        assert len(words) > 20
 
 
 @pytest.mark.parametrize("page", sorted(DOCS.rglob("*.md")), ids=lambda p: p.relative_to(DOCS).as_posix())

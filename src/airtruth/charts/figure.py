@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from airtruth.charts.model import SHAPES, Chart, Colour, Panel, Shape, drawable
+from airtruth.charts.model import SHAPES, Cells, Chart, Colour, Panel, Shape, drawable
+from airtruth.charts.ticks import log_ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -133,7 +134,26 @@ def _draw(ax: Axes, panel: Panel) -> None:
     _label(ax, panel)
 
 
+def _draw_cells(ax: Axes, cells: Cells) -> None:
+    from matplotlib.patches import Rectangle
+
+    for row, column, value in cells.each():
+        colour = _shade("blue" if value >= 0.0 else "vermillion")
+        box = Rectangle(
+            (column - 0.5, row - 0.5), 1.0, 1.0, color=colour, alpha=min(0.75, 0.75 * abs(value)), lw=0.0
+        )
+        ax.add_patch(box)
+        ax.text(column, row, f"{value:.2f}".replace("-", "\u2212"), ha="center", va="center", fontsize=7.5)
+    ax.set_xticks(range(len(cells.columns)), cells.columns)
+    ax.grid(visible=False)
+
+
 def _draw_ranges(ax: Axes, panel: Panel) -> None:
+    for area in panel.areas:
+        for number, piece in enumerate(area.pieces()):
+            x, low, high = zip(*piece, strict=True)
+            label = area.label if area.label and not number else None
+            ax.fill_between(x, low, high, color=_shade(area.colour), alpha=0.25, lw=0.0, label=label)
     for band in panel.bands:
         if drawable(band.low) and drawable(band.high):
             span = ax.axvspan if band.axis == "x" else ax.axhspan
@@ -155,10 +175,17 @@ def _draw_ranges(ax: Axes, panel: Panel) -> None:
 def _label(ax: Axes, panel: Panel) -> None:
     ax.set(title=panel.title, xlabel=panel.x_label)
     ax.set_xlim(*panel.x_range())
-    ax.locator_params(axis="x", nbins=_TICKS)
+    if panel.cells is not None:
+        _draw_cells(ax, panel.cells)
+    elif panel.x_log:
+        at = log_ticks(*panel.x_range())
+        ax.set_xticks(at, [f"{10.0**value:g}" for value in at])
+    else:
+        ax.locator_params(axis="x", nbins=_TICKS)
     if panel.rows:
         ax.set_yticks(range(len(panel.rows)), panel.rows, fontsize=7.5)
-        ax.set_ylim(len(panel.rows) - 0.4, -0.6)
+        margin = 0.6 if panel.cells is None else 0.5
+        ax.set_ylim(len(panel.rows) - 1.0 + margin, -margin)
         ax.grid(axis="y", visible=False)
     else:
         ax.set_ylabel(panel.y_label)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, Literal
 
@@ -25,6 +25,15 @@ SHAPES: Final[Mapping[Colour, Shape]] = {
     "grey": "triangle",
 }
 """Shape of the marks of each colour: print without colours, and readers who do not see them, tell marks apart."""
+
+MODELS: Final[tuple[Colour, ...]] = ("blue", "vermillion", "green", "purple", "orange", "sky")
+"""Colours of several models, the last model first: it is the answer."""
+
+
+def colours_of(models: Sequence[str]) -> dict[str, Colour]:
+    """Model -> its colour, the same in every chart of a page."""
+    return {name: MODELS[k % len(MODELS)] for k, name in enumerate(reversed(models))}
+
 
 LARGEST: Final = 1e30
 """Largest magnitude that is drawn [-]; judgement: beyond any quantity, and its square does not overflow."""
@@ -116,15 +125,71 @@ class Band:
 
 
 @dataclass(frozen=True)
+class Area:
+    """The range between two curves; a pair that is not finite is a gap.
+
+    Attributes
+    ----------
+    x, low, high : coordinates in the units of the axes, one length.
+    label : entry of the legend, "" for none.
+    """
+
+    x: tuple[float, ...]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    label: str = ""
+    colour: Colour = "blue"
+
+    def pieces(self) -> Iterator[list[tuple[float, float, float]]]:
+        """Runs of neighbours that can be drawn, as x, low and high."""
+        piece: list[tuple[float, float, float]] = []
+        for point in zip(self.x, self.low, self.high, strict=True):
+            if all(map(drawable, point)):
+                piece.append(point)
+            elif piece:
+                yield piece
+                piece = []
+        if piece:
+            yield piece
+
+
+Item = Line | Area | Mark | Bar | Rule | Band
+"""What a legend has entries of."""
+
+
+@dataclass(frozen=True)
+class Cells:
+    """A matrix of numbers from -1 to 1 over the rows of a panel, coloured by sign and size.
+
+    Attributes
+    ----------
+    columns : names of the columns.
+    values : rows of numbers, NaN for an empty cell.
+    """
+
+    columns: tuple[str, ...]
+    values: tuple[tuple[float, ...], ...]
+
+    def each(self) -> Iterator[tuple[int, int, float]]:
+        """Row, column and number of every cell that is not empty."""
+        for row, numbers in enumerate(self.values):
+            for column, number in enumerate(numbers):
+                if math.isfinite(number):
+                    yield row, column, number
+
+
+@dataclass(frozen=True)
 class Panel:
     """One pair of axes.
 
     Attributes
     ----------
     title, x_label, y_label : words, with units.
-    lines, marks, bars, rules, bands : what it shows.
+    lines, areas, marks, bars, rules, bands : what it shows.
     rows : names of the rows from top to bottom; a panel with rows has no scale of y.
-    y_limits : ends of the scale of y, None for those of the data.
+    cells : a matrix over the rows; a panel with one has no scale of x.
+    x_limits, y_limits : ends of the scales, None for those of the data.
+    x_log : whether the scale of x is logarithmic; its values are then log10 of what the ticks state.
     words : text in the centre of a panel without data.
     """
 
@@ -136,12 +201,20 @@ class Panel:
     bars: tuple[Bar, ...] = ()
     rules: tuple[Rule, ...] = ()
     bands: tuple[Band, ...] = ()
+    areas: tuple[Area, ...] = ()
     rows: tuple[str, ...] = ()
+    cells: Cells | None = None
+    x_limits: tuple[float, float] | None = None
     y_limits: tuple[float, float] | None = None
+    x_log: bool = False
     words: str = ""
 
     def x_range(self) -> tuple[float, float]:
-        """Ends of the scale of x: the data with a margin; zero to one if there are none."""
+        """Ends of the scale of x: as stated, or the data with a margin; zero to one if there are none."""
+        if self.cells is not None:
+            return -0.5, len(self.cells.columns) - 0.5
+        if self.x_limits is not None and all(map(drawable, self.x_limits)):
+            return _range(self.x_limits, 0.0)
         values = [x for line in self.lines for x, y in zip(line.x, line.y, strict=True) if drawable(y)]
         for mark in self.marks:
             values += [mark.value, mark.lower, mark.upper, *(mark.widest or ())]
@@ -155,15 +228,16 @@ class Panel:
         if self.y_limits is not None and all(map(drawable, self.y_limits)):
             return _range(self.y_limits, 0.0)
         values = [y for line in self.lines for y in line.y]
+        values += [y for area in self.areas for y in (*area.low, *area.high)]
         values += [rule.at for rule in self.rules if rule.axis == "y"]
         values += [y for band in self.bands if band.axis == "y" for y in (band.low, band.high)]
         return _range(values, 0.06)
 
-    def legend(self) -> Iterator[tuple[str, Line | Mark | Bar | Rule | Band]]:
+    def legend(self) -> Iterator[tuple[str, Item]]:
         """Each label once, with the first item that has it."""
         seen: set[str] = set()
-        items: tuple[Line | Mark | Bar | Rule | Band, ...]
-        for items in (self.lines, self.marks, self.bars, self.rules, self.bands):
+        items: tuple[Item, ...]
+        for items in (self.lines, self.areas, self.marks, self.bars, self.rules, self.bands):
             for item in items:
                 if item.label and item.label not in seen:
                     seen.add(item.label)
@@ -191,9 +265,9 @@ class Chart:
     caption: str = ""
     legend: bool = field(default=True)
 
-    def entries(self) -> list[tuple[str, Line | Mark | Bar | Rule | Band]]:
+    def entries(self) -> list[tuple[str, Item]]:
         """Entries of the common legend: each label once."""
-        found: dict[str, Line | Mark | Bar | Rule | Band] = {}
+        found: dict[str, Item] = {}
         for panel in self.panels:
             for label, item in panel.legend():
                 found.setdefault(label, item)
@@ -219,17 +293,22 @@ def _range(values: Iterable[float], margin: float) -> tuple[float, float]:
 
 __all__ = [
     "LARGEST",
+    "MODELS",
     "SHAPES",
     "SMALLEST",
+    "Area",
     "Band",
     "Bar",
+    "Cells",
     "Chart",
     "Colour",
+    "Item",
     "Line",
     "Mark",
     "Panel",
     "Rule",
     "Shape",
     "Stroke",
+    "colours_of",
     "drawable",
 ]

@@ -5,13 +5,28 @@ Colours are variables of the page's style sheet (``--blue`` ... ``--ink``), so t
 
 from __future__ import annotations
 
-import html
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from airtruth.charts.model import SHAPES, Band, Bar, Chart, Colour, Line, Mark, Panel, Rule, Shape, drawable
-from airtruth.charts.ticks import label, ticks
+from airtruth.charts.model import (
+    SHAPES,
+    Area,
+    Band,
+    Bar,
+    Cells,
+    Chart,
+    Colour,
+    Item,
+    Line,
+    Mark,
+    Panel,
+    Rule,
+    Shape,
+    drawable,
+)
+from airtruth.charts.ticks import label, log_ticks, ticks
+from airtruth.table import escaped
 
 _WIDTH: Final = 340.0
 """Width of a panel [px]; judgement: three side by side on a page, one on a telephone."""
@@ -21,6 +36,8 @@ _HEIGHT: Final = 190.0
 """Height of a panel without rows [px] (judgement)."""
 _ROW: Final = 19.0
 """Height of a row [px]; judgement: a line of type."""
+_CELL: Final = 26.0
+"""Height of a row of a matrix [px] (judgement: its numbers keep their distance)."""
 _CHARACTER: Final = 6.3
 """Width of a character of the labels [px]; judgement: 11 px type, on the safe side."""
 _LEAST_PLOT: Final = 120.0
@@ -62,8 +79,8 @@ def as_html(chart: Chart) -> str:
     width = _WIDE if chart.columns == 1 else _WIDTH
     legend = _legend(chart) if chart.legend else ""
     panels = "".join(_panel(panel, width, own_legend=not chart.legend) for panel in chart.panels)
-    caption = f"<figcaption>{html.escape(chart.caption)}</figcaption>" if chart.caption else ""
-    title = html.escape(chart.title)
+    caption = f"<figcaption>{escaped(chart.caption)}</figcaption>" if chart.caption else ""
+    title = escaped(chart.title)
     return (
         f'<figure class="chart" aria-label="{title}"><div class="charttitle">{title}</div>{legend}'
         f'<div class="panels c{chart.columns}">{panels}</div>{caption}</figure>\n'
@@ -75,9 +92,11 @@ def _legend(chart: Chart) -> str:
     return f'<div class="legend">{entries}</div>' if entries else ""
 
 
-def _entry(words: str, item: Line | Mark | Bar | Rule | Band) -> str:
+def _entry(words: str, item: Item) -> str:
     if isinstance(item, Band):
         key = '<rect x="0" y="1" width="22" height="10" class="band"/>'
+    elif isinstance(item, Area):
+        key = f'<rect x="0" y="1" width="22" height="10" class="area" fill="var(--{item.colour})"/>'
     elif isinstance(item, Bar):
         key = f'<rect x="4" y="2" width="14" height="8" fill="var(--{item.colour})"/>'
     elif isinstance(item, Mark):
@@ -88,14 +107,14 @@ def _entry(words: str, item: Line | Mark | Bar | Rule | Band) -> str:
         dash = _DASHES[item.stroke] if isinstance(item, Line) else ""
         key = f'<line x1="0" x2="22" y1="6" y2="6" stroke="var(--{item.colour})" stroke-width="2"{dash}/>'
     svg = f'<svg width="22" height="12" viewBox="0 0 22 12" aria-hidden="true">{key}</svg>'
-    return f"<span>{svg}{html.escape(words)}</span>"
+    return f"<span>{svg}{escaped(words)}</span>"
 
 
 def _panel(panel: Panel, width: float, own_legend: bool) -> str:
     frame = _frame(panel, width)
     height = frame.top + frame.height + (34.0 if panel.x_label else 20.0)
     parts = [*_axes(panel, frame), *_items(panel, frame), *_words(panel, frame)]
-    name = html.escape(panel.title or panel.y_label or panel.x_label)
+    name = escaped(panel.title or panel.y_label or panel.x_label)
     legend = ""
     if own_legend:
         entries = "".join(_entry(words, item) for words, item in panel.legend())
@@ -111,14 +130,14 @@ def _frame(panel: Panel, width: float) -> _Frame:
     right = 12.0
     if panel.rows:
         longest = max(len(row) for row in panel.rows)
-        left = min(10.0 + _CHARACTER * longest, width - right - _LEAST_PLOT)
+        left = min(16.0 + _CHARACTER * longest, width - right - _LEAST_PLOT)
         return _Frame(
             left=left,
             top=top,
             width=width - left - right,
-            height=_ROW * len(panel.rows) + 6.0,
+            height=(_ROW if panel.cells is None else _CELL) * len(panel.rows) + 6.0,
             x=panel.x_range(),
-            y=(len(panel.rows) - 0.4, -0.6),
+            y=(len(panel.rows) - 0.4, -0.6) if panel.cells is None else (len(panel.rows) - 0.5, -0.5),
         )
     left = 58.0 if panel.y_label else 46.0
     height = _HEIGHT - top - 34.0
@@ -126,18 +145,17 @@ def _frame(panel: Panel, width: float) -> _Frame:
 
 
 def _axes(panel: Panel, f: _Frame) -> Iterator[str]:
-    at = ticks(*f.x)
-    step = at[1] - at[0] if len(at) > 1 else f.x[1] - f.x[0]
     bottom = f.top + f.height
-    for value in at:
+    for value, words in _x_ticks(panel, f):
         x = f.px(value)
-        yield f'<line class="grid" x1="{x:.1f}" x2="{x:.1f}" y1="{f.top:.1f}" y2="{bottom:.1f}"/>'
-        yield f'<text x="{x:.1f}" y="{bottom + 13:.1f}" text-anchor="middle">{label(value, step)}</text>'
+        if panel.cells is None:
+            yield f'<line class="grid" x1="{x:.1f}" x2="{x:.1f}" y1="{f.top:.1f}" y2="{bottom:.1f}"/>'
+        yield f'<text x="{x:.1f}" y="{bottom + 13:.1f}" text-anchor="middle">{escaped(words)}</text>'
     yield f'<line class="axis" x1="{f.left:.1f}" x2="{f.left + f.width:.1f}" y1="{bottom:.1f}" y2="{bottom:.1f}"/>'
     for row, words in enumerate(panel.rows):
         y = f.py(row) + 4.0
         shown = _shortened(words, f.left - 8.0)
-        yield f'<text x="{f.left - 6:.1f}" y="{y:.1f}" text-anchor="end">{html.escape(shown)}</text>'
+        yield f'<text x="{f.left - 6:.1f}" y="{y:.1f}" text-anchor="end">{escaped(shown)}</text>'
     if not panel.rows and not panel.words:
         at = ticks(*f.y, most=4)
         step = at[1] - at[0] if len(at) > 1 else f.y[1] - f.y[0]
@@ -145,6 +163,17 @@ def _axes(panel: Panel, f: _Frame) -> Iterator[str]:
             y = f.py(value)
             yield f'<line class="grid" x1="{f.left:.1f}" x2="{f.left + f.width:.1f}" y1="{y:.1f}" y2="{y:.1f}"/>'
             yield f'<text x="{f.left - 5:.1f}" y="{y + 4:.1f}" text-anchor="end">{label(value, step)}</text>'
+
+
+def _x_ticks(panel: Panel, f: _Frame) -> Iterator[tuple[float, str]]:
+    if panel.cells is not None:
+        yield from ((float(k), name) for k, name in enumerate(panel.cells.columns))
+    elif panel.x_log:
+        yield from ((at, f"{10.0**at:g}") for at in log_ticks(*f.x))
+    else:
+        at = ticks(*f.x)
+        step = at[1] - at[0] if len(at) > 1 else f.x[1] - f.x[0]
+        yield from ((value, label(value, step)) for value in at)
 
 
 def _shortened(words: str, width: float) -> str:
@@ -155,6 +184,10 @@ def _shortened(words: str, width: float) -> str:
 def _items(panel: Panel, f: _Frame) -> Iterator[str]:
     for band in panel.bands:
         yield _band(band, f)
+    for area in panel.areas:
+        yield _area(area, f)
+    if panel.cells is not None:
+        yield from _cells(panel.cells, f)
     for rule in panel.rules:
         if drawable(rule.at):
             yield _rule(rule, f)
@@ -178,6 +211,30 @@ def _band(band: Band, f: _Frame) -> str:
     return f'<rect class="band" x="{f.left:.1f}" y="{high:.1f}" width="{f.width:.1f}" height="{low - high:.1f}"/>'
 
 
+def _area(area: Area, f: _Frame) -> str:
+    path = ""
+    for piece in area.pieces():
+        there = "L".join(f"{f.px(x):.1f} {f.py(low):.1f}" for x, low, _ in piece)
+        back = "L".join(f"{f.px(x):.1f} {f.py(high):.1f}" for x, _, high in reversed(piece))
+        path += f"M{there}L{back}Z"
+    return f'<path d="{path}" class="area" fill="var(--{area.colour})"/>'
+
+
+def _cells(cells: Cells, f: _Frame) -> Iterator[str]:
+    """Squares whose opacity is the size of the number, blue if it is positive, vermillion if negative."""
+    width, height = f.width / len(cells.columns), f.height / len(cells.values)
+    for row, column, value in cells.each():
+        x, y = f.left + column * width, f.top + row * height
+        colour = "blue" if value >= 0.0 else "vermillion"
+        words = f"{value:.2f}".replace("-", "\u2212")
+        yield (
+            f'<rect x="{x:.1f}" y="{y:.1f}" width="{width - 1.0:.1f}" height="{height - 1.0:.1f}" '
+            f'fill="var(--{colour})" fill-opacity="{min(0.75, 0.75 * abs(value)):.2f}"/>'
+            f'<text class="cell" x="{x + 0.5 * width:.1f}" y="{y + 0.5 * height + 4.0:.1f}" '
+            f'text-anchor="middle">{words}</text>'
+        )
+
+
 def _rule(rule: Rule, f: _Frame) -> str:
     colour = f'stroke="var(--{rule.colour})"'
     if rule.axis == "x":
@@ -198,7 +255,7 @@ def _bar(bar: Bar, f: _Frame) -> Iterator[str]:
         inside = ends[1] + _CHARACTER * len(bar.words) > f.left + f.width
         anchor, x = ("end", ends[1] - 4.0) if inside else ("start", ends[1] + 4.0)
         kind = ' class="onbar"' if inside else ""
-        yield f'<text{kind} x="{x:.1f}" y="{y + 4:.1f}" text-anchor="{anchor}">{html.escape(bar.words)}</text>'
+        yield f'<text{kind} x="{x:.1f}" y="{y + 4:.1f}" text-anchor="{anchor}">{escaped(bar.words)}</text>'
 
 
 def _line(line: Line, f: _Frame) -> Iterator[str]:
@@ -255,19 +312,19 @@ def _dot(colour: Colour, x: float, y: float, shape: Shape, radius: float = _RADI
 def _words(panel: Panel, f: _Frame) -> Iterator[str]:
     middle = f.left + 0.5 * f.width
     if panel.title:
-        yield f'<text class="title" x="{middle:.1f}" y="13" text-anchor="middle">{html.escape(panel.title)}</text>'
+        yield f'<text class="title" x="{middle:.1f}" y="13" text-anchor="middle">{escaped(panel.title)}</text>'
     if panel.x_label:
         y = f.top + f.height + 29.0
-        yield f'<text x="{middle:.1f}" y="{y:.1f}" text-anchor="middle">{html.escape(panel.x_label)}</text>'
+        yield f'<text x="{middle:.1f}" y="{y:.1f}" text-anchor="middle">{escaped(panel.x_label)}</text>'
     if panel.y_label and not panel.rows:
         y = f.top + 0.5 * f.height
         yield (
             f'<text transform="translate(12 {y:.1f}) rotate(-90)" text-anchor="middle">'
-            f"{html.escape(panel.y_label)}</text>"
+            f"{escaped(panel.y_label)}</text>"
         )
     if panel.words:
         y = f.top + 0.5 * f.height
-        yield f'<text class="quiet" x="{middle:.1f}" y="{y:.1f}" text-anchor="middle">{html.escape(panel.words)}</text>'
+        yield f'<text class="quiet" x="{middle:.1f}" y="{y:.1f}" text-anchor="middle">{escaped(panel.words)}</text>'
 
 
 __all__ = ["as_html"]

@@ -21,7 +21,15 @@ def ticks(low: float, high: float, most: int = 5) -> list[float]:
     power = 10.0 ** math.floor(math.log10(rough))
     step = next(s for s in _STEPS if s * power >= rough * (1.0 - 1e-9)) * power
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
-    return [k * step for k in range(first, last + 1)]
+    # a single tick gives no scale
+    return [k * step for k in range(first, last + 1)] if last > first else ticks(low, high, 2 * most)
+
+
+def log_ticks(low: float, high: float) -> list[float]:
+    """Return log10 of the numbers 1, 2 and 5 times a power of ten between two ends, which are log10 as well."""
+    powers = range(math.floor(low), math.ceil(high) + 1)
+    found = (k + math.log10(s) for k in powers for s in _STEPS[:3])
+    return [at for at in found if low - 1e-9 <= at <= high + 1e-9]
 
 
 def label(value: float, step: float) -> str:

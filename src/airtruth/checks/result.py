@@ -157,7 +157,8 @@ class CheckResult:
         right.invert_yaxis()
         right.set_xlabel("distance from the best set [-]")
         right.set_title("sets of errors, the best first")
-        figure.suptitle(textwrap.fill(self.sentences[0], 110), fontsize=10.0, fontweight="bold")
+        title = self.sentences[0].replace("+-", "\u00b1")
+        figure.suptitle(textwrap.fill(title, 110), fontsize=10.0, fontweight="bold")
         return figure
 
     def _repr_html_(self) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.charts import Chart, Mark, Panel, Rule
+from airtruth.charts import Cells, Chart, Colour, Mark, Panel, Rule
 from airtruth.numerics.order_statistics import quantiles
 from airtruth.physics.short_period import MODAL, PARAMETERS, UNITS
 
@@ -23,6 +23,20 @@ _NAMES: Final = (*PARAMETERS, *MODAL)
 """Parameters of the panels."""
 _COLUMNS: Final = 4
 """Panels side by side [-] (judgement)."""
+
+COLOURS: Final[tuple[Colour, ...]] = (
+    "blue",
+    "vermillion",
+    "green",
+    "purple",
+    "orange",
+    "sky",
+    "ink",
+    "grey",
+)
+"""Colours of the methods, in their order."""
+_SPREAD: Final = 0.36
+"""Half of the height of a row that the methods share [-] (judgement: rows stay apart)."""
 
 Frames = Callable[[], Iterable["pd.DataFrame"]]
 """Returns rows of contract 2 in the same parts at each call, each run in one of them."""
@@ -56,11 +70,7 @@ def intervals_chart(
             x_label=f"{name.removesuffix('_rad_s')} [{UNITS[name]}]",
             rows=tuple(methods),
             marks=tuple(row[name] for row in marks if name in row),
-            rules=tuple(
-                Rule(values[name], label=label, colour="ink")
-                for label, values in (references or {}).items()
-                if name in values
-            ),
+            rules=_rules(references, name),
         )
         for name in _NAMES
     )
@@ -73,6 +83,86 @@ def intervals_chart(
     by = f"{len(methods)} methods" if len(methods) > 1 else "".join(methods)
     title = f"Derivatives of {f'run {first}' if runs == 1 else f'{runs} runs'}" + (f" by {by}" if by else "")
     return Chart("intervals", title, panels, _COLUMNS, words)
+
+
+def runs_chart(
+    estimates: pd.DataFrame,
+    references: Mapping[str, Mapping[str, float]] | None = None,
+    confidence: float = 0.95,
+) -> Chart:
+    """Draw the estimate of each run with its interval: a panel for each derivative, a row for each run.
+
+    Parameters
+    ----------
+    estimates : rows of contract 2 of several runs, converged or not; only the converged ones are drawn.
+    references : label -> parameter -> value of a rule beside the estimates.
+    confidence : probability of the intervals [-].
+    """
+    runs = list(dict.fromkeys(map(str, estimates["run_id"])))
+    methods = list(dict.fromkeys(map(str, estimates["method"])))
+    good = estimates[estimates["converged"]]
+    spread = _SPREAD * (1.0 - 1.0 / max(len(methods), 1))  # marks of one run stay nearer than those of two
+    offsets = np.linspace(-spread, spread, len(methods))
+    panels = []
+    for name in PARAMETERS:
+        marks = [
+            Mark(
+                runs.index(str(run)) + float(offsets[methods.index(method)]),
+                value,
+                low,
+                high,
+                None,
+                method,
+                colour,
+            )
+            for run, method, value, low, high in zip(
+                good["run_id"],
+                map(str, good["method"]),
+                *(good[name + end].astype(float).tolist() for end in ("", "_lower", "_upper")),
+                strict=True,
+            )
+            for colour in [COLOURS[methods.index(method) % len(COLOURS)]]
+        ]
+        rules = _rules(references, name)
+        panels.append(
+            Panel(x_label=f"{name} [{UNITS[name]}]", rows=tuple(runs), marks=tuple(marks), rules=rules)
+        )
+    title = "Estimates of each run"
+    return Chart(
+        "runs",
+        title,
+        tuple(panels),
+        3,
+        f"Estimate and {100.0 * confidence:g} % interval of each converged run.",
+    )
+
+
+def _rules(references: Mapping[str, Mapping[str, float]] | None, name: str) -> tuple[Rule, ...]:
+    return tuple(
+        Rule(values[name], label=label, colour="ink")
+        for label, values in (references or {}).items()
+        if name in values
+    )
+
+
+def correlation_chart(correlations: Mapping[str, Array], of: str) -> Chart:
+    """Draw the correlation matrix of the estimates of each method.
+
+    Parameters
+    ----------
+    correlations : method -> (6, 6) correlation in the order of `PARAMETERS` [-].
+    of : what was correlated, a sentence.
+    """
+    short = tuple(name.replace("alpha", "\u03b1").replace("de", "\u03b4") for name in PARAMETERS)
+    panels = tuple(
+        Panel(
+            title=method,
+            rows=short,
+            cells=Cells(short, tuple(map(tuple, matrix.tolist()))),
+        )
+        for method, matrix in correlations.items()
+    )
+    return Chart("correlation", "Correlation of the estimates", panels, min(3, max(2, len(panels))), of)
 
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
@@ -118,4 +208,4 @@ def _values(frame: pd.DataFrame, method: str, end: str = "") -> Array:
     return np.asarray(own[[name + end for name in _NAMES]], dtype=np.float64)
 
 
-__all__ = ["Frames", "intervals_chart"]
+__all__ = ["COLOURS", "Frames", "correlation_chart", "intervals_chart", "runs_chart"]

@@ -27,7 +27,10 @@ SHOWN: Final = ("Cmalpha", "Cmq", "CLalpha")
 _WIDEST_PCT: Final = 30.0
 """Half width of a panel of biases [%]; judgement: larger biases are written as numbers at its edge."""
 
-_STAGES: Final = (("before", style.VERMILLION, -0.16, "o"), ("after", style.BLUE, 0.16, "s"))
+_STAGES: Final = (
+    ("before: the method as it is", style.VERMILLION, -0.16, "o"),
+    ("after: with the traced effects", style.BLUE, 0.16, "s"),
+)
 """Stage, colour, vertical offset over the distance between methods [-], and marker."""
 
 
@@ -49,7 +52,7 @@ def _bias_panel(ax: Axes, table: LoopTable, methods: list[str], name: str) -> No
     j = PARAMETERS.index(name)
     limit = BARS.get(name)
     if limit is not None:
-        ax.axvspan(-limit, limit, color=style.SKY, alpha=0.25, lw=0.0, label=f"{limit:g} %")
+        ax.axvspan(-limit, limit, color=style.SKY, alpha=0.25, lw=0.0, label=f"bias of at most {limit:g} %")
     ax.axvline(0.0, color=style.BLACK, lw=1.0)
     for stage, (label, colour, offset, marker) in enumerate(_STAGES):
         biases = [bias_pct(pair[stage], table.truth) for pair in table.statistics.values()]

@@ -255,6 +255,20 @@ def ratio(numerator: float, denominator: float, products: tuple[float, float, fl
     return value, value * math.sqrt(max(paired, 0.0))
 
 
+@np.errstate(over="ignore", invalid="ignore")
+def difference(one: float, other: float, products: tuple[float, float, float], n: int) -> tuple[float, float]:
+    """Return the difference of two RelErr over the same runs, and its standard error, paired run by run.
+
+    Parameters
+    ----------
+    one, other : the two RelErr.
+    products : as in `ratio`.
+    n : number of runs; the products are (n - 1)/n of the squared errors, see `relative_error_of`.
+    """
+    own, theirs, common = products
+    return one - other, math.sqrt(max(own + theirs - 2.0 * common, 0.0) * n / (n - 1))
+
+
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def correlation_of(n: int, products: Array) -> Array:
     """Return a correlation matrix from the sums of products of deviations from the means; the identity for n < 2."""

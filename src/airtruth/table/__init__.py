@@ -1,7 +1,7 @@
 """The one table of the package and its writers: text, Markdown, HTML, LaTeX, CSV, JSON and pandas."""
 
 from airtruth.table.data import as_csv, as_json, from_frame, to_frame
-from airtruth.table.html import as_html
+from airtruth.table.html import as_html, escaped
 from airtruth.table.latex import as_latex
 from airtruth.table.model import (
     MISSING,
@@ -35,6 +35,7 @@ __all__ = [
     "as_latex",
     "as_markdown",
     "as_text",
+    "escaped",
     "fixed",
     "flat",
     "from_frame",

@@ -1,35 +1,22 @@
-"""Free runs against the tolerances for the short period of a training simulator.
-
-Source: 14 CFR Part 60, Appendix A, Table A2A, test 2.c.10 (short-period dynamics): 1.5 deg pitch angle or
-2 deg/s pitch rate, and 0.10 g normal acceleration.
-"""
+"""Free runs against the tolerances for the short period of a training simulator (`airtruth.physics.proof_of_match`)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.physics.proof_of_match import NORMAL_M_S2, PITCH_RAD, RATE_RAD_S, SOURCE
 from airtruth.tracing.inference.assess import Assessment
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.model.compile import CHANNELS
 from airtruth.tracing.stage_errors import BySet, Excursions, Tolerances
 from airtruth.tracing.stages import Stages
-from airtruth.units import DEG, G0
 
 Array = NDArray[np.float64]
 
-SOURCE: Final = "14 CFR Part 60, Appendix A, Table A2A, test 2.c.10"
-"""The regulation that states the tolerances."""
-PITCH_RAD: Final = 1.5 * DEG
-"""Tolerance of the pitch angle [rad]; source: `SOURCE`."""
-RATE_RAD_S: Final = 2.0 * DEG
-"""Tolerance of the pitch rate [rad/s]; source: `SOURCE`."""
-NORMAL_M_S2: Final = 0.10 * G0
-"""Tolerance of the normal acceleration [m/s2]; source: `SOURCE`."""
 _Q, _AZ = CHANNELS.index("q_rad_s"), CHANNELS.index("az_m_s2")
 
 
@@ -99,4 +86,4 @@ def _compare(assessed: Sequence[Assessment], problem: TraceProblem) -> Excursion
     )
 
 
-__all__ = ["NORMAL_M_S2", "PITCH_RAD", "RATE_RAD_S", "SOURCE", "Excursion", "excursion", "tolerances"]
+__all__ = ["Excursion", "excursion", "tolerances"]

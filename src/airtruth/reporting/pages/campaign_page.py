@@ -2,29 +2,36 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.stats import norm
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import AirtruthError
 from airtruth.identification.charts import Frames, intervals_chart
 from airtruth.logs.sources import Logs
 from airtruth.reporting.campaign import ESTIMATES, Campaign, Parted
-from airtruth.reporting.pages.estimates_page import MOST_RUNS, runs_tables, shifts_of
+from airtruth.reporting.pages.estimates_page import shifts_of
+from airtruth.reporting.pages.frequency_page import frequency_charts, frequency_section
+from airtruth.reporting.pages.headline import headline
 from airtruth.reporting.pages.identified import SIMULATED, Identified, read_identified
 from airtruth.reporting.pages.origin import of_methods, origin_section
 from airtruth.reporting.pages.page import Report, Section, answer_html, data_table, page_of
 from airtruth.reporting.pages.records import records_section, records_tables
+from airtruth.reporting.pages.scatter_page import (
+    LEAST_RUNS,
+    MOST_RUNS,
+    correlation_section,
+    runs_section,
+)
 from airtruth.reporting.paper import tables
 from airtruth.reporting.paper.layout import lay_out
 from airtruth.reporting.paper.published import ESTIMATED, SYMBOLS
 from airtruth.reporting.paper.tables import PaperTable
-from airtruth.reporting.statistics import MethodStatistics
 from airtruth.reporting.stored_campaign import StoredCampaign
-from airtruth.table import as_csv, as_latex, flat, significant
+from airtruth.table import as_csv, as_latex, flat
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,49 +61,45 @@ def campaign_report(campaign: Parted, logs: Logs | None = None, aircraft: Aircra
     histories = identified.histories
     statistics = {m: s for table in shown for m, s in table.statistics.items()}
     facts = [f"Gust: {campaign.gust}."] if campaign.gust else []
+    confidence = identified.confidence
+    runs, runs_drawn = runs_section(_with_std(first, confidence), flown, {"truth": truth}, confidence)
+    correlation, correlated = correlation_section(
+        {m: s.correlation for m, s in statistics.items() if s.counts.used >= LEAST_RUNS},
+        "Correlation over the converged runs.",
+    )
     sections = [
+        records_section(histories, identified.reason, SIMULATED),
         Section(
             "Estimates against the truth",
             "tables",
             "".join(data_table(one, table.name) for one, table in zip(laid_out, shown, strict=True)),
         ),
-        records_section(histories, identified.reason, SIMULATED),
         shift_section,
-        Section("Estimates of each run", "runs", runs_tables(first, flown)),
+        runs_drawn,
+        correlated,
+        frequency_section(histories),
         Section("Error per record", "errors", records_tables(histories) if histories else ""),
         origin_section(histories, of_methods(identified.records), facts),
     ]
     return Report(
         page=page_of(
             campaign.title or campaign.name,
-            answer_html(*_answer(statistics, flown, campaign.runs)),
+            answer_html(*headline(statistics, flown, campaign.runs, confidence)),
             chart,
             sections,
         ),
         csv=as_csv(flat(campaign.title, tables.LONG_COLUMNS, rows)),
         latex="\n".join(latex),
-        charts=(chart, *shifts),
+        charts=(chart, *shifts, *runs, *correlation, *frequency_charts(histories)),
     )
 
 
-def _answer(statistics: Mapping[str, MethodStatistics], flown: int, planned: int) -> list[str]:
-    """The method nearest to the truth, and the number of runs."""
-    relerr = {m: s.relerr.value for m, s in statistics.items() if math.isfinite(s.relerr.value)}
-    runs = f"{flown} of {planned} runs flew."
-    if not relerr:
-        return ["No method has a converged estimate.", runs]
-    best = min(relerr, key=lambda m: relerr[m])
-    words = (
-        f"{best} is nearest to the truth: its mean derivatives are off by {_percent(relerr[best])} (RelErr)"
-    )
-    if len(relerr) > 1:
-        worst = max(relerr, key=lambda m: relerr[m])
-        words += f", those of {worst} by {_percent(relerr[worst])}"
-    return [words + ".", runs]
-
-
-def _percent(value: float) -> str:
-    return f"{significant(100.0 * value, 2)} %"
+def _with_std(rows: pd.DataFrame, confidence: float) -> pd.DataFrame:
+    """The rows with the standard errors of their intervals, which are symmetric and normal."""
+    half = float(norm.isf(0.5 * (1.0 - confidence)))
+    with np.errstate(over="ignore", invalid="ignore"):
+        std = {f"{n}_std": 0.5 * (rows[f"{n}_upper"] - rows[f"{n}_lower"]) / half for n in ESTIMATED}
+    return rows.assign(**std)
 
 
 def _flown(campaign: Parted) -> tuple[int, dict[str, float]]:

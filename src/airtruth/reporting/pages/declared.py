@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.charts import Chart, Colour, Mark
+from airtruth.charts import Chart, Mark
+from airtruth.identification.charts import COLOURS
 from airtruth.logs.histories import Histories
 from airtruth.physics.atmosphere import altitude_of_density_m
 from airtruth.physics.short_period import PARAMETERS
@@ -25,17 +26,6 @@ Array = NDArray[np.float64]
 
 MODEL: Final = "declared"
 """Name of the declared aircraft among the models."""
-_COLOURS: Final[tuple[Colour, ...]] = (
-    "blue",
-    "vermillion",
-    "green",
-    "purple",
-    "orange",
-    "sky",
-    "ink",
-    "grey",
-)
-"""Colours of the methods, in their order."""
 _SPREAD: Final = 0.32
 """Half of the height of a row that the methods share [-] (judgement: rows stay apart)."""
 
@@ -98,7 +88,7 @@ def shifts_chart(declared: Declared, estimates: pd.DataFrame) -> Chart:
             value, low, high = (
                 (x - declared.values[name]) / declared.std[name] for x in _mean(estimates, method, name)
             )
-            colour = _COLOURS[k % len(_COLOURS)]
+            colour = COLOURS[k % len(COLOURS)]
             marks.append(Mark(row + float(offsets[k]), value, low, high, label=method, colour=colour))
     return chart_of_shifts(
         PARAMETERS,

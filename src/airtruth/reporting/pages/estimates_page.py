@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -15,19 +14,27 @@ from airtruth.identification.charts import intervals_chart
 from airtruth.identification.result import IdentificationResult
 from airtruth.identification.simulated import simulated_records
 from airtruth.identification.stored import Record
-from airtruth.physics.short_period import MODAL, PARAMETERS
+from airtruth.reporting.pages.frequency_page import frequency_charts, frequency_section
 from airtruth.reporting.pages.identified import SIMULATED, Identified, answer_of, require_same_aircraft
 from airtruth.reporting.pages.origin import of_methods, origin_section
 from airtruth.reporting.pages.page import Report, Section, answer_html, data_table, page_of
 from airtruth.reporting.pages.records import records_section, records_tables
+from airtruth.reporting.pages.scatter_page import (
+    correlation_section,
+    runs_section,
+    scattered_correlations,
+    stated_correlations,
+)
 from airtruth.reporting.paper.published import SYMBOLS
-from airtruth.table import Number, Row, as_csv, as_latex, flat
+from airtruth.table import as_csv, as_latex
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from airtruth.reporting.pages.declared import Declared
 
+_OVER_RUNS: Final = "Correlation over the converged runs."
+"""What a correlation from the scatter of the runs is."""
 _SYMBOLS: Final = {**SYMBOLS, "wn_rad_s": r"$\omega_n$"}
 """Symbols of a table that has a column of units."""
 
@@ -51,11 +58,18 @@ def estimates_report(title: str, identified: Identified) -> Report:
     notes += [
         f"Overridden by --force: {s}" for record in identified.records.values() for s in record["forced"]
     ]
+    runs, runs_drawn = runs_section(frame, None, references, identified.confidence)
+    if identified.correlations is None:
+        correlation, correlated = correlation_section(scattered_correlations(frame), _OVER_RUNS)
+    else:
+        correlation, correlated = correlation_section(identified.correlations)
     sections = [
         records_section(histories, identified.reason, SIMULATED),
         Section("Estimates of all methods", "estimates", data_table(table, "estimates")),
         shift_section,
-        Section("Estimates of each run", "runs", runs_tables(frame)),
+        runs_drawn,
+        correlated,
+        frequency_section(histories),
         Section("Error per record", "errors", records_tables(histories) if histories else ""),
         origin_section(histories, of_methods(identified.records), dict.fromkeys(notes)),
     ]
@@ -63,7 +77,7 @@ def estimates_report(title: str, identified: Identified) -> Report:
         page=page_of(title, answer_html(*answer_of(frame)), chart, sections),
         csv=as_csv(table),
         latex=as_latex(table, "estimates", _SYMBOLS),
-        charts=(chart, *shifts),
+        charts=(chart, *shifts, *runs, *correlation, *frequency_charts(histories)),
     )
 
 
@@ -110,50 +124,9 @@ def identification_report(result: IdentificationResult, aircraft: Aircraft | Non
         histories=histories,
         reason="The result holds no logs, so the records are not shown.",
         declared=declared,
+        correlations=stated_correlations(result.estimates),
     )
     return estimates_report(f"Identification of {result.settings.aircraft}", identified)
 
 
-def runs_tables(frame: pd.DataFrame, of_runs: int | None = None) -> str:
-    """Return the table of every run and method as HTML; of many runs, the first `MOST_RUNS` alone.
-
-    Parameters
-    ----------
-    frame : rows of contract 2, of at least the first `MOST_RUNS` runs.
-    of_runs : number of all runs; None for those of ``frame``.
-    """
-    runs = list(dict.fromkeys(frame["run_id"]))
-    total = of_runs or len(runs)
-    if total == 1:
-        return ""  # the table of all methods holds them
-    kept = frame[frame["run_id"].isin(runs[:MOST_RUNS])]
-    names = [name for name in (*PARAMETERS, *MODAL) if name in frame]
-    shown = [column for name in names for column in (name, f"{name}_std") if column in frame]
-    values = kept[shown].to_numpy(dtype=np.float64)
-    rows: list[Row] = [
-        (
-            str(run),
-            str(method),
-            "yes" if converged else "no",
-            *(
-                Number(float(x), digits=2 if c.endswith("_std") else 4)
-                for c, x in zip(shown, row, strict=True)
-            ),
-        )
-        for run, method, converged, row in zip(
-            kept["run_id"], kept["method"], kept["converged"], values, strict=True
-        )
-    ]
-    columns = ["run", "method", "converged", *(c.replace("_std", " std") for c in shown)]
-    notes = (
-        (f"The first {MOST_RUNS} of {total} runs; estimates.parquet holds all, the table above counts all.",)
-        if total > MOST_RUNS
-        else ()
-    )
-    return data_table(replace(flat("Estimates of each run", columns, rows, notes), keys=2), "runs")
-
-
-MOST_RUNS: Final = 30
-"""Most runs in a table of single runs [-] (judgement: a page stays small)."""
-
-__all__ = ["MOST_RUNS", "estimates_report", "identification_report", "runs_tables", "shifts_of"]
+__all__ = ["estimates_report", "identification_report", "shifts_of"]

@@ -8,6 +8,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from airtruth.charts import Chart
 from airtruth.charts import as_html as chart_html
 from airtruth.documents import read_json
 from airtruth.errors import StoreError
@@ -100,16 +101,14 @@ def _report(
     names = tuple(asdict(changes[0])) if changes else ("method", "derivative")
     long = flat(table.title, names, [tuple(asdict(change).values()) for change in changes])
     chart = loop_chart(changes)
-    intervals = [
-        replace(drawn, name=f"intervals-{stage}", title=f"{stage.capitalize()}: {drawn.title}")
-        for stage, frame in frames.items()
-        for drawn in [intervals_chart(frame)]
-    ]
+    intervals = _intervals(frames, {c.derivative: c.declared for c in changes})
     origin = of_trace(Provenance.read(histories.facts.get(PROVENANCE) if histories else None))
+    records, *others = trace_sections(answer, histories)
     sections = [
+        records,
         Section("Derivatives before and after", NAME, data_table(table, NAME)),
         Section("Intervals of all methods", "intervals", "".join(map(chart_html, intervals))),
-        *trace_sections(answer, histories),
+        *others,
         origin_section(histories, origin, closing(answer)),
     ]
     return Report(
@@ -118,6 +117,26 @@ def _report(
         latex=as_latex(table, NAME, SYMBOLS),
         charts=(chart, *intervals, *trace_charts(answer, histories)),
     )
+
+
+def _intervals(frames: Mapping[str, pd.DataFrame], declared: Mapping[str, float]) -> list[Chart]:
+    """One chart of the intervals before and after, in which each method has two rows; one row if they are the same."""
+    import pandas as pd
+
+    if not frames:
+        return []
+    first = next(iter(frames.values()))
+    if all(frame.equals(first) for frame in frames.values()):
+        return [intervals_chart(first, {"declared": declared})]
+    parts = [
+        frame.assign(method=[f"{m}, {stage}" for m in frame["method"]]) for stage, frame in frames.items()
+    ]
+    both = pd.concat(parts, ignore_index=True)
+    methods = [f"{m}, {stage}" for m in dict.fromkeys(first["method"]) for stage in frames]
+    ordered = both.sort_values("method", kind="stable", key=lambda names: names.map(methods.index))
+    drawn = intervals_chart(ordered, {"declared": declared})
+    title = "Derivatives without the traced effects (before) and with them (after)"
+    return [replace(drawn, title=title)]
 
 
 __all__ = ["DOCUMENT", "loop_report", "stored_loop_report"]

@@ -14,7 +14,7 @@ from airtruth.charts import as_html as chart_html
 from airtruth.errors import StoreError, choices
 from airtruth.logs.atomic import make_folder, write_text
 from airtruth.reporting.pages.assets import own, uplot
-from airtruth.table import Table, as_csv
+from airtruth.table import Table, as_csv, escaped
 from airtruth.table import as_html as table_html
 
 if TYPE_CHECKING:
@@ -124,18 +124,18 @@ def as_json(value: object) -> str:
 
 def answer_html(sentence: str, *further: str) -> str:
     """Return the answer of a page, and further sentences below it, from plain text."""
-    paragraphs = [f'<p class="verdict">{html.escape(sentence)}</p>']
-    return "\n".join([*paragraphs, *(f"<p>{html.escape(words)}</p>" for words in further)])
+    paragraphs = [f'<p class="verdict">{escaped(sentence)}</p>']
+    return "\n".join([*paragraphs, *(f"<p>{escaped(words)}</p>" for words in further)])
 
 
 def notes_html(sentences: Iterable[str]) -> str:
     """Return sentences as paragraphs of the class "note"."""
-    return "\n".join(f'<p class="note">{html.escape(sentence)}</p>' for sentence in sentences)
+    return "\n".join(f'<p class="note">{escaped(sentence)}</p>' for sentence in sentences)
 
 
 def preformatted(lines: Iterable[str]) -> str:
     """Return lines of plain text as an HTML block that keeps their alignment."""
-    return f"<pre>{html.escape(chr(10).join(lines))}</pre>"
+    return f"<pre>{escaped(chr(10).join(lines))}</pre>"
 
 
 def format_of(out: Path, wanted: str | None) -> str:

@@ -12,10 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.channels import shown
+from airtruth.charts import colours_of
+from airtruth.charts.model import MODELS
 from airtruth.logs.histories import Histories, History
+from airtruth.physics.proof_of_match import NORMAL_M_S2, OF_CHANNEL, PITCH_RAD, RATE_RAD_S, SOURCE
+from airtruth.reporting.pages.agreement import agreement_of_records, agreement_table
 from airtruth.reporting.pages.page import Section, as_json, data_table, notes_html
 from airtruth.table import MISSING, Number, Row, Table, flat
-from airtruth.units import DEG
+from airtruth.units import DEG, G0
 
 Array = NDArray[np.float64]
 
@@ -27,8 +31,6 @@ _LEAST: Final = 200
 """Least samples of a record on a page [-]; judgement: a doublet remains visible."""
 _BYTES: Final = 16.0 / 3.0
 """Size of a number as base64 of float32 [byte]."""
-_COLOURS: Final = ("blue", "vermillion", "green", "purple", "orange", "sky")
-"""Colours of the models, the last model first: it is the answer."""
 _DASHES: Final = ((), (7, 3), (2, 3))
 """Dashes of the first six models, of the next six, and of the rest [px]."""
 _QUANTITIES: Final = (
@@ -116,19 +118,24 @@ def records_section(histories: Histories | None, reason: str = "", note: str = "
         anchor,
         f'{controls}<div class="controls toggles" id="toggles"></div><p class="note" id="condition"></p>'
         f'<div id="plots"></div><script type="application/json" id="records-data">{data}</script>\n'
+        + data_table(agreement_table(histories), "agreement")
         + notes_html(
             [
-                "Drag over a plot to zoom all of them; a double click shows the whole record."
-                + (
-                    " Shaded: two standard deviations of what gusts and sensor noise explain."
-                    if _floors(chosen)
-                    else ""
-                ),
+                "Drag over a plot to zoom all of them; a double click shows the whole record.",
+                f"Tolerance of a training simulator ({SOURCE}), dashed in a residual: "
+                f"q within {RATE_RAD_S / DEG:g} deg/s, or pitch within {PITCH_RAD / DEG:g} deg (not "
+                f"drawn), and az within {NORMAL_M_S2 / G0:.2f} g of the measurement.",
                 *([note] if note else []),
                 *chosen.notes,
             ]
         ),
     )
+
+
+def _keys(chosen: Extract) -> list[tuple[str, str]]:
+    """Words and style of what the plots show beside the models."""
+    keys = [("measured", "measured"), ("tolerance of a simulator", "tolerance")]
+    return keys + ([("2 \u03c3 of gusts and noise", "band")] if _floors(chosen) else [])
 
 
 def _floors(chosen: Extract) -> bool:
@@ -137,11 +144,13 @@ def _floors(chosen: Extract) -> bool:
 
 def _data(histories: Histories, chosen: Extract) -> dict[str, object]:
     first = chosen.records[0]
-    colours = dict(zip(reversed(histories.models), _COLOURS * len(histories.models), strict=False))
-    ranks = {name: k // len(_COLOURS) for k, name in enumerate(reversed(histories.models))}
+    colours = colours_of(histories.models)
+    ranks = {name: k // len(MODELS) for k, name in enumerate(reversed(histories.models))}
     return {
         "first": [r.run_id for r in chosen.records].index(histories.first.run_id),
         "channels": [shown(c)[0] for c in first.measured],
+        "tolerances": [OF_CHANNEL.get(c, 0.0) * shown(c)[1] for c in first.measured],
+        "keys": _keys(chosen),
         "models": [
             {"name": m, "colour": colours[m], "dash": list(_DASHES[min(ranks[m], 2)])}
             for m in histories.models
@@ -234,8 +243,10 @@ def conditions_table(histories: Histories) -> Table:
 
 
 def records_tables(histories: Histories) -> str:
-    """Return the table of the errors of each record as HTML."""
-    return data_table(record_errors(histories), "record-errors")
+    """Return the tables of the errors of each record as HTML."""
+    return data_table(record_errors(histories), "record-errors") + data_table(
+        agreement_of_records(histories), "record-agreement"
+    )
 
 
 __all__ = [

@@ -11,10 +11,11 @@ from airtruth.charts import as_html as chart_html
 from airtruth.errors import StoreError
 from airtruth.logs.histories import FILE, Histories, read_histories
 from airtruth.logs.provenance import PROVENANCE, Provenance
+from airtruth.reporting.pages.frequency_page import frequency_section
 from airtruth.reporting.pages.origin import of_trace, origin_section
 from airtruth.reporting.pages.page import Report, Section, data_table, page_of
 from airtruth.reporting.pages.records import records_section, records_tables
-from airtruth.table import Number, Row, Table, as_latex, flat
+from airtruth.table import Number, Row, Table, as_latex, escaped, flat
 from airtruth.tracing.answer import ANSWER, TraceAnswer
 from airtruth.tracing.presentation.candidates import candidate_table
 from airtruth.tracing.presentation.charts import (
@@ -110,6 +111,7 @@ def trace_sections(answer: TraceAnswer, histories: Histories | None) -> list[Sec
         Section(
             "Derivatives", "derivatives", (chart_html(shifts) if shifts else "") + "\n".join(derivatives)
         ),
+        frequency_section(histories),
         Section("Candidates", "candidates", chart_html(scores_chart(answer)) + "\n".join(candidates)),
         Section(
             "Remaining residual", "innovations", chart_html(innovations_chart(histories)) if histories else ""
@@ -166,7 +168,7 @@ def _sets_table(answer: TraceAnswer) -> Table:
 
 
 def _next(answer: TraceAnswer) -> str:
-    parts = [f"<p>{html.escape(answer.next_flight)}</p>"]
+    parts = [f"<p>{escaped(answer.next_flight)}</p>"]
     sizes = "; ".join(detectable(answer))
     if sizes:
         parts.append(f"<p>Smallest traceable sizes in these records: {html.escape(sizes)}.</p>")

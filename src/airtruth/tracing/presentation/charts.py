@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from airtruth.channels import shown
-from airtruth.charts import Band, Bar, Chart, Colour, Mark, Panel, Rule, Stroke
+from airtruth.charts import Band, Bar, Chart, Colour, Mark, Panel, Rule, Stroke, colours_of
 from airtruth.logs.histories import Histories, History
 from airtruth.table import significant
 from airtruth.tracing.answer import CandidateScore, TraceAnswer
 from airtruth.tracing.presentation.candidates import ranked
 from airtruth.tracing.presentation.effect_panel import line
-from airtruth.tracing.presentation.error_table import stages_of
+from airtruth.tracing.presentation.error_table import MEANING, stages_of
 from airtruth.tracing.presentation.text import FAR_SIGMA, headline
 from airtruth.tracing.presentation.trace_histories import panel_of
 
@@ -33,6 +33,8 @@ _SMALLEST: Final = 1e-290
 """Probability up to which a p-value is converted to a normal variable [-] (above underflow)."""
 _LARGEST_SIGMA: Final = 36.0
 """Size of a normal variable with that probability [-], as norm.isf(0.5e-290) = 36.4."""
+_MODEL_STROKES: Final[tuple[Stroke, ...]] = ("dashed", "solid", "dotted")
+"""Strokes beside the colours of the models, in their order."""
 _POINTS: Final = 600
 """Most points of a curve of a chart [-]; judgement: two per pixel of a panel."""
 _LAGS: Final = 50
@@ -42,13 +44,16 @@ _LAGS: Final = 50
 def trace_chart(answer: TraceAnswer, histories: Histories) -> Chart:
     """Residuals of one record's free run: as declared; the effect; before and after.
 
-    The first column shows the declared model alone, and the third has the same scales.
+    The first column shows the declared model alone, and the third has the same scales. Without an accepted effect, the
+    record beside its simulations, and the residuals.
     """
     record = histories.first
-    channels = list(record.measured)
+    if not record.effect:
+        return _without_effect(answer, histories)
+    channels, colours = list(record.measured), colours_of(histories.models)
     best = histories.models[-1]
-    left = [_residuals(record, channel, histories.models[:1]) for channel in channels]
-    right = [_residuals(record, channel, histories.models[1:]) for channel in channels]
+    left = [_residuals(record, channel, histories.models[:1], colours) for channel in channels]
+    right = [_residuals(record, channel, histories.models[1:], colours) for channel in channels]
     middle = [panel_of(histories), _contribution(record), _stages(answer)]
     panels = []
     for i, (first, centre, last) in enumerate(zip(left, middle, right, strict=True)):
@@ -69,21 +74,66 @@ def trace_chart(answer: TraceAnswer, histories: Histories) -> Chart:
         panels=tuple(panels),
         columns=3,
         caption=f"Free runs of record {record.run_id}{group}. Shaded: two standard deviations of the response to gusts "
-        "and sensor noise.",
+        f"and sensor noise. {_meanings(stages_of(answer))}",
         legend=False,
     )
 
 
-def _residuals(record: History, channel: str, models: Sequence[str]) -> Panel:
+def _without_effect(answer: TraceAnswer, histories: Histories) -> Chart:
+    """One record beside its simulations, and their residuals, where no effect was accepted."""
+    record = histories.first
+    step = max(1, -(-len(record.t_s) // _POINTS))
+    colours = colours_of(histories.models)
+    panels = []
+    for i, channel in enumerate(record.measured):
+        name, factor = shown(channel)
+        measured = line(record.t_s[::step], record.measured[channel][::step] * factor)
+        lines = [replace(measured, label="measured", colour="ink", stroke="points")]
+        residuals = []
+        # the declared model last and dashed: a refitted one that is the same would hide it
+        for model, stroke in reversed(list(zip(histories.models, _MODEL_STROKES, strict=False))):
+            colour = colours[model]
+            y = record.models[model][channel][::step] * factor
+            lines.append(replace(line(record.t_s[::step], y), label=model, colour=colour, stroke=stroke))
+            residual = record.residual(model, channel)[::step] * factor
+            residuals.append(replace(line(record.t_s[::step], residual), colour=colour, stroke=stroke))
+        floor = 2.0 * record.floor.get(channel, np.nan) * factor
+        time = "time [s]" if i == len(record.measured) - 1 else ""
+        titles = ("measured and simulated", "residual") if i == 0 else ("", "")
+        panels += [
+            Panel(titles[0], time, name, tuple(lines)),
+            Panel(
+                titles[1],
+                time,
+                name.replace(" [", " residual ["),
+                tuple(residuals),
+                bands=(Band(-floor, floor, label="two standard deviations of gusts and noise"),),
+            ),
+        ]
+    group = f", {record.group}" if record.group else ""
+    return Chart(
+        name="trace",
+        title=f"{headline(answer)}. One record beside the declared and the refitted model",
+        panels=tuple(panels),
+        columns=2,
+        caption=f"Free runs of record {record.run_id}{group}. {_meanings(histories.models)}",
+    )
+
+
+def _meanings(stages: Iterable[str]) -> str:
+    """What the stages are, as a sentence."""
+    return "; ".join(MEANING[name] for name in stages if name in MEANING).capitalize() + "."
+
+
+def _residuals(record: History, channel: str, models: Sequence[str], colours: Mapping[str, Colour]) -> Panel:
     name, factor = shown(channel)
     floor = 2.0 * record.floor.get(channel, np.nan) * factor
     step = max(1, -(-len(record.t_s) // _POINTS))
     lines = []
     for model in models:
-        colour: Colour = "grey" if model != models[-1] else "blue"
         residual = record.residual(model, channel)[::step] * factor
-        label = model if len(models) > 1 and channel == next(iter(record.measured)) else ""
-        lines.append(replace(line(record.t_s[::step], residual), label=label, colour=colour))
+        label = model if channel == next(iter(record.measured)) else ""
+        lines.append(replace(line(record.t_s[::step], residual), label=label, colour=colours[model]))
     last = channel == list(record.measured)[-1]
     return Panel(
         x_label="time [s]" if last else "", y_label=name, lines=tuple(lines), bands=(Band(-floor, floor),)
@@ -94,7 +144,7 @@ def _contribution(record: History) -> Panel:
     """The effects' part of the outputs, over the floor."""
     title = "effect on the outputs"
     if not record.effect:
-        return Panel(title=title, words="no effect accepted")
+        return Panel(title=title, words="no effect on this record")
     step = max(1, -(-len(record.t_s) // _POINTS))
     return Panel(
         title=title,
@@ -151,18 +201,17 @@ def scores_chart(answer: TraceAnswer) -> Chart:
     leading = {e.key for e in answer.effects}
     alike = {name for e in answer.effects for name in e.indistinguishable_from}
     sigma = [_sigma(r.candidate) for r in rows]
-    bars = []
+    needed = _needed(sigma)
+    bars, refused = [], []
     for at, r in enumerate(rows):
         accepted, same = r.candidate.key in leading, r.candidate.name in alike
         colour: Colour = "vermillion" if accepted else "orange" if same else "blue"
         label = "accepted" if accepted else "looks the same" if same else "not accepted"
         words = [] if colour == "blue" else [label]
+        if colour == "blue" and sigma[at] > needed[at]:
+            refused.append(f"{r.candidate.key} ({r.outcome})")
         words += [] if r.gain is None else [f"refit gains {significant(r.gain)} in 2 log L"]
         bars.append(Bar(at, sigma[at], label, colour, ": ".join(words)))
-    # Holm's rule goes by significance, whatever the order of the rows
-    order = np.argsort(-np.array(sigma), kind="stable")
-    needed = np.empty(len(rows))
-    needed[order] = norm.isf(0.5 * LEVEL / (len(rows) - np.arange(len(rows))))
     holm = replace(
         line(needed, np.arange(len(rows))),
         label=f"Holm, {100.0 * LEVEL:g} % over all",
@@ -181,8 +230,17 @@ def scores_chart(answer: TraceAnswer) -> Chart:
         title=f"{headline(answer)}. Candidates at the refitted aircraft without effects",
         panels=(panel,),
         columns=1,
-        caption="An effect is accepted on the gain of its refit, which can be large although its score is small.",
+        caption="An effect is accepted on the gain of its refit, which can be large although its score is small."
+        + (f" Beyond the line and not accepted: {', '.join(refused)}." if refused else ""),
     )
+
+
+def _needed(sigma: Sequence[float]) -> Array:
+    """Significance that Holm's rule asks for in each row; it goes by significance, whatever the order of the rows."""
+    order = np.argsort(-np.array(sigma), kind="stable")
+    needed = np.empty(len(sigma))
+    needed[order] = norm.isf(0.5 * LEVEL / (len(sigma) - np.arange(len(sigma))))
+    return needed
 
 
 def _sigma(candidate: CandidateScore) -> float:
@@ -239,43 +297,62 @@ def _is_far(mark: Mark) -> bool:
 
 
 def innovations_chart(histories: Histories) -> Chart:
-    """Whitened innovations of one record and their autocorrelation, as declared and of the last stage."""
+    """Whitened innovations of one record as declared and of the last stage, and the autocorrelation of both."""
     record = histories.first
     models = list(dict.fromkeys((histories.models[0], histories.models[-1])))
     return Chart(
         name="innovations",
         title=f"Whitened innovations and their autocorrelation, {' and '.join(models)}",
-        panels=tuple(p for channel in record.measured for p in _whiteness(record, channel, models)),
-        columns=2,
-        caption=f"Record {record.run_id}. Shaded: 95 % of white noise.",
+        panels=tuple(
+            p
+            for channel in record.measured
+            for p in _whiteness(record, channel, models, colours_of(histories.models))
+        ),
+        columns=len(models) + 1,
+        caption=f"Record {record.run_id}. {_meanings(models)}",
     )
 
 
-def _whiteness(record: History, channel: str, models: Sequence[str]) -> Iterator[Panel]:
+def _whiteness(
+    record: History, channel: str, models: Sequence[str], colours: Mapping[str, Colour]
+) -> Iterator[Panel]:
+    """A panel of innovations for each model with one scale, so that none hides another; then the autocorrelations."""
     n = len(record.t_s)
     step = max(1, -(-n // _POINTS))
     lags = np.arange(1, min(_LAGS + 1, max(2, n // 4)))
     dt = float(record.t_s[1] - record.t_s[0]) if n > 1 else np.nan
     bound = float(norm.isf(0.025) / np.sqrt(n))
     series, correlations = [], []
-    for model in models:
+    for model, stroke in zip(models, _MODEL_STROKES, strict=False):
+        colour = colours[model]
         e = record.innovations.get(model, {}).get(channel)
         if e is None:
             continue
-        colour: Colour = "blue" if model == models[-1] else "grey"
         series.append(replace(line(record.t_s[::step], e[::step]), label=model, colour=colour))
-        correlations.append(replace(line(lags * dt, _correlation(e, lags)), label=model, colour=colour))
+        correlations.append(
+            replace(line(lags * dt, _correlation(e, lags)), label=model, colour=colour, stroke=stroke)
+        )
+    white = "95 % of white noise"
+    panels = [
+        Panel(
+            title=own.label,
+            x_label="time [s]",
+            y_label=f"{_short(channel)} [\u03c3]",
+            lines=(own,),
+            bands=(Band(-1.96, 1.96, label=white),),
+        )
+        for own in series
+    ]
+    ends = [panel.y_range() for panel in panels]
+    for panel in panels:
+        both = (min(low for low, _ in ends), max(high for _, high in ends))
+        yield replace(panel, y_limits=both)
     yield Panel(
-        x_label="time [s]",
-        y_label=f"{_short(channel)} [σ]",
-        lines=tuple(series),
-        bands=(Band(-1.96, 1.96),),
-    )
-    yield Panel(
+        title="autocorrelation",
         x_label="lag [s]",
-        y_label=f"{_short(channel)} autocorrelation",
+        y_label=f"{_short(channel)} [-]",
         lines=tuple(correlations),
-        bands=(Band(-bound, bound),),
+        bands=(Band(-bound, bound, label=white),),
     )
 
 

@@ -16,7 +16,7 @@ KINDS: Final = (("free_run", "Free run"), ("innovation", "Innovations"))
 """Kinds of error and their names in a heading."""
 CSV_COLUMNS: Final = ("records", "kind", "channel", "stage", "rms")
 """Columns of `error_csv`."""
-_MEANING: Final = {
+MEANING: Final = {
     "declared": "declared: the aircraft as declared",
     "before": "before: derivatives and noise levels refitted, no effect",
     "after": "after: with the effects",
@@ -49,7 +49,7 @@ def error_table(answer: TraceAnswer) -> Table:
         columns=("", "signal", *names),
         groups=tuple(g for g in groups if g.rows),
         notes=(
-            "; ".join(_MEANING[name] for name in names) + ".",
+            "; ".join(MEANING[name] for name in names) + ".",
             "Every stage has the same free biases, initial states and trims of the records; an effect is credited "
             "with the step from before to after alone. signal: standard deviation of the measured channel.",
         ),
@@ -121,4 +121,4 @@ def _row(channel: str, signal: float, cells: list[float | None]) -> Row:
     return (name, Number(signal * factor, digits=3), *numbers)
 
 
-__all__ = ["CSV_COLUMNS", "axial_words", "error_csv", "error_table", "stages_of"]
+__all__ = ["CSV_COLUMNS", "MEANING", "axial_words", "error_csv", "error_table", "stages_of"]

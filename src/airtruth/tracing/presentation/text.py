@@ -261,8 +261,7 @@ def effect_details(effect: AcceptedEffect, share: float | None = None) -> Iterat
         )
     yield f"{line}; {significant(effect.separation_sigma)} sigma from the next effect"
     if share is not None:
-        part = f"{100.0 * share:.0f} %"
-        yield f"  its removal costs {part} of the log-likelihood gained from the declared aircraft to this answer"
+        yield f"  {_removal(share)}"
     alike = effect.indistinguishable_from
     yield (
         f"  looks the same in these records: {', '.join(alike)}"
@@ -272,6 +271,13 @@ def effect_details(effect: AcceptedEffect, share: float | None = None) -> Iterat
     if effect.other_variants:
         names = ", ".join(f"{effect.name}:{v}" for v in effect.other_variants)
         yield f"  explains the records as well: {names}"
+
+
+def _removal(share: float) -> str:
+    """How much worse the answer fits without one of its effects."""
+    if share > 1.0:
+        return "without it, the rest of this answer fits the records worse than the declared aircraft does"
+    return f"without it, {100.0 * share:.0f} % of the improvement over the declared aircraft is lost (log-likelihood)"
 
 
 def detectable(answer: TraceAnswer) -> Iterator[str]:

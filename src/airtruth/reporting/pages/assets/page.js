@@ -125,26 +125,60 @@
     plot.ctx.fillStyle = shade("band");
     plot.ctx.fillRect(left, high, width, low - high);
   } } });
-  const fitted = (half) => (plot, low, high) => {
+  // Tolerance of a training simulator: a corridor about the measurement, or about zero.
+  const tolerancePlugin = (half, centre) => ({ hooks: { drawClear: (plot) => {
+    if (!(half > 0)) return;
+    const { left, top, width, height } = plot.bbox;
+    const context = plot.ctx;
+    const time = plot.data[0];
+    context.save();
+    context.beginPath();
+    context.rect(left, top, width, height);
+    context.clip();
+    if (!centre) { // lines, because a second shade would hide that of the gusts
+      context.strokeStyle = shade("green");
+      context.setLineDash([6, 4]);
+      for (const side of [-1, 1]) {
+        const y = plot.valToPos(side * half, "y", true);
+        context.beginPath();
+        context.moveTo(left, y);
+        context.lineTo(left + width, y);
+        context.stroke();
+      }
+      context.restore();
+      return;
+    }
+    context.fillStyle = shade("tolerance");
+    context.beginPath();
+    const at = (k, side) => [plot.valToPos(time[k], "x", true), plot.valToPos((centre[k] || 0) + side * half, "y", true)];
+    for (let k = 0; k < time.length; k += 1) context.lineTo(...at(k, 1));
+    for (let k = time.length - 1; k >= 0; k -= 1) context.lineTo(...at(k, -1));
+    context.fill();
+    context.restore();
+  } } });
+  const fitted = (half, tolerance, centre) => (plot, low, high) => {
     if (low === null || high === null) return [-1, 1];
-    const ends = half > 0 ? [Math.min(low, -half), Math.max(high, half)] : [low, high];
+    const about = centre ? centre.filter((x) => x !== null) : [0];
+    const least = (tolerance > 0 ? about : []).reduce((a, x) => Math.min(a, x - tolerance), -half || low);
+    const most = (tolerance > 0 ? about : []).reduce((a, x) => Math.max(a, x + tolerance), half || high);
+    const ends = [Math.min(low, least), Math.max(high, most)];
     const margin = 0.06 * (ends[1] - ends[0]) || 0.5 * Math.abs(ends[0]) || 1;
     return [ends[0] - margin, ends[1] + margin];
   };
-  const plotOf = (title, height, series, values, half, last) => {
+  const plotOf = (title, height, series, values, half, last, tolerance = 0, centre = null) => {
     const readout = element("span", { class: "readout" });
     const box = element("div", { class: "plot" }, element("h3", {}, title + " ", readout));
     plotsBox.append(box);
     const shown = (x) => (x === null || x === undefined ? "-" : Number(x).toPrecision(4));
     const plot = new uPlot({
       width: plotsBox.clientWidth, height, legend: { show: false },
-      scales: { x: { time: false }, y: { range: fitted(half) } },
+      scales: { x: { time: false }, y: { range: fitted(half, tolerance, centre) } },
       axes: [axis({ size: last ? 30 : 18, label: last ? "time [s]" : undefined, labelSize: 14, labelFont: "11px system-ui" }),
-        axis({ size: 52, space: 20 })],
+        axis({ size: 52, space: 16 })],
       series: [{}, ...series],
       cursor: { drag: { x: true, y: false }, points: { size: 5 },
         sync: { key: "records", scales: ["x", null], filters: { pub: (type) => type === "mousemove" || type === "mouseleave" } } },
-      plugins: [bandPlugin(half)],
+      plugins: [tolerancePlugin(tolerance, centre), bandPlugin(half)],
       hooks: { setScale: [linked], setCursor: [(u) => {
         const at = u.cursor.idx;
         readout.textContent = at === null || at === undefined ? "" :
@@ -169,7 +203,8 @@
       const models = record.models.map((own) => numbers(own[i]));
       const points = { label: "measured", stroke: () => shade("ink"), paths: () => null,
         points: { show: true, size: 3, stroke: () => shade("grey"), fill: () => shade("grey") } };
-      plotOf(channel, 150, [points, ...data.models.map(lineOf)], [time, measured, ...models], 0, false);
+      plotOf(channel, 150, [points, ...data.models.map(lineOf)], [time, measured, ...models], 0, false,
+        data.tolerances[i], measured);
       const isLast = i === data.channels.length - 1;
       if (below.value === "innovation") {
         plotOf(`${channel.split(" ")[0]} innovation [\u03c3]`, isLast ? 126 : 104, data.models.map(lineOf),
@@ -177,13 +212,17 @@
         return;
       }
       const residuals = models.map((own) => own.map((x, k) => (x === null || measured[k] === null ? null : measured[k] - x)));
-      plotOf(`${channel.replace(" [", " residual [")}`, isLast ? 126 : 104, data.models.map(lineOf), [time, ...residuals], 2 * record.floor[i], isLast);
+      plotOf(`${channel.replace(" [", " residual [")}`, isLast ? 126 : 104, data.models.map(lineOf), [time, ...residuals],
+        2 * record.floor[i], isLast, data.tolerances[i]);
     });
     document.getElementById("condition").textContent = record.words;
     section.dataset.record = record.name;
     zoom(range);
   };
   const toggles = document.getElementById("toggles");
+  for (const [words, kind] of data.keys) {
+    toggles.append(element("span", { class: "key" }, element("i", { class: kind }), words));
+  }
   for (const model of data.models) {
     const chip = element("i");
     const button = element("button", { type: "button", "aria-pressed": "true" }, chip, model.name);

@@ -1,4 +1,4 @@
-"""A headless Chromium for the tests of pages, driven through its debugging pipe; it loads no other package."""
+"""A headless Chromium for pictures and tests of pages, driven through its debugging pipe; it loads no other package."""
 
 import base64
 import json
@@ -83,16 +83,13 @@ class Tab:
             self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y, button="left", buttons=1)
         self.call("Input.dispatchMouseEvent", type="mouseReleased", x=end[0], y=end[1], **mouse)
 
-    def picture(self, whole=True):
-        """PNG of the page."""
-        size = self.call("Page.getLayoutMetrics")["cssContentSize"]
-        clip = {"x": 0, "y": 0, "width": size["width"], "height": size["height"], "scale": 1.0}
-        shot = self.call(
-            "Page.captureScreenshot",
-            format="png",
-            captureBeyondViewport=whole,
-            **({"clip": clip} if whole else {}),
-        )
+    def picture(self, area=None):
+        """PNG of the page, or of an area of it: left, top, width and height [px]."""
+        if area is None:
+            size = self.call("Page.getLayoutMetrics")["cssContentSize"]
+            area = (0, 0, size["width"], size["height"])
+        clip = dict(zip(("x", "y", "width", "height"), area, strict=True), scale=1.0)
+        shot = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=True, clip=clip)
         return base64.b64decode(shot["data"])
 
     def complaints(self):
