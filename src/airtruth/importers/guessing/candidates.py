@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.checks.evidence import LIMITS, MEANS
+from airtruth.checks.means import LIMITS, MEANS
 from airtruth.importers.attitude import euler_angles
 from airtruth.importers.dictionary import DIMENSIONS, QUATERNION, VELOCITY, Entry, Lexicon, Words, compact
 from airtruth.importers.guessing.columns import Clock, Column
