@@ -7,9 +7,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from airtruth.checks.kinematics import check_kinematics, declared_biases, declared_errors
-from airtruth.checks.kinematics_fit import fit, limits_of, problem_of
+from airtruth.checks.kinematics_fit import Fit, fit, limits_of, problem_of
 from airtruth.checks.kinematics_lines import lines_of
 from airtruth.checks.kinematics_model import ERRORS, Record, compare, stacked
+from airtruth.checks.kinematics_search import Explanation
+from airtruth.checks.kinematics_words import _factors
 from airtruth.checks.result import tables
 from airtruth.checks.samples import derivative, earlier, integral, lagged
 from airtruth.errors import LogError
@@ -475,3 +477,23 @@ def test_declared_sensors_of_the_gtm(gtm):
     biases = declared_biases(gtm)
     assert set(biases) == {"airspeed_m_s", "theta_rad", "q_rad_s", "ax_m_s2", "az_m_s2"}
     assert (biases["q_rad_s"], biases["ax_m_s2"]) == pytest.approx((0.0027, 0.0162 * G0), abs=1e-6)
+
+
+def test_no_set_of_errors_is_excluded_for_its_size_alone():
+    """Distances by hand: 9.6 by the cost, of which 3.3 is the improbability of a long arm."""
+    empty = np.zeros(0)
+    fitted = Fit((), empty, empty, np.zeros((0, 0)), 0.0, True)
+    best = Explanation(fitted, cost=20.0, improbability=0.1)
+    long_arm = Explanation(fitted, cost=29.6, improbability=3.4)
+    assert long_arm.behind(best) == pytest.approx(9.6 - 3.3)
+    assert Explanation(fitted, cost=21.0, improbability=0.0).behind(best) == pytest.approx(1.0)
+
+
+def test_combinations_are_two_lists():
+    """Eight sets, every choice of two with every choice of four."""
+    sets = [frozenset((a, b)) for a in ("t1", "t2") for b in ("v1", "v2", "v3", "v4")]
+    first, second = _factors(sets) or ((), ())
+    assert {one | other for one in first for other in second} == set(sets)
+    assert sorted((len(first), len(second))) == [2, 4]
+    assert _factors(sets[:-1]) is None
+    assert _factors([frozenset("a"), frozenset("b")]) is None

@@ -1,8 +1,9 @@
 """Which errors explain the records: sets of causes compared by one statistic.
 
 A set of errors costs its statistic (`airtruth.checks.kinematics_fit`), the improbability of its sizes and a price for
-each error (`price`). The sets within a margin of the cheapest one explain the records as well. The same weight serves every set:
-it is assessed at the cheapest set of the round before, until that set stays the same.
+each error (`price`). The sets within a margin of the cheapest one explain the records as well. A size is no evidence of the
+records: it ranks the sets, and no set is excluded for it alone. The same weight serves every set: it is assessed at the
+cheapest set of the round before, until that set stays the same.
 """
 
 from __future__ import annotations
@@ -56,15 +57,22 @@ class Explanation:
     ----------
     fit : sizes and statistic.
     cost : statistic, improbability of the sizes, and `price` for each error, as a difference of 2 log likelihood.
+    improbability : part of the cost that the sizes make.
     """
 
     fit: Fit
     cost: float
+    improbability: float = 0.0
 
     @property
     def names(self) -> frozenset[str]:
         """Errors of the set."""
         return frozenset(self.fit.names)
+
+    def behind(self, best: Explanation) -> float:
+        """Distance from the best set in 2 log likelihood: by the cost, or by the records alone if that is less."""
+        whole = self.cost - best.cost
+        return min(whole, whole - self.improbability + best.improbability)
 
 
 @dataclass(frozen=True)
@@ -79,7 +87,7 @@ class Search:
     tried : every explanation, the cheapest first.
     unsound : sets whose fit ended at a limit or unconverged, the cheapest first.
     enlargement : factor on variances, common to all sets, for motion that no set explains; at least 1.
-    margin : difference in cost up to which sets are equal.
+    margin : `Explanation.behind` up to which sets are equal.
     statistic, degrees, p_value : absolute test of the best explanation, each record and equation by itself.
     stable : whether the weight was assessed at the best explanation itself.
     """
@@ -299,7 +307,7 @@ class _Scale:
     Attributes
     ----------
     factor : factor on variances [-].
-    margin : difference in cost up to which sets are equal.
+    margin : `Explanation.behind` up to which sets are equal.
     """
 
     factor: float
@@ -352,14 +360,18 @@ def _ranked(
     chosen = [f for f in fits.values() if f.sound is sound]
     costs = _costs(problem, chosen, usual, exact)
     return sorted(
-        (Explanation(f, float(c)) for f, c in zip(chosen, costs, strict=True)), key=lambda e: e.cost
+        (
+            Explanation(f, float(c), _improbability(problem, f, usual))
+            for f, c in zip(chosen, costs, strict=True)
+        ),
+        key=lambda e: e.cost,
     )
 
 
 def _equals(ranked: Sequence[Explanation], most: float) -> tuple[Explanation, ...]:
     best = ranked[0]
     near = [
-        e for e in ranked if e.cost <= best.cost + most and not (e.names > best.names or e.names < best.names)
+        e for e in ranked if e.behind(best) <= most and not (e.names > best.names or e.names < best.names)
     ]
     return tuple(e for e in near if not any(o.names < e.names for o in near))
 

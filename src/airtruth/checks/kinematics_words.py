@@ -119,12 +119,23 @@ def _named(findings: Sequence[Finding], causes: Sequence[Cause]) -> list[str]:
     options = [[f for f in c.errors if f.name not in common] for c in possible]
     by_name = {f.name: f for f in findings}
     if len(options) > 1:
-        words = " or ".join(
-            " with ".join(f"{f.name} {shown(by_name[f.name] if len(o) == 1 else f)}" for f in o)
-            for o in options
+
+        def words(names: Sequence[Finding], alone: bool) -> str:
+            return " with ".join(f"{f.name} {shown(by_name[f.name] if alone else f)}" for f in names)
+
+        # where every choice of one list goes with every choice of the other, two lists replace the product
+        lists = _factors([frozenset(f.name for f in o) for o in options])
+        first = {f.name: f for o in reversed(options) for f in o}
+        told = (
+            "; and one of: ".join(
+                " or ".join(words([first[n] for n in sorted(c)], alone=len(c) == 1) for c in choices)
+                for choices in lists
+            )
+            if lists
+            else " or ".join(words(o, alone=len(o) == 1) for o in options)
         )
         result.append(
-            f"One of several: {words}. These records do not tell them apart; a surveyed position, a known scale or "
+            f"One of several: {told}. These records do not tell them apart; a surveyed position, a known scale or "
             "a manoeuvre of higher frequency does."
         )
     bias, scale = by_name.get("accelerometer_bias"), by_name.get("accelerometer_scale")
@@ -135,6 +146,28 @@ def _named(findings: Sequence[Finding], causes: Sequence[Cause]) -> list[str]:
             "gravity alone does not tell them apart."
         )
     return result
+
+
+def _factors(sets: Sequence[frozenset[str]]) -> tuple[list[frozenset[str]], list[frozenset[str]]] | None:
+    """Two lists whose every pair is one of the sets, and whose pairs are all of them; None where there are no such lists.
+
+    Examples
+    --------
+    >>> ab_cd = [frozenset(pair) for pair in ("ac", "bc", "ad", "bd")]
+    >>> [[*map(sorted, one)] for one in _factors(ab_cd) or ()]
+    [[['a'], ['b']], [['c'], ['d']]]
+    """
+    names = dict.fromkeys(n for one in sets for n in sorted(one))
+    for name in names:
+        rest = {one - {name} for one in sets if name in one}
+        second = list(dict.fromkeys(one - {name} for one in sets if name in one))
+        own = frozenset().union(*second)
+        first = list(dict.fromkeys(one - own for one in sets))
+        if min(len(first), len(second)) < 2:
+            continue
+        if all({one & own for one in sets if one - own == choice} == rest for choice in first):
+            return first, second
+    return None
 
 
 __all__ = ["NAMED", "conclusions", "limiting", "verdict_of"]

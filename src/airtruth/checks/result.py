@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 
 from airtruth import style
-from airtruth.table import Cell, Table, as_text, flat
+from airtruth.table import WIDTH, Cell, Table, as_text, flat
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -122,7 +123,11 @@ class CheckResult:
     def summary(self) -> str:
         """Conclusion and both tables, as text."""
         shown_tables = tables(self) if self.causes else ()
-        return "\n\n".join(["\n".join(self.sentences), *(as_text(table) for table in shown_tables)])
+        lines = (textwrap.fill(sentence, WIDTH, break_on_hyphens=False) for sentence in self.sentences)
+        return "
+
+".join(["
+".join(lines), *(as_text(table) for table in shown_tables)])
 
     def to_frame(self) -> pd.DataFrame:
         """One row per error of a sensor: estimate, std, 95 % interval, declared value."""
@@ -212,7 +217,14 @@ def _judged(one: Cause, result: CheckResult) -> str:
     if one.possible:
         return "possible"
     names = {f.name for f in one.errors}
-    return "not needed" if any(names > {f.name for f in c.errors} for c in result.possible) else "excluded"
+    if any(names > {f.name for f in c.errors} for c in result.possible):
+        return "not needed"
+    odds = math.exp(0.5 * one.distance) if one.distance < 2.0 * math.log(EXCLUDED) else math.inf
+    return f"unlikely (1:{odds:.0f})" if odds < EXCLUDED else "excluded"
+
+
+EXCLUDED: Final = 1000.0
+"""Odds against a set, relative to the best one, from which it is called excluded and not unlikely [-] (convention)."""
 
 
 SETS: Final = 8
