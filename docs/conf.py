@@ -22,6 +22,7 @@ copyright = author
 version = release = airtruth.__version__
 
 extensions = [
+    "descriptions",
     "mathml",
     "myst_nb",
     "sphinx.ext.autodoc",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import importlib.util
 import subprocess
 import sys
 
@@ -79,7 +81,10 @@ HEAVY = ("pandas", "scipy.signal", "scipy.stats", "scipy.optimize", "numba", "ma
         ("identify data/undeclared/b.parquet --aircraft gtm --method iv-f3", "iv-f3"),
         ("identify none.parquet --aircraft gtm", "none.parquet"),
         ("identify data/undeclared/b.parquet --aircraft gtx", "gtx"),
-        ("trace data/undeclared/b.parquet --aircraft gtm --out out/x --effect elevator_dela", "elevator_dela"),
+        (
+            "trace data/undeclared/b.parquet --aircraft gtm --out out/x --effect elevator_dela",
+            "elevator_dela",
+        ),
         ("loop none.parquet --aircraft gtm --out out/x", "none.parquet"),
         ("check none.parquet", "none.parquet"),
         ("plan none.toml", "none.toml"),
@@ -101,3 +106,51 @@ def test_wrong_names_are_refused_before_heavy_imports(arguments: str, word: str)
     assert code == "2", done.stderr
     assert word in done.stderr
     assert not set(HEAVY) & set(modules)
+
+
+def test_an_effect_of_the_library_stands_for_its_key() -> None:
+    (delay,) = at.list_effects("elevator_delay")
+    assert at.TraceOptions(effects=(delay, "vane_arm")).keys == ("elevator_delay", "vane_arm")
+    assert at.TraceOptions(effects="vane_arm").keys == ("vane_arm",)
+    with pytest.raises(at.ConfigurationError, match="no effect of the library"):
+        at.TraceOptions(effects=(dataclasses.replace(delay, name="other"),))
+
+
+def test_an_aircraft_prints_a_line() -> None:
+    text = repr(at.load_aircraft("gtm"))
+    assert "\n" not in text
+    assert text.startswith("Aircraft(gtm: mass 26.19 kg")
+
+
+def test_descriptions_of_parameters_are_no_types() -> None:
+    spec = importlib.util.spec_from_file_location("descriptions", "docs/_ext/descriptions.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    written = [
+        "Do it.",
+        "",
+        "Parameters",
+        "----------",
+        "a, b : lengths [m],",
+        "    both.",
+        "",
+        "Returns",
+        "-------",
+        "x : y",
+    ]
+    made = [
+        "Do it.",
+        "",
+        "Parameters",
+        "----------",
+        "a, b",
+        "    lengths [m],",
+        "    both.",
+        "",
+        "Returns",
+        "-------",
+        "x : y",
+    ]
+    assert module.split(written) == made
