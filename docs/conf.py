@@ -22,6 +22,7 @@ copyright = author
 version = release = airtruth.__version__
 
 extensions = [
+    "descriptions",
     "mathml",
     "parameters",
     "myst_nb",

@@ -21,8 +21,10 @@ from airtruth.logs.atomic import make_folder, write_text
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.sources import Logs, named_logs
 from airtruth.physics.short_period import PARAMETERS, UNITS
+from airtruth.result import shortened
 from airtruth.table import MISSING, Cell, Group, Number, Pair, Row, Table, as_html, as_text, write_table
 from airtruth.tracing import TraceOptions, TraceResult, trace
+from airtruth.tracing.accepted import AcceptedEffect
 from airtruth.tracing.compensate import (
     Compensation,
     Treatment,
@@ -95,6 +97,16 @@ class LoopResult:
         """The derivatives of every method before and after, beside the declared ones."""
         return loop_table(self.changes, self.treatments)
 
+    @property
+    def verdict(self) -> str:
+        """Verdict of the trace."""
+        return self.trace.verdict
+
+    @property
+    def effects(self) -> tuple[AcceptedEffect, ...]:
+        """Accepted effects of the trace."""
+        return self.trace.effects
+
     def summary(self) -> str:
         """Verdict, effects and the table of before and after."""
         answer = self.trace.answer
@@ -128,6 +140,10 @@ class LoopResult:
         from airtruth.charts import as_figure
 
         return as_figure(loop_chart(self.changes))
+
+    def __repr__(self) -> str:
+        """Return the first lines of the summary."""
+        return shortened(self.summary())
 
     def _repr_html_(self) -> str:
         return verdict_html(self.trace.answer) + as_html(self.table())

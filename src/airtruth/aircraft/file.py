@@ -267,6 +267,13 @@ class Aircraft(Strict):
     file: AircraftFile
     constants: Constants
 
+    def __repr__(self) -> str:
+        """Return name, folder and constants in a line."""
+        return (
+            f"Aircraft({self.name}: mass {self.mass_kg:.4g} kg, wing {self.wing_area_m2:.4g} m2, chord {self.chord_m:.4g} m, "
+            f"inertia {self.inertia_yy_kg_m2:.4g} kg m2; {self.folder})"
+        )
+
     @property
     def name(self) -> str:
         """Name of the aircraft, as logs state it."""

@@ -15,6 +15,7 @@ from airtruth.errors import ConfigurationError, LogError, StoreError
 from airtruth.logs.histories import FILE, read_histories
 from airtruth.logs.outputs import writing
 from airtruth.logs.provenance import PROVENANCE, Provenance
+from airtruth.result import shortened
 from airtruth.table import Table, as_html, as_text, flat, to_frame, write_table
 from airtruth.tracing.answer import ANSWER, TraceAnswer
 from airtruth.tracing.presentation.files import ERRORS
@@ -100,6 +101,10 @@ class TracedSets:
         bars = tuple(Bar(row, float(n), words=str(n)) for row, n in enumerate(counts))
         panel = Panel(x_label="number of sets [-]", rows=names, bars=bars)
         return as_figure(Chart(NAME, f"Verdicts of {len(self.sets)} sets of records", (panel,), columns=1))
+
+    def __repr__(self) -> str:
+        """Return the first lines of the summary."""
+        return shortened(self.summary())
 
     def _repr_html_(self) -> str:
         return as_html(self.table())

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 
 from airtruth import style
+from airtruth.result import shortened
 from airtruth.table import WIDTH, Cell, Table, as_text, flat
 
 if TYPE_CHECKING:
@@ -165,6 +166,10 @@ class CheckResult:
         title = self.sentences[0].replace("+-", "\u00b1")
         figure.suptitle(textwrap.fill(title, 110), fontsize=10.0, fontweight="bold")
         return figure
+
+    def __repr__(self) -> str:
+        """Return the first lines of the summary."""
+        return shortened(self.summary())
 
     def _repr_html_(self) -> str:
         return "\n".join(table._repr_html_() for table in tables(self))

@@ -13,7 +13,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
-from scipy.signal import lfilter
 
 Array = NDArray[np.float64]
 
@@ -87,6 +86,8 @@ def lagged(x: Array, dt_s: float, lag_s: float) -> Array:
     """
     if lag_s <= 0.0:
         return x
+    from scipy.signal import lfilter  # slow to import, and few channels lag
+
     slope = derivative(x, dt_s)
     rise = np.diff(x) / dt_s
     left, right = slope[..., :-1], slope[..., 1:]

@@ -10,7 +10,7 @@ import typer
 from airtruth.cli.application import app
 from airtruth.cli.arguments import PROCESSORS, CampaignFile, OnCluster, Quiet
 from airtruth.cli.output import notice, print_result
-from airtruth.cli.progress import progress_bar
+from airtruth.cli.progress import loading, progress_bar
 from airtruth.errors import FAILED_RUNS
 
 SHOWN_FAILURES: Final = 5
@@ -43,11 +43,12 @@ def fly(
     quiet: Quiet = False,
 ) -> None:
     """Fly a campaign in JSBSim and write its flight logs."""
-    from airtruth.cluster import workers
-    from airtruth.logs.manifest import MANIFEST
-    from airtruth.logs.remote import location
-    from airtruth.simulation.campaign import plan as planning
-    from airtruth.simulation.campaign import run as flying
+    with loading("fly", quiet):
+        from airtruth.cluster import workers
+        from airtruth.logs.manifest import MANIFEST
+        from airtruth.logs.remote import location
+        from airtruth.simulation.campaign import plan as planning
+        from airtruth.simulation.campaign import run as flying
 
     if dry_run:
         print_result(planning.describe(planning.make(campaign, seed, runs)))

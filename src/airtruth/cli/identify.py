@@ -21,8 +21,9 @@ from airtruth.cli.arguments import (
     Trim,
 )
 from airtruth.cli.compilation import compile_identification
+from airtruth.cli.early import require_names
 from airtruth.cli.output import notice, print_result
-from airtruth.cli.progress import announced_compilation, progress_bar, working
+from airtruth.cli.progress import announced_compilation, loading, progress_bar, working
 
 
 @app.command(epilog="Example: airtruth identify out/light --aircraft gtm --method iv-f1 --method ls")
@@ -79,14 +80,16 @@ def identify(
 ) -> None:
     """Estimate the six short-period derivatives of every run (default: iv-f1)."""
     methods = method or ["iv-f1"]
-    compile_identification(context, methods, cluster)
-    from airtruth import identification
-    from airtruth.aircraft import load
-    from airtruth.api.writing import aircraft_files
-    from airtruth.cluster import workers
-    from airtruth.logs.outputs import writing
-    from airtruth.logs.remote import RemotePath, location
-    from airtruth.logs.sources import log_files
+    with loading("identify", quiet):
+        require_names(logs, aircraft, methods)
+        compile_identification(context, methods, cluster)
+        from airtruth import identification
+        from airtruth.aircraft import load
+        from airtruth.api.writing import aircraft_files
+        from airtruth.cluster import workers
+        from airtruth.logs.outputs import writing
+        from airtruth.logs.remote import RemotePath, location
+        from airtruth.logs.sources import log_files
 
     options = identification.Options(
         trim=trim,

@@ -10,8 +10,9 @@ import typer
 
 from airtruth.cli.application import app
 from airtruth.cli.arguments import Quiet
+from airtruth.cli.early import require_file
 from airtruth.cli.output import notice, print_result
-from airtruth.cli.progress import working
+from airtruth.cli.progress import loading, working
 
 
 @app.command(
@@ -65,7 +66,10 @@ def import_(
     quiet: Quiet = False,
 ) -> None:
     """Convert measured logs of other formats to a flight log."""
-    from airtruth import importers
+    with loading("import", quiet):
+        for file in files:
+            require_file(file, "file", "give the measured log")
+        from airtruth import importers
     from airtruth.errors import ConfigurationError, counted
 
     if guess:

@@ -9,8 +9,9 @@ import typer
 
 from airtruth.cli.application import app
 from airtruth.cli.arguments import Force, Json, Quiet
+from airtruth.cli.early import require_names
 from airtruth.cli.output import notice, print_result
-from airtruth.cli.progress import progress_bar
+from airtruth.cli.progress import loading, progress_bar
 
 
 @app.command(epilog="Example: airtruth check data/undeclared/a.parquet --aircraft gtm")
@@ -33,9 +34,11 @@ def check(
     """Check the channels of logs against each other: biases, scales, arms, lags, delays."""
     import json
 
-    from airtruth import aircraft as planes
-    from airtruth.checks.kinematics import check_logs
-    from airtruth.logs.sources import named_logs
+    with loading("check", quiet):
+        require_names(log, aircraft)
+        from airtruth import aircraft as planes
+        from airtruth.checks.kinematics import check_logs
+        from airtruth.logs.sources import named_logs
 
     declared = planes.load(aircraft) if aircraft else None
     named = list(named_logs(log, run_ids=run))

@@ -11,8 +11,9 @@ import typer
 from airtruth.cli.application import app
 from airtruth.cli.arguments import Json, PlanPressure, Quiet, Replace
 from airtruth.cli.completion import complete_aircraft, complete_derivative, complete_effect
+from airtruth.cli.early import require_file, require_names
 from airtruth.cli.output import print_result
-from airtruth.cli.progress import progress_bar, status
+from airtruth.cli.progress import loading, progress_bar, status
 from airtruth.errors import ConfigurationError
 from airtruth.units import DEG
 
@@ -126,9 +127,19 @@ def plan(
     """Predict the standard errors of a campaign, or compute the flight that separates effects or determines derivatives."""
     import json
 
-    from airtruth.api.plans import base_campaign
-    from airtruth.design import ForecastResult, NarrowResult, PlanOptions, SplitResult, forecast
-    from airtruth.design.from_files import Stated, planned_from
+    with loading("plan", quiet):
+        if campaign is not None:
+            require_file(
+                campaign,
+                "file",
+                "`airtruth new campaign --out FILE.toml` writes a campaign file to start from",
+            )
+        if trace is not None:
+            require_file(trace, "folder", "`airtruth trace LOG --aircraft A --out DIR` writes it")
+        require_names(aircraft=aircraft, effects=[] if split is None else _listed("--split", split))
+        from airtruth.api.plans import base_campaign
+        from airtruth.design import ForecastResult, NarrowResult, PlanOptions, SplitResult, forecast
+        from airtruth.design.from_files import Stated, planned_from
 
     result: ForecastResult | SplitResult | NarrowResult
     predicts = split is None and derivative is None and trace is None

@@ -160,6 +160,25 @@ def _spinner(remaining: Remaining) -> Progress:
 
 
 @contextmanager
+def loading(verb: str, quiet: bool) -> Iterator[None]:
+    """Show one line on a terminal while a command imports its libraries, which takes seconds; it goes when the block ends.
+
+    Parameters
+    ----------
+    verb : name of the command.
+    quiet : show nothing.
+    """
+    if quiet or not _is_terminal():
+        yield
+        return
+    print(f"airtruth {verb}: loading", end="", file=sys.stderr, flush=True)
+    try:
+        yield
+    finally:
+        print("\r\x1b[2K", end="", file=sys.stderr, flush=True)  # ECMA-48: erase the line
+
+
+@contextmanager
 def working(verb: str, quiet: bool) -> Iterator[None]:
     """Show the elapsed time on a terminal while a command works that has no steps to count.
 
@@ -282,4 +301,12 @@ def _bar(things: str) -> Progress:
     return Progress(*columns, console=Console(stderr=True), redirect_stdout=False)
 
 
-__all__ = ["TRACE_STEPS", "Remaining", "announced_compilation", "progress_bar", "status", "working"]
+__all__ = [
+    "TRACE_STEPS",
+    "Remaining",
+    "announced_compilation",
+    "loading",
+    "progress_bar",
+    "status",
+    "working",
+]

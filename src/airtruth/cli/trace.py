@@ -26,8 +26,9 @@ from airtruth.cli.arguments import (
     TraceSeed,
 )
 from airtruth.cli.compilation import compile_filter
+from airtruth.cli.early import require_names
 from airtruth.cli.output import notice, print_result
-from airtruth.cli.progress import TRACE_STEPS, announced_compilation, progress_bar, status
+from airtruth.cli.progress import TRACE_STEPS, announced_compilation, loading, progress_bar, status
 from airtruth.errors import FAILED_RUNS
 
 if TYPE_CHECKING:
@@ -60,11 +61,13 @@ def trace(
     quiet: Quiet = False,
 ) -> None:
     """Name the effect that a declared aircraft lacks, add it, and report the error before and after."""
-    compile_filter(context, cluster)
-    from airtruth.api.campaigns import load_aircraft
-    from airtruth.api.trace_tasks import TraceTask
+    with loading("trace", quiet):
+        require_names(logs, aircraft, effects=effect or ())
+        compile_filter(context, cluster)
+        from airtruth.api.campaigns import load_aircraft
+        from airtruth.api.trace_tasks import TraceTask
 
-    options = _options(model, hold_out, jobs, seed, effect, time_budget, increments)
+        options = _options(model, hold_out, jobs, seed, effect, time_budget, increments)
     if each:
         _trace_each(logs, aircraft, options, out, cluster, force=force, as_json=json_, quiet=quiet)
         return
@@ -94,12 +97,14 @@ def loop(
     quiet: Quiet = False,
 ) -> None:
     """Trace, remove the traced effects from the logs, and identify before and after (default: ls and iv-f1)."""
-    compile_filter(context, cluster)
-    from airtruth.api.campaigns import load_aircraft
-    from airtruth.api.trace_tasks import TraceTask
-    from airtruth.loop import METHODS
+    with loading("loop", quiet):
+        require_names(logs, aircraft, method or (), effect or ())
+        compile_filter(context, cluster)
+        from airtruth.api.campaigns import load_aircraft
+        from airtruth.api.trace_tasks import TraceTask
+        from airtruth.loop import METHODS
 
-    options = _options(model, hold_out, jobs, seed, effect, time_budget, increments)
+        options = _options(model, hold_out, jobs, seed, effect, time_budget, increments)
     task = TraceTask(tuple(logs), load_aircraft(aircraft), options, out, force, tuple(method or METHODS))
     _perform(task, cluster, as_json=json_, quiet=quiet)
 

@@ -21,6 +21,7 @@ from airtruth.errors import ConfigurationError, choices, counted
 from airtruth.identification.likelihood.options import PRESSURES
 from airtruth.physics.gust_figures import GustScales
 from airtruth.physics.short_period import PARAMETERS
+from airtruth.result import shortened
 from airtruth.simulation.campaign.chunk import flown_runs
 from airtruth.simulation.campaign.file import Campaign
 from airtruth.simulation.campaign.plan import Plan, PlannedRun, make, planned_runs
@@ -169,6 +170,10 @@ class ForecastResult:
             ax.set_ylabel("least standard error [%]")
             style.legend_above(figure, [ax], self.table().title)
         return figure
+
+    def __repr__(self) -> str:
+        """Return the first lines of the summary."""
+        return shortened(self.summary())
 
     def _repr_html_(self) -> str:
         return as_html(self.table())

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from airtruth.design.planned_campaign import PlannedCampaign, draw_elevator
 from airtruth.physics.short_period import UNITS
+from airtruth.result import shortened
 from airtruth.table import Table, as_html, as_text, flat
 from airtruth.table.model import Number, Row, significant
 from airtruth.tracing.answer import Z95
@@ -259,6 +260,10 @@ class NarrowResult(PlannedCampaign):
             ax.set_xticks(range(len(kinds)), [label for label, *_ in kinds])
             ax.set_xlim(-0.5, len(kinds) - 0.5)
             ax.set_ylabel(f"{target} [{UNITS.get(target, '-')}], 95 %")
+
+    def __repr__(self) -> str:
+        """Return the first lines of the summary."""
+        return shortened(self.summary())
 
     def _repr_html_(self) -> str:
         return as_html(self.table()) + as_html(self.quantity_table())

@@ -12,6 +12,7 @@ from scipy.stats import norm
 
 from airtruth.design.planned_campaign import PlannedCampaign, draw_elevator
 from airtruth.design.separation import Member
+from airtruth.result import shortened
 from airtruth.table import Table, as_html, as_text, flat
 from airtruth.table.model import Number, Row, significant
 from airtruth.tracing.model.compile import CHANNELS
@@ -218,6 +219,10 @@ class SplitResult(PlannedCampaign):
                 columns=2,
             )
         return figure
+
+    def __repr__(self) -> str:
+        """Return the first lines of the summary."""
+        return shortened(self.summary())
 
     def _repr_html_(self) -> str:
         return as_html(self.table())

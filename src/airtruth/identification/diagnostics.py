@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from airtruth.identification.condition import AircraftConstants, observe
 from airtruth.identification.estimates import Estimates
@@ -227,7 +227,7 @@ def whiteness(e: Array) -> tuple[Array, Array]:
     equivalent = np.minimum(samples, 2.0 * samples / (1.0 + 2.0 * np.sum(rho**2, axis=-1)))
     lags = np.arange(1, min(_WHITENESS_LAGS, samples - 1) + 1)
     statistic = samples * (samples + 2.0) * np.sum(rho[..., : lags.size] ** 2 / (samples - lags), axis=-1)
-    return equivalent, chi2.sf(statistic, lags.size)
+    return equivalent, chdtrc(lags.size, statistic)
 
 
 def cross_correlation(p: Projected, factors: Array, lags: Ints) -> Array:

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from airtruth.physics.short_period import MODAL, PARAMETERS, Scale, modal, system
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 
@@ -73,6 +75,36 @@ class Estimates:
     def converged(self) -> NDArray[np.bool_]:
         """(runs,) whether the estimate converged."""
         return np.asarray(self.status == Status.CONVERGED)
+
+    @property
+    def params(self) -> pd.DataFrame:
+        """`airtruth.identification.frames.params`."""
+        from airtruth.identification import frames
+
+        return frames.params(self)
+
+    @property
+    def bse(self) -> pd.DataFrame:
+        """`airtruth.identification.frames.bse`."""
+        from airtruth.identification import frames
+
+        return frames.bse(self)
+
+    def conf_int(self, alpha: float = 0.05) -> pd.DataFrame:
+        """`airtruth.identification.frames.conf_int`."""
+        from airtruth.identification import frames
+
+        return frames.conf_int(self, alpha)
+
+    def cov_params(self, run_id: str | None = None) -> pd.DataFrame:
+        """`airtruth.identification.frames.cov_params`."""
+        from airtruth.identification import frames
+
+        return frames.cov_params(self, run_id)
+
+    def __repr__(self) -> str:
+        """Return method, runs and convergence in a line."""
+        return f"Estimates({self.method}, {int(self.converged.sum())} of {len(self.run_ids)} runs converged)"
 
     def rows(self, first: int, end: int) -> Estimates:
         """Estimates of the runs from number ``first`` to before number ``end``."""
@@ -211,11 +243,13 @@ def deviations(estimates: Estimates) -> Array:
 
 def half_width(confidence: float) -> float:
     """Half the width of an interval of a normal variable [standard deviations]."""
-    return float(norm.ppf(0.5 + 0.5 * confidence))
+    return float(ndtri(0.5 + 0.5 * confidence))
 
 
 def estimates_table(estimates: Estimates) -> pd.DataFrame:
     """One row per run: run_id, method, converged, iterations, then NAME, NAME_std, ..._upper, then status."""
+    import pandas as pd
+
     q = quantities(estimates)
     columns: dict[str, object] = {
         "run_id": list(estimates.run_ids),

@@ -5,8 +5,9 @@ Source of all: M. Brunot, "An Instrumental Variable Approach for Aircraft Identi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.metadata import EntryPoint, entry_points
 from typing import Final
 
 import numpy as np
@@ -114,7 +115,7 @@ def _f2(o: Observation, options: Options) -> Problem:
     return dynamic_problem(o, options, f2_numerator)
 
 
-METHODS: Final[dict[str, Method]] = {
+OWN: Final[dict[str, Method]] = {
     m.name: m
     for m in (
         Method("ls", "LS", "eq. (5)", ls_problem, iterates=False),
@@ -175,7 +176,43 @@ METHODS: Final[dict[str, Method]] = {
         ),
     )
 }
-"""The estimators by name."""
+"""The estimators of airtruth by name."""
+GROUP: Final = "airtruth.methods"
+"""Group of the entry points by which other packages add estimators."""
+
+
+def merged(own: Mapping[str, Method], others: Iterable[EntryPoint]) -> dict[str, Method]:
+    """Return estimators by name, those of entry points last.
+
+    A package adds an estimator by an entry point whose object is a `Method` or an iterable of them; in its pyproject.toml:
+
+        [project.entry-points."airtruth.methods"]
+        ridge = "my_package.ridge:METHOD"
+
+    Raises
+    ------
+    ConfigurationError
+        If an entry point provides anything else, or a name that exists.
+    """
+    result = dict(own)
+    for point in others:
+        loaded = point.load()
+        where = f"entry point {point.name} = {point.value} in {GROUP}"
+        for one in (loaded,) if isinstance(loaded, Method) else loaded:
+            if not isinstance(one, Method):
+                raise ConfigurationError(
+                    f"{where} gives {type(one).__name__}; it has to be an airtruth.identification.Method or an iterable of them"
+                )
+            if one.name in result:
+                raise ConfigurationError(
+                    f"{where}: a method {one.name!r} exists already; choose another name"
+                )
+            result[one.name] = one
+    return result
+
+
+METHODS: Final[dict[str, Method]] = merged(OWN, entry_points(group=GROUP))
+"""The estimators by name, with those of other packages."""
 
 
 def regression(chosen: Method) -> Callable[[Observation, Options], Problem]:

@@ -20,6 +20,7 @@ from airtruth.identification.options import Options
 from airtruth.identification.record_constants import Constants, values_of
 from airtruth.logs.histories import Histories
 from airtruth.logs.sources import Logs
+from airtruth.result import shortened
 from airtruth.table import Table, as_html, as_text
 
 if TYPE_CHECKING:
@@ -136,6 +137,12 @@ class IdentificationResult:
         """
         return _frame(self.estimates)
 
+    def tidy(self) -> pd.DataFrame:
+        """One row for each method, run and quantity, see `airtruth.identification.frames.tidy`."""
+        from airtruth.identification.frames import tidy
+
+        return tidy(self.estimates)
+
     def frames(self) -> Iterator[pd.DataFrame]:
         """The rows of `to_frame` in parts of up to `RUNS_PER_FRAME` runs, so that the memory need not hold them all."""
         return frames_of(self._parts)
@@ -212,6 +219,10 @@ class IdentificationResult:
 
     def _parts(self) -> Iterable[Sequence[Estimates]]:
         return (self.estimates,)
+
+    def __repr__(self) -> str:
+        """Return the first lines of the summary."""
+        return shortened(self.summary())
 
     def _repr_html_(self) -> str:
         return as_html(self.table())

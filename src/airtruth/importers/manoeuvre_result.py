@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from airtruth import style
 from airtruth.logs.atomic import write_text
+from airtruth.result import shortened
 from airtruth.table import MISSING, Cell, Number, Table, flat
 from airtruth.units import DEG
 
@@ -125,6 +126,10 @@ class ManoeuvreResult:
         """Write the table as CSV and the picture beside it, with the suffix .png."""
         write_text(path, self.table())
         style.save(self.plot(), path.with_suffix(".png"))
+
+    def __repr__(self) -> str:
+        """Return the first lines of the summary."""
+        return shortened(self.summary())
 
     def _repr_html_(self) -> str:
         rows = [tuple(map(_cell, asdict(c).values())) for c in self.candidates]

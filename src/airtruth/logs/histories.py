@@ -90,6 +90,10 @@ class Histories:
     of_records: int
     facts: Mapping[str, Any] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        """Return the number of records and the models in a line."""
+        return f"Histories({len(self.records)} of {self.of_records} records; {', '.join(self.models)})"
+
     @property
     def first(self) -> History:
         """The record that a report shows first."""

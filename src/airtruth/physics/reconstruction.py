@@ -18,7 +18,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_simpson, cumulative_trapezoid
 
 from airtruth.units import DEG, G0
 
@@ -161,6 +160,8 @@ def _variance(residual: Array, name: str) -> float:
 
 
 def _integral(x: Array, dt_s: float) -> Array:
+    from scipy.integrate import cumulative_simpson, cumulative_trapezoid  # slow to import
+
     rule = cumulative_simpson if len(x) > 2 else cumulative_trapezoid
     return np.asarray(rule(x, dx=dt_s, initial=0.0))
 

@@ -228,6 +228,12 @@ class TraceAnswer:
     credit: dict[str, float] = field(default_factory=dict)
     axial_force: AxialErrors | None = None
 
+    def __repr__(self) -> str:
+        """Return verdict, effects and model in a line."""
+        doubt = ", provisional" if self.provisional else ""
+        named = ", ".join(effect_key(e.name, e.variant) for e in self.effects)
+        return f"TraceAnswer({self.verdict}{doubt}: {named or 'no effect'}; model {self.model})"
+
     def to_dict(self) -> dict[str, Any]:
         """What trace.json holds."""
         found = {f.name: _plain(getattr(self, f.name)) for f in fields(self)}

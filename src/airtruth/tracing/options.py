@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
 from airtruth.arguments import names, require_whole
+from airtruth.effects.effect import Effect
+from airtruth.effects.registry import EFFECTS, GROUP
 from airtruth.errors import ConfigurationError, choices
 
 MODELS: Final = ("aircraft", "linear")
@@ -25,8 +28,8 @@ class TraceOptions:
         the only one.
     threads : number of records processed at a time; the answer does not depend on it.
     seed : seed of the random draws behind p-values, 0 or more.
-    effects : keys of the candidates, a string is one of them; a name without a variant selects all of its variants; None
-        for the library.
+    effects : keys of the candidates, a string is one of them; a name without a variant selects all of its variants; an
+        `Effect` of the library, as `list_effects` returns it, stands for its key; None for the library.
     time_budget_s : time after which the search starts no new step [s]; None for no limit. The answer then depends on the
         machine, is provisional, and lists the omitted steps.
     increments : whether increments are learned from the residual of the named effects; None where the whole library is
@@ -37,9 +40,16 @@ class TraceOptions:
     hold_out: tuple[str, ...] | None = None
     threads: int = 1
     seed: int = 0
-    effects: tuple[str, ...] | None = None
+    effects: tuple[str | Effect, ...] | None = None
     time_budget_s: float | None = None
     increments: bool | None = None
+
+    @property
+    def keys(self) -> tuple[str, ...] | None:
+        """Keys and names of the candidates; None for the library."""
+        if self.effects is None:
+            return None
+        return tuple(one.key if isinstance(one, Effect) else one for one in self.effects)
 
     @property
     def learns(self) -> bool:
@@ -59,6 +69,15 @@ class TraceOptions:
         if self.threads < 1:
             raise ConfigurationError(f"--jobs {self.threads}: must be at least 1")
         require_whole("seed", self.seed, 0)
+        if isinstance(self.effects, Effect):
+            object.__setattr__(self, "effects", (_key(self.effects),))
+        elif (
+            self.effects is not None
+            and not isinstance(self.effects, str)
+            and isinstance(self.effects, Iterable)
+        ):
+            keys = tuple(_key(one) if isinstance(one, Effect) else one for one in self.effects)
+            object.__setattr__(self, "effects", keys)
         for name, example in (("hold_out", "light-00001"), ("effects", "elevator_delay")):
             value = getattr(self, name)
             if value is not None:
@@ -67,3 +86,12 @@ class TraceOptions:
             raise ConfigurationError(
                 f"--time-budget {self.time_budget_s}: must be a number of seconds, 0 or more"
             )
+
+
+def _key(effect: Effect) -> str:
+    """Key of an effect of the library."""
+    if EFFECTS.get(effect.key) != effect:
+        raise ConfigurationError(
+            f"effects: {effect.key} is no effect of the library; an entry point of the group {GROUP} adds it, see docs/effects.md"
+        )
+    return effect.key

@@ -155,7 +155,7 @@ def _declared_causes(
 ) -> DeclaredCauses:
     """Causes that move several derivatives, and wrong declarations, as far as they are requested."""
     mean = np.mean([r.plant.derivatives for r in fitted], axis=0)
-    keys = options.effects
+    keys = options.keys
     causes = causes_of(directions(mean, tail_geometry(aircraft)))
     return DeclaredCauses(
         tuple(c for c in causes if keys is None or c.key in keys),

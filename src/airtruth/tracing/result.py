@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 from airtruth.logs.atomic import write_text
 from airtruth.logs.histories import Histories
 from airtruth.logs.provenance import Provenance
+from airtruth.result import shortened
+from airtruth.tracing.accepted import AcceptedEffect
 from airtruth.tracing.answer import ANSWER, TraceAnswer
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.presentation.html import as_trace_html
@@ -51,6 +53,16 @@ class TraceResult:
         """Records, declared aircraft and candidates."""
         return self.stages.case
 
+    @property
+    def verdict(self) -> str:
+        """Verdict of the answer: "none", "traced", "one_of", "learned" or "unexplained"."""
+        return self.answer.verdict
+
+    @property
+    def effects(self) -> tuple[AcceptedEffect, ...]:
+        """Accepted effects of the answer, with the estimates of their parameters."""
+        return self.answer.effects
+
     def summary(self) -> str:
         """The text that `airtruth trace` prints, the verdict first."""
         return as_trace_text(self.answer)
@@ -85,6 +97,10 @@ class TraceResult:
         write_evidence(self.answer, self.histories, out)
         mark_provisional(self.answer)
         write_text(out / ANSWER, self.answer.to_json())
+
+    def __repr__(self) -> str:
+        """Return the first lines of the summary."""
+        return shortened(self.summary())
 
     def _repr_html_(self) -> str:
         return as_trace_html(self.answer)

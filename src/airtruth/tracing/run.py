@@ -243,10 +243,10 @@ def _with_later_colour(
 
 def _effects(options: TraceOptions) -> list[Effect]:
     """The requested candidates, each once; a name without a variant selects all of its variants."""
-    if options.effects is None:
+    if options.keys is None:
         return [effect for effect in EFFECTS.values() if not effect.in_derivatives]
     found: dict[str, Effect] = {}
-    for key in options.effects:
+    for key in options.keys:
         matching = {k: e for k, e in EFFECTS.items() if key in (k, e.name)}
         if not matching:
             raise ConfigurationError(

@@ -13,6 +13,7 @@ import numpy as np
 from airtruth.channels import SIGNALS
 from airtruth.errors import LogError, choices, counted
 from airtruth.logs.names import chunk_file
+from airtruth.result import shortened
 from airtruth.simulation.campaign.chunk import FAILED, INTERRUPTED, OK, Outcome
 from airtruth.simulation.campaign.plan import Plan
 
@@ -130,6 +131,10 @@ class CampaignResult:
                 ax.set_xlabel("time [s]")
             figure.suptitle(f"{self.plan.campaign.name}: run {shown}")
         return figure
+
+    def __repr__(self) -> str:
+        """Return the first lines of the summary."""
+        return shortened(self.summary())
 
     def _repr_html_(self) -> str:
         from html import escape
