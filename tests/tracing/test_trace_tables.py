@@ -8,7 +8,7 @@ import pytest
 
 from airtruth.tracing.answer import TraceAnswer
 from airtruth.tracing.reservations import MANY
-from scripts.trace_tables import CLASSES, PAGES, attributes, keys, rules, with_part
+from scripts.trace_tables import CLASSES, KEYS_PAGE, PAGES, attributes, keys, rules, with_part
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
@@ -25,6 +25,7 @@ def test_every_key_is_described(documented) -> None:
 
 def test_keys_and_rules_have_their_rows() -> None:
     assert all(f"`{f.name}`" in keys() for f in fields(TraceAnswer))
+    assert "`shown_by`" in KEYS_PAGE.read_text(encoding="utf-8")
     assert f"| `MANY` | {MANY} | Number of separate causes" in rules()
 
 
