@@ -50,8 +50,11 @@ def seconds_of_text(cells: NDArray[Any]) -> NDArray[np.float64] | None:
     if not all(isinstance(cell, str) for cell in cells[~empty]):
         return None
     text = column.str.strip().str.strip('"').str.replace(",", ".").mask(column.str.strip() == "")
+    form = _OF_DAY if _OF_DAY.fullmatch(first) else _DATED
+    if not text.str.fullmatch(form.pattern, na=True).all():
+        return None
     times: pd.Series[Any]
-    if _OF_DAY.fullmatch(first):
+    if form is _OF_DAY:
         text = text.where(~text.str.fullmatch(r"\d{1,2}:\d{2}", na=False), text + ":00")
         times = pd.to_timedelta(text, errors="coerce")
     else:

@@ -145,10 +145,10 @@ def _readings(line: str) -> list[list[str]]:
     glued = re.sub(r"[\[({][^\[\](){}]*[\])}]", lambda match: re.sub(r"\s+", "\0", match[0]), glued)
     quoted = re.findall(r'"([^"]*)"', line)
     return [
+        quoted if line.count('"') == 2 * len(quoted) and not re.sub(r'"[^"]*"', "", line).strip() else [],
         line.split(),
         [word.replace("\0", " ") for word in glued.split()],
         re.split(r"\t|\s{2,}", line.strip()),
-        quoted if line.count('"') == 2 * len(quoted) and not re.sub(r'"[^"]*"', "", line).strip() else [],
     ]
 
 
