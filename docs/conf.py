@@ -22,7 +22,6 @@ copyright = author
 version = release = airtruth.__version__
 
 extensions = [
-    "descriptions",
     "mathml",
     "parameters",
     "myst_nb",

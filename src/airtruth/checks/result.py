@@ -125,10 +125,7 @@ class CheckResult:
         """Conclusion and both tables, as text."""
         shown_tables = tables(self) if self.causes else ()
         lines = (textwrap.fill(sentence, WIDTH, break_on_hyphens=False) for sentence in self.sentences)
-        return "
-
-".join(["
-".join(lines), *(as_text(table) for table in shown_tables)])
+        return "\n\n".join(["\n".join(lines), *(as_text(table) for table in shown_tables)])
 
     def to_frame(self) -> pd.DataFrame:
         """One row per error of a sensor: estimate, std, 95 % interval, declared value."""
