@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
 import subprocess
 import sys
 
@@ -120,37 +119,3 @@ def test_an_aircraft_prints_a_line() -> None:
     text = repr(at.load_aircraft("gtm"))
     assert "\n" not in text
     assert text.startswith("Aircraft(gtm: mass 26.19 kg")
-
-
-def test_descriptions_of_parameters_are_no_types() -> None:
-    spec = importlib.util.spec_from_file_location("descriptions", "docs/_ext/descriptions.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    written = [
-        "Do it.",
-        "",
-        "Parameters",
-        "----------",
-        "a, b : lengths [m],",
-        "    both.",
-        "",
-        "Returns",
-        "-------",
-        "x : y",
-    ]
-    made = [
-        "Do it.",
-        "",
-        "Parameters",
-        "----------",
-        "a, b",
-        "    lengths [m],",
-        "    both.",
-        "",
-        "Returns",
-        "-------",
-        "x : y",
-    ]
-    assert module.split(written) == made

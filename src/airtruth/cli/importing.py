@@ -66,23 +66,26 @@ def import_(
     quiet: Quiet = False,
 ) -> None:
     """Convert measured logs of other formats to a flight log."""
-    with loading("import", quiet):
-        for file in files:
-            require_file(file, "file", "give the measured log")
-        from airtruth import importers
     from airtruth.errors import ConfigurationError, counted
 
-    if guess:
-        if len(files) > 1:
-            raise ConfigurationError("--guess proposes a mapping for one file; run it once for each file")
-        words = importers.read_dictionary(dictionary) if dictionary else None
-        print_result(importers.guess_mapping(files[0], words=words), end="")
-        return
-    if mapping is None or out is None:
+    if guess and len(files) > 1:
+        raise ConfigurationError("--guess proposes a mapping for one file; run it once for each file")
+    if not guess and (mapping is None or out is None):
         raise ConfigurationError(
             "import needs --mapping MAP.toml and --out LOG.parquet; "
             f"`airtruth import --guess {quote(str(files[0]))}` prints a mapping to start from"
         )
+    with loading("import", quiet):
+        for file in files:
+            require_file(file, "file", "give the measured log")
+        from airtruth import importers
+
+    if guess:
+        words = importers.read_dictionary(dictionary) if dictionary else None
+        print_result(importers.guess_mapping(files[0], words=words), end="")
+        return
+    assert mapping is not None
+    assert out is not None
     if find_manoeuvres:
         _find(files, mapping, out, force=force, quiet=quiet)
         return
