@@ -212,7 +212,8 @@ def test_a_guess_from_names_with_units_imports_as_it_stands(tmp_path):
         "density_kg_m3": "slug_ft3",
     }
     assert mapping.channels["az_m_s2"].sign == -1
-    assert "elevator_rad: opposite sign" in text  # trailing edge up positive in this file
+    assert mapping.channels["elevator_rad"].sign == -1  # trailing edge up positive in this file
+    assert "the elevator changes q' by" in text
     turned = text.replace("\n[channels.elevator_rad]", "\n" + "[channels.elevator_rad]\nsign = -1")
     (tmp_path / "m.toml").write_text(turned)
     assert import_log(tmp_path / "f.csv", tmp_path / "m.toml").faults == ()

@@ -148,6 +148,7 @@ class Grid:
         t = times_of(column, clocks) if self.dt_s else np.arange(float(len(column.values)))
         if t is None or len(t) != len(column.values):
             return None
+        t = rising(t)
         ok = np.isfinite(t) & np.isfinite(column.values)
         if ok.sum() < 4:
             return None
@@ -164,6 +165,15 @@ def times_of(column: Column, clocks: Mapping[str, Clock]) -> Array | None:
     if clock is None and len(clocks) == 1:
         clock = next(iter(clocks.values()))
     return clock.t_s if clock is not None and len(clock.t_s) == len(column.values) else None
+
+
+def rising(t: Array) -> Array:
+    """Times without the steps back of a counter that wraps or restarts, for comparisons between channels [s]."""
+    steps = np.diff(t)
+    if not len(steps) or not (steps < 0.0).any():
+        return t
+    usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 1.0
+    return np.concatenate([t[:1], t[0] + np.cumsum(np.where(steps < 0.0, usual, steps))])
 
 
 def candidates(
@@ -313,9 +323,20 @@ def _read(
             )
             where = stated if not stated else ("format" if entry else "stated")
             found.readings.setdefault(slot, []).append(
-                Reading(slot, channel, (column,), unit, sign, values, evidence + likely + signed + _size(slot, values),
-                        named, where, offset, entry.rank if entry else 1)
-            )  # fmt: skip
+                Reading(
+                    slot,
+                    channel,
+                    (column,),
+                    unit,
+                    sign,
+                    values,
+                    evidence + likely + signed + _size(slot, values),
+                    named,
+                    where,
+                    offset=offset,
+                    rank=entry.rank if entry else 1,
+                )
+            )
 
 
 def _physical(channel: str, values: Array) -> Array:
@@ -382,4 +403,4 @@ def _velocity(found: Candidates, three: tuple[Column, ...], grid: Grid, clocks: 
             )  # fmt: skip
 
 
-__all__ = ["MIXED", "OUTSIDE", "SLOTS", "Candidates", "Grid", "Reading", "candidates", "times_of"]
+__all__ = ["MIXED", "OUTSIDE", "SLOTS", "Candidates", "Grid", "Reading", "candidates", "rising", "times_of"]
