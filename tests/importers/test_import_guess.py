@@ -283,19 +283,10 @@ def test_the_layout_of_other_tables(tmp_path):
         assert "#   3: 3" in text
 
 
-@pytest.mark.parametrize(
-    ("encoding", "words"),
-    [
-        ("cp1252", "probably in Windows-1252 or Latin-1 (byte 13 is '\u00b0' there); save it as UTF-8"),
-        ("utf-16", "probably in UTF-16; save it as UTF-8"),
-        ("utf-16-le", "probably in UTF-16; save it as UTF-8"),
-    ],
-)
-def test_other_encodings(tmp_path, encoding, words):
-    (tmp_path / "f.csv").write_text("Zeit;Alpha [\u00b0]\n0,0;1,5\n0,1;1,6\n", encoding=encoding)
-    with pytest.raises(StoreError) as caught:
+def test_utf_16_without_a_mark_is_refused(tmp_path):
+    (tmp_path / "f.csv").write_text("Zeit;Alpha [\u00b0]\n0,0;1,5\n0,1;1,6\n", encoding="utf-16-le")
+    with pytest.raises(StoreError, match="probably in UTF-16; save it as UTF-8"):
         guess_mapping(tmp_path / "f.csv")
-    assert words in str(caught.value)
 
 
 def test_a_name_of_two_columns(log, tmp_path):

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, Final
 
 from airtruth.errors import StoreError
+from airtruth.foreign.dates import is_date, seconds
 from airtruth.foreign.source import Source, packed, table_source
 from airtruth.foreign.text import WHITESPACE, TextFormat, read_text
 from airtruth.isolation.protocol import Reply
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def read(path: str, name: str, layout: Mapping[str, Any]) -> Reply:
@@ -42,7 +38,7 @@ def _csv(path: Path, layout: TextFormat) -> Source:
 
 
 def _table(path: Path, layout: TextFormat) -> Source:
-    return read_text(path, TextFormat(WHITESPACE, layout.decimal, layout.skip_rows, layout.header))
+    return read_text(path, replace(layout, delimiter=WHITESPACE))
 
 
 def _parquet(path: Path, layout: TextFormat) -> Source:
@@ -53,26 +49,11 @@ def _parquet(path: Path, layout: TextFormat) -> Source:
         frame = frame.reset_index()
     if frame.empty:
         raise StoreError(f"{path}: holds no rows; export it again")
-    columns = [_in_seconds(frame.iloc[:, i]) for i in range(frame.shape[1])]
+    parts = [frame.iloc[:, i] for i in range(frame.shape[1])]
+    columns = [seconds(part) if is_date(part) else part.to_numpy() for part in parts]
     names = [str(name) for name in frame.columns]
-    dates = [name for name, kind in zip(names, frame.dtypes, strict=True) if kind.kind in _DATES]
+    dates = [name for name, part in zip(names, parts, strict=True) if is_date(part)]
     return table_source(path, names, columns, dates=dates)
-
-
-_DATES: Final = "mM"
-"""Kinds of numpy types that are durations or dates."""
-_PER_SECOND: Final = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
-"""Unit of pandas' dates and durations -> integers per second."""
-
-
-def _in_seconds(column: pd.Series[Any]) -> NDArray[Any]:
-    """Values of a column; dates are seconds since 1970 and durations seconds, whatever the unit of their integers."""
-    if column.dtype.kind not in _DATES:
-        return column.to_numpy()
-    integers, per_second = column.astype("int64").to_numpy(), _PER_SECOND[column.dt.unit]
-    # whole seconds and the rest apart: 2e18 ns have more digits than a float64
-    seconds = integers // per_second + integers % per_second / per_second
-    return np.where(column.isna().to_numpy(), np.nan, seconds)
 
 
 def _mat(path: Path, layout: TextFormat) -> Source:

@@ -9,37 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError, StoreError, reason
+from airtruth.foreign.unit_words import are_units
 
 _HDF5: Final = b"\x89HDF\r\n\x1a\n"
 """First bytes of an HDF5 file (HDF5 file format specification, version 3, section II.A)."""
 _AT: Final = (0, 512)
 """Offsets at which they are searched [byte]; MATLAB writes a text header of 512 bytes before HDF5."""
-
-_UNITS: Final = frozenset(
-    [
-        "rad",
-        "deg",
-        "m",
-        "s",
-        "g",
-        "ft",
-        "kt",
-        "kts",
-        "kg",
-        "pa",
-        "psf",
-        "n",
-        "-",
-        "1",
-        "%",
-        "hz",
-        "k",
-        "c",
-        "v",
-        "sec",
-    ]
-)
-"""Texts that are units and no names of columns."""
 
 Arrays = dict[str, NDArray[Any]]
 Labels = dict[str, tuple[str, ...]]
@@ -82,7 +57,7 @@ def _labels(arrays: Arrays, raw: Arrays) -> Labels:
         for values in raw.values()
         if values.dtype.kind in "UO" and all(isinstance(cell, str) for cell in values.ravel())
     }
-    names = [t for t in texts if len(t) > 1 and not _units_alone(t)]
+    names = [t for t in texts if len(t) > 1 and not are_units(t)]
     labels = {}
     for name, values in arrays.items():
         if values.ndim != 2:
@@ -93,12 +68,6 @@ def _labels(arrays: Arrays, raw: Arrays) -> Labels:
         if len(fitting) == 1:
             labels[name] = fitting[0][: values.shape[1]]
     return labels
-
-
-def _units_alone(texts: tuple[str, ...]) -> bool:
-    """Whether most of the texts are units and no names."""
-    words = [t.strip("[]() ").lower() for t in texts if t]
-    return sum(w in _UNITS or "/" in w for w in words) > 0.5 * len(words)
 
 
 def _column(values: NDArray[Any]) -> NDArray[Any]:

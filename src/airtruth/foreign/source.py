@@ -35,6 +35,7 @@ class Source:
         `further_name`.
     comments : lines of a text file among its rows that are none, in order.
     dates : names of columns of dates or durations, whose values are seconds.
+    notes : sentences on what the reader assumed or left out.
     """
 
     path: Path
@@ -47,6 +48,7 @@ class Source:
     repeated: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     comments: tuple[int, ...] = ()
     dates: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def line(self, row: int) -> int:
         """Line of a row, counted from 0, in a text file; 0 if it is none."""
@@ -74,6 +76,8 @@ def table_source(
     first_line: int = 0,
     comments: Sequence[int] = (),
     dates: Sequence[str] = (),
+    units: Sequence[str] = (),
+    notes: Sequence[str] = (),
 ) -> Source:
     """The columns of one table.
 
@@ -82,11 +86,12 @@ def table_source(
     path : the file.
     names : one for each column, of which several may be equal; none if the columns are numbered.
     columns : their values.
-    first_line, comments, dates : as of `Source`.
+    first_line, comments, dates, notes : as of `Source`.
+    units : one for each column, "" where the file states none; () if it states none at all.
     """
     if not names:
         numbered = {f"{i}": one for i, one in enumerate(columns, 1)}
-        return Source(path, numbered, first_line=first_line, comments=tuple(comments))
+        return Source(path, numbered, first_line=first_line, comments=tuple(comments), notes=tuple(notes))
     numbers: dict[str, tuple[int, ...]] = {}
     arrays: dict[str, NDArray[Any]] = {}
     for number, (stated, values) in enumerate(zip(names, columns, strict=True), 1):
@@ -94,8 +99,16 @@ def table_source(
         arrays[further_name(name, number) if name in numbers else name] = values
         numbers[name] = (*numbers.get(name, ()), number)
     repeated = {name: several for name, several in numbers.items() if len(several) > 1}
+    own = {name: unit.strip(" []()") for name, unit in zip(arrays, units, strict=False)}
     return Source(
-        path, arrays, first_line=first_line, repeated=repeated, comments=tuple(comments), dates=tuple(dates)
+        path,
+        arrays,
+        first_line=first_line,
+        units={name: unit for name, unit in own.items() if unit},
+        repeated=repeated,
+        comments=tuple(comments),
+        dates=tuple(dates),
+        notes=tuple(notes),
     )
 
 
@@ -123,6 +136,7 @@ def packed(source: Source) -> Reply:
         "repeated": [[name, list(numbers)] for name, numbers in source.repeated.items()],
         "comments": list(source.comments),
         "dates": list(source.dates),
+        "notes": list(source.notes),
     }
     return Reply(facts, tuple(arrays))
 
@@ -152,6 +166,7 @@ def unpacked(path: Path, reply: Reply) -> Source:
         {name: tuple(numbers) for name, numbers in facts["repeated"]},
         tuple(facts["comments"]),
         tuple(facts["dates"]),
+        tuple(facts["notes"]),
     )
 
 

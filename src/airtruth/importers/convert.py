@@ -14,6 +14,7 @@ from airtruth.checks.fault import Fault
 from airtruth.checks.gate import require
 from airtruth.errors import ConfigurationError, LogError
 from airtruth.importers.align import Alignment, aligned
+from airtruth.importers.clock import with_increasing_times
 from airtruth.importers.derived import with_air_data, with_alpha
 from airtruth.importers.manoeuvre_result import ManoeuvreResult
 from airtruth.importers.manoeuvres import find, read_table
@@ -30,6 +31,8 @@ Array = NDArray[np.float64]
 
 _SHORTENED: Final = "shortened"
 """Key of the metadata that lists what records have lost at their ends."""
+_READ: Final = "reading"
+"""Key of the metadata that lists what was assumed or left out when the files were read."""
 
 
 @dataclass(frozen=True)
@@ -67,12 +70,14 @@ class Merged:
     series : channel -> samples.
     resample : common rate; None if all channels share their times.
     notes : sentences on the alignment.
+    reading : sentences on what was assumed or left out of the files.
     """
 
     pieces: tuple[Piece, ...]
     series: Mapping[str, Series]
     resample: Resample | None
     notes: tuple[str, ...] = field(default=())
+    reading: tuple[str, ...] = field(default=())
 
 
 def import_log(
@@ -126,9 +131,9 @@ def import_log(
 
 
 def _lost(log: FlightLog) -> Sequence[str]:
-    """What records have lost at their ends, in words."""
-    stated = log.metadata.get(_SHORTENED, ())
-    return [str(sentence) for sentence in stated] if isinstance(stated, Sequence) else []
+    """What was assumed or left out, and what records have lost at their ends, in words."""
+    stated = [log.metadata.get(key, ()) for key in (_READ, _SHORTENED)]
+    return [str(sentence) for one in stated if isinstance(one, Sequence) for sentence in one]
 
 
 def find_manoeuvres(
@@ -232,10 +237,12 @@ def merge(parts: Sequence[tuple[Source, MappingFile]]) -> Merged:
         As `import_log`.
     """
     source, mapping = parts[0]
-    series = read_series(source, mapping)
+    series, read_notes = _read(source, mapping)
+    reading = [*read_notes]
     pieces, notes, reference = [Piece(source, mapping)], [], dict(series)
     for other, own in parts[1:]:
-        read = read_series(other, own)
+        read, read_notes = _read(other, own)
+        reading += read_notes
         name = str(other.path)
         if own.time.run is not None or mapping.time.run is not None:
             raise ConfigurationError(
@@ -256,7 +263,16 @@ def merge(parts: Sequence[tuple[Source, MappingFile]]) -> Merged:
         rates = [1.0 / float(np.median(np.diff(s.t_s))) for s in reference.values() if not s.constant]
         resample = Resample(rate_hz=float(f"{max(rates):.4g}"), method="cubic")
         notes.append(f"channels are resampled to {resample.rate_hz:g} Hz, the rate of {source.path.name}")
-    return Merged(tuple(pieces), series, resample, tuple(notes))
+    return Merged(tuple(pieces), series, resample, tuple(notes), tuple(reading))
+
+
+def _read(source: Source, mapping: MappingFile) -> tuple[dict[str, Series], list[str]]:
+    """Channels on times that increase, and what was assumed or left out; rows that name their runs stay as they are."""
+    series = read_series(source, mapping)
+    if mapping.time.run is not None:
+        return series, list(source.notes)
+    series, notes = with_increasing_times(series)
+    return series, [*source.notes, *(f"{source.path.name}: {note}" for note in notes)]
 
 
 def built(merged: Merged) -> FlightLog:
@@ -294,6 +310,8 @@ def built(merged: Merged) -> FlightLog:
         metadata[RECORD_CONSTANTS] = facts
     if merged.resample:
         metadata[RESAMPLED] = _resampled(merged.resample, slow)
+    if merged.reading:
+        metadata[_READ] = list(merged.reading)
     if lost:
         metadata[_SHORTENED] = lost
     if drifts:

@@ -7,12 +7,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from airtruth.foreign.encoding import head_of
 from airtruth.foreign.formats import SUFFIXES
-from airtruth.foreign.text import WHITESPACE, is_number, names_a_comment
+from airtruth.foreign.text import WHITESPACE, delimiter_line, is_number, names_a_comment
 from airtruth.importers.mapping import SourceSection
 
 _HEAD_BYTES: Final = 65_536
 """Part of a file that is looked at [byte] (judgement: some hundred rows)."""
+_PROSE: Final = 200
+"""Rows that may be prose [-] (judgement)."""
 _ROWS: Final = 30
 """Rows that are compared [-] (judgement)."""
 _LAYOUTS: Final = {
@@ -43,9 +46,10 @@ def _first_rows(path: Path) -> list[str]:
             head = file.read(_HEAD_BYTES)
     except OSError:  # the reader of the file reports it
         return []
-    lines = head.decode("utf-8-sig", errors="replace").splitlines()
+    lines = head_of(head).split("\n")
     whole = lines[:-1] if len(head) == _HEAD_BYTES else lines
-    return [line for line in whole if line.strip() and not names_a_comment(line)][:_ROWS]
+    rows = [line for line in whole if line.strip() and not names_a_comment(line)]
+    return [line for line in rows[:_PROSE] if delimiter_line(line) is None][-_ROWS:]
 
 
 def _numbers(rows: Sequence[str], delimiter: str, decimal: str) -> float:

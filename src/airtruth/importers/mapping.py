@@ -76,14 +76,12 @@ class SourceSection(Strict):
     """How the file is read; only what its format has use for.
 
     format : left out, the suffix says it. variable : matrix that column numbers refer to (.mat).
-    structs : structs of a .mat file or groups of an HDF5 file that are a run each; a pattern with * is allowed, and the
-        columns are then those inside a struct. delimiter, decimal, skip_rows, header, encoding : of text; header = false
+    delimiter, decimal, skip_rows, header, encoding : of text; header = false
         numbers the columns, an encoding that is left out is recognised.
     """
 
     format: Literal["csv", "table", "mat", "parquet", "ulg", "dataflash", "mdf", "hdf5"] | None = None
     variable: str | None = None
-    structs: tuple[str, ...] = ()
     delimiter: str = ","
     decimal: Literal[".", ","] = "."
     skip_rows: int = Field(default=0, ge=0)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,8 @@ from airtruth.isolation.limits import limits_of
 from airtruth.isolation.protocol import IsolatedError, Task
 
 Array = NDArray[np.float64]
+_UNIT: Final = re.compile(r"[\[(][^\[\]()]*[\])]\s*$")
+"""Unit in brackets at the end of a name."""
 
 
 def open_source(path: Path | str, section: SourceSection | None = None) -> Source:
@@ -45,7 +48,9 @@ def open_source(path: Path | str, section: SourceSection | None = None) -> Sourc
 
 def _isolated(path: Path, name: str, section: SourceSection) -> Source:
     limits = limits_of(path.stat().st_size)
-    layout = {key: getattr(section, key) for key in ("delimiter", "decimal", "skip_rows", "header")}
+    layout = {
+        key: getattr(section, key) for key in ("delimiter", "decimal", "skip_rows", "header", "encoding")
+    }
     arguments = {"path": str(path.absolute()), "name": name, "layout": layout}
     try:
         return unpacked(path, call(Task("airtruth.foreign.formats:read", arguments, limits, FORMATS[name])))
@@ -90,7 +95,7 @@ def numbers(source: Source, place: Place, variable: str | None = None) -> tuple[
 def column(source: Source, place: Place, variable: str | None = None) -> tuple[NDArray[Any], str]:
     """Values as the file has them, and the name of their array; raises `LogError` if there are none."""
     variable = place.variable or variable
-    key = place.column
+    key = _without_unit(source, place.column)
     if variable is None and source.ordered and isinstance(key, int):
         if key > len(source.arrays):
             raise LogError(
@@ -135,6 +140,14 @@ def column(source: Source, place: Place, variable: str | None = None) -> tuple[N
             f"{source.path}: no column {key} in {variable!r}, which has {matrix.shape[1]}, counted from 1"
         )
     return matrix[:, key - 1], variable
+
+
+def _without_unit(source: Source, key: str | int) -> str | int:
+    """Name of the one column whose name without its unit in brackets is the stated one; else the stated one."""
+    if not isinstance(key, str) or key in source.arrays or not source.ordered:
+        return key
+    alike = [name for name in source.names if _UNIT.sub("", name).strip() == key]
+    return alike[0] if len(alike) == 1 and alike[0] not in source.repeated else key
 
 
 __all__ = ["FORMATS", "SUFFIXES", "Source", "column", "numbers", "open_source"]

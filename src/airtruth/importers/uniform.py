@@ -262,7 +262,8 @@ def _check_times(where: str, name: str, t: Array) -> None:
         row = int(back[0])
         raise LogError(
             f"{where}: time does not increase in {len(back)} rows, the first is row {row + 2}: {t[row]:.9g} s, then "
-            f"{t[row + 1]:.9g} s; sort the file and drop repeated rows, or name each run's rows by [time] run"
+            f"{t[row + 1]:.9g} s; if the recorder started again there, name each run's rows by [time] run or split the file; if "
+            "rows are out of order, sort the file"
         )
 
 
