@@ -30,8 +30,8 @@ BLOCK_S: Final = 8.0
 BAND_HZ: Final = 1.0
 """Band of the motion, which gives the number of independent samples [Hz] (judgement)."""
 TOLERANCE, BROAD = 0.2, 2.0
-"""Standard deviation of the logarithm of a factor that scales, lags and positions of sensors explain, and of one of which nothing is
-known [-] (judgement)."""
+"""Standard deviation of the logarithm of a factor that scales, lags and positions of sensors explain, and of one of which
+nothing is known [-] (judgement)."""
 MOST: Final = 10.0
 """Largest logarithm of a likelihood ratio that one relation may give [-]: a model is never surer of itself."""
 
