@@ -212,7 +212,7 @@ def test_without_a_vane_the_guess_offers_the_reconstruction(log, tmp_path):
     c = log.channels
     columns = {"t": log.t_s, "qbar": c["airspeed_m_s"] ** 2 * 0.5, "q": c["q_rad_s"], "az": c["az_m_s2"]}
     write_csv(tmp_path / "f.csv", {**columns, "de": c["elevator_rad"], "h [m]": c["altitude_m"]})
-    text, mapping = guessed(tmp_path / "f.csv")
+    _, mapping = guessed(tmp_path / "f.csv")
     assert mapping.reconstruct.alpha
     assert mapping.channels["dynamic_pressure_pa"].unit == "pa"
     assert "airspeed_m_s" not in mapping.channels

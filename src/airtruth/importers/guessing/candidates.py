@@ -183,10 +183,8 @@ def candidates(
     found = Candidates()
     parts: dict[tuple[str, str], Column] = {}
     turned: dict[tuple[str, Entry, str], dict[int, Column]] = {}
-    velocities = {
-        c.group for c in columns if compact(c.name) in ("w", "wbody") for d in columns
-        if d.group == c.group and compact(d.name) in ("u", "ubody")
-    }  # fmt: skip
+    forward, down = ({c.group for c in columns if compact(c.name) in (x, x + "body")} for x in "uw")
+    velocities = forward & down
     for column in columns:
         known = words.entry(column.full)
         if known is not None:
@@ -323,20 +321,9 @@ def _read(
             )
             where = stated if not stated else ("format" if entry else "stated")
             found.readings.setdefault(slot, []).append(
-                Reading(
-                    slot,
-                    channel,
-                    (column,),
-                    unit,
-                    sign,
-                    values,
-                    evidence + likely + signed + _size(slot, values),
-                    named,
-                    where,
-                    offset=offset,
-                    rank=entry.rank if entry else 1,
-                )
-            )
+                Reading(slot, channel, (column,), unit, sign, values, evidence + likely + signed + _size(slot, values),
+                        named, where, offset=offset, rank=entry.rank if entry else 1)
+            )  # fmt: skip
 
 
 def _physical(channel: str, values: Array) -> Array:
