@@ -64,8 +64,8 @@ x_m = 0.8
 """
 """Campaign of the example."""
 
-MAP_EDITS: Final = (("\n[channels.elevator_rad]", "\n[channels.elevator_rad]\nsign = -1"),)
-"""Text of the guessed mapping, and its correction."""
+SIGN: Final = ('unit = "deg"\nsign = -1\n', 'unit = "deg"\n')
+"""Lines of the elevator in the guess, and the same without its sign."""
 
 AIR_DATA: Final = ("airspeed_m_s", "altitude_m", "density_kg_m3")
 """Channels with the clock of the air data."""
@@ -119,11 +119,8 @@ def export(records: list[dict[str, Array]], folder: Path) -> None:
 
 
 def mapping(guess: str, channels: tuple[str, ...], clock: str) -> str:
-    """Return the guessed mapping with a reader's corrections: the sign of the elevator, and the clock of the air data."""
+    """Return the guessed mapping with a reader's addition, the clock of the air data."""
     text = guess
-    for old, new in MAP_EDITS:
-        assert old in text, text
-        text = text.replace(old, new, 1)
     for name in channels:
         text = re.sub(
             rf"(\n\[channels\.{name}\][^\n]*\n)",
@@ -168,8 +165,9 @@ def make(folder: Path) -> Page:
     page = Page(folder)
     head = (folder / "flight7.csv").read_text(encoding="utf-8").splitlines()[:2]
     page.blocks["file"] = "\n".join(head)
-    guess = page.run("guess", "import", "--guess", "flight7.csv", keep=(slice(0, 12), slice(28, 38))) + "\n"
-    (folder / "flight7.toml").write_text(guess, encoding="utf-8")
+    guess = page.run("guess", "import", "--guess", "flight7.csv", keep=(slice(0, 13), slice(35, 46))) + "\n"
+    assert SIGN[0] in guess, guess
+    (folder / "flight7.toml").write_text(guess.replace(*SIGN), encoding="utf-8")
     page.run("refused", "import", "flight7.csv", "--mapping", "flight7.toml", "--out", "flight7.parquet")
     (folder / "flight7.toml").write_text(mapping(guess, AIR_DATA, "ADC time (s)"), encoding="utf-8")
     page.run("imported", "import", "flight7.csv", "--mapping", "flight7.toml", "--out", "flight7.parquet")

@@ -15,7 +15,7 @@ from airtruth.errors import AirtruthError
 from airtruth.importers.convert import convert
 from airtruth.importers.dictionary import Words, lexicon
 from airtruth.importers.guessing.assignment import Search
-from airtruth.importers.guessing.candidates import Grid, candidates, times_of
+from airtruth.importers.guessing.candidates import Grid, candidates, rising, times_of
 from airtruth.importers.guessing.columns import Clock, Column, clocks_of, columns_of
 from airtruth.importers.guessing.proposal import Proposal, Writer, column_list
 from airtruth.importers.layout import guess_layout
@@ -73,7 +73,9 @@ def _names(source: Source) -> Iterator[str]:
 def _grid(columns: Sequence[Column], clocks: Mapping[str, Clock]) -> Grid:
     """Times common to the columns: those of the clocks' longest part, at the rate of the fastest within limits."""
     least, most, samples = _GRID
-    times = {id(t): t[np.isfinite(t)] for c in columns if (t := times_of(c, clocks)) is not None}
+    times = {
+        id(t): (r := rising(t))[np.isfinite(r)] for c in columns if (t := times_of(c, clocks)) is not None
+    }
     usable = [t for t in times.values() if len(t) > 3 and 0.0 < np.ptp(t) < 1e7]
     if not usable:
         rows = max((len(c.values) for c in columns), default=4)

@@ -148,6 +148,7 @@ class Grid:
         t = times_of(column, clocks) if self.dt_s else np.arange(float(len(column.values)))
         if t is None or len(t) != len(column.values):
             return None
+        t = rising(t)
         ok = np.isfinite(t) & np.isfinite(column.values)
         if ok.sum() < 4:
             return None
@@ -166,6 +167,15 @@ def times_of(column: Column, clocks: Mapping[str, Clock]) -> Array | None:
     return clock.t_s if clock is not None and len(clock.t_s) == len(column.values) else None
 
 
+def rising(t: Array) -> Array:
+    """Times without the steps back of a counter that wraps or restarts, for comparisons between channels [s]."""
+    steps = np.diff(t)
+    if not len(steps) or not (steps < 0.0).any():
+        return t
+    usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 1.0
+    return np.concatenate([t[:1], t[0] + np.cumsum(np.where(steps < 0.0, usual, steps))])
+
+
 def candidates(
     columns: Sequence[Column], words: Lexicon, grid: Grid, clocks: Mapping[str, Clock]
 ) -> Candidates:
@@ -173,10 +183,8 @@ def candidates(
     found = Candidates()
     parts: dict[tuple[str, str], Column] = {}
     turned: dict[tuple[str, Entry, str], dict[int, Column]] = {}
-    velocities = {
-        c.group for c in columns if compact(c.name) in ("w", "wbody") for d in columns
-        if d.group == c.group and compact(d.name) in ("u", "ubody")
-    }  # fmt: skip
+    forward, down = ({c.group for c in columns if compact(c.name) in (x, x + "body")} for x in "uw")
+    velocities = forward & down
     for column in columns:
         known = words.entry(column.full)
         if known is not None:
@@ -314,7 +322,7 @@ def _read(
             where = stated if not stated else ("format" if entry else "stated")
             found.readings.setdefault(slot, []).append(
                 Reading(slot, channel, (column,), unit, sign, values, evidence + likely + signed + _size(slot, values),
-                        named, where, offset, entry.rank if entry else 1)
+                        named, where, offset=offset, rank=entry.rank if entry else 1)
             )  # fmt: skip
 
 
@@ -382,4 +390,4 @@ def _velocity(found: Candidates, three: tuple[Column, ...], grid: Grid, clocks: 
             )  # fmt: skip
 
 
-__all__ = ["MIXED", "OUTSIDE", "SLOTS", "Candidates", "Grid", "Reading", "candidates", "times_of"]
+__all__ = ["MIXED", "OUTSIDE", "SLOTS", "Candidates", "Grid", "Reading", "candidates", "rising", "times_of"]

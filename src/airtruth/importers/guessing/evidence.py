@@ -30,8 +30,8 @@ BLOCK_S: Final = 8.0
 BAND_HZ: Final = 1.0
 """Band of the motion, which gives the number of independent samples [Hz] (judgement)."""
 TOLERANCE, BROAD = 0.2, 2.0
-"""Standard deviation of the logarithm of a factor that scales, lags and positions of sensors explain, and of an unknown one
-[-] (judgement)."""
+"""Standard deviation of the logarithm of a factor that scales, lags and positions of sensors explain, and of one of which
+nothing is known [-] (judgement)."""
 MOST: Final = 10.0
 """Largest logarithm of a likelihood ratio that one relation may give [-]: a model is never surer of itself."""
 
@@ -233,20 +233,15 @@ def _pressure_height(c: Mapping[str, Array], dt_s: float) -> Finding:
     return _near(off / 250.0, 1.0, 40.0, f"the altitude is {off:+.0f} m from the satellites' altitude")
 
 
-_TURNED: Final = _moved(
-    "theta", "the integral of q", 2, lambda c: c["theta"], lambda c, dt: integral(c["q"], dt)
-)
-_HEAVED: Final = _moved("alpha", "the integral of q + (az + g)/V", 2, lambda c: c["alpha"], _heave)
-_DRAWN: Final = _moved(
+_TURNED = _moved("theta", "the integral of q", 2, lambda c: c["theta"], lambda c, dt: integral(c["q"], dt))
+_HEAVED = _moved("alpha", "the integral of q + (az + g)/V", 2, lambda c: c["alpha"], _heave)
+_DRAWN = _moved(
     "the airspeed", "the integral of the force along the path", 2, lambda c: c["airspeed"], _along
 )
-_LIFTED: Final = _moved(
+_LIFTED = _moved(
     "the altitude", "the double integral of the vertical force", 3, lambda c: c["altitude"], _risen
 )
-_FLOWN: Final = _moved(
-    "the altitude", "the integral of V sin(theta - alpha)", 2, lambda c: c["altitude"], _climbed
-)
-"""Tests of changes; the module states the equations."""
+_FLOWN = _moved("the altitude", "the integral of V sin(theta - alpha)", 2, lambda c: c["altitude"], _climbed)
 RELATIONS: Final = (
     Relation(("az",), _weight),
     Relation(("theta", "q"), _TURNED),
