@@ -159,14 +159,14 @@ def unpacked(path: Path, reply: Reply) -> Source:
         path,
         {name: values(entry) for name, entry in facts["arrays"]},
         {name: values(entry) for name, entry in facts["clocks"]},
-        {name: tuple(names) for name, names in facts["labels"]},
-        facts["ordered"],
-        facts["first_line"],
-        facts["units"],
-        {name: tuple(numbers) for name, numbers in facts["repeated"]},
-        tuple(facts["comments"]),
-        tuple(facts["dates"]),
-        tuple(facts["notes"]),
+        labels={name: tuple(names) for name, names in facts["labels"]},
+        ordered=facts["ordered"],
+        first_line=facts["first_line"],
+        units=facts["units"],
+        repeated={name: tuple(numbers) for name, numbers in facts["repeated"]},
+        comments=tuple(facts["comments"]),
+        dates=tuple(facts["dates"]),
+        notes=tuple(facts["notes"]),
     )
 
 

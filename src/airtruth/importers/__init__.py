@@ -1,6 +1,7 @@
 """Measured logs in other formats, brought under the log contract by a mapping file."""
 
-from airtruth.importers.convert import Imported, convert, find_manoeuvres, import_log, record_constants
+from airtruth.importers.constants import record_constants
+from airtruth.importers.convert import Imported, convert, find_manoeuvres, import_log
 from airtruth.importers.dictionary import Words, read_dictionary
 from airtruth.importers.guess import guess_mapping
 from airtruth.importers.manoeuvre_result import ManoeuvreResult

@@ -14,16 +14,17 @@ from airtruth.channels import SIGNALS
 from airtruth.checks.fault import Fault
 from airtruth.checks.gate import admit
 from airtruth.checks.stated import KEY as STATED
-from airtruth.errors import ConfigurationError, LogError
+from airtruth.errors import ConfigurationError
 from airtruth.importers.align import Alignment, aligned
 from airtruth.importers.clock import with_increasing_times
+from airtruth.importers.constants import constants_of
 from airtruth.importers.derived import with_air_data, with_alpha
 from airtruth.importers.manoeuvre_result import ManoeuvreResult
 from airtruth.importers.manoeuvres import find, read_table
-from airtruth.importers.mapping import CONSTANTS, MappingFile, Place, Resample, read_mapping, unit_factor
+from airtruth.importers.mapping import MappingFile, Resample, read_mapping
 from airtruth.importers.runs import require_rows, run_of_file, runs_of
-from airtruth.importers.series import Series, base_clock, read_series
-from airtruth.importers.sources import Source, numbers, open_source
+from airtruth.importers.series import Series, read_series
+from airtruth.importers.sources import Source, open_source
 from airtruth.importers.uniform import beyond, shortened, slower, uniform
 from airtruth.logs.flight_log import RECORD_CONSTANTS, RESAMPLED, FlightLog
 from airtruth.units import DEG
@@ -60,6 +61,11 @@ class Piece:
     source: Source
     mapping: MappingFile
     alignment: Alignment | None = None
+
+    def constants(self, part: tuple[float, float, NDArray[np.bool_] | None]) -> dict[str, float]:
+        """`airtruth.importers.constants.constants_of` on the clock of the first file."""
+        moved = self.alignment.applied if self.alignment is not None else np.asarray
+        return constants_of(self.source, self.mapping, part, moved)
 
 
 @dataclass(frozen=True)
@@ -303,7 +309,7 @@ def built(merged: Merged) -> FlightLog:
         ids.append(run_id)
         times.append(t)
         blocks.append(values)
-        known = [_constants(piece, start, end, rows) for piece in reversed(merged.pieces)]
+        known = [piece.constants((start, end, rows)) for piece in reversed(merged.pieces)]
         stated = {name: value for one in known for name, value in one.items()}
         if stated:
             facts[run_id] = stated
@@ -366,38 +372,6 @@ def _metadata(merged: Merged, times: Sequence[Array]) -> dict[str, object]:
     return metadata
 
 
-def record_constants(log: FlightLog, run_id: str) -> Mapping[str, float]:
-    """Mass, inertia and reference lengths that the mapping stated for a run, in SI; {} if none."""
-    facts = log.metadata.get(RECORD_CONSTANTS, {})
-    return dict(facts.get(run_id, {})) if isinstance(facts, Mapping) else {}
-
-
-def _constants(piece: Piece, start: float, end: float, rows: NDArray[np.bool_] | None) -> dict[str, float]:
-    result: dict[str, float] = {}
-    source, mapping = piece.source, piece.mapping
-    for name, one in mapping.constants.items():
-        factor = unit_factor(CONSTANTS[name], one.unit)
-        if one.column is None:
-            assert one.value is not None
-            result[name] = factor * one.value
-            continue
-        values, own = numbers(
-            source, Place(column=one.column, variable=one.variable), mapping.source.variable
-        )
-        clock = base_clock(source, mapping)
-        t = clock.t_s if clock is not None else own
-        if len(values) > 1 and t is not None and len(t) == len(values):
-            moved = t if piece.alignment is None else piece.alignment.applied(t)
-            values = Series(moved, values).between(start, end, rows).values
-        mean = float(np.nanmean(values)) * factor
-        if not np.isfinite(mean) or mean <= 0.0:
-            raise LogError(
-                f"{source.path}: {name} is {mean:g}, which has to be above 0; map another column, or state a value"
-            )
-        result[name] = mean
-    return result
-
-
 __all__ = [
     "Imported",
     "Merged",
@@ -407,5 +381,4 @@ __all__ = [
     "find_manoeuvres",
     "import_log",
     "merge",
-    "record_constants",
 ]
