@@ -118,7 +118,7 @@ def test_pulse_widths_of_a_servo_are_recognised(log):
 def test_a_fault_that_rests_on_declared_numbers_blames_them_too(log, gtm):
     """The wing area a hundred times too large moves CLalpha and Cmde, and no other test."""
     wrong = gtm.model_copy(
-        update={"constants": replace(gtm.constants, wing_area_m2=100.0 * gtm.wing_area_m2)}
+        update={"constants": gtm.constants.model_copy(update={"wing_area_m2": 100.0 * gtm.wing_area_m2})}
     )
     assert certain(log) == []
     faults = certain(log, wrong)
@@ -157,9 +157,9 @@ def vaneless(log, airspeed, theta):
 
 
 @pytest.mark.parametrize("theta", [True, False])
-def test_a_reconstructed_alpha_is_no_evidence(log, theta):
+def test_a_reconstructed_alpha_is_no_evidence(log, gtm, theta):
     """With 0.8 of the airspeed every channel agreed with the alpha that was computed from it."""
-    result = check_logs([("", vaneless(log, 0.8, theta))])
+    result = check_logs([("", vaneless(log, 0.8, theta))], gtm)
     assert result.verdict == "cannot_tell"
     text = result.summary()
     assert "agree" not in text

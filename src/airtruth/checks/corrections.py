@@ -159,7 +159,7 @@ def _pulses(name: str, runs: Runs, stated: Stated | None) -> Iterator[Correction
             f'state the degrees per microsecond as scale, less their product with the centre as offset, and unit = "deg" under '
             f"[channels.{name}] in the import mapping",
             change,
-            2.0,
+            1.0,  # 1/100 deg explains the same numbers, and seldom leaves all of them in `_PULSE_US`
         )
 
 

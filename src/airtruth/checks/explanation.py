@@ -106,21 +106,23 @@ class Explanation:
         return "; or ".join(words)
 
 
-def total(results: list[Relation], before: list[Relation] | None = None) -> Array:
-    """Sums of the squared distances (runs + 1,) of each run and of all together.
+def total(results: Sequence[Relation]) -> Array:
+    """Sums of the squared distances (runs + 1,) of each run and of all together."""
+    return np.asarray(sum(t.distance for t in results))
 
-    With ``before``, a test that a correction leaves without information counts as before the correction: to
-    hide the evidence is no explanation.
-    """
-    own = {t.name: t for t in before or () if t.name != "range"}
-    return np.asarray(
-        sum(
-            np.where(t.informed, t.distance, np.maximum(t.distance, own[t.name].distance))
-            if t.name in own
-            else t.distance
-            for t in results
-        )
-    )
+
+def _kept(after: Sequence[Relation], before: Sequence[Relation]) -> list[Relation]:
+    """Tests after a correction; one that it leaves without information counts as before: to hide evidence explains nothing."""
+    own = {t.name: t for t in before if t.name != "range"}
+    result = []
+    for test in after:
+        if test.name in own:
+            hidden = ~test.informed & (own[test.name].distance > test.distance)
+            distance = np.where(hidden, own[test.name].distance, test.distance)
+            figures = np.where(hidden[:, None], own[test.name].figures, test.figures)
+            test = replace(test, distance=distance, figures=figures)
+        result.append(test)
+    return result
 
 
 def _trials(
@@ -138,8 +140,8 @@ def _trials(
         changed = runs.changed(correction.apply)
         if _stills(changed, correction) or _leaves(changed, correction, results):
             continue
-        after = relations(changed, aircraft)
-        found.append(Trial(correction, after, total(after, results) + correction.penalty))
+        after = _kept(relations(changed, aircraft), results)
+        found.append(Trial(correction, after, total(after) + correction.penalty))
     return found
 
 
