@@ -120,19 +120,19 @@ def _named(findings: Sequence[Finding], causes: Sequence[Cause]) -> list[str]:
     by_name = {f.name: f for f in findings}
     if len(options) > 1:
 
-        def words(names: Sequence[Finding], alone: bool) -> str:
-            return " with ".join(f"{f.name} {shown(by_name[f.name] if alone else f)}" for f in names)
+        def words(errors: Sequence[Finding]) -> str:
+            return " with ".join(f"{f.name} {shown(f)}" for f in errors)
 
         # where every choice of one list goes with every choice of the other, two lists replace the product
         lists = _factors([frozenset(f.name for f in o) for o in options])
         first = {f.name: f for o in reversed(options) for f in o}
         told = (
             "; and one of: ".join(
-                " or ".join(words([first[n] for n in sorted(c)], alone=len(c) == 1) for c in choices)
+                " or ".join(words([first[n] for n in sorted(c)]) for c in choices)
                 for choices in lists
             )
             if lists
-            else " or ".join(words(o, alone=len(o) == 1) for o in options)
+            else " or ".join(words(o) for o in options)
         )
         result.append(
             f"One of several: {told}. These records do not tell them apart; a surveyed position, a known scale or "
