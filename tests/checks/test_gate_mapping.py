@@ -13,9 +13,11 @@ from airtruth.checks.gate import admit, inspect
 from airtruth.checks.kinematics import check_logs
 from airtruth.checks.stated import KEY
 from airtruth.errors import LogError
+from airtruth.identification import identify
 from airtruth.logs.flight_log import PRESCRIBED, FlightLog
-from airtruth.logs.store import read_log
+from airtruth.logs.store import iter_logs, read_log
 from airtruth.physics.reconstruction import COLUMNS, Priors, reconstruct
+from airtruth.simulation.campaign import run as campaign
 from airtruth.units import DEG, G0
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -139,6 +141,35 @@ def test_a_prescribed_surface_is_its_command(log, gtm):
     same = replace(log, channels={**log.channels, "elevator_command_rad": log.channels["elevator_rad"]})
     assert [f.code for f in certain(same, gtm)] == ["copy"]
     assert certain(replace(same, metadata={**log.metadata, PRESCRIBED: True}), gtm) == []
+
+
+REPLAY = """
+schema = 1
+name = "again"
+aircraft = "gtm"
+runs = 1
+seed = 1
+duration_s = 6.0
+[condition]
+eas_kt = 75.0
+altitude_ft = 7000.0
+[[manoeuvre]]
+kind = "replay"
+file = "{file}"
+run_id = "r1"
+channel = "elevator_rad"
+start_s = 0.0
+[sensors]
+ideal = true
+"""
+
+
+def test_a_surface_that_was_replayed_with_ideal_sensors_is_identified(tmp_path):
+    (tmp_path / "again.toml").write_text(REPLAY.format(file=ROOT / "data" / "undeclared" / "a.parquet"))
+    campaign.fly(tmp_path / "again.toml", tmp_path / "again")
+    (again,) = iter_logs(tmp_path / "again")
+    np.testing.assert_array_equal(again.channels["elevator_rad"], again.channels["elevator_command_rad"])
+    assert identify(again, "gtm", ("ls",)).of("ls").converged.all()
 
 
 def vaneless(log, airspeed, theta):

@@ -1,5 +1,6 @@
-"""Logs that must be refused, each with one message that says what, where and what to do."""
+"""Logs that must be refused and runs that must be left out, each with one message that says what, where and what to do."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -64,19 +65,19 @@ CASES = {
     ),
     "degrees by range": (
         lambda: changed("alpha_rad", lambda x: x / DEG),
-        "alpha_rad: degrees taken as radians in 1 of 3 runs.*unit = .deg.",
+        "alpha_rad: degrees taken as radians in 1 of 3 runs",
     ),
     "degrees of alpha by kinematics": (
         lambda: changed("alpha_rad", lambda x: x / DEG, SMALL),
-        "alpha_rad: degrees taken as radians in 1 of 3 runs.*unit = .deg.",
+        "alpha_rad: degrees taken as radians in 1 of 3 runs",
     ),
     "degrees of q by kinematics": (
         lambda: changed("q_rad_s", lambda x: x / DEG, SMALL),
-        "q_rad_s: degrees taken as radians in 1 of 3 runs.*unit = .deg_s.",
+        "q_rad_s: degrees taken as radians in 1 of 3 runs",
     ),
     "degrees of the elevator": (
         lambda: changed("elevator_rad", lambda x: x / DEG, fly(runs=3, noise=1.0, amplitude_rad=1.2 * DEG)),
-        r"elevator_rad: degrees taken as radians in 1 of 3 runs.*unit = .deg.",
+        r"elevator_rad: degrees taken as radians in 1 of 3 runs",
     ),
     "az in g": (
         lambda: changed("az_m_s2", lambda x: x / G0),
@@ -102,12 +103,36 @@ CASES = {
 }
 
 
+ONE_OF_THREE = (
+    "no excitation", "constant alpha", "constant elevator", "degrees by range",
+    "degrees of alpha by kinematics", "degrees of q by kinematics",
+    "degrees of the elevator", "az in g", "az without gravity",
+)  # fmt: skip
+"""Cases that concern one run of three."""
+
+
 @pytest.mark.grid
-@pytest.mark.parametrize("case", list(CASES))
+@pytest.mark.parametrize("case", [case for case in CASES if case not in ONE_OF_THREE])
 def test_a_bad_log_is_refused_by_name(case):
     make, message = CASES[case]
     with pytest.raises(LogError, match=f"(?s){message}"):
         identify(make(), GTM, ("ls", "iv-f1"))
+
+
+@pytest.mark.grid
+@pytest.mark.parametrize("case", ONE_OF_THREE)
+def test_one_bad_run_of_three_is_named_and_the_others_are_answered(case):
+    make, message = CASES[case]
+    log = make()
+    result = identify(log, GTM, ("ls", "iv-f1"))
+    others = [log.run_ids[0], log.run_ids[2]]
+    assert list(result.run_ids) == others
+    (note,) = [note for note in result.notes if "left out" in note]
+    assert re.search(f"left out 1 of 3 runs .'{log.run_ids[1]}'., the other 2 are used: {message}", note)
+    alone = identify(log.select(others), GTM, ("ls", "iv-f1"))
+    np.testing.assert_array_equal(result.of("ls").theta, alone.of("ls").theta)
+    with pytest.raises(LogError, match=re.split("[:.]", message)[0]):
+        identify(log.select([log.run_ids[1]]), GTM, ("ls", "iv-f1"))
 
 
 def test_the_good_logs_are_accepted():

@@ -11,7 +11,7 @@ import airtruth as at
 from airtruth import style
 from airtruth.errors import ConfigurationError, LogError
 from airtruth.importers import find_manoeuvres, import_log, read_table
-from airtruth.importers.manoeuvres import RATE_HZ, SETTLE_S, TRIM_S, find
+from airtruth.importers.manoeuvres import RATE_HZ, SETTLE_S, TRIM_S, find, shortest_s
 from airtruth.importers.series import Series
 from studies.real_rows import run
 from validation.linear_flight import DENSITY_KG_M3, fly
@@ -86,6 +86,38 @@ def test_the_reason_of_a_part_that_is_not_accepted(flight):
     assert "airspeed changes" in reasons["m02"]
     assert "load factor of 1.4" in reasons["m04"]
     assert "m04 not: mean load factor" in found.summary()
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor", "reason"),
+    [
+        ("airspeed_m_s", 0.1, "on the ground: airspeed of 4.3 m/s"),
+        ("elevator_rad", 30.0, "beyond 45 deg: another unit or column"),  # 60 deg
+    ],
+)
+def test_a_control_check_on_the_ground_and_an_impossible_surface_are_no_manoeuvres(
+    flight, channel, factor, reason
+):
+    t, c = flight
+    other = {**c, channel: np.where(t < 1050.0, factor, 1.0) * c[channel]}
+    first = find("f", {n: Series(t, v) for n, v in other.items()}).candidates[0]
+    assert first.accept == "no"
+    assert reason in first.reason
+
+
+def test_a_record_that_check_and_identify_would_refuse_is_too_short(flight):
+    """The record ends half a second after an input at 140 s; at 3 Hz the low-pass needs more than the 6 s that remain."""
+    t, c = flight
+    part = (t > 1100.0) & (t < 1144.0)
+    cut = {n: Series(t[part], v[part]) for n, v in c.items()}
+    (one,) = find("f", cut).candidates
+    assert one.accept == "yes"
+    (one,) = find("f", cut, 3.0).candidates
+    assert one.end_s - one.start_s < shortest_s(3.0)
+    assert (
+        one.reason
+        == f"lasts {one.end_s - one.start_s:.1f} s, check and identify need {shortest_s(3.0):.1f} s at this rate"
+    )
 
 
 def test_two_inputs_close_together_share_no_sample(flight):

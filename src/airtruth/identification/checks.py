@@ -6,15 +6,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.checks.sentences import runs
 from airtruth.errors import ConfigurationError, LogError
 from airtruth.identification.methods import METHODS, Method
 from airtruth.identification.options import Options
-from airtruth.logs.flight_log import Batch, FlightLog
+from airtruth.logs.flight_log import Batch, FlightLog, batches
 from airtruth.numerics.prefilter import butterworth, edge_samples, zero_phase
 
 Array = NDArray[np.float64]
@@ -69,15 +71,54 @@ def airspeed_fault(log: FlightLog, options: Options) -> str | None:
     )
 
 
-def check_batch(batch: Batch, options: Options) -> None:
-    """Check that runs of one length and rate can be identified.
+@dataclass(frozen=True)
+class Unfit:
+    """Runs that cannot be identified.
+
+    Attributes
+    ----------
+    run_ids : names of the runs.
+    sentence : the reason, with the runs.
+    cure : what to do about it.
+    """
+
+    run_ids: tuple[str, ...]
+    sentence: str
+    cure: str = "leave these runs out"
+
+
+def fit_runs(log: FlightLog, options: Options) -> tuple[FlightLog, tuple[str, ...]]:
+    """Return the runs that can be identified, and a sentence for each reason for which a minority was left out.
+
+    The rule is that of `airtruth.checks.gate.admit`.
 
     Raises
     ------
     ConfigurationError
         If the low-pass does not fit the sample rate or the trim window the record.
     LogError
-        Naming runs and channels: too short, constant, or not excited.
+        If half of the runs or more are too short, constant or not excited, naming runs and channels.
+    """
+    found = [one for batch in batches(log) for one in unfit(batch, options)]
+    bad = {run_id for one in found for run_id in one.run_ids}
+    if not bad:
+        return log, ()
+    if 2 * len(bad) >= len(log):
+        raise LogError(f"{found[0].sentence}; {found[0].cure}")
+    rest = log.select([run_id for run_id in log.run_ids if run_id not in bad])
+    return rest, tuple(
+        f"left out {runs(one.run_ids, len(log))}, the other {len(rest)} are used: {one.sentence}"
+        for one in found
+    )
+
+
+def unfit(batch: Batch, options: Options) -> list[Unfit]:
+    """Return runs of one length and rate that cannot be identified: too short, constant, or not excited.
+
+    Raises
+    ------
+    ConfigurationError
+        As `fit_runs`.
     """
     rate_hz = 1.0 / batch.dt_s
     cutoff_hz = options.cutoff_of(batch.dt_s)
@@ -89,32 +130,40 @@ def check_batch(batch: Batch, options: Options) -> None:
     sos = butterworth(cutoff_hz, options.order, batch.dt_s)
     samples = batch.t_s.shape[1]
     shortest = EDGES * edge_samples(sos)
-    everyone = np.ones(len(batch.run_ids), dtype=np.bool_)
     if samples < shortest:
-        raise LogError(
+        everyone = np.ones(len(batch.run_ids), dtype=np.bool_)
+        sentence = (
             f"too short to identify: {_named(batch, everyone)} of {samples} samples "
             f"({samples * batch.dt_s:.3g} s); the low-pass of order {options.order} needs at least {shortest}"
         )
-    channels = batch.channels
+        return [Unfit(batch.run_ids, sentence)]
+    channels, result = batch.channels, []
+
+    def note(which: Bools, sentence: str, cure: str = Unfit.cure) -> None:
+        if which.any():
+            ids = tuple(batch.run_ids[i] for i in np.flatnonzero(which))
+            result.append(Unfit(ids, sentence.replace("{runs}", _named(batch, which)), cure))
+
     for name in _MOVING:
         constant = np.ptp(channels[name], axis=1) == 0.0
-        if constant.any():
-            raise LogError(
-                f"{name} is constant in {_named(batch, constant)}: "
-                "the sensor was not recorded, or nothing moved; leave these runs out"
-            )
+        note(constant, f"{name} is constant in {{runs}}: the sensor was not recorded, or nothing moved")
     elevator = zero_phase(channels["elevator_rad"], sos)
-    still = elevator.std(axis=1) < STILL * (channels["elevator_rad"] - elevator).std(axis=1)
-    if still.any():
-        raise LogError(
-            f"elevator_rad: no excitation in {_named(batch, still)}: the surface moves less than its own "
-            "noise; identification needs a manoeuvre, leave these runs out"
-        )
+    moved, noise = elevator.std(axis=1), (channels["elevator_rad"] - elevator).std(axis=1)
+    note(
+        (moved < STILL * noise) & (np.ptp(channels["elevator_rad"], axis=1) > 0.0),
+        "elevator_rad: no excitation in {runs}: the surface moves less than its own noise; identification needs a manoeuvre",
+    )
     if options.trim == "mean" or options.condition == "window":
-        _check_window(batch, options, elevator)
+        early = _early(batch, options, elevator)
+        sentence = (
+            f"the elevator already moves within the trim window of {options.trim_window_s:g} s in {{runs}}"
+        )
+        note(early, sentence, "shorten trim_window_s, or use trim = 'intercept'")
+    return result
 
 
-def _check_window(batch: Batch, options: Options, elevator: Array) -> None:
+def _early(batch: Batch, options: Options, elevator: Array) -> Bools:
+    """Runs whose elevator moves within the trim window."""
     samples = round(options.trim_window_s / batch.dt_s)
     if not 1 <= samples < batch.t_s.shape[1]:
         raise ConfigurationError(
@@ -122,12 +171,7 @@ def _check_window(batch: Batch, options: Options, elevator: Array) -> None:
             f"{batch.t_s.shape[1] * batch.dt_s:.3g} s at {1.0 / batch.dt_s:.4g} Hz; "
             "it must hold a sample and end inside the record"
         )
-    early = np.ptp(elevator[:, :samples], axis=1) > EARLY * np.ptp(elevator, axis=1)
-    if early.any():
-        raise LogError(
-            f"the elevator already moves within the trim window of {options.trim_window_s:g} s in "
-            f"{_named(batch, early)}; shorten trim_window_s, or use trim = 'intercept'"
-        )
+    return np.asarray(np.ptp(elevator[:, :samples], axis=1) > EARLY * np.ptp(elevator, axis=1))
 
 
 def _named(batch: Batch, which: Bools) -> str:

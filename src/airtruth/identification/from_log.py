@@ -16,7 +16,7 @@ from airtruth.checks.airspeed import is_noisy, speeds
 from airtruth.cluster import Cluster, LostWorkError
 from airtruth.errors import ConfigurationError, LogError, StoreError
 from airtruth.identification.batch import identify_batch
-from airtruth.identification.checks import airspeed_fault, check_batch, check_channels
+from airtruth.identification.checks import airspeed_fault, check_channels, fit_runs
 from airtruth.identification.condition import AircraftConstants, pressure_range
 from airtruth.identification.declared_sensors import as_ideal, taken_out
 from airtruth.identification.doubts import CHANGES
@@ -121,8 +121,10 @@ def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made
     log = read_log(task.folder / entry) if isinstance(entry, Path) else entry
     found = FromLog(tuple(log.run_ids))
     log = _checked(log, task, found)
-    found.run_ids = tuple(log.run_ids)
     try:
+        log, left_out = fit_runs(log, task.options)
+        found.notes += left_out
+        found.run_ids = tuple(log.run_ids)
         for run_id, name, own, declared in differing(log.metadata, log.run_ids, task.plane):
             found.stated.setdefault(name, []).append((run_id, own, declared))
         servo_s = task.plane.servo_time_s if isinstance(task.plane, Aircraft) else 0.0
@@ -132,7 +134,6 @@ def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made
             for p in with_constants(log, task.plane)
         ]
         for part in parts:
-            check_batch(part.batch, task.options)
             found.dt_s = max(found.dt_s, part.batch.dt_s)
             ranges = zip(part.batch.run_ids, pressure_range(part.batch).tolist(), strict=True)
             found.changes += [(run_id, changed) for run_id, changed in ranges if changed > CHANGES]
