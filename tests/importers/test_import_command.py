@@ -79,7 +79,7 @@ def test_a_wrong_sign_ends_with_2_and_writes_nothing_unless_forced(folder):
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
-        (("import", "f.csv"), "`airtruth import --guess f.csv` prints a mapping"),
+        (("import", __file__), f"`airtruth import --guess {__file__}` prints a mapping"),
         (("import", "--guess", "none.csv"), "none.csv: no such file"),
         (("check", "none.parquet"), "no such file"),
     ],

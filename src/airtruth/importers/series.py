@@ -23,6 +23,7 @@ from airtruth.importers.mapping import (
     Place,
     unit_factor,
 )
+from airtruth.importers.mirrored import are_mirrored
 from airtruth.importers.sources import Source, numbers
 from airtruth.logs.validate import JITTER, single_precision_s
 from airtruth.units import ZEROS
@@ -84,11 +85,30 @@ def read_series(source: Source, mapping: MappingFile) -> dict[str, Series]:
         if any(name in series for name in AIRSPEEDS):
             del made["airspeed_m_s"]
         series = made | series
+    _check_mirrored(source, mapping, series, clock)
     if not series:
         raise ConfigurationError(
             f"{source.path}: the mapping names no channel; state [channels.alpha_rad] ..."
         )
     return series
+
+
+def _check_mirrored(
+    source: Source, mapping: MappingFile, series: dict[str, Series], clock: Series | None
+) -> None:
+    """Refuse a mean of two surfaces that cancels the elevator; weights state that a mean is meant."""
+    for name in ("elevator_rad", "elevator_command_rad"):
+        one, q = mapping.channels.get(name), series.get("q_rad_s")
+        if one is None or q is None or q.constant or len(one.places) != 2 or one.weights or one.calibrations:
+            continue
+        times, read = _read(source, mapping, one.places, f"channels.{name}", one.clock, clock)
+        if are_mirrored(times.t_s, read, q.t_s, q.values):
+            raise LogError(
+                f"{source.path}: {name}: the pitch acceleration follows the difference of "
+                f"{' and '.join(map(repr, one.columns))}, not their mean: the servos are mirrored; state "
+                f"weights = [0.5, -0.5] under [channels.{name}] and the offset of the difference, or weights = [0.5, 0.5] if the "
+                "mean is right"
+            )
 
 
 def base_clock(source: Source, mapping: MappingFile) -> Series | None:
