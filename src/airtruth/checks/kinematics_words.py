@@ -128,8 +128,7 @@ def _named(findings: Sequence[Finding], causes: Sequence[Cause]) -> list[str]:
         first = {f.name: f for o in reversed(options) for f in o}
         told = (
             "; and one of: ".join(
-                " or ".join(words([first[n] for n in sorted(c)]) for c in choices)
-                for choices in lists
+                " or ".join(words([first[n] for n in sorted(c)]) for c in choices) for choices in lists
             )
             if lists
             else " or ".join(words(o) for o in options)
