@@ -11,7 +11,7 @@ from airtruth.api.campaigns import load_aircraft
 
 if TYPE_CHECKING:
     from airtruth.api.arguments import AircraftSource, FilePath
-    from airtruth.identification import IdentificationResult
+    from airtruth.identification import IdentificationResult, Method
     from airtruth.identification.options import Options
     from airtruth.logs.sources import Logs
     from airtruth.loop import LoopResult
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def identify(
     logs: Logs,
     aircraft: AircraftSource,
-    methods: Sequence[str] = ("iv-f1",),
+    methods: Sequence[str | Method] = ("iv-f1",),
     options: Options | None = None,
     *,
     joint: bool = False,
@@ -34,7 +34,7 @@ def identify(
     ----------
     logs : logs of one aircraft.
     aircraft : aircraft, for its mass, inertia and reference lengths.
-    methods : names of estimators, a string is one of them; see docs/methods.md.
+    methods : names of estimators or `airtruth.identification.Method` objects, one or a sequence; see docs/methods.md.
     options : choices of the estimators; None for the defaults.
     joint : whether all runs share one estimate per method.
     force : continue although a log contradicts physics; the result records the faults.

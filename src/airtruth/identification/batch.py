@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from airtruth.errors import ConfigurationError
 from airtruth.identification.condition import AircraftConstants, OneOrEach
 from airtruth.identification.estimates import Estimates
-from airtruth.identification.methods import method, regression
+from airtruth.identification.methods import Method, method, regression
 from airtruth.identification.options import Options
 from airtruth.identification.reconstructed import with_reconstruction
 from airtruth.identification.regression.solve import regress_batch, regress_joint
@@ -14,7 +15,7 @@ from airtruth.logs.flight_log import Batch
 
 
 def identify_batch(
-    batch: Batch, constants: AircraftConstants, name: str, options: Options | None = None
+    batch: Batch, constants: AircraftConstants, name: str | Method, options: Options | None = None
 ) -> Estimates:
     """Estimate the six derivatives of each run; nothing is checked.
 
@@ -24,7 +25,7 @@ def identify_batch(
     ----------
     batch : runs of one length and sample period, as `airtruth.logs.flight_log.batches` makes them.
     constants : aircraft, any object with wing_area_m2, chord_m, mass_kg, inertia_yy_kg_m2.
-    name : method, a key of `airtruth.identification.METHODS`.
+    name : method, a key of `airtruth.identification.METHODS`, or a `Method`.
     options : choices; None for the defaults.
 
     Raises
@@ -38,13 +39,13 @@ def identify_batch(
         if chosen.estimate is not None:
             return chosen.estimate(parts[0], constants, options)
         pose = regression(chosen) if chosen.iterates else None
-        return regress_batch(parts[0], constants, name, pose, options)
+        return regress_batch(parts[0], constants, chosen.name, pose, options)
 
     return with_reconstruction(estimate, [batch], options or Options())
 
 
 def identify_joint(
-    parts: Sequence[Batch], constants: OneOrEach, name: str, options: Options | None = None
+    parts: Sequence[Batch], constants: OneOrEach, name: str | Method, options: Options | None = None
 ) -> Estimates:
     """One estimate for all runs together; nothing is checked.
 
@@ -60,15 +61,19 @@ def identify_joint(
     Raises
     ------
     ConfigurationError
-        If the method does not exist.
+        If the method does not exist, or estimates each run alone.
     """
     chosen = method(name)
+    if chosen.estimate is not None and chosen.estimate_joint is None:
+        raise ConfigurationError(
+            f"method {chosen.name} has no estimate_joint: identify each run, or give the Method that function"
+        )
 
     def estimate(parts: Sequence[Batch], options: Options) -> Estimates:
         if chosen.estimate_joint is not None:
             return chosen.estimate_joint(parts, constants, options)
         pose = regression(chosen) if chosen.iterates else None
-        return regress_joint(parts, constants, name, pose, options)
+        return regress_joint(parts, constants, chosen.name, pose, options)
 
     return with_reconstruction(estimate, parts, options or Options())
 

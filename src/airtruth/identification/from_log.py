@@ -147,7 +147,7 @@ def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made
         found.parts = parts
         return found
     for chosen in task.methods:
-        made = [identify_batch(p.batch, p.constants, chosen.name, task.options) for p in parts]
+        made = [identify_batch(p.batch, p.constants, chosen, task.options) for p in parts]
         found.estimates[chosen.name] = concatenated(made, log.run_ids)
         estimated(found.estimates[chosen.name])
     return found

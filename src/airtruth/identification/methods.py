@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.arguments import names
 from airtruth.errors import ConfigurationError, choices
 from airtruth.identification.condition import AircraftConstants, Observation, OneOrEach
 from airtruth.identification.estimates import Estimates
@@ -215,6 +216,29 @@ METHODS: Final[dict[str, Method]] = merged(OWN, entry_points(group=GROUP))
 """The estimators by name, with those of other packages."""
 
 
+def title(name: str) -> str:
+    """Name of an estimator in tables; of one that is not in `METHODS`, the name itself."""
+    return METHODS[name].title if name in METHODS else name
+
+
+def chosen_methods(given: str | Method | Iterable[str | Method]) -> list[Method]:
+    """Return the estimators of names or `Method` objects, each once.
+
+    Raises
+    ------
+    ConfigurationError
+        If one does not exist or is neither, or two that differ have one name.
+    """
+    each = (given,) if isinstance(given, str | Method) or not isinstance(given, Iterable) else tuple(given)
+    plain = iter(names("methods", [one for one in each if not isinstance(one, Method)], "ls"))
+    result: dict[str, Method] = {}
+    for one in each:
+        found = method(one if isinstance(one, Method) else next(plain))
+        if result.setdefault(found.name, found) != found:
+            raise ConfigurationError(f"methods: two methods have the name {found.name!r}; rename one")
+    return list(result.values())
+
+
 def regression(chosen: Method) -> Callable[[Observation, Options], Problem]:
     """Return the function that makes the method's regression.
 
@@ -232,14 +256,18 @@ def regression(chosen: Method) -> Callable[[Observation, Options], Problem]:
     return chosen.pose
 
 
-def method(name: str) -> Method:
-    """The estimator of that name.
+def method(name: str | Method) -> Method:
+    """The estimator of that name; a `Method` is returned as it is.
 
     Raises
     ------
     ConfigurationError
-        If there is none; the message lists those that exist.
+        If there is none; the message lists those that exist. If a `Method` has the name of another one in `METHODS`.
     """
+    if isinstance(name, Method):
+        if METHODS.get(name.name, name) != name:
+            raise ConfigurationError(f"a method {name.name!r} exists already; choose another name")
+        return name
     if name not in METHODS:
         raise ConfigurationError(f"method {name!r} does not exist: {choices(name, METHODS)}")
     return METHODS[name]

@@ -13,7 +13,6 @@ from pathlib import Path
 
 from airtruth import __version__
 from airtruth import aircraft as planes
-from airtruth.arguments import names
 from airtruth.cluster import Cluster
 from airtruth.errors import ConfigurationError
 from airtruth.identification.batch import identify_batch, identify_joint
@@ -23,7 +22,7 @@ from airtruth.identification.doubts import changing_pressure, doubts, smoothed_a
 from airtruth.identification.estimates import Estimates, concatenated
 from airtruth.identification.from_log import FromLog, LogTask, results_of
 from airtruth.identification.loading import at_one_cg, mean_cg
-from airtruth.identification.methods import Method, method
+from airtruth.identification.methods import Method, chosen_methods
 from airtruth.identification.options import Options
 from airtruth.identification.record_constants import Part, by_loading
 from airtruth.identification.result import (
@@ -44,7 +43,7 @@ Progress = Callable[[int, int, int], None]
 def identify(
     logs: Logs,
     aircraft: str | Path | AircraftConstants,
-    methods: Sequence[str] = ("iv-f1",),
+    methods: Sequence[str | Method] = ("iv-f1",),
     options: Options | None = None,
     *,
     joint: bool = False,
@@ -64,7 +63,7 @@ def identify(
     logs : a file, a folder, a log in memory, or several of these; runs may differ in length and rate.
     aircraft : folder or file of an aircraft, the name of a shipped one, or any object with wing_area_m2,
         chord_m, mass_kg, inertia_yy_kg_m2.
-    methods : names of methods, a string is one of them; keys of `airtruth.identification.METHODS`.
+    methods : names of methods, keys of `airtruth.identification.METHODS`, or `Method` objects; one or a sequence.
     options : choices; None for the defaults.
     joint : whether all runs share one estimate.
     force : continue although a log contradicts physics; the result records the faults in ``forced``.
@@ -89,7 +88,7 @@ def identify(
     >>> result.to_frame().loc[0, ["run_id", "method", "converged"]].tolist()
     ['r1', 'ls', True]
     """
-    chosen = [method(name) for name in dict.fromkeys(names("methods", methods, "ls"))]
+    chosen = chosen_methods(methods)
     made: list[Sequence[Estimates]] = []
     work = _worked(
         made.append, _Request(logs, aircraft, chosen, options or Options(), joint, force), advance, cluster
@@ -117,7 +116,7 @@ def identify(
 def identified(
     logs: Logs,
     aircraft: str | Path | AircraftConstants,
-    methods: Sequence[str] = ("iv-f1",),
+    methods: Sequence[str | Method] = ("iv-f1",),
     options: Options | None = None,
     *,
     joint: bool = False,
@@ -148,7 +147,7 @@ def identified(
             logs, aircraft, methods, options, joint=True, force=force, advance=advance, cluster=cluster
         )
         return
-    chosen = [method(name) for name in dict.fromkeys(names("methods", methods, "ls"))]
+    chosen = chosen_methods(methods)
     with Spool(folder) as spool:
         request = _Request(logs, aircraft, chosen, options or Options(), False, force)
         work = _worked(spool.add, request, advance, cluster)
@@ -272,7 +271,7 @@ class _Work:
         for chosen in self.methods:
             each = {
                 cg: identify_joint(
-                    [p.batch for p in parts], [p.constants for p in parts], chosen.name, self.options
+                    [p.batch for p in parts], [p.constants for p in parts], chosen, self.options
                 )
                 for cg, parts in groups.items()
             }

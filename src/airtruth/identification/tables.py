@@ -20,7 +20,7 @@ from airtruth.identification.estimates import (
     point_values,
     quantities,
 )
-from airtruth.identification.methods import METHODS
+from airtruth.identification.methods import title
 from airtruth.physics.short_period import MODAL, PARAMETERS, UNITS
 from airtruth.table import Cell, Group, Interval, Number, Pair, Table, flat
 
@@ -65,7 +65,7 @@ def details(estimates: Estimates, run_id: str | None = None) -> Table:
     ]
     percent = f"{100.0 * estimates.confidence:g} %"
     return flat(
-        title=f"{METHODS[estimates.method].title}, run {estimates.run_ids[run]}",
+        title=f"{title(estimates.method)}, run {estimates.run_ids[run]}",
         columns=("parameter", "unit", "estimate", "std", f"lower {percent}", f"upper {percent}"),
         rows=tuple(rows),
         notes=(
@@ -92,7 +92,7 @@ def _distribution(estimates: Estimates) -> Table:
         error = spread / math.sqrt(value.size) if value.size > 1 else math.nan
         rows.append((name, UNITS[name], mean, error, spread, stated))
     return flat(
-        title=f"{METHODS[estimates.method].title}, {count} of {len(estimates.run_ids)} runs converged",
+        title=f"{title(estimates.method)}, {count} of {len(estimates.run_ids)} runs converged",
         columns=("parameter", "unit", "mean", "standard error", "spread over runs", "stated std (rms)"),
         rows=tuple(rows),
         notes=(*_outcomes(estimates), f"covariance: {estimates.covariance_name}"),
