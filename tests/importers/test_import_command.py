@@ -67,7 +67,7 @@ def test_a_wrong_sign_ends_with_2_and_writes_nothing_unless_forced(folder):
     assert done.returncode == 2
     assert done.stdout == ""
     assert "contradicts physics" in done.stderr
-    assert "sign = -1 under [channels.q_rad_s]" in done.stderr
+    assert "sign = 1 in place of -1 under [channels.q_rad_s]" in done.stderr
     assert not (folder / "bad.parquet").exists()
     forced = run(*arguments, "--force")
     assert forced.returncode == 0

@@ -314,7 +314,7 @@ def test_page_of_a_trace_stands_alone(found, tmp_path):
     assert page.links == []
     assert (
         set(page.anchors)
-        == {"records", "errors", "derivatives", "candidates", "innovations", "next", "origin"}
+        == {"records", "frequency", "errors", "derivatives", "candidates", "innovations", "next", "origin"}
         == set(page.targets)
     )
     assert out.with_suffix(".csv").read_text() == error_csv(TraceAnswer.read(folder / "trace.json"))

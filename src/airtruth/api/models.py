@@ -208,7 +208,7 @@ def report(
     >>> [path.name for path in at.report("out/light", "out/light.html")]
     ['light.html', 'light.csv', 'light.tex']
     >>> [path.name for path in at.report("out/light", "out/light.svg")]
-    ['light-intervals.svg']
+    ['light-intervals.svg', 'light-runs.svg']
     """
     from airtruth import reporting
     from airtruth.arguments import as_path

@@ -74,9 +74,10 @@ def motion(runs: Runs, aircraft: Aircraft | None) -> list[Relation]:
         result.append(replace(test, distance=np.maximum(test.distance, finite(unclear)), informed=informed))
     if "alpha_rad" in names:
         result.append(_alpha_relation(runs, turned, lines))
+    angle = (lambda c, dt_s: c["alpha_rad"]) if "alpha_rad" in names else _inertial_alpha
     causes = [
-        runs.spectra(lambda c, dt_s, name=name: integral(c[name], dt_s))  # type: ignore[misc]
-        for name in ("elevator_rad", *(("alpha_rad",) if "alpha_rad" in names else ()), "q_rad_s")
+        runs.spectra(lambda c, dt_s, of=of: integral(of(c, dt_s), dt_s))  # type: ignore[misc]
+        for of in (lambda c, dt_s: c["elevator_rad"], angle, lambda c, dt_s: c["q_rad_s"])
     ]
     control = regress(runs.spectra(lambda c, dt_s: c["q_rad_s"]), np.stack(causes, axis=1), lines=lines)
     result.append(_sign_test(control))
@@ -90,6 +91,16 @@ def motion(runs: Runs, aircraft: Aircraft | None) -> list[Relation]:
 
 def _turned(c: Channels, dt_s: float) -> Array:
     return integral(c["q_rad_s"], dt_s)
+
+
+def _inertial_alpha(c: Channels, dt_s: float) -> Array:
+    """Change of alpha without a vane: the integral of q and of the vertical acceleration over the airspeed.
+
+    A regression of q' on elevator and q alone gives the elevator the pitching moment of alpha, and with it the wrong sign.
+    """
+    pitch = _turned(c, dt_s)
+    attitude = c.get("theta_rad", pitch)
+    return pitch + integral((c["az_m_s2"] + G0 * np.cos(attitude)) / c["airspeed_m_s"], dt_s)
 
 
 def _alpha_relation(runs: Runs, turned: Array, lines: NDArray[np.int64]) -> Relation:

@@ -229,7 +229,9 @@ def chosen_methods(given: str | Method | Iterable[str | Method]) -> list[Method]
     ConfigurationError
         If one does not exist or is neither, or two that differ have one name.
     """
-    each = (given,) if isinstance(given, str | Method) or not isinstance(given, Iterable) else tuple(given)
+    if not isinstance(given, str | Method | Iterable):
+        names("methods", given, "ls")
+    each = (given,) if isinstance(given, str | Method) else tuple(given)
     plain = iter(names("methods", [one for one in each if not isinstance(one, Method)], "ls"))
     result: dict[str, Method] = {}
     for one in each:
