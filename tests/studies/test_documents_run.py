@@ -43,7 +43,7 @@ def test_the_readme_leads_from_an_empty_folder_to_a_report():
         "identify",
         "report",
     ]
-    assert words[:2] == ["example", "loop"]
+    assert words[:2] == ["example", "trace"]
 
 
 @pytest.mark.slow
