@@ -16,7 +16,7 @@ from airtruth.checks.explanation import DECLARED, SUSPECT, Explanation, explain,
 from airtruth.checks.fault import Fault
 from airtruth.checks.means import OUTSIDE, ranges
 from airtruth.checks.relation import Relation
-from airtruth.checks.sentences import culprit, evidence, runs
+from airtruth.checks.sentences import culprit, evidence, left_out, runs
 from airtruth.checks.stated import Stated, stated_of
 from airtruth.checks.together import Runs
 from airtruth.errors import LogError
@@ -144,8 +144,7 @@ def admit(
         kept = admit(rest, aircraft, source=source)
         heading = f"{source}: " if source else ""
         sentences = tuple(
-            f"{heading}left out {runs(fault.run_ids, len(log))}, the other {len(rest)} are used: {fault.sentence}"
-            for fault in certain
+            heading + left_out(fault.run_ids, len(log), len(rest), fault.sentence) for fault in certain
         )
         return replace(kept, left_out=(*sentences, *kept.left_out))
     usable = any(fault.code != "constant" for fault in certain)
@@ -186,10 +185,8 @@ def _motion_faults(
         return list(_explained(tested, everyone if suspect[-1] else each, found, aircraft, count))
     faults: list[Fault] = []
     rest = everyone.copy()
-    for (
-        which,
-        one,
-    ) in odd:  # a mistake of the mapping makes hardly any run worse, one of a run makes the others worse
+    for which, one in odd:
+        # a mistake of the mapping makes hardly any run worse, one of a run makes the others worse
         helped = which | _helped(tested, one, aircraft, distances)
         affected = helped if 2 * helped.sum() >= len(tested) else which
         faults += _explained(tested, affected, one, aircraft, count)

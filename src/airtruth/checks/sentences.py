@@ -19,6 +19,11 @@ FAILED: Final = 50.0
 """Squared distance above which a test has failed as clearly as it can."""
 
 
+def left_out(run_ids: Sequence[str], count: int, rest: int, reason: str) -> str:
+    """State that runs of ``count`` were left out and that the other ``rest`` are used, with the reason."""
+    return f"left out {runs(run_ids, count)}, the other {rest} are used: {reason}"
+
+
 def evidence(test: Relation, row: int = -1) -> str:
     """What a test measured and what physics requires, for one run, or with -1 for all together."""
     f = [float(x) for x in test.figures[row]]

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.checks.sentences import runs
+from airtruth.checks.sentences import left_out
 from airtruth.errors import ConfigurationError, LogError
 from airtruth.identification.methods import METHODS, Method
 from airtruth.identification.options import Options
@@ -106,10 +106,7 @@ def fit_runs(log: FlightLog, options: Options) -> tuple[FlightLog, tuple[str, ..
     if 2 * len(bad) >= len(log):
         raise LogError(f"{found[0].sentence}; {found[0].cure}")
     rest = log.select([run_id for run_id in log.run_ids if run_id not in bad])
-    return rest, tuple(
-        f"left out {runs(one.run_ids, len(log))}, the other {len(rest)} are used: {one.sentence}"
-        for one in found
-    )
+    return rest, tuple(left_out(one.run_ids, len(log), len(rest), one.sentence) for one in found)
 
 
 def unfit(batch: Batch, options: Options) -> list[Unfit]:
