@@ -17,7 +17,8 @@ from airtruth.importers.dictionary import Words, lexicon
 from airtruth.importers.guessing.assignment import Search
 from airtruth.importers.guessing.candidates import Grid, candidates, rising, times_of
 from airtruth.importers.guessing.columns import Clock, Column, clocks_of, columns_of
-from airtruth.importers.guessing.proposal import Proposal, Writer, column_list
+from airtruth.importers.guessing.proposal import Proposal, Writer
+from airtruth.importers.guessing.times import Times, column_list, run_column
 from airtruth.importers.layout import guess_layout
 from airtruth.importers.mapping import MappingFile, SourceSection
 from airtruth.importers.sources import Source, open_source, records
@@ -59,7 +60,8 @@ def guess_mapping(
     grid = _grid(columns, clocks)
     found = candidates(columns, known, grid, clocks)
     decisions = Search(found.readings, grid.dt_s).decisions()
-    proposal = Writer(decisions, found, clocks, grid, bool(source.clocks)).proposal()
+    times = Times(clocks, decisions, bool(source.clocks), run_column(source, clocks))
+    proposal = Writer(decisions, found, times, grid).proposal()
     name = "the name of the file" if not section.structs else "the names of the structs"
     head = ["schema = 1", f"# run_id = {json.dumps(source.path.stem)} # {name}, unless stated"]
     body = "\n".join([*head, *_source_table(section), *proposal.lines])

@@ -10,6 +10,7 @@ import numpy as np
 
 from airtruth.importers.guessing.candidates import SLOTS, Reading
 from airtruth.importers.guessing.evidence import RELATIONS, Finding, compared
+from airtruth.importers.guessing.sides import are_sides
 
 BEAM: Final = 30
 """Assignments that the search keeps [-] (judgement: twice as many give the same ones)."""
@@ -151,6 +152,8 @@ class Search:
         scale = max(abs(float(np.median(one.values))), float(one.values.std()), 1e-9)
         level = abs(float(np.median(one.values) - np.median(other.values))) / scale
         moves = share > least**2 and abs(factor - 1.0) < factor_off
+        if moves and are_sides(one, other):  # each surface has a rigging of its own
+            return True
         steady = one.slot in ("airspeed", "altitude", "density", "throttle", "gps_altitude", "ground_speed")
         return bool(level < level_off and (moves or steady))
 

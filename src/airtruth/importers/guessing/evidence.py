@@ -175,7 +175,8 @@ def _pitches(c: Mapping[str, Array], dt_s: float) -> Finding:
     if not (np.isfinite(value) and std > 0.0):
         return Finding(0.0, "it does not move")
     t = value / std
-    signed = float(np.clip(log_ndtr(-t) - log_ndtr(t), -MOST, MOST))
+    # the two signs differ by the logarithm of the odds of a negative effect, half of which counts for each
+    signed = float(np.clip(0.5 * (log_ndtr(-t) - log_ndtr(t)), -0.5 * MOST, 0.5 * MOST))
     size = (
         float(np.clip(-0.5 * (np.log(max(abs(value), 1e-9) / 15.0) / 1.5) ** 2, -MOST, 0.0))
         if abs(t) > 3

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -12,22 +12,16 @@ from numpy.typing import NDArray
 
 from airtruth.channels import REQUIRED, SIGNALS
 from airtruth.importers.guessing.assignment import CERTAIN, Decision
-from airtruth.importers.guessing.candidates import MIXED, SLOTS, Candidates, Grid, Reading, times_of
-from airtruth.importers.guessing.columns import Clock, Column
+from airtruth.importers.guessing.candidates import MIXED, SLOTS, Candidates, Grid, Reading
+from airtruth.importers.guessing.columns import Column
 from airtruth.importers.guessing.evidence import control
-from airtruth.importers.uniform import even_times
-from airtruth.logs.validate import JITTER, single_precision_s
+from airtruth.importers.guessing.sides import other_side
+from airtruth.importers.guessing.times import Times, entry
 from airtruth.physics.atmosphere import density_kg_m3
 from airtruth.physics.reconstruction import NEEDED
 
 Array = NDArray[np.float64]
 
-_LOWEST_HZ: Final = 0.1
-"""Least rate that a guess takes from a clock [Hz] (judgement: slower logs do not show a short period)."""
-_HIGHEST_HZ: Final = 1e5
-"""Highest rate that a guess takes from a clock [Hz] (judgement: above that of any recorder)."""
-_USUAL_HZ: Final = 50.0
-"""Rate of a guess without a plausible clock [Hz] (judgement)."""
 _DENSITY: Final = 0.03
 """Relative error of the density up to which the unit of an altitude may be assumed [-] (judgement: less than that of the air's
 temperature, 15 K)."""
@@ -57,12 +51,10 @@ class Writer:
         self,
         decisions: Mapping[str, Decision],
         found: Candidates,
-        clocks: Mapping[str, Clock],
+        times: Times,
         grid: Grid,
-        own_times: bool,
     ) -> None:
-        self.decisions, self.found, self.clocks, self.grid = decisions, found, clocks, grid
-        self.own_times = own_times
+        self.decisions, self.found, self.times, self.grid = decisions, found, times, grid
         self.mapped: set[str] = set()
         self.doubts: list[str] = []
         self.used: list[Column] = []
@@ -74,7 +66,11 @@ class Writer:
         body += self._missing()
         if not any(line.startswith("\n[channels.") for line in body):
             body.insert(0, "\n[channels]")
-        return Proposal((*self._time(), *body), frozenset(self.mapped), tuple(self.doubts))
+        if self.times.missing:
+            self.doubts.append(
+                "no time was found; state [time] column and unit, or the sample rate as rate_hz"
+            )
+        return Proposal((*self.times.table(self.used), *body), frozenset(self.mapped), tuple(self.doubts))
 
     def _slot(self, slot: str) -> Iterator[str]:
         decision = self.decisions.get(slot)
@@ -101,7 +97,7 @@ class Writer:
             keys = ", ".join(json.dumps(c.key) for c in r.columns)
             yield f"\n[attitude] # theta from a quaternion\nquaternion = [{keys}]"
             yield f'order = "{r.order}"\nframe = "{r.frame}"'
-            yield from self._clock(r.column)
+            yield from self.times.clock(r.column)
         else:
             text = SIGNALS[name].description if name in SIGNALS else _INSTEAD.get(name, "")
             yield f"\n[channels.{name}] # {text}"
@@ -168,7 +164,8 @@ class Writer:
 
     def _lines(self, decision: Decision) -> Iterator[str]:
         r = decision.reading
-        yield entry(r.column)
+        other = other_side(r, decision.others) if r.slot == "elevator" else None
+        yield entry(*((r.column, other.column) if other is not None else (r.column,)))
         yield f'unit = "{r.unit}"'
         if r.sign < 0:
             yield "sign = -1"
@@ -176,7 +173,7 @@ class Writer:
             yield f"offset = {r.offset:g}"
         if r.channel == "height_m":
             yield f"reference_m = {self._reference() or 0.0:.1f} # from the satellites' altitude"
-        yield from self._clock(r.column)
+        yield from self.times.clock(r.column)
 
     def _reference(self) -> float | None:
         """Elevation of the point from which a height counts, by the satellites' altitude [m]."""
@@ -213,7 +210,7 @@ class Writer:
         yield f'unit = "{r.unit}"'
         if r.column.variable:
             yield f"variable = {json.dumps(r.column.variable)}"
-        yield from self._clock(r.column)
+        yield from self.times.clock(r.column)
         findings = [
             f.words
             for s in ("airspeed", "alpha")
@@ -301,7 +298,7 @@ class Writer:
             if s in ("q", "az", "alpha", "airspeed", "theta")
         }
         for column, why in self.found.surfaces:
-            x = self.grid.of(column, self.clocks)
+            x = self.grid.of(column, self.times.clocks)
             if x is None or np.ptp(x) == 0.0:
                 continue
             effect = 0.0
@@ -309,50 +306,6 @@ class Writer:
                 value, std = control({**values, "elevator": x}, self.grid.dt_s)
                 effect = value / std if np.isfinite(value) and std > 0.0 else 0.0
             yield column, why, effect
-
-    def _time(self) -> Iterator[str]:
-        base = self._base()
-        yield "\n[time]"
-        if base is not None:
-            yield f'{entry(base.column)}\nunit = "{base.unit}" # {base.reason}'
-        elif self.own_times:
-            yield "# each topic has its own times"
-        else:
-            self.doubts.append(
-                "no time was found; state [time] column and unit, or the sample rate as rate_hz"
-            )
-            yield "# no time was found: state column and unit, or the sample rate"
-            yield '# column = "..."\n# rate_hz = ...'
-        times = {id(t): t for c in self.used if (t := times_of(c, self.clocks)) is not None}
-        if len(times) > 1 or any(not _regular(t) for t in times.values()):
-            yield f'\n[resample] # linear, cubic or previous\nrate_hz = {self._rate_hz():.6g}\nmethod = "linear"'
-
-    def _base(self) -> Clock | None:
-        if "" in self.clocks or not self.clocks:
-            return self.clocks.get("")
-        columns = [c for d in self.decisions.values() for c in d.reading.columns]
-        groups = [c.group for c in columns if c.group in self.clocks]
-        group = max(groups, key=groups.count) if groups else next(iter(self.clocks))
-        return self.clocks[group]
-
-    def _clock(self, column: Column) -> Iterator[str]:
-        base, own = self._base(), self.clocks.get(column.group)
-        if column.t_s is not None or own is None or own is base:
-            return
-        matrix = f", variable = {json.dumps(own.column.variable)}" if own.column.variable else ""
-        yield f'clock = {{ column = {json.dumps(own.column.key)}{matrix}, unit = "{own.unit}" }}'
-
-    def _rate_hz(self) -> float:
-        """Rate of q, or of the first channel whose rate is plausible [Hz]."""
-        first = [self.decisions["q"].reading.column] if "q" in self.decisions else []
-        for column in (*first, *self.used):
-            t = times_of(column, self.clocks)
-            steps = np.diff(t) if t is not None else np.empty(0)
-            steps = steps[steps > 0.0]
-            step = float(np.median(steps)) if len(steps) else 0.0
-            if 1.0 / _HIGHEST_HZ <= step <= 1.0 / _LOWEST_HZ:
-                return float(f"{1.0 / step:.3g}")
-        return _USUAL_HZ
 
 
 _INSTEAD: Final = {
@@ -366,34 +319,9 @@ _INSTEAD: Final = {
 """Quantity -> what it is mapped for."""
 
 
-def entry(column: Column) -> str:
-    """Place of a column in a mapping."""
-    text = f"column = {json.dumps(column.key)}"
-    return text + (f"\nvariable = {json.dumps(column.variable)}" if column.variable else "")
-
-
 def _shown(r: Reading) -> str:
     sign = ", sign = -1" if r.sign < 0 else ""
     return f"{r.channel} = {r.column.full!r}, unit = {r.unit!r}{sign}"
 
 
-def _regular(t: Array) -> bool:
-    finite = t[np.isfinite(t)]
-    steps = np.diff(finite)
-    if len(steps) < 2 or not (steps > 0.0).all():
-        return bool(len(steps) < 2 or not np.any(steps == 0.0))
-    even = even_times(finite, single_precision_s(finite))
-    return bool(np.ptp(np.diff(even)) <= JITTER * float(np.median(steps)))
-
-
-def column_list(columns: Sequence[Column], shown: int) -> Iterator[str]:
-    """Columns with their first and last value, the smallest and the largest."""
-    for c in columns[:shown]:
-        finite = c.values[np.isfinite(c.values)]
-        if len(finite):
-            where = f"{c.variable} column {c.key}" if c.variable else repr(c.key)
-            label = f" ({c.name})" if isinstance(c.key, int) and c.name and not c.name.isdigit() else ""
-            yield f"#   {where}{label}: {finite[0]:.6g}, {finite[-1]:.6g}; {finite.min():.6g}, {finite.max():.6g}"
-
-
-__all__ = ["Proposal", "Writer", "column_list", "entry"]
+__all__ = ["Proposal", "Writer"]
