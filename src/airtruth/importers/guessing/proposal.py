@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from airtruth.channels import REQUIRED, SIGNALS
 from airtruth.importers.guessing.assignment import CERTAIN, Decision
-from airtruth.importers.guessing.candidates import MIXED, SLOTS, Candidates, Grid, Reading
+from airtruth.importers.guessing.candidates import MIXED, Grid
 from airtruth.importers.guessing.columns import Column
 from airtruth.importers.guessing.evidence import control
+from airtruth.importers.guessing.readings import Candidates, Reading
 from airtruth.importers.guessing.sides import other_side
+from airtruth.importers.guessing.slots import ALL_SLOTS, LATERAL_SLOTS
 from airtruth.importers.guessing.times import Times, entry
 from airtruth.physics.atmosphere import density_kg_m3
 from airtruth.physics.reconstruction import NEEDED
@@ -37,11 +39,11 @@ _FEW: Final = 3
 
 @dataclass(frozen=True)
 class Proposal:
-    """Text of the mapping, the channels that it maps, and sentences on what is missing or in doubt."""
+    """Text of the mapping, and sentences on needed channels that are missing or in doubt, and on optional ones in doubt."""
 
     lines: tuple[str, ...]
-    mapped: frozenset[str]
     doubts: tuple[str, ...]
+    optional: tuple[str, ...]
 
 
 class Writer:
@@ -57,12 +59,14 @@ class Writer:
         self.decisions, self.found, self.times, self.grid = decisions, found, times, grid
         self.mapped: set[str] = set()
         self.doubts: list[str] = []
+        self.optional: list[str] = []
         self.used: list[Column] = []
 
     def proposal(self) -> Proposal:
         """Tables of time, channels and what is computed."""
         body = [line for slot in _ORDER for line in self._slot(slot)]
         body += self._velocity()
+        body += [line for slot in LATERAL_SLOTS for line in self._slot(slot)]
         body += self._missing()
         if not any(line.startswith("\n[channels.") for line in body):
             body.insert(0, "\n[channels]")
@@ -70,7 +74,7 @@ class Writer:
             self.doubts.append(
                 "no time was found; state [time] column and unit, or the sample rate as rate_hz"
             )
-        return Proposal((*self.times.table(self.used), *body), frozenset(self.mapped), tuple(self.doubts))
+        return Proposal((*self.times.table(self.used), *body), tuple(self.doubts), tuple(self.optional))
 
     def _slot(self, slot: str) -> Iterator[str]:
         decision = self.decisions.get(slot)
@@ -83,14 +87,18 @@ class Writer:
         doubt = self._doubt(slot, decision)
         name = decision.reading.channel
         if doubt:
-            self.doubts.append(f"{name} is in doubt: {doubt}")
+            listed = self.optional if slot in LATERAL_SLOTS else self.doubts
+            listed.append(f"{name} is in doubt: {doubt}")
             yield f"\n# [channels.{name}] # in doubt: {doubt}"
-            yield from (f"# {line}" for line in self._lines(decision) if not line.startswith("#"))
+            lines = (line for text in self._lines(decision) for line in text.splitlines())
+            yield from (f"# {line}" for line in lines if not line.startswith("#"))
             if decision.rival is not None:
                 yield f"# rival: {_shown(decision.rival)}"
             return
         self._take(decision.reading)
-        if decision.reading.kind == "velocity":
+        if decision.reading.kind == "velocity" or (
+            slot in LATERAL_SLOTS and decision.reading.kind == "attitude"
+        ):
             return
         if decision.reading.kind == "attitude":
             r = decision.reading
@@ -107,7 +115,7 @@ class Writer:
             yield f"# the same in {', '.join(repr(r.column.full) for r in decision.others[:_FEW])}"
 
     def _take(self, reading: Reading) -> None:
-        self.mapped.add(SLOTS[reading.slot][0])
+        self.mapped.add(ALL_SLOTS[reading.slot][0])
         self.used += reading.columns
 
     def _doubt(self, slot: str, decision: Decision) -> str:
@@ -164,8 +172,11 @@ class Writer:
 
     def _lines(self, decision: Decision) -> Iterator[str]:
         r = decision.reading
-        other = other_side(r, decision.others) if r.slot == "elevator" else None
-        yield entry(*((r.column, other.column) if other is not None else (r.column,)))
+        other = other_side(r, decision.others) if r.slot in ("elevator", "rudder") else None
+        if r.kind == "pair":
+            yield entry(*r.columns, weights=r.weights)
+        else:
+            yield entry(*((r.column, other.column) if other is not None else (r.column,)))
         yield f'unit = "{r.unit}"'
         if r.sign < 0:
             yield "sign = -1"
@@ -199,7 +210,7 @@ class Writer:
             for s in ("airspeed", "alpha")
             if s in self.decisions
             and self.decisions[s].reading.kind == "velocity"
-            and SLOTS[s][0] in self.mapped
+            and ALL_SLOTS[s][0] in self.mapped
         ]
         if not used:
             return
@@ -251,7 +262,7 @@ class Writer:
             yield '# value = 1.225\n# unit = "kg_m3"'
 
     def _doubted(self, slot: str) -> bool:
-        return slot in self.decisions and SLOTS[slot][0] not in self.mapped
+        return slot in self.decisions and ALL_SLOTS[slot][0] not in self.mapped
 
     def _surface(self) -> Iterator[str]:
         """Columns that follow the elevator without being an angle."""
@@ -271,7 +282,7 @@ class Writer:
             f"elevator_rad: {column.full!r} is {why}; measure the deflection at two of its values and state them as calibration"
         )
         yield f"\n# [channels.elevator_rad] # needed: {column.full!r} is {why}"
-        yield f"# {entry(column)}"
+        yield from (f"# {line}" for line in entry(column).splitlines())
         finite = column.values[np.isfinite(column.values)]
         low, high = float(finite.min()), float(finite.max())
         yield f"# calibration = [[{low:.6g}, ...], [{high:.6g}, ...]] # value, deflection [deg], trailing edge down positive"

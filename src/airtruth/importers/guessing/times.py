@@ -134,12 +134,13 @@ def _equal(one: Any, other: Any) -> bool:
     return bool(one == other) or (one != one and other != other)
 
 
-def entry(*columns: Column) -> str:
-    """Column of a channel in a mapping, or several."""
+def entry(*columns: Column, weights: Sequence[float] = ()) -> str:
+    """Column of a channel in a mapping, or several, whose mean is taken without weights."""
     first = columns[0]
     text = f"column = {json.dumps(first.key)}"
     if len(columns) > 1:
-        text = f"columns = [{', '.join(json.dumps(c.key) for c in columns)}] # their mean"
+        text = f"columns = [{', '.join(json.dumps(c.key) for c in columns)}]"
+        text += f"\nweights = {json.dumps(list(weights))}" if weights else " # their mean"
     return text + (f"\nvariable = {json.dumps(first.variable)}" if first.variable else "")
 
 
