@@ -158,8 +158,9 @@ def _breaks(clocked: Clocked) -> list[int]:
     """Indices of times at which a clock starts again, or goes on after a pause."""
     steps = np.diff(clocked.t_s)
     usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
-    pauses = np.flatnonzero(steps > max(GAP[0] * usual, GAP[1])) + 1 if usual else []
-    return sorted({*clocked.starts, *(int(row) for row in pauses)})
+    long = steps > max(GAP[0] * usual, GAP[1])
+    pauses = np.flatnonzero(long) + 1 if usual else np.empty(0, dtype=np.int64)
+    return sorted({*clocked.starts, *pauses.tolist()})
 
 
 def _parts(t: Array) -> list[Array]:
