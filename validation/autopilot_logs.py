@@ -27,6 +27,8 @@ DERIVATIVES: Final = {"CLalpha": 4.9, "CLq": 6.5, "CLde": 0.38, "Cmalpha": -1.05
 """Truth about the CG [1/rad]."""
 LIFT_0, MOMENT_0, DRAG = 0.28, 0.03, (0.035, 0.06)
 AIRSPEED_M_S, DENSITY_KG_M3, ALTITUDE_M = 17.0, 1.2133, 100.0
+SEA_LEVEL_KG_M3: Final = 1.225
+"""Density to which an indicated airspeed refers [kg/m3]."""
 DELAY_S: Final = 0.06
 """From the command to the surface as the air sees it [s]; nothing declares it."""
 STEP_S, FIRST_S, EACH_S, MANOEUVRES = 0.0025, 12.0, 14.0, 9
@@ -153,7 +155,7 @@ def write_px4(path: Path, flight: Flight) -> None:
 
 
 def write_ardupilot(path: Path, flight: Flight) -> None:
-    """A DataFlash log with the messages of ArduPlane: angles in degrees, the servo in microseconds."""
+    """A DataFlash log with the messages of ArduPlane: angles in degrees, indicated airspeed, the servo in microseconds."""
     made = topics(flight)
     (t_imu, imu), (t_att, attitude) = made["imu"], made["attitude"]
     (t_air, air), (t_baro, baro), (t_servo, servo) = made["airspeed"], made["baro"], made["servo"]
@@ -179,7 +181,12 @@ def write_ardupilot(path: Path, flight: Flight) -> None:
             {"Roll": none(t_att), "Pitch": attitude["theta"] / DEG, "Yaw": none(t_att)},
             dict.fromkeys(("Roll", "Pitch", "Yaw"), "deg"),
         ),
-        Topic("ARSP", t_air, {"Airspeed": air["airspeed"]}, {"Airspeed": "m/s"}),
+        Topic(
+            "ARSP",
+            t_air,
+            {"Airspeed": air["airspeed"] * np.sqrt(DENSITY_KG_M3 / SEA_LEVEL_KG_M3)},
+            {"Airspeed": "m/s"},
+        ),
         Topic("BARO", t_baro, {"Alt": baro["altitude"]}, {"Alt": "m"}),
         Topic(
             "RCOU",

@@ -1,7 +1,8 @@
-"""From the log of an autopilot to a corrected aircraft that flies: no vane, no JSBSim model, a servo delay of 60 ms.
+"""From the log of an autopilot, or the table of a test centre, to a corrected aircraft that flies.
 
-The files are those of `validation.autopilot_logs`, whose truth is a simulation of its own. The commands are those of
-docs/howto/from-px4.md and from-ardupilot.md.
+There is no vane and no JSBSim model, and the servo is 60 ms late. The files are those of `validation.autopilot_logs`, whose
+truth is a simulation of its own. The commands are those of docs/howto/from-px4.md, from-ardupilot.md and from-csv.md, and print
+what these pages show.
 """
 
 from __future__ import annotations
@@ -11,11 +12,13 @@ import os
 import resource
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
 from airtruth import aircraft
+from scripts.readme import differs, steps
 from validation import autopilot_logs as uav
 
 HOWTO = Path(__file__).resolve().parents[2] / "docs" / "howto"
@@ -25,15 +28,9 @@ MANOEUVRES = "".join(
 )
 
 
-def commands_of(page: str) -> list[str]:
-    """The commands of a page, which are indented lines."""
-    lines = (line.strip() for line in page.splitlines() if line.startswith("       "))
-    return [line.removeprefix("airtruth ") for line in lines if line.startswith("airtruth ")]
-
-
 def completed(mapping: str, page: str) -> str:
     """A guessed mapping with the edits of the page: rate, elevator, height, and the manoeuvres of the flight."""
-    block = page.split("```toml")[1].split("[[manoeuvre]]")[0]
+    block = page.split("[[manoeuvre]]")[0].rpartition("```toml")[2]
     elevator = "\n".join(line.strip() for line in block.splitlines())
     text = mapping.replace("rate_hz = 100", "rate_hz = 50")
     head, found, height = text.partition("# [channels.height_m]")
@@ -45,10 +42,10 @@ def completed(mapping: str, page: str) -> str:
     return text + elevator + MANOEUVRES
 
 
-def command(folder: Path, line: str) -> str:
-    """Run a command line in a folder and return what it prints."""
+def command(folder: Path, words: Sequence[str]) -> list[str]:
+    """Run a command in a folder and return the lines that it prints."""
     done = subprocess.run(
-        [sys.executable, "-m", "airtruth", *line.split()],
+        [sys.executable, "-m", "airtruth", *words],
         cwd=folder,
         env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
         capture_output=True,
@@ -56,42 +53,70 @@ def command(folder: Path, line: str) -> str:
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    return done.stdout
+    return done.stdout.splitlines()
+
+
+WRITERS = {
+    "px4": ("flight.ulg", uav.write_px4),
+    "ardupilot": ("flight.bin", uav.write_ardupilot),
+    "csv": ("flight.csv", uav.write_csv),
+}
+"""Page -> file that its first command reads, and its writer."""
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("source", ["px4", "ardupilot"])
-def test_the_log_of_an_autopilot_becomes_a_corrected_aircraft(tmp_path, source):
-    pytest.importorskip("pyulog" if source == "px4" else "pymavlink")
+@pytest.mark.parametrize("source", sorted(WRITERS))
+def test_a_stranger_s_log_becomes_a_corrected_aircraft(tmp_path, source):
+    if source != "csv":
+        pytest.importorskip("pyulog" if source == "px4" else "pymavlink")
     page = (HOWTO / f"from-{source}.md").read_text(encoding="utf-8")
-    if source == "px4":
-        uav.write_px4(tmp_path / "flight.ulg", uav.fly())
-    else:
-        uav.write_ardupilot(tmp_path / "flight.bin", uav.fly())
-    first, *others = commands_of(page)
-    assert len(others) == 5
+    name, write = WRITERS[source]
+    write(tmp_path / name, uav.fly())
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    command(tmp_path, first)
-    file = tmp_path / "map.toml"
-    file.write_text(completed(file.read_text(encoding="utf-8"), page), encoding="utf-8")
-    for line in others:
-        command(tmp_path, line)
+    other_than_shown = []
+    for number, step in enumerate(steps(page)):
+        difference = differs(step.shown, command(tmp_path, step.words))
+        if difference:
+            other_than_shown.append(f"{step.title}: {difference}")
+        if number == 0 and source != "csv":
+            file = tmp_path / "map.toml"
+            file.write_text(completed(file.read_text(encoding="utf-8"), page), encoding="utf-8")
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     answer = json.loads((tmp_path / "traced" / "trace.json").read_text(encoding="utf-8"))
     (late,) = [e for e in answer["effects"] if e["name"] == "elevator_delay"]
     assert late["parameters"]["delay_s"]["value"] == pytest.approx(uav.DELAY_S, rel=0.05)
     corrected = aircraft.load(tmp_path / answer["updated_aircraft"])
-    for name, quantity in corrected.file.derivatives.items():
-        assert abs(quantity.value - uav.DERIVATIVES[name]) < 2.0 * quantity.std, name
+    for derivative, quantity in corrected.file.derivatives.items():
+        assert abs(quantity.value - uav.DERIVATIVES[derivative]) < 2.0 * quantity.std, derivative
     (element,) = corrected.file.dynamics.surface
     assert (element.kind, element.value) == ("delay", late["parameters"]["delay_s"]["value"])
     assert list((tmp_path / "first" / "logs").glob("*.parquet"))
+    assert not other_than_shown
     assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 180.0
 
 
-def test_a_page_has_at_most_six_commands_and_its_edits_complete_a_guess():
+@pytest.mark.parametrize("source", sorted(WRITERS))
+def test_a_page_has_six_commands(source):
+    page = (HOWTO / f"from-{source}.md").read_text(encoding="utf-8")
+    words = [step.words[:2] for step in steps(page)]
+    assert [one[0] for one in words] == ["new", "import", "new", "trace", "new", "fly"]
+    assert next(iter(steps(page))).words[2] == WRITERS[source][0]
+
+
+def test_the_first_commands_of_the_csv_page_print_what_it_shows(tmp_path):
+    """Mapping, import without an edit, and the aircraft; the long test runs the others."""
+    page = (HOWTO / "from-csv.md").read_text(encoding="utf-8")
+    uav.write_csv(tmp_path / "flight.csv", uav.fly())
+    for step in list(steps(page))[:3]:
+        assert not differs(step.shown, command(tmp_path, step.words)), step.title
+    mapping = (tmp_path / "map.toml").read_text(encoding="utf-8").splitlines()
+    shown = page.split("```toml\n")[1].split("```")[0].splitlines()
+    assert [line for line in shown if not line.endswith("; ...") and line not in mapping] == []
+    assert all(any(m.startswith(line[:-5]) for m in mapping) for line in shown if line.endswith("; ..."))
+
+
+def test_the_edits_of_a_page_complete_a_guess():
     page = (HOWTO / "from-ardupilot.md").read_text(encoding="utf-8")
-    assert len(commands_of(page)) == 6
     guess = 'rate_hz = 100\n# [channels.height_m] # in doubt\n# column = "BARO.Alt"\n# reference_m = 0.0\n\n# an end\n'
     text = completed(guess, page)
     assert '\n[channels.height_m] # in doubt\ncolumn = "BARO.Alt"\nreference_m = 0.0\n\n# an end' in text
