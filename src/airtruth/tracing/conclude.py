@@ -40,7 +40,7 @@ from airtruth.tracing.declared_model import (
     remaining_evidence,
     with_axial_force,
 )
-from airtruth.tracing.friction import LATE_VANE, imitated_lag_s
+from airtruth.tracing.friction import imitated_lag_s, is_late_vane
 from airtruth.tracing.increment_table import in_physical_terms, increment_rows, least_certain
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, derivative_likelihood
 from airtruth.tracing.inference.homogeneity import Homogeneity, homogeneity
@@ -164,7 +164,7 @@ def _reserved(
     agreement: Homogeneity,
 ) -> tuple[str, ...]:
     """Each reason against relying on the effects, and how the records differ, in words."""
-    late = any(e.key in LATE_VANE for e in effects)
+    late = any(is_late_vane(e.key) for e in effects)
     lag_s = imitated_lag_s(problem, last.reported) if late else 0.0
     differ = differences(agreement, [r.signals.run_id for r in problem.records], bool(effects))
     return (*reservations(effects, sets, declared.p_value, last.p_value_of(FRICTION), lag_s), *differ)
@@ -229,7 +229,7 @@ def _effect(
         other_variants=tuple(
             sorted(c.score.effect.variant for c in others if c.score.effect.name == effect.name)
         ),
-        channel=effect.variant if effect.name == "sensor_delay" else None,
+        channel=effect.variant_channel,
         about_alpha_rad=final.hypothesis.trim_alpha_rad + shift if is_curvature(effect) else None,
     )
     if isinstance(effect, Increment):

@@ -59,8 +59,9 @@ def _without(model: StageModel, effect: AcceptedEffect, case: Case) -> StageMode
         return replace(model, common=common)
     cause = next(c for c in case.declared.causes if c.key == effect.name)
     (estimate,) = effect.parameters.values()
-    size = EFFECTS[cause.key].parameters[0].size(estimate.value)
-    common[Common.derivatives] -= size_in_derivatives(cause.key, size) * cause.direction
+    own = EFFECTS[cause.key]
+    size = own.parameters[0].size(estimate.value)
+    common[Common.derivatives] -= size_in_derivatives(own, size) * cause.direction
     return replace(model, common=common)
 
 

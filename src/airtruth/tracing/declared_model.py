@@ -32,7 +32,6 @@ from airtruth.tracing.selection.explanation import DERIVATIVES, CauseSet, size_o
 from airtruth.tracing.selection.ranking import TIE
 from airtruth.tracing.selection.release import (
     CONTRADICTED,
-    DIVISORS,
     DeclaredCauses,
     Release,
     size_in_derivatives,
@@ -134,13 +133,13 @@ def _apparent_shift(last: SearchRound, covariance: Array, causes: DeclaredCauses
     slopes = np.zeros((len(PARAMETERS), len(covariance)))
     slopes[:, Common.derivatives] = np.eye(len(PARAMETERS))
     directions = {c.key: c.direction for c in causes.causes}
-    for key in (e.key for e in hypothesis.effects if e.key in directions):
-        number = hypothesis.span(key).start
+    for effect in (e for e in hypothesis.effects if e.key in directions):
+        number = hypothesis.span(effect.key).start
         in_filter = float(point.sizes[number])
-        size = size_in_derivatives(key, in_filter)
-        slope = (1.0 + in_filter) ** -2 if key in DIVISORS else 1.0
-        shift += size * directions[key]
-        slopes[:, size_index(number)] = slope * directions[key]
+        size = size_in_derivatives(effect, in_filter)
+        slope = (1.0 + in_filter) ** -2 if effect.divides else 1.0
+        shift += size * directions[effect.key]
+        slopes[:, size_index(number)] = slope * directions[effect.key]
     return shift, np.sqrt(np.diag(slopes @ covariance @ slopes.T))
 
 
@@ -295,7 +294,8 @@ def _estimates(
             for i, name in enumerate(PARAMETERS)
             if name in best.wrong
         }
-    first = EFFECTS[key].parameters[0]
+    effect = EFFECTS[key]
+    first = effect.parameters[0]
     if key in [e.key for e in last.null.hypothesis.effects]:
         number = last.null.hypothesis.span(key).start
         std_size = float(np.sqrt(max(covariance[size_index(number), size_index(number)], 0.0)))
@@ -303,9 +303,9 @@ def _estimates(
     at = best.causes.index(key)
     size, std_size = best.sizes[at], best.size_std[at]
     low, value, high = (
-        first.value(size_in_filter(key, s)) for s in (size - Z95 * std_size, size, size + Z95 * std_size)
+        first.value(size_in_filter(effect, s)) for s in (size - Z95 * std_size, size, size + Z95 * std_size)
     )
-    slope = value**2 if key in DIVISORS else 1.0
+    slope = value**2 if effect.divides else 1.0
     return {first.name: ParameterEstimate(value, std_size * slope, (low, high))}
 
 

@@ -6,15 +6,20 @@ from typing import Final
 
 import numpy as np
 
+from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.parameters import PerRecord
+from airtruth.tracing.model.settings import VANE
 from airtruth.tracing.selection.omnibus import views
 from airtruth.units import DEG
 
-LATE_VANE: Final = frozenset({"vane_lag", "sensor_delay:alpha_rad"})
-"""Effects that make the vane late, by a time [s]."""
 PLAUSIBLE_RAD: Final = 0.1 * DEG
 """Half width of the play of a plausible vane with friction [rad] (judgement: a dry bearing or a potentiometer)."""
+
+
+def is_late_vane(key: str) -> bool:
+    """Whether an effect of the library makes the vane late, by a time [s]."""
+    return key in EFFECTS and EFFECTS[key].late_signal == VANE
 
 
 def imitated_lag_s(problem: TraceProblem, fitted: PosteriorFit) -> float:
@@ -38,4 +43,4 @@ def imitated_lag_s(problem: TraceProblem, fitted: PosteriorFit) -> float:
     return float(PLAUSIBLE_RAD * np.abs(rate_rad_s).mean() / np.square(rate_rad_s).mean())
 
 
-__all__ = ["LATE_VANE", "PLAUSIBLE_RAD", "imitated_lag_s"]
+__all__ = ["PLAUSIBLE_RAD", "imitated_lag_s", "is_late_vane"]

@@ -31,7 +31,6 @@ from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.parameters import Common, Parameters, PerRecord, size_index
 from airtruth.tracing.selection.direction import eliminated, extended_by
 from airtruth.tracing.selection.explanation import REFERENCE
-from airtruth.tracing.selection.late import late_signal
 from airtruth.tracing.selection.score_test import directions, perceptible_step
 
 Array = NDArray[np.float64]
@@ -209,9 +208,7 @@ def minima(slope: Array, information: Array, chosen: NDArray[np.int64]) -> tuple
 
 def _may_join(a: Effect, b: Effect) -> bool:
     """Whether two effects may be in one set: not two variants of one, but delays of two channels."""
-    return a.name != b.name or (
-        late_signal(a) != late_signal(b) and "" not in (late_signal(a), late_signal(b))
-    )
+    return a.name != b.name or (a.late_signal != b.late_signal and "" not in (a.late_signal, b.late_signal))
 
 
 def _room(effect: Effect) -> tuple[float, float]:
