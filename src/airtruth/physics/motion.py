@@ -143,6 +143,22 @@ class Motion:
         """
         return self.parameters.index(name)
 
+    def at(self, coefficient: str, signal: str) -> int:
+        """Position of the derivative of a coefficient with respect to a signal.
+
+        Raises
+        ------
+        ValueError
+            If the motion lacks the coefficient or the signal.
+
+        Examples
+        --------
+        >>> LONGITUDINAL.at("Cm", "elevator")
+        5
+        """
+        of = [(c.name, s.name) for c in self.coefficients for s in self.signals]
+        return of.index((coefficient, signal))
+
     def row(self, coefficient: str) -> slice:
         """Positions of the derivatives of a coefficient.
 

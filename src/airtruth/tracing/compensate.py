@@ -41,6 +41,7 @@ from airtruth.physics.terms import (
     declared_total,
 )
 from airtruth.tracing.increment_response import increments, response
+from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.model.records import head_samples
 from airtruth.tracing.model.surface import through
 from airtruth.tracing.result import TraceResult
@@ -127,7 +128,7 @@ def compensation_of(result: TraceResult) -> Compensation:
         treatments.append(treatment_of(effect.key, change))
         total = total + change
     aero, states = _measurable(total)
-    increment = fit.point.common[: len(short_period.PARAMETERS)]
+    increment = fit.point.common[Common.derivatives]
     records = result.case.fitted.records
     return Compensation(
         conditions=tuple(

@@ -14,6 +14,7 @@ from scipy.stats import chi2
 from airtruth.aircraft.dynamics import declared_dynamics
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.inference.assess import Assessment, noise_floor
 from airtruth.tracing.inference.cross_validate import LeftOut, leave_one_out, one_by_the_other
 from airtruth.tracing.inference.feedback import responds_to_motion
@@ -264,7 +265,9 @@ def declared_part(problem: TraceProblem, effect: Effect) -> float:
         if term.signal == _ALPHA_DOT:
             like = (term.coefficient, term.signal)
             own = sum(t.amplitude for t in stated if (t.coefficient, t.signal) == like)
-            return own + float(alpha_dot(plant)[("CL", "Cm").index(term.coefficient)])
+            return own + float(
+                alpha_dot(plant)[[c.name for c in LONGITUDINAL.coefficients].index(term.coefficient)]
+            )
     return 0.0
 
 

@@ -204,7 +204,7 @@ def size_of(likelihood: DerivativeLikelihood, cause: Cause) -> tuple[float, floa
 
 def predicted_cost(likelihood: DerivativeLikelihood, causes: Sequence[Cause]) -> float:
     """Negative log-posterior that a fit of these causes reaches, sizes without a prior, to first order in them."""
-    turned = np.eye(6) + likelihood.information @ likelihood.declared
+    turned = np.eye(len(likelihood.vector)) + likelihood.information @ likelihood.declared
     seen = np.linalg.solve(turned, likelihood.vector)
     directions = np.array([c.direction for c in causes])
     told = directions @ np.linalg.solve(turned, likelihood.information) @ directions.T
@@ -249,29 +249,32 @@ def _evidence(
 ) -> _Evidence:
     """One set of physical causes with each set of wrong declarations, see `WRONG_BY`."""
     information, vector, declared = likelihood.information, likelihood.vector, likelihood.declared
+    size, unit = len(vector), np.eye(len(vector))
     own = np.repeat(declared[None], len(subsets), axis=0)
     for i, subset in enumerate(subsets):
         at = list(subset)
         own[i, at, at] += (wrong_by**2 - 1.0) * np.diag(declared)[at]
-    directions = np.array([c.direction for c in chosen]).reshape(len(chosen), len(PARAMETERS))
+    directions = np.array([c.direction for c in chosen]).reshape(len(chosen), size)
     shape = np.array([c.prior.shape for c in chosen])
     sizes = np.tile([c.prior.std for c in chosen], (len(subsets), 1))
     given = np.column_stack([information, vector])
     for _ in range(2):  # the uncertainty of a direction goes with the size
-        about = own + np.einsum("nk,k,ki->ni", sizes**2, shape**2, directions**2)[:, :, None] * np.eye(6)
-        both = np.linalg.solve(np.eye(6) + information @ about, np.broadcast_to(given, (len(subsets), 6, 7)))
-        told, seen = both[..., :6], both[..., 6]
+        about = own + np.einsum("nk,k,ki->ni", sizes**2, shape**2, directions**2)[:, :, None] * unit
+        both = np.linalg.solve(
+            unit + information @ about, np.broadcast_to(given, (len(subsets), *given.shape))
+        )
+        told, seen = both[..., :size], both[..., size]
         size_information = np.einsum("ki,nij,lj->nkl", directions, told, directions)
         size_covariance = np.linalg.pinv(size_information, hermitian=True)
         sizes = np.einsum("nkl,li,ni->nk", size_covariance, directions, seen)
     std = np.sqrt(np.maximum(np.diagonal(size_covariance, axis1=1, axis2=2), 0.0))
     prior = np.einsum("k,ki,kj->ij", np.array([c.prior.std**2 for c in chosen]), directions, directions)
     covariance = about + prior
-    turned = np.eye(6) + covariance @ information
+    turned = unit + covariance @ information
     gained = 0.5 * np.einsum(
         "i,ni->n", vector, np.linalg.solve(turned, (covariance @ vector)[..., None])[..., 0]
     )
-    least = np.linalg.slogdet(np.eye(6) + declared @ information)[1]
+    least = np.linalg.slogdet(unit + declared @ information)[1]
     occam = 0.5 * (np.linalg.slogdet(turned)[1] - least)
     in_range = _in_range(chosen, sizes, std)
     wrong = np.array([len(subset) for subset in subsets])

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from airtruth.effects.increment import Increment
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.readings import reading_increments
-from airtruth.physics.short_period import PARAMETERS
 from airtruth.physics.terms import READINGS
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
@@ -56,15 +56,9 @@ _LEAST_DECLARED: Final = 1e-3
 """Least declared derivative with which an increment is compared [-] (judgement: one that is declared as zero)."""
 _FLOWN: Final = (0.02, 0.98)
 """Quantiles of the flown signal between which the swing counts [-] (judgement)."""
-_DERIVATIVE: Final[Mapping[str, str]] = {
-    "alpha": "alpha",
-    "elevator": "de",
-    "qhat": "q",
-    "alpha_dot_hat": "q",
-    "qbar": "alpha",
-}
-"""Derivative with which an increment over a signal is compared; a moment by alpha' with the damping, one by the dynamic
-pressure with what the angle of attack does in the same records."""
+_DERIVATIVE: Final[Mapping[str, str]] = {"alpha_dot_hat": "qhat", "qbar": "alpha"}
+"""Signal of the derivative with which an increment over another signal is compared: a moment by alpha' with the damping, one
+by the dynamic pressure with what the angle of attack does in the same records."""
 
 
 @dataclass(frozen=True)
@@ -225,7 +219,8 @@ def relative_swing(problem: TraceProblem, own: PosteriorFit, effect: Increment) 
     if shape.of_reading:
         return _share_of_channel(problem.records, own, effect)
     bends, _ = fitted_bends(own, effect, own.covariance)
-    index = PARAMETERS.index(f"{shape.acts_on}{_DERIVATIVE[shape.factor or shape.signal]}")
+    by = shape.factor or shape.signal
+    index = LONGITUDINAL.at(shape.acts_on, _DERIVATIVE.get(by, by))
     declared = max(abs(float(problem.declared_derivatives[index])), _LEAST_DECLARED)
     if not shape.cells:
         return abs(float(bends[0])) / declared
