@@ -43,7 +43,7 @@ class Motion:
     coefficients : rows of the derivatives.
     signals : columns of the derivatives.
     implicit : coefficient and state whose rate drives it, the term that makes the equations implicit.
-    gusts : gust components that enter the motion.
+    gusts : gust components that enter the motion; the filter estimates the first.
     declared : quantities of aircraft.toml that scale or shift the coefficients.
     modes : modal parameters of the linear model.
     required : columns without which no analysis is possible; air density or altitude is needed beside them.
@@ -214,7 +214,7 @@ LONGITUDINAL: Final = Motion(
         Signal("elevator", "de", "elevator_rad"),
     ),
     implicit=("CL", "alpha"),
-    gusts=("u", "w"),
+    gusts=("w", "u"),
     declared=(
         Declared("mass", 1.0, divides=("CL",)),
         Declared("inertia", 1.0, divides=("Cm",)),

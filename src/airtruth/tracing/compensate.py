@@ -41,7 +41,6 @@ from airtruth.physics.terms import (
     declared_total,
 )
 from airtruth.tracing.increment_response import increments, response
-from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.model.records import head_samples
 from airtruth.tracing.model.surface import through
 from airtruth.tracing.result import TraceResult
@@ -128,7 +127,7 @@ def compensation_of(result: TraceResult) -> Compensation:
         treatments.append(treatment_of(effect.key, change))
         total = total + change
     aero, states = _measurable(total)
-    increment = fit.point.common[Common.derivatives]
+    increment = fit.point.common[fit.point.of.common.derivatives]
     records = result.case.fitted.records
     return Compensation(
         conditions=tuple(

@@ -48,7 +48,6 @@ from airtruth.tracing.inference.hypothesis import is_curvature
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.inference.robust import robust_covariance
 from airtruth.tracing.intervals import at_measured_alpha, estimates, widened_by_profile, widened_by_rejected
-from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.notes import notes
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.record_differences import CERTAIN, DIFFERENCES, differences
@@ -211,7 +210,7 @@ def _effect(
         for c in own.candidates
         if c is not best and c.score.effect.name != effect.name and c.gain <= best.gain
     ]
-    own_covariance = covariance[Common.size :, Common.size :][span, span]
+    own_covariance = covariance[final.layout.sizes, final.layout.sizes][span, span]
     stated = estimates(effect, final.point.sizes[span], own_covariance)
     if own.profile is not None:
         stated = widened_by_profile(effect, stated, own.profile)
@@ -316,11 +315,13 @@ def _derivatives(case: Case, rounds: Sequence[SearchRound], covariance: Array) -
     def named(values: Array) -> dict[str, float]:
         return dict(zip(PARAMETERS, values.tolist(), strict=True))
 
+    last = rounds[-1].null
+    rows = last.layout.of.common.derivatives
     return Derivatives(
         declared=named(declared),
-        before=named(declared + before_fit(rounds).point.common[Common.derivatives]),
-        after=named(declared + rounds[-1].null.point.common[Common.derivatives]),
-        after_std=named(np.sqrt(np.diag(covariance)[Common.derivatives])),
+        before=named(declared + before_fit(rounds).point.common[rows]),
+        after=named(declared + last.point.common[rows]),
+        after_std=named(np.sqrt(np.diag(covariance)[rows])),
     )
 
 

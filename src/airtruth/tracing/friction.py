@@ -8,7 +8,6 @@ import numpy as np
 
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.model.parameters import PerRecord
 from airtruth.tracing.model.settings import VANE
 from airtruth.tracing.selection.omnibus import views
 from airtruth.units import DEG
@@ -36,7 +35,7 @@ def imitated_lag_s(problem: TraceProblem, fitted: PosteriorFit) -> float:
     problem, fitted : records, and a fit of them; the motion is the one that the filter predicts.
     """
     airspeed_m_s = np.array([r.signals.airspeed_m_s.mean() for r in problem.records])
-    gust_rad = np.exp(fitted.point.per_record[:, PerRecord.log_gust]) / airspeed_m_s
+    gust_rad = np.exp(fitted.point.per_record[:, problem.layout.per_record.log_gust]) / airspeed_m_s
     if gust_rad.min() <= PLAUSIBLE_RAD:
         return 0.0
     rate_rad_s = np.concatenate([np.diff(v.alpha_rad) / v.dt_s for v in views(fitted, problem)])

@@ -24,7 +24,7 @@ from airtruth.tracing.axial_force import AxialForce
 from airtruth.tracing.increment_table import increment_table
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import robust_covariance
-from airtruth.tracing.model.parameters import Common
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.response import moved_past_sensors_m
 from airtruth.tracing.model.settings import VANE
 from airtruth.tracing.prepare import Case
@@ -126,7 +126,9 @@ def write_update(
     plants = [record.plant for record in case.fitted.records]
     shift = case.fitted.alpha_shift_rad
     change = from_zero_alpha(change, shift)
-    increments = dict(zip(PARAMETERS, fit.point.common[Common.derivatives].tolist(), strict=True))
+    increments = dict(
+        zip(PARAMETERS, fit.point.common[SHORT_PERIOD.common.derivatives].tolist(), strict=True)
+    )
     release = rounds[-1].release
     causes = release.sets[0].effects if released and release is not None else ()
     names = dict.fromkeys([*(e.key for e in fit.hypothesis.effects), *(e.key for e in along), *causes])
@@ -171,7 +173,7 @@ def _write_flying(aircraft: Aircraft, at: TrimPoint, change: Change, folder: Pat
 
 def _with_std(aircraft: Aircraft, case: Case, fit: PosteriorFit) -> Aircraft:
     """The aircraft with the standard deviations of the refitted derivatives, which contain the declared ones."""
-    std = np.sqrt(np.diag(robust_covariance(case.fitted, fit))[Common.derivatives])
+    std = np.sqrt(np.diag(robust_covariance(case.fitted, fit))[SHORT_PERIOD.common.derivatives])
     refitted = {
         name: aircraft.file.derivatives[name].model_copy(update={"std": float(value)})
         for name, value in zip(PARAMETERS, std, strict=True)

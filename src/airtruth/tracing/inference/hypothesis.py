@@ -13,7 +13,6 @@ from airtruth.effects.effect import Effect, Parameter
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import AeroTerm, Change
 from airtruth.tracing.model.compile import CompiledChange, compile_change
-from airtruth.tracing.model.parameters import size_index
 
 Array = NDArray[np.float64]
 
@@ -109,9 +108,9 @@ class Hypothesis:
 
     @cached_property
     def fixed(self) -> tuple[int, ...]:
-        """Indices among common parameters and sizes of the sizes whose range is a single value."""
+        """Numbers of the sizes whose range is a single value."""
         ends = [self.effects[i].parameters[j].ends for i, j in self.parameters]
-        return tuple(size_index(k) for k, (low, high) in enumerate(ends) if low == high)
+        return tuple(k for k, (low, high) in enumerate(ends) if low == high)
 
     @cached_property
     def size_precision(self) -> Array:

@@ -19,7 +19,7 @@ from airtruth.tracing.model.kernel_input import (
     SensorArrays,
 )
 from airtruth.tracing.model.linearise import linearise
-from airtruth.tracing.model.parameters import CORE, OUTPUTS, Common, state_layout
+from airtruth.tracing.model.parameters import CORE, OUTPUTS, SHORT_PERIOD, state_layout
 from airtruth.tracing.model.steady import without_update
 from airtruth.tracing.model.tangent import matrices_along
 
@@ -29,7 +29,7 @@ _AT: Final = AirPoint(*[1.0] * len(AirPoint._fields))
 
 def _model() -> FilterModel:
     axis, ones, none = np.array([0.0, 1.0]), np.ones(OUTPUTS), np.empty(0)
-    whole, increments = np.empty(0, dtype=np.int64), np.zeros(Common.derivatives.stop)
+    whole, increments = np.empty(0, dtype=np.int64), np.zeros(SHORT_PERIOD.common.derivatives.stop)
     return FilterModel(
         AircraftArrays._make(
             [*[1.0] * 12, np.zeros((2, 3)), increments, axis, axis, axis, np.zeros((2, 2, 2, 3))]

@@ -203,7 +203,7 @@ def tangent_of(given: FilterInputs, settings: Settings, common: Array, per_recor
     Parameters
     ----------
     given : what the record gives to the filter.
-    common, per_record : see `Common` and `PerRecord`.
+    common, per_record : see `CommonEntries` and `RecordEntries`.
     """
     kernel = kernel_input(given, settings, common, per_record)
     # the differences move these

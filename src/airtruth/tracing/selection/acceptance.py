@@ -20,7 +20,7 @@ from airtruth.tracing.inference.cross_validate import LeftOut, leave_one_out, on
 from airtruth.tracing.inference.feedback import responds_to_motion
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import MEMORY_S, inflation, long_run
-from airtruth.tracing.model.parameters import OUTPUTS, Common, PerRecord, size_index
+from airtruth.tracing.model.parameters import OUTPUTS
 from airtruth.tracing.model.plant import alpha_dot
 from airtruth.tracing.selection.score_test import Score
 
@@ -146,7 +146,7 @@ def assess_candidate(
     """
     size, std = _size(s, own)
     few = len(problem.records) < _SEVERAL
-    excess = float(inflation(problem, own, unbiased=few)[size_index(_first_size(s, own))])
+    excess = float(inflation(problem, own, unbiased=few)[own.layout.size(_first_size(s, own))])
     left_out = tested_on_left_out(problem, own, reference, gain)
     reasons = [
         *_fit_reasons(s, own, gain, least, excess),
@@ -334,7 +334,7 @@ def declared_probability(problem: TraceProblem, own: PosteriorFit) -> float:
     Source: G. E. P. Box, J. R. Statist. Soc. A 143 (1980), the prior predictive check. The mode is nearer to the
     prior than the maximum of the likelihood, so the check is conservative.
     """
-    off = own.point.common[Common.derivatives]
+    off = own.point.common[own.point.of.common.derivatives]
     tight = [i for i in range(off.size) if i not in own.hypothesis.unconstrained]
     covariance = problem.declared_covariance[np.ix_(tight, tight)]
     return float(chi2.sf(float(off[tight] @ np.linalg.solve(covariance, off[tight])), len(tight)))
@@ -346,8 +346,8 @@ def own_probability(problem: TraceProblem, own: PosteriorFit) -> float:
     for (middle, precision), local in zip(
         problem.priors(own.hypothesis).per_record, own.point.per_record, strict=True
     ):
-        off = (local - middle)[PerRecord.offsets]
-        total += float(off**2 @ np.diag(precision)[PerRecord.offsets])
+        off = (local - middle)[own.point.of.per_record.offsets]
+        total += float(off**2 @ np.diag(precision)[own.point.of.per_record.offsets])
         count += off.size
     return float(chi2.sf(total, count))
 

@@ -105,9 +105,8 @@ def _most_probable(
         return t
 
     further = problem.each(extended, range(len(problem.records)))
-    k = len(null.point.sizes)
     sensitivities = [
-        inserted(base, k, t, np.zeros((len(t), 3, 3)))
+        inserted(base, null.layout.sizes.stop, t, np.zeros((len(t), 3, 3)))
         for base, t in zip(null.sensitivities, further, strict=True)
     ]
     gradient, information = projected(null, problem, sensitivities, NO_WHITENER, len(stds))

@@ -17,7 +17,6 @@ from airtruth.physics.terms import READINGS
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import inflation, robust_covariance
-from airtruth.tracing.model.parameters import size_index
 from airtruth.tracing.model.records import FINE, TraceRecord
 from airtruth.tracing.selection.acceptance import (
     IMMATERIAL,
@@ -147,7 +146,7 @@ def fitted_bends(own: PosteriorFit, effect: Increment, covariance: Array) -> tup
     own : a fit with the increment; covariance : of its common parameters and sizes.
     """
     first = own.hypothesis.span(effect.key).start
-    at = slice(size_index(first), size_index(first) + effect.bends)
+    at = slice(own.layout.size(first), own.layout.size(first) + effect.bends)
     return own.point.sizes[first : first + effect.bends], covariance[at, at]
 
 
@@ -169,7 +168,7 @@ def assessed(problem: TraceProblem, own: FittedIncrement, reference: Reference) 
     """A refitted increment with the tests that it fails."""
     gain = 2.0 * own.log_evidence
     ratios = inflation(problem, own.fit)
-    first = size_index(own.fit.hypothesis.span(own.effect.key).start)
+    first = own.fit.layout.size(own.fit.hypothesis.span(own.effect.key).start)
     excess = float(np.mean(ratios[first : first + own.effect.bends] ** 2))
     left_out = tested_on_left_out(problem, own.fit, reference, gain)
     swing = relative_swing(problem, own.fit, own.effect)

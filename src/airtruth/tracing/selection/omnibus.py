@@ -107,9 +107,8 @@ def anomalies(null: PosteriorFit, problem: TraceProblem, whitener: Whitener) -> 
         return _tangents(null, problem, index, [s for series in built[index].values() for s in series])
 
     extra = problem.each(one, range(len(problem.records)))
-    k = len(null.point.sizes)
     extended = [
-        inserted(base, k, t, np.zeros((len(t), 3, 3)))
+        inserted(base, null.layout.sizes.stop, t, np.zeros((len(t), 3, 3)))
         for base, t in zip(null.sensitivities, extra, strict=True)
     ]
     gradient, information = projected(null, problem, extended, whitener, len(extra[0]))

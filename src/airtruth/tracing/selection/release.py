@@ -19,7 +19,6 @@ from airtruth.tracing.inference.derivative_likelihood import (
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import converged_fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.selection.explanation import (
     WRONG_BY,
     Cause,
@@ -183,7 +182,9 @@ def _as_effects(
         hypothesis = hypothesis.plus(effects[key])
         low, high = effects[key].parameters[0].reach
         size = min(max(size_in_filter(effects[key], causes[key].most_probable(told, std)), low), high)
-        away[Common.derivatives] -= size_in_derivatives(effects[key], size) * causes[key].direction
+        away[problem.layout.common.derivatives] -= (
+            size_in_derivatives(effects[key], size) * causes[key].direction
+        )
         sizes.append(size)
     first = np.array(sizes)
     own = from_declared(problem, null, hypothesis, first, rival)

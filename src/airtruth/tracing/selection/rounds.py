@@ -17,7 +17,7 @@ from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.profile import Profile, best_location, location_index
 from airtruth.tracing.inference.whitening import Whitener, autoregression
-from airtruth.tracing.model.parameters import Common, Parameters
+from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection import score_test
 from airtruth.tracing.selection.absorbed import refit_absorbed
 from airtruth.tracing.selection.acceptance import SUPERSEDED, SURPASSED, UNSUPPORTED, Candidate, has_converged
@@ -310,11 +310,9 @@ def _refit_whitened(problem: TraceProblem, null: PosteriorFit, whitener: Whitene
         near=null,
     )
     if again is not None:
-        std = np.sqrt(np.diag(null.covariance)[Common.derivatives])
-        if (
-            np.abs(again.point.common[Common.derivatives] - null.point.common[Common.derivatives])
-            < _FAR * std
-        ).all():
+        rows = null.layout.of.common.derivatives
+        std = np.sqrt(np.diag(null.covariance)[rows])
+        if (np.abs(again.point.common[rows] - null.point.common[rows]) < _FAR * std).all():
             return again
     return (
         fit(problem, null.hypothesis, null.point, whitener, iterations=0, free_levels=False, near=null)
