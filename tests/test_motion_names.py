@@ -38,7 +38,7 @@ CAPS: dict[str, int] = {
     "starting": 15,
     "tracing": 164,
     "tracing/inference": 10,
-    "tracing/model": 367,
+    "tracing/model": 360,
     "tracing/presentation": 44,
     "tracing/selection": 91,
 }

@@ -22,7 +22,6 @@ from airtruth.tracing.model.linearise import process_intensity
 from airtruth.tracing.model.parameters import (
     CORE,
     GUST_1,
-    GUST_2,
     LEAD,
     OUTPUTS,
     Parameters,
@@ -346,7 +345,7 @@ def _gust_records(record: TraceRecord, linear: _LinearModel, seed: int) -> Array
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     rng = np.random.default_rng([seed, samples])
     x = np.zeros((n, _DRAWS))
-    x[[GUST_1, GUST_2]] = np.linalg.cholesky(GUST_COVARIANCE) @ rng.standard_normal((2, _DRAWS))
+    x[GUST_1 : GUST_1 + 2] = np.linalg.cholesky(GUST_COVARIANCE) @ rng.standard_normal((2, _DRAWS))
     x[LEAD:CORE] = x[GUST_1]
     if linear.noise >= 0:
         x[linear.noise :] = rng.standard_normal((OUTPUTS, _DRAWS))

@@ -58,7 +58,7 @@ def _filter() -> None:
 
 def _tangent() -> None:
     given = _given()
-    matrices_along(given, path_of(2, CORE), 1.0)
+    matrices_along(given, path_of(2, CORE, OUTPUTS), 1.0)
 
 
 KERNELS: Final[tuple[tuple[str, Callable[[], None]], ...]] = (

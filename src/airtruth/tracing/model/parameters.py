@@ -287,18 +287,16 @@ class Layout:
         return self.of.common.size + self.count + self.of.per_record.size
 
 
-ALPHA, Q, GUST_1, GUST_2, LATE_GUST = range(5)
-"""States of the motion over ground (alpha [rad], q [rad/s]), of Dryden's filter [-], and the gust at the tail [-]."""
+GUST_1: Final = len(LONGITUDINAL.states)
+"""First of the two states of Dryden's filter, behind those of the short period; the gust at the tail follows [-]."""
 LEAD_COUNT: Final = 3
 """Number of low-passed copies of the first gust state, which give the gusts their rolloff [-]."""
-LEAD: Final = LATE_GUST + 1
+LEAD: Final = GUST_1 + 3
 """First of these states."""
 CORE: Final = LEAD + LEAD_COUNT
 """States of the motion and the gusts; those of effects, of late sensors and of correlated noise follow [-]."""
-OUTPUTS: Final = 3
-"""Outputs of the filter, see `airtruth.tracing.model.compile.CHANNELS` [-]."""
-AZ: Final = 2
-"""Number of az among them."""
+OUTPUTS: Final = len(LONGITUDINAL.outputs)
+"""Outputs of the short period, see `airtruth.tracing.model.compile.CHANNELS` [-]."""
 DELAY_ORDER: Final = 8
 """States of a delay [-]. Judgement: two states bend the highest frequencies of von Karman gusts (a delay of 60 ms was
 estimated 3 ms long); eight keep the phase to one degree up to 11 rad."""
@@ -324,14 +322,25 @@ class StateLayout(NamedTuple):
     size: int
 
 
-def effect_states(kinds: list[str]) -> tuple[Ints, int]:
+def lead_of(states: int) -> int:
+    """First low-passed copy of a gust state, behind the states of the motion, of the gust's filter and the late gust."""
+    return states + LEAD - GUST_1
+
+
+def core_of(states: int) -> int:
+    """Number of states of a motion and its gusts."""
+    return states + CORE - GUST_1
+
+
+def effect_states(kinds: list[str], states: int = GUST_1) -> tuple[Ints, int]:
     """First state of each effect with states, and the number of states up to the last.
 
     Parameters
     ----------
     kinds : kind of each `airtruth.physics.terms.StateTerm`: a mode has two states, others have one.
+    states : number of states of the motion.
     """
-    first, at = [], CORE
+    first, at = [], core_of(states)
     for kind in kinds:
         first.append(at)
         at += 2 if kind == "mode" else 1
@@ -347,9 +356,10 @@ def state_layout(effect: Ints, motion: int, lags: Array, delays: Array, slow: bo
     lags, delays : (outputs,) of the sensors [s]; 0 for none.
     slow : whether the sensors have correlated noise.
     """
-    lag, delay = np.full(OUTPUTS, -1, dtype=np.int64), np.full(OUTPUTS, -1, dtype=np.int64)
+    outputs = len(lags)
+    lag, delay = np.full(outputs, -1, dtype=np.int64), np.full(outputs, -1, dtype=np.int64)
     at = motion
-    for i in range(OUTPUTS):
+    for i in range(outputs):
         if lags[i] > 0.0:
             lag[i] = at
             at += 1
@@ -357,18 +367,14 @@ def state_layout(effect: Ints, motion: int, lags: Array, delays: Array, slow: bo
             delay[i] = at
             at += DELAY_ORDER
     noise = at if slow else -1
-    return StateLayout(motion, effect, lag, delay, noise, at + (OUTPUTS if slow else 0))
+    return StateLayout(motion, effect, lag, delay, noise, at + (outputs if slow else 0))
 
 
 __all__ = [
-    "ALPHA",
-    "AZ",
     "COLOUR_TIME_S",
     "CORE",
     "DELAY_ORDER",
     "GUST_1",
-    "GUST_2",
-    "LATE_GUST",
     "LEAD",
     "LEAD_COUNT",
     "OUTPUTS",
@@ -379,9 +385,10 @@ __all__ = [
     "Layout",
     "ParameterLayout",
     "Parameters",
-    "Q",
     "RecordEntries",
     "StateLayout",
+    "core_of",
     "effect_states",
+    "lead_of",
     "state_layout",
 ]
