@@ -89,7 +89,7 @@ def write_update(
     rounds: Sequence[SearchRound],
     aircraft: Aircraft,
     out: Path,
-    contradicted: bool = False,
+    refit: bool = False,
     axial: AxialForce | None = None,
 ) -> str | None:
     """Write the aircraft with the accepted effects and the refitted derivatives to OUT/aircraft/NAME.
@@ -100,8 +100,8 @@ def write_update(
 
     Parameters
     ----------
-    contradicted : whether the records contradict the declared model; its derivatives are then refitted although no
-        effect was accepted.
+    refit : whether the refitted derivatives are written although no effect was accepted: the records contradict the
+        declared ones, or determine them better.
     axial : increments of CX that ax shows; None for none.
 
     Returns
@@ -118,8 +118,7 @@ def write_update(
     along = () if axial is None else axial.increments
     change += Change() if axial is None else axial.change
     released = rounds[-1].null.hypothesis.spread is not None
-    refits = released or contradicted
-    if change == Change() and not refits and aircraft.file.jsbsim is not None:
+    if change == Change() and not (released or refit) and aircraft.file.jsbsim is not None:
         atomic.remove_folder(folder)
         return None
     fit = rounds[-1].reported
@@ -130,7 +129,7 @@ def write_update(
     release = rounds[-1].release
     causes = release.sets[0].effects if released and release is not None else ()
     names = dict.fromkeys([*(e.key for e in fit.hypothesis.effects), *(e.key for e in along), *causes])
-    found = ", ".join(names) or "no effect of the library explains the residual"
+    found = ", ".join(names) or "no effect of the library"
     note = f"Traced from measured records: {found}."
     corrections = None
     refitted = bool(np.isfinite(list(increments.values())).all())
