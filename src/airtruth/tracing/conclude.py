@@ -71,8 +71,7 @@ from airtruth.units import FT, KT
 
 Array = NDArray[np.float64]
 Publish = Callable[[bool], tuple[str | None, Replay | None]]
-"""From whether derivatives are refined to the folder of the updated aircraft and the records flown again; None where there are
-none."""
+"""From whether derivatives are refined to the folder of the updated aircraft and the records flown again, each None for none."""
 
 _TRACEABLE: Final = 4.0
 """Root of the noncentrality from which an effect counts as traceable [-] (judgement: after Holm's correction at 5 %
