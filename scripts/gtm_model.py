@@ -54,7 +54,7 @@ def read(name: str, coefficient: str) -> tuple[list[Array], Array]:
 
 
 def mirrored(points: list[Array], values: Array, factor: float) -> Array:
-    """Values of the left aileron from those of the right one: sideslip changes sign.
+    """Values of the mirror image of a table over alpha, sideslip and deflection: sideslip changes sign.
 
     Parameters
     ----------
@@ -63,6 +63,20 @@ def mirrored(points: list[Array], values: Array, factor: float) -> Array:
     """
     assert np.array_equal(points[1], -points[1][::-1])
     return factor * values[:, ::-1, :]
+
+
+def both_ailerons(points: list[Array], values: Array, factor: float) -> tuple[list[Array], Array]:
+    """The table of right and left aileron at opposite deflections, from that of the right one.
+
+    The left aileron is the mirror image of the right one. The sum is exact between break points as well, because those of
+    deflection and sideslip are symmetric.
+
+    Parameters
+    ----------
+    points, values : as in `mirrored`; factor : as there.
+    """
+    assert np.array_equal(points[2], -points[2][::-1])
+    return points, values + mirrored(points, values, factor)[:, :, ::-1]
 
 
 def both_ways(points: list[Array], values: Array, factor: float) -> tuple[list[Array], Array]:
@@ -80,17 +94,11 @@ def both_ways(points: list[Array], values: Array, factor: float) -> tuple[list[A
 def function(coefficient: str) -> str:
     """The function of the increments of one coefficient, as XML."""
     description, length, factor = _AXES[coefficient]
-    aileron = read("right_aileron", coefficient)
+    aileron = both_ailerons(*read("right_aileron", coefficient), factor)
     rudder = both_ways(*read("rudder", coefficient), factor)
     tables = [
         _table("sideslip", *read("sideslip", coefficient), (_ALPHA, _BETA)),
-        _table("right aileron", *aileron, (_ALPHA, _BETA, "aero/function/aileron-right-deg")),
-        _table(
-            "left aileron",
-            aileron[0],
-            mirrored(*aileron, factor),
-            (_ALPHA, _BETA, "aero/function/aileron-left-deg"),
-        ),
+        _table("ailerons", *aileron, (_ALPHA, _BETA, "aero/function/aileron-deg")),
         _table("rudder", *rudder, (_ALPHA, _BETA, "aero/function/rudder-deg")),
     ]
     if factor < 0.0:
@@ -127,10 +135,10 @@ def _table(name: str, points: list[Array], values: Array, variables: tuple[str, 
     for end, sheet in sheets:
         lines += [f"<tableData{end}>", "        " + "".join(f"{p:13g}" for p in points[1])]
         rows = zip(points[0], sheet, strict=True)
-        lines += [f"{a:8g}" + "".join(f"{v + 0.0:13.7g}" for v in row) for a, row in rows]
+        lines += [f"{a:8g}" + "".join(f" {round(v, 9) + 0.0:12.8g}" for v in row) for a, row in rows]
         lines.append("</tableData>")
     body = "".join(f"                {line}\n" for line in lines)
-    return f'              <!-- {name} -->\n              <table>\n{body}              </table>\n'
+    return f"              <!-- {name} -->\n              <table>\n{body}              </table>\n"
 
 
 def generated(model: str, functions: Mapping[str, str]) -> str:

@@ -27,6 +27,7 @@ from airtruth.simulation.campaign.effects import EFFECTS
 from airtruth.simulation.campaign.plan import Plan, PlannedRun
 from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.linearise import Linearisation, linearise
+from airtruth.simulation.linearise_lateral import LateralLinearisation, lateral_truth, linearise_lateral
 from airtruth.simulation.simulator import STOPS, Condition
 from airtruth.simulation.trim import Trim, trim
 
@@ -93,11 +94,12 @@ class FlownChunk:
 
 @dataclass(frozen=True)
 class Prepared:
-    """A flight condition, trimmed, linearised and loaded."""
+    """A flight condition, trimmed, linearised and loaded; the lateral derivatives only in six axes."""
 
     trim: Trim
     linear: Linearisation
     flight: Flight
+    lateral: LateralLinearisation | None = None
 
 
 class Pilot:
@@ -186,6 +188,7 @@ class Pilot:
                 trim=at_trim,
                 linear=linearise(plan.aircraft, at_trim, plan.dt_s),
                 flight=Flight(plan.aircraft, at_trim, plan.dt_s, self._record_every),
+                lateral=linearise_lateral(plan.aircraft, at_trim, plan.dt_s) if at.six_axes else None,
             )
         self._prepared[at] = prepared
         if len(self._prepared) > _CACHED_CONDITIONS:
@@ -321,6 +324,8 @@ def truth_row(run: PlannedRun, prepared: Prepared | None) -> dict[str, object]:
         "density_kg_m3": at.density_kg_m3 if at else np.nan,
         "dynamic_pressure_pa": 0.5 * at.density_kg_m3 * at.airspeed_m_s**2 if at else np.nan,
     }
+    if run.condition.six_axes:
+        result |= lateral_truth(prepared.lateral if prepared else None, at)
     for name in (
         "eas_m_s",
         "altitude_m",
