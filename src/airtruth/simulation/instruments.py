@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -34,9 +34,9 @@ LOGGED: Final = (
 """Channels of a log in the pitch plane, in the order of its columns."""
 
 
-def logged(truth: Container[str]) -> tuple[str, ...]:
-    """Channels of the log of a flight with these channels: the lateral ones where it has sideslip."""
-    return (*LOGGED, *LATERAL) if "beta_rad" in truth else LOGGED
+def logged(lateral: bool) -> tuple[str, ...]:
+    """Channels of the log of a flight, with the lateral ones where it rolls and yaws."""
+    return (*LOGGED, *LATERAL) if lateral else LOGGED
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def log_channels(
     """
     result = {}
     more = {} if readings is None else readings.increments(truth, dt_s)
-    for name in logged(truth):
+    for name in logged("beta_rad" in truth):
         values = truth[name]
         if name in fitted:
             values = sensors.at_instrument(name, truth, fitted[name]) + more.get(name, 0.0)
