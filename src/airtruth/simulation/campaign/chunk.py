@@ -17,6 +17,7 @@ from airtruth.logs import store
 from airtruth.logs.digest import sha256_of
 from airtruth.logs.flight_log import PRESCRIBED, FlightLog
 from airtruth.logs.names import chunk_file
+from airtruth.physics.motion import LATERAL
 from airtruth.physics.short_period import MODAL, PARAMETERS
 from airtruth.simulation import instruments as measure
 from airtruth.simulation.campaign import streams
@@ -27,6 +28,7 @@ from airtruth.simulation.campaign.plan import Plan, PlannedRun
 from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.lateral_feedback import LateralFeedback
 from airtruth.simulation.linearise import Linearisation, linearise
+from airtruth.simulation.linearise_lateral import LateralLinearisation, linearise_lateral
 from airtruth.simulation.manoeuvres import ELEVATOR, sample
 from airtruth.simulation.simulator import STOPS, Condition
 from airtruth.simulation.trim import Trim, trim
@@ -94,11 +96,12 @@ class FlownChunk:
 
 @dataclass(frozen=True)
 class Prepared:
-    """A flight condition, trimmed, linearised and loaded."""
+    """A flight condition, trimmed, linearised and loaded; lateral: of a trim in six axes."""
 
     trim: Trim
     linear: Linearisation
     flight: Flight
+    lateral: LateralLinearisation | None = None
 
 
 class Pilot:
@@ -188,6 +191,7 @@ class Pilot:
                 trim=at_trim,
                 linear=linearise(plan.aircraft, at_trim, plan.dt_s),
                 flight=Flight(plan.aircraft, at_trim, plan.dt_s, self._record_every),
+                lateral=linearise_lateral(plan.aircraft, at_trim, plan.dt_s) if at.six_axes else None,
             )
         self._prepared[at] = prepared
         if len(self._prepared) > _CACHED_CONDITIONS:
@@ -311,21 +315,25 @@ def truth_row(run: PlannedRun, prepared: Prepared | None) -> dict[str, object]:
 
     Parameters
     ----------
-    run : the planned run.
+    run : the planned run; one in six axes has the lateral derivatives and modes as well.
     prepared : its flight condition; None for a run that failed.
     """
     result: dict[str, object] = {"run_id": run.run_id, "status": "ok" if prepared else "failed"}
-    sides = {"": "plus", "_minus": "minus", "_central": "central"}
-    for suffix, side in sides.items():
-        values = getattr(prepared.linear, side) if prepared else np.full(len(PARAMETERS), np.nan)
-        result |= {name + suffix: float(v) for name, v in zip(PARAMETERS, values, strict=True)}
-    modal = (prepared.linear.wn_rad_s, prepared.linear.zeta) if prepared else (np.nan, np.nan)
+    linear = prepared.linear if prepared else None
+    result |= _derivatives(PARAMETERS, linear)
+    modal = (linear.wn_rad_s, linear.zeta) if linear else (np.nan, np.nan)
     result |= dict(zip(MODAL, modal, strict=True))
+    if run.condition.six_axes:
+        lateral = prepared.lateral if prepared else None
+        result |= _derivatives(LATERAL.parameters, lateral)
+        modes = lateral.modes.tolist() if lateral else [np.nan] * len(LATERAL.modal)
+        result |= dict(zip(LATERAL.modal, modes, strict=True))
     at = prepared.trim if prepared else None
     result |= {
         "trim_alpha_rad": at.alpha_rad if at else np.nan,
         "trim_elevator_rad": at.elevator_rad if at else np.nan,
         "trim_throttle": at.controls.throttle if at else np.nan,
+        **(_lateral_trim(at) if run.condition.six_axes else {}),
         "airspeed_m_s": at.airspeed_m_s if at else np.nan,
         "density_kg_m3": at.density_kg_m3 if at else np.nan,
         "dynamic_pressure_pa": 0.5 * at.density_kg_m3 * at.airspeed_m_s**2 if at else np.nan,
@@ -344,3 +352,25 @@ def truth_row(run: PlannedRun, prepared: Prepared | None) -> dict[str, object]:
     if run.effects is not None:
         result[EFFECTS] = run.effects
     return result
+
+
+def _derivatives(
+    names: Sequence[str], linear: Linearisation | LateralLinearisation | None
+) -> dict[str, object]:
+    """Upward, downward and central differences of each derivative."""
+    sides = {"": "plus", "_minus": "minus", "_central": "central"}
+    missing = np.full(len(names), np.nan)
+    values = {suffix: getattr(linear, side, missing).tolist() for suffix, side in sides.items()}
+    return {name + suffix: v for suffix, own in values.items() for name, v in zip(names, own, strict=True)}
+
+
+def _lateral_trim(at: Trim | None) -> dict[str, object]:
+    """Sideslip, bank and surfaces of a trim in six axes [rad]."""
+    values = (
+        (at.controls.sideslip_rad, at.controls.bank_rad, at.aileron_rad, at.rudder_rad)
+        if at
+        else [np.nan] * 4
+    )
+    return dict(
+        zip(("trim_beta_rad", "trim_phi_rad", "trim_aileron_rad", "trim_rudder_rad"), values, strict=True)
+    )
