@@ -17,32 +17,39 @@ def loop(given: LateralFeedback, bank_rad: float = 0.0) -> tuple[Loop, dict[str,
     return Loop(given, 0.005, bank_rad, [lambda n=name: motion[n] for name in motion]), motion
 
 
-def test_commands_are_the_gains_times_the_readings_and_are_held():
+def test_feedback_is_the_gains_times_the_readings_and_is_held():
     own, motion = loop(feedback(0.01, yaw_damper_gain_s=0.5, roll_damper_gain_s=0.2, bank_gain=0.4), 0.1)
     motion |= {"p": 0.3, "r": -0.2, "phi": 0.25}
-    aileron, rudder = own.at(8)
-    assert rudder == pytest.approx(0.5 * (-0.2 + 0.02), abs=1e-15)
-    assert aileron == pytest.approx(0.4 * (0.25 + 0.03 - 0.1) + 0.2 * (0.3 + 0.01), abs=1e-15)
+    own.sample(8)
+    assert own.rudder_rad == pytest.approx(0.5 * (-0.2 + 0.02), abs=1e-15)
+    assert own.aileron_rad == pytest.approx(0.4 * (0.25 + 0.03 - 0.1) + 0.2 * (0.3 + 0.01), abs=1e-15)
+    before = own.aileron_rad
     motion["p"] = 9.0
-    assert own.at(9) == own.at(11) == (aileron, rudder)
-    assert own.at(12) != (aileron, rudder)
+    own.sample(11)
+    assert own.aileron_rad == before
+    own.sample(12)
+    assert own.aileron_rad != before
 
 
-def test_the_command_of_a_control_is_added_in_the_units_of_its_property():
-    own, motion = loop(feedback(bank_gain=0.4))
+def test_feedback_is_added_to_the_commands_in_the_units_of_their_properties():
+    own, motion = loop(feedback(bank_gain=0.4, yaw_damper_gain_s=0.1))
     sent = []
-    send = own.added("aileron", sent.append, 2.0)
-    motion["phi"] = 0.25
-    own.at(0)
-    send(0.3)
-    assert sent == [pytest.approx(0.3 + 2.0 * 0.1)]
+    aileron, rudder = own.added([sent.append, sent.append], [2.0, -1.0])
+    motion |= {"phi": 0.25, "r": 1.0}
+    own.sample(0)
+    aileron(0.3)
+    rudder(0.3)
+    assert sent == [pytest.approx(0.3 + 2.0 * 0.1), pytest.approx(0.3 - 0.1)]
 
 
 def test_washout_forgets_a_constant_yaw_rate():
     """High pass of a step from zero at the samples: exp(-t/T) of it, with t counted from the sample before the step."""
     own, motion = loop(feedback(yaw_damper_gain_s=1.0, washout_s=2.0))
     motion["r"] = 0.3
-    found = [own.at(step)[1] for step in range(0, 800, 4)]
+    found = []
+    for step in range(0, 800, 4):
+        own.sample(step)
+        found.append(own.rudder_rad)
     t = 0.02 * np.arange(1, len(found) + 1)
     np.testing.assert_allclose(found, 0.3 * np.exp(-t / 2.0), rtol=1e-12)
 
@@ -55,7 +62,8 @@ def test_washout_has_the_gain_of_its_high_pass():
     found = []
     for k, time in enumerate(t):
         motion["r"] = np.sin(w * time)
-        found.append(own.at(4 * k)[1])
+        own.sample(4 * k)
+        found.append(own.rudder_rad)
     late = t > 8.0
     basis = np.stack([np.sin(w * t[late]), np.cos(w * t[late])], axis=1)
     response = np.linalg.lstsq(basis, np.array(found)[late], rcond=None)[0] @ [1, 1j]

@@ -67,7 +67,7 @@ class Sensor(Strict):
 
 
 class Actuator(Strict):
-    """First-order elevator servo; the delay counts from command to surface."""
+    """First-order servo of a control surface; the delay counts from command to surface."""
 
     bandwidth: qt.Frequency
     rate_limit: qt.Rate
@@ -98,15 +98,21 @@ class Geometry(Strict):
 
 
 class MassProperties(Strict):
-    """Mass, pitch inertia about the CG, and CG behind the leading edge of the MAC as a fraction of it."""
+    """Mass, inertias about the CG, and CG behind the leading edge of the MAC as a fraction of it.
+
+    inertia_xx, inertia_zz and inertia_xz, the integral of x z dm, serve the lateral-directional motion.
+    """
 
     mass: qt.Mass
     inertia_yy: qt.Inertia
     cg: qt.Ratio = Quantity(value=0.25)
+    inertia_xx: qt.Inertia | None = None
+    inertia_zz: qt.Inertia | None = None
+    inertia_xz: qt.Inertia | None = None
 
     @model_validator(mode="after")
     def _positive(self) -> MassProperties:
-        qt.require_positive(self, ("mass", "inertia_yy"))
+        qt.require_positive(self, ("mass", "inertia_yy", "inertia_xx", "inertia_zz"))
         return self
 
 
@@ -197,6 +203,8 @@ class AircraftFile(Strict):
     tail: Tail | None = None
     jsbsim: JsbsimModel | None = None
     elevator_actuator: Actuator | None = None
+    aileron_actuator: Actuator | None = None
+    rudder_actuator: Actuator | None = None
     dynamics: Dynamics | None = None
     derivatives: dict[str, qt.Ratio] = Field(default_factory=dict)
     sensors: dict[str, Sensor] = Field(default_factory=dict)

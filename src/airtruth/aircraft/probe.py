@@ -24,12 +24,17 @@ _LIMITS: Final = Limits(seconds=60.0, memory_bytes=3_000_000_000)
 message)."""
 _MODULES: Final = ("airtruth.aircraft.probe_child", "jsbsim")
 """Modules of the process that loads a model."""
+_WRITTEN: Final = ("six_axes", "rotary_gust", "roll_gust", "yaw_gust")
+"""Entries of the [jsbsim] table with a property that flights write."""
 _OUTPUT_LINES: Final = 6
 """Lines of JSBSim's output that an error quotes [-] (judgement: its own message and what precedes it)."""
 
 
 class Constants(Strict):
-    """Geometry and mass of a model as loaded: S [m2], c and span [m], mass [kg], Iyy [kg m2].
+    """Geometry and mass of a model as loaded: S [m2], c and span [m], mass [kg], inertias about the CG [kg m2].
+
+    inertia_xx_kg_m2, inertia_zz_kg_m2, inertia_xz_kg_m2 are 0 where neither the model nor aircraft.toml states them; Ixz is the
+    integral of x z dm.
 
     cg_fraction is the position of the CG behind the leading edge of the MAC, as a fraction of it; 0.25 for a model
     that does not state it.
@@ -41,6 +46,9 @@ class Constants(Strict):
     mass_kg: float
     inertia_yy_kg_m2: float
     cg_fraction: float = 0.25
+    inertia_xx_kg_m2: float = 0.0
+    inertia_zz_kg_m2: float = 0.0
+    inertia_xz_kg_m2: float = 0.0
 
 
 def probe(folder: Path, jsbsim_json: str) -> Constants:
@@ -100,6 +108,8 @@ def _explain(error: IsolatedError, output: Path) -> str:
 def _refuse_control(folder: Path, table: dict[str, Any]) -> None:
     names = [*table["set"], *table["declare"], table["elevator"]["command"], *table["throttle"]["command"]]
     names += (table["lateral"] or {}).values()
+    names += [table[name]["command"] for name in ("aileron", "rudder") if table[name]]
+    names += [table[name] for name in _WRITTEN if table[name]]
     for name in filter(controls_simulation, names):
         raise AircraftError(
             f"{folder}: [jsbsim] writes {name}: an aircraft must not stop, trim, rewind or re-time the simulation; "

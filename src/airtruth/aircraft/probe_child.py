@@ -61,7 +61,10 @@ def _load(folder: Path, table: dict[str, Any]) -> dict[str, Any]:
             "chord_m": fdm["metrics/cbarw-ft"] * FT,
             "span_m": fdm["metrics/bw-ft"] * FT,
             "mass_kg": fdm["inertia/mass-slugs"] * SLUG,
-            "inertia_yy_kg_m2": fdm["inertia/iyy-slugs_ft2"] * SLUG * FT**2,
+            **{
+                f"inertia_{axes}_kg_m2": fdm[f"inertia/i{axes}-slugs_ft2"] * SLUG * FT**2
+                for axes in ("xx", "yy", "zz", "xz")
+            },
         }
     }
 
@@ -70,7 +73,9 @@ def _named(table: dict[str, Any]) -> list[str]:
     elevator, throttle = table["elevator"], table["throttle"]
     names = [elevator["command"], elevator["surface"], *throttle["command"], *throttle["trim"], *table["set"]]
     names += [*(table["augmentation"] or {}).values(), *(table["lateral"] or {}).values()]
-    return names + ([table["rotary_gust"]] if table["rotary_gust"] else [])
+    for surface in filter(None, (table["aileron"], table["rudder"])):
+        names += [surface["command"], surface["surface"]]
+    return names + [table[key] for key in ("six_axes", "rotary_gust", "roll_gust", "yaw_gust") if table[key]]
 
 
 def _explain_missing(fdm: Any, missing: list[str]) -> str:

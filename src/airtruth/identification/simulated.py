@@ -23,6 +23,7 @@ from airtruth.logs.flight_log import Batch, FlightLog
 from airtruth.logs.histories import Histories, History
 from airtruth.logs.sources import Logs, named_logs
 from airtruth.physics.atmosphere import air_density
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.short_period import PARAMETERS, Scale, normal_force_row, scale, system
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-OUTPUTS: Final = ("alpha_rad", "q_rad_s", "az_m_s2")
+OUTPUTS: Final = LONGITUDINAL.output_channels
 """Channels that are simulated."""
 MOST_RECORDS: Final = 12
 """Largest number of records that are simulated for a report [-]; judgement: a reader looks through a dozen."""

@@ -12,34 +12,17 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.physics.motion import LONGITUDINAL
+
 Array = NDArray[np.float64]
 
-PARAMETERS: Final = ("CLalpha", "CLq", "CLde", "Cmalpha", "Cmq", "Cmde")
+PARAMETERS: Final = LONGITUDINAL.parameters
 """Names of the six derivatives [-], in the order of every array of derivatives."""
-CL_ALPHA: Final = 0
-"""Index of CLalpha in `PARAMETERS`."""
-CL_Q: Final = 1
-"""Index of CLq in `PARAMETERS`."""
-CL_DE: Final = 2
-"""Index of CLde in `PARAMETERS`."""
-CM_ALPHA: Final = 3
-"""Index of Cmalpha in `PARAMETERS`."""
-CM_Q: Final = 4
-"""Index of Cmq in `PARAMETERS`."""
-CM_DE: Final = 5
-"""Index of Cmde in `PARAMETERS`."""
-MODAL: Final = ("wn_rad_s", "zeta")
+CL_ALPHA, CL_Q, CL_DE, CM_ALPHA, CM_Q, CM_DE = range(len(PARAMETERS))
+"""Indices in `PARAMETERS`."""
+MODAL: Final = LONGITUDINAL.modal
 """Names of the modal parameters: natural frequency [rad/s] and damping ratio [-]."""
-UNITS: Final = {
-    "CLalpha": "1/rad",
-    "CLq": "-",
-    "CLde": "1/rad",
-    "Cmalpha": "1/rad",
-    "Cmq": "-",
-    "Cmde": "1/rad",
-    "wn_rad_s": "rad/s",
-    "zeta": "-",
-}
+UNITS: Final = LONGITUDINAL.units
 """Derivative or modal parameter -> its unit; rate derivatives are those to q c/(2V), which has none."""
 
 

@@ -13,6 +13,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.sensor_errors import Kind
 from airtruth.physics.short_period import PARAMETERS
 
@@ -26,7 +27,7 @@ FACTORS: Final = ("alpha", "elevator", "qhat")
 """Signals by which an `AeroTerm` may be multiplied: those of the six derivatives."""
 MEASURED: Final = ("alpha", "elevator", "qhat", "qbar")
 """Signals that a log measures; a `ReadingTerm` names one of these or a state."""
-READINGS: Final = ("alpha_rad", "q_rad_s", "az_m_s2")
+READINGS: Final = LONGITUDINAL.output_channels
 """Channels of a `ReadingTerm`, the outputs of the filter."""
 ELEVATOR: Final = "elevator_rad"
 """Channel of the measured surface."""

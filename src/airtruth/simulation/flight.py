@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +12,35 @@ from airtruth.aircraft import Aircraft
 from airtruth.aircraft.model import SurfaceProperties
 from airtruth.channels import SIGNALS
 from airtruth.errors import ConfigurationError, FlightError
+from airtruth.simulation.attitude import straight_attitude
 from airtruth.simulation.lateral_feedback import LateralFeedback, Loop
-from airtruth.simulation.readings import LATERAL_READ, READ, channels, lateral_channels, require_sound
+from airtruth.simulation.readings import READ, READ_LATERAL, channels, lateral_channels, require_sound
 from airtruth.simulation.simulator import Executive
 from airtruth.simulation.trim import Trim
 from airtruth.units import FT
 
 Array = NDArray[np.float64]
 
-_PITCH_PLANE: Final = len(READ) + 1
-"""Properties of a flight in the pitch plane: those of `READ` and the elevator."""
+
+@dataclass(frozen=True)
+class LateralInputs:
+    """Lateral inputs of one run in six axes, at the times of `Inputs`; (samples,) each.
+
+    Attributes
+    ----------
+    aileron_rad, rudder_rad : commands, deviations from trim [rad]; aileron (right - left)/2, trailing edges down positive,
+        rudder trailing edge left positive.
+    gust_v_m_s : velocity of the air to the right of the flight direction [m/s], or None.
+    gust_p_rad_s, gust_r_rad_s : rotation of the air about body x and z [rad/s], or None.
+    feedback : yaw damper and bank hold, or None.
+    """
+
+    aileron_rad: Array
+    rudder_rad: Array
+    gust_v_m_s: Array | None = None
+    gust_p_rad_s: Array | None = None
+    gust_r_rad_s: Array | None = None
+    feedback: LateralFeedback | None = None
 
 
 @dataclass(frozen=True)
@@ -37,10 +55,7 @@ class Inputs:
     q_error_rad_s, theta_error_rad : sensor errors fed into the augmentation, or None.
     damper_gain_s, attitude_gain : gains of the augmentation [s], [-].
     surface : the commands drive the surfaces themselves, past the actuators.
-    aileron_command_rad, rudder_command_rad : commands in six axes, deviations from trim [rad]; None for the trim's.
-    gust_v_m_s : velocity of the air to the right of the flight direction [m/s], or None.
-    gust_p_rad_s, gust_r_rad_s : rotation of the air, right wing down and nose right positive [rad/s], or None.
-    feedback : yaw damper and bank hold, or None.
+    lateral : lateral inputs of a run in six axes; None for fixed lateral controls in air without lateral gusts.
     """
 
     command_rad: Array
@@ -52,26 +67,7 @@ class Inputs:
     damper_gain_s: float = 0.0
     attitude_gain: float = 0.0
     surface: bool = False
-    aileron_command_rad: Array | None = None
-    rudder_command_rad: Array | None = None
-    gust_v_m_s: Array | None = None
-    gust_p_rad_s: Array | None = None
-    gust_r_rad_s: Array | None = None
-    feedback: LateralFeedback | None = None
-
-    def moves_laterally(self) -> bool:
-        """Whether the inputs need six axes."""
-        return any(
-            value is not None
-            for value in (
-                self.aileron_command_rad,
-                self.rudder_command_rad,
-                self.gust_v_m_s,
-                self.gust_p_rad_s,
-                self.gust_r_rad_s,
-                self.feedback,
-            )
-        )
+    lateral: LateralInputs | None = None
 
 
 class Flight:
@@ -98,19 +94,13 @@ class Flight:
         model = executive.model
         self._elevator = model.elevator
         self._augmentation = model.augmentation
-        self._model = model
-        names = [*READ, model.elevator.surface]
+        self._rotary = model.rotary_gust
+        self._lateral: list[SurfaceProperties] = []
+        read = [*READ, model.elevator.surface]
         if trim.condition.six_axes:
-            names += [*LATERAL_READ, *(surface.surface for surface in self._surfaces)]
-        self._read = executive.nodes(names)
-
-    @property
-    def _surfaces(self) -> tuple[SurfaceProperties, SurfaceProperties]:
-        """Aileron and rudder, which an aircraft that is trimmed in six axes has."""
-        aileron, rudder = self._model.aileron, self._model.rudder
-        assert aileron is not None
-        assert rudder is not None
-        return aileron, rudder
+            self._lateral = [surface for surface in (model.aileron, model.rudder) if surface is not None]
+            read += [*READ_LATERAL, *(surface.surface for surface in self._lateral)]
+        self._read = executive.nodes(read)
 
     def fly(self, inputs: Inputs) -> dict[str, Array]:
         """Fly one run.
@@ -119,48 +109,55 @@ class Flight:
         -------
         dict
             Channels of `airtruth.simulation.readings.channels`, with elevator_command_rad and throttle, (records,)
-            each [SI]; record k is the state at the time k record_every dt. In six axes also those of `lateral_channels`,
-            aileron_command_rad and rudder_command_rad.
+            each [SI]; record k is the state at the time k record_every dt. In six axes also those of
+            `airtruth.simulation.readings.lateral_channels`, with aileron_command_rad and rudder_command_rad. The commands are
+            those of the inputs, without feedback.
 
         Raises
         ------
         FlightError
             If the state leaves the range in which the simulation has a meaning, or the model ends the simulation.
         ConfigurationError
-            If the inputs need an augmentation or a rotary gust that the aircraft lacks, or six axes and the trim is in the
+            If the inputs need an augmentation or a rotary gust that the aircraft lacks, or lateral inputs meet a trim of the
             pitch plane.
         """
-        trim = self.trim
-        if inputs.moves_laterally() and not trim.condition.six_axes:
+        if inputs.lateral is not None and not self._lateral:
             raise ConfigurationError(
-                "lateral inputs need a trim in six axes: state how the condition is held straight (wings-level, no-sideslip)"
+                "lateral inputs need a trim in six axes; state wings-level or no-sideslip in the condition"
             )
-        columns, fed_back = self._simulate(inputs)
+        columns = self._simulate(inputs)
         require_sound(columns, self._record_every * self._executive.dt_s, "the flight")
+        own, controls, mass = len(READ) + 1, self.trim.controls, self.trim.mass_kg
         command = inputs.command_rad[:: self._record_every]
-        result = channels(columns[:_PITCH_PLANE], trim.mass_kg, self._elevator.surface_rad) | {
-            "elevator_command_rad": trim.controls.elevator_command_rad + command,
-            "throttle": np.full(columns.shape[1], trim.controls.throttle),
+        result = channels(columns[:own], mass, self._elevator.surface_rad) | {
+            "elevator_command_rad": controls.elevator_command_rad + command,
+            "throttle": np.full(columns.shape[1], controls.throttle),
         }
-        if not trim.condition.six_axes:
+        if not self._lateral:
             return result
-        aileron, rudder = self._surfaces
-        result |= lateral_channels(
-            columns[_PITCH_PLANE:], trim.mass_kg, aileron.surface_rad, rudder.surface_rad
-        )
-        for name, absolute, more in zip(("aileron", "rudder"), self._lateral(inputs), fed_back, strict=True):
-            result[f"{name}_command_rad"] = absolute[:: self._record_every] + more
-        return result
+        result |= lateral_channels(columns[own:], mass, *(surface.surface_rad for surface in self._lateral))
+        names = ("aileron_command_rad", "rudder_command_rad")
+        commands = (c[:: self._record_every] for c in self._lateral_commands(inputs))
+        return result | dict(zip(names, commands, strict=True))
 
-    def _lateral(self, inputs: Inputs) -> tuple[Array, Array]:
+    def _lateral_commands(self, inputs: Inputs) -> tuple[Array, Array]:
         """Commands of aileron and rudder at every step [rad]."""
-        controls, still = self.trim.controls, np.zeros_like(inputs.command_rad)
-        aileron = still if inputs.aileron_command_rad is None else inputs.aileron_command_rad
-        rudder = still if inputs.rudder_command_rad is None else inputs.rudder_command_rad
-        return controls.aileron_command_rad + aileron, controls.rudder_command_rad + rudder
+        at, lateral = self.trim.controls, inputs.lateral
+        still = np.zeros_like(inputs.command_rad)
+        aileron, rudder = (still, still) if lateral is None else (lateral.aileron_rad, lateral.rudder_rad)
+        return at.aileron_command_rad + aileron, at.rudder_command_rad + rudder
 
-    def _simulate(self, inputs: Inputs) -> tuple[Array, Array]:
-        """(properties, records) values of the properties, and (2, records) feedback to aileron and rudder [rad]."""
+    @property
+    def _theta_rad(self) -> float:
+        """Pitch attitude of the trim [rad]."""
+        at, gamma = self.trim, self.trim.condition.gamma_rad
+        if not at.condition.six_axes:
+            return at.alpha_rad + gamma
+        return straight_attitude(
+            at.alpha_rad, at.controls.sideslip_rad, at.controls.bank_rad, gamma
+        ).theta_rad
+
+    def _simulate(self, inputs: Inputs) -> Array:
         renewed = self._executive.renewed() if self._flown else self._executive
         if renewed is not self._executive:
             self._executive = renewed
@@ -175,11 +172,7 @@ class Flight:
         fdm.reset_to_initial_conditions(2)  # a reset without run_ic, which settle() does
         executive.configure()
         first = controls.elevator_command_rad + float(inputs.command_rad[0])
-        held = replace(controls, elevator_command_rad=first)
-        if trim.condition.six_axes:
-            aileron, rudder = (float(values[0]) for values in self._lateral(inputs))
-            held = replace(held, aileron_command_rad=aileron, rudder_command_rad=rudder)
-        executive.hold(held)
+        executive.hold(replace(controls, elevator_command_rad=first))
         self._engage(inputs)
         for setter, first_value in zip(setters[1:], (values[0] for values in series[1:]), strict=True):
             setter(first_value)
@@ -191,70 +184,79 @@ class Flight:
         records = [get() for get in gets]
         run, every = fdm.run, self._record_every
         extend = records.extend
-        steps = list(zip(*(values[1:] for values in series), strict=True))
-        fed_back = []
-        for first in range(0, len(steps) - every + 1, every):
+        fed = () if loop is None else loop.setters
+        pairs = zip(setters, series, strict=True)
+        moving = [(s, v) for s, v in pairs if v.count(v[0]) < len(v) or s in fed]
+        count = len(series[0]) - 1
+        steps = list(zip(*(values[1:] for _, values in moving), strict=True)) or [()] * count
+        write = _writer([setter for setter, _ in moving])
+        for first in range(0, count - every + 1, every):
             if loop is not None:
-                fed_back.append(loop.at(first))
+                loop.sample(first)
             for values in steps[first : first + every]:
-                for setter, value in zip(setters, values):  # noqa: B905 (hot loop)
-                    setter(value)
+                write(*values)
                 if not run():
                     raise FlightError(f"the model ended the flight at {fdm.get_sim_time():.3f} s")
             extend([get() for get in gets])
-        columns = np.array(records).reshape(-1, len(gets)).T
-        if loop is None:
-            return columns, np.zeros((2, columns.shape[1]))
-        return columns, np.array([*fed_back, loop.at(len(fed_back) * every)]).T
+        return np.array(records).reshape(-1, len(gets)).T
 
     def _loop(self, inputs: Inputs) -> Loop | None:
         """The feedback of a run, connected to the motion."""
-        if inputs.feedback is None:
+        if inputs.lateral is None or inputs.lateral.feedback is None:
             return None
         motion = self._executive.nodes([SIGNALS[name].jsbsim for name in ("p_rad_s", "r_rad_s", "phi_rad")])
-        held = self.trim.controls.bank_rad
-        return Loop(inputs.feedback, self._executive.dt_s, held, [n.get_double_value for n in motion])
+        reads = [node.get_double_value for node in motion]
+        return Loop(inputs.lateral.feedback, self._executive.dt_s, self.trim.controls.bank_rad, reads)
 
     def _inputs(
         self, inputs: Inputs, loop: Loop | None
-    ) -> tuple[list[Callable[[float], None]], list[list[float]]]:
+    ) -> tuple[list[Callable[[float], object]], list[list[float]]]:
         """Setters and their values at every step; the elevator first."""
-        executive, model = self._executive, self._model
+        executive, elevator = self._executive, self._elevator
         absolute = self.trim.controls.elevator_command_rad + inputs.command_rad
         pairs = [
-            _sent(self._elevator, absolute, inputs.surface),
+            (elevator.command, _in_time(elevator, absolute, inputs)),
             ("atmosphere/gust-north-fps", inputs.gust_u_m_s / FT),
             ("atmosphere/gust-down-fps", inputs.gust_w_m_s / FT),
         ]
-        if inputs.gust_v_m_s is not None:
-            pairs.append(("atmosphere/gust-east-fps", inputs.gust_v_m_s / FT))
-        for entry, rotation in (
-            ("rotary_gust", inputs.gust_q_rad_s),
-            ("roll_gust", inputs.gust_p_rad_s),
-            ("yaw_gust", inputs.gust_r_rad_s),
-        ):
-            if rotation is None:
-                continue
-            name = getattr(model, entry)
-            if name is None:
-                raise ConfigurationError(f"the aircraft has no property for a rotary gust (jsbsim.{entry})")
-            pairs.append((name, rotation))
+        if inputs.gust_q_rad_s is not None:
+            if self._rotary is None:
+                raise ConfigurationError(
+                    "the aircraft has no property for a rotary gust (jsbsim.rotary_gust)"
+                )
+            pairs.append((self._rotary, inputs.gust_q_rad_s))
         if self._augmentation is not None and inputs.q_error_rad_s is not None:
             pairs.append((self._augmentation.q_error, inputs.q_error_rad_s))
         if self._augmentation is not None and inputs.theta_error_rad is not None:
             pairs.append((self._augmentation.theta_error, inputs.theta_error_rad))
+        aileron = len(pairs)
+        if self._lateral:
+            pairs += self._lateral_inputs(inputs)
         setters = [executive.node(name).set_double_value for name, _ in pairs]
-        series = [values for _, values in pairs]
-        if self.trim.condition.six_axes:
-            surfaces = zip(("aileron", "rudder"), self._surfaces, self._lateral(inputs), strict=True)
-            for control, surface, command in surfaces:
-                name, values = _sent(surface, command, inputs.surface)
-                setter = executive.node(name).set_double_value
-                setters.append(
-                    setter if loop is None else loop.added(control, setter, surface.command_per_rad)
-                )
-                series.append(values)
-        return setters, [np.asarray(values, dtype=np.float64).tolist() for values in series]
+        if loop is not None:
+            fed = slice(aileron, aileron + len(self._lateral))
+            setters[fed] = loop.added(setters[fed], [surface.command_per_rad for surface in self._lateral])
+        return setters, [np.asarray(values, dtype=np.float64).tolist() for _, values in pairs]
+
+    def _lateral_inputs(self, inputs: Inputs) -> list[tuple[str, Array]]:
+        """Properties and values of the lateral inputs, the commands of aileron and rudder first."""
+        commands = zip(self._lateral, self._lateral_commands(inputs), strict=True)
+        pairs = [(surface.command, _in_time(surface, values, inputs)) for surface, values in commands]
+        lateral, model = inputs.lateral, self._executive.model
+        if lateral is None:
+            return pairs
+        if lateral.gust_v_m_s is not None:
+            pairs.append(("atmosphere/gust-east-fps", lateral.gust_v_m_s / FT))
+        for name, key, values in (
+            (model.roll_gust, "roll_gust", lateral.gust_p_rad_s),
+            (model.yaw_gust, "yaw_gust", lateral.gust_r_rad_s),
+        ):
+            if values is None:
+                continue
+            if name is None:
+                raise ConfigurationError(f"the aircraft has no property for a rotary gust (jsbsim.{key})")
+            pairs.append((name, values))
+        return pairs
 
     def _engage(self, inputs: Inputs) -> None:
         if inputs.damper_gain_s == 0.0 and inputs.attitude_gain == 0.0:
@@ -266,14 +268,31 @@ class Flight:
         fdm, names = self._executive.fdm, self._augmentation
         fdm[names.damper_gain] = inputs.damper_gain_s
         fdm[names.attitude_gain] = inputs.attitude_gain
-        fdm[names.theta_reference] = self.trim.alpha_rad + self.trim.condition.gamma_rad
+        fdm[names.theta_reference] = self._theta_rad
 
 
-def _sent(surface: SurfaceProperties, command_rad: Array, directly: bool) -> tuple[str, Array]:
-    """Property of a command and its values at every step, of which a model that reads them a frame early gets them later."""
-    late = 0 if directly else surface.command_frames
-    sent = np.concatenate([np.repeat(command_rad[:1], late), command_rad[: len(command_rad) - late]])
-    return surface.command, sent * surface.command_per_rad
+def _writer(setters: Sequence[Callable[[float], object]]) -> Callable[..., object]:
+    """One call that writes a value with each setter; without a loop, which takes twice the time."""
+    match setters:
+        case []:
+            return lambda: None
+        case [a]:
+            return a
+        case [a, b]:
+            return lambda x, y: (a(x), b(y))
+        case [a, b, c]:
+            return lambda x, y, z: (a(x), b(y), c(z))
+        case [a, b, c, *rest]:
+            others = _writer(rest)
+            return lambda x, y, z, *more: (a(x), b(y), c(z), others(*more))
+    raise AssertionError("setters are a list")
+
+
+def _in_time(surface: SurfaceProperties, absolute_rad: Array, inputs: Inputs) -> Array:
+    """Values to write of a command, later by the frames between reading it and acting on it."""
+    late = 0 if inputs.surface else surface.command_frames
+    command = np.concatenate([np.repeat(absolute_rad[:1], late), absolute_rad[: len(absolute_rad) - late]])
+    return command * surface.command_per_rad
 
 
 def fly_all(

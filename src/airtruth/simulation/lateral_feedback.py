@@ -5,7 +5,8 @@
 p, r and phi are the readings of the sensors, with their bias and noise. h is the high pass (washout) s T/(s T + 1) of the yaw
 rate, so that a steady turn is not opposed, or 1 without a time constant. With the signs of the channels positive gains damp the
 yaw, hold the bank and damp the roll: a rudder with the trailing edge left yaws to the left, an aileron (right - left)/2 with the
-trailing edge down on the right rolls to the left. The commands are held between two samples.
+trailing edge down on the right rolls to the left. The feedback is held between two samples and added to the command; the command
+of the log is that of the manoeuvre alone, as it is with the augmentation of the pitch plane.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class LateralFeedback:
 
 
 class Loop:
-    """The feedback in one flight; it keeps the state of the washout and the commands until the next sample.
+    """The feedback in one flight; it keeps the state of the washout and the feedback until the next sample.
 
     Parameters
     ----------
@@ -52,57 +53,60 @@ class Loop:
     dt_s : simulation step [s].
     bank_rad : bank to hold [rad].
     motion : functions that return p, r [rad/s] and phi [rad] of the present step.
+
+    Attributes
+    ----------
+    aileron_rad, rudder_rad : present feedback [rad].
+    setters : those that `added` returned.
     """
 
     def __init__(
-        self,
-        feedback: LateralFeedback,
-        dt_s: float,
-        bank_rad: float,
-        motion: Sequence[Callable[[], float]],
+        self, feedback: LateralFeedback, dt_s: float, bank_rad: float, motion: Sequence[Callable[[], float]]
     ) -> None:
         self._feedback, self._bank_rad, self._motion = feedback, bank_rad, motion
         period = dt_s * feedback.every
         self._forget = math.exp(-period / feedback.washout_s) if feedback.washout_s else 1.0
         self._slow_rad_s = 0.0
-        self._commands_rad = {"aileron": 0.0, "rudder": 0.0}
+        self.aileron_rad = self.rudder_rad = 0.0
+        self.setters: tuple[Callable[[float], object], ...] = ()
 
-    def at(self, step: int) -> tuple[float, float]:
-        """Commands of aileron and rudder from a simulation step on, deviations from the trim [rad].
+    def sample(self, step: int) -> None:
+        """Renew the feedback at the multiples of ``every``.
 
-        The commands change at the multiples of the feedback's ``every``. The low pass whose difference to the yaw rate is the
-        high pass takes each sample as constant since the one before, exact for such a signal; it starts from a yaw rate of zero.
+        The low pass whose difference to the yaw rate is the high pass takes each sample as constant since the one before, exact
+        for such a signal; it starts from a yaw rate of zero.
 
         Parameters
         ----------
-        step : number of the present step.
+        step : number of the present simulation step.
         """
         f = self._feedback
-        if step % f.every == 0:
-            p, r, phi = (read() for read in self._motion)
-            p += float(f.p_error_rad_s[step])
-            r += float(f.r_error_rad_s[step])
-            phi += float(f.phi_error_rad[step])
-            self._slow_rad_s = self._forget * self._slow_rad_s + (1.0 - self._forget) * r
-            self._commands_rad["rudder"] = f.yaw_damper_gain_s * (r - self._slow_rad_s)
-            self._commands_rad["aileron"] = f.bank_gain * (phi - self._bank_rad) + f.roll_damper_gain_s * p
-        return self._commands_rad["aileron"], self._commands_rad["rudder"]
+        if step % f.every:
+            return
+        p, r, phi = (read() for read in self._motion)
+        p += float(f.p_error_rad_s[step])
+        r += float(f.r_error_rad_s[step])
+        phi += float(f.phi_error_rad[step])
+        self._slow_rad_s = self._forget * self._slow_rad_s + (1.0 - self._forget) * r
+        self.rudder_rad = f.yaw_damper_gain_s * (r - self._slow_rad_s)
+        self.aileron_rad = f.bank_gain * (phi - self._bank_rad) + f.roll_damper_gain_s * p
 
-    def added(self, control: str, setter: Callable[[float], None], per_rad: float) -> Callable[[float], None]:
-        """Return a setter that adds the present command of a control to what it is given.
+    def added(
+        self, setters: Sequence[Callable[[float], object]], per_rad: Sequence[float]
+    ) -> tuple[Callable[[float], object], ...]:
+        """Setters of the commands of aileron and rudder that add the present feedback to what they are given.
 
         Parameters
         ----------
-        control : "aileron" or "rudder".
-        setter : sets the property of the command.
-        per_rad : units of the property per radian.
+        setters : set the properties of the commands of aileron and rudder.
+        per_rad : units of each property per radian.
         """
-        commands = self._commands_rad
-
-        def set_sum(value: float) -> None:
-            setter(value + commands[control] * per_rad)
-
-        return set_sum
+        (aileron, rudder), (per_aileron, per_rudder) = setters, per_rad
+        self.setters = (
+            lambda value: aileron(value + self.aileron_rad * per_aileron),
+            lambda value: rudder(value + self.rudder_rad * per_rudder),
+        )
+        return self.setters
 
 
 __all__ = ["LateralFeedback", "Loop"]

@@ -25,7 +25,7 @@ READ: Final = (
 """Properties that `channels` takes, in its order; the surface's own property follows them."""
 _LATERAL_STATE: Final = ("beta_rad", "p_rad_s", "r_rad_s", "phi_rad", "psi_rad")
 """Lateral channels with a JSBSim property of their own."""
-LATERAL_READ: Final = (
+READ_LATERAL: Final = (
     *(SIGNALS[name].jsbsim for name in _LATERAL_STATE),
     "forces/fby-total-lbs",
     "accelerations/pdot-rad_sec2",
@@ -69,20 +69,20 @@ def lateral_channels(
 
     Parameters
     ----------
-    columns : (10, records) values of `LATERAL_READ` and of the properties of aileron and rudder [JSBSim's units].
+    columns : (10, records) values of `READ_LATERAL` and of the properties of aileron and rudder [JSBSim's units].
     mass_kg : mass of the aircraft [kg].
     aileron_rad, rudder_rad : radians per unit of the surfaces' properties.
 
     Returns
     -------
     dict
-        Channel -> (records,) values at the centre of gravity [SI]; the heading is continuous and starts within half a turn of
-        north.
+        Channel -> (records,) values at the centre of gravity [SI]; bank and heading without jumps of a turn.
     """
     *state, fy, p_dot, r_dot, aileron, rudder = columns
     result = {name: column * SIGNALS[name].to_si for name, column in zip(_LATERAL_STATE, state, strict=True)}
-    heading = np.unwrap(result["psi_rad"])
-    result["psi_rad"] = heading - 2.0 * np.pi * np.round(heading[0] / (2.0 * np.pi))
+    for name in ("phi_rad", "psi_rad"):
+        start = np.remainder(result[name][:1] + np.pi, 2.0 * np.pi) - np.pi
+        result[name] = np.unwrap(np.concatenate([start, result[name]]))[1:]
     return result | {
         "ay_m_s2": fy * (SLUG * FT / mass_kg),
         "p_dot_rad_s2": p_dot,
@@ -97,7 +97,7 @@ def require_sound(columns: Array, record_s: float, flight: str) -> None:
 
     Parameters
     ----------
-    columns : (10 or more, records), the first as in `channels`.
+    columns : (10 or more, records) as in `channels`.
     record_s : time between two records [s].
     flight : subject of the message.
 
@@ -117,4 +117,4 @@ def require_sound(columns: Array, record_s: float, flight: str) -> None:
         )
 
 
-__all__ = ["LATERAL_READ", "MOST_ALPHA_RAD", "READ", "channels", "lateral_channels", "require_sound"]
+__all__ = ["MOST_ALPHA_RAD", "READ", "READ_LATERAL", "channels", "lateral_channels", "require_sound"]

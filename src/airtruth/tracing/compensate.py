@@ -27,6 +27,7 @@ from airtruth.logs.flight_log import Batch, FlightLog, batches
 from airtruth.numerics.prefilter import butterworth
 from airtruth.physics import short_period
 from airtruth.physics.atmosphere import air_density
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.readings import reading_increments, state_of
 from airtruth.physics.sensor_errors import SensorErrors
 from airtruth.physics.terms import (
@@ -46,7 +47,7 @@ from airtruth.tracing.result import TraceResult
 
 Array = NDArray[np.float64]
 
-OUTPUTS: Final = ("alpha_rad", "q_rad_s", "az_m_s2")
+OUTPUTS: Final = LONGITUDINAL.output_channels
 """Channels that the response to increments changes."""
 _FINE: Final = 8
 """Points between two samples on which the surface moves [-] (judgement: 2.5 ms at 50 Hz, below any traced delay)."""

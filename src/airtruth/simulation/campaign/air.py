@@ -80,7 +80,8 @@ def _simulated(plan: Plan, run: PlannedRun, unit: dryden.DiscreteGust, stream: i
     """(outputs, samples) of a gust of unit standard deviations."""
     states = unit.phi.shape[-1]
     normals = streams.normals(plan.seed, run.run, stream, plan.samples * states)
-    return dryden.simulate(unit, normals.reshape(1, plan.samples, states), plan.campaign.gust.start)[0].T
+    drawn = normals.reshape(1, plan.samples, states)
+    return np.asarray(dryden.simulate(unit, drawn, plan.campaign.gust.start)[0].T)
 
 
 def _span(plan: Plan) -> float | None:

@@ -17,7 +17,6 @@ from airtruth.logs import store
 from airtruth.logs.digest import sha256_of
 from airtruth.logs.flight_log import PRESCRIBED, FlightLog
 from airtruth.logs.names import chunk_file
-from airtruth.physics.motion import LATERAL
 from airtruth.physics.short_period import MODAL, PARAMETERS
 from airtruth.simulation import instruments as measure
 from airtruth.simulation.campaign import streams
@@ -25,11 +24,11 @@ from airtruth.simulation.campaign.air import air_of
 from airtruth.simulation.campaign.effects import EFFECTS
 from airtruth.simulation.campaign.inputs import commands
 from airtruth.simulation.campaign.plan import Plan, PlannedRun
-from airtruth.simulation.flight import Flight, Inputs
+from airtruth.simulation.flight import Flight, Inputs, LateralInputs
 from airtruth.simulation.lateral_feedback import LateralFeedback
 from airtruth.simulation.linearise import Linearisation, linearise
-from airtruth.simulation.linearise_lateral import LateralLinearisation, linearise_lateral
-from airtruth.simulation.manoeuvres import ELEVATOR, sample
+from airtruth.simulation.linearise_lateral import LateralLinearisation, lateral_truth, linearise_lateral
+from airtruth.simulation.manoeuvres import ELEVATOR, LATERAL_CONTROLS, sample
 from airtruth.simulation.simulator import STOPS, Condition
 from airtruth.simulation.trim import Trim, trim
 
@@ -96,7 +95,7 @@ class FlownChunk:
 
 @dataclass(frozen=True)
 class Prepared:
-    """A flight condition, trimmed, linearised and loaded; lateral: of a trim in six axes."""
+    """A flight condition, trimmed, linearised and loaded; the lateral derivatives only in six axes."""
 
     trim: Trim
     linear: Linearisation
@@ -212,9 +211,9 @@ class Pilot:
         flown = plan.inputs[run.manoeuvre]
         amplitudes = [run.amplitude_of(number) for number in range(len(flown))]
         command = commands(flown, self._shapes[run.manoeuvre], amplitudes)
-        gains = plan.campaign.augmentation
+        gains, still = plan.campaign.augmentation, np.zeros(plan.samples)
         inputs = Inputs(
-            command_rad=command.get(ELEVATOR, np.zeros(plan.samples)),
+            command_rad=command.get(ELEVATOR, still),
             gust_u_m_s=air.u_m_s,
             gust_w_m_s=air.w_m_s,
             gust_q_rad_s=air.q_rad_s,
@@ -229,15 +228,9 @@ class Pilot:
                 theta_error_rad=self._error("theta_rad", run),
             )
         if plan.campaign.lateral:
-            inputs = replace(
-                inputs,
-                aileron_command_rad=command.get("aileron"),
-                rudder_command_rad=command.get("rudder"),
-                gust_v_m_s=air.v_m_s,
-                gust_p_rad_s=air.p_rad_s,
-                gust_r_rad_s=air.r_rad_s,
-                feedback=self._feedback(run),
-            )
+            aileron, rudder = (command.get(name, still) for name in LATERAL_CONTROLS)
+            turning = LateralInputs(aileron, rudder, air.v_m_s, air.p_rad_s, air.r_rad_s, self._feedback(run))
+            inputs = replace(inputs, lateral=turning)
         return prepared.flight.fly(inputs)
 
     def _feedback(self, run: PlannedRun) -> LateralFeedback | None:
@@ -319,25 +312,23 @@ def truth_row(run: PlannedRun, prepared: Prepared | None) -> dict[str, object]:
     prepared : its flight condition; None for a run that failed.
     """
     result: dict[str, object] = {"run_id": run.run_id, "status": "ok" if prepared else "failed"}
-    linear = prepared.linear if prepared else None
-    result |= _derivatives(PARAMETERS, linear)
-    modal = (linear.wn_rad_s, linear.zeta) if linear else (np.nan, np.nan)
+    sides = {"": "plus", "_minus": "minus", "_central": "central"}
+    for suffix, side in sides.items():
+        values = getattr(prepared.linear, side) if prepared else np.full(len(PARAMETERS), np.nan)
+        result |= {name + suffix: float(v) for name, v in zip(PARAMETERS, values, strict=True)}
+    modal = (prepared.linear.wn_rad_s, prepared.linear.zeta) if prepared else (np.nan, np.nan)
     result |= dict(zip(MODAL, modal, strict=True))
-    if run.condition.six_axes:
-        lateral = prepared.lateral if prepared else None
-        result |= _derivatives(LATERAL.parameters, lateral)
-        modes = lateral.modes.tolist() if lateral else [np.nan] * len(LATERAL.modal)
-        result |= dict(zip(LATERAL.modal, modes, strict=True))
     at = prepared.trim if prepared else None
     result |= {
         "trim_alpha_rad": at.alpha_rad if at else np.nan,
         "trim_elevator_rad": at.elevator_rad if at else np.nan,
         "trim_throttle": at.controls.throttle if at else np.nan,
-        **(_lateral_trim(at) if run.condition.six_axes else {}),
         "airspeed_m_s": at.airspeed_m_s if at else np.nan,
         "density_kg_m3": at.density_kg_m3 if at else np.nan,
         "dynamic_pressure_pa": 0.5 * at.density_kg_m3 * at.airspeed_m_s**2 if at else np.nan,
     }
+    if run.condition.six_axes:
+        result |= lateral_truth(prepared.lateral if prepared else None, at)
     for name in (
         "eas_m_s",
         "altitude_m",
@@ -352,25 +343,3 @@ def truth_row(run: PlannedRun, prepared: Prepared | None) -> dict[str, object]:
     if run.effects is not None:
         result[EFFECTS] = run.effects
     return result
-
-
-def _derivatives(
-    names: Sequence[str], linear: Linearisation | LateralLinearisation | None
-) -> dict[str, object]:
-    """Upward, downward and central differences of each derivative."""
-    sides = {"": "plus", "_minus": "minus", "_central": "central"}
-    missing = np.full(len(names), np.nan)
-    values = {suffix: getattr(linear, side, missing).tolist() for suffix, side in sides.items()}
-    return {name + suffix: v for suffix, own in values.items() for name, v in zip(names, own, strict=True)}
-
-
-def _lateral_trim(at: Trim | None) -> dict[str, object]:
-    """Sideslip, bank and surfaces of a trim in six axes [rad]."""
-    values = (
-        (at.controls.sideslip_rad, at.controls.bank_rad, at.aileron_rad, at.rudder_rad)
-        if at
-        else [np.nan] * 4
-    )
-    return dict(
-        zip(("trim_beta_rad", "trim_phi_rad", "trim_aileron_rad", "trim_rudder_rad"), values, strict=True)
-    )
