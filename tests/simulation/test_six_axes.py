@@ -14,6 +14,7 @@ from airtruth.errors import ConfigurationError, TrimError
 from airtruth.physics.motion import LATERAL
 from airtruth.simulation.attitude import straight_attitude
 from airtruth.simulation.flight import Flight, Inputs, LateralInputs
+from airtruth.simulation.lateral_feedback import LateralFeedback
 from airtruth.simulation.linearise import linearise
 from airtruth.simulation.linearise_lateral import linearise_lateral
 from airtruth.simulation.simulator import Condition, Executive
@@ -231,11 +232,12 @@ def test_bank_and_heading_have_no_jumps(gtm, level):
         assert np.abs(np.diff(flown[name])).max() < 0.5
 
 
-def test_augmentation_holds_bank_and_damps_the_dutch_roll(gtm, level):
+def test_feedback_holds_bank_and_damps_the_dutch_roll(gtm, level):
     rudder = np.where((np.arange(1601) > 100) & (np.arange(1601) < 160), 3.0 * DEG, 0.0)
 
     def flown(**gains):
-        lateral = LateralInputs(still(1601), rudder, **gains)
+        feedback = LateralFeedback(*[still(1601)] * 3, **gains)
+        lateral = LateralInputs(still(1601), rudder, feedback=feedback)
         return Flight(gtm, level, 1.0 / 200.0, 4).fly(
             Inputs(still(1601), still(1601), still(1601), lateral=lateral)
         )

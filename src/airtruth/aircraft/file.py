@@ -33,8 +33,8 @@ class Sensor(Strict):
 
     noise_std: white, one sample to the next [unit of the channel]; bias, quantum, minimum, maximum
     likewise; scale: factor [-]; lag: time constant [s]; delay, hold (sample and hold) [s];
-    x, z: position ahead of and below the CG [m] (vane, accelerometer); alpha_slope: relative change of the airspeed with the
-    angle of attack about its mean [1/rad].
+    x, y, z: position ahead of, right of and below the CG [m] (vane, accelerometer); alpha_slope: relative change of the
+    airspeed with the angle of attack about its mean [1/rad].
     """
 
     noise_std: Quantity = Quantity(value=0.0)
@@ -47,6 +47,7 @@ class Sensor(Strict):
     minimum: Quantity | None = None
     maximum: Quantity | None = None
     x: Quantity = Quantity(value=0.0)
+    y: Quantity = Quantity(value=0.0)
     z: Quantity = Quantity(value=0.0)
     alpha_slope: Quantity = Quantity(value=0.0)
 

@@ -60,16 +60,6 @@ class AugmentationProperties(Strict):
     theta_error: str
 
 
-class LateralAugmentationProperties(Strict):
-    """JSBSim properties of a yaw damper and bank hold, and of the sensor errors in its inputs."""
-
-    yaw_damper_gain: str
-    bank_gain: str
-    bank_reference: str
-    r_error: str
-    phi_error: str
-
-
 class JsbsimModel(Strict):
     """Where the JSBSim model lies and which of its properties mean what.
 
@@ -88,7 +78,6 @@ class JsbsimModel(Strict):
     elevator: ElevatorProperties
     throttle: ThrottleProperties = ThrottleProperties()
     augmentation: AugmentationProperties | None = None
-    lateral_augmentation: LateralAugmentationProperties | None = None
     rotary_gust: str | None = None
     roll_gust: str | None = None
     yaw_gust: str | None = None
@@ -105,7 +94,6 @@ __all__ = [
     "AugmentationProperties",
     "ElevatorProperties",
     "JsbsimModel",
-    "LateralAugmentationProperties",
     "LateralProperties",
     "SurfaceProperties",
     "ThrottleProperties",

@@ -80,7 +80,6 @@ def _named(table: dict[str, Any]) -> list[str]:
     names += [*(table["augmentation"] or {}).values(), *(table["lateral"] or {}).values()]
     for surface in filter(None, (table["aileron"], table["rudder"])):
         names += [surface["command"], surface["surface"]]
-    names += (table["lateral_augmentation"] or {}).values()
     return names + [table[key] for key in ("six_axes", "rotary_gust", "roll_gust", "yaw_gust") if table[key]]
 
 

@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.aircraft.model import SurfaceProperties
+from airtruth.channels import SIGNALS
 from airtruth.errors import ConfigurationError, FlightError
+from airtruth.simulation.attitude import straight_attitude
+from airtruth.simulation.lateral_feedback import LateralFeedback, Loop
 from airtruth.simulation.readings import READ, READ_LATERAL, channels, lateral_channels, require_sound
 from airtruth.simulation.simulator import Executive
 from airtruth.simulation.trim import Trim
@@ -29,8 +32,7 @@ class LateralInputs:
         rudder trailing edge left positive.
     gust_v_m_s : velocity of the air to the right of the flight direction [m/s], or None.
     gust_p_rad_s, gust_r_rad_s : rotation of the air about body x and z [rad/s], or None.
-    r_error_rad_s, phi_error_rad : sensor errors fed into the augmentation, or None.
-    yaw_damper_gain_s, bank_gain : gains of the augmentation [s], [-].
+    feedback : yaw damper and bank hold, or None.
     """
 
     aileron_rad: Array
@@ -38,10 +40,7 @@ class LateralInputs:
     gust_v_m_s: Array | None = None
     gust_p_rad_s: Array | None = None
     gust_r_rad_s: Array | None = None
-    r_error_rad_s: Array | None = None
-    phi_error_rad: Array | None = None
-    yaw_damper_gain_s: float = 0.0
-    bank_gain: float = 0.0
+    feedback: LateralFeedback | None = None
 
 
 @dataclass(frozen=True)
@@ -111,7 +110,8 @@ class Flight:
         dict
             Channels of `airtruth.simulation.readings.channels`, with elevator_command_rad and throttle, (records,)
             each [SI]; record k is the state at the time k record_every dt. In six axes also those of
-            `airtruth.simulation.readings.lateral_channels`, with aileron_command_rad and rudder_command_rad.
+            `airtruth.simulation.readings.lateral_channels`, with aileron_command_rad and rudder_command_rad. The commands are
+            those of the inputs, without feedback.
 
         Raises
         ------
@@ -147,6 +147,16 @@ class Flight:
         aileron, rudder = (still, still) if lateral is None else (lateral.aileron_rad, lateral.rudder_rad)
         return at.aileron_command_rad + aileron, at.rudder_command_rad + rudder
 
+    @property
+    def _theta_rad(self) -> float:
+        """Pitch attitude of the trim [rad]."""
+        at, gamma = self.trim, self.trim.condition.gamma_rad
+        if not at.condition.six_axes:
+            return at.alpha_rad + gamma
+        return straight_attitude(
+            at.alpha_rad, at.controls.sideslip_rad, at.controls.bank_rad, gamma
+        ).theta_rad
+
     def _simulate(self, inputs: Inputs) -> Array:
         renewed = self._executive.renewed() if self._flown else self._executive
         if renewed is not self._executive:
@@ -156,7 +166,8 @@ class Flight:
         executive, trim = self._executive, self.trim
         fdm = executive.fdm
         controls = trim.controls
-        setters, series = self._inputs(inputs)
+        loop = self._loop(inputs)
+        setters, series = self._inputs(inputs, loop)
         fdm.set_trim_status(True)
         fdm.reset_to_initial_conditions(2)  # a reset without run_ic, which settle() does
         executive.configure()
@@ -173,11 +184,15 @@ class Flight:
         records = [get() for get in gets]
         run, every = fdm.run, self._record_every
         extend = records.extend
-        moving = [(s, v) for s, v in zip(setters, series, strict=True) if v.count(v[0]) < len(v)]
+        fed = () if loop is None else loop.setters
+        pairs = zip(setters, series, strict=True)
+        moving = [(s, v) for s, v in pairs if v.count(v[0]) < len(v) or s in fed]
         count = len(series[0]) - 1
         steps = list(zip(*(values[1:] for _, values in moving), strict=True)) or [()] * count
         write = _writer([setter for setter, _ in moving])
         for first in range(0, count - every + 1, every):
+            if loop is not None:
+                loop.sample(first)
             for values in steps[first : first + every]:
                 write(*values)
                 if not run():
@@ -185,7 +200,17 @@ class Flight:
             extend([get() for get in gets])
         return np.array(records).reshape(-1, len(gets)).T
 
-    def _inputs(self, inputs: Inputs) -> tuple[list[Callable[[float], object]], list[list[float]]]:
+    def _loop(self, inputs: Inputs) -> Loop | None:
+        """The feedback of a run, connected to the motion."""
+        if inputs.lateral is None or inputs.lateral.feedback is None:
+            return None
+        motion = self._executive.nodes([SIGNALS[name].jsbsim for name in ("p_rad_s", "r_rad_s", "phi_rad")])
+        reads = [node.get_double_value for node in motion]
+        return Loop(inputs.lateral.feedback, self._executive.dt_s, self.trim.controls.bank_rad, reads)
+
+    def _inputs(
+        self, inputs: Inputs, loop: Loop | None
+    ) -> tuple[list[Callable[[float], object]], list[list[float]]]:
         """Setters and their values at every step; the elevator first."""
         executive, elevator = self._executive, self._elevator
         absolute = self.trim.controls.elevator_command_rad + inputs.command_rad
@@ -204,13 +229,17 @@ class Flight:
             pairs.append((self._augmentation.q_error, inputs.q_error_rad_s))
         if self._augmentation is not None and inputs.theta_error_rad is not None:
             pairs.append((self._augmentation.theta_error, inputs.theta_error_rad))
+        aileron = len(pairs)
         if self._lateral:
             pairs += self._lateral_inputs(inputs)
         setters = [executive.node(name).set_double_value for name, _ in pairs]
+        if loop is not None:
+            fed = slice(aileron, aileron + len(self._lateral))
+            setters[fed] = loop.added(setters[fed], [surface.command_per_rad for surface in self._lateral])
         return setters, [np.asarray(values, dtype=np.float64).tolist() for _, values in pairs]
 
     def _lateral_inputs(self, inputs: Inputs) -> list[tuple[str, Array]]:
-        """Properties and values of the lateral inputs."""
+        """Properties and values of the lateral inputs, the commands of aileron and rudder first."""
         commands = zip(self._lateral, self._lateral_commands(inputs), strict=True)
         pairs = [(surface.command, _in_time(surface, values, inputs)) for surface, values in commands]
         lateral, model = inputs.lateral, self._executive.model
@@ -227,24 +256,9 @@ class Flight:
             if name is None:
                 raise ConfigurationError(f"the aircraft has no property for a rotary gust (jsbsim.{key})")
             pairs.append((name, values))
-        names = model.lateral_augmentation
-        if names is not None and lateral.r_error_rad_s is not None:
-            pairs.append((names.r_error, lateral.r_error_rad_s))
-        if names is not None and lateral.phi_error_rad is not None:
-            pairs.append((names.phi_error, lateral.phi_error_rad))
         return pairs
 
     def _engage(self, inputs: Inputs) -> None:
-        lateral = inputs.lateral
-        if lateral is not None and (lateral.yaw_damper_gain_s != 0.0 or lateral.bank_gain != 0.0):
-            fdm, lateral_names = self._executive.fdm, self._executive.model.lateral_augmentation
-            if lateral_names is None:
-                raise ConfigurationError(
-                    "the aircraft has no yaw damper and no bank hold (jsbsim.lateral_augmentation in aircraft.toml)"
-                )
-            fdm[lateral_names.yaw_damper_gain] = lateral.yaw_damper_gain_s
-            fdm[lateral_names.bank_gain] = lateral.bank_gain
-            fdm[lateral_names.bank_reference] = self.trim.controls.bank_rad
         if inputs.damper_gain_s == 0.0 and inputs.attitude_gain == 0.0:
             return
         if self._augmentation is None:
@@ -254,7 +268,7 @@ class Flight:
         fdm, names = self._executive.fdm, self._augmentation
         fdm[names.damper_gain] = inputs.damper_gain_s
         fdm[names.attitude_gain] = inputs.attitude_gain
-        fdm[names.theta_reference] = self.trim.alpha_rad + self.trim.condition.gamma_rad
+        fdm[names.theta_reference] = self._theta_rad
 
 
 def _writer(setters: Sequence[Callable[[float], object]]) -> Callable[..., object]:
