@@ -202,7 +202,7 @@ def test_a_copy_holds_what_the_model_refers_to_and_nothing_else(plane, tmp_path)
     out = tmp_path / "out"
     copy(read(gtm.folder, gtm.file.jsbsim), out)
     copied = {p.relative_to(out).as_posix() for p in out.rglob("*") if p.is_file()}
-    assert copied == {"Systems/pitch-augmentation.xml", "Systems/lateral-augmentation.xml"}
+    assert copied == {"Systems/pitch-augmentation.xml"}
 
 
 def test_a_copy_of_a_model_of_the_wheel_has_no_output(tmp_path):
