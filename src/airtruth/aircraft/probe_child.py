@@ -62,8 +62,13 @@ def _load(folder: Path, table: dict[str, Any]) -> dict[str, Any]:
             "span_m": fdm["metrics/bw-ft"] * FT,
             "mass_kg": fdm["inertia/mass-slugs"] * SLUG,
             **{
-                f"inertia_{axes}_kg_m2": fdm[f"inertia/i{axes}-slugs_ft2"] * SLUG * FT**2
-                for axes in ("xx", "yy", "zz", "xz")
+                f"inertia_{axes}_kg_m2": sign * fdm[f"inertia/i{axes}-slugs_ft2"] * SLUG * FT**2
+                for axes, sign in (
+                    ("xx", 1.0),
+                    ("yy", 1.0),
+                    ("zz", 1.0),
+                    ("xz", -1.0),
+                )  # JSBSim's ixz is -Ixz
             },
         }
     }

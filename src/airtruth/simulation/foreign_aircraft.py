@@ -15,7 +15,12 @@ from airtruth.aircraft.file import FILE
 from airtruth.aircraft.jsbsim import files
 from airtruth.aircraft.jsbsim.bypass import bypass
 from airtruth.aircraft.jsbsim.confine import model_files
-from airtruth.aircraft.model import ElevatorProperties, LateralProperties, ThrottleProperties
+from airtruth.aircraft.model import (
+    ElevatorProperties,
+    LateralProperties,
+    SurfaceProperties,
+    ThrottleProperties,
+)
 from airtruth.aircraft.probe import Constants, wheel_root
 from airtruth.aircraft.write import require_new
 from airtruth.errors import AircraftError, StoreError, choices
@@ -43,6 +48,17 @@ _SENSORS: Final = {
     "elevator_rad": 0.02 * DEG,
 }
 """Noise of the sensors of a new aircraft [units of the channels] (judgement: good flight-test instruments)."""
+_LATERAL_SENSORS: Final = {
+    "beta_rad": 0.05 * DEG,
+    "p_rad_s": 0.05 * DEG,
+    "r_rad_s": 0.05 * DEG,
+    "phi_rad": 0.05 * DEG,
+    "psi_rad": 0.05 * DEG,
+    "ay_m_s2": 0.005 * G0,
+    "aileron_rad": 0.02 * DEG,
+    "rudder_rad": 0.02 * DEG,
+}
+"""The same for the lateral motion."""
 _TURN: Final = (1.6, 0.3, 1.2)
 """Step of a manoeuvre: turn of the short period in it [rad], shortest and longest step [s] (judgement)."""
 
@@ -169,7 +185,10 @@ def _written(
     table = _table(facts["jsbsim"], out.name, model, root)
     rows, flight = _rows(facts), _flight(facts)
     file = AircraftFile.model_construct(
-        name=out.name, description=f"{model} of JSBSim", jsbsim=table, sensors=_sensors()
+        name=out.name,
+        description=f"{model} of JSBSim",
+        jsbsim=table,
+        sensors=_sensors(table.aileron is not None),
     )
     heading = f"{model} of JSBSim, surveyed by airtruth; {REPORT} has the report. Author and licence: the JSBSim file."
     with new_folder(out) as made:
@@ -238,7 +257,7 @@ def _survey(folder: Path, model: str, root: str) -> Mapping[str, Any]:
 
 def _table(found: Mapping[str, Any], name: str, model: str, root: Literal[".", "wheel"]) -> JsbsimModel:
     """The [jsbsim] table with the entries that differ from their defaults."""
-    elevator = {k: v for k, v in found["elevator"].items() if v != ElevatorProperties.model_fields[k].default}
+    elevator = _stated(ElevatorProperties, found["elevator"])
     entries: dict[str, Any] = {
         "model": name if root == "." else model,
         "root": root,
@@ -246,14 +265,23 @@ def _table(found: Mapping[str, Any], name: str, model: str, root: Literal[".", "
         "throttle": ThrottleProperties(command=tuple(found["throttle"]["command"])),
     }
     entries |= {key: found[key] for key in ("set", "declare", "engine_start_s") if found[key]}
+    for name in ("aileron", "rudder"):
+        if found[name] is not None:
+            entries[name] = SurfaceProperties(**_stated(SurfaceProperties, found[name]))
     if found["lateral"] is not None:
         entries["lateral"] = LateralProperties(**found["lateral"])
     return JsbsimModel(**entries)
 
 
-def _sensors() -> dict[str, Sensor]:
+def _stated(kind: type[SurfaceProperties], found: Mapping[str, Any]) -> dict[str, Any]:
+    """Entries of a control's table that differ from their defaults."""
+    return {k: v for k, v in found.items() if v != kind.model_fields[k].default}
+
+
+def _sensors(lateral: bool) -> dict[str, Sensor]:
+    noise = _SENSORS | (_LATERAL_SENSORS if lateral else {})
     source = "assumed by airtruth"
-    return {name: Sensor(noise_std=Quantity(value=std, source=source)) for name, std in _SENSORS.items()}
+    return {name: Sensor(noise_std=Quantity(value=std, source=source)) for name, std in noise.items()}
 
 
 def _rows(facts: Mapping[str, Any]) -> tuple[str, ...]:

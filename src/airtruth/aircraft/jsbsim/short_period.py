@@ -97,7 +97,7 @@ def _metrics(c: Constants) -> str:
 def _mass_balance(c: Constants) -> str:
     unit = SLUG * FT**2  # JSBSim's factors for SI have six digits
     inertia = c.inertia_yy_kg_m2 / unit
-    return f"""  <mass_balance>
+    return f"""  <mass_balance negated_crossproduct_inertia="false">
     <ixx unit="SLUG*FT2"> {_n(c.inertia_xx_kg_m2 / unit or inertia)} </ixx>
     <iyy unit="SLUG*FT2"> {_n(inertia)} </iyy>
     <izz unit="SLUG*FT2"> {_n(c.inertia_zz_kg_m2 / unit or inertia)} </izz>

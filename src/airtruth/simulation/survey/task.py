@@ -18,6 +18,7 @@ from airtruth.isolation.protocol import Reply
 from airtruth.simulation.survey import bench as benches
 from airtruth.simulation.survey import controls, engines, envelope
 from airtruth.simulation.survey.bench import Bench
+from airtruth.simulation.survey.lateral import with_lateral_controls
 from airtruth.simulation.survey.names import ModelNames, names_of
 
 _ABSENT: Final = re.compile(r"property (\S+) does not exist")
@@ -71,13 +72,16 @@ def _examined(folder: Path, model: JsbsimModel, names: ModelNames) -> dict[str, 
     found = controls.elevator_of(powered.bench, names)
     notes += found.notes
     decisions += found.decisions
-    bench = powered.bench.known(elevator=found.elevator)
+    bench = powered.bench.known(elevator=ElevatorProperties(**found.surface.model_dump()))
     bench, more, to_decide = controls.without_feedback(bench, names)
     notes += more
     decisions += to_decide
     integrating = controls.integrated(bench, names) if bench.model.elevator.feedback else []
     if bench.model.elevator.surface in integrating:
         return {"integrating": integrating, "jsbsim": bench.model.model_dump()}
+    bench, more, to_decide = with_lateral_controls(bench, names)
+    notes += more
+    decisions += to_decide
     lateral, more = controls.lateral_of(bench)
     notes += more
     bench = bench.known(lateral=lateral)
