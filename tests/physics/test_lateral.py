@@ -22,9 +22,11 @@ GTM = SimpleNamespace(
 )
 """NASA GTM T-2, GTM_DesignSim."""
 THETA = np.array(
-    [-1.0158, 0.063, 0.8565, -0.0157, 0.3406]
-    + [-0.1403, -0.3352, 0.1472, -0.0718, 0.0266]
-    + [0.2185, -0.0528, -0.3897, -0.0035, -0.1700]
+    [
+        *(-1.0158, 0.063, 0.8565, -0.0157, 0.3406),
+        *(-0.1403, -0.3352, 0.1472, -0.0718, 0.0266),
+        *(0.2185, -0.0528, -0.3897, -0.0035, -0.1700),
+    ]
 )
 """Derivatives of the GTM at 75 kt EAS, 7000 ft, from an independent six-degree-of-freedom integration of NASA's tables."""
 SPEED = 42.85
