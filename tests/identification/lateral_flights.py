@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from airtruth.logs.flight_log import Batch
+from airtruth.logs.flight_log import Batch, FlightLog
 from airtruth.units import DEG, FT, G0, KT, LB, SLUG
 
 SLUG_FT2 = SLUG * FT**2
@@ -176,3 +176,28 @@ def fly(runs=2, seconds=10.0, degrees=3.0, sigma=0.0, noise=1.0, seed=0, theta=T
     picked = {name: np.ascontiguousarray(values[:, ::PICK]) for name, values in channels.items()}
     times = np.tile(t[::PICK], (runs, 1))
     return Batch(tuple(f"r{k}" for k in range(runs)), PICK / RATE, times, picked)
+
+
+def log_of(batch, elevator_degrees=0.0):
+    """The runs as a `FlightLog` that holds the longitudinal channels as well; the elevator moves in a doublet of its own."""
+    rng = np.random.default_rng(5)
+    shape = batch.t_s.shape
+    elevator = elevator_degrees * DEG * np.sign(np.sin(2.0 * np.pi * batch.t_s)) * (batch.t_s < 2.0)
+    # a slow pitching of the path, so that theta, q and az agree
+    theta = ALPHA + 0.02 * np.sin(1.5 * batch.t_s)
+    q = 0.03 * np.cos(1.5 * batch.t_s)
+    channels = {
+        **batch.channels,
+        "theta_rad": theta + 3e-4 * rng.standard_normal(shape),
+        "q_rad_s": q + batch.channels["q_rad_s"],
+        "az_m_s2": -G0 * np.cos(theta) - SPEED * q + 0.06 * rng.standard_normal(shape),
+        "elevator_rad": elevator + 1e-5 * rng.standard_normal(shape),
+    }
+    runs, samples = shape
+    return FlightLog(
+        metadata={"schema": 1, "aircraft": "gtm", "sample_rate_hz": round(1.0 / batch.dt_s)},
+        run_ids=batch.run_ids,
+        offsets=samples * np.arange(runs + 1),
+        t_s=batch.t_s.ravel(),
+        channels={name: values.ravel() for name, values in channels.items()},
+    )

@@ -10,7 +10,7 @@ Identification", eqs (2)-(4) (short period).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
@@ -177,6 +177,10 @@ class Motion:
     declared: tuple[str, ...]
     modes: tuple[Mode, ...]
     required: tuple[str, ...]
+
+    def __reduce__(self) -> tuple[Callable[[str], Motion], tuple[str]]:
+        """Pickle the name: a motion is the same object in every process."""
+        return _named, (self.name,)
 
     @cached_property
     def derivatives(self) -> tuple[Derivative, ...]:
@@ -347,6 +351,11 @@ LATERAL: Final = Motion(
 
 MOTIONS: Final[Mapping[str, Motion]] = MappingProxyType({m.name: m for m in (LONGITUDINAL, LATERAL)})
 """Name -> motion, in the order of answers."""
+
+
+def _named(name: str) -> Motion:
+    return MOTIONS[name]
+
 
 __all__ = [
     "LATERAL",

@@ -14,7 +14,7 @@ Source: V. Klein and E. A. Morelli, Aircraft System Identification, AIAA, 2006, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -122,6 +122,29 @@ def known_inputs(batch: Batch) -> Known:
     return Known(beta, phi, alpha, theta, q, trend)
 
 
+def assumed(channels: Collection[str]) -> list[str]:
+    """Sentences on the channels that a lateral identification replaces by the steady flight or reconstructs."""
+    notes = []
+    if not {"alpha_rad", "theta_rad"} & set(channels):
+        notes.append(
+            "lateral motion: without alpha_rad and theta_rad the flight path and the body are taken as level"
+        )
+    elif "alpha_rad" not in channels:
+        notes.append("lateral motion: without alpha_rad the path is taken as level, alpha as theta")
+    elif "theta_rad" not in channels:
+        notes.append("lateral motion: without theta_rad the path is taken as level, theta as alpha")
+    if "q_rad_s" not in channels:
+        notes.append("lateral motion: without q_rad_s the products of the rates are left out")
+    if "phi_rad" not in channels and "beta_rad" not in channels:
+        notes.append("lateral motion: phi is integrated from p and r, from level wings")
+    if "beta_rad" not in channels:
+        notes.append(
+            "lateral motion: beta is reconstructed from ay, p, r and phi, and a trend in time is free in each equation; gusts "
+            "are no part of it, so that the derivatives of beta err in turbulence"
+        )
+    return notes
+
+
 def integrated(rate: Array, dt_s: float) -> Array:
     """(runs, samples) integral of a rate from 0, by the cubic through the four nearest samples of each cell."""
     edge = np.concatenate([rate[:, :1], rate, rate[:, -1:]], axis=1)
@@ -201,6 +224,7 @@ __all__ = [
     "Each",
     "Known",
     "Observation",
+    "assumed",
     "condition_of",
     "integrated",
     "known_inputs",
