@@ -112,7 +112,7 @@ def test_files_of_both_motions_do_not_mix(tmp_path):
 
 def test_a_pickled_estimate_keeps_its_motion():
     made = identify(LOG, GTM, ["ls"], motion=LATERAL).of("ls")
-    again = pickle.loads(pickle.dumps(made))  # noqa: S301
+    again = pickle.loads(pickle.dumps(made))
     assert again.motion is LATERAL
     pd.testing.assert_frame_equal(estimates_table(again), estimates_table(made))
     assert replace(made, method="x").motion is LATERAL

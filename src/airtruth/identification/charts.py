@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.charts import Cells, Chart, Colour, Mark, Panel, Rule
-from airtruth.identification.stored import motion_of
 from airtruth.numerics.order_statistics import quantiles
-from airtruth.physics.motion import LONGITUDINAL, Motion
+from airtruth.physics.motion import LONGITUDINAL, Motion, motion_of
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -49,6 +49,9 @@ CHANGES: Final = 0.2
 """Range of the dynamic pressure in a record over its mean from which a method that takes it for constant is in doubt [-]. In 180
 records of a small aircraft, the 95 % intervals of Cmalpha by iv-f1 contain the truth in 0.90 of those with a smaller range and in
 0.27 of the others (`python -m studies.small_aircraft_intervals --flights 30 --method iv-f1`)."""
+COLOURED: Final = 0.2
+"""Correlation of neighbouring innovations from which they count as coloured [-] (judgement: intervals of a white noise are then
+too narrow by a factor of sqrt(1.2/0.8), 1.2)."""
 SOME: Final = 0.1
 """Least share of the records that the sentence about it needs [-] (judgement)."""
 LIKELY: Final = (
@@ -80,6 +83,7 @@ def doubts(parts: Parts, dt_s: float = 0.0) -> list[str]:
     result: list[str] = []
     for i, method in enumerate(own):
         result += method.missing()
+        result += method.not_white()
         result += method.undetermined(_variances(parts, i))
         result += method.dulled(dt_s)
     result = [sentence for method in own for sentence in method.wrong_signs()] + result
@@ -149,6 +153,7 @@ class _Method:
         self.name, self.covariance_name = first.method, first.covariance_name
         self.names, self.expected = first.motion.parameters, EXPECTED[first.motion.name]
         self.size = np.array([self.expected.sizes[name] for name in self.names])
+        self.coloured, self.memory = 0, 0.0
         self.runs = self.bare = self.aperiodic = self.known = self.open = 0
         self.absent: Counter[int] = Counter()
         self.periodic, self.summed_rad_s = 0, 0.0
@@ -179,6 +184,11 @@ class _Method:
         self.open += int(open_ones.any(axis=1).sum())
         chosen = np.flatnonzero(known)[open_ones.any(axis=1)]
         self.relative += (one.covariance[chosen] / np.outer(self.size, self.size)).sum(axis=0)
+        if one.memory is not None:
+            with np.errstate(invalid="ignore"):
+                coloured = one.memory > COLOURED
+            self.coloured += int(coloured.sum())
+            self.memory += float(one.memory[coloured].sum())
         half = half_width(one.confidence) * deviations(one)
         for name, (sign, _) in self.expected.signs.items():
             i = self.names.index(name)
@@ -209,6 +219,19 @@ class _Method:
                 else "the information of the record is singular, or the method did not converge"
             )
             yield f"{self.name}: no intervals{_some(self.bare, self.runs)}: {why}."
+
+    def not_white(self) -> Iterator[str]:
+        """Innovations with a memory in at least half of the runs: the model lacks what they hold."""
+        if self.coloured and 2 * self.coloured >= self.runs:
+            still = self.name == "output-error"
+            cause = "turbulence, which this method lacks, or " if still else ""
+            cure = "Use filter-error, or look" if still else "Look"
+            yield (
+                f"Warning: {self.name}: the residuals are not white{_some(self.coloured, self.runs)}: neighbouring ones have a "
+                f"correlation of {self.memory / self.coloured:.2g} on average. The cause is {cause}aerodynamics that the linear "
+                f"model lacks; the intervals are too narrow, and the estimates can be wrong. {cure} for the cause "
+                "(`airtruth trace`)."
+            )
 
     def undetermined(self, variances: Blocks) -> Iterator[str]:
         """Parameters that most of the runs leave open, and the direction in which they may change together."""

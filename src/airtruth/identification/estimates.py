@@ -65,6 +65,7 @@ class Estimates:
     scale : factors (runs,) of the flight condition that theta refers to.
     confidence : probability of the intervals [-].
     motion : whose derivatives they are.
+    memory : (runs,) largest correlation of neighbouring innovations of an output [-]; None where the method makes none.
     """
 
     method: str
@@ -77,6 +78,7 @@ class Estimates:
     scale: AnyScale
     confidence: float
     motion: Motion = LONGITUDINAL
+    memory: Array | None = None
 
     @property
     def converged(self) -> NDArray[np.bool_]:
@@ -124,6 +126,7 @@ class Estimates:
             status=self.status[part],
             iterations=self.iterations[part],
             scale=chosen(self.scale, part),
+            memory=None if self.memory is None else self.memory[part],
         )
 
 
@@ -171,7 +174,13 @@ def concatenated(parts: Sequence[Estimates], run_ids: Sequence[str]) -> Estimate
         status=np.concatenate([part.status for part in parts])[order],
         iterations=np.concatenate([part.iterations for part in parts])[order],
         scale=chosen(scale, order),
+        memory=_joined_memory([part.memory for part in parts], order),
     )
+
+
+def _joined_memory(parts: Sequence[Array | None], order: slice | NDArray[np.int64]) -> Array | None:
+    known = [part for part in parts if part is not None]
+    return np.concatenate(known)[order] if len(known) == len(parts) else None
 
 
 def chosen(scale: S, runs: slice | NDArray[np.int64]) -> S:

@@ -161,7 +161,7 @@ def with_constants(
             values = values_of(own, motion)
             key = (*astuple(values), -1.0 if cg is None else cg)
             groups.setdefault(key, []).append(run)
-            owners.setdefault(key, (values if motion is LATERAL else own, cg))
+            owners.setdefault(key, (own, cg))
         for key, runs in groups.items():
             yield Part(batch if len(groups) == 1 else _some(batch, runs), *owners[key])
 

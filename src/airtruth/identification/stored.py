@@ -16,7 +16,7 @@ from typing_extensions import TypedDict
 from airtruth.errors import StoreError
 from airtruth.logs.store import read_metadata, read_table
 from airtruth.logs.tables import Kind, group_ends, read_group, read_rows, require_kinds
-from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
+from airtruth.physics.motion import motion_of
 
 KEY: Final = "estimates"
 """Key of the file-level JSON that holds a record for each method."""
@@ -24,12 +24,6 @@ KEYS: Final = ("run_id", "method")
 """Columns that identify a row."""
 _STEP: Final = "choose another --out, or replace it with --force"
 """Next step of a user whose file cannot be merged into."""
-
-
-def motion_of(columns: Iterable[str]) -> Motion:
-    """The motion whose derivatives are among the columns of a table of estimates; the longitudinal one if none is."""
-    names = set(columns)
-    return next((m for m in MOTIONS.values() if names.issuperset(m.parameters)), LONGITUDINAL)
 
 
 class Record(TypedDict):
@@ -148,4 +142,4 @@ def _require_estimates(path: Path, frame: pd.DataFrame) -> None:
 _OPTIONAL: Final[dict[str, Kind]] = {"converged": "flag", "iterations": "number", "status": "text"}
 """Columns that older files may lack."""
 
-__all__ = ["KEY", "KEYS", "Record", "Stored", "motion_of", "open_stored", "read_stored"]
+__all__ = ["KEY", "KEYS", "Record", "Stored", "open_stored", "read_stored"]

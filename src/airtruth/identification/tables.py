@@ -21,8 +21,7 @@ from airtruth.identification.estimates import (
     quantities,
 )
 from airtruth.identification.methods import title
-from airtruth.identification.stored import motion_of
-from airtruth.physics.motion import LONGITUDINAL, Motion
+from airtruth.physics.motion import LONGITUDINAL, Motion, motion_of
 from airtruth.table import Cell, Group, Interval, Number, Pair, Table, flat
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ Identification", eqs (2)-(4) (short period).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
@@ -353,6 +353,12 @@ MOTIONS: Final[Mapping[str, Motion]] = MappingProxyType({m.name: m for m in (LON
 """Name -> motion, in the order of answers."""
 
 
+def motion_of(columns: Iterable[str]) -> Motion:
+    """The motion whose derivatives are among the columns of a table of estimates; the longitudinal one if none is."""
+    names = set(columns)
+    return next((m for m in MOTIONS.values() if names.issuperset(m.parameters)), LONGITUDINAL)
+
+
 def _named(name: str) -> Motion:
     return MOTIONS[name]
 
@@ -370,4 +376,5 @@ __all__ = [
     "Reference",
     "Signal",
     "State",
+    "motion_of",
 ]
