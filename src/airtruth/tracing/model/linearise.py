@@ -27,11 +27,11 @@ ANGLE_RAD: Final = 0.01
 """Half width of the central differences in angles [rad]. Judgement: wide enough to average a break of a table, so that
 the gain does not jump with the reference; the curvature of the sines over it is 2e-5."""
 RATE_RAD_S: Final = 0.05
-"""The same in the pitch rate [rad/s]."""
+"""Half width of the central differences in rates [rad/s]."""
 _GUSTS: Final = CORE - GUST_1
 """Number of states of the gusts, which follow those of the motion [-]."""
 _GUST: Final = 0.1
-"""The same in a gust state that does not move alpha [-]."""
+"""Half width of the central differences in a gust state that does not move alpha [-]."""
 
 
 class FirstUpdate(NamedTuple):

@@ -29,11 +29,12 @@ _CARRIED: Final[tuple[Kind, ...]] = ("arm", "lag", "delay", "scale")
 _UNCONSTRAINED_STD: Final = 10.0
 """Prior standard deviation of an unconstrained derivative in alpha [1/rad]: twice a lift slope (judgement)."""
 _UNCONSTRAINED_TRIM_STD: Final = 0.5
-"""The same of its coefficient at the trim [-]: a curvature of 40 about zero gives 0.4 at 0.1 rad (judgement)."""
+"""Prior standard deviation of the coefficient at the trim beside an unconstrained derivative [-]: a curvature of 40 about zero
+gives 0.4 at 0.1 rad (judgement)."""
 _NOISE_STD: Final = 0.1
 """Prior standard deviation of the logarithm of declared noise [-]: data sheets are right within 10 % (judgement)."""
 _NOISE_UNKNOWN_STD: Final = 1.0
-"""The same where the noise is not declared [-]: a factor of e (judgement)."""
+"""Prior standard deviation of the logarithm of the noise where none is declared [-]: a factor of e (judgement)."""
 _NOISE: Final = (0.1 * DEG, 0.3 * DEG, 0.1)
 """Noise of alpha [rad], q [rad/s], az [m/s2] where none is declared: small flight-test instruments (judgement)."""
 _RESOLUTION: Final = 0.01

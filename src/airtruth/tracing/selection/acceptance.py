@@ -47,8 +47,8 @@ IMPROBABLE: Final = 0.001
 _ALPHA_DOT: Final = "alpha_dot_hat"
 """Signal of a term in alpha_dot c/(2V)."""
 _SLIGHT: Final = 0.25
-"""Share of a declared size by which an effect may exceed the removal of all of it [-] (judgement: a flight tells a term in
-alpha_dot to about that)."""
+"""Overshoot allowed to an effect that cancels a declared term, as a fraction of that term [-] (judgement: a flight tells a
+term in alpha_dot to about that)."""
 _ERRORS: Final = 2.0
 """Standard errors that count as a difference [-] (convention)."""
 _FREE_ERRORS: Final = 3.0

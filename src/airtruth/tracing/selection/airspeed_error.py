@@ -109,7 +109,7 @@ def _most_probable(
         inserted(base, null.layout.sizes.stop, t, np.zeros((len(t), 3, 3)))
         for base, t in zip(null.sensitivities, further, strict=True)
     ]
-    gradient, information = projected(null, problem, sensitivities, NO_WHITENER, len(stds))
+    gradient, information = projected(null, problem, sensitivities, NO_WHITENER)
     scaled = information * np.outer(stds, stds) + np.eye(len(stds))
     amounts = -np.linalg.solve(scaled, stds * gradient)
     limit = float(chi2.ppf(_PLAUSIBLE, len(stds)))

@@ -122,14 +122,13 @@ def with_freedoms(
     levels: bool = False,
 ) -> tuple[Array, Array]:
     """`projected`, each direction with the derivatives that its effect leaves unconstrained."""
-    count = len(tried)
-    gradient, information = projected(null, problem, sensitivities, whitener, count, levels)
+    gradient, information = projected(null, problem, sensitivities, whitener, levels)
     kept = null.hypothesis.unconstrained
     freedoms = [null.hypothesis.plus(d.effect).unconstrained for d in tried]
     for free in sorted({f for f in freedoms if f != kept}):
         rows = [i for i, f in enumerate(freedoms) if f == free]
         freer = replace(null, hypothesis=replace(null.hypothesis, also_unconstrained=free))
-        g, h = projected(freer, problem, sensitivities, whitener, count, levels)
+        g, h = projected(freer, problem, sensitivities, whitener, levels)
         gradient[rows] = g[rows]
         information[rows], information[:, rows] = h[rows], h[:, rows]
     return gradient, information
@@ -140,14 +139,13 @@ def projected(
     problem: TraceProblem,
     sensitivities: Sequence[Sensitivities],
     whitener: Whitener,
-    count: int,
     levels: bool = False,
 ) -> tuple[Array, Array]:
     """Gradient and information of further directions, nuisance parameters eliminated, priors included.
 
     Parameters
     ----------
-    sensitivities : of each record, with ``count`` directions after the sizes of the null.
+    sensitivities : of each record, with the directions after the sizes of the null.
     levels : whether noise and gust levels count.
     """
     terms = [likelihood_terms(t, whitener, levels) for t in sensitivities]

@@ -46,7 +46,8 @@ AS_PROBABLE: Final = 0.1
 """Posterior weight over that of the most probable effects from which fewer effects are preferred [-] (judgement: a further cause
 is named where the odds for it are strong, from ten to one by H. Jeffreys, Theory of Probability, 3rd ed. (1961), appendix B)."""
 _AS_PROBABLE_IN_EVENT: Final = 0.5
-"""The same for a further cause of the same event [-] (judgement: a changed loading changes CG, mass and inertia, as a rule)."""
+"""Posterior weight over that of the most probable effects from which fewer effects of the same event are preferred [-]
+(judgement: a changed loading changes CG, mass and inertia, as a rule)."""
 _NEGLIGIBLE: Final = 60.0
 """Log-posterior behind the most probable set from which a set is left out [-] (judgement: twice what a refit may still change).
 """

@@ -111,7 +111,7 @@ def anomalies(null: PosteriorFit, problem: TraceProblem, whitener: Whitener) -> 
         inserted(base, null.layout.sizes.stop, t, np.zeros((len(t), 3, 3)))
         for base, t in zip(null.sensitivities, extra, strict=True)
     ]
-    gradient, information = projected(null, problem, extended, whitener, len(extra[0]))
+    gradient, information = projected(null, problem, extended, whitener)
     found, at = [], 0
     for name, series in built[0].items():
         span = slice(at, at + len(series))

@@ -61,8 +61,9 @@ NOTHING_KNOWN: Final[Mapping[str, float]] = MappingProxyType({})
 NOTHING_DECLARED: Final = DeclaredCauses(wrong_allowed=False)
 """No explanation of a contradiction: the declared derivatives are not tested."""
 _STRAINED: Final = 15.0
-"""Log-posterior that an explanation of the derivatives loses to derivatives without a prior, from which effects are
-refitted from the declared aircraft [-] (judgement: one physical cause loses 6, two wrong declarations lose 8)."""
+"""Loss of log-posterior against unconstrained derivatives above which a sensor error may be hidden in an explanation of the
+derivatives, so that effects are refitted from the declared aircraft [-] (judgement: one physical cause loses 6, two wrong
+declarations lose 8)."""
 _RELEASE_LEADS: Final = 30.0
 """Gain in 2 log L by which released derivatives have to lead for no effect to be followed beside them [-] (judgement: what a
 later effect may still add to it)."""
