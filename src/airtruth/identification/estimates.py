@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from airtruth.identification.covariance_columns import correlation_columns
+from airtruth.identification.record_constants import Constants
 from airtruth.physics.short_period import MODAL, PARAMETERS, Scale, modal, system
 
 if TYPE_CHECKING:
@@ -246,8 +248,16 @@ def half_width(confidence: float) -> float:
     return float(ndtri(0.5 + 0.5 * confidence))
 
 
-def estimates_table(estimates: Estimates) -> pd.DataFrame:
-    """One row per run: run_id, method, converged, iterations, then NAME, NAME_std, ..._upper, then status."""
+def estimates_table(estimates: Estimates, constants: Constants | None = None) -> pd.DataFrame:
+    """One row per run: run_id, method, converged, iterations, then NAME, NAME_std, ..._upper, then status.
+
+    Behind them, correlations of the derivatives (`correlation_columns`) and, with the constants, the flight condition:
+    airspeed_m_s, density_kg_m3 (for the mass of the constants, also of a run that states another mass).
+
+    Parameters
+    ----------
+    constants : of the aircraft; None leaves the flight condition out.
+    """
     import pandas as pd
 
     q = quantities(estimates)
@@ -263,4 +273,10 @@ def estimates_table(estimates: Estimates) -> pd.DataFrame:
         columns[f"{name}_lower"] = q.lower[:, i]
         columns[f"{name}_upper"] = q.upper[:, i]
     columns["status"] = np.array(list(SENTENCES.values()), dtype=object)[estimates.status].tolist()
+    columns |= correlation_columns(estimates.covariance)
+    if constants is not None:
+        airspeed = np.broadcast_to(estimates.scale.airspeed_m_s, len(estimates.run_ids))
+        pressure = estimates.scale.normal * constants.mass_kg / constants.wing_area_m2
+        columns["airspeed_m_s"] = airspeed
+        columns["density_kg_m3"] = 2.0 * pressure / airspeed**2
     return pd.DataFrame(columns)
