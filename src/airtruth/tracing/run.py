@@ -21,12 +21,13 @@ from airtruth.logs import atomic
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.provenance import Provenance, digests_of
 from airtruth.logs.sources import Logs, named_logs
-from airtruth.tracing.answer import ANSWER, DECLARED_LEVEL
+from airtruth.tracing.answer import ANSWER, DECLARED_LEVEL, TraceAnswer
 from airtruth.tracing.axial_force import axial_force
 from airtruth.tracing.conclude import conclude
 from airtruth.tracing.declared_model import declared_p_value
 from airtruth.tracing.kinematic_start import (
     kinematic_check,
+    names_a_sensor,
     sets_of,
     starts_of,
     with_contradictions,
@@ -114,18 +115,23 @@ def _traced(
     advance("compare ax with the declared axial force")
     axial = axial_force(stages, checked, declared, rounds[-1].gls) if options.learns else None
     origin = provenance_of(logs, declared, options)
-    dt_s = _longest_period_s(case)
+
+    def compared(answer: TraceAnswer) -> TraceAnswer:
+        whole = kinematics
+        if held and kinematics is not None and names_a_sensor(answer):
+            whole = kinematic_check(checked, declared, ())
+        answer = with_contradictions(answer, kinematics, _longest_period_s(case), whole)
+        return replace(answer, notes=(*remarks, *answer.notes))
+
     if out is None:
-        answer = with_contradictions(conclude(stages, rounds, forced=forced, axial=axial), kinematics, dt_s)
-        answer = replace(answer, notes=(*remarks, *answer.notes))
+        answer = compared(conclude(stages, rounds, forced=forced, axial=axial))
         return TraceResult(answer, rounds, stages, origin)
     advance("write the updated aircraft")
     atomic.remove_file(out / ANSWER)  # an interrupted trace has no answer, not one of another trace
     contradicted = declared_p_value(rounds) <= DECLARED_LEVEL
     updated = write_update(case, rounds, declared, out, contradicted, axial)
     replay = flown_again(stages, declared, updated)
-    answer = with_contradictions(conclude(stages, rounds, updated, replay, forced, axial), kinematics, dt_s)
-    answer = replace(answer, notes=(*remarks, *answer.notes))
+    answer = compared(conclude(stages, rounds, updated, replay, forced, axial))
     result = TraceResult(answer, rounds, stages, origin)
     result.write(out)
     return result
