@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import time
 
@@ -21,6 +22,7 @@ from airtruth.simulation.campaign import plan
 from airtruth.simulation.campaign import run as campaign
 from airtruth.simulation.campaign.air import air_of
 from airtruth.simulation.campaign.write import as_toml
+from airtruth.starting.examples import data_root
 from airtruth.units import DEG
 
 AILERON = {"control": "aileron", "kind": "121", "amplitude_deg": 3.0, "start_s": 0.5, "step_s": 0.2}
@@ -323,16 +325,14 @@ def test_bad_campaigns_are_refused_with_the_place(tmp_path, case):
 
 
 def test_an_aircraft_without_lateral_controls_is_refused(tmp_path):
-    changes = {"aircraft": "T38", "condition": {"eas_kt": 300.0, "altitude_ft": 10000.0}, "gust": None}
-    ended = command(
-        "fly",
-        write(tmp_path / "campaign.toml", manoeuvre=[AILERON], **changes),
-        "--out",
-        tmp_path / "out",
-        "--dry-run",
-    )
+    folder = shutil.copytree(data_root().parent / "aircraft" / "gtm", tmp_path / "plane")
+    file = folder / "aircraft.toml"
+    before, _, rest = file.read_text().partition("[jsbsim.rudder]")
+    file.write_text(before + rest[rest.index("[jsbsim.") :])
+    campaign_path = write(tmp_path / "campaign.toml", aircraft=str(folder), manoeuvre=[AILERON])
+    ended = command("fly", campaign_path, "--out", tmp_path / "out", "--dry-run")
     assert ended.code == 2
-    assert "manoeuvre.control: T38 has no [jsbsim.aileron] in its aircraft.toml" in ended.err
+    assert "manoeuvre.control: gtm has no [jsbsim.rudder] in its aircraft.toml" in ended.err
 
 
 def test_a_lateral_campaign_is_written_and_read_again(tmp_path):
