@@ -20,9 +20,13 @@ from airtruth.simulation.foreign_aircraft import LATERAL_CAMPAIGN, REPORT, new_f
 from airtruth.units import DEG
 from studies.foreign_fleet import AIRCRAFT
 
-MODES = ("dutch_roll_wn_rad_s", "dutch_roll_zeta", "roll_1_s", "spiral_1_s")
-TRIM = ("trim_beta_rad", "trim_aileron_rad", "trim_rudder_rad")
+COLUMNS = (
+    ("sideslip, aileron, rudder of the trim [deg]", ("trim_beta_rad", "trim_aileron_rad", "trim_rudder_rad")),
+    ("Dutch roll [rad/s], damping", ("dutch_roll_wn_rad_s", "dutch_roll_zeta")),
+    ("roll, spiral [1/s]", ("roll_1_s", "spiral_1_s")),
+)
 RANGES = ("beta_rad", "phi_rad", "aileron_rad", "rudder_rad")
+MOVES = "sideslip, bank, aileron and rudder move by [deg]"
 
 
 def row(name: str, out: Path) -> str:
@@ -41,8 +45,15 @@ def row(name: str, out: Path) -> str:
     first = truth.iloc[0]
     channels = [read_log(path).channels for path in sorted((logs / "logs").glob("*.parquet"))]
     ranges = [max(float(np.ptp(c[n])) for c in channels) / DEG for n in RANGES]
-    cells = [f"{first[n] / DEG:.2f}" for n in TRIM] + [f"{first[n]:.3g}" for n in MODES]
-    return f"| {name} | {' | '.join(cells + [f'{x:.1f}' for x in ranges])} |"
+    cells = [", ".join(shown(name, float(first[name])) for name in names) for _, names in COLUMNS]
+    return f"| {' | '.join([name, *cells, ', '.join(f'{x:.1f}' for x in ranges)])} |"
+
+
+def shown(name: str, value: float) -> str:
+    """A value of truth.parquet in the table; angles in degrees."""
+    if name.endswith("_rad"):
+        return f"{round(value / DEG, 2) + 0.0:.2f}"
+    return f"{value:.3g}"
 
 
 def main() -> None:
@@ -51,8 +62,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--aircraft", nargs="+", default=AIRCRAFT)
     options = parser.parse_args()
-    print("| aircraft | " + " | ".join((*TRIM, *MODES, *RANGES)) + " |")
-    print("|---" * (1 + len(TRIM) + len(MODES) + len(RANGES)) + "|")
+    print("| aircraft | " + " | ".join((*(title for title, _ in COLUMNS), MOVES)) + " |")
+    print("|---" * (2 + len(COLUMNS)) + "|")
     for name in options.aircraft:
         try:
             print(row(name, options.out), flush=True)
