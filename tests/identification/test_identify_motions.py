@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from lateral_flights import GTM, NAMES, THETA, fly, log_of
 
 from airtruth import identification
 from airtruth.errors import ConfigurationError, LogError, StoreError
@@ -15,8 +14,9 @@ from airtruth.identification import answers, identify, quantities
 from airtruth.identification.estimates import estimates_table
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
+from validation.affine_lateral import GTM, NAMES, THETA, fly, log_of, pitching
 
-LOG = log_of(fly(runs=3, sigma=0.3, seed=2))
+LOG = log_of(fly(q=pitching, runs=3, gust=0.4, seed=2))
 
 
 def test_records_of_the_lateral_surfaces_are_answered_by_the_lateral_motion():
@@ -27,7 +27,7 @@ def test_records_of_the_lateral_surfaces_are_answered_by_the_lateral_motion():
 
 
 def test_a_log_of_both_kinds_of_records_is_answered_by_both():
-    pitch = log_of(fly(runs=2, degrees=0.0, seed=4), elevator_degrees=2.0)
+    pitch = log_of(fly(q=pitching, runs=2, degrees=0.0, seed=4), elevator_degrees=2.0)
     pitch = FlightLog(pitch.metadata, ("p0", "p1"), pitch.offsets, pitch.t_s, pitch.channels)
     both = FlightLog.concat([pitch, LOG])
     asked, _ = answers(both, GTM, ["ls", "iv-f2"])

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lateral_flights import GTM, NAMES, THETA, fly, log_of
 
 from airtruth.identification import Options, identify, identify_batch, identify_joint
 from airtruth.identification.lateral.observation import condition_of, known_inputs
@@ -15,6 +14,7 @@ from airtruth.identification.likelihood.predictor import layout
 from airtruth.numerics.discretise import assemble
 from airtruth.physics.lateral import lateral_system
 from airtruth.physics.motion import LATERAL
+from validation.affine_lateral import GTM, NAMES, THETA, fly, log_of, pitching
 
 DETERMINED = [NAMES.index(n) for n in ("CYbeta", "Clbeta", "Clp", "Clda", "Cnbeta", "Cndr")]
 QUIET = fly(runs=2, noise=1e-3)
@@ -54,7 +54,7 @@ def test_predictor_has_the_matrices_of_the_linear_model():
 
 
 def test_gradient_is_that_of_differences():
-    batch = fly(runs=1, seconds=6.0, sigma=0.5, seed=8)
+    batch = fly(runs=1, seconds=6.0, gust=0.6, seed=8)
     data = records_of(batch, GTM, Options(), 533.4, gusts=True)
     noise = np.log([0.6, 6e-4, 9e-3, 6e-3, 9e-4, 0.064, 0.01, 0.01])
     z = np.concatenate([1.02 * THETA, noise])[None]
@@ -78,7 +78,7 @@ def test_records_without_a_vane_or_bank_are_fitted():
 
 
 def test_constant_pressure_is_a_choice():
-    batch = fly(runs=2, sigma=0.6, seed=1)
+    batch = fly(runs=2, gust=0.75, seed=1)
     for method in ("filter-error", "frequency"):
         one, other = (
             identify_batch(batch, GTM, method, Options(pressure=p), LATERAL).theta
@@ -88,18 +88,18 @@ def test_constant_pressure_is_a_choice():
 
 
 def test_output_error_in_turbulence_is_warned_about():
-    log = log_of(fly(runs=2, sigma=0.6, seed=6))
+    log = log_of(fly(q=pitching, runs=2, gust=0.75, seed=6))
     noted = identify(log, GTM, ["output-error", "filter-error"], motion=LATERAL).notes
     warned = [note for note in noted if "not white" in note]
     assert len(warned) == 1
     assert warned[0].startswith("Warning: output-error: the residuals are not white in 2 of 2 runs")
     assert "Use filter-error" in warned[0]
-    calm = log_of(fly(runs=2, seed=6))
+    calm = log_of(fly(q=pitching, runs=2, seed=6))
     assert not any("not white" in n for n in identify(calm, GTM, ["output-error"], motion=LATERAL).notes)
 
 
 def test_joint_estimates_are_better_than_single_ones():
-    batch = fly(runs=4, sigma=0.6, seed=11)
+    batch = fly(runs=4, gust=0.75, seed=11)
     for method in ("filter-error", "frequency"):
         joint = identify_joint([batch], GTM, method, motion=LATERAL)
         single = identify_batch(batch, GTM, method, motion=LATERAL)
@@ -117,10 +117,10 @@ def test_a_band_with_too_few_frequencies_is_refused():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sigma", [0.0, 0.64])
-def test_filter_error_states_its_error(sigma):
+@pytest.mark.parametrize("gust", [0.0, 1.0])
+def test_filter_error_states_its_error(gust):
     """150 runs of 15 derivatives: coverage within 2.5 standard errors of 95 %, errors as stated."""
-    batch = fly(runs=150, sigma=sigma, seed=1)
+    batch = fly(runs=150, gust=gust, seed=1)
     made = identify_batch(batch, GTM, "filter-error", motion=LATERAL)
     assert made.converged.all()
     error = made.theta - THETA

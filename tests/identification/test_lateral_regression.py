@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lateral_flights import ALPHA, DENSITY, GTM, NAMES, SPEED, THETA, fly
 from scipy.signal import butter, sosfiltfilt
 
 from airtruth.identification.estimates import Status, quantities
@@ -14,9 +13,10 @@ from airtruth.identification.lateral.solve import POSES, regress_batch, regress_
 from airtruth.identification.options import Options
 from airtruth.numerics.prefilter import butterworth, edge_samples
 from airtruth.physics.motion import LATERAL
+from validation.affine_lateral import ALPHA, DENSITY, GTM, NAMES, SPEED, THETA, fly
 
 CALM = fly(runs=2, noise=0.0)
-NOISY = fly(runs=3, sigma=0.6, seed=3)
+NOISY = fly(runs=3, gust=0.75, seed=3)
 DETERMINED = ["CYbeta", "Clbeta", "Clp", "Clda", "Cnbeta", "Cndr"]
 
 

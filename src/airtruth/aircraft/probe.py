@@ -18,6 +18,7 @@ from airtruth.isolation.limits import Limits
 from airtruth.isolation.protocol import IsolatedError, Task
 from airtruth.logs.temporary import private_folder, remove
 from airtruth.quantity import Strict
+from airtruth.units import FT, SLUG
 
 _LIMITS: Final = Limits(seconds=60.0, memory_bytes=3_000_000_000)
 """Limits of JSBSim while it loads a model (judgement: far above those of any shipped model, and a user still waits for the
@@ -138,6 +139,21 @@ def model_file(folder: Path, root: str, model: str) -> Path:
     if root == "." and own.is_file():
         return own
     return model_root(folder, root)[1] / model / f"{model}.xml"
+
+
+def constants_of(fdm: Any) -> Constants:
+    """Constants of the model that an executive has loaded."""
+    inertia = SLUG * FT**2
+    return Constants(
+        wing_area_m2=fdm["metrics/Sw-sqft"] * FT**2,
+        chord_m=fdm["metrics/cbarw-ft"] * FT,
+        span_m=fdm["metrics/bw-ft"] * FT,
+        mass_kg=fdm["inertia/mass-slugs"] * SLUG,
+        inertia_yy_kg_m2=fdm["inertia/iyy-slugs_ft2"] * inertia,
+        inertia_xx_kg_m2=fdm["inertia/ixx-slugs_ft2"] * inertia,
+        inertia_zz_kg_m2=fdm["inertia/izz-slugs_ft2"] * inertia,
+        inertia_xz_kg_m2=-fdm["inertia/ixz-slugs_ft2"] * inertia,  # JSBSim's ixz is -Ixz
+    )
 
 
 def load_model(fdm: Any, folder: Path, root: str, model: str) -> bool:

@@ -7,10 +7,9 @@ import os
 from pathlib import Path
 from typing import Any
 
-from airtruth.aircraft.probe import load_model, model_file, model_root
+from airtruth.aircraft.probe import constants_of, load_model, model_file, model_root
 from airtruth.errors import choices
 from airtruth.isolation.protocol import Reply
-from airtruth.units import FT, SLUG
 
 
 def load(folder: str, jsbsim_json: str, output: str) -> Reply:
@@ -55,23 +54,7 @@ def _load(folder: Path, table: dict[str, Any]) -> dict[str, Any]:
         fdm.run_ic()
     except (jsbsim.BaseError, RuntimeError, KeyError) as error:
         return {"error": f"JSBSim refused {xml}: {error}"}
-    return {
-        "constants": {
-            "wing_area_m2": fdm["metrics/Sw-sqft"] * FT**2,
-            "chord_m": fdm["metrics/cbarw-ft"] * FT,
-            "span_m": fdm["metrics/bw-ft"] * FT,
-            "mass_kg": fdm["inertia/mass-slugs"] * SLUG,
-            **{
-                f"inertia_{axes}_kg_m2": sign * fdm[f"inertia/i{axes}-slugs_ft2"] * SLUG * FT**2
-                for axes, sign in (
-                    ("xx", 1.0),
-                    ("yy", 1.0),
-                    ("zz", 1.0),
-                    ("xz", -1.0),
-                )  # JSBSim's ixz is -Ixz
-            },
-        }
-    }
+    return {"constants": constants_of(fdm).model_dump()}
 
 
 def _named(table: dict[str, Any]) -> list[str]:

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft, AircraftFile, JsbsimModel
-from airtruth.aircraft.probe import Constants
+from airtruth.aircraft.probe import Constants, constants_of
 from airtruth.simulation.simulator import Condition, Controls, Executive
-from airtruth.units import DEG, FT, G0, SLUG
+from airtruth.units import DEG, G0
 
 Array = NDArray[np.float64]
 
@@ -96,14 +96,7 @@ def bench(folder: Path, model: JsbsimModel, altitude_m: float = 1500.0, lift: fl
     """
     unknown = Constants(wing_area_m2=1.0, chord_m=1.0, span_m=1.0, mass_kg=1.0, inertia_yy_kg_m2=1.0)
     first = Bench(folder, model, unknown, Condition(60.0, altitude_m))
-    fdm = first.at().fdm
-    constants = Constants(
-        wing_area_m2=fdm["metrics/Sw-sqft"] * FT**2,
-        chord_m=fdm["metrics/cbarw-ft"] * FT,
-        span_m=fdm["metrics/bw-ft"] * FT,
-        mass_kg=fdm["inertia/mass-slugs"] * SLUG,
-        inertia_yy_kg_m2=fdm["inertia/iyy-slugs_ft2"] * SLUG * FT**2,
-    )
+    constants = constants_of(first.at().fdm)
     return replace(first, constants=constants, condition=Condition(eas_of(constants, lift), altitude_m))
 
 

@@ -1,7 +1,7 @@
 """Flights of an aircraft whose lateral aerodynamics are affine, by an integration of its own: known truth for estimators.
 
 Constant alpha, theta and inertial speed; the equations of Klein and Morelli, 3.2, with sin(phi) and the products of rates.
-Gusts u and v have Dryden's first-order and second-order spectra. Nothing of airtruth.identification is used.
+Gusts u and v have Dryden's spectra. Nothing of airtruth.identification or of airtruth.physics is used.
 """
 
 from types import SimpleNamespace
@@ -47,6 +47,8 @@ NOISE = {
     "q_rad_s": 0.3857 * DEG,
 }
 """Standard deviations of the GTM's instruments per sample at 200 Hz."""
+LIGHT = (1.166, 0.812, 911.0, 840.0)
+"""Light gusts of the GTM at 7000 ft: standard deviations of u and v [m/s], their scale lengths [m]."""
 RATE, PICK = 200, 4
 SERVO_S = 1.0 / (2.0 * np.pi * 5.0)
 
@@ -76,29 +78,28 @@ def servo(command):
     return out
 
 
-def gusts(rng, runs, samples, sigma, length_m=533.4):
-    """(2, runs, samples) u and v of standard deviation sigma [m/s], stationary."""
-    a = SPEED / length_m
+def gusts(rng, runs, samples, level):
+    """(2, runs, samples) u and v at ``level`` times light gusts [m/s], stationary, of Dryden's spectra."""
     dt = 1.0 / RATE
-    fine = rng.standard_normal((3, runs, samples + 1))
-    u, w1, w2 = np.zeros((3, runs, samples))
-    decay, kick = np.exp(-a * dt), np.sqrt(1.0 - np.exp(-2.0 * a * dt))
-    s = fine[:, :, 0] * np.array([1.0, 1.0, np.sqrt(0.25)])[:, None]
-    s[2] += 0.5 * s[1]
+    draws = rng.standard_normal((2, runs, samples + 1))
+    sigma_u, sigma_v, length_u, length_v = LIGHT
+    a = SPEED / np.array([length_u, length_v])
+    decay, kick = np.exp(-a * dt)[:, None], np.sqrt(1.0 - np.exp(-2.0 * a * dt))[:, None]
+    out = np.zeros((2, runs, samples))
+    first = draws[:, :, 0].copy()
+    second = 0.5 * first[1] + 0.5 * rng.standard_normal(runs)
     for k in range(samples):
-        u[:, k], w1[:, k], w2[:, k] = s
-        s = np.stack(
-            [
-                decay * s[0] + kick * fine[0, :, k + 1],
-                decay * s[1] + kick * fine[1, :, k + 1],
-                decay * s[2] + a * dt * decay * s[1] + 0.5 * a * dt * kick * fine[1, :, k + 1],
-            ]
-        )
-    return sigma * np.stack([u, np.sqrt(1.5) * (w1 + (1.0 / np.sqrt(3.0) - 1.0) * w2)])
+        out[0, :, k] = sigma_u * first[0]
+        out[1, :, k] = sigma_v * np.sqrt(1.5) * (first[1] + (1.0 / np.sqrt(3.0) - 1.0) * second)
+        moved = decay * first + kick * draws[:, :, k + 1]
+        second = decay[1] * second + 0.5 * a[1] * dt * (decay[1] * first[1] + moved[1])
+        first = moved
+    return level * out
 
 
-def fly(runs=2, seconds=10.0, degrees=3.0, sigma=0.0, noise=1.0, seed=0, theta=THETA, start=None, q=None):
-    """Records of runs at 50 Hz as a `Batch`, doublets of alternating sign, gusts of sigma [m/s], noise times that of the GTM.
+def fly(runs=2, seconds=10.0, degrees=3.0, gust=0.0, noise=1.0, seed=0, theta=THETA, start=None, q=None):
+    """Records of runs at 50 Hz as a `Batch`, doublets of alternating sign, gusts and noise so many times
+    light gusts and the noise of the GTM.
 
     ``start`` is the initial state (4,); ``q`` a function of time [s] for the pitch rate [rad/s].
     """
@@ -106,7 +107,7 @@ def fly(runs=2, seconds=10.0, degrees=3.0, sigma=0.0, noise=1.0, seed=0, theta=T
     sign = np.where(np.arange(runs) % 2 == 0, 1.0, -1.0)
     surface = servo(commands(runs, seconds, degrees * DEG, sign))
     samples = surface.shape[-1]
-    u_gust, v_gust = gusts(rng, runs, samples, sigma)
+    u_gust, v_gust = gusts(rng, runs, samples, gust)
     t = np.arange(samples) / RATE
     c = GTM
     inertia = np.array([[c.inertia_xx_kg_m2, -c.inertia_xz_kg_m2], [-c.inertia_xz_kg_m2, c.inertia_zz_kg_m2]])
@@ -178,18 +179,21 @@ def fly(runs=2, seconds=10.0, degrees=3.0, sigma=0.0, noise=1.0, seed=0, theta=T
     return Batch(tuple(f"r{k}" for k in range(runs)), PICK / RATE, times, picked)
 
 
+def pitching(t):
+    """Pitch rate of a slow oscillation of the path [rad/s], so that theta, q and az of a log agree."""
+    return 0.03 * np.cos(1.5 * t)
+
+
 def log_of(batch, elevator_degrees=0.0):
-    """The runs as a `FlightLog` that holds the longitudinal channels as well; the elevator moves in a doublet of its own."""
+    """Runs that were flown with `pitching` as a `FlightLog` that holds the longitudinal channels as well."""
     rng = np.random.default_rng(5)
     shape = batch.t_s.shape
     elevator = elevator_degrees * DEG * np.sign(np.sin(2.0 * np.pi * batch.t_s)) * (batch.t_s < 2.0)
-    # a slow pitching of the path, so that theta, q and az agree
     theta = ALPHA + 0.02 * np.sin(1.5 * batch.t_s)
-    q = 0.03 * np.cos(1.5 * batch.t_s)
+    q = pitching(batch.t_s)
     channels = {
         **batch.channels,
         "theta_rad": theta + 3e-4 * rng.standard_normal(shape),
-        "q_rad_s": q + batch.channels["q_rad_s"],
         "az_m_s2": -G0 * np.cos(theta) - SPEED * q + 0.06 * rng.standard_normal(shape),
         "elevator_rad": elevator + 1e-5 * rng.standard_normal(shape),
     }
