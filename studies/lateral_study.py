@@ -1,6 +1,6 @@
 """The lateral estimators on records of an affine aircraft: tables as the paper's, errors over the bound, coverage.
 
-The GTM at 75 kt EAS, 7000 ft, with affine lateral aerodynamics (`validation.lateral_flight`): aileron doublet, then rudder
+The GTM at 75 kt EAS, 7000 ft, with affine lateral aerodynamics (`validation.affine_lateral`): aileron doublet, then rudder
 3-2-1-1, 3 deg, records of 10 s at 50 Hz, the GTM's sensors, gusts u and v at LEVEL times the light ones. Each method is
 printed with mean, standard deviation, RelErr = |mean - truth|/|truth| of the 15 derivatives, iterations and modal parameters;
 then RMSE over the Cramer-Rao bound (gust, sensor noise and output biases unknown; no noise of p' and r') and the coverage of
@@ -23,7 +23,7 @@ from airtruth.identification.lateral.predictor import PROCESS, levels, outputs_o
 from airtruth.identification.likelihood.cramer_rao import bound
 from airtruth.physics.lateral import lateral_modal
 from airtruth.physics.motion import LATERAL
-from validation.lateral_flight import GTM, LIGHT, NOISE, THETA, fly
+from validation.affine_lateral import GTM, LIGHT, NOISE, THETA, fly
 
 BLOCK = 100
 SEED = 71

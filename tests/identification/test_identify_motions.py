@@ -14,7 +14,7 @@ from airtruth.identification import answers, identify, quantities
 from airtruth.identification.estimates import estimates_table
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
-from validation.lateral_flight import GTM, NAMES, THETA, fly, log_of, pitching
+from validation.affine_lateral import GTM, NAMES, THETA, fly, log_of, pitching
 
 LOG = log_of(fly(q=pitching, runs=3, gust=0.4, seed=2))
 

@@ -14,7 +14,7 @@ from airtruth.identification.likelihood.predictor import layout
 from airtruth.numerics.discretise import assemble
 from airtruth.physics.lateral import lateral_system
 from airtruth.physics.motion import LATERAL
-from validation.lateral_flight import GTM, NAMES, THETA, fly, log_of, pitching
+from validation.affine_lateral import GTM, NAMES, THETA, fly, log_of, pitching
 
 DETERMINED = [NAMES.index(n) for n in ("CYbeta", "Clbeta", "Clp", "Clda", "Cnbeta", "Cndr")]
 QUIET = fly(runs=2, noise=1e-3)

@@ -13,7 +13,7 @@ from airtruth.identification.lateral.solve import POSES, regress_batch, regress_
 from airtruth.identification.options import Options
 from airtruth.numerics.prefilter import butterworth, edge_samples
 from airtruth.physics.motion import LATERAL
-from validation.lateral_flight import ALPHA, DENSITY, GTM, NAMES, SPEED, THETA, fly
+from validation.affine_lateral import ALPHA, DENSITY, GTM, NAMES, SPEED, THETA, fly
 
 CALM = fly(runs=2, noise=0.0)
 NOISY = fly(runs=3, gust=0.75, seed=3)

@@ -162,7 +162,7 @@ def close_loop(
     -------
     LoopResult
         Its ``to_frame()`` has one row per method and derivative [1/rad, rates as q c/(2V)]: declared value, mean
-        and standard error before and after.
+        and standard error before and after, and the same method on simulated records of the same inputs.
 
     Raises
     ------
