@@ -21,6 +21,7 @@ from airtruth.cli.arguments import (
     Pressure,
     Quiet,
     Replace,
+    Terms,
     Trim,
 )
 from airtruth.cli.compilation import compile_identification
@@ -72,6 +73,7 @@ def identify(
     covariance: Annotated[
         Covariance, typer.Option(help="Formula of the covariance, see docs/methods.md.")
     ] = "corrected",
+    term: Terms = None,
     tolerance: Annotated[
         float, typer.Option(help="Relative change at which an estimator has converged.")
     ] = 0.01,
@@ -107,6 +109,7 @@ def identify(
         pressure=pressure,
         covariance=covariance,
         tolerance=tolerance,
+        terms=tuple(term or ()),
     )
     logs = [location(log) for log in logs]
     declared = load(aircraft)

@@ -64,6 +64,11 @@ class Settings:
         options = {f.name: getattr(self.options, f.name) for f in dataclasses.fields(self.options)}
         if self.options.auxiliary is not None:
             options["auxiliary"] = getattr(self.options.auxiliary, "__qualname__", "custom")
+        # files of older versions do not name the terms
+        if self.options.terms:
+            options["terms"] = list(self.options.terms)
+        else:
+            del options["terms"]
         if self.options.band_hz is not None:
             options["band_hz"] = list(self.options.band_hz)
         return {
