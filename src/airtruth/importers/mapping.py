@@ -49,22 +49,8 @@ DERIVED: Final[dict[str, str]] = {
     "air_temperature_k": "temperature",
 }
 """Quantities that a mapping may state instead of a channel, which is computed from them: name -> dimension."""
-FURTHER: Final[dict[str, str]] = {
-    "beta_rad": "angle",
-    "p_rad_s": "angular_rate",
-    "r_rad_s": "angular_rate",
-    "phi_rad": "angle",
-    "psi_rad": "angle",
-    "ay_m_s2": "acceleration",
-    "aileron_rad": "angle",
-    "rudder_rad": "angle",
-    "aileron_command_rad": "angle",
-    "rudder_command_rad": "angle",
-}
-"""Columns of a log of the lateral motion that a mapping may state too: name -> dimension."""
 MAPPED: Final[dict[str, str]] = {
     **{name: signal.dimension for name, signal in SIGNALS.items()},
-    **FURTHER,
     **DERIVED,
 }
 """Every name below [channels] -> dimension."""
@@ -293,7 +279,6 @@ __all__ = [
     "AIRSPEEDS",
     "CONSTANTS",
     "DERIVED",
-    "FURTHER",
     "MAPPED",
     "TIME_UNITS",
     "Align",
