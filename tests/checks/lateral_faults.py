@@ -64,7 +64,6 @@ LATERAL_FAULTS = {
     "alpha and beta": swapped("alpha_rad", "beta_rad"),
     "ay and az": swapped("ay_m_s2", "az_m_s2"),
     "aileron and rudder": swapped("aileron_rad", "rudder_rad"),
-    "aileron and elevator": swapped("aileron_rad", "elevator_rad"),
     "p and phi": swapped("p_rad_s", "phi_rad"),
     "r in place of p": copied("r_rad_s", "p_rad_s"),
     "beta in place of phi": copied("beta_rad", "phi_rad"),

@@ -203,14 +203,15 @@ def constant(batch: Batch) -> Iterator[tuple[str, Bools, float]]:
     ]
     still = {n: np.ptp(c[n], axis=1) == 0.0 for n in judged}
     moving = sum((~still[n]).astype(int) for n in judged if n != "elevator_rad")
+    aside = {"p_rad_s", "r_rad_s"} <= c.keys()
+    turning = turns(c, batch.dt_s) if aside else np.zeros(len(batch.run_ids), dtype=np.bool_)
     for name in judged:
         bad = still[name] & (moving > 0)
+        if name == "elevator_rad":
+            bad &= ~turning  # a manoeuvre of roll or yaw needs none
         if bad.any():
             yield name, np.asarray(bad), float(bad.sum())
-    if "p_rad_s" not in c or "r_rad_s" not in c:
-        return
-    turning = turns(c, batch.dt_s)
-    for name in (n for n in SIDE if n in c):
+    for name in (n for n in SIDE if n in c and aside):
         bad = turning & (np.ptp(c[name], axis=1) == 0.0)
         if bad.any():
             yield name, np.asarray(bad), float(bad.sum())

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from airtruth.checks.excitation import moves, turns
 from airtruth.checks.factors import command_test, factor_test, follows_test, of_moving, sign_test
 from airtruth.checks.lateral_model import driven
+from airtruth.checks.means import mean_test
 from airtruth.checks.relation import Relation, finite
 from airtruth.checks.rotation import bank_coupling, heading_rate, side_gravity, sideslip_turn
 from airtruth.checks.spectra import integral, regress, spectrum
@@ -36,8 +37,11 @@ Signal = Callable[[Channels, float], Array]
 
 ATTITUDE_STD: Final = 0.15
 """Tolerance of the factors of bank and heading on the integrals of their rates [-]: scale and lag of gyroscopes."""
-BETA_STD: Final = (0.25, 0.3, 0.5)
-"""Tolerances of the factors of the rate of beta on the turn, gravity and ay [-]: lag and arm of a vane (judgement)."""
+BETA_STD: Final = (0.25, 0.35, 10.0)
+"""Tolerances of the factors of the rate of beta on the turn, gravity and ay [-] (judgement).
+
+Lag of a vane; that of ay is free, because an arm of 1 m of a vane or an accelerometer can change it by 2.
+"""
 RATES: Final = {"aileron_rad": "p_rad_s", "rudder_rad": "r_rad_s"}
 """Surface -> rate that it drives."""
 BALANCED: Final = {
@@ -49,18 +53,22 @@ BALANCED: Final = {
 Steady roll rate over aileron is 3 to 15 1/s, steady sideslip over rudder 0.4 to 1.6 (aircraft of Klein and Morelli and of
 Jategaonkar; the GTM has 9 1/s and 0.8).
 """
-CLEAR: Final = 100.0
-"""First-stage F above which two causes of sideslip are told apart [-]: ten times that of one (judgement)."""
+CLEAR: Final = 200.0
+"""First-stage F above which two causes of sideslip are told apart [-]: twenty times that of one (judgement)."""
 SIGNIFICANT: Final = 3.0
 """Standard deviations by which both derivatives differ from zero where their ratio is tested [-]."""
 SIDESLIP: Final = (
     "beta_rad", "r_rad_s", "phi_rad", "ay_m_s2", "p_rad_s", "airspeed_m_s", "alpha_rad", "theta_rad",
 )  # fmt: skip
 """Channels of the test "beta", the likeliest culprit first."""
-SIDE_SLOPE: Final = (float(np.log(2.0)), 0.9)
+SIDE_SLOPE: Final = (float(np.log(2.0)), 0.8)
 """Logarithm of the usual slope of -ay on beta [g/rad], and its tolerance: -CYbeta/CL of 0.6 to 6 (judgement)."""
+SIDE_OF_LIFT: Final = (float(np.log(0.16)), 0.6)
+"""Logarithm of that slope over the slope of -az on alpha, -CYbeta/CLalpha, and its tolerance: 0.09 to 0.25."""
+SIDE_LOAD_STD: Final = 0.25
+"""Tolerance of the mean of ay, as a share of gravity [-]: a steady sideslip of 7 deg (judgement)."""
 SIDE_SHARE: Final = 0.5
-"""Squared multiple correlation of ay below which its slope is not tested: noise of the vane flattens it (judgement)."""
+"""Squared multiple correlation of a specific force below which its slope is not tested: noise flattens it (judgement)."""
 
 
 def lateral(runs: Runs) -> list[Relation]:
@@ -73,6 +81,10 @@ def lateral(runs: Runs) -> list[Relation]:
         return []
     surfaces = tuple(n for n in RATES if n in names)
     result = _attitudes(runs)
+    if "ay_m_s2" in names:
+        mean = runs.each(lambda c, dt_s: c["ay_m_s2"].mean(axis=1))
+        std = np.full_like(mean, SIDE_LOAD_STD * G0)
+        result.append(mean_test("ay_mean", ("ay_m_s2",), mean, np.zeros_like(mean), std, SIDE_LOAD_STD * G0))
     if "beta_rad" in names and surfaces:
         result += [_sideslip(runs), _side_slope(runs, surfaces)]
     for name in surfaces:
@@ -156,21 +168,35 @@ def _side_slope(runs: Runs, surfaces: tuple[str, ...]) -> Relation:
     channels = ("ay_m_s2", "beta_rad", "p_rad_s", "r_rad_s", *surfaces)
     if "ay_m_s2" not in runs.channels:
         return _nothing("side_slope", channels[1:], runs)
-    causes = [runs.spectra(_channel(n)) for n in channels[1:]]
-    factors = regress(runs.spectra(_channel("ay_m_s2")), np.stack(causes, axis=1), lines=runs.lines())
-    value, std = -factors.value[:, 0] / G0, np.sqrt(factors.covariance[:, 0, 0]) / G0
+    value, std, clear = _slope(runs, channels)
     usual, tolerance = SIDE_SLOPE
+    lift_channels = ("az_m_s2", "alpha_rad", "q_rad_s", "elevator_rad")
+    if set(lift_channels) <= set(runs.channels):
+        lift, lift_std, lifts = _slope(runs, lift_channels)
+        known = lifts & (lift > SIGNIFICANT * lift_std)
+        usual = np.where(known, np.log(np.where(known, lift, 1.0)) + SIDE_OF_LIFT[0], usual)
+        tolerance = np.where(known, SIDE_OF_LIFT[1], tolerance)
+    clear &= np.abs(value) > SIGNIFICANT * std
     against = np.minimum(value, 0.0) / std
     size = np.log(np.maximum(np.abs(value), 1e-9)) - usual
     size = size / np.sqrt(tolerance**2 + (std / value) ** 2)
-    clear = (factors.share > SIDE_SHARE) & (np.abs(value) > SIGNIFICANT * std)
     distance = finite((against**2 + size**2) * clear)
-    return Relation("side_slope", channels, distance, np.stack([value, std], axis=1), clear)
+    return Relation(
+        "side_slope", channels, distance, np.stack([value, std, np.exp(usual + 0.0 * value)], axis=1), clear
+    )
+
+
+def _slope(runs: Runs, channels: tuple[str, ...]) -> tuple[Array, Array, Bools]:
+    """Slope of less the first channel on the second over gravity, the others held; its deviation; whether enough is explained."""
+    causes = [runs.spectra(_channel(n)) for n in channels[1:]]
+    factors = regress(runs.spectra(_channel(channels[0])), np.stack(causes, axis=1), lines=runs.lines())
+    std = np.sqrt(factors.covariance[:, 0, 0]) / G0
+    return -factors.value[:, 0] / G0, std, factors.share > SIDE_SHARE
 
 
 def _nothing(name: str, channels: tuple[str, ...], runs: Runs) -> Relation:
     none = np.zeros(len(runs) + 1)
-    return Relation(name, channels, none, np.stack([none, none], axis=1), none > 0.0)
+    return Relation(name, channels, none, np.stack([none, none, none], axis=1), none > 0.0)
 
 
 def _surface(runs: Runs, name: str, surfaces: tuple[str, ...]) -> list[Relation]:

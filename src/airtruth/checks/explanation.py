@@ -138,13 +138,13 @@ def _trials(
 ) -> list[Trial]:
     """Every correction that may be made beside those that were made already.
 
-    Of a record in all axes those that no failed test has a channel of are left out: they are many, and change nothing.
+    Of a record in all axes those with a channel that no failed test has are left out: they are many.
     """
     found = []
     failing = {n for t in results if np.max(t.distance) > PASSED for n in t.channels}
     everything = not turned(runs)
     for correction in catalogue(runs, stated):
-        if not everything and failing.isdisjoint(correction.channels):
+        if not everything and not failing.issuperset(correction.channels):
             continue
         if any(_excludes(one, correction) for one in made):
             continue

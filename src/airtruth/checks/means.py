@@ -149,7 +149,7 @@ def gravity(runs: Runs, level: NDArray[np.bool_] | None = None) -> list[Relation
     turning = (mean < required) if level is None else (mean < required) & ~level
     load_std = np.where(turning | (not vane), TURN_STD, LOAD_STD) * G0
     path = tuple(name for name in PATH if name in names)
-    result = [_mean_test("az_mean", path, mean, required, np.sqrt(load_std**2 + std**2), LOAD_STD * G0)]
+    result = [mean_test("az_mean", path, mean, required, np.sqrt(load_std**2 + std**2), LOAD_STD * G0)]
     if {"theta_rad", "ax_m_s2"} <= names:
 
         def required_ax(c: Channels, dt_s: float) -> Array:
@@ -163,7 +163,7 @@ def gravity(runs: Runs, level: NDArray[np.bool_] | None = None) -> list[Relation
         channels = ("ax_m_s2", "theta_rad", "alpha_rad", "q_rad_s", "airspeed_m_s")
         used = tuple(name for name in channels if name in names)
         result.append(
-            _mean_test("ax_mean", used, mean, required, np.hypot(AXIAL_STD_M_S2, std), AXIAL_STD_M_S2)
+            mean_test("ax_mean", used, mean, required, np.hypot(AXIAL_STD_M_S2, std), AXIAL_STD_M_S2)
         )
     return result
 
@@ -184,7 +184,7 @@ def _slope(x: Array, dt_s: float) -> tuple[Array, Array]:
     return rate, SPREAD_LIMIT * rest.std(axis=1) * np.sqrt(2.0) / length_s
 
 
-def _mean_test(
+def mean_test(
     name: str, channels: tuple[str, ...], mean: Array, required: Array, std: Array, common: float
 ) -> Relation:
     """Distance of means from the required ones; ``common`` is the part of std that all runs share."""
@@ -205,4 +205,4 @@ def _with_all(distance: Array) -> Array:
     return finite(np.append(distance, np.median(distance)))
 
 
-__all__ = ["LEVEL", "LIMITS", "MEANS", "OUTSIDE", "air", "gravity", "ranges"]
+__all__ = ["LEVEL", "LIMITS", "MEANS", "OUTSIDE", "air", "gravity", "mean_test", "ranges"]

@@ -38,7 +38,7 @@ def evidence(test: Relation, row: int = -1) -> str:
             f"density_kg_m3 averages {f[0]:.3g} kg/m3, where the standard atmosphere has {f[2]:.3g} kg/m3 at the "
             f"altitude_m of {f[1]:.5g} m"
         )
-    if test.name in ("az_mean", "ax_mean"):
+    if test.name in ("az_mean", "ax_mean", "ay_mean"):
         return f"{name} averages {f[0]:.3g} m/s2, where gravity and the path require {f[1]:.3g} +- {f[2]:.2g} m/s2"
     if test.name == "theta":
         return (
@@ -61,7 +61,7 @@ def evidence(test: Relation, row: int = -1) -> str:
     if test.name == "side_slope":
         return (
             f"ay_m_s2 changes by {-f[0]:.2g} +- {f[1]:.2g} g per radian of beta_rad, where sideslip from the right pushes to the "
-            "left, by 0.6 to 6 g"
+            f"left, usually by about {f[2]:.2g} g"
         )
     if test.name in ("aileron", "rudder"):
         side = "rolls" if test.name == "aileron" else "yaws"
