@@ -19,7 +19,6 @@ from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from airtruth.checks.kinematics_fit import Fit, Problem, fit, problem_of
-from airtruth.checks.kinematics_model import ERRORS
 
 Array = NDArray[np.float64]
 
@@ -28,12 +27,6 @@ FALSE: Final = 1e-3
 in 1.4 % of the records."""
 EQUAL: Final = 5e-3
 """Probability that noise alone makes the true set worse than another one by more than the margin [-]: judgement."""
-SAME: Final = (
-    frozenset({"vane_arm", "accelerometer_arm"}),
-    frozenset({"accelerometer_scale", "airspeed_scale"}),
-)
-"""Pairs of errors that move alpha in the same way: the kinematics shows the difference of the arms and the ratio of the
-scales, so that no set has both."""
 MOST: Final = 3
 """Largest number of errors in a set [-]: judgement; a real record, which no kinematic model of few terms explains exactly, takes
 up any further error."""
@@ -130,7 +123,13 @@ def search(problem: Problem, usual: Mapping[str, float]) -> Search:
             stable = True
             break
         problem = problem_of(
-            problem.records, problem.equations, problem.known, problem.limits, errors, problem.lines
+            problem.records,
+            problem.equations,
+            problem.known,
+            problem.limits,
+            errors,
+            problem.lines,
+            problem.kinematics,
         )
     ranked = _ranked(problem, best, usual)
     scale, _ = _scale(problem, [f for f in best.values() if f.sound], usual)
@@ -188,7 +187,7 @@ def _hints(problem: Problem, usual: Mapping[str, float]) -> list[_Hint]:
     result = []
     for name in usual:
         declared, high = problem.start(name), problem.limits[name][1]
-        shares = (0.0, *STARTS) if ERRORS[name].kind in ("lag", "delay") else (0.0,)
+        shares = (0.0, *STARTS) if problem.kinematics.errors[name].kind in ("lag", "delay") else (0.0,)
         for share in shares:
             start = declared + share * (high - declared)
             moments = problem.moments({name: start}) if share else base
@@ -250,7 +249,7 @@ def _grow(
         promises: dict[frozenset[str], tuple[float, int]] = {}
         for i, hints in enumerate(more):
             names = frozenset(h.name for h in hints)
-            if names & errors.keys() or _doubled(names | errors.keys()):
+            if names & errors.keys() or _doubled(problem, names | errors.keys()):
                 continue
             promised = _promised(moments, slopes, hints), i
             promises[names] = min(promised, promises.get(names, promised))
@@ -265,8 +264,8 @@ def _grow(
                 known[key] = better
 
 
-def _doubled(names: frozenset[str]) -> bool:
-    return any(pair <= names for pair in SAME)
+def _doubled(problem: Problem, names: frozenset[str]) -> bool:
+    return any(len(group & names) > 1 for group in problem.kinematics.same)
 
 
 def _pruned(
@@ -382,7 +381,8 @@ def completed(found: Search, usual: Mapping[str, float]) -> Search:
     for one in found.equals[: MOST + 1]:
         errors = dict(zip(one.fit.names, one.fit.value, strict=True))
         for name in usual:
-            twins = {n for pair in SAME if name in pair for n in pair} - {name}
+            same = found.problem.kinematics.same
+            twins = {n for group in same if name in group for n in group} - {name}
             start = {n: v for n, v in errors.items() if n not in twins}
             key = frozenset(start) | {name}
             if key not in tried:

@@ -15,9 +15,11 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.channels import LATERAL
+
 Array = NDArray[np.float64]
 
-Kind = Literal["bias", "scale", "lag", "delay", "arm", "alpha_slope"]
+Kind = Literal["bias", "scale", "lag", "delay", "arm", "arm_down", "alpha_slope"]
 """Errors that an effect may add to those declared."""
 
 
@@ -78,6 +80,12 @@ INSTRUMENTS: Final[Mapping[str, str]] = {
     "theta_rad": "attitude",
     "q_rad_s": "gyro",
     "az_m_s2": "accelerometer",
+    "beta_rad": "vane",
+    "p_rad_s": "gyro",
+    "r_rad_s": "gyro",
+    "phi_rad": "attitude",
+    "psi_rad": "attitude",
+    "ay_m_s2": "accelerometer",
 }
 """Instrument of a channel, as its errors are named."""
 
@@ -180,10 +188,13 @@ def error_name(channel: str, kind: Kind) -> str:
 
     Examples
     --------
-    >>> error_name("alpha_rad", "scale"), error_name("q_rad_s", "delay")
-    ('vane_scale', 'sensor_delay:q_rad_s')
+    >>> error_name("alpha_rad", "scale"), error_name("q_rad_s", "delay"), error_name("beta_rad", "arm")
+    ('vane_scale', 'sensor_delay:q_rad_s', 'vane_arm:beta_rad')
     """
-    return f"sensor_delay:{channel}" if kind == "delay" else f"{INSTRUMENTS[channel]}_{kind}"
+    if kind == "delay":
+        return f"sensor_delay:{channel}"
+    name = f"{INSTRUMENTS[channel]}_{kind.replace('arm_down', 'arm_z')}"
+    return f"{name}:{channel}" if channel in LATERAL else name
 
 
 __all__ = ["INSTRUMENTS", "KINDS", "ErrorKind", "Kind", "SensorErrors", "error_name"]
