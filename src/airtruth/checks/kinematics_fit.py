@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
 
@@ -118,6 +118,7 @@ class Problem:
     limits : name -> smallest and largest value.
     weight : common weight of all fits.
     kinematics : of the motion.
+    enlarged : equation -> factor on its noise for motion that no error explains.
     """
 
     records: tuple[Samples, ...]
@@ -127,6 +128,7 @@ class Problem:
     limits: Mapping[str, tuple[float, float]]
     weight: Weight
     kinematics: Kinematics = LONGITUDINAL
+    enlarged: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def _stacks(self) -> list[_Stack]:
@@ -168,6 +170,7 @@ def problem_of(
     errors: Mapping[str, float] | None = None,
     lines: Sequence[Lines] | None = None,
     kinematics: Kinematics = LONGITUDINAL,
+    enlarged: Mapping[str, float] | None = None,
 ) -> Problem:
     """Weigh records at given errors.
 
@@ -177,12 +180,14 @@ def problem_of(
     errors : errors at which the noise is assessed; None for those declared.
     lines : lines of the records; None makes them.
     kinematics : of the motion.
+    enlarged : see `Problem`; None for no factor.
     """
+    enlarged = dict(enlarged or {})
     lines = tuple(lines or (lines_of(r, kinematics) for r in records))
     at = {**known, **(errors or {})}
     differences = [kinematics.compare(r, at, equations) for r in records]
-    weight = weigh(records, lines, differences, equations, kinematics)
-    made = Problem(tuple(records), lines, tuple(equations), known, limits, weight, kinematics)
+    weight = weigh(records, lines, differences, equations, kinematics, enlarged)
+    made = Problem(tuple(records), lines, tuple(equations), known, limits, weight, kinematics, enlarged)
     base = made.white(errors or {})
     for name, step in kinematics.offsets.items():
         moved = made.white({**(errors or {}), name: step}) - base

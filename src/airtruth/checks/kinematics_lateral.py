@@ -8,13 +8,14 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import f as fisher
 
 from airtruth.aircraft import Aircraft
 from airtruth.checks.kinematics_bias import rms
 from airtruth.checks.kinematics_findings import bias_of, cause_of, drift, errors_of
-from airtruth.checks.kinematics_fit import limits_of, problem_of
+from airtruth.checks.kinematics_fit import Problem, limits_of, problem_of
 from airtruth.checks.kinematics_record import thinned
-from airtruth.checks.kinematics_search import Search, completed, search
+from airtruth.checks.kinematics_search import DOUBT, Search, by_equation, completed, search
 from airtruth.checks.kinematics_side import ERRORS, LATERAL, SideRecord
 from airtruth.checks.kinematics_words import NAMED, conclusions, verdict_of
 from airtruth.checks.result import CheckResult, Finding
@@ -36,8 +37,12 @@ USUAL_ARM_SPANS: Final = 0.4
 """Arm that is not unusual [spans]: judgement; the nose of a transport is that far ahead."""
 USUAL_ARM_M: Final = 10.0
 """Arm that is not unusual where no span is known [m]: judgement."""
-OF_EQUATION: Final = {"phi": ("phi_rad", "p_rad_s"), "psi": ("psi_rad",), "beta": ("beta_rad", "ay_m_s2")}
-"""Equation -> channels whose errors it alone shows; r enters psi and beta."""
+OF_EQUATION: Final = {
+    "phi": ("phi_rad", "p_rad_s"),
+    "psi": ("psi_rad", "r_rad_s"),
+    "beta": ("beta_rad", "r_rad_s", "ay_m_s2"),
+}
+"""Equation -> channels whose errors it shows."""
 BY_GUSTS: Final = ("gyro_scale:r_rad_s", "accelerometer_scale:ay_m_s2")
 """Errors that a gust at the vane hides."""
 ARMS: Final = ("vane_arm:beta_rad", "accelerometer_arm:ay_m_s2")
@@ -68,28 +73,60 @@ def check_lateral(
     """
     records, remarks = _records(logs)
     known = {n: v for n, v in (declared or {}).items() if n in ERRORS}
-    equations = tuple(e for e, c in LATERAL.channels.items() if records[0].channel(LATERAL.fields[c]) is not None)
+    equations = tuple(
+        e for e, c in LATERAL.channels.items() if records[0].channel(LATERAL.fields[c]) is not None
+    )
     usual = _candidates(equations, known, span_m)
     limits = limits_of(records, LONGEST_ARM_M if span_m is None else LONGEST_ARM_SPANS * span_m, LATERAL)
     problem = problem_of(records, equations, known, limits, kinematics=LATERAL)
-    found = completed(search(problem, usual), usual)
+    found, shown = _searched(problem, usual)
     findings = (*errors_of(found, usual), *_biases(found, biases or {}))
-    verdict = verdict_of(found, findings)
+    verdict = verdict_of(shown, findings)
     if verdict == "failed":
         findings = tuple(replace(f, state="not assessed") if f.state in NAMED else f for f in findings)
     causes = tuple(cause_of(found, i, findings) for i in range(len(found.tried)))
-    words = [*conclusions(verdict, found, findings, causes), *_of_arms(findings, known), *_of_gusts(findings)]
+    words = [*conclusions(verdict, shown, findings, causes), *_of_arms(findings, known), *_of_gusts(findings)]
     return CheckResult(
         verdict=verdict,
         run_ids=tuple(r.run_id for r in records),
         findings=findings,
         causes=causes,
-        statistic=found.statistic,
-        degrees=found.degrees,
-        p_value=found.p_value,
-        enlargement=found.enlargement,
+        statistic=shown.statistic,
+        degrees=shown.degrees,
+        p_value=shown.p_value,
+        enlargement=shown.enlargement,
         residual_rms=rms(found.problem, found.best.fit),
         sentences=(*words, *remarks),
+    )
+
+
+def _searched(problem: Problem, usual: Mapping[str, float]) -> tuple[Search, Search]:
+    """Outcome of a search, and the same with the test of its best set against the noise alone.
+
+    The equations differ in what they leave: a good attitude shows every imperfection of a gyroscope, and a vane in the air does
+    not. What an equation leaves beyond noise enlarges its own noise, not that of the others.
+    """
+    found = search(problem, usual)
+    enlarged = {}
+    for equation, (energy, count) in by_equation(found.problem, found.best.fit).items():
+        if fisher.sf(energy / max(count, 1), max(count, 1), found.problem.weight.degrees) < DOUBT:
+            enlarged[equation] = float(np.sqrt(energy / count))
+    if not enlarged:
+        return completed(found, usual), found
+    again = problem_of(
+        problem.records,
+        problem.equations,
+        problem.known,
+        problem.limits,
+        None,
+        problem.lines,
+        LATERAL,
+        enlarged,
+    )
+    final = completed(search(again, usual), usual)
+    factor = max(max(enlarged.values()) ** 2, final.enlargement)
+    return final, replace(
+        final, statistic=found.statistic, degrees=found.degrees, p_value=found.p_value, enlargement=factor
     )
 
 
@@ -123,7 +160,9 @@ def _records(logs: Sequence[FlightLog]) -> tuple[list[SideRecord], list[str]]:
     missing = [n for n in _NEEDED if n not in shared]
     if missing or not {"aileron_rad", "rudder_rad"} & shared or not set(LATERAL.channels.values()) & shared:
         wanted = missing or ["aileron_rad or rudder_rad, and beta_rad, phi_rad or psi_rad"]
-        raise LogError(f"the lateral motion cannot be assessed: {', '.join(wanted)} is missing; map it on import")
+        raise LogError(
+            f"the lateral motion cannot be assessed: {', '.join(wanted)} is missing; map it on import"
+        )
     records: list[SideRecord] = []
     runs = sum(len(log.run_ids) for log in logs)
     for log in logs:
@@ -188,19 +227,12 @@ def _candidates(
 ) -> dict[str, float]:
     """Errors that the equations can show, with their usual sizes [SI]; of two arms the one that is not declared."""
     shown = {channel for equation in equations for channel in OF_EQUATION[equation]}
-    if {"psi", "beta"} & set(equations):
-        shown.add("r_rad_s")
     arm = USUAL_ARM_M if span_m is None else USUAL_ARM_SPANS * span_m
     result = {}
     for name, error in ERRORS.items():
-        if error.channel not in shown or (error.kind == "arm" and name not in known and set(ARMS) & known.keys()):
-            if error.channel not in shown or name == "accelerometer_arm:ay_m_s2":
-                continue
-        if "phi" not in equations and error.channel == "p_rad_s":
+        if error.channel not in shown or name == ARMS[1] and name in known:
             continue
         result[name] = error.usual if not error.is_arm else arm if error.kind == "arm" else 0.3 * arm
-    if "accelerometer_arm:ay_m_s2" in known:
-        result.pop("accelerometer_arm:ay_m_s2", None)
     return result
 
 
@@ -242,7 +274,9 @@ def _of_arms(findings: Sequence[Finding], known: Mapping[str, float]) -> list[st
     if not any(f.name in ARMS for f in findings):
         return []
     if ARMS[1] in known:
-        return [f"The arm of the vane is measured from the CG, with the accelerometer {known[ARMS[1]]:.4g} m ahead as declared."]
+        return [
+            f"The arm of the vane is measured from the CG, with the accelerometer {known[ARMS[1]]:.4g} m ahead as declared."
+        ]
     return [
         "The arms of the beta vane and of the accelerometer of ay enter as their difference: each stands for the distance of the "
         "vane ahead of the accelerometer, and is that from the CG if the other instrument is there. Declare the place of one."
@@ -255,8 +289,8 @@ def _of_gusts(findings: Sequence[Finding]) -> list[str]:
     if not hidden:
         return []
     return [
-        f"{' and '.join(hidden)} cannot be determined by the kinematics of these records: the vane of beta measures moving air as "
-        "well, or the manoeuvre is weak."
+        f"{' and '.join(hidden)} cannot be determined by the kinematics of these records: the vane of beta measures moving "
+        "air as well, or the manoeuvre is weak."
     ]
 
 

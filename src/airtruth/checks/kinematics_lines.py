@@ -131,6 +131,7 @@ def weigh(
     differences: Sequence[Mapping[str, Array]],
     equations: Sequence[str],
     kinematics: Kinematics = LONGITUDINAL,
+    enlarged: Mapping[str, float] | None = None,
 ) -> Weight:
     """Estimate the noise of each record and equation, and whiten the motions of the control surfaces.
 
@@ -140,6 +141,7 @@ def weigh(
     differences : of each record, equation -> (samples,) difference at the errors where the noise is judged.
     equations : equations that are used.
     kinematics : of the motion.
+    enlarged : equation -> factor on the noise for motion that no error explains; 1 without an entry.
     """
     stds, own, trends, blocks = [], [], [], []
     count = lines[0].basis.shape[0]
@@ -150,6 +152,8 @@ def weigh(
             y = line.of(difference[equation])
             outside = np.vstack([line.basis, line.trends])
             s = noise_spectrum(y, line.hz, outside, _floor(record, line, kinematics, equation))
+            if enlarged and equation in enlarged:
+                s = enlarged[equation] * s
             std[equation] = s
             steps = _orthonormal_rows(line.trends / s)
             white = line.basis / s

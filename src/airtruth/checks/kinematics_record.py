@@ -149,6 +149,8 @@ class Kinematics:
     controls : the control surfaces, in sentences.
     same : groups of errors that move the channels in the same way; no set has two of a group.
     telling : sizes that records have to show before the channels are called consistent [SI].
+    most : largest number of errors in a set; a real record, which no kinematic model of few terms explains exactly, takes up any
+        further error.
     trends : degree of the polynomial that is free in each equation and record.
     offsets : unknown constants, free in every set: name -> step of its derivative [SI].
     """
@@ -161,6 +163,7 @@ class Kinematics:
     controls: str
     same: tuple[frozenset[str], ...] = ()
     telling: Mapping[str, float] = field(default_factory=dict)
+    most: int = 3
     trends: int = 1
     offsets: Mapping[str, float] = field(default_factory=dict)
 

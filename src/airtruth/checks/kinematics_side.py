@@ -196,6 +196,7 @@ LATERAL: Final = Kinematics(
     controls="aileron and rudder",
     same=(frozenset({"vane_arm:beta_rad", "accelerometer_arm:ay_m_s2"}),),
     telling={"vane_scale:beta_rad": 0.15, "vane_lag:beta_rad": 0.1},
+    most=4,
     trends=2,
     offsets={ALPHA_BIAS: 1e-3},
 )
