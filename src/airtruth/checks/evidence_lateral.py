@@ -169,7 +169,7 @@ def _side_slope(runs: Runs, surfaces: tuple[str, ...]) -> Relation:
     if "ay_m_s2" not in runs.channels:
         return _nothing("side_slope", channels[1:], runs)
     value, std, clear = _slope(runs, channels)
-    usual, tolerance = SIDE_SLOPE
+    usual, tolerance = (np.full_like(value, x) for x in SIDE_SLOPE)
     lift_channels = ("az_m_s2", "alpha_rad", "q_rad_s", "elevator_rad")
     if set(lift_channels) <= set(runs.channels):
         lift, lift_std, lifts = _slope(runs, lift_channels)
@@ -182,7 +182,7 @@ def _side_slope(runs: Runs, surfaces: tuple[str, ...]) -> Relation:
     size = size / np.sqrt(tolerance**2 + (std / value) ** 2)
     distance = finite((against**2 + size**2) * clear)
     return Relation(
-        "side_slope", channels, distance, np.stack([value, std, np.exp(usual + 0.0 * value)], axis=1), clear
+        "side_slope", channels, distance, np.stack([value, std, np.exp(usual)], axis=1), clear
     )
 
 

@@ -232,7 +232,8 @@ def _airspeed(found: Search) -> list[Finding]:
     pneumatic lines, which no log states. It therefore has no part in the errors of the other instruments.
     """
     problem, one = found.problem, found.best.fit
-    if problem.records[0].ax is None or problem.records[0].theta is None:
+    first = problem.records[0]
+    if first.channel("ax") is None or first.channel("theta") is None:
         return []
     known = {**problem.known, **dict(zip(one.names, one.value, strict=True))}
     usual = {name: ERRORS[name].usual for name in AIRSPEED}
@@ -256,11 +257,11 @@ def _biases(found: Search, known: Mapping[str, float]) -> list[Finding]:
     turn, turn_std = drift(found, "theta", known)
     meaning = "constant in q, by the drift of its integral from theta"
     result = [bias_of(found, "gyro_bias", "rad/s", meaning, -turn, turn_std)]
-    airspeed = float(np.mean([r.airspeed.mean() for r in problem.records]))
+    airspeed = float(np.mean([np.mean(getattr(r, "airspeed")) for r in problem.records]))
     meaning = "constant in az, by the drift of the integral of q + az/V from alpha"
     bias, spread = airspeed * (ramp + turn), airspeed * float(np.hypot(std, turn_std))
     result.append(bias_of(found, "accelerometer_bias", "m/s2", meaning, bias, spread))
-    if problem.records[0].ax is not None:
+    if problem.records[0].channel("ax") is not None:
         meaning = (
             "constant in ax + az alpha - g (theta - alpha): biases that airspeed alone does not separate"
         )

@@ -37,6 +37,10 @@ USUAL_ARM_SPANS: Final = 0.4
 """Arm that is not unusual [spans]: judgement; the nose of a transport is that far ahead."""
 USUAL_ARM_M: Final = 10.0
 """Arm that is not unusual where no span is known [m]: judgement."""
+ROUNDS: Final = 3
+"""Largest number of searches with enlarged noise [-]: judgement; two usually suffice."""
+STEADY: Final = 0.1
+"""Relative change of an enlargement below which it is settled [-]: judgement."""
 OF_EQUATION: Final = {
     "phi": ("phi_rad", "p_rad_s"),
     "psi": ("psi_rad", "r_rad_s"),
@@ -106,27 +110,34 @@ def _searched(problem: Problem, usual: Mapping[str, float]) -> tuple[Search, Sea
     The equations differ in what they leave: a good attitude shows every imperfection of a gyroscope, and a vane in the air does
     not. What an equation leaves beyond noise enlarges its own noise, not that of the others.
     """
-    found = search(problem, usual)
-    enlarged = {}
-    for equation, (energy, count) in by_equation(found.problem, found.best.fit).items():
-        if fisher.sf(energy / max(count, 1), max(count, 1), found.problem.weight.degrees) < DOUBT:
-            enlarged[equation] = float(np.sqrt(energy / count))
+    first = found = search(problem, usual)
+    enlarged: dict[str, float] = {}
+    for _ in range(ROUNDS):
+        left = {}
+        for equation, (energy, count) in by_equation(found.problem, found.best.fit).items():
+            whole = energy * enlarged.get(equation, 1.0) ** 2 / max(count, 1)
+            if fisher.sf(whole, max(count, 1), found.problem.weight.degrees) < DOUBT:
+                left[equation] = float(np.sqrt(whole))
+        if left.keys() == enlarged.keys() and all(abs(left[e] / enlarged[e] - 1.0) < STEADY for e in left):
+            break
+        enlarged = left
+        again = problem_of(
+            problem.records,
+            problem.equations,
+            problem.known,
+            problem.limits,
+            None,
+            problem.lines,
+            LATERAL,
+            enlarged,
+        )
+        found = search(again, usual)
+    final = completed(found, usual)
     if not enlarged:
-        return completed(found, usual), found
-    again = problem_of(
-        problem.records,
-        problem.equations,
-        problem.known,
-        problem.limits,
-        None,
-        problem.lines,
-        LATERAL,
-        enlarged,
-    )
-    final = completed(search(again, usual), usual)
+        return final, final
     factor = max(max(enlarged.values()) ** 2, final.enlargement)
     return final, replace(
-        final, statistic=found.statistic, degrees=found.degrees, p_value=found.p_value, enlargement=factor
+        final, statistic=first.statistic, degrees=first.degrees, p_value=first.p_value, enlargement=factor
     )
 
 
@@ -230,7 +241,7 @@ def _candidates(
     arm = USUAL_ARM_M if span_m is None else USUAL_ARM_SPANS * span_m
     result = {}
     for name, error in ERRORS.items():
-        if error.channel not in shown or name == ARMS[1] and name in known:
+        if error.channel not in shown or (name == ARMS[1] and name in known):
             continue
         result[name] = error.usual if not error.is_arm else arm if error.kind == "arm" else 0.3 * arm
     return result

@@ -48,7 +48,7 @@ class Samples:
     @property
     def length(self) -> int:
         """Number of samples."""
-        return next(x.shape[-1] for n in self.names() if (x := self.channel(n)) is not None)
+        return int(next(x.shape[-1] for n in self.names() if (x := self.channel(n)) is not None))
 
     @property
     def duration_s(self) -> float:

@@ -135,7 +135,7 @@ def _check(motion: Motion, logs: Sequence[FlightLog], aircraft: Aircraft | None)
     return kinematics_lateral.check_lateral(
         logs,
         kinematics_lateral.declared_errors(aircraft),
-        aircraft.file.geometry.span.value or None,
+        None if aircraft.file.geometry is None else aircraft.file.geometry.span.value,
         kinematics_lateral.declared_biases(aircraft),
     )
 
