@@ -49,6 +49,7 @@ from airtruth.tracing.selection.search import search
 from airtruth.tracing.selection.settled import total_cost
 from airtruth.tracing.selection.significance import LEVEL
 from airtruth.tracing.selection.weights import with_rival
+from airtruth.tracing.stage_errors import Replay
 from airtruth.tracing.stages import assess_stages
 from airtruth.tracing.update import updated_folder, write_update
 
@@ -115,19 +116,21 @@ def _traced(
     axial = axial_force(stages, checked, declared, rounds[-1].gls) if options.learns else None
     origin = provenance_of(logs, declared, options)
     dt_s = _longest_period_s(case)
-    if out is None:
-        answer = with_contradictions(conclude(stages, rounds, forced=forced, axial=axial), kinematics, dt_s)
-        answer = replace(answer, notes=(*remarks, *answer.notes))
-        return TraceResult(answer, rounds, stages, origin)
-    advance("write the updated aircraft")
-    atomic.remove_file(out / ANSWER)  # an interrupted trace has no answer, not one of another trace
-    contradicted = declared_p_value(rounds) <= DECLARED_LEVEL
-    updated = write_update(case, rounds, declared, out, contradicted, axial)
-    replay = flown_again(stages, declared, updated)
-    answer = with_contradictions(conclude(stages, rounds, updated, replay, forced, axial), kinematics, dt_s)
+
+    def publish(refined: bool) -> tuple[str | None, Replay | None]:
+        if out is None:
+            return None, None
+        advance("write the updated aircraft")
+        atomic.remove_file(out / ANSWER)  # an interrupted trace has no answer, not one of another trace
+        refit = refined or declared_p_value(rounds) <= DECLARED_LEVEL
+        updated = write_update(case, rounds, declared, out, refit, axial)
+        return updated, flown_again(stages, declared, updated)
+
+    answer = with_contradictions(conclude(stages, rounds, publish, forced, axial), kinematics, dt_s)
     answer = replace(answer, notes=(*remarks, *answer.notes))
     result = TraceResult(answer, rounds, stages, origin)
-    result.write(out)
+    if out is not None:
+        result.write(out)
     return result
 
 
