@@ -47,13 +47,18 @@ def flown(number: int, seed: int) -> tuple[dict[str, float], float, list[Flight]
 
 def false_causes(result: CheckResult, errors: dict[str, float]) -> list[str]:
     """Errors that are said to be present and are not; a pair that is said to be one holds no false cause."""
-    return [f.name for f in result.findings if f.state == "present" and f.name in ERRORS and f.name not in errors]
+    return [
+        f.name for f in result.findings if f.state == "present" and f.name in ERRORS and f.name not in errors
+    ]
 
 
 def covered(result: CheckResult, errors: dict[str, float]) -> Iterator[tuple[str, bool]]:
-    """Whether intervals hold the truth, of the errors that are possible or shown, and of the biases."""
+    """Whether intervals hold the truth, of the errors that are shown, and of the biases.
+
+    The interval of a possible cause is that of its size if it is the cause, and counts only then.
+    """
     for finding in result.findings:
-        if finding.name in ERRORS and finding.state != "not shown":
+        if finding.name in ERRORS and (finding.state == "not needed" or finding.name in errors):
             truth = errors.get(finding.name, ERRORS[finding.name].neutral)
             yield finding.state, bool(finding.lower - 1e-12 <= truth <= finding.upper + 1e-12)
         elif finding.name in TRUE_BIASES:
@@ -88,7 +93,9 @@ def main() -> None:
             hits.setdefault(state, []).append(inside)
         hits.setdefault("set of the very errors", []).extend(best_covers(result, errors))
         print(number, gust, errors, sorted(possible)[:6], absent, f"p {result.p_value:.3f}", flush=True)
-    print(f"false causes in {wrong} of {arguments.records} logs; errors missed: {missed}; true set not possible: {excluded}")
+    print(
+        f"false causes in {wrong} of {arguments.records} logs; errors missed: {missed}; true set not possible: {excluded}"
+    )
     print(f"p below 0.05 in {np.mean(small):.1%}")
     for state, inside in hits.items():
         print(f"{state}: {np.mean(inside):.1%} of {len(inside)} intervals hold the truth")

@@ -181,9 +181,7 @@ def _side_slope(runs: Runs, surfaces: tuple[str, ...]) -> Relation:
     size = np.log(np.maximum(np.abs(value), 1e-9)) - usual
     size = size / np.sqrt(tolerance**2 + (std / value) ** 2)
     distance = finite((against**2 + size**2) * clear)
-    return Relation(
-        "side_slope", channels, distance, np.stack([value, std, np.exp(usual)], axis=1), clear
-    )
+    return Relation("side_slope", channels, distance, np.stack([value, std, np.exp(usual)], axis=1), clear)
 
 
 def _slope(runs: Runs, channels: tuple[str, ...]) -> tuple[Array, Array, Bools]:

@@ -257,7 +257,7 @@ def _biases(found: Search, known: Mapping[str, float]) -> list[Finding]:
     turn, turn_std = drift(found, "theta", known)
     meaning = "constant in q, by the drift of its integral from theta"
     result = [bias_of(found, "gyro_bias", "rad/s", meaning, -turn, turn_std)]
-    airspeed = float(np.mean([np.mean(getattr(r, "airspeed")) for r in problem.records]))
+    airspeed = float(np.mean([np.asarray(r.channel("airspeed")).mean() for r in problem.records]))
     meaning = "constant in az, by the drift of the integral of q + az/V from alpha"
     bias, spread = airspeed * (ramp + turn), airspeed * float(np.hypot(std, turn_std))
     result.append(bias_of(found, "accelerometer_bias", "m/s2", meaning, bias, spread))

@@ -75,7 +75,7 @@ def check_lateral(
     LogError
         If a channel is missing, or no run is long enough and has an aileron or rudder that moves.
     """
-    records, remarks = _records(logs)
+    records, remarks = side_records(logs)
     known = {n: v for n, v in (declared or {}).items() if n in ERRORS}
     equations = tuple(
         e for e, c in LATERAL.channels.items() if records[0].channel(LATERAL.fields[c]) is not None
@@ -165,8 +165,14 @@ _INPUTS: Final = ("alpha_rad", "theta_rad", "q_rad_s")
 """Channels of the other motion that are known inputs."""
 
 
-def _records(logs: Sequence[FlightLog]) -> tuple[list[SideRecord], list[str]]:
-    """Runs worth judging, with the channels that all of them have, and remarks on absent ones."""
+def side_records(logs: Sequence[FlightLog]) -> tuple[list[SideRecord], list[str]]:
+    """Runs worth judging, with the channels that all of them have, and remarks on absent ones.
+
+    Raises
+    ------
+    LogError
+        As `check_lateral`.
+    """
     shared = set.intersection(*(set(log.channels) for log in logs))
     missing = [n for n in _NEEDED if n not in shared]
     if missing or not {"aileron_rad", "rudder_rad"} & shared or not set(LATERAL.channels.values()) & shared:
@@ -305,4 +311,4 @@ def _of_gusts(findings: Sequence[Finding]) -> list[str]:
     ]
 
 
-__all__ = ["check_lateral", "declared_biases", "declared_errors"]
+__all__ = ["check_lateral", "declared_biases", "declared_errors", "side_records"]
