@@ -248,11 +248,11 @@ LATERAL: Final = Motion(
     ),
     known=("airspeed_m_s", "density_kg_m3", "alpha_rad", "theta_rad", "q_rad_s"),
     outputs=(
-        Output("beta", "beta_rad", "sideslip_vane"),
-        Output("p", "p_rad_s", "roll_gyro"),
-        Output("r", "r_rad_s", "yaw_gyro"),
-        Output("phi", "phi_rad", "bank"),
-        Output("ay", "ay_m_s2", "lateral_accelerometer", late=True),
+        Output("beta", "beta_rad", "vane"),
+        Output("p", "p_rad_s", "gyro"),
+        Output("r", "r_rad_s", "gyro"),
+        Output("phi", "phi_rad", "attitude"),
+        Output("ay", "ay_m_s2", "accelerometer", late=True),
     ),
     coefficients=(
         Coefficient("CY", "side force, to the right", None),

@@ -15,11 +15,12 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.channels import LATERAL
 from airtruth.physics.motion import MOTIONS
 
 Array = NDArray[np.float64]
 
-Kind = Literal["bias", "scale", "lag", "delay", "arm", "alpha_slope"]
+Kind = Literal["bias", "scale", "lag", "delay", "arm", "arm_down", "alpha_slope"]
 """Errors that an effect may add to those declared."""
 
 
@@ -79,6 +80,7 @@ INSTRUMENTS: Final[Mapping[str, str]] = {
     "airspeed_m_s": "airspeed",
     "theta_rad": "attitude",
     **{output.channel: output.instrument for motion in MOTIONS.values() for output in motion.outputs},
+    "psi_rad": "attitude",
 }
 """Instrument of a channel, as its errors are named."""
 
@@ -182,10 +184,13 @@ def error_name(channel: str, kind: Kind) -> str:
 
     Examples
     --------
-    >>> error_name("alpha_rad", "scale"), error_name("q_rad_s", "delay")
-    ('vane_scale', 'sensor_delay:q_rad_s')
+    >>> error_name("alpha_rad", "scale"), error_name("q_rad_s", "delay"), error_name("beta_rad", "arm")
+    ('vane_scale', 'sensor_delay:q_rad_s', 'vane_arm:beta_rad')
     """
-    return f"sensor_delay:{channel}" if kind == "delay" else f"{INSTRUMENTS[channel]}_{kind}"
+    if kind == "delay":
+        return f"sensor_delay:{channel}"
+    name = f"{INSTRUMENTS[channel]}_{kind.replace('arm_down', 'arm_z')}"
+    return f"{name}:{channel}" if channel in LATERAL else name
 
 
 __all__ = ["INSTRUMENTS", "KINDS", "ErrorKind", "Kind", "SensorErrors", "error_name"]
