@@ -73,7 +73,8 @@ def _edits(text: str, new: AircraftFile) -> Iterator[_Edit]:
             elif path in found.tables:
                 yield None
             else:
-                added.setdefault(path[:-1], []).append(f"{path[-1]} = {toml.quantity(value, unit)}")
+                short = value.model_copy(update={"std": float(f"{value.std:.3g}")})
+                added.setdefault(path[:-1], []).append(f"{path[-1]} = {toml.quantity(short, unit)}")
         elif isinstance(value, tuple) and path[0] == "dynamics":
             known = before or ()
             if path in found.values or value[: len(known)] != known:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -146,9 +146,8 @@ def provenance_of(logs: Logs, aircraft: Aircraft, options: TraceOptions) -> Prov
     StoreError, ConfigurationError
         If a file cannot be read, or a log does not exist.
     """
-    stated = {
-        name: value for name, value in asdict(options).items() if name != "threads"
-    }  # which changes nothing
+    stated = {f.name: getattr(options, f.name) for f in fields(options) if f.name != "threads"}
+    stated["effects"] = options.keys  # the number of threads changes nothing
     words = {name: "default" if value is None else _words(value) for name, value in stated.items()}
     digests = digests_of(logs, aircraft.folder)
     return Provenance(__version__, aircraft.name, words, digests, str(aircraft.folder.resolve()))
@@ -250,10 +249,13 @@ def _with_later_colour(
 
 def _effects(options: TraceOptions) -> list[Effect]:
     """The requested candidates, each once; a name without a variant selects all of its variants."""
-    if options.keys is None:
+    if options.effects is None:
         return [effect for effect in EFFECTS.values() if not effect.in_derivatives]
     found: dict[str, Effect] = {}
-    for key in options.keys:
+    for key in options.effects:
+        if isinstance(key, Effect):
+            found[key.key] = key
+            continue
         matching = {k: e for k, e in EFFECTS.items() if key in (k, e.name)}
         if not matching:
             raise ConfigurationError(
