@@ -287,10 +287,13 @@ def test_the_schema_knows_every_effect_and_the_names_that_validators_test():
              described["EffectTable"]["anyOf"]}  # fmt: skip
     assert shown == {(e.name, e.variant) for e in EFFECTS.values()}
     for (model, field), names in NAMES.items():
-        required = {"kind": "replay", "file": "f"} if field == "kind" else {}
+        required = {
+            "kind": {"kind": "replay", "file": "f"},
+            "control": {"kind": "step", "amplitude_deg": 1.0},
+        }.get(field, {})
         for name in names:
             moved = {"file": "f"} if name == "replay" else {"amplitude_deg": 1.0}
-            given = {field: name} | (moved if field == "kind" else {})
+            given = (required if field != "kind" else moved) | {field: name}
             model.model_validate(given)
         with pytest.raises(ValueError, match="is not known"):
             model.model_validate(required | {field: "bogus"})

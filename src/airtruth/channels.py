@@ -1,6 +1,7 @@
 """The channels of a flight log: name, unit, axis, sign and JSBSim property of each, in one table.
 
-Body axes: x forward, z down, pitch nose-up positive; elevator trailing edge down positive.
+Body axes: x forward, y right, z down; pitch nose-up, right wing down and nose right positive; elevator trailing edge down
+positive, aileron (right - left)/2 with each trailing edge down positive, rudder trailing edge left positive.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ class Signal:
     limit: float = float("inf")
 
 
-_ALL = (
+_LONGITUDINAL = (
     Signal("airspeed_m_s", "m/s", "speed", "true airspeed", "velocities/vt-fps", units.FT, 1000.0),
     Signal("alpha_rad", "rad", "angle", "angle of attack, nose-up positive", "aero/alpha-rad", 1.0, 1.6),
     Signal("theta_rad", "rad", "angle", "pitch attitude, nose-up positive", "attitude/theta-rad", 1.0, 1.6),
@@ -89,9 +90,64 @@ _ALL = (
         2.0,
     ),
 )
+_LATERAL = (
+    Signal("beta_rad", "rad", "angle", "sideslip, wind from the right positive", "aero/beta-rad", 1.0, 1.6),
+    Signal(
+        "p_rad_s",
+        "rad/s",
+        "angular_rate",
+        "body roll rate, right wing down positive",
+        "velocities/p-rad_sec",
+        1.0,
+        10.0,
+    ),
+    Signal(
+        "r_rad_s",
+        "rad/s",
+        "angular_rate",
+        "body yaw rate, nose right positive",
+        "velocities/r-rad_sec",
+        1.0,
+        10.0,
+    ),
+    # of the angles of bank and heading whole turns are added up where they jump
+    Signal("phi_rad", "rad", "angle", "bank, right wing down positive", "attitude/phi-rad"),
+    Signal("psi_rad", "rad", "angle", "heading, nose right positive", "attitude/psi-rad"),
+    Signal("ay_m_s2", "m/s2", "acceleration", "specific force along body y (right)", "", 1.0, 200.0),
+    Signal(
+        "aileron_rad",
+        "rad",
+        "angle",
+        "aileron surface, (right - left)/2, each trailing edge down positive",
+        "",
+        1.0,
+        1.6,
+    ),
+    Signal("rudder_rad", "rad", "angle", "rudder surface, trailing edge left positive", "", 1.0, 1.6),
+    Signal(
+        "aileron_command_rad",
+        "rad",
+        "angle",
+        "aileron command sent to the actuators, (right - left)/2, each trailing edge down positive",
+        "",
+        1.0,
+        1.6,
+    ),
+    Signal(
+        "rudder_command_rad",
+        "rad",
+        "angle",
+        "rudder command sent to the actuator, trailing edge left positive",
+        "",
+        1.0,
+        1.6,
+    ),
+)
 
-SIGNALS: Final[dict[str, Signal]] = {s.name: s for s in _ALL}
+SIGNALS: Final[dict[str, Signal]] = {s.name: s for s in (*_LONGITUDINAL, *_LATERAL)}
 """Column name -> channel, in the order of the columns of a log (contract 1)."""
+LATERAL: Final = tuple(s.name for s in _LATERAL)
+"""Channels of the lateral-directional motion; every log may lack all of them."""
 
 RUN_ID: Final = "run_id"
 """Column with the name of the run."""

@@ -85,3 +85,10 @@ def test_command_line():
     run = CliRunner().invoke(cli.app, ["plan", str(LIGHT), "--records", "10", "--json"])
     assert run.exit_code == 0
     assert set(json.loads(run.stdout)["parameters"]) == {"CLalpha", "CLq", "CLde", "Cmalpha", "Cmq", "Cmde"}
+
+
+def test_a_campaign_that_moves_no_elevator_is_refused():
+    with pytest.raises(
+        ConfigurationError, match=r"campaign lateral moves no elevator.*add a manoeuvre of the elevator"
+    ):
+        forecast(LIGHT.with_name("lateral.toml"))

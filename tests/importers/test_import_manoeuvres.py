@@ -258,3 +258,57 @@ def test_the_public_function_shows_and_writes_its_result(files, tmp_path):
 def test_what_was_not_measured_is_none_in_the_dictionary(flight):
     found = find("f", {name: one for name, one in series(flight).items() if name != "az_m_s2"})
     assert {row["load_factor"] for row in found.to_dict()["candidates"]} == {None}
+
+
+def quiet_flight(extra):
+    """Four minutes at 50 Hz with two 3-2-1-1, and a further pitch rate while the elevator is at rest."""
+    starts = (20.0, 200.0)
+    batch = fly(
+        rate_hz=50, duration_s=240.0, gust=0.05, noise=0.3, seed=7, shape=lambda t: train(t, starts), amplitude_rad=2 * DEG
+    )  # fmt: skip
+    c = {name: values[0] for name, values in batch.channels.items()}
+    t = batch.t_s[0]
+    c["q_rad_s"] = c["q_rad_s"] + extra(t)
+    return {name: Series(t, values) for name, values in c.items()}
+
+
+def test_a_free_response_is_kept_and_named():
+    """An upset of 6 deg/s that decays with a damping ratio of 0.2 at 3 rad/s, as after a gust or a released trim."""
+
+    def upset(t):
+        after = np.maximum(t - 110.0, 0.0)
+        return np.where(t >= 110.0, 6.0 * DEG * np.exp(-0.6 * after) * np.cos(2.94 * after), 0.0)
+
+    found = find("f", quiet_flight(upset))
+    assert [(one.kind, one.reason) for one in found.candidates] == [
+        ("input", ""),
+        ("free response", ""),
+        ("input", ""),
+    ]
+    one = found.candidates[1]
+    assert one.start_s == pytest.approx(110.0 - TRIM_S, abs=0.2)
+    assert one.input_deg < 0.2
+    assert "3 of 3 manoeuvres accepted" in found.summary()
+    assert "m02 is a free response: the elevator stays within" in found.summary()
+    assert found.table().splitlines()[0].endswith(",reason,kind")
+
+
+def test_turbulence_is_no_free_response():
+    """Ten seconds of a pitch rate of the short period's band that does not settle."""
+    from scipy.signal import butter, sosfilt
+
+    def gusty(t):
+        shaped = sosfilt(
+            butter(2, [0.2, 1.0], "bandpass", fs=50.0, output="sos"),
+            np.random.default_rng(3).standard_normal(len(t)),
+        )
+        return np.where((t > 105.0) & (t < 115.0), 4.0 * DEG * shaped / shaped.std(), 0.0)
+
+    found = find("f", quiet_flight(gusty))
+    assert [one.kind for one in found.candidates] == ["input", "input"]
+
+
+def test_a_table_with_a_kind_is_read(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("run_id,accept,start_s,end_s,kind\na,yes,1.0,5.0,free response\nb,no,7.0,9.0,input\n")
+    assert [one.run_id for one in read_table(path)] == ["a"]

@@ -8,6 +8,7 @@ import pytest
 
 from airtruth.errors import LogError, StoreError
 from airtruth.foreign.text import WHITESPACE, TextFormat, read_text
+from airtruth.importers.build import sentences
 from airtruth.importers.clock import increasing
 from airtruth.importers.convert import convert
 from airtruth.importers.mapping import MappingFile
@@ -159,13 +160,94 @@ def test_repeated_times_are_dropped_and_counted():
     assert clocked.notes == ("3 repeated times are left out",)
 
 
-def test_a_restart_is_refused_with_its_cure():
-    t = np.concatenate([100.0 + T, T])
-    assert increasing(t).notes == ()
-    arrays = {"t": t, "v": 20.0 + t}
-    mapping = {"time": {"column": "t"}, "channels": {"airspeed_m_s": {"column": "v", "unit": "m/s"}}}
-    with pytest.raises(LogError, match="if the recorder started again there, name each run's rows"):
-        convert(Source(Path("f.csv"), arrays), MappingFile.model_validate(mapping))
+LONG = np.arange(300) * 0.02
+SPEED = {"time": {"column": "t"}, "channels": {"airspeed_m_s": {"column": "v", "unit": "m/s"}}}
+
+
+def restarted(*starts, rows=300):
+    t = np.concatenate([start + LONG[:rows] for start in starts])
+    return Source(Path("f.csv"), {"t": t, "v": 20.0 + np.arange(len(t)) * 0.01, "m": np.arange(len(t)) + 1.0})
+
+
+def test_a_clock_that_starts_again_divides_the_record_into_runs():
+    source = restarted(100.0, 0.0, 40.0, 0.1)  # the step to 40 s is a pause
+    log = convert(
+        source, MappingFile.model_validate({**SPEED, "resample": {"rate_hz": 50, "method": "previous"}})
+    )
+    assert log.run_ids == ("f-1", "f-2", "f-3")
+    assert np.diff(log.offsets).tolist() == [300, 2300, 300]
+    np.testing.assert_array_equal(log.channels["airspeed_m_s"][:300], source.arrays["v"][:300])
+    np.testing.assert_array_equal(log.channels["airspeed_m_s"][-300:], source.arrays["v"][-300:])
+    np.testing.assert_allclose(log.t_s[-300:], LONG, atol=1e-9)
+    # parts count on in whole seconds, 10 s or more after the end: 105.98 -> 116, 161.98 -> 172 less 0.1
+    assert log.metadata["reading"] == [
+        "f.csv: the clock starts again at 0 s: part 2 counts on from 116 s, and is a run of its own",
+        "f.csv: the clock starts again at 0.1 s: part 3 counts on from 172.1 s, and is a run of its own",
+    ]
+
+
+def test_the_parts_have_constants_of_their_own():
+    stated = {**SPEED, "constants": {"mass_kg": {"column": "m", "unit": "kg"}}}
+    log = convert(restarted(100.0, 0.0), MappingFile.model_validate(stated))
+    assert {run: facts["mass_kg"] for run, facts in log.metadata["record_constants"].items()} == {
+        "f-1": pytest.approx(150.5),  # the means of 1 ... 300 and 301 ... 600
+        "f-2": pytest.approx(450.5),
+    }
+
+
+def test_manoeuvres_count_on_the_continued_clock():
+    cut = [{"run_id": "late", "start_s": 117.0, "end_s": 118.0}]
+    log = convert(restarted(100.0, 0.0), MappingFile.model_validate({**SPEED, "manoeuvre": cut}))
+    np.testing.assert_allclose(log.channels["airspeed_m_s"], 20.0 + (350 + np.arange(51)) * 0.01)
+
+
+def test_a_part_that_is_shorter_than_a_run_is_left_out_and_named():
+    one = restarted(100.0)
+    arrays = {name: np.concatenate([values[:12], values]) for name, values in one.arrays.items()}
+    arrays["t"][:12] = LONG[:12] + 300.0
+    log = convert(Source(Path("f.csv"), arrays), MappingFile.model_validate(SPEED))
+    assert log.run_ids == ("f-2",)
+    assert len(log.t_s) == 300
+    assert any("part 1" in text and "shorter than a run" in text for text in log.metadata["reading"])
+
+
+@pytest.mark.parametrize("order", [[0, 2, 1, 3], [0, 1, 3, 2]])
+def test_rows_out_of_order_are_refused(order):
+    source = restarted(100.0)
+    arrays = {name: values.copy() for name, values in source.arrays.items()}
+    arrays["t"][50:54] = arrays["t"][50:54][order]
+    with pytest.raises(LogError, match="if rows are out of order, sort the file by the time"):
+        convert(Source(Path("f.csv"), arrays), MappingFile.model_validate(SPEED))
+
+
+def test_channels_whose_clocks_start_again_at_different_times_are_refused():
+    arrays = {"t": np.concatenate([LONG + 100.0, LONG]), "own": np.arange(600) * 0.02, "v": LONG.repeat(2)}
+    stated = {**SPEED, "resample": {"rate_hz": 50, "method": "linear"}}
+    stated["channels"] = {
+        **SPEED["channels"],
+        "q_rad_s": {"column": "v", "unit": "rad/s", "clock": {"column": "own"}},
+    }
+    with pytest.raises(LogError, match="if the recorder started again there"):
+        convert(Source(Path("f.csv"), arrays), MappingFile.model_validate(stated))
+
+
+def test_jitter_is_stated_with_the_method():
+    t = LONG + 0.004 * np.sin(np.arange(300))
+    source = Source(Path("f.csv"), {"t": t, "v": 20.0 + t})
+    for method, words in (
+        ("linear", "linear interpolation"),
+        ("cubic", "cubic splines"),
+        ("previous", "holding the previous sample"),
+    ):
+        log = convert(
+            source, MappingFile.model_validate({**SPEED, "resample": {"rate_hz": 50, "method": method}})
+        )
+        # the largest step is 0.02 + 0.004 (sin i - sin(i - 1)), at most 0.02 + 0.008 sin(1/2), 19.2 % more
+        assert sentences(log) == [
+            f"the steps of the times differ by up to 19 %: channels are resampled to 50 Hz by {words}"
+        ]
+    even = convert(Source(Path("f.csv"), {"t": LONG, "v": 20.0 + LONG}), MappingFile.model_validate(SPEED))
+    assert sentences(even) == []
 
 
 @pytest.mark.skipif(not FIELD.is_dir(), reason="AIRTRUTH_FIELD names no folder")

@@ -121,7 +121,7 @@ def test_to_frame_is_the_table_of_the_file(log: FlightLog) -> None:
 def test_repr_is_one_short_line(log: FlightLog) -> None:
     assert repr(log) == (
         "FlightLog(3 runs of 0.58 to 0.78 s at 50 Hz, "
-        "11 channels: airspeed_m_s, alpha_rad, theta_rad, q_rad_s, ...)"
+        "21 channels: airspeed_m_s, alpha_rad, theta_rad, q_rad_s, ...)"
     )
     assert repr(log.select("a", "q_rad_s")) == "FlightLog(1 run of 0.58 s at 50 Hz, 1 channel: q_rad_s)"
     assert repr(log.select([])).startswith("FlightLog(0 runs, 11 channels: ")

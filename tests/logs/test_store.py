@@ -18,7 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from airtruth.channels import SIGNALS
+from airtruth.channels import LATERAL, SIGNALS
 from airtruth.errors import LogError, StoreError
 from airtruth.logs import atomic, store
 from airtruth.logs.flight_log import FlightLog
@@ -456,3 +456,19 @@ def test_a_log_that_would_not_be_written_as_a_whole_is_refused(log, tmp_path, ch
     with pytest.raises(LogError, match=problem):
         store.write_log(tmp_path / "log.parquet", replace(log, **change))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_log_keeps_the_lateral_channels_and_their_units(log: FlightLog, tmp_path: Path) -> None:
+    """Contract 1 lists ten lateral columns; a log may hold all of them or none."""
+    assert len(LATERAL) == 10
+    assert set(LATERAL) <= set(log.channels)
+    store.write_log(tmp_path / "log.parquet", log, dtype="float64")
+    read = store.read_log(tmp_path / "log.parquet")
+    units = {name: pq.read_schema(tmp_path / "log.parquet").field(name).metadata[b"unit"] for name in LATERAL}
+    assert units["ay_m_s2"] == b"m/s2"
+    assert units["p_rad_s"] == units["r_rad_s"] == b"rad/s"
+    assert {units[n] for n in LATERAL if n.endswith("_rad")} == {b"rad"}
+    for name in LATERAL:
+        assert np.array_equal(read.channels[name], log.channels[name])
+    without = log.select(channels=[n for n in log.channels if n not in LATERAL])
+    validate(without)

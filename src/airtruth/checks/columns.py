@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.channels import SIGNALS
+from airtruth.channels import LATERAL, SIGNALS
 from airtruth.checks.fault import Fault
 from airtruth.checks.spectra import integral
 from airtruth.logs.flight_log import Batch, FlightLog
@@ -25,11 +25,10 @@ Bools = NDArray[np.bool_]
 
 OTHERS: Final = frozenset(
     {
-        "ay_m_s2", "p_rad_s", "r_rad_s", "beta_rad", "phi_rad", "psi_rad", "aileron_rad", "rudder_rad",
         "flap_rad", "gamma_rad", "latitude_rad", "longitude_rad", "latitude_deg", "longitude_deg",
     }
 )  # fmt: skip
-"""Columns that resemble a channel and are none: the lateral motion and the position."""
+"""Columns that resemble a channel and are none: flaps, the flight path and the position."""
 ALIKE: Final = 0.84
 """Similarity (`difflib`) above which a column is taken for a misspelt channel; elevator_cmd_rad has 0.89."""
 COPIED: Final = 1e-9
@@ -66,7 +65,7 @@ SPIKE_SHARE: Final = 0.01
 
 def names(log: FlightLog) -> Iterator[Fault]:
     """Columns that resemble a channel that the log lacks."""
-    absent = [name for name in SIGNALS if name not in log.channels]
+    absent = [name for name in SIGNALS if name not in log.channels and name not in LATERAL]
     for column in log.channels:
         if column in SIGNALS or column.casefold() in OTHERS:
             continue
@@ -172,7 +171,8 @@ def copies(batch: Batch, aircraft: Aircraft | None, prescribed: bool = False) ->
 
     The elevator and its command differ by the declared actuator, unless the surface was prescribed.
     """
-    moving = {n: v for n, v in batch.channels.items() if n in SIGNALS and (v.std(axis=1) > MOVED).all()}
+    named = {n: v for n, v in batch.channels.items() if n in SIGNALS and n not in LATERAL}
+    moving = {n: v for n, v in named.items() if (v.std(axis=1) > MOVED).all()}
     actuator = aircraft.file.elevator_actuator if aircraft is not None else None
     for one, other in combinations(moving, 2):
         pair = {one, other}

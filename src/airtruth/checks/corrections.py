@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import SIGNALS
+from airtruth.channels import LATERAL, SIGNALS
 from airtruth.checks.relation import ATMOSPHERE_M
 from airtruth.checks.stated import Stated
 from airtruth.checks.together import Runs
@@ -309,7 +309,7 @@ def catalogue(runs: Runs, stated: Mapping[str, Stated] | None = None) -> list[Co
     stated : what the mapping states of the channels: a mistake is a difference from that. Empty if no mapping is known.
     """
     stated = stated or {}
-    names = tuple(name for name in runs.channels if name in SIGNALS)
+    names = tuple(name for name in runs.channels if name in SIGNALS and name not in LATERAL)
     result: list[Correction] = []
     for name in names:
         if SIGNALS[name].dimension in _UNITS:

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import SIGNALS
+from airtruth.channels import LATERAL, SIGNALS
 from airtruth.checks.relation import ATMOSPHERE_M, Relation, finite, informed_everywhere
 from airtruth.checks.together import Runs
 from airtruth.physics.atmosphere import density_kg_m3
@@ -20,7 +20,7 @@ Channels = Mapping[str, Array]
 OUTSIDE: Final = 1000.0
 """Distance of a channel that leaves the range of flight [-]; larger than any sum of the others that matters."""
 LIMITS: Final = {
-    **{signal.name: (-signal.limit, signal.limit) for signal in SIGNALS.values()},
+    **{name: (-one.limit, one.limit) for name, one in SIGNALS.items() if name not in LATERAL},
     "elevator_rad": (-45.0 * DEG, 45.0 * DEG),
     "throttle": (-0.05, 1.05),
 }

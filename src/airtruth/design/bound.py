@@ -27,6 +27,7 @@ from airtruth.simulation.campaign.file import Campaign
 from airtruth.simulation.campaign.plan import Plan, PlannedRun, make, planned_runs
 from airtruth.simulation.campaign.run import Progress
 from airtruth.simulation.disposable import isolated_flight
+from airtruth.simulation.manoeuvres import ELEVATOR
 from airtruth.simulation.trim import Trim
 from airtruth.table import Table, as_html, as_text, flat, significant
 
@@ -50,7 +51,7 @@ _KIND: Final = (
     "length_u_m",
     "length_w_m",
 )
-"""Columns of the run table that define a kind of run: the bound depends on nothing else."""
+"""Columns of the run table that define a kind of run, with the amplitudes of further inputs: the bound depends on no other."""
 
 
 @dataclass(frozen=True)
@@ -197,7 +198,7 @@ def forecast(
     Raises
     ------
     ConfigurationError
-        If the campaign cannot be flown as written, ``pressure`` is not known, or a sensor has no noise.
+        If the campaign cannot be flown as written or moves no elevator, ``pressure`` is not known, or a sensor has no noise.
     AircraftError, StoreError
         If the aircraft or a file cannot be loaded.
     TrimError, FlightError
@@ -208,12 +209,18 @@ def forecast(
     if records is not None:
         require_whole("records", records, 1)
     plan = campaign if isinstance(campaign, Plan) else make(campaign)
+    if ELEVATOR not in plan.campaign.moved:
+        raise ConfigurationError(
+            f"plan: campaign {plan.campaign.name} moves no elevator, so it tells nothing of the six derivatives of the pitch "
+            "plane; add a manoeuvre of the elevator, or plan another campaign"
+        )
     noise = sensor_noise(plan.sensors, plan.aircraft, pressure)
-    groups = plan.table.groupby(list(_KIND), sort=False)
+    further = [name for name in plan.table.columns if name.startswith("amplitude_") and name not in _KIND]
+    groups = plan.table.groupby([*_KIND, *further], sort=False, dropna=False)
     kinds = groups.head(1).head(MOST_KINDS)
     counts = groups.size().to_numpy()[: len(kinds)].astype(np.float64)
     runs = planned_runs(kinds)
-    still = [replace(run, sigma_u_m_s=0.0, sigma_w_m_s=0.0) for run in runs]
+    still = [replace(run, sigma_u_m_s=0.0, sigma_w_m_s=0.0, sigma_v_m_s=0.0) for run in runs]
     flown = isolated_flight(
         len(runs) * plan.samples,
         f"the flights of {plan.aircraft.name}",

@@ -96,15 +96,19 @@ def _classic(path: Path) -> Arrays:
 
 
 def _flatten(name: str, value: Any, arrays: Arrays) -> None:
-    """Structs of one element become paths; cells of strings become string arrays."""
+    """Structs become paths, those of an array with their number from 1; cells of strings become string arrays."""
     if isinstance(value, np.ndarray) and value.dtype == object:
         if value.size == 1:
             _flatten(name, value.item(), arrays)
+            return
+        inner = value.ravel(order="F")
+        cells = [c.item() if isinstance(c, np.ndarray) and c.size == 1 else c for c in inner]
+        if cells and all(hasattr(c, "_fieldnames") for c in cells):
+            for number, one in enumerate(cells, 1):
+                _flatten(f"{name}({number})", one, arrays)
         else:
-            cells = [c.item() if isinstance(c, np.ndarray) and c.size == 1 else c for c in value.ravel()]
-            arrays[name] = (
-                np.array(cells, dtype=object) if all(isinstance(c, str) for c in cells) else value.ravel()
-            )
+            texts = all(isinstance(c, str) for c in cells)
+            arrays[name] = np.array(cells, dtype=object) if texts else inner
     elif hasattr(value, "_fieldnames"):
         for key in value._fieldnames:
             _flatten(f"{name}.{key}", getattr(value, key), arrays)

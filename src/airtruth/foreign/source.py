@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from airtruth.isolation.protocol import Reply
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 _PLAIN_KINDS: Final = "biufcmMSU"
 """Kinds of numpy types whose bytes can be sent; others are sent as JSON."""
@@ -62,6 +63,32 @@ class Source:
         """Names as the file has them, each once."""
         further = {further_name(name, n) for name, numbers in self.repeated.items() for n in numbers[1:]}
         return tuple(name for name in self.arrays if name not in further)
+
+    @property
+    def structs(self) -> tuple[str, ...]:
+        """Paths of structs (groups) that hold arrays, each once."""
+        found = dict.fromkeys(name.rpartition(".")[0] for name in self.arrays)
+        return tuple(name for name in found if name)
+
+    def within(self, struct: str) -> Source:
+        """The arrays of one struct, named within it; none if there is no such struct."""
+        start = f"{struct}."
+
+        def inner(table: Mapping[str, T]) -> dict[str, T]:
+            return {
+                name.removeprefix(start): value for name, value in table.items() if name.startswith(start)
+            }
+
+        return Source(
+            self.path,
+            inner(self.arrays),
+            inner(self.clocks),
+            labels=inner(self.labels),
+            ordered=False,
+            units=inner(self.units),
+            dates=tuple(n.removeprefix(start) for n in self.dates if n.startswith(start)),
+            notes=self.notes,
+        )
 
 
 def further_name(name: str, number: int) -> str:

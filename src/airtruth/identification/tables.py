@@ -21,7 +21,7 @@ from airtruth.identification.estimates import (
     quantities,
 )
 from airtruth.identification.methods import title
-from airtruth.physics.short_period import MODAL, PARAMETERS, UNITS
+from airtruth.physics.motion import LONGITUDINAL, Motion, motion_of
 from airtruth.table import Cell, Group, Interval, Number, Table, Uncertain, flat
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def details(estimates: Estimates, run_id: str | None = None) -> Table:
     rows: list[tuple[Cell, ...]] = [
         (
             name,
-            UNITS[name],
+            estimates.motion.units[name],
             float(q.value[run, i]),
             float(q.std[run, i]),
             float(q.lower[run, i]),
@@ -90,7 +90,7 @@ def _distribution(estimates: Estimates) -> Table:
         std = std[np.isfinite(std)]
         stated = float(np.sqrt(np.mean(std**2))) if std.size else math.nan
         error = spread / math.sqrt(value.size) if value.size > 1 else math.nan
-        rows.append((name, UNITS[name], mean, error, spread, stated))
+        rows.append((name, estimates.motion.units[name], mean, error, spread, stated))
     return flat(
         title=f"{title(estimates.method)}, {count} of {len(estimates.run_ids)} runs converged",
         columns=("parameter", "unit", "mean", "standard error", "spread over runs", "stated std (rms)"),
@@ -153,18 +153,24 @@ def overview(estimates: pd.DataFrame, confidence: float = 0.95) -> Table:
     estimates : rows of estimates.parquet, see `airtruth.identification.result.IdentificationResult.to_frame`.
     confidence : probability of their intervals [-].
     """
-    names = [*PARAMETERS, *MODAL]
+    motion = motion_of(estimates.columns)
+    names = _names(motion)
     by_method = {str(name): rows for name, rows in estimates.groupby("method", sort=False)}
     if all(len(rows) == 1 for rows in by_method.values()):
-        return _single({name: rows.iloc[0] for name, rows in by_method.items()}, confidence)
+        return _single({name: rows.iloc[0] for name, rows in by_method.items()}, confidence, motion)
     return _spread(
         lambda: (
             {
                 m: (rows[names].to_numpy(np.float64), rows["converged"].to_numpy())
                 for m, rows in by_method.items()
             },
-        )
+        ),
+        motion,
     )
+
+
+def _names(motion: Motion) -> list[str]:
+    return [*motion.parameters, *motion.modal]
 
 
 def overview_of(parts: Parts) -> Table:
@@ -173,23 +179,34 @@ def overview_of(parts: Parts) -> Table:
     for part in parts():
         runs, first = runs + len(part[0].run_ids), part if first is None else first
     if first is not None and runs == 1:
-        return _single({e.method: estimates_table(e).iloc[0] for e in first}, first[0].confidence)
-    return _spread(lambda: ({e.method: (point_values(e), e.converged) for e in part} for part in parts()))
-
-
-def _single(by_method: Mapping[str, pd.Series], confidence: float) -> Table:
-    cells = {name: _intervals(run) for name, run in by_method.items()}
-    converged = {name: int(run["converged"]) for name, run in by_method.items()}
-    return _overview(
-        f"Estimates with {100.0 * confidence:g} % intervals", cells, converged, dict.fromkeys(by_method, 1)
+        rows = {e.method: estimates_table(e).iloc[0] for e in first}
+        return _single(rows, first[0].confidence, first[0].motion)
+    motion = LONGITUDINAL if first is None else first[0].motion
+    return _spread(
+        lambda: ({e.method: (point_values(e), e.converged) for e in part} for part in parts()), motion
     )
 
 
-def _spread(parts: Callable[[], Iterable[Mapping[str, tuple[Array, NDArray[np.bool_]]]]]) -> Table:
-    """Mean and its standard error over the converged runs, from two passes over values (runs, 8) and convergence."""
+def _single(by_method: Mapping[str, pd.Series], confidence: float, motion: Motion) -> Table:
+    cells = {name: _intervals(run, motion) for name, run in by_method.items()}
+    converged = {name: int(run["converged"]) for name, run in by_method.items()}
+    return _overview(
+        f"Estimates with {100.0 * confidence:g} % intervals",
+        cells,
+        converged,
+        dict.fromkeys(by_method, 1),
+        motion,
+    )
+
+
+def _spread(
+    parts: Callable[[], Iterable[Mapping[str, tuple[Array, NDArray[np.bool_]]]]], motion: Motion
+) -> Table:
+    """Mean and its standard error over the converged runs, from two passes over values (runs, quantities) and convergence."""
     runs: Counter[str] = Counter()
     converged: Counter[str] = Counter()
-    count, total, squares = _Sums(), _Sums(), _Sums()
+    size = len(_names(motion))
+    count, total, squares = _Sums(size), _Sums(size), _Sums(size)
     for part in parts():
         for method, (values, good) in part.items():
             runs[method] += len(good)
@@ -207,22 +224,29 @@ def _spread(parts: Callable[[], Iterable[Mapping[str, tuple[Array, NDArray[np.bo
             name: Uncertain(
                 Number(mean[method][i]), Number(std[method][i] / np.sqrt(count[method][i]), digits=2)
             )
-            for i, name in enumerate((*PARAMETERS, *MODAL))
+            for i, name in enumerate(_names(motion))
         }
         for method in runs
     }
-    return _overview("Mean +- standard error over the converged runs", cells, converged, runs)
+    return _overview("Mean +- standard error over the converged runs", cells, converged, runs, motion)
 
 
 class _Sums(dict[str, Array]):
-    """Sums of each method over its runs, (8,)."""
+    """Sums of each method over its runs, (quantities,)."""
+
+    def __init__(self, size: int) -> None:
+        self.size = size
 
     def __missing__(self, method: str) -> Array:
-        return np.zeros(len(PARAMETERS) + len(MODAL))
+        return np.zeros(self.size)
 
 
 def _overview(
-    title: str, cells: Mapping[str, Mapping[str, Cell]], converged: Mapping[str, int], runs: Mapping[str, int]
+    title: str,
+    cells: Mapping[str, Mapping[str, Cell]],
+    converged: Mapping[str, int],
+    runs: Mapping[str, int],
+    motion: Motion,
 ) -> Table:
     return Table(
         title=title,
@@ -230,7 +254,7 @@ def _overview(
         groups=(
             Group(
                 "",
-                tuple((n, UNITS[n], *(c[n] for c in cells.values())) for n in (*PARAMETERS, *MODAL)),
+                tuple((n, motion.units[n], *(c[n] for c in cells.values())) for n in _names(motion)),
             ),
             Group(
                 "Runs",
@@ -244,8 +268,8 @@ def _overview(
     )
 
 
-def _intervals(run: pd.Series) -> dict[str, Cell]:
+def _intervals(run: pd.Series, motion: Motion) -> dict[str, Cell]:
     return {
         name: Interval(Number(run[name]), Number(run[f"{name}_lower"]), Number(run[f"{name}_upper"]))
-        for name in (*PARAMETERS, *MODAL)
+        for name in _names(motion)
     }

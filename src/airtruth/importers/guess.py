@@ -14,17 +14,26 @@ from airtruth.checks.gate import inspect
 from airtruth.errors import AirtruthError
 from airtruth.importers.convert import convert
 from airtruth.importers.dictionary import Words, lexicon
-from airtruth.importers.guessing.assignment import Search
+from airtruth.importers.guessing.assignment import CERTAIN, Decision, Search
 from airtruth.importers.guessing.candidates import Grid, candidates, rising, times_of
 from airtruth.importers.guessing.columns import Clock, Column, clocks_of, columns_of
-from airtruth.importers.guessing.proposal import Proposal, Writer, column_list
+from airtruth.importers.guessing.lateral import LATERAL_RELATIONS
+from airtruth.importers.guessing.proposal import Proposal, Writer
+from airtruth.importers.guessing.readings import Candidates, Reading
+from airtruth.importers.guessing.slots import LATERAL_SLOTS
+from airtruth.importers.guessing.times import Times, column_list, run_column
 from airtruth.importers.layout import guess_layout
 from airtruth.importers.mapping import MappingFile, SourceSection
-from airtruth.importers.sources import Source, open_source
+from airtruth.importers.sources import Source, open_source, records
 from airtruth.logs.validate import validate
 
 _SHOWN: Final = 200
 """Columns that the comment at the end lists [-] (judgement)."""
+_RECORDS: Final = (4, 0.8)
+"""Fewest fields of a struct that is a record, and least share of the file's arrays that such structs hold [-] (judgement:
+topics and instances of a sensor are structs of equal fields too, and hold less)."""
+_EMPTY: Final = "some of its cells are empty; map it with [resample], which fills them"
+"""Why a column of the lateral motion is left out."""
 _GRID: Final = (5.0, 25.0, 60_000)
 """Least and largest rate on which readings are compared [Hz], and most samples [-] (judgement: 40 minutes of short periods)."""
 
@@ -46,22 +55,72 @@ def guess_mapping(
         If the file cannot be read.
     """
     section = section or guess_layout(path)
-    source = open_source(path, section)
+    whole = open_source(path, section)
+    if not section.structs:
+        section = section.model_copy(update={"structs": alike(whole)})
+    source = records(whole, section)[0][1]
     known = lexicon(_names(source), words)
     columns = list(columns_of(source, known))
     clocks = clocks_of(columns, known)
     grid = _grid(columns, clocks)
     found = candidates(columns, known, grid, clocks)
     decisions = Search(found.readings, grid.dt_s).decisions()
-    proposal = Writer(decisions, found, clocks, grid, bool(source.clocks)).proposal()
-    head = ["schema = 1", f"# run_id = {json.dumps(source.path.stem)} # the name of the file, unless stated"]
+    times = Times(clocks, decisions, bool(source.clocks), run_column(source, clocks))
+    beside = _lateral(found, decisions, grid.dt_s)
+    proposal = Writer({**decisions, **beside}, found, times, grid).proposal()
+    name = "the name of the file" if not section.structs else "the names of the structs"
+    head = ["schema = 1", f"# run_id = {json.dumps(source.path.stem)} # {name}, unless stated"]
     body = "\n".join([*head, *_source_table(section), *proposal.lines])
     lines = [f"# A guess from {source.path.name}: check every unit and sign before use."]
     lines += [f"# {name}: column {c.key!r} is zero throughout and is not mapped" for name, c in found.zero]
     lines += [f"# {c.full!r} is not {channel}: {why}" for c, why, channel in found.refused if channel]
-    lines += [f"# {text}" for text in _judgement(source, body, proposal)]
+    lines += [f"# {text}" for text in _judgement(whole, body, proposal)]
+    lines += [f"# Not mapped: {text}." for text in proposal.optional]
     lines += ["", body, "", "# Columns of the file, first and last value, smallest and largest:"]
     return "\n".join([*lines, *column_list(columns, _SHOWN)]) + "\n"
+
+
+def _lateral(found: Candidates, decisions: Mapping[str, Decision], dt_s: float) -> dict[str, Decision]:
+    """Decisions on the lateral-directional motion, which change nothing of the others.
+
+    A quaternion that gives theta gives phi and psi too, and a velocity that gives alpha gives beta; otherwise neither does.
+    A column with empty cells is refused, because it would stop the import.
+    """
+    kind = {"phi": "attitude", "psi": "attitude", "beta": "velocity"}
+    source = {"phi": "theta", "psi": "theta", "beta": "alpha"}
+    readings: dict[str, list[Reading]] = {}
+    for slot in LATERAL_SLOTS:
+        own = decisions.get(source.get(slot, ""))
+        whole = own.reading.columns if own is not None and own.reading.kind == kind.get(slot) else None
+        for r in found.readings.get(slot, ()):
+            if r.columns != whole if whole is not None else r.kind in ("attitude", "velocity"):
+                continue
+            if all(np.isfinite(column.values).all() for column in r.columns):
+                readings.setdefault(slot, []).append(r)
+            elif (r.column, _EMPTY, r.channel) not in found.refused:
+                found.refused.append((r.column, _EMPTY, r.channel))
+    given = {slot: one.reading for slot, one in decisions.items() if one.lead >= CERTAIN}
+    return Search(readings, dt_s, LATERAL_SLOTS, LATERAL_RELATIONS, given).decisions()
+
+
+def alike(source: Source) -> tuple[str, ...]:
+    """Structs that are records of one layout: siblings with the same fields, which hold nearly all of the file."""
+    if source.ordered or source.clocks:
+        return ()
+    groups: dict[tuple[str, frozenset[str]], list[str]] = {}
+    for struct in source.structs:
+        fields = frozenset(source.within(struct).arrays)
+        parent = struct.rpartition(".")[0]
+        groups.setdefault((parent, fields), []).append(struct)
+    least, share = _RECORDS
+    for (_, fields), structs in groups.items():
+        if (
+            len(structs) > 1
+            and len(fields) >= least
+            and len(structs) * len(fields) >= share * len(source.arrays)
+        ):
+            return tuple(structs)
+    return ()
 
 
 def _names(source: Source) -> Iterator[str]:
@@ -96,7 +155,7 @@ def _source_table(section: SourceSection) -> Iterator[str]:
     if stated:
         yield "\n[source]"
     for name, value in stated.items():
-        yield f"{name} = {json.dumps(value)}"
+        yield f"{name} = {json.dumps(value)}" + (" # each a run" if name == "structs" else "")
 
 
 def _judgement(source: Source, body: str, proposal: Proposal) -> list[str]:

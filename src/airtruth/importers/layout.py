@@ -19,8 +19,16 @@ _PROSE: Final = 200
 _ROWS: Final = 30
 """Rows that are compared [-] (judgement)."""
 _LAYOUTS: Final = {
-    "csv": ((",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ",")),
-    "table": ((WHITESPACE, "."), (WHITESPACE, ","), (",", "."), (";", "."), (";", ",")),
+    "csv": ((",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), ("|", "."), ("|", ",")),
+    "table": (
+        (WHITESPACE, "."),
+        (WHITESPACE, ","),
+        (",", "."),
+        (";", "."),
+        (";", ","),
+        ("|", "."),
+        ("|", ","),
+    ),
 }
 """Format that a suffix names -> delimiters and decimal signs; of equal ones the first is taken."""
 

@@ -25,6 +25,12 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+INPUT: Final = "input"
+"""Kind of a manoeuvre that the elevator causes."""
+FREE: Final = "free response"
+"""Kind of a manoeuvre in which the elevator is at rest."""
+
+
 @dataclass(frozen=True)
 class Candidate:
     """A part of a flight that may become a run; the columns of the table.
@@ -41,6 +47,7 @@ class Candidate:
     airspeed_m_s, airspeed_change : mean [m/s] and relative range [-]; nan without airspeed.
     load_factor : mean of -az/g [-]; nan without az.
     reason : why it is not accepted.
+    kind : "input", or "free response" where the elevator is at rest.
     """
 
     run_id: str
@@ -55,6 +62,7 @@ class Candidate:
     airspeed_change: float
     load_factor: float
     reason: str = ""
+    kind: str = INPUT
 
 
 _LARGEST: Final = 1e4
@@ -96,10 +104,16 @@ class ManoeuvreResult:
         return text.getvalue()
 
     def summary(self) -> str:
-        """The number of candidates, and the reasons of those that are not accepted."""
+        """The number of candidates, the reasons of those that are not accepted, and the free responses."""
         rejected = [c for c in self.candidates if c.accept != "yes"]
         text = f"{len(self.accepted)} of {len(self.candidates)} manoeuvres accepted"
-        return text + "".join(f"\n  {c.run_id} not: {c.reason}" for c in rejected)
+        text += "".join(f"\n  {c.run_id} not: {c.reason}" for c in rejected)
+        return text + "".join(
+            f"\n  {c.run_id} is a free response: the elevator stays within {c.input_deg:.2g} deg; it shows the short period, and "
+            "no derivative of the elevator"
+            for c in self.accepted
+            if c.kind == FREE
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """One row per candidate, with the columns of the CSV table."""
@@ -149,4 +163,4 @@ def _cell(value: str | float) -> Cell:
     return MISSING if math.isnan(value) else Number(value, digits=4)
 
 
-__all__ = ["Candidate", "ManoeuvreResult"]
+__all__ = ["FREE", "INPUT", "Candidate", "ManoeuvreResult"]

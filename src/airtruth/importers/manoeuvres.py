@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from airtruth.checks.means import LIMITS, MEANS
 from airtruth.documents import read_plain
 from airtruth.errors import ConfigurationError, LogError, StoreError
-from airtruth.importers.manoeuvre_result import Candidate, ManoeuvreResult
+from airtruth.importers.free_response import free_spans
+from airtruth.importers.manoeuvre_result import FREE, INPUT, Candidate, ManoeuvreResult
 from airtruth.importers.mapping import Manoeuvre, Resample
 from airtruth.importers.series import Series
 from airtruth.importers.uniform import gaps, resampled
@@ -75,7 +76,8 @@ LENGTHS: Final = 4
 def find(where: str, series: Mapping[str, Series], rate_hz: float | None = None) -> ManoeuvreResult:
     """Search a flight for manoeuvres.
 
-    A manoeuvre is accepted if it was flown, its surface is possible, and it is long enough for every command.
+    A manoeuvre is an input of the elevator, or a free response with the elevator at rest. It is accepted if it was flown, its
+    surface is possible, and it is long enough for every command.
 
     Parameters
     ----------
@@ -103,16 +105,19 @@ def find(where: str, series: Mapping[str, Series], rate_hz: float | None = None)
     c = {name: resampled(one, t, how) for name, one in used.items()}
     deviation, threshold = _deviation(c["elevator_rad"])
     background = _background(c["q_rad_s"])
-    spans = _spans(deviation, threshold)
+    spans = [(first, last, INPUT) for first, last in _spans(deviation, threshold)]
+    spans += _free(c["q_rad_s"], spans, background)
+    spans.sort()
     least_s = shortest_s(rate_hz or 1.0 / float(np.median(np.diff(used["q_rad_s"].t_s))))
     candidates = []
-    for number, (first, last) in enumerate(spans):
+    for number, (first, last, kind) in enumerate(spans):
         before = spans[number - 1][1] if number else 0
         after = spans[number + 1][0] if number + 1 < len(spans) else count - 1
         low = max(first - round(TRIM_S * RATE_HZ), before)
         high = _settled(c["q_rad_s"], last, min(after, count - 1), background)
         high = min(max(high, low + math.ceil(least_s * RATE_HZ) + 1), after, count - 1)
-        one = _candidate(f"m{number + 1:02d}", c, deviation, (low, first, last, high), background, t, least_s)
+        at = (low, first, last, high)
+        one = _candidate(f"m{number + 1:02d}", kind, c, deviation, at, background, t, least_s)
         candidates.append(_without_gaps(one, used))
     return ManoeuvreResult(tuple(candidates), t, c["elevator_rad"], c["q_rad_s"], threshold)
 
@@ -177,6 +182,19 @@ def _spans(deviation: Array, threshold: float) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(firsts, lasts, strict=True)]
 
 
+def _free(q: Array, spans: Sequence[tuple[int, int, str]], background: float) -> list[tuple[int, int, str]]:
+    """Free responses outside the inputs, and the responses to them."""
+    from scipy.ndimage import median_filter
+
+    busy = np.zeros(len(q), dtype=np.bool_)
+    for first, last, _ in spans:
+        busy[first : last + round(SETTLE_S[1] * RATE_HZ)] = True
+    size = min(2 * round(0.5 * TREND_S * RATE_HZ) + 1, 2 * (len(q) // 2) - 1)
+    quick = q - median_filter(q, size, mode="nearest")
+    found = free_spans(quick, busy, EXCITED * background, round(REACH_S * RATE_HZ), 1.0 / RATE_HZ)
+    return [(first, last, FREE) for first, last in found]
+
+
 def _settled(q: Array, last: int, limit: int, background: float) -> int:
     """Sample at which the response has ended, between the shortest and the longest time after the input."""
     least, most = (last + round(s * RATE_HZ) for s in SETTLE_S)
@@ -189,6 +207,7 @@ def _settled(q: Array, last: int, limit: int, background: float) -> int:
 
 def _candidate(
     run_id: str,
+    kind: str,
     c: Mapping[str, Array],
     deviation: Array,
     at: tuple[int, int, int, int],
@@ -221,13 +240,13 @@ def _candidate(
         reasons.append(
             f"lasts {(high - low) / RATE_HZ:.1f} s, check and identify need {least_s:.1f} s at this rate"
         )
-    if (last - first) / RATE_HZ > LONGEST_S:
+    if kind == INPUT and (last - first) / RATE_HZ > LONGEST_S:
         reasons.append(f"input of {(last - first) / RATE_HZ:.0f} s, longer than a manoeuvre")
     if response < EXCITED:
         reasons.append(f"q moves {response:.1f} times its background")
-    if first - low < 0.5 * TRIM_S * RATE_HZ:
+    if kind == INPUT and first - low < 0.5 * TRIM_S * RATE_HZ:
         reasons.append("no trim before the input")
-    elif trim > TRIMMED:
+    elif kind == INPUT and trim > TRIMMED:
         reasons.append(f"the elevator moves by {100 * trim:.0f} % of the input before it")
     if change > SPEED_CHANGE:
         reasons.append(f"airspeed changes by {100 * change:.0f} %")
@@ -247,6 +266,7 @@ def _candidate(
         airspeed_change=change,
         load_factor=load,
         reason="; ".join(reasons),
+        kind=kind,
     )
 
 

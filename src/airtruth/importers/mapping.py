@@ -49,22 +49,8 @@ DERIVED: Final[dict[str, str]] = {
     "air_temperature_k": "temperature",
 }
 """Quantities that a mapping may state instead of a channel, which is computed from them: name -> dimension."""
-FURTHER: Final[dict[str, str]] = {
-    "beta_rad": "angle",
-    "p_rad_s": "angular_rate",
-    "r_rad_s": "angular_rate",
-    "phi_rad": "angle",
-    "psi_rad": "angle",
-    "ay_m_s2": "acceleration",
-    "aileron_rad": "angle",
-    "rudder_rad": "angle",
-    "aileron_command_rad": "angle",
-    "rudder_command_rad": "angle",
-}
-"""Columns of a log of the lateral motion that a mapping may state too: name -> dimension."""
 MAPPED: Final[dict[str, str]] = {
     **{name: signal.dimension for name, signal in SIGNALS.items()},
-    **FURTHER,
     **DERIVED,
 }
 """Every name below [channels] -> dimension."""
@@ -76,17 +62,27 @@ class SourceSection(Strict):
     """How the file is read; only what its format has use for.
 
     format : left out, the suffix says it. variable : matrix that column numbers refer to (.mat).
+    structs : structs of one layout, each of which becomes a run; columns are named within them (.mat, .h5).
     delimiter, decimal, skip_rows, header, encoding : of text; header = false
         numbers the columns, an encoding that is left out is recognised.
     """
 
     format: Literal["csv", "table", "mat", "parquet", "ulg", "dataflash", "mdf", "hdf5"] | None = None
     variable: str | None = None
+    structs: tuple[str, ...] = ()
     delimiter: str = ","
     decimal: Literal[".", ","] = "."
     skip_rows: int = Field(default=0, ge=0)
     header: bool | None = None
     encoding: Literal["utf-8", "utf-16", "windows-1252"] | None = None
+
+    @field_validator("structs")
+    @classmethod
+    def _each_once(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        twice = sorted({name for name in value if value.count(name) > 1})
+        if twice:
+            raise ValueError(f"{twice[0]!r} is given twice; name each struct once")
+        return value
 
     @field_validator("delimiter")
     @classmethod
@@ -213,6 +209,9 @@ class MappingFile(Strict):
             raise ValueError(f"manoeuvre: run_id {', '.join(map(repr, repeated))} is given twice")
         if self.manoeuvre and self.time.run is not None:
             raise ValueError("[time] run and [[manoeuvre]] both divide the file into runs; keep one")
+        if len(self.source.structs) > 1 and (self.manoeuvre or self.time.run is not None):
+            other = "[[manoeuvre]]" if self.manoeuvre else "[time] run"
+            raise ValueError(f"[source] structs and {other} both divide the file into runs; keep one")
         self._require_one_origin()
         clocked = [f"channels.{name}" for name, channel in self.channels.items() if channel.clock]
         clocked += ["attitude"] if self.attitude and self.attitude.clock else []
@@ -293,7 +292,6 @@ __all__ = [
     "AIRSPEEDS",
     "CONSTANTS",
     "DERIVED",
-    "FURTHER",
     "MAPPED",
     "TIME_UNITS",
     "Align",

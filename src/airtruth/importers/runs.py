@@ -1,4 +1,4 @@
-"""The runs of a file: rows that a column names, manoeuvres between two times, or the whole."""
+"""The runs of a file: rows that a column names, manoeuvres, parts of a clock that starts again, or the whole."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.errors import LogError
+from airtruth.importers.clock import ONE, Parts
 from airtruth.importers.mapping import MappingFile, Place
 from airtruth.importers.series import Series
 from airtruth.importers.sources import Source, column
 
 
 def runs_of(
-    source: Source, mapping: MappingFile, series: Mapping[str, Series]
+    source: Source, mapping: MappingFile, series: Mapping[str, Series], parts: Parts = ONE
 ) -> list[tuple[str, float, float, NDArray[np.bool_] | None]]:
     """Name, start and end on the first file's clock, and rows (where a column names them) of each run.
 
@@ -23,6 +24,7 @@ def runs_of(
     ----------
     source, mapping : of the first file.
     series : channels of all files on the clock of the first.
+    parts : parts of a clock that starts again, of which each long one is a run.
 
     Raises
     ------
@@ -42,7 +44,11 @@ def runs_of(
         raise LogError(f"{source.path}: no time is finite; state [time] column and unit")
     low, high = min(e[0] for e in edges), max(e[1] for e in edges)
     if not mapping.manoeuvre:
-        return [(mapping.run_id or run_of_file(source), -np.inf, np.inf, None)]
+        name = mapping.run_id or run_of_file(source)
+        if not parts.several:
+            return [(name, -np.inf, np.inf, None)]
+        listed = enumerate(zip(parts.spans_s, parts.long, strict=True), 1)
+        return [(f"{name}-{number}", *span, None) for number, (span, long) in listed if long]
     for one in mapping.manoeuvre:
         if one.end_s <= low or one.start_s >= high:
             raise LogError(

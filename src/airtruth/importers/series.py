@@ -35,6 +35,10 @@ _EDGE: Final = 0.1
 """Part of a step by which a sample may lie outside the stated times [-] (judgement: rounding of what was stated)."""
 
 
+_TURNING: Final = ("phi_rad", "psi_rad")
+"""Angles that recorders let jump by a turn."""
+
+
 @dataclass(frozen=True)
 class Series:
     """A channel in SI with the times of its samples.
@@ -158,7 +162,8 @@ def _series(source: Source, mapping: MappingFile, name: str, one: Channel, clock
         if one.calibrations:
             read = np.stack([calibrated(*pair) for pair in zip(read, one.calibrations, strict=True)])
         combined = np.array(one.weights) @ read if one.weights else read.mean(axis=0)
-        return replace(times, values=factor * (one.scale * combined + zero) + above)
+        values = factor * (one.scale * combined + zero) + above
+    return replace(times, values=_unwrapped(values) if name in _TURNING else values)
 
 
 def _attitude(source: Source, mapping: MappingFile, one: Attitude, clock: Series | None) -> dict[str, Series]:

@@ -66,6 +66,29 @@ def _isolated(path: Path, name: str, section: SourceSection) -> Source:
         raise StoreError(f"{path}: {what[error.kind]}") from None
 
 
+def records(source: Source, section: SourceSection) -> list[tuple[str, Source]]:
+    """Name and content of each struct that a mapping names as a record; one without a name for the whole file.
+
+    Raises
+    ------
+    LogError
+        If there is no such struct.
+    """
+    if not section.structs:
+        return [("", source)]
+    listed = []
+    for name in section.structs:
+        part = source.within(name)
+        if not part.arrays:
+            known = [one for one in source.structs if one]
+            raise LogError(
+                f"{source.path}: [source] structs: no struct {name!r}; "
+                + (choices(name, known) if known else "the file holds none, so leave structs out")
+            )
+        listed.append((name, part))
+    return listed
+
+
 def numbers(source: Source, place: Place, variable: str | None = None) -> tuple[Array, Array | None]:
     """Values of a column (rows,) float64, and their own times [s] if the file has such.
 
@@ -150,4 +173,4 @@ def _without_unit(source: Source, key: str | int) -> str | int:
     return alike[0] if len(alike) == 1 and alike[0] not in source.repeated else key
 
 
-__all__ = ["FORMATS", "SUFFIXES", "Source", "column", "numbers", "open_source"]
+__all__ = ["FORMATS", "SUFFIXES", "Source", "column", "numbers", "open_source", "records"]

@@ -143,6 +143,18 @@ def slower(series: Mapping[str, Series], rate_hz: float) -> dict[str, float]:
     return own
 
 
+def jitter_of(one: Series) -> float:
+    """Largest departure of a step from the usual one, as a share of it, without pauses and lost samples [-]."""
+    steps = np.diff(one.t_s[np.isfinite(one.t_s)]) if not one.constant else np.empty(0)
+    if len(steps) < 2 or not (steps > 0.0).all():
+        return 0.0
+    usual = float(np.median(steps))
+    apart = np.abs(steps - usual)[steps < 1.5 * usual] / usual
+    rounding = one.rounding_s / usual
+    largest = float(apart.max(initial=0.0))
+    return largest if largest > 2.0 * rounding else 0.0
+
+
 def _phase(full: Mapping[str, Series], start: float, end: float, rate_hz: float) -> float:
     """Start of the new times: a sample of a channel that has the new rate already, which is then not interpolated."""
     for one in full.values():
@@ -262,8 +274,8 @@ def _check_times(where: str, name: str, t: Array) -> None:
         row = int(back[0])
         raise LogError(
             f"{where}: time does not increase in {len(back)} rows, the first is row {row + 2}: {t[row]:.9g} s, then "
-            f"{t[row + 1]:.9g} s; if the recorder started again there, name each run's rows by [time] run or split the file; if "
-            "rows are out of order, sort the file"
+            f"{t[row + 1]:.9g} s; if rows are out of order, sort the file by the time; if the recorder started again there, name "
+            "each run's rows by [time] run, or split the file"
         )
 
 
@@ -297,6 +309,7 @@ __all__ = [
     "beyond",
     "even_times",
     "gaps",
+    "jitter_of",
     "low_passed",
     "resampled",
     "shortened",

@@ -10,7 +10,7 @@ Identification", eqs (2)-(4) (short period).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
@@ -177,6 +177,10 @@ class Motion:
     declared: tuple[str, ...]
     modes: tuple[Mode, ...]
     required: tuple[str, ...]
+
+    def __reduce__(self) -> tuple[Callable[[str], Motion], tuple[str]]:
+        """Pickle the name: a motion is the same object in every process."""
+        return _named, (self.name,)
 
     @cached_property
     def derivatives(self) -> tuple[Derivative, ...]:
@@ -348,6 +352,17 @@ LATERAL: Final = Motion(
 MOTIONS: Final[Mapping[str, Motion]] = MappingProxyType({m.name: m for m in (LONGITUDINAL, LATERAL)})
 """Name -> motion, in the order of answers."""
 
+
+def motion_of(columns: Iterable[str]) -> Motion:
+    """The motion whose derivatives are among the columns of a table of estimates; the longitudinal one if none is."""
+    names = set(columns)
+    return next((m for m in MOTIONS.values() if names.issuperset(m.parameters)), LONGITUDINAL)
+
+
+def _named(name: str) -> Motion:
+    return MOTIONS[name]
+
+
 __all__ = [
     "LATERAL",
     "LONGITUDINAL",
@@ -361,4 +376,5 @@ __all__ = [
     "Reference",
     "Signal",
     "State",
+    "motion_of",
 ]

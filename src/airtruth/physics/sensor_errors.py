@@ -68,6 +68,7 @@ KINDS: Final[Mapping[str, ErrorKind]] = {
     "maximum": ErrorKind("maximum", neutral=np.inf),
     "arm": ErrorKind("x", "length"),
     "arm_down": ErrorKind("z", "length"),
+    "arm_right": ErrorKind("y", "length"),
     "alpha_slope": ErrorKind("alpha_slope", "per_angle"),
 }
 """Every kind of error by its name."""
@@ -96,7 +97,7 @@ class SensorErrors:
     quantum : size of a quantisation step, rounding to nearest [unit of the channel]; 0 for none.
     minimum, maximum : ends of the range [unit of the channel].
     hold_s : update period of a slower instrument, which holds its value between updates [s]; 0 for none.
-    x_m, z_m : position ahead of and below the centre of gravity [m]; it matters to alpha_rad, ax_m_s2, az_m_s2.
+    x_m, y_m, z_m : position ahead of, right of and below the centre of gravity [m]; it matters to vanes and accelerometers.
     alpha_slope_per_rad : relative change of the reading with the angle of attack about its mean [1/rad]; of airspeed_m_s alone,
         the position error of a static source.
     """
@@ -113,6 +114,7 @@ class SensorErrors:
     x_m: float = 0.0
     z_m: float = 0.0
     alpha_slope_per_rad: float = 0.0
+    y_m: float = 0.0
 
     @property
     def lead_s(self) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -23,6 +23,7 @@ from airtruth.tracing.answer import (
     Derivatives,
     Evidence,
     RecordNames,
+    RefinedDerivative,
     TraceAnswer,
     VerdictName,
 )
@@ -37,6 +38,7 @@ from airtruth.tracing.declared_model import (
     detectable_causes,
     explaining_effects,
     inclusion,
+    refined_derivatives,
     remaining_evidence,
     with_axial_force,
 )
@@ -68,6 +70,8 @@ from airtruth.tracing.tolerances import tolerances
 from airtruth.units import FT, KT
 
 Array = NDArray[np.float64]
+Publish = Callable[[bool], tuple[str | None, Replay | None]]
+"""From whether derivatives are refined to the folder of the updated aircraft and the records flown again, each None for none."""
 
 _TRACEABLE: Final = 4.0
 """Root of the noncentrality from which an effect counts as traceable [-] (judgement: after Holm's correction at 5 %
@@ -77,8 +81,7 @@ over 33 candidates such an effect is significant in four of five flights, as nor
 def conclude(
     stages: Stages,
     rounds: Sequence[SearchRound],
-    updated_aircraft: str | None = None,
-    replay: Replay | None = None,
+    publish: Publish | None = None,
     forced: Sequence[str] = (),
     axial: AxialForce | None = None,
 ) -> TraceAnswer:
@@ -87,8 +90,7 @@ def conclude(
     Parameters
     ----------
     stages, rounds : assessed stages, and rounds of the search.
-    updated_aircraft : folder of the updated aircraft, None where none was written.
-    replay : records flown again in JSBSim, None where nothing was flown again.
+    publish : writes the updated aircraft and flies it; None to write nothing.
     forced : faults of the logs that the caller overruled.
     axial : what ax shows; None where it was not compared.
     """
@@ -116,6 +118,8 @@ def conclude(
     if verdict == "unexplained" and declared.consistent:
         anomaly = remaining = Anomaly(DIFFERENCES, agreement.statistic, agreement.degrees, agreement.p_value)
     errors = stage_errors(stages)
+    refined = _refined(stages, declared) if verdict == "none" else {}
+    updated_aircraft, replay = (None, None) if publish is None else publish(bool(refined))
     return TraceAnswer(
         verdict=verdict,
         provisional=case.held is None
@@ -152,7 +156,14 @@ def conclude(
         inclusion=inclusion(sets),
         credit=credit(stated, stages),
         axial_force=None if axial is None else axial.errors,
+        refined=refined,
     )
+
+
+def _refined(stages: Stages, declared: DeclaredModel) -> dict[str, RefinedDerivative]:
+    """The refined derivatives, none where the held-out records deny them."""
+    denied = confirmation(stages, "declared", "before") is False
+    return {} if denied else refined_derivatives(declared)
 
 
 def _reserved(

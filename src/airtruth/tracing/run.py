@@ -21,7 +21,7 @@ from airtruth.logs import atomic
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.provenance import Provenance, digests_of
 from airtruth.logs.sources import Logs, named_logs
-from airtruth.tracing.answer import ANSWER, DECLARED_LEVEL, TraceAnswer
+from airtruth.tracing.answer import ANSWER, DECLARED_LEVEL
 from airtruth.tracing.axial_force import axial_force
 from airtruth.tracing.conclude import conclude
 from airtruth.tracing.declared_model import declared_p_value
@@ -50,6 +50,7 @@ from airtruth.tracing.selection.search import search
 from airtruth.tracing.selection.settled import total_cost
 from airtruth.tracing.selection.significance import LEVEL
 from airtruth.tracing.selection.weights import with_rival
+from airtruth.tracing.stage_errors import Replay
 from airtruth.tracing.stages import assess_stages
 from airtruth.tracing.update import updated_folder, write_update
 
@@ -115,25 +116,26 @@ def _traced(
     advance("compare ax with the declared axial force")
     axial = axial_force(stages, checked, declared, rounds[-1].gls) if options.learns else None
     origin = provenance_of(logs, declared, options)
+    dt_s = _longest_period_s(case)
 
-    def compared(answer: TraceAnswer) -> TraceAnswer:
-        whole = kinematics
-        if held and kinematics is not None and names_a_sensor(answer):
-            whole = kinematic_check(checked, declared, ())
-        answer = with_contradictions(answer, kinematics, _longest_period_s(case), whole)
-        return replace(answer, notes=(*remarks, *answer.notes))
+    def publish(refined: bool) -> tuple[str | None, Replay | None]:
+        if out is None:
+            return None, None
+        advance("write the updated aircraft")
+        atomic.remove_file(out / ANSWER)  # an interrupted trace has no answer, not one of another trace
+        refit = refined or declared_p_value(rounds) <= DECLARED_LEVEL
+        updated = write_update(case, rounds, declared, out, refit, axial)
+        return updated, flown_again(stages, declared, updated)
 
-    if out is None:
-        answer = compared(conclude(stages, rounds, forced=forced, axial=axial))
-        return TraceResult(answer, rounds, stages, origin)
-    advance("write the updated aircraft")
-    atomic.remove_file(out / ANSWER)  # an interrupted trace has no answer, not one of another trace
-    contradicted = declared_p_value(rounds) <= DECLARED_LEVEL
-    updated = write_update(case, rounds, declared, out, contradicted, axial)
-    replay = flown_again(stages, declared, updated)
-    answer = compared(conclude(stages, rounds, updated, replay, forced, axial))
+    answer = conclude(stages, rounds, publish, forced, axial)
+    whole = kinematics
+    if held and kinematics is not None and names_a_sensor(answer):
+        whole = kinematic_check(checked, declared, ())
+    answer = with_contradictions(answer, kinematics, dt_s, whole)
+    answer = replace(answer, notes=(*remarks, *answer.notes))
     result = TraceResult(answer, rounds, stages, origin)
-    result.write(out)
+    if out is not None:
+        result.write(out)
     return result
 
 

@@ -8,8 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from airtruth.importers.guessing.candidates import SLOTS, Reading
-from airtruth.importers.guessing.evidence import RELATIONS, Finding, compared
+from airtruth.importers.guessing.evidence import RELATIONS, Finding, Relation, compared
+from airtruth.importers.guessing.readings import Reading
+from airtruth.importers.guessing.sides import are_sides
+from airtruth.importers.guessing.slots import ALL_SLOTS, SLOTS
 
 BEAM: Final = 30
 """Assignments that the search keeps [-] (judgement: twice as many give the same ones)."""
@@ -28,7 +30,9 @@ _SYSTEM: Final = {
 _MIXED: Final = 1.2
 """Loss of a file that mixes degrees and radians, or metres and feet, where it does not state them (judgement)."""
 _ONE_SENSOR: Final = 6.0
-"""Loss where the axes of one accelerometer have different units (judgement)."""
+"""Loss where the axes of one instrument have different units (judgement)."""
+_AXES: Final = (("ax", "az"), ("ay", "az"), ("p", "q"), ("r", "q"))
+"""Slots of one instrument: accelerometers and gyroscopes."""
 _SAME: Final = (0.9, 0.15, 0.15)
 """Least correlation, and largest departures of factor and level, of two sensors of one quantity [-] (judgement)."""
 
@@ -54,9 +58,18 @@ class Decision:
 class Search:
     """A beam search over slots, whose criterion is the sum of the evidence of names, units and physics."""
 
-    def __init__(self, readings: Mapping[str, Sequence[Reading]], dt_s: float) -> None:
+    def __init__(
+        self,
+        readings: Mapping[str, Sequence[Reading]],
+        dt_s: float,
+        slots: Mapping[str, tuple[str, ...]] = SLOTS,
+        relations: Sequence[Relation] = RELATIONS,
+        given: Mapping[str, Reading] | None = None,
+    ) -> None:
+        """Readings of the slots that are searched, the relations that are tested, and readings of other slots that are given."""
         self.dt_s = dt_s
-        self.readings = {slot: _plausible(readings.get(slot, ())) for slot in SLOTS}
+        self.relations, self.given = relations, dict(given or {})
+        self.readings = {slot: _plausible(readings.get(slot, ())) for slot in slots}
         self._cache: dict[tuple[int, ...], Finding] = {}
 
     def score(self, state: State) -> float:
@@ -74,8 +87,10 @@ class Search:
                 if kind in family:
                     kinds[kind] = kinds.get(kind, False) or not r.unit_from
             total -= _MIXED * (len(kinds) > 1 and any(kinds.values()))
-        ax, az = state.get("ax"), state.get("az")
-        total -= _ONE_SENSOR * bool(ax and az and ax.unit != az.unit and not (ax.unit_from and az.unit_from))
+        total -= _ONE_SENSOR * sum(
+            bool(one and other and one.unit != other.unit and not (one.unit_from and other.unit_from))
+            for one, other in ((state.get(a), state.get(b)) for a, b in _AXES)
+        )
         velocity = {r.slot for r in used if r.kind == "velocity"}
         units = {r.unit for r in used if r.kind == "velocity" and r.slot == "airspeed"}
         for r in used:
@@ -89,7 +104,7 @@ class Search:
         if not self.dt_s:
             return result
         filled = {slot: r for slot, r in state.items() if r is not None}
-        for number, relation in enumerate(RELATIONS):
+        for number, relation in enumerate(self.relations):
             if not all(slot in filled for slot in relation.needs):
                 continue
             used = (*relation.needs, *(s for s in relation.uses if s in filled))
@@ -102,7 +117,7 @@ class Search:
 
     def best(self) -> list[tuple[float, dict[str, Reading | None]]]:
         """Assignments by evidence, the best first."""
-        states: list[tuple[float, dict[str, Reading | None]]] = [(0.0, {})]
+        states: list[tuple[float, dict[str, Reading | None]]] = [(0.0, {**self.given})]
         for slot, readings in self.readings.items():
             grown = []
             for _, state in states:
@@ -119,7 +134,7 @@ class Search:
         top, state = states[0]
         result = {}
         for slot, reading in state.items():
-            if reading is None:
+            if reading is None or slot in self.given:
                 continue
             rivals: list[tuple[float, Reading | None]] = []
             others: dict[int, Reading] = {}
@@ -143,7 +158,7 @@ class Search:
         """Whether two readings are of one quantity: equal but for a sensor's error, or ranked by the source of both."""
         least, factor_off, level_off = _SAME
         if one.columns == other.columns:
-            same = one.channel == other.channel or len(SLOTS[one.slot]) > 1
+            same = one.channel == other.channel or len(ALL_SLOTS[one.slot]) > 1
             return same and bool(np.allclose(one.values, other.values))
         if one.named.startswith("format") and other.named.startswith("format") and one.rank < other.rank:
             return True
@@ -151,6 +166,8 @@ class Search:
         scale = max(abs(float(np.median(one.values))), float(one.values.std()), 1e-9)
         level = abs(float(np.median(one.values) - np.median(other.values))) / scale
         moves = share > least**2 and abs(factor - 1.0) < factor_off
+        if moves and are_sides(one, other):  # each surface has a rigging of its own
+            return True
         steady = one.slot in ("airspeed", "altitude", "density", "throttle", "gps_altitude", "ground_speed")
         return bool(level < level_off and (moves or steady))
 

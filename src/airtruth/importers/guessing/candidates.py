@@ -4,53 +4,23 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.checks.means import LIMITS, MEANS
 from airtruth.importers.attitude import euler_angles
 from airtruth.importers.dictionary import DIMENSIONS, QUATERNION, VELOCITY, Entry, Lexicon, Words, compact
 from airtruth.importers.guessing.columns import Clock, Column
+from airtruth.importers.guessing.readings import Candidates, Reading
+from airtruth.importers.guessing.sides import mixed_with, pair
+from airtruth.importers.guessing.slots import ALL_SLOTS, OPPOSITE, SIGN, SIGNED, SLOT_OF, TURNING, size_of
 from airtruth.physics.atmosphere import altitude_of_pressure_m
 from airtruth.units import UNITS
 
 Array = NDArray[np.float64]
 
-SLOTS: Final[dict[str, tuple[str, ...]]] = {
-    "az": ("az_m_s2",),
-    "q": ("q_rad_s",),
-    "theta": ("theta_rad",),
-    "airspeed": (
-        "airspeed_m_s",
-        "calibrated_airspeed_m_s",
-        "equivalent_airspeed_m_s",
-        "indicated_airspeed_m_s",
-        "dynamic_pressure_pa",
-    ),
-    "alpha": ("alpha_rad",),
-    "ax": ("ax_m_s2",),
-    "elevator": ("elevator_rad",),
-    "ground_speed": ("ground_speed_m_s",),
-    "gps_altitude": ("gps_altitude_m",),
-    "altitude": ("altitude_m", "static_pressure_pa", "height_m"),
-    "density": ("density_kg_m3",),
-    "elevator_command": ("elevator_command_rad",),
-    "throttle": ("throttle",),
-}
-"""Slot of an assignment -> what may fill it, the best first."""
-_SLOT_OF: Final = {name: slot for slot, names in SLOTS.items() for name in names}
-"""Channel -> its slot."""
-_SIZE: Final = {
-    "airspeed": (40.0, 0.9), "alpha": (0.08, 0.9), "theta": (0.12, 1.1), "q": (0.2, 1.3), "az": (9.81, 0.15), "ax": (1.5, 1.1),
-    "elevator": (0.1, 1.1), "elevator_command": (0.1, 1.1), "altitude": (800.0, 1.6), "density": (1.1, 0.25),
-    "throttle": (0.5, 0.8), "ground_speed": (40.0, 0.9), "gps_altitude": (800.0, 1.6),
-}  # fmt: skip
-"""Slot -> median and standard deviation of the logarithm of a usual size [SI] (judgement: from a 1 kg model to an airliner)."""
-_CENTRED: Final = frozenset({"airspeed", "az", "altitude", "density", "ground_speed", "gps_altitude"})
-"""Slots whose size is that of the median; of the others it is the 95th percentile of the magnitude."""
 _RARE: Final = {
     **dict.fromkeys(("cdeg", "cdeg_s", "cm", "cm_s"), 0.03),
     **dict.fromkeys(("mm", "mg"), 0.02),
@@ -68,72 +38,8 @@ FORMAT, EXACT, TRIMMED, PER_WORD = 12.0, 6.0, 5.0, 0.3
 them (judgement: one column of 150 000, of 400, of 150 has it by chance)."""
 _RANK, _SECOND, OWN = 0.7, 0.3, 10.0
 """Loss for each rank of a column, and of a channel within its slot; evidence of a name of the user's own (judgement)."""
-_SIGN: Final = {"az": 0.5, "elevator": 0.3, "elevator_command": 0.3, "ax": 0.04}
-"""Slot -> probability of the sign opposite to the contract's (judgement)."""
-_OPPOSITE: Final = 0.02
-"""The same of other angles and rates."""
-_SIGNED: Final = frozenset({"az", "ax", "q", "theta", "alpha", "elevator", "elevator_command"})
-"""Slots that have a sign."""
 MIXED: Final = "one of several surfaces that are elevator and aileron together"
 """Why an elevon is no elevator."""
-OUTSIDE: Final = 20.0
-"""Loss of a reading that leaves the range of flight (judgement)."""
-
-
-@dataclass(frozen=True)
-class Reading:
-    """A column as a channel, in a unit and with a sign.
-
-    Attributes
-    ----------
-    slot, channel : what it fills.
-    columns : its columns; several of a quaternion or a velocity.
-    unit, sign, offset : as in a mapping.
-    values : (samples,) on the common grid [SI].
-    evidence : logarithm of the evidence of name, unit and size.
-    named : "format PX4" or "named".
-    unit_from : "stated", "by its size".
-    rank : preference among columns of one channel.
-    kind : "column", "attitude" or "velocity".
-    order, frame : of a quaternion, as in a mapping.
-    """
-
-    slot: str
-    channel: str
-    columns: tuple[Column, ...]
-    unit: str
-    sign: int
-    values: Array
-    evidence: float
-    named: str
-    unit_from: str
-    offset: float = 0.0
-    rank: int = 1
-    kind: str = "column"
-    order: str = ""
-    frame: str = ""
-
-    @property
-    def column(self) -> Column:
-        """Its first column."""
-        return self.columns[0]
-
-
-@dataclass
-class Candidates:
-    """Readings of each slot, and columns that are not taken.
-
-    refused : (column, what it is, channel that its name resembles).
-    surfaces : columns that move with the elevator, without the throw of the surface, and why.
-    synthetic : columns with an angle of attack that no vane measured.
-    zero : channels whose column is zero throughout.
-    """
-
-    readings: dict[str, list[Reading]] = field(default_factory=dict)
-    refused: list[tuple[Column, str, str]] = field(default_factory=list)
-    surfaces: list[tuple[Column, str]] = field(default_factory=list)
-    synthetic: list[tuple[Column, str]] = field(default_factory=list)
-    zero: list[tuple[str, Column]] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -143,8 +49,8 @@ class Grid:
     t_s: Array
     dt_s: float
 
-    def of(self, column: Column, clocks: Mapping[str, Clock]) -> Array | None:
-        """Values of a column on the grid; None where it has no times or hardly any value."""
+    def of(self, column: Column, clocks: Mapping[str, Clock], turn: float = 0.0) -> Array | None:
+        """Values of a column on the grid; None where it has no times or hardly any value. ``turn`` is the jump of an angle."""
         t = times_of(column, clocks) if self.dt_s else np.arange(float(len(column.values)))
         if t is None or len(t) != len(column.values):
             return None
@@ -154,7 +60,8 @@ class Grid:
             return None
         t, x = t[ok], column.values[ok]
         order = np.argsort(t, kind="stable")
-        return np.asarray(np.interp(self.t_s, t[order], x[order]))
+        x = np.unwrap(x[order], period=turn) if turn else x[order]
+        return np.asarray(np.interp(self.t_s, t[order], x))
 
 
 def times_of(column: Column, clocks: Mapping[str, Clock]) -> Array | None:
@@ -180,7 +87,7 @@ def candidates(
     columns: Sequence[Column], words: Lexicon, grid: Grid, clocks: Mapping[str, Clock]
 ) -> Candidates:
     """Every reading that names, units and ranges allow."""
-    found = Candidates()
+    found, parts_of_pairs = Candidates(), Candidates()
     parts: dict[tuple[str, str], Column] = {}
     turned: dict[tuple[str, Entry, str], dict[int, Column]] = {}
     forward, down = ({c.group for c in columns if compact(c.name) in (x, x + "body")} for x in "uw")
@@ -206,6 +113,8 @@ def candidates(
         for channel, evidence, reason in _meanings(column, words):
             if channel == "elevon_rad":
                 found.surfaces.append((column, MIXED))
+                for surface in ("elevator_rad", mixed_with(column.name)):
+                    _read(parts_of_pairs, column, surface, evidence, "named", grid, clocks, None)
             elif channel in (*QUATERNION, *VELOCITY):
                 parts.setdefault((column.group, channel), column)
                 if channel != "v_m_s" or column.group in velocities:
@@ -227,6 +136,7 @@ def candidates(
         if (group, "u_m_s") in parts and (group, "w_m_s") in parts:
             three = tuple(parts[group, name] for name in VELOCITY if (group, name) in parts)
             _velocity(found, three, grid, clocks)
+    pair(found, parts_of_pairs, MIXED)
     return found
 
 
@@ -282,7 +192,7 @@ def _read(
     entry: Entry | None,
 ) -> None:
     """Add the readings of a column as a channel: units that are not excluded, and both signs."""
-    slot = _SLOT_OF.get(channel)
+    slot = SLOT_OF.get(channel)
     if slot is None:
         return
     finite = column.values[np.isfinite(column.values)]
@@ -302,16 +212,19 @@ def _read(
     fixed = (
         column.unit.sign if column.unit is not None and column.unit.sign < 0 else entry.sign if entry else 0
     )
-    evidence -= _SECOND * SLOTS[slot].index(channel)
+    evidence -= _SECOND * ALL_SLOTS[slot].index(channel)
     units = [stated] if stated else [unit for unit in table if unit not in ("k", "degc", "degf")]
-    signs = (fixed,) if fixed else (1, -1) if slot in _SIGNED else (1,)
+    signs = (fixed,) if fixed else (1, -1) if slot in SIGNED else (1,)
     offset = entry.offset if entry is not None else 0.0
     total = sum(_RARE.get(unit, 1.0) for unit in units)
     for unit in units:
         likely = 0.0 if stated else float(np.log(_RARE.get(unit, 1.0) / total))
+        if channel in TURNING:
+            raw = grid.of(column, clocks, 2.0 * np.pi / table[unit])
+            assert raw is not None
         for sign in signs:
             values = _physical(channel, sign * table[unit] * (raw + offset))
-            turned = _SIGN.get(slot, _OPPOSITE)
+            turned = SIGN.get(slot, OPPOSITE)
             signed = (
                 0.0
                 if fixed
@@ -321,7 +234,7 @@ def _read(
             )
             where = stated if not stated else ("format" if entry else "stated")
             found.readings.setdefault(slot, []).append(
-                Reading(slot, channel, (column,), unit, sign, values, evidence + likely + signed + _size(slot, values),
+                Reading(slot, channel, (column,), unit, sign, values, evidence + likely + signed + size_of(slot, values),
                         named, where, offset=offset, rank=entry.rank if entry else 1)
             )  # fmt: skip
 
@@ -333,18 +246,6 @@ def _physical(channel: str, values: Array) -> Array:
     if channel == "static_pressure_pa":
         return np.asarray(altitude_of_pressure_m(np.clip(values, 5500.0, 110000.0)))
     return values
-
-
-def _size(slot: str, values: Array) -> float:
-    """Logarithm of the density of a size over that of the usual one, and the loss of a reading outside the range of flight."""
-    name = SLOTS[slot][0]
-    low, high = LIMITS.get(name, (-np.inf, np.inf))
-    least, most = MEANS.get(name, (-np.inf, np.inf))
-    inner = np.quantile(values, [0.02, 0.98])
-    loss = OUTSIDE * float(inner[0] < low or inner[1] > high or not least <= np.median(values) <= most)
-    middle, spread = _SIZE[slot]
-    size = abs(float(np.median(values))) if slot in _CENTRED else float(np.quantile(np.abs(values), 0.95))
-    return -0.5 * (np.log(max(size, 1e-9) / middle) / spread) ** 2 - loss if size > 0.0 else -loss
 
 
 def _attitude(
@@ -364,12 +265,13 @@ def _attitude(
     if not (np.abs(np.sqrt((stacked**2).sum(axis=0)) - 1.0) < 0.05).all():
         return
     for frame, loss in (("ned", 0.0),) if title else (("ned", 0.3), ("enu", 1.4)):
-        theta = euler_angles(stacked, frame=frame)[1]  # type: ignore[arg-type]
-        reading = Reading(
-            "theta", "theta_rad", four, "rad", 1, theta, evidence - loss, f"format {title}" if title else "named", "stated",
-            kind="attitude", order=order, frame=frame,
-        )  # fmt: skip
-        found.readings.setdefault("theta", []).append(reading)
+        angles = euler_angles(stacked, frame=frame)  # type: ignore[arg-type]
+        for slot, angle in zip(("phi", "theta", "psi"), angles, strict=True):
+            reading = Reading(
+                slot, f"{slot}_rad", four, "rad", 1, angle if slot == "theta" else np.unwrap(angle), evidence - loss,
+                f"format {title}" if title else "named", "stated", kind="attitude", order=order, frame=frame,
+            )  # fmt: skip
+            found.readings.setdefault(slot, []).append(reading)
 
 
 def _velocity(found: Candidates, three: tuple[Column, ...], grid: Grid, clocks: Mapping[str, Clock]) -> None:
@@ -380,14 +282,18 @@ def _velocity(found: Candidates, three: tuple[Column, ...], grid: Grid, clocks: 
     stated = three[0].unit.name if three[0].unit and three[0].unit.name in table else ""
     for unit in [stated] if stated else table:
         likely = 0.0 if stated else float(np.log(_RARE.get(unit, 1.0) / 3.0))
-        for slot, channel, values in (
+        v = grid.of(three[1], clocks) if len(three) > 2 else None
+        made = [
             ("airspeed", "airspeed_m_s", np.hypot(u, w) * table[unit]),
             ("alpha", "alpha_rad", np.arctan2(w, u)),
-        ):
+        ]
+        if v is not None:
+            made.append(("beta", "beta_rad", np.arctan2(v, np.hypot(u, w))))
+        for slot, channel, values in made:
             found.readings.setdefault(slot, []).append(
-                Reading(slot, channel, three, unit, 1, values, EXACT - 1.0 + likely + _size(slot, values), "named",
+                Reading(slot, channel, three, unit, 1, values, EXACT - 1.0 + likely + size_of(slot, values), "named",
                         "stated" if stated else "", kind="velocity")
             )  # fmt: skip
 
 
-__all__ = ["MIXED", "OUTSIDE", "SLOTS", "Candidates", "Grid", "Reading", "candidates", "rising", "times_of"]
+__all__ = ["MIXED", "Grid", "candidates", "rising", "times_of"]

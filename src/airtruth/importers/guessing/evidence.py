@@ -9,7 +9,7 @@ broad one. A wrong unit moves k, a wrong sign makes it negative, a wrong axis ta
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Final
@@ -73,7 +73,7 @@ def compared(y: Array, x: Array, dt_s: float, degree: int) -> tuple[float, float
         a, b = _rest(y, dt_s, degree), _rest(x, dt_s, degree)
         own, given, product = (a**2).sum(), (b**2).sum(), (a * b).sum()
         samples = 2.0 * BAND_HZ * dt_s * a.size
-        share = product**2 / max(own * given, 1e-300)
+        share = min(product**2 / max(own * given, 1e-300), 1.0)
         factor = product / max(given, 1e-300)
     if not np.isfinite([share, factor]).all() or samples * share < 9.0:
         return 0.0, float(factor) if np.isfinite(factor) else np.nan, 0.0
@@ -90,7 +90,7 @@ def _density(deviation: float, std: float, broad: float) -> float:
     return float(np.clip(ratio, -MOST, MOST))
 
 
-def _moved(
+def moved(
     name: str, words: str, degree: int, y: Callable[..., Array], x: Callable[..., Array]
 ) -> Callable[..., Finding]:
     def test(c: Mapping[str, Array], dt_s: float) -> Finding:
@@ -100,7 +100,7 @@ def _moved(
     return test
 
 
-def _near(deviation: float, std: float, broad: float, words: str) -> Finding:
+def near(deviation: float, std: float, broad: float, words: str) -> Finding:
     return Finding(_density(deviation, std, broad) if np.isfinite(deviation) else 0.0, words)
 
 
@@ -147,41 +147,57 @@ def _climbed(c: Mapping[str, Array], dt_s: float) -> Array:
 
 def _weight(c: Mapping[str, Array], dt_s: float) -> Finding:
     mean = float(np.median(c["az"]))
-    return _near(mean / G0 + 1.0, 0.12, 2.0, f"the median of az is {mean / G0:.2f} g")
+    return near(mean / G0 + 1.0, 0.12, 2.0, f"the median of az is {mean / G0:.2f} g")
 
 
 def _axial(c: Mapping[str, Array], dt_s: float) -> Finding:
     off = float(np.median(c["ax"] - G0 * np.sin(np.clip(c["theta"], -1.5, 1.5)))) / G0
-    return _near(off, 0.05, 0.5, f"the median of ax departs by {off:+.3f} g from g sin(theta)")
+    return near(off, 0.05, 0.5, f"the median of ax departs by {off:+.3f} g from g sin(theta)")
 
 
 def _level(c: Mapping[str, Array], dt_s: float) -> Finding:
     off = float(np.median(c["theta"] - c["alpha"]))
-    return _near(off, 0.12, 1.0, f"the median of theta - alpha is {np.degrees(off):.1f} deg")
+    return near(off, 0.12, 1.0, f"the median of theta - alpha is {np.degrees(off):.1f} deg")
 
 
 def control(c: Mapping[str, Array], dt_s: float) -> tuple[float, float]:
     """Change of q' with the elevator, with q and alpha held, and its standard deviation [1/s2]."""
-    causes = [integral(x, dt_s) for x in (c["elevator"], incidence(c, dt_s), c["q"])]
+    return effect(c["q"], [c["elevator"], incidence(c, dt_s), c["q"]], dt_s)
+
+
+def effect(rate: Array, causes: Sequence[Array], dt_s: float) -> tuple[float, float]:
+    """Change of the derivative of a rate with the first cause, the others held, and its standard deviation."""
     with np.errstate(all="ignore"):
         factors = regress(
-            spectrum(c["q"][None], dt_s), np.stack([spectrum(x[None], dt_s) for x in causes], axis=1)
+            spectrum(rate[None], dt_s),
+            np.stack([spectrum(integral(x, dt_s)[None], dt_s) for x in causes], axis=1),
         )
         return float(factors.value[0, 0]), float(np.sqrt(factors.covariance[0, 0, 0]))
 
 
 def _pitches(c: Mapping[str, Array], dt_s: float) -> Finding:
-    value, std = control(c, dt_s)
+    return moves(*control(c, dt_s), 15.0, "the elevator changes q'")
+
+
+def moves(value: float, std: float, usual: float, words: str) -> Finding:
+    """Evidence of an effect of a surface that has to be negative.
+
+    The two signs differ by the logarithm of the odds of a negative effect, half of which counts for each.
+
+    Parameters
+    ----------
+    value, std : effect and its standard deviation [1/s2]; usual : size of that of an aircraft [1/s2].
+    """
     if not (np.isfinite(value) and std > 0.0):
         return Finding(0.0, "it does not move")
     t = value / std
-    signed = float(np.clip(log_ndtr(-t) - log_ndtr(t), -MOST, MOST))
+    signed = float(np.clip(0.5 * (log_ndtr(-t) - log_ndtr(t)), -0.5 * MOST, 0.5 * MOST))
     size = (
-        float(np.clip(-0.5 * (np.log(max(abs(value), 1e-9) / 15.0) / 1.5) ** 2, -MOST, 0.0))
+        float(np.clip(-0.5 * (np.log(max(abs(value), 1e-9) / usual) / 1.5) ** 2, -MOST, 0.0))
         if abs(t) > 3
         else 0.0
     )
-    return Finding(signed + size, f"the elevator changes q' by {value:+.3g} +- {std:.2g} 1/s2")
+    return Finding(signed + size, f"{words} by {value:+.3g} +- {std:.2g} 1/s2")
 
 
 def _lifts(c: Mapping[str, Array], dt_s: float) -> Finding:
@@ -205,14 +221,12 @@ def _lifts(c: Mapping[str, Array], dt_s: float) -> Finding:
     if not (np.isfinite([slope, speed, std]).all() and slope > 0.0 and speed > 0.0 and std < 0.6):
         return Finding(0.0, "the lift does not show it")
     off = float(np.log(max(float(np.mean(c["airspeed"])), 1e-3) / speed))
-    return _near(
-        off, std, 2.0, f"the airspeed is {np.exp(off):.2f} of that which lift and pitch rate require"
-    )
+    return near(off, std, 2.0, f"the airspeed is {np.exp(off):.2f} of that which lift and pitch rate require")
 
 
 def _ground(c: Mapping[str, Array], dt_s: float) -> Finding:
     ratio = float(np.median(c["airspeed"])) / max(float(np.median(c["ground_speed"])), 1e-3)
-    return _near(
+    return near(
         float(np.log(max(ratio, 1e-6))), 0.3, 2.0, f"the airspeed is {ratio:.2f} of the speed over ground"
     )
 
@@ -220,7 +234,7 @@ def _ground(c: Mapping[str, Array], dt_s: float) -> Finding:
 def _air(c: Mapping[str, Array], dt_s: float) -> Finding:
     standard = density_kg_m3(np.clip(np.median(c["altitude"]), -500.0, 20000.0))
     ratio = float(np.median(c["density"]) / standard)
-    return _near(
+    return near(
         float(np.log(max(ratio, 1e-6))),
         0.05,
         2.0,
@@ -230,18 +244,16 @@ def _air(c: Mapping[str, Array], dt_s: float) -> Finding:
 
 def _pressure_height(c: Mapping[str, Array], dt_s: float) -> Finding:
     off = float(np.median(c["altitude"] - c["gps_altitude"]))
-    return _near(off / 250.0, 1.0, 40.0, f"the altitude is {off:+.0f} m from the satellites' altitude")
+    return near(off / 250.0, 1.0, 40.0, f"the altitude is {off:+.0f} m from the satellites' altitude")
 
 
-_TURNED = _moved("theta", "the integral of q", 2, lambda c: c["theta"], lambda c, dt: integral(c["q"], dt))
-_HEAVED = _moved("alpha", "the integral of q + (az + g)/V", 2, lambda c: c["alpha"], _heave)
-_DRAWN = _moved(
-    "the airspeed", "the integral of the force along the path", 2, lambda c: c["airspeed"], _along
-)
-_LIFTED = _moved(
+_TURNED = moved("theta", "the integral of q", 2, lambda c: c["theta"], lambda c, dt: integral(c["q"], dt))
+_HEAVED = moved("alpha", "the integral of q + (az + g)/V", 2, lambda c: c["alpha"], _heave)
+_DRAWN = moved("the airspeed", "the integral of the force along the path", 2, lambda c: c["airspeed"], _along)
+_LIFTED = moved(
     "the altitude", "the double integral of the vertical force", 3, lambda c: c["altitude"], _risen
 )
-_FLOWN = _moved("the altitude", "the integral of V sin(theta - alpha)", 2, lambda c: c["altitude"], _climbed)
+_FLOWN = moved("the altitude", "the integral of V sin(theta - alpha)", 2, lambda c: c["altitude"], _climbed)
 RELATIONS: Final = (
     Relation(("az",), _weight),
     Relation(("theta", "q"), _TURNED),
@@ -259,4 +271,15 @@ RELATIONS: Final = (
 )
 """Everything that is tested. A relation uses further slots where they are assigned."""
 
-__all__ = ["MOST", "RELATIONS", "Finding", "Relation", "compared", "control"]
+__all__ = [
+    "MOST",
+    "RELATIONS",
+    "Finding",
+    "Relation",
+    "compared",
+    "control",
+    "effect",
+    "moved",
+    "moves",
+    "near",
+]

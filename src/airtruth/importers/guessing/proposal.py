@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -12,22 +12,18 @@ from numpy.typing import NDArray
 
 from airtruth.channels import REQUIRED, SIGNALS
 from airtruth.importers.guessing.assignment import CERTAIN, Decision
-from airtruth.importers.guessing.candidates import MIXED, SLOTS, Candidates, Grid, Reading, times_of
-from airtruth.importers.guessing.columns import Clock, Column
+from airtruth.importers.guessing.candidates import MIXED, Grid
+from airtruth.importers.guessing.columns import Column
 from airtruth.importers.guessing.evidence import control
-from airtruth.importers.uniform import even_times
-from airtruth.logs.validate import JITTER, single_precision_s
+from airtruth.importers.guessing.readings import Candidates, Reading
+from airtruth.importers.guessing.sides import other_side
+from airtruth.importers.guessing.slots import ALL_SLOTS, LATERAL_SLOTS
+from airtruth.importers.guessing.times import Times, entry
 from airtruth.physics.atmosphere import density_kg_m3
 from airtruth.physics.reconstruction import NEEDED
 
 Array = NDArray[np.float64]
 
-_LOWEST_HZ: Final = 0.1
-"""Least rate that a guess takes from a clock [Hz] (judgement: slower logs do not show a short period)."""
-_HIGHEST_HZ: Final = 1e5
-"""Highest rate that a guess takes from a clock [Hz] (judgement: above that of any recorder)."""
-_USUAL_HZ: Final = 50.0
-"""Rate of a guess without a plausible clock [Hz] (judgement)."""
 _DENSITY: Final = 0.03
 """Relative error of the density up to which the unit of an altitude may be assumed [-] (judgement: less than that of the air's
 temperature, 15 K)."""
@@ -43,11 +39,11 @@ _FEW: Final = 3
 
 @dataclass(frozen=True)
 class Proposal:
-    """Text of the mapping, the channels that it maps, and sentences on what is missing or in doubt."""
+    """Text of the mapping, and sentences on needed channels that are missing or in doubt, and on optional ones in doubt."""
 
     lines: tuple[str, ...]
-    mapped: frozenset[str]
     doubts: tuple[str, ...]
+    optional: tuple[str, ...]
 
 
 class Writer:
@@ -57,24 +53,28 @@ class Writer:
         self,
         decisions: Mapping[str, Decision],
         found: Candidates,
-        clocks: Mapping[str, Clock],
+        times: Times,
         grid: Grid,
-        own_times: bool,
     ) -> None:
-        self.decisions, self.found, self.clocks, self.grid = decisions, found, clocks, grid
-        self.own_times = own_times
+        self.decisions, self.found, self.times, self.grid = decisions, found, times, grid
         self.mapped: set[str] = set()
         self.doubts: list[str] = []
+        self.optional: list[str] = []
         self.used: list[Column] = []
 
     def proposal(self) -> Proposal:
         """Tables of time, channels and what is computed."""
         body = [line for slot in _ORDER for line in self._slot(slot)]
         body += self._velocity()
+        body += [line for slot in LATERAL_SLOTS for line in self._slot(slot)]
         body += self._missing()
         if not any(line.startswith("\n[channels.") for line in body):
             body.insert(0, "\n[channels]")
-        return Proposal((*self._time(), *body), frozenset(self.mapped), tuple(self.doubts))
+        if self.times.missing:
+            self.doubts.append(
+                "no time was found; state [time] column and unit, or the sample rate as rate_hz"
+            )
+        return Proposal((*self.times.table(self.used), *body), tuple(self.doubts), tuple(self.optional))
 
     def _slot(self, slot: str) -> Iterator[str]:
         decision = self.decisions.get(slot)
@@ -87,21 +87,25 @@ class Writer:
         doubt = self._doubt(slot, decision)
         name = decision.reading.channel
         if doubt:
-            self.doubts.append(f"{name} is in doubt: {doubt}")
+            listed = self.optional if slot in LATERAL_SLOTS else self.doubts
+            listed.append(f"{name} is in doubt: {doubt}")
             yield f"\n# [channels.{name}] # in doubt: {doubt}"
-            yield from (f"# {line}" for line in self._lines(decision) if not line.startswith("#"))
+            lines = (line for text in self._lines(decision) for line in text.splitlines())
+            yield from (f"# {line}" for line in lines if not line.startswith("#"))
             if decision.rival is not None:
                 yield f"# rival: {_shown(decision.rival)}"
             return
         self._take(decision.reading)
-        if decision.reading.kind == "velocity":
+        if decision.reading.kind == "velocity" or (
+            slot in LATERAL_SLOTS and decision.reading.kind == "attitude"
+        ):
             return
         if decision.reading.kind == "attitude":
             r = decision.reading
             keys = ", ".join(json.dumps(c.key) for c in r.columns)
             yield f"\n[attitude] # theta from a quaternion\nquaternion = [{keys}]"
             yield f'order = "{r.order}"\nframe = "{r.frame}"'
-            yield from self._clock(r.column)
+            yield from self.times.clock(r.column)
         else:
             text = SIGNALS[name].description if name in SIGNALS else _INSTEAD.get(name, "")
             yield f"\n[channels.{name}] # {text}"
@@ -111,7 +115,7 @@ class Writer:
             yield f"# the same in {', '.join(repr(r.column.full) for r in decision.others[:_FEW])}"
 
     def _take(self, reading: Reading) -> None:
-        self.mapped.add(SLOTS[reading.slot][0])
+        self.mapped.add(ALL_SLOTS[reading.slot][0])
         self.used += reading.columns
 
     def _doubt(self, slot: str, decision: Decision) -> str:
@@ -168,7 +172,11 @@ class Writer:
 
     def _lines(self, decision: Decision) -> Iterator[str]:
         r = decision.reading
-        yield entry(r.column)
+        other = other_side(r, decision.others) if r.slot in ("elevator", "rudder") else None
+        if r.kind == "pair":
+            yield entry(*r.columns, weights=r.weights)
+        else:
+            yield entry(*((r.column, other.column) if other is not None else (r.column,)))
         yield f'unit = "{r.unit}"'
         if r.sign < 0:
             yield "sign = -1"
@@ -176,7 +184,7 @@ class Writer:
             yield f"offset = {r.offset:g}"
         if r.channel == "height_m":
             yield f"reference_m = {self._reference() or 0.0:.1f} # from the satellites' altitude"
-        yield from self._clock(r.column)
+        yield from self.times.clock(r.column)
 
     def _reference(self) -> float | None:
         """Elevation of the point from which a height counts, by the satellites' altitude [m]."""
@@ -202,7 +210,7 @@ class Writer:
             for s in ("airspeed", "alpha")
             if s in self.decisions
             and self.decisions[s].reading.kind == "velocity"
-            and SLOTS[s][0] in self.mapped
+            and ALL_SLOTS[s][0] in self.mapped
         ]
         if not used:
             return
@@ -213,7 +221,7 @@ class Writer:
         yield f'unit = "{r.unit}"'
         if r.column.variable:
             yield f"variable = {json.dumps(r.column.variable)}"
-        yield from self._clock(r.column)
+        yield from self.times.clock(r.column)
         findings = [
             f.words
             for s in ("airspeed", "alpha")
@@ -254,7 +262,7 @@ class Writer:
             yield '# value = 1.225\n# unit = "kg_m3"'
 
     def _doubted(self, slot: str) -> bool:
-        return slot in self.decisions and SLOTS[slot][0] not in self.mapped
+        return slot in self.decisions and ALL_SLOTS[slot][0] not in self.mapped
 
     def _surface(self) -> Iterator[str]:
         """Columns that follow the elevator without being an angle."""
@@ -274,7 +282,7 @@ class Writer:
             f"elevator_rad: {column.full!r} is {why}; measure the deflection at two of its values and state them as calibration"
         )
         yield f"\n# [channels.elevator_rad] # needed: {column.full!r} is {why}"
-        yield f"# {entry(column)}"
+        yield from (f"# {line}" for line in entry(column).splitlines())
         finite = column.values[np.isfinite(column.values)]
         low, high = float(finite.min()), float(finite.max())
         yield f"# calibration = [[{low:.6g}, ...], [{high:.6g}, ...]] # value, deflection [deg], trailing edge down positive"
@@ -301,7 +309,7 @@ class Writer:
             if s in ("q", "az", "alpha", "airspeed", "theta")
         }
         for column, why in self.found.surfaces:
-            x = self.grid.of(column, self.clocks)
+            x = self.grid.of(column, self.times.clocks)
             if x is None or np.ptp(x) == 0.0:
                 continue
             effect = 0.0
@@ -309,50 +317,6 @@ class Writer:
                 value, std = control({**values, "elevator": x}, self.grid.dt_s)
                 effect = value / std if np.isfinite(value) and std > 0.0 else 0.0
             yield column, why, effect
-
-    def _time(self) -> Iterator[str]:
-        base = self._base()
-        yield "\n[time]"
-        if base is not None:
-            yield f'{entry(base.column)}\nunit = "{base.unit}" # {base.reason}'
-        elif self.own_times:
-            yield "# each topic has its own times"
-        else:
-            self.doubts.append(
-                "no time was found; state [time] column and unit, or the sample rate as rate_hz"
-            )
-            yield "# no time was found: state column and unit, or the sample rate"
-            yield '# column = "..."\n# rate_hz = ...'
-        times = {id(t): t for c in self.used if (t := times_of(c, self.clocks)) is not None}
-        if len(times) > 1 or any(not _regular(t) for t in times.values()):
-            yield f'\n[resample] # linear, cubic or previous\nrate_hz = {self._rate_hz():.6g}\nmethod = "linear"'
-
-    def _base(self) -> Clock | None:
-        if "" in self.clocks or not self.clocks:
-            return self.clocks.get("")
-        columns = [c for d in self.decisions.values() for c in d.reading.columns]
-        groups = [c.group for c in columns if c.group in self.clocks]
-        group = max(groups, key=groups.count) if groups else next(iter(self.clocks))
-        return self.clocks[group]
-
-    def _clock(self, column: Column) -> Iterator[str]:
-        base, own = self._base(), self.clocks.get(column.group)
-        if column.t_s is not None or own is None or own is base:
-            return
-        matrix = f", variable = {json.dumps(own.column.variable)}" if own.column.variable else ""
-        yield f'clock = {{ column = {json.dumps(own.column.key)}{matrix}, unit = "{own.unit}" }}'
-
-    def _rate_hz(self) -> float:
-        """Rate of q, or of the first channel whose rate is plausible [Hz]."""
-        first = [self.decisions["q"].reading.column] if "q" in self.decisions else []
-        for column in (*first, *self.used):
-            t = times_of(column, self.clocks)
-            steps = np.diff(t) if t is not None else np.empty(0)
-            steps = steps[steps > 0.0]
-            step = float(np.median(steps)) if len(steps) else 0.0
-            if 1.0 / _HIGHEST_HZ <= step <= 1.0 / _LOWEST_HZ:
-                return float(f"{1.0 / step:.3g}")
-        return _USUAL_HZ
 
 
 _INSTEAD: Final = {
@@ -366,34 +330,9 @@ _INSTEAD: Final = {
 """Quantity -> what it is mapped for."""
 
 
-def entry(column: Column) -> str:
-    """Place of a column in a mapping."""
-    text = f"column = {json.dumps(column.key)}"
-    return text + (f"\nvariable = {json.dumps(column.variable)}" if column.variable else "")
-
-
 def _shown(r: Reading) -> str:
     sign = ", sign = -1" if r.sign < 0 else ""
     return f"{r.channel} = {r.column.full!r}, unit = {r.unit!r}{sign}"
 
 
-def _regular(t: Array) -> bool:
-    finite = t[np.isfinite(t)]
-    steps = np.diff(finite)
-    if len(steps) < 2 or not (steps > 0.0).all():
-        return bool(len(steps) < 2 or not np.any(steps == 0.0))
-    even = even_times(finite, single_precision_s(finite))
-    return bool(np.ptp(np.diff(even)) <= JITTER * float(np.median(steps)))
-
-
-def column_list(columns: Sequence[Column], shown: int) -> Iterator[str]:
-    """Columns with their first and last value, the smallest and the largest."""
-    for c in columns[:shown]:
-        finite = c.values[np.isfinite(c.values)]
-        if len(finite):
-            where = f"{c.variable} column {c.key}" if c.variable else repr(c.key)
-            label = f" ({c.name})" if isinstance(c.key, int) and c.name and not c.name.isdigit() else ""
-            yield f"#   {where}{label}: {finite[0]:.6g}, {finite[-1]:.6g}; {finite.min():.6g}, {finite.max():.6g}"
-
-
-__all__ = ["Proposal", "Writer", "column_list", "entry"]
+__all__ = ["Proposal", "Writer"]

@@ -69,7 +69,7 @@ def _conclusion(answer: TraceAnswer) -> str:
         own = "" if declared is None else f"; {probability(declared.p_value)} for the declared model"
         return (
             f"None: the declared aircraft explains these records ({probability(answer.anomaly.p_value)} for a missing "
-            f"effect{own}); they show no missing effect."
+            f"effect{own}); they show no missing effect.{_refinement(answer)}"
         )
     if answer.verdict == "unexplained":
         return (
@@ -81,6 +81,15 @@ def _conclusion(answer: TraceAnswer) -> str:
     if alike:
         sentence += f", or an effect that looks the same in these records: {', '.join(alike)}"
     return sentence + "."
+
+
+def _refinement(answer: TraceAnswer) -> str:
+    """Derivatives that the updated aircraft has from the records, in a sentence; empty for none."""
+    refined = [
+        f"{name} {significant(r.estimate)} +- {significant(r.std, 2)} (declared {significant(r.declared)})"
+        for name, r in answer.refined.items()
+    ]
+    return f" They refine {_listed(refined)}." if refined else ""
 
 
 def headline(answer: TraceAnswer) -> str:

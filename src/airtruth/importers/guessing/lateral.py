@@ -1,0 +1,113 @@
+"""What physics says of the lateral-directional columns of an assignment.
+
+With the Euler angles phi, theta, psi and the rates p, q, r in body axes (B. L. Stevens and F. L. Lewis, *Aircraft Control and
+Simulation*, 2nd ed., 2003, 1.4):
+
+    phi' = p + tan(theta) (q sin(phi) + r cos(phi))
+    psi' = (q sin(phi) + r cos(phi)) / cos(theta)
+    v'   = ay + g cos(theta) sin(phi) - r u + p w
+
+A right aileron that moves down rolls to the left, and a rudder whose trailing edge moves left yaws to the left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.checks.spectra import integral
+from airtruth.importers.guessing.evidence import Finding, Relation, compared, effect, moved, moves, near
+from airtruth.units import G0
+
+Array = NDArray[np.float64]
+
+
+def _yawing(c: Mapping[str, Array]) -> Array:
+    """q sin(phi) + r cos(phi) [rad/s]."""
+    phi, zero = c.get("phi", np.zeros_like(c["r"])), np.zeros_like(c["r"])
+    return np.asarray(c.get("q", zero) * np.sin(phi) + c["r"] * np.cos(phi))
+
+
+def _bank(c: Mapping[str, Array], dt_s: float) -> Array:
+    climb = np.tan(np.clip(c["theta"], -1.4, 1.4)) * _yawing(c) if {"theta", "r"} <= c.keys() else 0.0
+    return integral(c["p"] + climb, dt_s)
+
+
+def _heading(c: Mapping[str, Array], dt_s: float) -> Array:
+    theta = np.clip(c["theta"], -1.4, 1.4) if "theta" in c else np.zeros_like(c["r"])
+    return integral(_yawing(c) / np.cos(theta), dt_s)
+
+
+def _pull(c: Mapping[str, Array]) -> Array:
+    """Sideways acceleration over the airspeed [rad/s]."""
+    theta = c.get("theta", np.zeros_like(c["ay"]))
+    return np.asarray(
+        (c["ay"] + G0 * np.cos(theta) * np.sin(c["phi"])) / np.maximum(np.abs(c["airspeed"]), 1.0)
+    )
+
+
+def _turning(c: Mapping[str, Array]) -> Array:
+    """Turn of the body about the lift's direction [rad/s]."""
+    alpha, zero = c.get("alpha", np.zeros_like(c["r"])), np.zeros_like(c["r"])
+    return np.asarray(c["r"] * np.cos(alpha) - c.get("p", zero) * np.sin(alpha))
+
+
+def _turned(c: Mapping[str, Array], dt_s: float) -> Finding:
+    """The turn that bank and side force require, where no sideslip tells the rest."""
+    if "beta" in c:
+        return Finding(0.0, "beta tells more")
+    ratio, factor, share = compared(integral(_turning(c), dt_s), integral(_pull(c), dt_s), dt_s, 1)
+    return Finding(
+        ratio, f"the turn is {factor:.3g} of that which bank and side force require (R2 {share:.2f})"
+    )
+
+
+def _rolls(c: Mapping[str, Array], dt_s: float) -> Finding:
+    others = [c[name] for name in ("p", "r", "beta") if name in c]
+    return moves(*effect(c["p"], [c["aileron"], *others], dt_s), 30.0, "the aileron changes p'")
+
+
+def _yaws(c: Mapping[str, Array], dt_s: float) -> Finding:
+    others = [c[name] for name in ("r", "p", "beta" if "beta" in c else "ay") if name in c]
+    return moves(*effect(c["r"], [c["rudder"], *others], dt_s), 6.0, "the rudder changes r'")
+
+
+def _centred(c: Mapping[str, Array], dt_s: float) -> Finding:
+    mean = float(np.median(c["ay"])) / G0
+    return near(mean, 0.08, 1.0, f"the median of ay is {mean:+.3f} g")
+
+
+def _coordinated(c: Mapping[str, Array], dt_s: float) -> Finding:
+    mean = float(np.median(c["beta"]))
+    return near(mean, 0.08, 0.8, f"the median of beta is {np.degrees(mean):+.1f} deg")
+
+
+_BANKED = moved("phi", "the integral of p and of the turn", 2, lambda c: c["phi"], _bank)
+_HEADED = moved("psi", "the integral of the turn", 2, lambda c: c["psi"], _heading)
+_SLIPPED = moved(
+    "beta",
+    "the integral of bank, side force and turn",
+    2,
+    lambda c: c["beta"],
+    lambda c, dt: integral(_pull(c) - _turning(c), dt),
+)
+_AILERON = moved("the aileron", "its command", 1, lambda c: c["aileron"], lambda c, dt: c["aileron_command"])
+_RUDDER = moved("the rudder", "its command", 1, lambda c: c["rudder"], lambda c, dt: c["rudder_command"])
+LATERAL_RELATIONS: Final = (
+    Relation(("ay",), _centred),
+    Relation(("beta",), _coordinated),
+    Relation(("phi", "p"), _BANKED, ("theta", "q", "r")),
+    Relation(("psi", "r"), _HEADED, ("theta", "q", "phi")),
+    Relation(("beta", "ay", "phi", "r", "airspeed"), _SLIPPED, ("p", "theta", "alpha")),
+    Relation(("r", "phi", "ay", "airspeed"), _turned, ("p", "theta", "alpha", "beta")),
+    Relation(("aileron", "p"), _rolls, ("r", "beta")),
+    Relation(("rudder", "r"), _yaws, ("p", "beta", "ay")),
+    Relation(("aileron", "aileron_command"), _AILERON),
+    Relation(("rudder", "rudder_command"), _RUDDER),
+)
+"""Everything that is tested of the lateral-directional motion. A relation uses further slots where they are assigned."""
+
+__all__ = ["LATERAL_RELATIONS"]
