@@ -149,3 +149,14 @@ def test_the_counts_of_the_issue():
 
 
 pytestmark = pytest.mark.xdist_group("fuzz")  # the base flight is made once
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["import dialects", "import structs", "source words"])
+def test_new_readers(name):
+    """The first 120 cases of seed 2; `python -m validation.fuzz --only NAME` draws a thousand for each kind of file."""
+    (case,) = [one for one in CASES if one.name == name]
+    assert case.count >= 1000
+    tally = harness.run_cases(case, range(120), seed=2)
+    assert not tally.bad
+    assert tally.endings["result"] > 0

@@ -213,3 +213,15 @@ def test_sources_know_their_lateral_columns(names, expected):
     entry = lexicon(names).entry(names[1])
     assert entry is not None
     assert entry[0].channel == expected
+
+
+@pytest.mark.parametrize("name", ["elevon_{}_pwm", "elevon {}"])
+def test_pulse_widths_of_elevons_are_no_angles(tmp_path, name):
+    """Half the difference of two pulse widths has the size of an angle, and is none."""
+    table = flight(**usual(units={"p": "deg/s", "r": "deg/s", "phi": "deg", "beta": "deg", "ay": "g"}))
+    elevator = table.pop("elevator [deg]")
+    table |= {name.format("L"): 1500.0 + 16.0 * elevator, name.format("R"): 1500.0 - 16.0 * elevator}
+    text = guess_mapping(write(tmp_path / "f.csv", table))
+    assert not {"elevator_rad", "aileron_rad"} & set(tomllib.loads(text)["channels"])
+    assert "# Not mapped: elevator_rad: " in text
+    assert "are several surfaces that are elevator and aileron together; state columns, and weights" in text

@@ -17,7 +17,8 @@ import numpy as np
 import pandas as pd
 import scipy.io
 
-from airtruth.importers import MappingFile, guess_mapping, import_log
+from airtruth import importers
+from airtruth.importers import MappingFile, guess_mapping, import_log, read_dictionary
 from airtruth.isolation import client
 from airtruth.logs.flight_log import FlightLog
 from validation import recorders
@@ -25,6 +26,8 @@ from validation.fuzz import logs
 from validation.fuzz.mutate import NUMBERS, WORDS, damaged
 from validation.recorders import Topic
 
+_KNOWN: Final = Path(importers.__file__).parent / "known"
+"""Folder of the sources that the package knows."""
 DEG: Final = np.pi / 180.0
 """Degree [rad]."""
 NAMES: Final = {
@@ -226,6 +229,54 @@ def hdf5() -> tuple[tuple[bytes, dict[str, Any]], ...]:
         return ((path.read_bytes(), text),)
 
 
+def _text(frame: pd.DataFrame, sep: str) -> str:
+    return frame.to_csv(index=False, sep=sep, float_format="%.9g", lineterminator="\n")
+
+
+@cache
+def dialects() -> tuple[tuple[bytes, dict[str, Any]], ...]:
+    """Prose with a row of units in Windows-1252; bars and a clock that starts again; records one below another with their names.
+
+    In the latter two the airspeed has a third of the rate, and there are lateral columns.
+    """
+    frame = pd.DataFrame(columns())
+    units = ["s", *(unit for _, unit, _ in NAMES.values())]
+    head = ["Flugversuch 7, Höhe in m", "", "|".join(frame.columns), "|".join(units)]
+    prose = "\n".join([*head, *_text(frame, "|").splitlines()[1:]]).encode("cp1252")
+    held = frame.assign(
+        TAS=frame["TAS"].to_numpy()[np.arange(len(frame)) // 3 * 3], roll=0.01, **{"yaw [deg]": 359.0}
+    )
+    again = pd.concat([held.assign(time=held["time"] + 100.0), held])
+    stacked = pd.concat([held.assign(Record="first"), held.assign(Record="second")])
+    bars = {"source": {"delimiter": "|"}}
+    named = {"time": {"column": "time", "unit": "s", "run": "Record"}}
+    lateral = {"phi_rad": {"column": "roll", "unit": "rad"}, "psi_rad": {"column": "yaw", "unit": "deg"}}
+    wide = {"channels": {**mapping()["channels"], **lateral}}
+    return (
+        (prose, mapping() | bars),
+        (_text(again, "|").encode(), mapping() | bars | wide),
+        (_text(stacked, ",").encode(), mapping() | named | wide),
+    )
+
+
+@cache
+def structs() -> tuple[tuple[bytes, dict[str, Any]], ...]:
+    """Two structs of one layout, plain and compressed, and an array of structs."""
+    results = []
+    for compressed in (False, True):
+        out = io.BytesIO()
+        scipy.io.savemat(out, {"a": columns(), "b": columns(), "day": 3.0}, do_compression=compressed)
+        results.append((out.getvalue(), mapping() | {"source": {"structs": ["a", "b"]}}))
+    out = io.BytesIO()
+    array = np.empty((1, 2), dtype=[(name, object) for name in columns()])
+    array[0, 0] = array[0, 1] = tuple(columns().values())
+    scipy.io.savemat(out, {"runs": array})
+    results.append((out.getvalue(), mapping() | {"source": {"structs": ["runs(1)", "runs(2)"]}}))
+    return tuple(results)
+
+
+TEXT: Final = ("csv", "table", "dialects")
+"""Formats whose cells are replaced too."""
 FORMATS: Final[Mapping[str, tuple[str, Callable[[], tuple[tuple[bytes, dict[str, Any]], ...]]]]] = {
     "csv": ("f.csv", csv),
     "table": ("f.txt", table),
@@ -236,6 +287,8 @@ FORMATS: Final[Mapping[str, tuple[str, Callable[[], tuple[tuple[bytes, dict[str,
     "dataflash": ("f.bin", dataflash),
     "mdf": ("f.mf4", mdf),
     "hdf5": ("f.h5", hdf5),
+    "dialects": ("f.csv", dialects),
+    "structs": ("f.mat", structs),
 }
 """Format -> file name and its contents with their mappings."""
 
@@ -243,7 +296,7 @@ FORMATS: Final[Mapping[str, tuple[str, Callable[[], tuple[tuple[bytes, dict[str,
 def damaged_file(rng: Random, name: str) -> tuple[bytes, dict[str, Any]]:
     """A damaged file of a format, and the mapping of the sound one."""
     content, document = rng.choice(FORMATS[name][1]())
-    text = name in ("csv", "table") and rng.random() < 0.5
+    text = name in TEXT and rng.random() < 0.5
     return _cells(rng, content) if text else damaged(rng, content), document
 
 
@@ -262,12 +315,21 @@ def importing(name: str) -> Callable[[Random, Path], None]:
     return run
 
 
+def words_case(rng: Random, folder: Path) -> None:
+    """A damaged file of knowledge of a source, and a guess with it."""
+    path, table = folder / "words.toml", folder / "f.csv"
+    text = rng.choice(sorted(_KNOWN.glob("*.toml"))).read_bytes()
+    path.write_bytes(damaged(rng, text) if rng.random() < 0.5 else _cells(rng, text))
+    table.write_bytes(csv()[0][0])
+    tomllib.loads(guess_mapping(table, words=read_dictionary(path)))
+
+
 def _cells(rng: Random, content: bytes) -> bytes:
     """A table of text with cells and lines replaced."""
-    lines = content.decode().splitlines()
+    lines = content.decode("cp1252").splitlines()
     for _ in range(rng.choice((1, 2, 5))):
         at = rng.randrange(len(lines))
-        cells = lines[at].split(sep := rng.choice((",", ";", " ")))
+        cells = lines[at].split(sep := rng.choice((",", ";", " ", "|")))
         odd = (str(rng.choice(NUMBERS)), rng.choice(WORDS), '"', "1e999", "0x10", "1_0", "#")
         cells[rng.randrange(len(cells))] = rng.choice(odd)
         lines[at] = sep.join(cells)
@@ -285,4 +347,4 @@ def warm(folder: Path) -> None:
     client.close()
 
 
-__all__ = ["FORMATS", "damaged_file", "importing", "mapping", "warm"]
+__all__ = ["FORMATS", "damaged_file", "importing", "mapping", "warm", "words_case"]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.channels import REQUIRED
+from airtruth.checks import poor
 from airtruth.checks.gate import admit
 from airtruth.checks.kinematics_bias import rms
 from airtruth.checks.kinematics_findings import bias_of, cause_of, drift, errors_of
@@ -21,7 +22,7 @@ from airtruth.checks.kinematics_vaneless import untestable, without_vane
 from airtruth.checks.kinematics_words import NAMED, conclusions, verdict_of
 from airtruth.checks.result import CheckResult, Finding
 from airtruth.errors import LogError
-from airtruth.logs.flight_log import FlightLog
+from airtruth.logs.flight_log import FlightLog, batches
 from airtruth.logs.validate import validate
 from airtruth.numerics.prefilter import butterworth, edge_samples
 from airtruth.physics.reconstruction import is_reconstructed
@@ -77,8 +78,9 @@ def check_logs(
         else check_kinematics(parts, declared_errors(aircraft), aircraft.chord_m, declared_biases(aircraft))
     )
     remarks = dict.fromkeys(sentence for one in admitted for sentence in one.remarks("aircraft"))
+    doubts = poor.words([one for log in parts for batch in batches(log) for one in poor.measured(batch)])
     forced = tuple(sentence for one in admitted for sentence in one.forced)
-    return replace(result, sentences=(*result.sentences, *remarks), forced=forced)
+    return replace(result, sentences=(*doubts, *result.sentences, *remarks), forced=forced)
 
 
 def check_kinematics(

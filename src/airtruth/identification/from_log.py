@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from airtruth.aircraft import Aircraft
-from airtruth.checks import gate
+from airtruth.checks import gate, poor
 from airtruth.checks.airspeed import is_noisy, speeds
 from airtruth.cluster import Cluster, LostWorkError
 from airtruth.errors import ConfigurationError, LogError, StoreError
@@ -62,13 +62,15 @@ class FromLog:
     """What one log gives: its runs and notes, the estimates of each method, or the parts of a joint estimate.
 
     ``dt_s`` is its longest sample period [s]; ``noisy`` are the runs whose airspeed is smoothed; ``changes`` are the runs whose
-    `pressure_range` exceeds `CHANGES`, with it. ``curved`` counts the runs that show a nonlinear term of a coefficient.
+    `pressure_range` exceeds `CHANGES`, with it. ``curved`` counts the runs that show a nonlinear term of a coefficient;
+    ``measures`` are those of `airtruth.checks.poor`.
     """
 
     run_ids: tuple[str, ...]
     dt_s: float = 0.0
     noisy: list[str] = field(default_factory=list)
     changes: list[tuple[str, float]] = field(default_factory=list)
+    measures: list[poor.Record] = field(default_factory=list)
     origin: Source | None = None
     parts: list[Part] = field(default_factory=list)
     estimates: dict[str, Estimates] = field(default_factory=dict)
@@ -154,6 +156,8 @@ def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made
             found.curved = curvature_of(parts, task.options)
         for part in parts:
             found.dt_s = max(found.dt_s, part.batch.dt_s)
+            if task.motion is LONGITUDINAL and len(found.measures) < poor.MOST_RUNS:
+                found.measures += poor.measured(part.batch)
             ranges = zip(part.batch.run_ids, pressure_range(part.batch).tolist(), strict=True)
             found.changes += [(run_id, changed) for run_id, changed in ranges if changed > CHANGES]
     except LogError as error:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from airtruth import __version__
 from airtruth import aircraft as planes
+from airtruth.checks import poor
 from airtruth.cluster import Cluster
 from airtruth.errors import ConfigurationError
 from airtruth.identification.batch import identify_batch, identify_joint
@@ -246,6 +247,7 @@ class _Work:
     noisy: list[str] = field(default_factory=list)
     changes: list[tuple[str, float]] = field(default_factory=list)
     curved: Counter[tuple[str, str]] = field(default_factory=Counter)
+    measures: list[poor.Record] = field(default_factory=list)
     runs: int = 0
     failed: int = 0
     dt_s: float = 0.0
@@ -275,15 +277,17 @@ class _Work:
         self.noisy += found.noisy
         self.changes += found.changes
         self.curved += found.curved
+        self.measures += found.measures
         self.runs += len(found.run_ids)
         if found.origin is not None:
             self.sources.append(found.origin)
 
     @property
     def noted(self) -> tuple[str, ...]:
-        """Notes of the logs, constants that records state differently from the aircraft, and those on airspeed and pressure."""
+        """Doubts about the records, notes of the logs, differing constants, and sentences on airspeed and pressure."""
         constant = [m.name for m in self.methods if takes_constant(self.options, m.pose is not None)]
         return (
+            *poor.words(self.measures),
             *self.notes,
             *_stated(self.stated),
             *smoothed_airspeed(self.noisy, self.runs),

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.channels import LATERAL
 from airtruth.importers.attitude import euler_angles
 from airtruth.importers.dictionary import DIMENSIONS, QUATERNION, VELOCITY, Entry, Lexicon, Words, compact
 from airtruth.importers.guessing.columns import Clock, Column
@@ -113,7 +114,7 @@ def candidates(
         for channel, evidence, reason in _meanings(column, words):
             if channel == "elevon_rad":
                 found.surfaces.append((column, MIXED))
-                for surface in ("elevator_rad", mixed_with(column.name)):
+                for surface in () if reason else ("elevator_rad", mixed_with(column.name)):
                     _read(parts_of_pairs, column, surface, evidence, "named", grid, clocks, None)
             elif channel in (*QUATERNION, *VELOCITY):
                 parts.setdefault((column.group, channel), column)
@@ -121,8 +122,10 @@ def candidates(
                     break
             elif reason and channel.startswith("elevator") and reason[1]:
                 found.surfaces.append((column, reason[0]))
-            elif reason:
+            elif reason and channel not in LATERAL:
                 found.refused.append((column, reason[0], channel))
+            elif reason:
+                continue
             elif channel != "t_s" and not (compact(column.name) == "v" and column.group in velocities):
                 _read(found, column, channel, evidence, "named", grid, clocks, None)
     for (_, entry, title), components in turned.items():

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Final
 
 from airtruth.importers.guessing.readings import Candidates, Reading
-from airtruth.importers.guessing.slots import size_of
+from airtruth.importers.guessing.slots import limits, size_of
 
 _SIDES: Final = {
     **dict.fromkeys(("left", "l", "lh", "port", "links", "lt"), "left"),
@@ -72,12 +72,12 @@ def pair(found: Candidates, mixed: Candidates, why: str) -> None:
 
 
 def _pairs(readings: Sequence[Reading]) -> Iterator[Reading]:
-    """Mean and half the difference, right less left, of readings of both sides."""
+    """Mean and half the difference, right less left, of readings of both sides, each of which is an angle of a surface."""
     for left in readings:
-        if side_of(left.column.name)[1] != "left":
+        if side_of(left.column.name)[1] != "left" or not _is_deflection(left):
             continue
         for right in readings:
-            if not are_sides(left, right):
+            if not are_sides(left, right) or not _is_deflection(right):
                 continue
             for weight in (-0.5, 0.5):
                 values = 0.5 * right.values + weight * left.values
@@ -90,6 +90,12 @@ def _pairs(readings: Sequence[Reading]) -> Iterator[Reading]:
                     kind="pair",
                     weights=(0.5, weight),
                 )
+
+
+def _is_deflection(one: Reading) -> bool:
+    """Whether a column is in the range of a surface: pulse widths are not, and their difference may be."""
+    low, high, _, _ = limits(one.channel)
+    return bool(low <= one.values.min() and one.values.max() <= high)
 
 
 __all__ = ["are_sides", "mixed_with", "other_side", "pair", "side_of"]

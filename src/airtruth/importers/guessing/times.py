@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.foreign.source import Source
-from airtruth.importers.clock import increasing
+from airtruth.importers.clock import Clocked, increasing
 from airtruth.importers.guessing.assignment import Decision
 from airtruth.importers.guessing.candidates import times_of
 from airtruth.importers.guessing.columns import Clock, Column
-from airtruth.importers.uniform import even_times
+from airtruth.importers.uniform import GAP, even_times
 from airtruth.logs.validate import JITTER, single_precision_s
 
 Array = NDArray[np.float64]
@@ -72,7 +72,7 @@ class Times:
             yield "# no time was found: state column and unit, or the sample rate"
             yield '# column = "..."\n# rate_hz = ...'
         if self.run:
-            yield f"run = {json.dumps(self.run)} # one value where the time goes on, another one where it starts again"
+            yield f"run = {json.dumps(self.run)} # one value until the time starts again or pauses"
         times = {id(t): t for c in used if (t := times_of(c, self.clocks)) is not None}
         if len(times) > 1 or any(not _regular(part) for t in times.values() for part in _parts(t)):
             yield f'\n[resample] # linear, cubic or previous\nrate_hz = {self._rate_hz(used):.6g}\nmethod = "linear"'
@@ -99,14 +99,14 @@ class Times:
 
 
 def run_column(source: Source, clocks: Mapping[str, Clock]) -> str:
-    """Column that keeps one value, which no other rows have, between rows at which the time starts again; "" if none does."""
+    """Column that keeps one value, which no other rows have, until the time starts again or pauses; "" if none does."""
     base = clocks.get("")
     if base is None or not source.ordered:
         return ""
     clocked = increasing(base.t_s)
-    if not clocked.starts:
+    starts = set(np.flatnonzero(clocked.keep)[_breaks(clocked)].tolist())
+    if not starts:
         return ""
-    starts = set(np.flatnonzero(clocked.keep)[list(clocked.starts)].tolist())
     for name in source.names:
         values = source.arrays[name]
         if name == base.column.key or len(values) != len(base.t_s):
@@ -154,11 +154,21 @@ def column_list(columns: Sequence[Column], shown: int) -> Iterator[str]:
             yield f"#   {where}{label}: {finite[0]:.6g}, {finite[-1]:.6g}; {finite.min():.6g}, {finite.max():.6g}"
 
 
+def _breaks(clocked: Clocked) -> list[int]:
+    """Indices of times at which a clock starts again, or goes on after a pause."""
+    steps = np.diff(clocked.t_s)
+    usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+    long = steps > max(GAP[0] * usual, GAP[1])
+    pauses = np.flatnonzero(long) + 1 if usual else np.empty(0, dtype=np.int64)
+    return sorted({*clocked.starts, *pauses.tolist()})
+
+
 def _parts(t: Array) -> list[Array]:
-    """Times of each part of a clock that starts again."""
+    """Times of each part of a clock that starts again or pauses; repeated times stay."""
     finite = t[np.isfinite(t)]
-    starts = increasing(finite).starts
-    return np.split(finite[increasing(finite).keep], starts) if starts else [finite]
+    clocked = increasing(finite)
+    breaks = np.flatnonzero(clocked.keep)[_breaks(clocked)]
+    return [part for part in np.split(finite, breaks) if len(part)]
 
 
 def _regular(t: Array) -> bool:
