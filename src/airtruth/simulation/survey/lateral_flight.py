@@ -30,6 +30,8 @@ _START_S: Final = 1.0
 """Start of the doublet of the aileron [s]; that of the rudder starts in the middle of the record."""
 _SECONDS: Final = (12.0, 6.0, 4.0)
 """Lengths of the record with both doublets that are tried [s] (judgement: shorter for an aircraft that is unstable in pitch)."""
+_FOLLOWS: Final = 0.2
+"""Share of a doublet that the surface has to follow [-] (judgement: feedback may take most of it)."""
 _MOST: Final = {"phi_rad": 45.0 * DEG, "beta_rad": 12.0 * DEG, "alpha_rad": 10.0 * DEG}
 """Largest departures from the trim in a sound record [rad] (judgement: inside the range of most tables)."""
 
@@ -109,7 +111,7 @@ def _trimmed(aircraft: Aircraft, at: Trim) -> tuple[Trim | None, str]:
     fault = ""
     for straight in _WAYS:
         try:
-            return trim(aircraft, replace(at.condition, straight=straight), near=at), ""
+            return trim(aircraft, replace(at.condition, straight=straight)), ""  # as a campaign trims
         except TrimError as error:
             fault = fault or str(error)
     return None, fault
@@ -139,6 +141,10 @@ def _ranges(aircraft: Aircraft, at: Trim, test: LateralTest) -> tuple[tuple[floa
         away = float(np.abs(flown[name] - flown[name][0]).max())
         if away > most:
             return (), f"{name.removesuffix('_rad')} moves by {away / DEG:.0f} deg in {test.duration_s:g} s"
+    for control, amplitude_deg in zip(("aileron", "rudder"), test.amplitude_deg, strict=True):
+        moved_deg = float(np.ptp(flown[f"{control}_rad"])) / DEG
+        if moved_deg < _FOLLOWS * 2.0 * amplitude_deg:
+            return (), f"a doublet of {amplitude_deg:g} deg moves the {control} by {moved_deg:.2g} deg"
     return tuple(float(np.ptp(flown[name])) / DEG for name in ("beta_rad", "phi_rad")), ""
 
 
