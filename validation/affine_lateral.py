@@ -97,11 +97,22 @@ def gusts(rng, runs, samples, level):
     return level * out
 
 
-def fly(runs=2, seconds=10.0, degrees=3.0, gust=0.0, noise=1.0, seed=0, theta=THETA, start=None, q=None):
-    """Records of runs at 50 Hz as a `Batch`, doublets of alternating sign, gusts and noise so many times
-    light gusts and the noise of the GTM.
+def fly(
+    runs=2,
+    seconds=10.0,
+    degrees=3.0,
+    gust=0.0,
+    noise=1.0,
+    seed=0,
+    theta=THETA,
+    start=None,
+    q=None,
+    curvature=0.0,
+):
+    """Records of runs at 50 Hz as a `Batch`: doublets of alternating sign, light gusts and the GTM's noise so many times.
 
-    ``start`` is the initial state (4,); ``q`` a function of time [s] for the pitch rate [rad/s].
+    ``start`` is the initial state (4,); ``q`` a function of time [s] for the pitch rate [rad/s]; ``curvature`` times
+    beta |beta| is added to Cl.
     """
     rng = np.random.default_rng(seed)
     sign = np.where(np.arange(runs) % 2 == 0, 1.0, -1.0)
@@ -127,6 +138,7 @@ def fly(runs=2, seconds=10.0, degrees=3.0, gust=0.0, noise=1.0, seed=0, theta=TH
         force = 0.5 * DENSITY * speed**2 * c.wing_area_m2
         signals = np.stack([beta + v / SPEED, p * c.span_m / (2 * speed), r * c.span_m / (2 * speed), *da_dr])
         cy, cl, cn = table @ signals
+        cl = cl + curvature * signals[0] * np.abs(signals[0])
         ixx, iyy, izz, ixz = c.inertia_xx_kg_m2, c.inertia_yy_kg_m2, c.inertia_zz_kg_m2, c.inertia_xz_kg_m2
         roll = force * c.span_m * cl + ixz * p * pitch - (izz - iyy) * pitch * r
         yaw = force * c.span_m * cn - ixz * pitch * r - (iyy - ixx) * p * pitch

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
+from airtruth.identification import identify_batch
 from airtruth.identification.estimates import Status, quantities
+from airtruth.identification.lateral.curvature import SIGNIFICANT, p_values
 from airtruth.identification.lateral.observation import observe
 from airtruth.identification.lateral.problems import ls_problem, rate_of
 from airtruth.identification.lateral.solve import POSES, regress_batch, regress_joint
-from airtruth.identification.options import Options
+from airtruth.identification.options import TERMS, Options
 from airtruth.numerics.prefilter import butterworth, edge_samples
 from airtruth.physics.motion import LATERAL
 from validation.affine_lateral import ALPHA, DENSITY, GTM, NAMES, SPEED, THETA, fly
@@ -190,3 +192,44 @@ def test_names_of_the_table_are_those_of_the_motion():
     rows = ls_problem(observation, Options()).rows(np.empty((2, 15)), np.arange(2))
     assert rows.x.shape == (2, 5, CALM.t_s.shape[1] - 4)
     assert DENSITY > 0.0
+
+
+def test_terms_are_columns_of_an_independent_least_squares():
+    batch = without_corners(NOISY)
+    alpha = ALPHA + 0.02 * np.sin(1.3 * batch.t_s)
+    batch = replace(batch, channels={**batch.channels, "alpha_rad": alpha})
+    made = regress_batch(batch, GTM, "ls", None, Options(terms=("alpha", "beta")))
+    order = butter(4, 5.0, fs=1.0 / batch.dt_s, output="sos")
+    pad = edge_samples(butterworth(5.0, 4, batch.dt_s))
+    for run in range(3):
+        x, y = independent(batch, run)
+        c = {name: values[run] for name, values in batch.channels.items()}
+        speed = sosfiltfilt(order, c["airspeed_m_s"], padtype="odd", padlen=pad)
+        half = GTM.span_m / (2 * speed)
+        columns = [c["beta_rad"], c["p_rad_s"] * half, c["r_rad_s"] * half, c["aileron_rad"], c["rudder_rad"]]
+        columns = [column - column[0] for column in columns]
+        more = [column * (c["alpha_rad"] - c["alpha_rad"].mean()) for column in columns]
+        more.append(columns[0] * np.abs(columns[0]))
+        x = np.column_stack([x, *(sosfiltfilt(order, m, padtype="odd", padlen=pad)[2:-2] for m in more)])
+        expected = np.linalg.lstsq(x, y, rcond=None)[0][:5].T.ravel()
+        np.testing.assert_allclose(made.theta[run], expected, rtol=1e-9, atol=1e-11)
+
+
+@pytest.mark.parametrize("method", ["ls", "iv-lowpass", "iv-f1", "frequency"])
+def test_a_curved_rolling_moment_is_found_and_freed(method):
+    batch = fly(runs=4, noise=0.2, degrees=4.0, seed=3, curvature=-0.5)
+    shown = p_values(batch, GTM, Options()) < SIGNIFICANT
+    assert shown[:, TERMS.index("beta"), 1].all()
+    assert not shown[:, :, [0, 2]].any()
+    error = {}
+    for terms in ((), ("beta",)):
+        made = identify_batch(batch, GTM, method, Options(terms=terms), LATERAL)
+        error[terms] = np.abs(made.theta[:, NAMES.index("Clbeta")] - THETA[NAMES.index("Clbeta")]).mean()
+    assert error["beta",] < 0.25 * error[()]
+
+
+def test_straight_coefficients_show_no_terms():
+    batch = fly(runs=60, gust=1.0, seed=5)
+    p = p_values(batch, GTM, Options())
+    assert (p < 0.05).mean() < 0.09
+    assert not (p < SIGNIFICANT).any()

@@ -37,6 +37,15 @@ OnCluster = Annotated[
         help="Work on a Dask cluster: local:N, tcp://HOST:PORT, tls://HOST:PORT or a scheduler file.",
     ),
 ]
+Terms = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--term",
+        metavar="NAME",
+        help="Nonlinear term to free in the lateral regressions, may be repeated: alpha, products with the angle of attack; "
+        "beta, beta |beta|.",
+    ),
+]
 OfMotion = Annotated[
     MotionName | None,
     typer.Option(

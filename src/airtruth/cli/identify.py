@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -20,10 +21,11 @@ from airtruth.cli.arguments import (
     Pressure,
     Quiet,
     Replace,
+    Terms,
     Trim,
 )
 from airtruth.cli.compilation import compile_identification
-from airtruth.cli.early import require_names
+from airtruth.cli.early import require_file, require_names
 from airtruth.cli.output import notice, print_result
 from airtruth.cli.progress import announced_compilation, loading, progress_bar, working
 
@@ -71,6 +73,7 @@ def identify(
     covariance: Annotated[
         Covariance, typer.Option(help="Formula of the covariance, see docs/methods.md.")
     ] = "corrected",
+    term: Terms = None,
     tolerance: Annotated[
         float, typer.Option(help="Relative change at which an estimator has converged.")
     ] = 0.01,
@@ -106,6 +109,7 @@ def identify(
         pressure=pressure,
         covariance=covariance,
         tolerance=tolerance,
+        terms=tuple(term or ()),
     )
     logs = [location(log) for log in logs]
     declared = load(aircraft)
@@ -196,6 +200,10 @@ def tables(
     quiet: Quiet = False,
 ) -> None:
     """Write the paper's tables from identified campaigns, beside the published figures."""
+    for folder in folders:
+        require_file(
+            folder, "campaign folder", f"`airtruth fly CAMPAIGN.toml --out {quote(str(folder))}` creates it"
+        )
     from airtruth.logs.outputs import writing
     from airtruth.logs.remote import location
     from airtruth.reporting import write_tables

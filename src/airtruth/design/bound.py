@@ -111,9 +111,9 @@ class ForecastResult:
             columns=(
                 "parameter",
                 "with effects" if self.with_effects else "declared",
-                "std of a record",
+                "standard error, one record",
                 "percent",
-                f"std of {counted(self.records, 'record')}",
+                f"standard error, {counted(self.records, 'record')}",
                 "percent of these",
             ),
             rows=[(name, *(float(c[i]) for c in columns)) for i, name in enumerate(self.parameters)],

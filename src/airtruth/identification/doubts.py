@@ -5,7 +5,7 @@ differences.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -126,6 +126,27 @@ def changing_pressure(
         f"{', '.join(methods)}: the dynamic pressure changes by {100.0 * largest:.0f} % of its mean in run {run_id!r}{often}. "
         "These estimates take it for constant, and their intervals do not allow for it; use --pressure measured."
     )
+
+
+def curvature(curved: Mapping[tuple[str, str], int], runs: int) -> Iterator[str]:
+    """Sentences about coefficients that are not linear in at least a share `SOME` of the records.
+
+    Parameters
+    ----------
+    curved : number of runs that show a term of a coefficient: (term, coefficient) -> runs.
+    runs : number of all runs.
+    """
+    words = {"alpha": "with the angle of attack", "beta": "with sideslip"}
+    for term, change in words.items():
+        names = [
+            name for (own, name), count in curved.items() if own == term and count >= max(SOME * runs, 1)
+        ]
+        if names:
+            most = max(curved[term, name] for name in names)
+            yield (
+                f"the derivatives of {' and '.join(names)} change {change}{_some(most, runs)}: the intervals of a linear model "
+                f"do not allow for that; --term {term} frees the change in ls, iv-lowpass, iv-f1 and frequency."
+            )
 
 
 def _variances(parts: Parts, method: int) -> Blocks:

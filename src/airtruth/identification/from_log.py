@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -22,6 +22,7 @@ from airtruth.identification.declared_sensors import as_ideal, taken_out
 from airtruth.identification.doubts import CHANGES
 from airtruth.identification.estimates import Estimates, concatenated
 from airtruth.identification.excited import excited_runs
+from airtruth.identification.lateral.methods import curvature_of
 from airtruth.identification.lateral.observation import assumed
 from airtruth.identification.methods import Method
 from airtruth.identification.options import Options
@@ -61,7 +62,7 @@ class FromLog:
     """What one log gives: its runs and notes, the estimates of each method, or the parts of a joint estimate.
 
     ``dt_s`` is its longest sample period [s]; ``noisy`` are the runs whose airspeed is smoothed; ``changes`` are the runs whose
-    `pressure_range` exceeds `CHANGES`, with it.
+    `pressure_range` exceeds `CHANGES`, with it. ``curved`` counts the runs that show a nonlinear term of a coefficient.
     """
 
     run_ids: tuple[str, ...]
@@ -74,6 +75,7 @@ class FromLog:
     stated: dict[str, list[tuple[str, float, float]]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     forced: list[str] = field(default_factory=list)
+    curved: Counter[tuple[str, str]] = field(default_factory=Counter)
 
 
 def results_of(
@@ -148,6 +150,8 @@ def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made
             replace(p, batch=replace(as_ideal(quiet(p.batch, found), taken), servo_s=servo_s))
             for p in with_constants(log, task.plane, task.motion)
         ]
+        if task.motion is LATERAL:
+            found.curved = curvature_of(parts, task.options)
         for part in parts:
             found.dt_s = max(found.dt_s, part.batch.dt_s)
             ranges = zip(part.batch.run_ids, pressure_range(part.batch).tolist(), strict=True)

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -18,7 +19,7 @@ from airtruth.errors import ConfigurationError
 from airtruth.identification.batch import identify_batch, identify_joint
 from airtruth.identification.condition import AircraftConstants, takes_constant
 from airtruth.identification.declared_sensors import declared_words, taken_out
-from airtruth.identification.doubts import changing_pressure, doubts, smoothed_airspeed
+from airtruth.identification.doubts import changing_pressure, curvature, doubts, smoothed_airspeed
 from airtruth.identification.estimates import Estimates, concatenated
 from airtruth.identification.from_log import FromLog, LogTask, results_of
 from airtruth.identification.loading import at_one_cg, mean_cg
@@ -244,6 +245,7 @@ class _Work:
     sources: list[Source] = field(default_factory=list)
     noisy: list[str] = field(default_factory=list)
     changes: list[tuple[str, float]] = field(default_factory=list)
+    curved: Counter[tuple[str, str]] = field(default_factory=Counter)
     runs: int = 0
     failed: int = 0
     dt_s: float = 0.0
@@ -272,6 +274,7 @@ class _Work:
         self.dt_s = max(self.dt_s, found.dt_s)
         self.noisy += found.noisy
         self.changes += found.changes
+        self.curved += found.curved
         self.runs += len(found.run_ids)
         if found.origin is not None:
             self.sources.append(found.origin)
@@ -285,6 +288,7 @@ class _Work:
             *_stated(self.stated),
             *smoothed_airspeed(self.noisy, self.runs),
             *changing_pressure(constant, self.changes, self.runs),
+            *curvature(self.curved, self.runs),
         )
 
     def joint(self) -> Iterator[Estimates]:

@@ -51,8 +51,8 @@ _COUNT: Final = len(LATERAL.parameters)
 """Number of derivatives."""
 
 
-def spectra(o: Observation) -> tuple[Complex, Complex, Array]:
-    """Transforms of regressors (runs, signals, frequencies) and left sides (runs, coefficients, ...), and w [rad/s]."""
+def spectra(o: Observation) -> tuple[Complex, Complex, Complex, Array]:
+    """Transforms (runs, ..., frequencies) of regressors, left sides and nonlinear terms; and w [rad/s]."""
     samples = o.regressors.shape[2]
 
     def centred(x: Array) -> Array:
@@ -65,7 +65,7 @@ def spectra(o: Observation) -> tuple[Complex, Complex, Array]:
     x[:, -len(CONTROLS) :] += transform(bend, o.dt_s) * np.exp(0.5j * omega * o.dt_s)
     ends = o.slopes[..., -1:] - o.slopes[..., :1]
     y = 1j * omega * transform(o.slopes, o.dt_s) + ends + transform(centred(o.added), o.dt_s)
-    return x, y, omega
+    return x, y, transform(centred(o.terms), o.dt_s), omega
 
 
 def band_of(wn_rad_s: Array, omega: Array, options: Options) -> Bools:
@@ -91,15 +91,20 @@ def band_of(wn_rad_s: Array, omega: Array, options: Options) -> Bools:
     return np.asarray(band)
 
 
-def _products(x: Complex, y: Complex, omega: Array, band: Bools) -> tuple[Array, Array, Array]:
+def _products(
+    x: Complex, y: Complex, terms: Complex, omega: Array, band: Bools
+) -> tuple[Array, Array, Array]:
     """X'X (runs, 5, 5), X'Y (runs, 5, 3) and Y'Y (runs, 3, 3) without the free columns, real parts over the band."""
     runs, width, count = x.shape
     w = np.where(omega > 0.0, omega, 1.0)
-    free = np.stack([np.ones(count), 1j * np.ones(count), 1j / w * w[min(1, count - 1)]])
-    both = np.concatenate([x, y, np.broadcast_to(free, (runs, _FREE, count))], axis=1) * band[:, None, :]
+    ends = np.stack([np.ones(count), 1j * np.ones(count), 1j / w * w[min(1, count - 1)]])
+    both = (
+        np.concatenate([x, y, terms, np.broadcast_to(ends, (runs, _FREE, count))], axis=1) * band[:, None, :]
+    )
     rows = np.concatenate([both.real, both.imag], axis=2)
-    basis = np.linalg.qr(np.swapaxes(rows[:, -_FREE:], 1, 2))[0]
-    rows = rows[:, :-_FREE]
+    left_sides = width + y.shape[1]
+    basis = np.linalg.qr(np.swapaxes(rows[:, left_sides:], 1, 2))[0]
+    rows = rows[:, :left_sides]
     rows = rows - np.matmul(np.matmul(rows, basis), np.swapaxes(basis, 1, 2))
     own, left = rows[:, :width], rows[:, width:]
     right = np.swapaxes(left, 1, 2)
@@ -121,8 +126,8 @@ def _solved(parts: Sequence[tuple[Array, Array, Array]], degrees: Array) -> tupl
     return theta, covariance
 
 
-def _degrees(band: Bools, omega: Array) -> Array:
-    return np.asarray(2.0 * band.sum(axis=1) - _FREE)
+def _degrees(band: Bools, terms: Complex) -> Array:
+    return np.asarray(2.0 * band.sum(axis=1) - _FREE - terms.shape[1])
 
 
 def estimate(batch: Batch, constants: LateralValues, options: Options) -> Estimates:
@@ -137,10 +142,10 @@ def estimate(batch: Batch, constants: LateralValues, options: Options) -> Estima
     for part in chunks(batch):
         o = observe(part, constants, options)
         start = regress_batch(part, constants, "ls", None, _quick(options))
-        x, y, omega = spectra(o)
+        x, y, terms, omega = spectra(o)
         band = band_of(lateral_modal(start.theta, o.scale)[:, 0], omega, options)
-        degrees = _degrees(band, omega) - len(LATERAL.signals)
-        theta, covariance = _solved([_products(x, y, omega, band)], degrees)
+        degrees = _degrees(band, terms) - len(LATERAL.signals)
+        theta, covariance = _solved([_products(x, y, terms, omega, band)], degrees)
         thetas.append(theta)
         covariances.append(covariance)
         scales.append(o.scale)
@@ -164,10 +169,10 @@ def estimate_joint(parts: Sequence[Batch], constants: Sequence[LateralValues], o
     for batch, own in zip(parts, constants, strict=True):
         for part in chunks(batch):
             o = observe(part, own, options)
-            x, y, omega = spectra(o)
+            x, y, terms, omega = spectra(o)
             band = band_of(np.repeat(wn, len(x)), omega, options)
-            degrees += float(_degrees(band, omega).sum())
-            sums.append([p.sum(axis=0) for p in _products(x, y, omega, band)])
+            degrees += float(_degrees(band, terms).sum())
+            sums.append([p.sum(axis=0) for p in _products(x, y, terms, omega, band)])
             scales.append(o.scale)
     matrix, right, square = (np.sum([s[k] for s in sums], axis=0)[None] for k in range(3))
     theta, covariance = _solved([(matrix, right, square)], np.array([degrees]))

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Final
 
 from airtruth.identification.condition import AircraftConstants, OneOrEach, each_batch
 from airtruth.identification.estimates import Estimates
 from airtruth.identification.lateral import frequency, likelihood
+from airtruth.identification.lateral.curvature import SIGNIFICANT, p_values
 from airtruth.identification.lateral.solve import POSES, regress_batch, regress_joint
-from airtruth.identification.options import Options
-from airtruth.identification.record_constants import LateralValues, values_of
+from airtruth.identification.options import TERMS, Options
+from airtruth.identification.record_constants import LateralValues, Part, values_of
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.motion import LATERAL
 
@@ -37,6 +40,17 @@ def lateral_values(constants: AircraftConstants) -> LateralValues:
     values = values_of(constants, LATERAL)
     assert isinstance(values, LateralValues)
     return values
+
+
+def curvature_of(parts: Sequence[Part], options: Options) -> Counter[tuple[str, str]]:
+    """Number of runs that show a nonlinear term that is not free: (term, coefficient) -> runs (`lateral.curvature`)."""
+    found: Counter[tuple[str, str]] = Counter()
+    for part in parts:
+        shown = p_values(part.batch, lateral_values(part.constants), options) < SIGNIFICANT
+        for (i, term), (j, coefficient) in product(enumerate(TERMS), enumerate(LATERAL.coefficients)):
+            if term not in options.terms:
+                found[term, coefficient.name] += int(shown[:, i, j].sum())
+    return found
 
 
 def _all_values(parts: Sequence[Batch], constants: OneOrEach) -> list[LateralValues]:
@@ -84,4 +98,4 @@ ESTIMATORS: Final[Mapping[str, Estimator]] = {
 }
 """Estimators by name, in the order of tables."""
 
-__all__ = ["ESTIMATORS", "Estimator", "lateral_values"]
+__all__ = ["ESTIMATORS", "Estimator", "curvature_of", "lateral_values"]

@@ -72,6 +72,7 @@ class Observation:
     bend : (runs, controls, samples) mean of the controls over the cell that ends at each sample, less that of the smooth
         interpolation [rad].
     trend : order of the polynomial in time that is free in each equation.
+    terms : (runs, terms, samples) nonlinear terms that are free in each equation, by ``options.terms``.
     scale : factors (runs,) of the flight condition.
     """
 
@@ -81,6 +82,7 @@ class Observation:
     added: Array
     bend: Array
     trend: int
+    terms: Array
     scale: LateralScale
 
     @property
@@ -89,9 +91,31 @@ class Observation:
         return self.regressors[:, -len(CONTROLS) :]
 
     def nuisance(self) -> Array:
-        """(columns, samples) 1 and, beside a reconstructed sideslip, the powers of time up to ``trend`` [-]."""
-        t = np.linspace(-1.0, 1.0, self.regressors.shape[2])
-        return np.stack([t**k for k in range(self.trend + 1)])
+        """(runs, columns, samples) 1, powers of time beside a reconstructed sideslip, and nonlinear terms [-]."""
+        runs, _, samples = self.regressors.shape
+        t = np.linspace(-1.0, 1.0, samples)
+        powers = np.stack([t**k for k in range(self.trend + 1)])
+        return np.concatenate([np.broadcast_to(powers, (runs, *powers.shape)), self.terms], axis=1)
+
+
+def nonlinear(regressors: Array, alpha: Array, names: Collection[str]) -> Array:
+    """Terms (runs, terms, samples) that a linear model lacks.
+
+    Parameters
+    ----------
+    regressors : (runs, signals, samples), about the trim.
+    alpha : (runs, samples) angle of attack [rad].
+    names : "alpha": the product of each signal with alpha about its mean, so that the derivatives are those at the mean;
+        "beta": beta |beta|.
+    """
+    runs, _, samples = regressors.shape
+    made = [np.empty((runs, 0, samples))]
+    if "alpha" in names:
+        made.append(regressors * (alpha - alpha.mean(axis=1, keepdims=True))[:, None])
+    if "beta" in names:
+        beta = regressors[:, [REGRESSORS.index("beta_rad")]]
+        made.append(beta * np.abs(beta))
+    return np.concatenate(made, axis=1)
 
 
 def known_inputs(batch: Batch) -> Known:
@@ -208,13 +232,15 @@ def observe(batch: Batch, constants: LateralConstants, options: Options) -> Obse
     regressors = np.stack([columns[name] for name in REGRESSORS], axis=1)
     window = window_samples(options, dt_s) if options.trim == "mean" else 1
     origin = regressors[..., :window].mean(axis=-1, keepdims=True)
+    regressors = regressors - origin
     return Observation(
         dt_s=dt_s,
-        regressors=regressors - origin,
+        regressors=regressors,
         slopes=slopes - slopes[..., :1],
         added=np.stack(added, axis=1),
         bend=np.stack([servo_bend(c[name]) for name in CONTROLS], axis=1),
         trend=known.trend,
+        terms=nonlinear(regressors, known.alpha, options.terms),
         scale=scale,
     )
 
@@ -228,5 +254,6 @@ __all__ = [
     "condition_of",
     "integrated",
     "known_inputs",
+    "nonlinear",
     "observe",
 ]

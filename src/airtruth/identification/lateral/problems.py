@@ -108,8 +108,9 @@ def smoothed(o: Observation, options: Options) -> Rows:
     inside = slice(2, -2)
     x = zero_phase(with_corners(o), sos)[..., inside]
     y = rate_of(zero_phase(o.slopes, sos), o.dt_s) + zero_phase(o.added, sos)[..., inside]
-    columns = np.broadcast_to(o.nuisance()[:, inside], (x.shape[0], o.trend + 1, x.shape[2]))
-    return free_of(x, x, y, columns)
+    columns = o.nuisance()
+    columns[:, o.trend + 1 :] = zero_phase(columns[:, o.trend + 1 :], sos)
+    return free_of(x, x, y, columns[..., inside])
 
 
 def _all(theta: Array, active: Ints) -> Bools:
@@ -154,11 +155,9 @@ def f1_problem(o: Observation, options: Options) -> Problem:
     Filters start from rest, and left sides count from the first sample, so that F p x = F x' holds exactly. Signals are
     linear between samples plus the area of the cubic through the four nearest; surfaces have the corners of their servo.
     """
-    count, columns = len(LATERAL.signals), o.trend + 1
+    count = len(LATERAL.signals)
     coefficients = len(LATERAL.coefficients)
-    runs, _, samples = o.regressors.shape
-    free = np.broadcast_to(o.nuisance(), (runs, columns, samples))
-    u = np.concatenate([o.regressors, o.slopes, o.added, free], axis=1)
+    u = np.concatenate([o.regressors, o.slopes, o.added, o.nuisance()], axis=1)
     more = smooth_bend(u)
     more[:, count - o.bend.shape[1] : count] += o.bend
     controls, control_bend = o.controls, more[:, count - o.bend.shape[1] : count]
@@ -178,7 +177,7 @@ def f1_problem(o: Observation, options: Options) -> Problem:
         added = out[:, count + coefficients : count + 2 * coefficients]
         return free_of(out[:, -count:], x, slopes + added, out[:, count + 2 * coefficients : -count])
 
-    return Problem(at, lambda theta, active: bounded(o, theta, active), runs)
+    return Problem(at, lambda theta, active: bounded(o, theta, active), u.shape[0])
 
 
 def smooth_bend(u: Array) -> Array:
