@@ -66,7 +66,11 @@ _ALL: Final = (
         "lateral",
         "ailerons and rudder of the GTM in light turbulence: steps in both signs, and orthogonal multisines",
         ("data/campaigns/lateral.toml", "data/campaigns/lateral_multisine.toml"),
-        ("airtruth fly data/campaigns/lateral.toml --out out/lateral",),
+        (
+            "airtruth plan data/campaigns/lateral.toml",
+            "airtruth fly data/campaigns/lateral.toml --out out/lateral",
+            "airtruth identify out/lateral --aircraft gtm",
+        ),
     ),
     Example(
         "vane",
