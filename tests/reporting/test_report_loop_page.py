@@ -49,7 +49,7 @@ def test_the_page_states_verdict_treatments_and_every_derivative(tmp_path):
     assert "gyro_lag: the lag of q is undone." in text
     for name in PARAMETERS:
         assert f">{name}</th>" in text
-    assert text.count("-0.9000 (0.020)") == len(PARAMETERS) * 2
+    assert text.count("-0.9000 \u00b1 0.020") == len(PARAMETERS) * 2
     assert (
         text.count("-0.0400 [-0.0678, -0.0122]") == len(PARAMETERS) * 2
     )  # t of 4 degrees of freedom is 2.776

@@ -143,16 +143,15 @@ def model_file(folder: Path, root: str, model: str) -> Path:
 
 def constants_of(fdm: Any) -> Constants:
     """Constants of the model that an executive has loaded."""
-    inertia = SLUG * FT**2
     return Constants(
         wing_area_m2=fdm["metrics/Sw-sqft"] * FT**2,
         chord_m=fdm["metrics/cbarw-ft"] * FT,
         span_m=fdm["metrics/bw-ft"] * FT,
         mass_kg=fdm["inertia/mass-slugs"] * SLUG,
-        inertia_yy_kg_m2=fdm["inertia/iyy-slugs_ft2"] * inertia,
-        inertia_xx_kg_m2=fdm["inertia/ixx-slugs_ft2"] * inertia,
-        inertia_zz_kg_m2=fdm["inertia/izz-slugs_ft2"] * inertia,
-        inertia_xz_kg_m2=-fdm["inertia/ixz-slugs_ft2"] * inertia,  # JSBSim's ixz is -Ixz
+        inertia_yy_kg_m2=fdm["inertia/iyy-slugs_ft2"] * SLUG * FT**2,
+        inertia_xx_kg_m2=fdm["inertia/ixx-slugs_ft2"] * SLUG * FT**2,
+        inertia_zz_kg_m2=fdm["inertia/izz-slugs_ft2"] * SLUG * FT**2,
+        inertia_xz_kg_m2=-fdm["inertia/ixz-slugs_ft2"] * SLUG * FT**2,  # JSBSim's ixz is -Ixz
     )
 
 

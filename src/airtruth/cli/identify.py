@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -24,7 +25,7 @@ from airtruth.cli.arguments import (
     Trim,
 )
 from airtruth.cli.compilation import compile_identification
-from airtruth.cli.early import require_names
+from airtruth.cli.early import require_file, require_names
 from airtruth.cli.output import notice, print_result
 from airtruth.cli.progress import announced_compilation, loading, progress_bar, working
 
@@ -199,6 +200,10 @@ def tables(
     quiet: Quiet = False,
 ) -> None:
     """Write the paper's tables from identified campaigns, beside the published figures."""
+    for folder in folders:
+        require_file(
+            folder, "campaign folder", f"`airtruth fly CAMPAIGN.toml --out {quote(str(folder))}` creates it"
+        )
     from airtruth.logs.outputs import writing
     from airtruth.logs.remote import location
     from airtruth.reporting import write_tables

@@ -29,7 +29,14 @@ from airtruth.cli.compilation import compile_filter
 from airtruth.cli.early import require_names
 from airtruth.cli.journal import is_verbose
 from airtruth.cli.output import notice, print_result
-from airtruth.cli.progress import TRACE_STEPS, announced_compilation, loading, progress_bar, status
+from airtruth.cli.progress import (
+    LOOP_STEPS,
+    TRACE_STEPS,
+    announced_compilation,
+    loading,
+    progress_bar,
+    status,
+)
 from airtruth.errors import FAILED_RUNS
 
 if TYPE_CHECKING:
@@ -118,7 +125,7 @@ def _perform(task: TraceTask, cluster: str | None, *, as_json: bool, quiet: bool
     with (
         workers(cluster) as on,
         announced_compilation(task.command, quiet),
-        status(task.command, quiet, TRACE_STEPS) as advance,
+        status(task.command, quiet, TRACE_STEPS if task.methods is None else LOOP_STEPS) as advance,
     ):
         if on is None:
             summary = perform(task, advance)

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from airtruth.identification.covariance_columns import correlation_columns
+from airtruth.identification.record_constants import Constants
 from airtruth.physics.lateral import LateralScale, lateral_modal, lateral_modes
 from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.short_period import Scale, modal, system
@@ -275,8 +277,16 @@ def half_width(confidence: float) -> float:
     return float(ndtri(0.5 + 0.5 * confidence))
 
 
-def estimates_table(estimates: Estimates) -> pd.DataFrame:
-    """One row per run: run_id, method, converged, iterations, then NAME, NAME_std, ..._upper, then status."""
+def estimates_table(estimates: Estimates, constants: Constants | None = None) -> pd.DataFrame:
+    """One row per run: run_id, method, converged, iterations, then NAME, NAME_std, ..._upper, then status.
+
+    Behind them, correlations of the derivatives (`correlation_columns`) and, with the constants, the flight condition:
+    airspeed_m_s, density_kg_m3 (for the mass of the constants, also of a run that states another mass).
+
+    Parameters
+    ----------
+    constants : of the aircraft; None leaves the flight condition out.
+    """
     import pandas as pd
 
     q = quantities(estimates)
@@ -292,4 +302,12 @@ def estimates_table(estimates: Estimates) -> pd.DataFrame:
         columns[f"{name}_lower"] = q.lower[:, i]
         columns[f"{name}_upper"] = q.upper[:, i]
     columns["status"] = np.array(list(SENTENCES.values()), dtype=object)[estimates.status].tolist()
+    columns |= correlation_columns(estimates.covariance, estimates.motion.parameters)
+    if constants is not None:
+        scale = estimates.scale
+        airspeed = np.broadcast_to(scale.airspeed_m_s, len(estimates.run_ids))
+        per_mass = scale.force if isinstance(scale, LateralScale) else scale.normal
+        pressure = per_mass * constants.mass_kg / constants.wing_area_m2
+        columns["airspeed_m_s"] = airspeed
+        columns["density_kg_m3"] = 2.0 * pressure / airspeed**2
     return pd.DataFrame(columns)

@@ -162,10 +162,11 @@ class IdentificationResult:
         """One row per run and method, the columns of estimates.parquet (docs/methods.md).
 
         run_id, method, converged, iterations; NAME, NAME_std, NAME_lower, NAME_upper of each derivative [-] and modal
-        parameter; status. Runs keep their order, and each run the order of
+        parameter; status; NAME_OTHER_corr, the correlations of the derivatives [-]; airspeed_m_s and density_kg_m3, the
+        flight condition of the estimate. Runs keep their order, and each run the order of
         the methods.
         """
-        return _frame(self.estimates)
+        return _frame(self.estimates, self.settings.constants)
 
     def tidy(self) -> pd.DataFrame:
         """One row for each method, run and quantity, see `airtruth.identification.frames.tidy`."""
@@ -175,7 +176,7 @@ class IdentificationResult:
 
     def frames(self) -> Iterator[pd.DataFrame]:
         """The rows of `to_frame` in parts of up to `RUNS_PER_FRAME` runs, so that the memory need not hold them all."""
-        return frames_of(self._parts)
+        return frames_of(self._parts, self.settings.constants)
 
     def summary(self) -> str:
         """Estimates of each method with their intervals, or mean and spread over runs; then the notes."""
@@ -289,18 +290,18 @@ class SpooledResult:
 
     def frames(self) -> Iterator[pd.DataFrame]:
         """The rows of `to_frame` in parts."""
-        return frames_of(self.parts)
+        return frames_of(self.parts, self.settings.constants)
 
     def summary(self) -> str:
         """`IdentificationResult.summary`."""
         return as_text(table_of(self.parts, self.forced, self.notes))
 
 
-def frames_of(parts: Parts) -> Iterator[pd.DataFrame]:
+def frames_of(parts: Parts, constants: Constants) -> Iterator[pd.DataFrame]:
     """Rows of contract 2 in frames of up to `RUNS_PER_FRAME` runs."""
     for estimates in parts():
         for first in range(0, len(estimates[0].run_ids), RUNS_PER_FRAME):
-            yield _frame([e.rows(first, first + RUNS_PER_FRAME) for e in estimates])
+            yield _frame([e.rows(first, first + RUNS_PER_FRAME) for e in estimates], constants)
 
 
 def json_of(frames: Iterable[pd.DataFrame]) -> Iterator[str]:
@@ -318,10 +319,10 @@ def table_of(parts: Parts, forced: Iterable[str], notes: Iterable[str]) -> Table
     return dataclasses.replace(tables.overview_of(parts), notes=(*overridden, *notes))
 
 
-def _frame(estimates: Sequence[Estimates]) -> pd.DataFrame:
+def _frame(estimates: Sequence[Estimates], constants: Constants) -> pd.DataFrame:
     """Rows of several methods for the same runs: run by run, and of each run the methods in their order."""
     import pandas as pd
 
-    table = pd.concat([estimates_table(e) for e in estimates], ignore_index=True)
+    table = pd.concat([estimates_table(e, constants) for e in estimates], ignore_index=True)
     order = np.arange(len(table)).reshape(len(estimates), -1).T.ravel()
     return table.iloc[order].reset_index(drop=True)

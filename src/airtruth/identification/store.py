@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 
 from airtruth.errors import LogError, StoreError
@@ -22,6 +21,9 @@ from airtruth.logs import ledger
 from airtruth.logs.remote import location
 from airtruth.logs.tables import write_parts
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FILE: Final = "estimates.parquet"
 """Name of the file of estimates in a campaign folder."""
@@ -110,6 +112,8 @@ def _write(
             path, map(_table, _merged(old, result, methods) if old.methods else result.frames()), metadata
         )
     except _OtherRunsError:
+        import pandas as pd
+
         kept = pd.concat(list(old.frames()), ignore_index=True)
         write_parts(
             path,
@@ -130,6 +134,8 @@ def _merged(
     old: Stored, result: IdentificationResult | SpooledResult, methods: Sequence[str]
 ) -> Iterator[pd.DataFrame]:
     """Rows of a file and of a result that have the same runs, in parts."""
+    import pandas as pd
+
     parts = iter(old.frames())
     waiting = next(parts)
     for rows in result.frames():
@@ -152,6 +158,8 @@ def _merged(
 
 def _together(old: pd.DataFrame, rows: pd.DataFrame, methods: Sequence[str]) -> pd.DataFrame:
     """Rows of a file, those that others replace left out, with the others: runs in the order of their first appearance."""
+    import pandas as pd
+
     keys = list(KEYS)
     kept = old[~old.set_index(keys).index.isin(rows.set_index(keys).index)]
     whole = pd.concat([part for part in (kept, rows) if len(part)], ignore_index=True)

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, NotRequired
+from typing import TYPE_CHECKING, Any, Final, NotRequired
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 from typing_extensions import TypedDict
@@ -17,6 +16,9 @@ from airtruth.errors import StoreError
 from airtruth.logs.store import read_metadata, read_table
 from airtruth.logs.tables import Kind, group_ends, read_group, read_rows, require_kinds
 from airtruth.physics.motion import motion_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 KEY: Final = "estimates"
 """Key of the file-level JSON that holds a record for each method."""
@@ -107,6 +109,8 @@ def open_stored(path: Path) -> Stored:
 
 def _methods_in_order(path: Path) -> tuple[str, ...]:
     """Methods of a file whose rows ascend by run; none where they do not, or where anything is wrong with it."""
+    import pandas as pd
+
     methods: dict[str, None] = {}
     last = pd.DataFrame()
     try:

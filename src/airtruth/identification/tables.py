@@ -22,7 +22,7 @@ from airtruth.identification.estimates import (
 )
 from airtruth.identification.methods import title
 from airtruth.physics.motion import LONGITUDINAL, Motion, motion_of
-from airtruth.table import Cell, Group, Interval, Number, Pair, Table, flat
+from airtruth.table import Cell, Group, Interval, Number, Table, Uncertain, flat
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -113,7 +113,7 @@ def _outcomes(estimates: Estimates) -> tuple[str, ...]:
 
 
 def comparison(estimates: Sequence[Estimates], run_id: str | None = None) -> Table:
-    """Methods side by side: estimate and deviation of one run, or mean and spread over converged runs.
+    """Methods side by side: estimate of one run or mean over the converged runs, with its standard error.
 
     Parameters
     ----------
@@ -127,7 +127,6 @@ def comparison(estimates: Sequence[Estimates], run_id: str | None = None) -> Tab
     """
     tables = [details(e, run_id) for e in estimates]
     single = run_id is not None or len(estimates[0].run_ids) == 1
-    value, deviation = (2, 3) if single else (2, 4)
     columns: list[str] = ["parameter", "unit"]
     for e in estimates:
         columns += [e.method, f"{e.method} +-"]
@@ -135,9 +134,9 @@ def comparison(estimates: Sequence[Estimates], run_id: str | None = None) -> Tab
     for i, first in enumerate(tables[0].rows):
         cells: list[Cell] = [first[0], first[1]]
         for table in tables:
-            cells += [table.rows[i][value], table.rows[i][deviation]]
+            cells += [table.rows[i][2], table.rows[i][3]]  # the estimate or the mean, and its standard error
         rows.append(tuple(cells))
-    shown = "estimate and its standard deviation" if single else "mean and spread over runs"
+    shown = "estimate and its standard error" if single else "mean over the runs and its standard error"
     return flat(
         title=f"{len(estimates)} methods: {shown}",
         columns=tuple(columns),
@@ -147,7 +146,7 @@ def comparison(estimates: Sequence[Estimates], run_id: str | None = None) -> Tab
 
 
 def overview(estimates: pd.DataFrame, confidence: float = 0.95) -> Table:
-    """Estimates of contract 2, a column per method: one run with its intervals, or mean and standard deviation.
+    """Estimates of contract 2, a column per method: one run with its intervals, or mean and standard error over the runs.
 
     Parameters
     ----------
@@ -203,7 +202,7 @@ def _single(by_method: Mapping[str, pd.Series], confidence: float, motion: Motio
 def _spread(
     parts: Callable[[], Iterable[Mapping[str, tuple[Array, NDArray[np.bool_]]]]], motion: Motion
 ) -> Table:
-    """Mean and standard deviation over the converged runs, from two passes over values (runs, quantities) and convergence."""
+    """Mean and its standard error over the converged runs, from two passes over values (runs, quantities) and convergence."""
     runs: Counter[str] = Counter()
     converged: Counter[str] = Counter()
     size = len(_names(motion))
@@ -222,12 +221,14 @@ def _spread(
         std = {m: np.sqrt(np.where(count[m] > 1, squares[m] / (count[m] - 1), np.nan)) for m in runs}
     cells: dict[str, dict[str, Cell]] = {
         method: {
-            name: Pair(Number(mean[method][i]), Number(std[method][i], digits=2))
+            name: Uncertain(
+                Number(mean[method][i]), Number(std[method][i] / np.sqrt(count[method][i]), digits=2)
+            )
             for i, name in enumerate(_names(motion))
         }
         for method in runs
     }
-    return _overview("Mean (standard deviation) over the converged runs", cells, converged, runs, motion)
+    return _overview("Mean +- standard error over the converged runs", cells, converged, runs, motion)
 
 
 class _Sums(dict[str, Array]):

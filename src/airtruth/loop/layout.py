@@ -9,7 +9,7 @@ from typing import Final
 from airtruth.charts import Chart, Mark, Panel, Rule
 from airtruth.loop.changes import DerivativeChange
 from airtruth.physics.short_period import PARAMETERS, UNITS
-from airtruth.table import MISSING, Cell, Group, Interval, Number, Pair, Row, Table
+from airtruth.table import MISSING, Cell, Group, Interval, Number, Row, Table, Uncertain
 from airtruth.tracing.answer import Derivatives
 from airtruth.tracing.compensate import Treatment
 
@@ -65,15 +65,15 @@ def _row(c: DerivativeChange) -> Row:
         c.method,
         Number(c.declared),
         Number(c.declared_same_inputs),
-        _pair(c.before, c.before_error),
-        _pair(c.after, c.after_error),
+        _estimate(c.before, c.before_error),
+        _estimate(c.after, c.after_error),
         Number(c.corrected_same_inputs),
         difference,
     )
 
 
 def _refit_row(name: str, refit: Derivatives) -> Row:
-    after = _pair(refit.after.get(name, math.nan), refit.after_std.get(name, math.nan))
+    after = _estimate(refit.after.get(name, math.nan), refit.after_std.get(name, math.nan))
     return (
         REFIT,
         Number(refit.declared.get(name, math.nan)),
@@ -130,7 +130,7 @@ def _explained(changes: Sequence[DerivativeChange], refit: Derivatives) -> Itera
 
 
 def _moved(name: str, refit: Derivatives) -> str:
-    value = _pair(refit.after.get(name, math.nan), refit.after_std.get(name, math.nan))
+    value = _estimate(refit.after.get(name, math.nan), refit.after_std.get(name, math.nan))
     return f"{name} from {Number(refit.declared.get(name, math.nan))} to {value}"
 
 
@@ -177,8 +177,8 @@ def loop_chart(changes: Sequence[DerivativeChange]) -> Chart:
     return Chart(NAME, title, tuple(panels), columns=3)
 
 
-def _pair(value: float, error: float) -> Pair:
-    return Pair(Number(value), Number(error, digits=2))
+def _estimate(value: float, error: float) -> Uncertain:
+    return Uncertain(Number(value), Number(error, digits=2))
 
 
 __all__ = ["NAME", "REFIT", "loop_chart", "loop_table"]

@@ -10,7 +10,7 @@ v is positive to the right. p and r are rotations of the air, right wing down an
 over the span, and p has no correlation with the other gusts. Aircraft relative to the air: v - v_gust, p - p_gust,
 r - r_gust.
 
-v and r are the vertical gust and its rotary part with 3 b in the place of 4 b, and p is a first-order lag as the longitudinal
+v and r are the vertical gust and its rotary part with 3 b instead of 4 b, and p is a first-order lag as the longitudinal
 gust is: its scale length is 4 b/pi and its variance sigma_w^2/(b Lw) (pi^2/10) (pi Lw/(4 b))^(1/3).
 """
 

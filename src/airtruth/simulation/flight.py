@@ -282,6 +282,8 @@ def _writer(setters: Sequence[Callable[[float], object]]) -> Callable[..., objec
             return lambda x, y: (a(x), b(y))
         case [a, b, c]:
             return lambda x, y, z: (a(x), b(y), c(z))
+        case [a, b, c, d, e]:  # aileron, rudder and three gusts
+            return lambda v, w, x, y, z: (a(v), b(w), c(x), d(y), e(z))
         case [a, b, c, *rest]:
             others = _writer(rest)
             return lambda x, y, z, *more: (a(x), b(y), c(z), others(*more))

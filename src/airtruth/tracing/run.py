@@ -27,6 +27,7 @@ from airtruth.tracing.conclude import conclude
 from airtruth.tracing.declared_model import declared_p_value
 from airtruth.tracing.kinematic_start import (
     kinematic_check,
+    names_a_sensor,
     sets_of,
     starts_of,
     with_contradictions,
@@ -115,7 +116,6 @@ def _traced(
     advance("compare ax with the declared axial force")
     axial = axial_force(stages, checked, declared, rounds[-1].gls) if options.learns else None
     origin = provenance_of(logs, declared, options)
-    dt_s = _longest_period_s(case)
 
     def publish(refined: bool) -> tuple[str | None, Replay | None]:
         if out is None:
@@ -126,7 +126,11 @@ def _traced(
         updated = write_update(case, rounds, declared, out, refit, axial)
         return updated, flown_again(stages, declared, updated)
 
-    answer = with_contradictions(conclude(stages, rounds, publish, forced, axial), kinematics, dt_s)
+    answer = conclude(stages, rounds, publish, forced, axial)
+    whole = kinematics
+    if held and kinematics is not None and names_a_sensor(answer):
+        whole = kinematic_check(checked, declared, ())
+    answer = with_contradictions(answer, kinematics, _longest_period_s(case), whole)
     answer = replace(answer, notes=(*remarks, *answer.notes))
     result = TraceResult(answer, rounds, stages, origin)
     if out is not None:

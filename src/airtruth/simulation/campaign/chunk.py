@@ -282,8 +282,18 @@ class Pilot:
         )
 
 
-def flown_runs(plan: Plan, runs: Sequence[PlannedRun]) -> list[tuple[Trim, Linearisation, dict[str, Array]]]:
-    """Fly single runs of a plan; trim, derivatives and noise-free channels of each.
+@dataclass(frozen=True)
+class FlownRun:
+    """A single run that was flown: trim, derivatives, those of the lateral motion in six axes, and noise-free channels."""
+
+    trim: Trim
+    linear: Linearisation
+    lateral: LateralLinearisation | None
+    channels: dict[str, Array]
+
+
+def flown_runs(plan: Plan, runs: Sequence[PlannedRun]) -> list[FlownRun]:
+    """Fly single runs of a plan.
 
     Raises
     ------
@@ -292,7 +302,7 @@ def flown_runs(plan: Plan, runs: Sequence[PlannedRun]) -> list[tuple[Trim, Linea
     """
     pilot = Pilot(plan)
     prepared = ((run, pilot.prepared(run.condition)) for run in runs)
-    return [(at.trim, at.linear, pilot.channels(run)) for run, at in prepared]
+    return [FlownRun(at.trim, at.linear, at.lateral, pilot.channels(run)) for run, at in prepared]
 
 
 def _log_metadata(plan: Plan) -> Mapping[str, object]:

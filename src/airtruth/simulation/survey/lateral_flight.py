@@ -26,8 +26,10 @@ _STICK: Final = 0.5
 """Largest doublet over the travel of the stick, from -1 to 1 [-] (judgement: the trim needs a part of it)."""
 _TURN: Final = (1.6, 0.3, 1.2)
 """Step of a doublet: turn of the Dutch roll in it [rad], shortest and longest step [s] (judgement)."""
-_SECONDS: Final = 12.0
-"""Length of the record with both doublets [s]: a second of rest, and half of the record for each."""
+_START_S: Final = 1.0
+"""Start of the doublet of the aileron [s]; that of the rudder starts in the middle of the record."""
+_SECONDS: Final = (12.0, 6.0, 4.0)
+"""Lengths of the record with both doublets that are tried [s] (judgement: shorter for an aircraft that is unstable in pitch)."""
 _MOST: Final = {"phi_rad": 45.0 * DEG, "beta_rad": 12.0 * DEG, "alpha_rad": 10.0 * DEG}
 """Largest departures from the trim in a sound record [rad] (judgement: inside the range of most tables)."""
 
@@ -41,9 +43,9 @@ class LateralTest:
     straight : how it is trimmed; "" without a trim.
     beta_deg, phi_deg, aileron_deg, rudder_deg : of the trim [deg].
     derivatives, modes : by the names of ``LATERAL``.
-    amplitude_deg : of the doublets of aileron and rudder in which it keeps to its range [deg]; empty for none.
+    amplitude_deg : of the doublets of aileron and rudder [deg].
     step_s, duration_s : of the doublets and of the record [s].
-    range_deg : range of sideslip and bank in it [deg].
+    range_deg : range of sideslip and bank in the record [deg]; empty if it does not keep to its range.
     fault : why it cannot fly; "" if it can.
     """
 
@@ -56,7 +58,7 @@ class LateralTest:
     modes: dict[str, float] | None = None
     amplitude_deg: tuple[float, ...] = ()
     step_s: float = 0.0
-    duration_s: float = _SECONDS
+    duration_s: float = 0.0
     range_deg: tuple[float, ...] = ()
     fault: str = ""
 
@@ -88,17 +90,18 @@ def flown_laterally(aircraft: Aircraft, at: Trim) -> LateralTest:
         rudder_deg=found.rudder_rad / DEG,
         derivatives=dict(zip(LATERAL.parameters, linear.central.tolist(), strict=True)),
         modes=modes,
-        step_s=step_s,
     )
-    for amplitude_deg in _AMPLITUDES_DEG:
-        both = _bounded(aircraft, amplitude_deg)
-        try:
-            ranges, fault = _ranges(aircraft, found, both, step_s)
-        except FlightError as error:
-            fault = str(error)
-            continue
-        if not fault:
-            return replace(known, amplitude_deg=both, range_deg=ranges)
+    for seconds in _SECONDS:
+        test = replace(known, duration_s=seconds, step_s=min(step_s, 0.5 * (0.5 * seconds - _START_S)))
+        for amplitude_deg in _AMPLITUDES_DEG:
+            test = replace(test, amplitude_deg=_bounded(aircraft, amplitude_deg))
+            try:
+                ranges, fault = _ranges(aircraft, found, test)
+            except FlightError as error:
+                fault = str(error)
+                continue
+            if not fault:
+                return replace(test, range_deg=ranges)
     return replace(known, fault=fault)
 
 
@@ -122,22 +125,20 @@ def _bounded(aircraft: Aircraft, amplitude_deg: float) -> tuple[float, float]:
     return aileron, rudder
 
 
-def _ranges(
-    aircraft: Aircraft, at: Trim, amplitude_deg: tuple[float, float], step_s: float
-) -> tuple[tuple[float, ...], str]:
+def _ranges(aircraft: Aircraft, at: Trim, test: LateralTest) -> tuple[tuple[float, ...], str]:
     """Ranges of sideslip and bank in a record with both doublets [deg], and what leaves its range."""
-    t = np.arange(round(_SECONDS / STEP_S) + 1, dtype=np.float64) * STEP_S
+    t = np.arange(round(test.duration_s / STEP_S) + 1, dtype=np.float64) * STEP_S
     still = np.zeros_like(t)
     aileron, rudder = (
-        sample(Manoeuvre("doublet", a * DEG, start_s=start, step_s=step_s), t)
-        for a, start in zip(amplitude_deg, (1.0, 0.5 * _SECONDS), strict=True)
+        sample(Manoeuvre("doublet", a * DEG, start_s=start, step_s=test.step_s), t)
+        for a, start in zip(test.amplitude_deg, (_START_S, 0.5 * test.duration_s), strict=True)
     )
     flight = Flight(aircraft, at, STEP_S, 4)
     flown = flight.fly(Inputs(still, still, still, lateral=LateralInputs(aileron, rudder)))
     for name, most in _MOST.items():
         away = float(np.abs(flown[name] - flown[name][0]).max())
         if away > most:
-            return (), f"{name.removesuffix('_rad')} moves by {away / DEG:.0f} deg in {_SECONDS:g} s"
+            return (), f"{name.removesuffix('_rad')} moves by {away / DEG:.0f} deg in {test.duration_s:g} s"
     return tuple(float(np.ptp(flown[name])) / DEG for name in ("beta_rad", "phi_rad")), ""
 
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from collections.abc import Sequence
 from typing import Final
 
-from airtruth.physics.short_period import PARAMETERS
-from airtruth.table import WIDTH, Group, Number, Pair, Row, Table, as_text, flat
+from airtruth.table import WIDTH, Group, Table, as_text
 from airtruth.tracing.answer import TraceAnswer
 from airtruth.tracing.presentation.candidates import probability
+from airtruth.tracing.presentation.derivative_table import derivative_table
 from airtruth.tracing.presentation.error_table import MEANING, error_table
 from airtruth.tracing.presentation.text import (
     candidate_lines,
@@ -87,26 +86,13 @@ def _errors(answer: TraceAnswer) -> Block:
 
 
 def _derivatives(answer: TraceAnswer) -> Block:
-    """Declared and refitted derivatives with their standard errors."""
-    stated = answer.derivatives
-    if not stated.declared:
+    """Declared and last refitted derivatives with their standard errors."""
+    if not answer.derivatives.declared:
         return ()
-    shifts = {} if answer.declared_model is None else answer.declared_model.shifts
-    uncertain = {name: s.declared_std for name, s in shifts.items()}
-    after = "after" if answer.effects else "before"
-    rows: list[Row] = [
-        (name, *(_pair(values, spread, d) for d in PARAMETERS))
-        for name, values, spread in (
-            ("declared", stated.declared, uncertain),
-            (after, getattr(stated, after), stated.after_std),
-        )
-    ]
-    return _lines(flat("Derivatives at the trim [1/rad, rates as q c/(2V)]", ("", *PARAMETERS), rows))
-
-
-def _pair(values: dict[str, float], errors: dict[str, float], name: str) -> Pair | Number:
-    value = Number(values.get(name, math.nan))
-    return Pair(value, Number(errors[name], digits=2)) if name in errors else value
+    table = derivative_table(answer)
+    last = "after" if answer.effects else "before"
+    rows = tuple(row for row in table.rows if row[0] in ("declared", last))
+    return _lines(Table(table.title, table.columns, (Group("", rows),)))
 
 
 def _lines(table: Table) -> Block:
