@@ -173,9 +173,11 @@ class Dynamics(Strict):
             for s in self.states
         ]
         for t in self.aero:
+            named.append(("aero: coefficient", t.coefficient, terms.COEFFICIENTS))
             named.append((f"aero {t.coefficient}: signal", t.signal, (*terms.SIGNALS, *states)))
             named.append((f"aero {t.coefficient}: factor", t.factor, ("", *terms.FACTORS)))
         for r in self.readings:
+            named.append(("readings: channel", r.channel, terms.READINGS))
             named.append((f"readings {r.channel}: signal", r.signal, (*terms.MEASURED, *measured)))
             named.append((f"readings {r.channel}: behind", r.behind, ("", *measured)))
         for name, value, allowed in named:

@@ -9,8 +9,9 @@ from dataclasses import replace
 from airtruth.aircraft import Sensor
 from airtruth.aircraft.origin import UNKNOWN, Origin
 from airtruth.errors import ConfigurationError
+from airtruth.physics.composition import CAUSES
 from airtruth.physics.sensor_errors import KINDS
-from airtruth.physics.terms import CAUSES, DECLARED, Change, SensorTerm, SurfaceTerm
+from airtruth.physics.terms import DECLARED, Change, SensorTerm, SurfaceTerm
 
 
 def effective(change: Change) -> Change:

@@ -15,6 +15,8 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.physics.motion import MOTIONS
+
 Array = NDArray[np.float64]
 
 Kind = Literal["bias", "scale", "lag", "delay", "arm", "alpha_slope"]
@@ -75,10 +77,8 @@ KINDS: Final[Mapping[str, ErrorKind]] = {
 
 INSTRUMENTS: Final[Mapping[str, str]] = {
     "airspeed_m_s": "airspeed",
-    "alpha_rad": "vane",
     "theta_rad": "attitude",
-    "q_rad_s": "gyro",
-    "az_m_s2": "accelerometer",
+    **{output.channel: output.instrument for motion in MOTIONS.values() for output in motion.outputs},
 }
 """Instrument of a channel, as its errors are named."""
 

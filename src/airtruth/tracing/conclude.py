@@ -42,7 +42,7 @@ from airtruth.tracing.declared_model import (
     remaining_evidence,
     with_axial_force,
 )
-from airtruth.tracing.friction import LATE_VANE, imitated_lag_s
+from airtruth.tracing.friction import imitated_lag_s, is_late_vane
 from airtruth.tracing.increment_table import in_physical_terms, increment_rows, least_certain
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, derivative_likelihood
 from airtruth.tracing.inference.homogeneity import Homogeneity, homogeneity
@@ -50,7 +50,6 @@ from airtruth.tracing.inference.hypothesis import is_curvature
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.inference.robust import robust_covariance
 from airtruth.tracing.intervals import at_measured_alpha, estimates, widened_by_profile, widened_by_rejected
-from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.notes import notes
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.record_differences import CERTAIN, DIFFERENCES, differences
@@ -175,7 +174,7 @@ def _reserved(
     agreement: Homogeneity,
 ) -> tuple[str, ...]:
     """Each reason against relying on the effects, and how the records differ, in words."""
-    late = any(e.key in LATE_VANE for e in effects)
+    late = any(is_late_vane(e.key) for e in effects)
     lag_s = imitated_lag_s(problem, last.reported) if late else 0.0
     differ = differences(agreement, [r.signals.run_id for r in problem.records], bool(effects))
     return (*reservations(effects, sets, declared.p_value, last.p_value_of(FRICTION), lag_s), *differ)
@@ -222,7 +221,7 @@ def _effect(
         for c in own.candidates
         if c is not best and c.score.effect.name != effect.name and c.gain <= best.gain
     ]
-    own_covariance = covariance[Common.size :, Common.size :][span, span]
+    own_covariance = covariance[final.layout.sizes, final.layout.sizes][span, span]
     stated = estimates(effect, final.point.sizes[span], own_covariance)
     if own.profile is not None:
         stated = widened_by_profile(effect, stated, own.profile)
@@ -240,7 +239,7 @@ def _effect(
         other_variants=tuple(
             sorted(c.score.effect.variant for c in others if c.score.effect.name == effect.name)
         ),
-        channel=effect.variant if effect.name == "sensor_delay" else None,
+        channel=effect.variant_channel,
         about_alpha_rad=final.hypothesis.trim_alpha_rad + shift if is_curvature(effect) else None,
     )
     if isinstance(effect, Increment):
@@ -327,11 +326,12 @@ def _derivatives(case: Case, rounds: Sequence[SearchRound], covariance: Array) -
     def named(values: Array) -> dict[str, float]:
         return dict(zip(PARAMETERS, values.tolist(), strict=True))
 
+    rows = rounds[-1].null.layout.of.common.derivatives
     return Derivatives(
         declared=named(declared),
-        before=named(declared + before_fit(rounds).point.common[Common.derivatives]),
-        after=named(declared + rounds[-1].null.point.common[Common.derivatives]),
-        after_std=named(np.sqrt(np.diag(covariance)[Common.derivatives])),
+        before=named(declared + before_fit(rounds).point.common[rows]),
+        after=named(declared + rounds[-1].null.point.common[rows]),
+        after_std=named(np.sqrt(np.diag(covariance)[rows])),
     )
 
 

@@ -27,7 +27,7 @@ from airtruth.tracing.axial_force import AxialForce
 from airtruth.tracing.increment_table import increment_table
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import robust_covariance
-from airtruth.tracing.model.parameters import Common
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.response import moved_past_sensors_m
 from airtruth.tracing.model.settings import VANE
 from airtruth.tracing.prepare import Case
@@ -133,7 +133,7 @@ def write_update(
     def change_at(sizes: Array) -> Change:
         return from_zero_alpha(accepted_change(case, fit, sizes, aircraft.constants.chord_m), shift)
 
-    change, std = with_spread(change_at, fit.point.sizes, covariance[Common.size :, Common.size :])
+    change, std = with_spread(change_at, fit.point.sizes, covariance[fit.layout.sizes, fit.layout.sizes])
     along = () if axial is None else axial.increments
     change += Change() if axial is None else axial.change
     released = rounds[-1].null.hypothesis.spread is not None
@@ -163,8 +163,8 @@ def write_update(
 
 def _corrections(case: Case, fit: PosteriorFit, covariance: Array) -> Corrections:
     """The refitted derivatives, about the mean trim of the fitted records."""
-    values = fit.point.common[Common.derivatives].tolist()
-    deviations = np.sqrt(np.diag(covariance)[Common.derivatives]).tolist()
+    values = fit.point.common[SHORT_PERIOD.common.derivatives].tolist()
+    deviations = np.sqrt(np.diag(covariance)[SHORT_PERIOD.common.derivatives]).tolist()
     std = dict(zip(PARAMETERS, deviations, strict=True))
     plants = [record.plant for record in case.fitted.records]
     alpha = float(np.mean([p.trim_alpha_rad for p in plants])) + case.fitted.alpha_shift_rad

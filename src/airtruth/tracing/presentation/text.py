@@ -16,7 +16,7 @@ from airtruth.tracing.presentation.candidates import probability, ranked
 from airtruth.tracing.presentation.derivative_table import derivative_table
 from airtruth.tracing.presentation.error_table import axial_words, error_table
 from airtruth.tracing.presentation.tolerances import tolerance_table
-from airtruth.tracing.selection.explanation import DERIVATIVES, EXPLAINING
+from airtruth.tracing.selection.explanation import DERIVATIVES
 from airtruth.units import printed
 
 MOST_CANDIDATES: Final = 8
@@ -150,7 +150,7 @@ def sets_line(answer: TraceAnswer) -> str:
 
 
 def _in_derivatives(name: str) -> bool:
-    return name in EXPLAINING or name == DERIVATIVES
+    return name == DERIVATIVES or (name in EFFECTS and EFFECTS[name].prior is not None)
 
 
 def _listed(names: list[str]) -> str:
