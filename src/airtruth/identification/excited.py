@@ -14,7 +14,7 @@ from airtruth.logs.store import read_log
 from airtruth.logs.tables import opened
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, MOTIONS, Motion
 
-SHARE: Final = 0.2
+SHARE: Final = 0.1
 """Motion of a surface over that of the surface that moves most, from which it excites its motion [-] (judgement: a damper or the
 hold of an attitude moves the other surfaces by less)."""
 
