@@ -12,10 +12,11 @@ from scipy.stats import f as fisher
 
 from airtruth.aircraft import Aircraft
 from airtruth.checks.kinematics_bias import rms
+from airtruth.checks.kinematics_energy import by_equation
 from airtruth.checks.kinematics_findings import bias_of, cause_of, drift, errors_of
 from airtruth.checks.kinematics_fit import Problem, limits_of, problem_of
 from airtruth.checks.kinematics_record import thinned
-from airtruth.checks.kinematics_search import DOUBT, Search, by_equation, completed, search
+from airtruth.checks.kinematics_search import DOUBT, Search, completed, search
 from airtruth.checks.kinematics_side import ERRORS, LATERAL, SideRecord
 from airtruth.checks.kinematics_words import NAMED, conclusions, verdict_of
 from airtruth.checks.result import CheckResult, Finding

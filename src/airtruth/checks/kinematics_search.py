@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.stats import f as fisher
 from scipy.stats import t as student
 
+from airtruth.checks.kinematics_energy import absolute
 from airtruth.checks.kinematics_fit import Fit, Problem, fit, problem_of
 
 Array = NDArray[np.float64]
@@ -145,34 +146,6 @@ def search(problem: Problem, usual: Mapping[str, float]) -> Search:
         p_value=float(fisher.sf(statistic / max(degrees, 1), max(degrees, 1), _noise_degrees(problem))),
         stable=stable,
     )
-
-
-def absolute(problem: Problem, one: Fit) -> tuple[float, int]:
-    """Energy of the surfaces' motion that a fit leaves in each record and equation, and its degrees of freedom."""
-    parts = _parts(problem, one)
-    return sum((energy for _, energy, _ in parts), 0.0), sum(n for _, _, n in parts) - len(one.names)
-
-
-def by_equation(problem: Problem, one: Fit) -> dict[str, tuple[float, int]]:
-    """The same energy for each equation, and the number of its components."""
-    parts = _parts(problem, one)
-    return {
-        equation: (sum(e for n, e, _ in parts if n == equation), sum(k for n, _, k in parts if n == equation))
-        for equation in problem.equations
-    }
-
-
-def _parts(problem: Problem, one: Fit) -> list[tuple[str, float, int]]:
-    """Equation, energy and number of components of each record and equation."""
-    white = problem.white(dict(zip(one.names, one.value, strict=True)))
-    start, parts = 0, []
-    for own in problem.weight.own:
-        for equation, columns in zip(problem.equations, own, strict=True):
-            stop = start + columns.shape[0]
-            energy = float(np.sum((columns.T @ white[start:stop]) ** 2))
-            parts.append((equation, energy, columns.shape[1]))
-            start = stop
-    return parts
 
 
 def _noise_degrees(problem: Problem) -> float:
@@ -407,4 +380,4 @@ def completed(found: Search, usual: Mapping[str, float]) -> Search:
     )
 
 
-__all__ = ["Explanation", "Search", "absolute", "by_equation", "completed", "price", "search"]
+__all__ = ["DOUBT", "Explanation", "Search", "absolute", "completed", "price", "search"]
