@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 CAMPAIGN = Path(__file__).resolve().parents[1] / "data" / "campaigns" / "light.toml"
-BARS = {"overhead": 1.5, "speed-up": 1.8, "help": 0.5, "import": 0.1, "memory": 1.1}
+LATERAL = CAMPAIGN.with_name("lateral.toml")
+BARS = {"overhead": 1.5, "six axes": 1.25, "speed-up": 1.8, "help": 0.5, "import": 0.1, "memory": 1.1}
 RUNS_PER_CHUNK = 100
 CHUNKS = 6
 
@@ -72,6 +73,35 @@ def overhead() -> float:
         f"  campaign {medians[0]:.2f} us, bare run() {medians[1]:.2f} us CPU a step; ratio {ratios[0]:.2f} to {ratios[-1]:.2f}"
     )
     return statistics.median(ratios)
+
+
+def six_axes() -> float:
+    """CPU per step of a lateral campaign over that of one in the pitch plane with records of the same length."""
+    from airtruth.simulation.campaign import file as campaign_file
+    from airtruth.simulation.campaign import plan
+    from airtruth.simulation.campaign.chunk import Pilot
+    from airtruth.simulation.campaign.workers import orders_of
+
+    lateral = plan.make(LATERAL, runs=RUNS_PER_CHUNK * 32)
+    same_length = {"duration_s": lateral.campaign.duration}
+    plane = plan.make(campaign_file.read(CAMPAIGN, same_length), runs=RUNS_PER_CHUNK * 32)
+    pilots = [(made, Pilot(made)) for made in (plane, lateral)]
+    numbers = _whole_chunks(plane.table["chunk"].value_counts())[: CHUNKS + 1]
+
+    with tempfile.TemporaryDirectory() as folder:
+        truths = Path(folder) / "truth"
+        truths.mkdir()
+
+        def chunk(number: int, made: plan.Plan, pilot: Pilot) -> float:
+            start = time.process_time()
+            (order,) = orders_of(made, [number])
+            assert not pilot.fly_chunk(order, Path(folder), truths).unflown
+            return 1e6 * (time.process_time() - start) / (RUNS_PER_CHUNK * (made.samples - 1))
+
+        pairs = [[chunk(number, *pilot) for pilot in pilots] for number in numbers][1:]
+    medians = [statistics.median(p) for p in zip(*pairs, strict=True)]
+    print(f"  pitch plane {medians[0]:.2f} us, six axes {medians[1]:.2f} us CPU a step")
+    return statistics.median(b / a for a, b in pairs)
 
 
 def machine() -> float:
@@ -174,6 +204,13 @@ def main(full: bool) -> None:
     ratio = overhead()
     report(
         "CPU a step over a bare run() loop", ratio, ratio <= BARS["overhead"], f"at most {BARS['overhead']}"
+    )
+    ratio = six_axes()
+    report(
+        "CPU a step in six axes over the pitch plane",
+        ratio,
+        ratio <= BARS["six axes"],
+        f"at most {BARS['six axes']}",
     )
     sizes = (100, 1000, 10_000) if full else (100, 1000)
     peaks = [peak_memory(runs) for runs in sizes]

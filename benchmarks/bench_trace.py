@@ -20,7 +20,7 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.logs.store import read_log
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.inference.optimise import fit, initial_parameters
-from airtruth.tracing.model.parameters import CORE, OUTPUTS, Common
+from airtruth.tracing.model.parameters import CORE, OUTPUTS, SHORT_PERIOD
 from airtruth.tracing.model.response import filter_inputs, respond, respond_to
 from airtruth.tracing.prepare import Case, prepare
 from airtruth.tracing.selection.increment_inputs import sensitivities_to
@@ -38,7 +38,7 @@ def flight(case: Case) -> str:
     given = filter_inputs(record, case.hypothesis.change(point.sizes))
     start = time.perf_counter()
     for _ in range(FLIGHTS):
-        respond_to(given, settings, np.zeros(Common.size), point.per_record[0])
+        respond_to(given, settings, np.zeros(SHORT_PERIOD.common.size), point.per_record[0])
     filtered = (time.perf_counter() - start) / FLIGHTS
     system = (0.9 * np.eye(CORE), np.ones((CORE, 1)), np.ones((OUTPUTS, CORE)), np.zeros((OUTPUTS, 1)), 1.0)
     inputs = np.ones((record.samples, 1))

@@ -83,7 +83,7 @@ def flight_figure(moderate: Path, gtm: Aircraft) -> Figure:
     run = plan.planned_runs(planned.table.head(1))[0]
     noise_free = Pilot(replace(planned, sensors={})).channels(run)
     t = np.arange(planned.samples) * planned.dt_s
-    command = run.amplitude_rad * manoeuvres.sample(planned.manoeuvres[run.manoeuvre], t)
+    command = run.amplitude_rad * manoeuvres.sample(planned.inputs[run.manoeuvre][0], t)
     at = trim(gtm, run.condition, planned.dt_s)
     calm = Flight(gtm, at, planned.dt_s, planned.log_every).fly(Inputs(command, 0.0 * t, 0.0 * t))
     measured = {name: values[0] for name, values in batch.channels.items()}

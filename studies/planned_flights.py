@@ -54,7 +54,7 @@ from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import trim
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.answer import TraceAnswer
-from airtruth.tracing.model.parameters import Common
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.plant import declared_covariance
 from airtruth.tracing.prepare import Case, prepare
 
@@ -233,7 +233,7 @@ def misfit(case: Case, member: Member, gust_m_s: float) -> float:
     experiment = Experiment(model, record)
     located = np.array([1.0 if p.is_location and p.unit == "rad" else 0.0 for p in member.effect.parameters])
     starts = [member.sizes + shift * located for shift in (LOCATIONS if located.any() else (0.0,))]
-    still_air = np.zeros(Common.size)
+    still_air = np.zeros(SHORT_PERIOD.common.size)
     return min(experiment.distance(record.signals.y, member.effect, s, still_air).sigma ** 2 for s in starts)
 
 

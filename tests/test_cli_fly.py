@@ -76,7 +76,7 @@ def test_module_runs_as_the_command():
         (["fly", CAMPAIGN, "--out", "x", "--runs", str(10**9), "--dry-run"], ["runs"]),
         (
             ["fly", "nowhere.toml", "--out", "x"],
-            ["nowhere.toml: cannot be read", "airtruth new campaign"],
+            ["nowhere.toml: no such campaign file", "airtruth new campaign"],
         ),
         (["fly", ".", "--out", "x"], ["cannot be read"]),
     ],

@@ -23,6 +23,8 @@ PAGES = [
     *sorted((ROOT / "docs").rglob("*.md")),
     *sorted((ROOT / "aircraft").glob("*/README.md")),
 ]
+LEDGERS = sorted((ROOT / "validation" / "blind" / "results").glob("*.md"))
+"""Results of every run, whose words are those of their time."""
 README_LINES = 120
 """Two screens."""
 
@@ -99,6 +101,15 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", h.strip().lower()).replace(" ", "-") for h in headings}
 
 
+@pytest.mark.parametrize("name", ["plan", "foreign_aircraft", "measured"])
+def test_results_are_stated_without_seeds_commits_and_hands(name):
+    """Those belong to the ledgers of the results."""
+    prose = split(ROOT / "docs" / f"{name}.md")[0]
+    assert not re.findall(
+        r"\bseeds? \d+|\bby hand\b(?! with)|\b(?=[0-9a-f]*[a-f])(?=[0-9a-f]*\d)[0-9a-f]{7}\b", prose
+    )
+
+
 @each_page
 def test_no_private_words(page):
     prose = split(page)[0]
@@ -111,7 +122,7 @@ def test_every_sentence_has_a_subject(page):
     assert not [s for s in sentences(split(page)[0]) if HEADLESS.match(s)]
 
 
-@each_page
+@pytest.mark.parametrize("page", [*PAGES, *LEDGERS], ids=name_of)
 def test_links_and_anchors_resolve(page):
     broken = []
     for target in re.findall(r"\]\(([^)]+)\)", split(page)[0]):

@@ -29,7 +29,7 @@ from airtruth.logs.sources import named_logs
 from airtruth.logs.store import read_log
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import converged_fit, initial_parameters
-from airtruth.tracing.model.parameters import Common
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.prepare import Case, prepare
 from airtruth.tracing.selection.corner_share import with_corner_share
@@ -103,7 +103,7 @@ def _fitted(case: Case, hypothesis: Hypothesis, true: Array, trial: dict[str, An
     start = initial_parameters(problem, hypothesis, true, _ITERATIONS)
     common = start.common.copy()
     if coloured:
-        common[Common.colour_shares] = _SLOW_SHARE
+        common[SHORT_PERIOD.common.colour_shares] = _SLOW_SHARE
     best = converged_fit(problem, hypothesis, replace(start, common=common, sizes=true))
     if best is None:
         raise AirtruthError(f"{name}: the motion is lost at the true sizes")

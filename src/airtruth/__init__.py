@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from airtruth.api import (
         check,
         close_loop,
+        export,
         find_manoeuvres,
         fly,
         identify,
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from airtruth.checks.result import CheckResult
     from airtruth.design import ForecastResult, Limits, NarrowResult, SplitResult
     from airtruth.effects.effect import Effect
+    from airtruth.exporting import LinearModel
     from airtruth.identification import IdentificationResult
     from airtruth.identification.options import Options as IdentificationOptions
     from airtruth.importers import Imported, ManoeuvreResult
@@ -66,6 +68,7 @@ _LAZY = {
     "Imported": "airtruth.importers",
     "Logs": "airtruth.logs.sources",
     "Limits": "airtruth.design",
+    "LinearModel": "airtruth.exporting",
     "LoopResult": "airtruth.loop",
     "ManoeuvreResult": "airtruth.importers",
     "NarrowResult": "airtruth.design",
@@ -76,6 +79,7 @@ _LAZY = {
     "Verification": "airtruth.logs.verify",
     "check": "airtruth.api",
     "close_loop": "airtruth.api",
+    "export": "airtruth.api",
     "find_manoeuvres": "airtruth.api",
     "fly": "airtruth.api",
     "identify": "airtruth.api",
@@ -123,6 +127,7 @@ __all__ = [
     "IdentificationResult",
     "Imported",
     "Limits",
+    "LinearModel",
     "LogError",
     "Logs",
     "LoopResult",
@@ -138,6 +143,7 @@ __all__ = [
     "__version__",
     "check",
     "close_loop",
+    "export",
     "find_manoeuvres",
     "fly",
     "identify",

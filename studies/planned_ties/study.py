@@ -137,7 +137,7 @@ def commanded(campaign: Campaign) -> tuple[Manoeuvre, ...]:
             run.amplitude_rad,
             0.0,
             0.0,
-            samples_rad=run.amplitude_rad * manoeuvres.sample(plan.manoeuvres[run.manoeuvre], t_s),
+            samples_rad=run.amplitude_rad * manoeuvres.sample(plan.inputs[run.manoeuvre][0], t_s),
         )
         for run in planned_runs(plan.table)
     )

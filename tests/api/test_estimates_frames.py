@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -111,8 +112,35 @@ def test_an_effect_of_the_library_stands_for_its_key() -> None:
     (delay,) = at.list_effects("elevator_delay")
     assert at.TraceOptions(effects=(delay, "vane_arm")).keys == ("elevator_delay", "vane_arm")
     assert at.TraceOptions(effects="vane_arm").keys == ("vane_arm",)
-    with pytest.raises(at.ConfigurationError, match="no effect of the library"):
-        at.TraceOptions(effects=(dataclasses.replace(delay, name="other"),))
+
+
+def test_an_effect_need_not_be_in_the_library() -> None:
+    (delay,) = at.list_effects("elevator_delay")
+    other = dataclasses.replace(delay, name="other")
+    assert at.TraceOptions(effects=other).effects == (other,)
+    assert at.TraceOptions(effects=(other, "vane_arm")).keys == ("other", "vane_arm")
+    with pytest.raises(at.ConfigurationError, match="another effect with the key elevator_delay"):
+        at.TraceOptions(effects=(dataclasses.replace(delay, explanation="mine"),))
+    (cause,) = at.list_effects("tail_effectiveness")
+    with pytest.raises(at.ConfigurationError, match="by a cause"):
+        at.TraceOptions(effects=(dataclasses.replace(cause, name="other"),))
+
+
+@pytest.mark.slow
+def test_an_effect_of_the_caller_is_traced(tmp_path: Path) -> None:
+    """An arm of 1.6 m was flown (tests/tracing/undeclared_key.toml)."""
+    (arm,) = at.list_effects("vane_arm")
+    own = dataclasses.replace(arm, name="probe_arm")
+    options = at.TraceOptions(model="linear", effects=(own,))
+    result = at.trace("data/undeclared/b.parquet", "gtm", options, out=tmp_path)
+    (found,) = result.effects
+    assert found.name == "probe_arm"
+    low, high = found.parameters["x_m"].ci95
+    assert low is not None
+    assert high is not None
+    assert low < 1.6 < high
+    assert "Effects: probe_arm." in (tmp_path / "aircraft" / "gtm" / "aircraft.toml").read_text()
+    assert "probe_arm" in result.summary()
 
 
 def test_an_aircraft_prints_a_line() -> None:

@@ -1,5 +1,6 @@
 """Kinematic consistency: equations against closed forms, known errors found, what is absent said."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,7 +13,7 @@ from airtruth.checks.kinematics_lines import lines_of
 from airtruth.checks.kinematics_model import ERRORS, Record, compare, stacked
 from airtruth.checks.kinematics_search import Explanation
 from airtruth.checks.kinematics_words import _factors
-from airtruth.checks.result import tables
+from airtruth.checks.result import Cause, CheckResult, Finding, tables, undetermined
 from airtruth.checks.samples import derivative, earlier, integral, lagged
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
@@ -497,3 +498,20 @@ def test_combinations_are_two_lists():
     assert sorted((len(first), len(second))) == [2, 4]
     assert _factors(sets[:-1]) is None
     assert _factors([frozenset("a"), frozenset("b")]) is None
+
+
+def test_an_error_without_a_size_of_its_own_has_no_row_of_numbers():
+    """Two arms whose difference alone is determined: 0.36 +- 1.14 m over all sets, 1.76 +- 0.19 m alone."""
+    arm = Finding("vane_arm", "m", "position", 0.36, 1.14, -1.6, 1.9, 0.0, 5.2, "one of")
+    lag = Finding("vane_lag", "s", "lag", 0.054, 0.012, 0.037, 0.088, 0.0, 0.021, "one of")
+    causes = (
+        Cause((replace(lag, std=0.006),), 5.0, 0.0, True),
+        Cause((replace(arm, value=1.76, std=0.19),), 11.0, 6.0, True),
+    )
+    result = CheckResult("one_of", ("r1",), (arm, lag), causes, 60.0, 70, 0.8, 1.0, {}, ("One of several.",))
+    assert undetermined(result) == ("vane_arm",)
+    frame = result.to_frame().set_index("error")
+    assert frame.loc["vane_arm", ["estimate", "std", "lower", "upper"]].isna().all()
+    assert frame.loc["vane_lag", "estimate"] == 0.054
+    assert "vane_arm: the records determine no size unless" in result.summary()
+    assert "vane_arm 1.76 m" in result.summary()

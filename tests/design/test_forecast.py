@@ -69,7 +69,7 @@ def test_every_form_of_the_result_agrees(made):
     assert "Cmq" in result.summary()
     assert "<table" in result._repr_html_()
     alone = replace(result, records=1)
-    assert "std of 1 record" in alone.table().columns
+    assert "standard error, 1 record" in alone.table().columns
     (legend,) = alone.plot().legends
     assert [words.get_text() for words in legend.get_texts()] == ["one record", "1 record together"]
 

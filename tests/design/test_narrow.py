@@ -38,7 +38,7 @@ from airtruth.tracing.answer import Z95, CandidateScore, TraceAnswer
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.model.parameters import Common, Parameters
+from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
 from airtruth.units import DEG, FT, KT
 from validation.linear_flight import AIRSPEED_M_S, GTM, LIGHT, NOISE, THETA, fly
 
@@ -136,7 +136,7 @@ def test_a_band_is_that_of_the_tracers_fit(bench, campaign, flown):
     band = BandQuestion((accepted(),)).at(bench, campaign, 2, 0)
     assert band.model.records == 2
     (own,) = band.learned
-    still = np.zeros(Common.size)
+    still = np.zeros(SHORT_PERIOD.common.size)
     found = band.covariance(flown.record, 1.0, still)
     hypothesis = Hypothesis(
         band.model.declared,
@@ -149,18 +149,18 @@ def test_a_band_is_that_of_the_tracers_fit(bench, campaign, flown):
     start = Parameters(still, np.stack([band.model.own(record)] * 2), own.sizes)
     ended = fit(problem, hypothesis, start, free_levels=False)
     np.testing.assert_allclose(ended.point.sizes, own.sizes, atol=1e-4)
-    expected = ended.covariance[Common.size :, Common.size :]
+    expected = ended.covariance[SHORT_PERIOD.common.size :, SHORT_PERIOD.common.size :]
     np.testing.assert_allclose(np.sqrt(np.diag(found)), np.sqrt(np.diag(expected)), rtol=0.02)
 
 
 def test_a_band_and_a_flight_are_combined_by_their_inverse_variances(bench, campaign, flown):
     """One draw, by hand; points of no band, in the cell of the trim without a slope, do not count."""
     band = BandQuestion((accepted(),)).at(bench, campaign, 3, 0)
-    band = replace(band, draws=((1.0, np.zeros(Common.size)),))
+    band = replace(band, draws=((1.0, np.zeros(SHORT_PERIOD.common.size)),))
     (own,) = band.learned
     assert own.at == pytest.approx([0.03, 0.065, 0.17])
     (found,) = band.expected(flown, final=True)
-    covariance = band.covariance(flown.record, 1.0, np.zeros(Common.size))
+    covariance = band.covariance(flown.record, 1.0, np.zeros(SHORT_PERIOD.common.size))
     alone = np.diag(own.basis @ covariance @ own.basis.T)
     np.testing.assert_allclose(found**2, alone * own.known**2 / (alone + own.known**2), rtol=1e-9)
     assert band.rate(flown)[0] == pytest.approx(

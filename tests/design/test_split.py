@@ -32,7 +32,7 @@ from airtruth.tracing.answer import TraceAnswer
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.model.parameters import Common, Parameters
+from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
 from airtruth.tracing.model.settings import declared_change, settings_of
 from airtruth.units import DEG, FT, KT
 
@@ -60,7 +60,7 @@ def test_separation_is_that_of_two_fits_of_the_tracer(bench, model):
     record = flown(bench).record
     truth = Member(EFFECTS["elevator_delay"], np.array([0.007]))
     experiment = Experiment(model, record)
-    still = np.zeros(Common.size)
+    still = np.zeros(SHORT_PERIOD.common.size)
     y = experiment.outputs(truth, still)
     rival = EFFECTS["gyro_lag"]
     expected = experiment.distance(y, rival, np.array([0.005]), still)
@@ -79,7 +79,7 @@ def test_separation_is_that_of_two_fits_of_the_tracer(bench, model):
 def test_an_effect_does_not_separate_from_itself(bench, model):
     experiment = Experiment(model, flown(bench).record)
     truth = Member(EFFECTS["vane_lag"], np.array([0.02]))
-    still = np.zeros(Common.size)
+    still = np.zeros(SHORT_PERIOD.common.size)
     y = experiment.outputs(truth, still)
     found = experiment.distance(y, truth.effect, np.array([0.005]), still)
     assert found.sigma < 0.05
@@ -87,7 +87,7 @@ def test_an_effect_does_not_separate_from_itself(bench, model):
 
 
 def test_separation_grows_with_the_root_of_the_records_beyond_the_priors(bench, model):
-    record, still = flown(bench).record, np.zeros(Common.size)
+    record, still = flown(bench).record, np.zeros(SHORT_PERIOD.common.size)
     truth = Member(EFFECTS["elevator_delay"], np.array([0.01]))
     sigma = []
     for records in (100, 400):

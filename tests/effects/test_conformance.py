@@ -12,10 +12,12 @@ from airtruth.aircraft import Sensor
 from airtruth.aircraft.neutral import effective, fitted
 from airtruth.channels import SIGNALS as LOG_CHANNELS
 from airtruth.effects.registry import EFFECTS
+from airtruth.effects.sensors import sensor_effects
 from airtruth.errors import ConfigurationError
+from airtruth.physics.composition import CAUSES, TailGeometry, directions
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.physics.sensor_errors import Kind
 from airtruth.physics.terms import (
-    CAUSES,
     DECLARED,
     SHAPES,
     SIGNALS,
@@ -110,6 +112,44 @@ def test_change_is_in_plain_known_terms(key):
     assert all(t.cause in CAUSES for t in change.derivatives)
     assert all(t.kind in get_args(Kind) and t.channel in LOG_CHANNELS for t in change.sensors)
     assert all(t.level in kinds(AirTerm, "level") for t in change.air)
+
+
+@pytest.mark.parametrize("key", ALL)
+def test_it_concerns_the_longitudinal_motion(key):
+    """Every name in its terms is one of the motion, or the tracer could not fly it."""
+    assert EFFECTS[key].applies_to(LONGITUDINAL)
+
+
+def test_an_effect_concerns_a_motion_that_has_all_its_names():
+    shared = {key for key in ALL if EFFECTS[key].applies_to(LATERAL)}
+    assert {"mass_error", "airspeed_scale", "airspeed_alpha_slope", "cg_shift"} <= shared
+    assert not shared & {
+        "inertia_error",
+        "elevator_effectiveness",
+        "accelerometer_lag",
+        "downwash_lag",
+        "gust_level",
+    }
+
+
+@pytest.mark.parametrize("key", [key for key in ALL if EFFECTS[key].prior])
+def test_a_cause_of_changed_derivatives_has_a_direction_and_a_plausible_range(key):
+    effect = EFFECTS[key]
+    assert np.any(directions(np.arange(1.0, 7.0), TailGeometry())[effect.quantity])
+    assert effect.prior.std > 0.0
+    assert effect.prior.low <= 0.0 < effect.prior.high
+
+
+def test_sensor_errors_follow_from_outputs_and_kinds():
+    """Lag, scale, bias and delay of each output; an arm where the position matters; one delay of each control."""
+    keys = [e.key for e in sensor_effects(LONGITUDINAL)]
+    of_outputs = 4 * len(LONGITUDINAL.outputs)
+    arms = [key for key in keys if key.endswith("_arm")]
+    of_airspeed = [key for key in keys if key.startswith("airspeed")]
+    assert (arms, len(of_airspeed)) == (["vane_arm", "accelerometer_arm"], 2)
+    assert (
+        len(set(keys)) == len(keys) == of_outputs + len(arms) + len(of_airspeed) + len(LONGITUDINAL.controls)
+    )
 
 
 @pytest.mark.parametrize("key", ALL)

@@ -10,8 +10,8 @@ from airtruth.aircraft import write as writing
 from airtruth.aircraft.tail import tail_geometry
 from airtruth.effects.registry import EFFECTS
 from airtruth.errors import AircraftError, ConfigurationError
-from airtruth.physics.composition import directions
-from airtruth.physics.terms import CAUSES, Change, DeclaredTerm
+from airtruth.physics.composition import CAUSES, directions
+from airtruth.physics.terms import Change, DeclaredTerm
 from airtruth.simulation.linearise import linearise
 from airtruth.simulation.resolution import linear_point
 from airtruth.simulation.trim import trim

@@ -127,7 +127,9 @@ def test_both_files_say_what_was_changed(gtm, tmp_path):
         text = "\n".join(said)
         assert "gtm, changed by airtruth" in text
         assert "A delay found in record 7." in text
-        assert "surface: kind = delay, value = 0.06" in text
+    assert "Delay of 0.06 s, at simulation rates up to 400 Hz" in (plane.folder / "gtm.xml").read_text()
+    assert plane.file.dynamics.surface == (SurfaceTerm("delay", 0.06),)
+    assert plane.file.sensors["alpha_rad"].bias.source == "changed by airtruth"
     original = gtm.folder / "gtm.xml"
     text = (plane.folder / "gtm.xml").read_text()
     assert "Two JetCat P70." in text  # comments stay

@@ -18,6 +18,7 @@ from airtruth.identification import (
     identify_batch,
     quantities,
 )
+from airtruth.identification.covariance_columns import correlation_names, covariance_of
 from airtruth.identification.estimates import Estimates
 from airtruth.identification.tables import comparison, details
 from airtruth.physics.short_period import modal
@@ -34,12 +35,26 @@ def test_columns_are_those_of_the_contract():
     expected = ["run_id", "method", "converged", "iterations"]
     for name in NAMES:
         expected += [name, f"{name}_std", f"{name}_lower", f"{name}_upper"]
-    expected += ["status"]
+    expected += ["status", *correlation_names()]
     assert table.columns.tolist() == expected
     assert table["run_id"].tolist() == list(BATCH.run_ids)
     assert table["converged"].dtype == bool
     np.testing.assert_array_equal(table["Cmq"], ESTIMATES.theta[:, 4])
     np.testing.assert_array_equal(table["wn_rad_s"], modal(ESTIMATES.theta, ESTIMATES.scale)[0])
+
+
+def test_the_table_holds_covariance_and_flight_condition():
+    table = estimates_table(ESTIMATES, GTM)
+    np.testing.assert_allclose(covariance_of(table), ESTIMATES.covariance, rtol=1e-12)
+    assert table["CLalpha_CLq_corr"].iloc[0] == pytest.approx(
+        ESTIMATES.covariance[0, 0, 1] / np.sqrt(ESTIMATES.covariance[0, 0, 0] * ESTIMATES.covariance[0, 1, 1])
+    )
+    # q_bar S/m of the scale, from airspeed and density of the table
+    pressure = 0.5 * table["density_kg_m3"] * table["airspeed_m_s"] ** 2
+    np.testing.assert_allclose(pressure * GTM.wing_area_m2 / GTM.mass_kg, ESTIMATES.scale.normal, rtol=1e-12)
+    np.testing.assert_array_equal(table["airspeed_m_s"], ESTIMATES.scale.airspeed_m_s)
+    older = table.drop(columns=list(correlation_names()))
+    assert np.isnan(covariance_of(older)).all()
 
 
 @pytest.mark.parametrize("confidence", [0.68, 0.95, 0.99])
@@ -122,7 +137,8 @@ def test_compare_methods_over_runs_and_for_one():
     table = comparison([ls, ESTIMATES])
     assert table.columns == ("parameter", "unit", "ls", "ls +-", "iv-f1", "iv-f1 +-")
     assert table.rows[0][2] == pytest.approx(ls.theta[:, 0].mean())
-    assert table.rows[0][5] == pytest.approx(ESTIMATES.theta[:, 0].std(ddof=1))
+    values = ESTIMATES.theta[:, 0]
+    assert table.rows[0][5] == pytest.approx(values.std(ddof=1) / len(values) ** 0.5)
     one = comparison([ls, ESTIMATES], "run-0002")
     assert one.rows[5][4] == ESTIMATES.theta[2, 5]
     assert one.rows[5][5] == pytest.approx(np.sqrt(ESTIMATES.covariance[2, 5, 5]))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airtruth.errors import ConfigurationError
-from airtruth.physics.gust_figures import gust_scales
+from airtruth.physics.gust_figures import gust_scales, side_gust
 from airtruth.units import FT, KT
 
 # NASA GTM_DesignSim at 800, 1226, 2000 and 7000 ft: Lu, Lw [m], and the products of table and gain
@@ -121,3 +121,14 @@ def test_the_ends_of_a_table_belong_to_it(figures: str, lowest_ft: float, highes
     for altitude_ft in (lowest_ft - 1.0, highest_ft + 1.0):
         with pytest.raises(ConfigurationError, match=f"cover {lowest_ft} to {highest_ft} ft"):
             gust_scales(figures, "severe", altitude_ft * FT)
+
+
+def test_the_side_gust_is_that_of_its_source() -> None:
+    """GTM_DesignSim: v as w. MIL-F-8785C, 3.7.3.4 at 500 ft: sigma_v/sigma_w = (.177 + .000823 h)^-.4, Lv = h/(...)^1.2."""
+    gtm = gust_scales("gtm", "light", 7000 * FT)
+    assert side_gust("gtm", gtm) == (gtm.sigma_w_m_s, gtm.length_w_m)
+    low = gust_scales("mil-f-8785c", "moderate", 500 * FT)
+    sigma_v, length_v = side_gust("mil-f-8785c", low)
+    ratio = 0.177 + 0.000823 * 500.0
+    assert sigma_v / low.sigma_w_m_s == pytest.approx(ratio**-0.4, rel=1e-12)
+    assert length_v == pytest.approx(500.0 * FT / ratio**1.2, rel=1e-12)

@@ -262,3 +262,90 @@ def test_an_accelerometer_on_the_x_axis_needs_no_pitch_rate() -> None:
 )
 def test_one_end_of_a_range_may_be_open(errors: SensorErrors, expected: list[float]) -> None:
     np.testing.assert_array_equal(reading(errors, np.array([-2.0, 0.2, 0.9])), expected)
+
+
+def test_arms_of_a_rolling_and_yawing_aircraft_against_rotated_frames() -> None:
+    """The path of a fixed point in an attitude that changes in three axes, differentiated twice numerically.
+
+    Rotation matrix and rates from the Euler angles (Etkin and Reid, Dynamics of Flight, 3rd ed., eqs (4.4,3), (4.4,7)).
+    """
+    arm = np.array([0.7, -0.4, 0.3])
+
+    def angles(t: float) -> Array:
+        return np.array([0.3 * np.sin(2.0 * t), 0.1 + 0.2 * np.cos(1.5 * t), 0.4 * np.sin(1.1 * t) + 0.2 * t])
+
+    def to_earth(t: float) -> Array:
+        phi, theta, psi = angles(t)
+        roll = np.array([[1, 0, 0], [0, np.cos(phi), -np.sin(phi)], [0, np.sin(phi), np.cos(phi)]])
+        pitch = np.array([[np.cos(theta), 0, np.sin(theta)], [0, 1, 0], [-np.sin(theta), 0, np.cos(theta)]])
+        yaw = np.array([[np.cos(psi), -np.sin(psi), 0], [np.sin(psi), np.cos(psi), 0], [0, 0, 1]])
+        return yaw @ pitch @ roll
+
+    def rates(t: float) -> Array:
+        phi, theta, _ = angles(t)
+        phi_dot = 0.6 * np.cos(2.0 * t)
+        theta_dot, psi_dot = -0.3 * np.sin(1.5 * t), 0.44 * np.cos(1.1 * t) + 0.2
+        return np.array(
+            [
+                phi_dot - psi_dot * np.sin(theta),
+                theta_dot * np.cos(phi) + psi_dot * np.cos(theta) * np.sin(phi),
+                -theta_dot * np.sin(phi) + psi_dot * np.cos(theta) * np.cos(phi),
+            ]
+        )
+
+    t, h = 0.83, 1e-3
+    steps = range(-2, 3)
+    second = np.array([-1, 16, -30, 16, -1]) / (12 * h * h)  # fourth order
+    first = np.array([1, -8, 0, 8, -1]) / (12 * h)
+    path = sum(w * to_earth(t + k * h) @ arm for w, k in zip(second, steps, strict=True))
+    changes = sum(w * rates(t + k * h) for w, k in zip(first, steps, strict=True))
+    found = sensors.rotation_acceleration(rates(t), changes, (0.7, -0.4, 0.3))
+    np.testing.assert_allclose(found, to_earth(t).T @ path, rtol=0, atol=1e-8)
+    truth = {"airspeed_m_s": np.array([40.0]), "alpha_rad": np.array([0.1]), "beta_rad": np.array([0.05])}
+    truth |= {f"{a}_rad_s": np.array([v]) for a, v in zip("pqr", rates(t), strict=True)}
+    truth |= {f"{a}_dot_rad_s2": np.array([v]) for a, v in zip("pqr", changes, strict=True)}
+    truth |= {f"a{a}_m_s2": np.array([v]) for a, v in zip("xyz", (0.3, 1.0, -9.8), strict=True)}
+    errors = SensorErrors(x_m=0.7, y_m=-0.4, z_m=0.3)
+    for k, (axis, own) in enumerate(zip("xyz", (0.3, 1.0, -9.8), strict=True)):
+        moved = sensors.at_instrument(f"a{axis}_m_s2", truth, errors)
+        assert moved[0] == pytest.approx(own + found[k], abs=1e-14)
+    p, q, r = rates(t)
+    assert sensors.at_instrument("alpha_rad", truth, errors)[0] == pytest.approx(
+        0.1 - q * 0.7 / 40 + p * -0.4 / 40, abs=1e-15
+    )
+    assert sensors.at_instrument("beta_rad", truth, errors)[0] == pytest.approx(
+        0.05 + 0.7 * r / 40 - 0.3 * p / 40, abs=1e-15
+    )
+
+
+def test_vanes_off_the_plane_of_symmetry_against_the_flow_at_the_vane() -> None:
+    """Flow at the vane, V + omega x r: alpha = atan(w/u), beta = asin(v/V); slow rates, so that first order suffices."""
+    v, alpha, beta = 42.85, 0.09, 0.02
+    omega, arm = np.array([2e-3, -1e-3, 1.5e-3]), np.array([0.5, 1.07, -0.2])
+    own = v * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
+    flow = own + np.cross(omega, arm)
+    p, q, r = omega
+    alpha_vane = sensors.vane_alpha(alpha, q, 0.5, v) + p * 1.07 / v
+    # the change of the flow is turned by alpha against the vane's axis: cos(alpha), and a forward part
+    expected = np.arctan2(flow[2], flow[0])
+    assert alpha_vane == pytest.approx(expected, abs=2e-2 * abs(alpha_vane - alpha) + 1e-5)
+    assert sensors.vane_beta(beta, p, r, 0.5, -0.2, v) == pytest.approx(
+        np.arcsin(flow[1] / np.linalg.norm(flow)), abs=2e-6
+    )
+
+
+@given(st.floats(-2, 2), st.floats(-2, 2), st.floats(-2, 2))
+def test_a_flight_without_roll_and_yaw_reads_as_one_in_the_pitch_plane(x: float, y: float, z: float) -> None:
+    """The general terms reduce to those of the pitch plane; y then has no effect on the channels of this plane."""
+    rng = np.random.default_rng(3)
+    names = ("airspeed_m_s", "alpha_rad", "q_rad_s", "q_dot_rad_s2", "ax_m_s2", "az_m_s2")
+    plane = {name: rng.standard_normal(5) + 3.0 for name in names}
+    still = {f"{axis}_{unit}": np.zeros(5) for axis in "pr" for unit in ("rad_s", "dot_rad_s2")}
+    errors = SensorErrors(x_m=x, y_m=y, z_m=z)
+    for name in ("alpha_rad", "ax_m_s2", "az_m_s2"):
+        np.testing.assert_allclose(
+            sensors.at_instrument(name, plane | still, errors),
+            sensors.at_instrument(name, plane, errors),
+            rtol=1e-13,
+            atol=1e-13,
+        )

@@ -111,6 +111,13 @@ def loop_folder(folder):
             "after_error": 0.01,
             "runs_before": 6,
             "runs_after": 6,
+            "declared_same_inputs": -0.95,
+            "corrected_same_inputs": -0.98,
+            "difference": -0.04,
+            "difference_error": 0.01,
+            "remaining": -0.01,
+            "remaining_error": 0.01,
+            "runs_compared": 6,
         }
         for method in METHODS
         for name in PARAMETERS

@@ -26,6 +26,13 @@ SAMPLE = {
             "after_error": 0.01,
             "runs_before": 6,
             "runs_after": 5,
+            "declared_same_inputs": -0.95,
+            "corrected_same_inputs": None if name == "CLq" else -0.98,
+            "difference": -0.04,
+            "difference_error": 0.01,
+            "remaining": -0.01,
+            "remaining_error": 0.01,
+            "runs_compared": 5,
         }
         for method in ("ls", "iv-f1")
         for name in PARAMETERS
@@ -42,10 +49,14 @@ def test_the_page_states_verdict_treatments_and_every_derivative(tmp_path):
     assert "gyro_lag: the lag of q is undone." in text
     for name in PARAMETERS:
         assert f">{name}</th>" in text
-    assert text.count("-0.9000 (0.020)") == len(PARAMETERS) * 2
+    assert text.count("-0.9000 \u00b1 0.020") == len(PARAMETERS) * 2
+    assert (
+        text.count("-0.0400 [-0.0678, -0.0122]") == len(PARAMETERS) * 2
+    )  # t of 4 degrees of freedom is 2.776
+    assert "CLalpha by ls (-0.040, refit -0.030), iv-f1 (-0.040, refit -0.030); CLq" in text
     rows = data.read_text().splitlines()
     assert rows[0].startswith("method,derivative,declared,before,before_error,after")
-    assert rows[1] == "ls,CLalpha,-1.0,-0.9,0.02,-0.99,0.01,6,5"
+    assert rows[1] == "ls,CLalpha,-1.0,-0.9,0.02,-0.99,0.01,6,5,-0.95,-0.98,-0.04,0.01,-0.01,0.01,5"
     assert len(rows) == 1 + 2 * len(PARAMETERS)
     assert r"\toprule" in latex.read_text()
 

@@ -97,7 +97,7 @@ def test_estimates_without_a_truth(light, tmp_path):
     rows = {row["parameter"]: row for row in csv.DictReader(io.StringIO(of_file[1].read_text()))}
     cmq = pq.read_table(light / "estimates.parquet").to_pandas().query("method == 'ls'")["Cmq"]
     assert float(rows["Cmq"]["ls"]) == pytest.approx(cmq.mean(), rel=1e-14)
-    assert float(rows["Cmq"]["ls (in brackets)"]) == pytest.approx(cmq.std(), rel=1e-14)
+    assert float(rows["Cmq"]["ls (standard error)"]) == pytest.approx(cmq.std() / 40**0.5, rel=1e-13)
     assert rows["converged"]["ls"] == "40"
     units = [rows[name]["unit"] for name in ("CLalpha", "CLq", "Cmde", "Cmq", "wn_rad_s", "zeta")]
     assert units == ["1/rad", "-", "1/rad", "-", "rad/s", "-"]

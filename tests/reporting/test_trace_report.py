@@ -24,6 +24,7 @@ from airtruth.simulation.campaign import run as campaign
 from airtruth.table import MISSING
 from airtruth.tracing import TraceAnswer, TraceOptions, trace
 from airtruth.tracing.answer import Evidence, ParameterEstimate
+from airtruth.tracing.presentation.brief import as_brief_text
 from airtruth.tracing.presentation.candidates import candidate_table, probability, ranked
 from airtruth.tracing.presentation.charts import scores_chart, trace_chart
 from airtruth.tracing.presentation.error_table import error_csv, error_table
@@ -73,7 +74,8 @@ def answer(found):
 def test_a_trace_is_a_result(found):
     result, folder = found
     assert isinstance(result, Result)
-    assert result.summary() == as_trace_text(result.answer)
+    assert result.summary() == as_brief_text(result.answer)
+    assert result.details() == as_trace_text(result.answer)
     assert result.to_dict() == json.loads((folder / "trace.json").read_text())
     assert result.to_frame()["name"].to_list() == [c.name for c in result.answer.candidates]
     assert len(result.plot().axes) == 9

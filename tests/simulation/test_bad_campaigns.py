@@ -190,7 +190,7 @@ def test_saturation_is_flown_when_asked_for(tmp_path):
     [
         ("eas = = 3", ["not valid TOML", "line 1"]),
         ("\xff\xfe", ["cannot be read"]),
-        (None, ["cannot be read", "airtruth new campaign"]),
+        (None, ["no such campaign file", "airtruth new campaign"]),
     ],
 )
 def test_files_that_are_no_campaign(tmp_path, content, words):

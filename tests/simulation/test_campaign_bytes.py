@@ -10,8 +10,10 @@ from fly_campaigns import command, fly, read, results, write
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airtruth.simulation.campaign import plan
+from airtruth.simulation import instruments as measure
+from airtruth.simulation.campaign import plan, streams
 from airtruth.simulation.campaign import run as campaign
+from airtruth.simulation.campaign.air import air_of
 from airtruth.simulation.campaign.chunk import Pilot
 from airtruth.simulation.campaign.numbering import chunk_numbers
 from airtruth.simulation.campaign.workers import orders_of
@@ -128,3 +130,33 @@ def test_plan_holds_every_draw_before_anything_flies(tmp_path):
     assert set(made["manoeuvre"]) == {0, 1}
     np.testing.assert_array_equal(made.loc[made["manoeuvre"] == 1, "amplitude_rad"], np.deg2rad(-1.0))
     assert made.equals(plan.make(tmp_path / "campaign.toml").table)
+
+
+def test_draws_and_gusts_of_a_pitch_plane_campaign_are_those_of_earlier_versions(tmp_path):
+    """Numbers that the version without lateral motion wrote: a new quantity or channel must not move an existing stream."""
+    doublet = {"kind": "doublet", "amplitude_deg": {"low": 1.0, "high": 2.0}, "start_s": 0.5, "step_s": 0.25}
+    file = write(
+        tmp_path / "campaign.toml",
+        runs=5,
+        duration_s=3.0,
+        condition={"eas_kt": {"low": 70.0, "high": 80.0}, "altitude_ft": {"mean": 5000.0, "std": 300.0}},
+        gust={"level": "moderate", "factor": {"choose": [0.5, 1.0]}, "rotary": True},
+        manoeuvre=[doublet, doublet | {"amplitude_deg": 1.0}],
+    )
+    made = plan.make(file)
+    expected = {
+        "eas_m_s": [38.31714901644626, 40.29033866663662, 36.31841354398453],
+        "altitude_m": [1652.3657753088871, 1386.2580306134578, 1473.7156220956638],
+        "amplitude_rad": [0.02823186200194506, 0.017453292519943295, 0.02899502768425677],
+        "sigma_u_m_s": [2.1499519834592156, 2.049417734715226, 2.082458799591732],
+        "length_w_m": [669.770628298329, 575.4073203714529, 606.4202758381341],
+    }
+    for name, values in expected.items():
+        np.testing.assert_allclose(made.table[name][:3], values, rtol=1e-14)
+    air = air_of(made, plan.planned_runs(made.table)[1], 42.0)
+    found = [air.u_m_s[100], air.w_m_s[100], air.q_rad_s[100]]
+    np.testing.assert_allclose(
+        found, [-0.4378579444731933, -0.06596919047123283, -0.01491144717817038], rtol=1e-10
+    )
+    numbers = dict(zip(measure.LOGGED, range(1, 12), strict=True))
+    assert {name: streams.SENSORS[name] for name in measure.LOGGED} == numbers

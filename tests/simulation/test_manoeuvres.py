@@ -96,3 +96,23 @@ def test_command_is_back_at_trim_after_its_end(kind):
     m = Manoeuvre(kind, 1.0, start_s=1.0, step_s=0.5, length_s=4.0, lowest_hz=0.5, **shapes.get(kind, {}))
     u = sample(m, T)
     assert np.abs(u[end_s(m) + 0.01 < T]).max() == 0.0
+
+
+def test_121_signs_and_lengths():
+    u = sample(Manoeuvre("121", 2.0, start_s=1.0, step_s=0.4, control="aileron"), T)
+    middles = 1.0 + 0.4 * np.array([-0.5, 0.5, 2.0, 3.5, 4.5])
+    np.testing.assert_allclose(np.interp(middles, T, u), [0, 2, -2, 2, 0], atol=1e-12)
+    assert np.trapezoid(u, T) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("parts", [2, 3])
+def test_multisines_of_several_controls_share_no_frequency(parts):
+    """Over their length the inputs are orthogonal at any shift: no line of one is a line of another."""
+    common = {"start_s": 0.0, "length_s": 10.0, "lowest_hz": 0.3, "highest_hz": 2.5, "parts": parts}
+    waves = [sample(Manoeuvre("multisine", 1.0, part=k, **common), T)[:-1] for k in range(parts)]
+    lines = [np.abs(np.fft.rfft(w)) > 1e-6 * len(w) for w in waves]
+    for one in range(parts):
+        for two in range(one):
+            assert not (lines[one] & lines[two]).any()
+            crossed = np.fft.irfft(np.fft.rfft(waves[one]) * np.conj(np.fft.rfft(waves[two])))
+            assert np.abs(crossed).max() < 1e-9 * np.linalg.norm(waves[one]) * np.linalg.norm(waves[two])

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from airtruth.simulation.campaign import streams
 
 N = 4000
-PURPOSES = [streams.GUST, *streams.SENSORS.values()]
+PURPOSES = [streams.GUST, streams.SIDE_GUST, *streams.SENSORS.values()]
 
 
 @given(seed=st.integers(0, 2**63 - 1), run=st.integers(0, 10_000_000), purpose=st.sampled_from(PURPOSES))

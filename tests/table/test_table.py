@@ -17,6 +17,7 @@ from airtruth.table import (
     Number,
     Pair,
     Table,
+    Uncertain,
     as_csv,
     as_html,
     as_json,
@@ -205,3 +206,17 @@ def test_files(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(StoreError, match="not written"):
         write_table(GROUPED, tmp_path / "file", "mine")
+
+
+def test_an_estimate_has_its_standard_error_in_every_format():
+    cell = Uncertain(Number(4.5259), Number(0.02201, digits=2))
+    table = flat(
+        "t", ("name", "x"), [("CLalpha", cell), ("CLq", Uncertain(Number(31.8), Number(float("nan"))))]
+    )
+    assert [str(row[1]) for row in table.rows] == ["4.526 +- 0.022", "31.80"]
+    assert "4.526 \u00b1 0.022" in as_html(table)
+    assert r"4.526 $\pm$ 0.022" in as_latex(table, "t")
+    frame = table.to_frame()
+    assert list(frame.columns) == ["name", "x", "x (standard error)"]
+    assert frame["x (standard error)"].iloc[0] == 0.02201
+    assert math.isnan(frame["x (standard error)"].iloc[1])

@@ -22,7 +22,7 @@ from airtruth.tracing.answer import DeclaredModel
 from airtruth.tracing.axial_force import axial_force
 from airtruth.tracing.axial_series import axial_series
 from airtruth.tracing.declared_model import with_axial_force
-from airtruth.tracing.model.parameters import PerRecord
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.records import read
 from airtruth.tracing.prepare import prepare
 from airtruth.tracing.presentation.error_table import axial_words
@@ -33,7 +33,7 @@ BREAK = AeroTerm("CX", "alpha", "above", -0.8, at=0.11)
 """A drag that rises from 6.3 deg on, 2.5 deg above it as much as the declared CX changes over the flown range."""
 NOISE_M_S2 = 0.0016 * 9.80665
 """White noise of ax that aircraft/gtm declares."""
-STILL = np.zeros(PerRecord.size)
+STILL = np.zeros(SHORT_PERIOD.per_record.size)
 """Own parameters of a record without biases."""
 OWN = {"gtm": (Condition(75 * KT, 7000 * FT), 1e-6), "c172x": (Condition(100 * KT, 4000 * FT), 1e-5)}
 """Condition, and the error over q_bar S: the axial force changes alpha', on which c172x has terms of its own."""
@@ -57,7 +57,7 @@ def shown(log):
     """What ax of a log shows at the declared aircraft, without a search."""
     plane = planes.load("gtm")
     case = prepare([log], plane, (), TraceOptions())
-    still = np.zeros((len(case.fitted.records), PerRecord.size))
+    still = np.zeros((len(case.fitted.records), SHORT_PERIOD.per_record.size))
     held = [SimpleNamespace(per_record=STILL) for _ in (case.held.records if case.held is not None else ())]
     stages = SimpleNamespace(case=case, best="before", held={"before": held})
     nothing = SimpleNamespace(

@@ -44,6 +44,15 @@ def test_a_delay_is_taken_out(loop):
     assert change_of(loop, "Cmq").runs_after == 3
 
 
+def test_declared_model_with_the_same_inputs_is_the_reference(loop):
+    """A linear declared model without noise: the method errs by the noise of the elevator alone, below a per cent."""
+    for name in ("CLalpha", "Cmalpha", "Cmq", "Cmde"):
+        change = change_of(loop, name)
+        assert change.runs_compared == 3
+        assert change.declared_same_inputs == pytest.approx(change.declared, rel=0.01)
+    assert "declared, same inputs" in loop.summary()
+
+
 def test_it_is_a_result(loop):
     assert isinstance(loop, Result)
     assert len(loop.to_frame()) == len(PARAMETERS)

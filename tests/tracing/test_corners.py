@@ -14,7 +14,7 @@ from airtruth.physics.terms import Change, SensorTerm, SurfaceTerm
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.model.elevator_path import corner_variance, read_between
-from airtruth.tracing.model.parameters import PerRecord
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.records import read
 from airtruth.tracing.model.response import filter_inputs, respond
 from airtruth.tracing.selection.corner_share import corner_share
@@ -218,7 +218,7 @@ def sharply_stepped(rng, anywhere, noise, name):
 
 def whitened(made, sigma_w=0.3):
     common, per_record = tr.still()
-    per_record[PerRecord.log_gust] = np.log(sigma_w)
+    per_record[SHORT_PERIOD.per_record.log_gust] = np.log(sigma_w)
     found = respond(made, tr.SETTINGS, Change(), common, per_record)
     return found.e @ found.white.T, found
 
@@ -242,7 +242,7 @@ def test_a_step_between_samples_leaves_no_spike():
     for _ in range(5):
         made, u = stepped(rng, sigma_w=0.02, noise=quiet.noise)
         common, per_record = tr.still()
-        per_record[PerRecord.log_gust] = np.log(0.02)
+        per_record[SHORT_PERIOD.per_record.log_gust] = np.log(0.02)
         for aware in worst:
             corner = corner_variance(u, 0.0) if aware else np.zeros(0)
             known = replace(made, signals=replace(made.signals, corner_rad2=corner))
@@ -270,7 +270,7 @@ def test_a_sensor_late_by_little_does_not_read_the_corner():
     made, u = stepped(np.random.default_rng(2))
     known = replace(made, signals=replace(made.signals, corner_rad2=corner_variance(u, 0.0)))
     common, own = tr.still()
-    own[PerRecord.log_gust] = np.log(0.3)
+    own[SHORT_PERIOD.per_record.log_gust] = np.log(0.3)
     more = [
         respond(known, tr.SETTINGS, change, common, own).more_logdet
         for change in (Change(), Change(sensors=(SensorTerm("az_m_s2", "lag", 1e-4),)))

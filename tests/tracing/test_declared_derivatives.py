@@ -9,7 +9,7 @@ from scipy.stats import kstest
 from airtruth.tracing.declared_model import remaining_evidence
 from airtruth.tracing.inference import derivative_likelihood as module
 from airtruth.tracing.inference.derivative_likelihood import contradiction, derivative_likelihood
-from airtruth.tracing.model.parameters import Common
+from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
 from airtruth.tracing.model.plant import declared_covariance
 from airtruth.tracing.selection.anomaly import DERIVATIVES_MOVED, Anomaly
 from airtruth.tracing.selection.omnibus import advice
@@ -24,7 +24,7 @@ TOLD = np.diag(np.array([0.02, 6.0, 0.01, 0.05, 1.0, 0.01]) ** -2.0)
 def white(monkeypatch):
     """Innovations that are white: plain and robust covariance are equal."""
     for name in ("inflation", "scatter"):
-        monkeypatch.setattr(module, name, lambda problem, fitted: np.ones(Common.size))
+        monkeypatch.setattr(module, name, lambda problem, fitted: np.ones(SHORT_PERIOD.common.size))
 
 
 def test_a_derivative_declared_as_zero_has_its_stated_deviation(gtm):
@@ -42,19 +42,21 @@ def test_a_derivative_declared_as_zero_has_its_stated_deviation(gtm):
 
 def fit_of(estimate, spread=None):
     """The posterior of a linear problem: prior of covariance ``DECLARED + spread`` about zero, likelihood about ``estimate``."""
-    prior = np.eye(Common.size)
-    own = Common.derivatives
+    prior = np.eye(SHORT_PERIOD.common.size)
+    own = SHORT_PERIOD.common.derivatives
     prior[own, own] = np.linalg.inv(DECLARED if spread is None else DECLARED + spread)
     precision = prior.copy()
     precision[own, own] += TOLD
     covariance = np.linalg.inv(precision)
-    mode = np.zeros(Common.size)
+    mode = np.zeros(SHORT_PERIOD.common.size)
     mode[own] = np.linalg.solve(precision[own, own], TOLD @ estimate)
     problem = SimpleNamespace(
-        declared_covariance=DECLARED, priors=lambda hypothesis: SimpleNamespace(common=prior)
+        declared_covariance=DECLARED,
+        priors=lambda hypothesis: SimpleNamespace(common=prior),
+        layout=SHORT_PERIOD,
     )
     fitted = SimpleNamespace(
-        point=SimpleNamespace(common=mode),
+        point=Parameters(mode, np.zeros((1, SHORT_PERIOD.per_record.size)), np.zeros(0)),
         covariance=covariance,
         hypothesis=SimpleNamespace(unconstrained=(), spread=spread),
         cost=0.5 * float((mode[own] - estimate) @ TOLD @ (mode[own] - estimate))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from airtruth.effects.effect import Prior
 from airtruth.physics.composition import TailGeometry, directions
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood
 from airtruth.tracing.selection.explanation import (
@@ -64,12 +65,12 @@ def test_declared_derivatives_lead_where_nothing_is_wrong():
 def test_the_evidence_is_that_of_a_normal_prior():
     """Two sets compared: the ratio of the densities of the estimate under both, by scipy's normal."""
     shift = np.array([0.1, 3.0, -0.05, 0.25, 4.0, 0.1])
-    cause = Cause("cg_shift", DIRECTIONS["cg"], std=0.05, low=-np.inf, high=np.inf, shape=0.0)
+    cause = Cause("cg_shift", DIRECTIONS["cg"], Prior(0.05, -np.inf, np.inf, shape=0.0))
     by_effects = {s.effects: s for s in explain(likelihood(shift), [cause], wrong_allowed=False)}
     about = np.diag(STD**2 + TOLD**2)
     wide = about + 0.05**2 * np.outer(cause.direction, cause.direction)
     densities = [multivariate_normal(np.zeros(6), c).logpdf(shift) for c in (about, wide)]
-    odds = cause.log_odds + 4.0  # the prior odds, and the constant that makes it comparable with refits
+    odds = cause.prior.log_odds + 4.0  # the prior odds, and the constant that makes it comparable with refits
     expected = densities[0] - densities[1] - odds
     assert by_effects[("cg_shift",)].cost - by_effects[()].cost == pytest.approx(expected, rel=1e-9)
 
@@ -77,7 +78,7 @@ def test_the_evidence_is_that_of_a_normal_prior():
 def test_the_size_is_that_of_weighted_least_squares():
     shift = 0.03 * DIRECTIONS["cg"] + 0.5 * STD
     v, weight = DIRECTIONS["cg"], 1.0 / (STD**2 + TOLD**2)
-    size, std = size_of(likelihood(shift), Cause("cg_shift", v, 0.05, -0.15, 0.15))
+    size, std = size_of(likelihood(shift), Cause("cg_shift", v, Prior(0.05, -0.15, 0.15)))
     assert size == pytest.approx((v * weight * shift).sum() / (v * weight * v).sum(), rel=1e-9)
     assert std == pytest.approx((v * weight * v).sum() ** -0.5, rel=1e-9)
 
@@ -98,7 +99,7 @@ def test_a_size_beyond_its_range_is_improbable():
     tail = [c for c in causes_of(DIRECTIONS) if c.key == "tail_effectiveness"]
     costs = [
         {s.effects: s.cost for s in explain(likelihood(shift), causes)}[("tail_effectiveness",)]
-        for causes in (tail, [replace(tail[0], low=-np.inf, high=np.inf)])
+        for causes in (tail, [replace(tail[0], prior=replace(tail[0].prior, low=-np.inf, high=np.inf))])
     ]
     assert costs[0] > costs[1] + 5.0
 

@@ -7,7 +7,7 @@ import pytest
 import trace_records as tr
 
 from airtruth.physics.terms import Change
-from airtruth.tracing.model.parameters import PerRecord
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.response import filter_inputs, respond_to
 from airtruth.tracing.model.schedule import UNSCHEDULED, schedule
 from airtruth.units import G0
@@ -48,7 +48,7 @@ def slowing(rng, sigma_w, speed=SPEED):
 
 def whitened(made, sigma_w, along=None):
     common, own = tr.still()
-    own[PerRecord.log_gust] = np.log(sigma_w)
+    own[SHORT_PERIOD.per_record.log_gust] = np.log(sigma_w)
     given = filter_inputs(made, Change())
     given = given if along is None else replace(given, along=along)
     found = respond_to(given, tr.SETTINGS, common, own)

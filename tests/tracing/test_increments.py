@@ -31,7 +31,7 @@ from airtruth.tracing.inference.posterior import (
 )
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.compile import compile_change
-from airtruth.tracing.model.parameters import Parameters, size_index
+from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
 from airtruth.tracing.presentation.text import increment_words
 from airtruth.tracing.selection.acceptance import SUPERSEDED, Candidate
 from airtruth.tracing.selection.explanation import CauseSet
@@ -75,7 +75,7 @@ def test_the_prior_of_a_size_enters_cost_gradient_and_information():
     with_prior, without = (
         marginal_information(problem.priors(h), point, terms, levels=True) for h in (held, free)
     )
-    sizes = [size_index(k) for k in range(4)]
+    sizes = [(SHORT_PERIOD.common.size + k) for k in range(4)]
     np.testing.assert_allclose(
         (with_prior.information - without.information)[np.ix_(sizes, sizes)], np.eye(4) / 0.02**2, rtol=1e-6
     )

@@ -221,3 +221,43 @@ def test_channels_that_contradict_each_other_are_not_nothing(verdict, p_value, e
     if expected == "unexplained":
         assert found.remaining.p_value == found.anomaly.p_value == p_value
         assert "single records" in found.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("size_m", "alike", "possible", "noted"),
+    [
+        (1.6, (), ("vane_lag",), True),
+        (0.3, (), ("vane_lag",), False),  # the records would not show this arm
+        (
+            1.6,
+            ("sensor_delay",),
+            ("sensor_delay:alpha_rad",),
+            False,
+        ),  # the trace does not tell it from what the check allows
+        (1.6, (), ("vane_arm", "vane_lag"), False),
+        (1.6, (), (), True),  # the channels agree
+    ],
+)
+def test_a_check_of_all_records_that_excludes_the_traced_error_is_a_note(size_m, alike, possible, noted):
+    found = Finding("vane_arm", "m", "", 0.1, 0.2, -0.3, 0.5, 0.0, 0.6, "not needed")
+    causes = [SimpleNamespace(errors=(error(name, unit="s"),), name=name) for name in possible]
+    causes = causes or [SimpleNamespace(errors=(), name="none")]
+    check = SimpleNamespace(verdict="one_of", possible=causes, findings=(found,), p_value=0.5)
+    own = ParameterEstimate(size_m, 0.1, (size_m - 0.2, size_m + 0.2))
+    effect = AcceptedEffect("vane_arm", {"x_m": own}, 1e-9, 5.0, alike)
+    answer = with_contradictions(Answer((effect,)), None, 0.02, check)
+    assert not answer.provisional
+    assert bool(answer.notes) is noted
+    if noted:
+        assert "check of all records, held-out ones included, excludes it" in answer.notes[0]
+        assert f"possible there: {possible[0] if possible else 'none'}" in answer.notes[0]
+
+
+def test_a_check_of_all_records_adds_nothing_to_a_contradiction_of_the_fitted_ones():
+    found = Finding("vane_arm", "m", "", 0.1, 0.2, -0.3, 0.5, 0.0, 0.6, "not needed")
+    lag = SimpleNamespace(errors=(error("vane_lag", 0.05, "s"),), name="vane_lag")
+    check = SimpleNamespace(verdict="errors", possible=(lag,), findings=(found,), p_value=0.5)
+    effect = AcceptedEffect("vane_arm", {"x_m": ParameterEstimate(1.6, 0.1, (1.4, 1.8))}, 1e-9, 5.0)
+    answer = with_contradictions(Answer((effect,)), check, 0.02, check)
+    assert answer.provisional
+    assert len([note for note in answer.notes if "excludes it" in note]) == 0

@@ -15,7 +15,7 @@ from airtruth.physics.terms import Change, SurfaceTerm
 from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.manoeuvres import Manoeuvre, sample
 from airtruth.simulation.trim import trim
-from airtruth.tracing.model.parameters import Common, PerRecord
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.plant import probed
 from airtruth.tracing.model.records import TraceRecord, read
 from airtruth.tracing.model.remainder import looked_up, remainders
@@ -111,10 +111,10 @@ def test_with_the_remainder_the_filter_flies_the_model(late):
     bare = TraceRecord(signals, plant_of(plane, at), 500.0)
     settings = settings_of(plane, 0.05)
     own = initial_per_record(bare, settings)
-    own[PerRecord.log_gust] = np.log(1e-3)
+    own[SHORT_PERIOD.per_record.log_gust] = np.log(1e-3)
     carried = replace(bare, remainder=remainders([signals], [bare.plant])[0])
     sizes = [
-        respond(r, settings, Change(), np.zeros(Common.size), own, free_run=True).e.std(axis=0)
+        respond(r, settings, Change(), np.zeros(SHORT_PERIOD.common.size), own, free_run=True).e.std(axis=0)
         for r in (bare, carried)
     ]
     assert (sizes[1] < 0.1 * sizes[0]).all()

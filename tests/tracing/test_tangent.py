@@ -11,7 +11,7 @@ from airtruth.effects.increment import Memory, Shape, increment
 from airtruth.physics.terms import Change, SensorTerm
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
-from airtruth.tracing.model.parameters import Common
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.records import FINE
 from airtruth.tracing.model.response import External, filter_inputs, respond_to
 from airtruth.tracing.model.tangent import FLOWN, POINTS, propagated, tangent_of
@@ -50,7 +50,7 @@ def flown(change, sub, share, uncertain):
     given = filter_inputs(record, change)
     point = tr.point([record])
     common = point.common.copy()
-    common[Common.colour_shares] = share
+    common[SHORT_PERIOD.common.colour_shares] = share
     arguments = given, tr.SETTINGS, common, point.per_record[0]
     return arguments, tangent_of(*arguments)
 
@@ -126,7 +126,7 @@ def test_shapes_change_the_innovations_as_refitted_filters_do(null, name):
     effect = increment(shape)
     made = sensitivities_to(fitted, problem, [shape])
     assert made is not None
-    own = slice(Common.size, Common.size + effect.bends)
+    own = slice(SHORT_PERIOD.common.size, SHORT_PERIOD.common.size + effect.bends)
     neutral = {p.name: shape.estimated_memory.get(p.name, 0.0) for p in effect.parameters}
     tried = []
     for p in effect.parameters[: effect.bends]:

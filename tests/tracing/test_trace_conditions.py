@@ -7,11 +7,12 @@ import pytest
 import trace_records as tr
 
 from airtruth.effects.registry import EFFECTS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import Change
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.model.compile import compile_change
-from airtruth.tracing.model.parameters import Common
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.response import pack_aircraft
 from airtruth.tracing.model.settings import common_prior
 from airtruth.units import DEG
@@ -58,8 +59,8 @@ def forward(records):
 
 def test_the_increments_are_common_to_both_conditions(forward):
     """Simulated with the declared derivatives of each condition and the same increments: three standard errors."""
-    off = forward.point.common[Common.derivatives] - MORE
-    assert (np.abs(off) < 3.0 * forward.common_std[Common.derivatives]).all()
+    off = forward.point.common[SHORT_PERIOD.common.derivatives] - MORE
+    assert (np.abs(off) < 3.0 * forward.common_std[SHORT_PERIOD.common.derivatives]).all()
     assert abs(forward.point.sizes[0] - ARM_M) < 3.0 * forward.size_std(0)
     assert forward.size_std(0) < 0.1
 
@@ -77,11 +78,11 @@ def test_the_order_of_the_conditions_does_not_matter(records, forward):
 
 def test_the_inertia_turns_about_each_condition_s_own_derivatives():
     """Increments of the moment: i times the declared derivatives of the condition."""
-    common = np.zeros(Common.size)
-    common[Common.inertia] = 0.05
+    common = np.zeros(SHORT_PERIOD.common.size)
+    common[SHORT_PERIOD.common.inertia] = 0.05
     for declared in (tr.TRUTH, DECLARED_FAST):
         packed = pack_aircraft(tr.plant(declared), compile_change(Change()), common)
-        np.testing.assert_allclose(packed.increments[Common.moment], 0.05 * declared[3:], rtol=1e-12)
+        np.testing.assert_allclose(packed.increments[LONGITUDINAL.row("Cm")], 0.05 * declared[3:], rtol=1e-12)
 
 
 def test_the_prior_of_two_conditions_is_their_mean_covariance(records):

@@ -9,10 +9,11 @@ from numba import njit
 from scipy.integrate import solve_ivp
 
 from airtruth.errors import ConfigurationError
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import AeroTerm, Change, DeclaredTerm, StateTerm
 from airtruth.tracing.model.equations import gust, rates
 from airtruth.tracing.model.kernel_input import AirPoint
-from airtruth.tracing.model.parameters import Common, PerRecord
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.response import respond
 from airtruth.tracing.model.settings import common_prior
 from airtruth.units import DEG, G0
@@ -64,11 +65,11 @@ def test_nonlinear_free_run_against_dop853(bolted):
         return 1.0 - 0.01 * t
 
     common, per_record = tr.still()
-    common[Common.derivatives] = [0.1, 2.0, -0.05, 0.03, -3.0, 0.1]
-    common[Common.thrust] = 0.04
-    common[Common.mounting] = bolted - 0.5
-    per_record[PerRecord.motion_start] = [0.06, -0.1]
-    per_record[PerRecord.offsets] = [0.001, -0.002, 0.05, 0.01, -0.004]
+    common[SHORT_PERIOD.common.derivatives] = [0.1, 2.0, -0.05, 0.03, -3.0, 0.1]
+    common[SHORT_PERIOD.common.thrust] = 0.04
+    common[SHORT_PERIOD.common.mounting] = bolted - 0.5
+    per_record[SHORT_PERIOD.per_record.motion_start] = [0.06, -0.1]
+    per_record[SHORT_PERIOD.per_record.offsets] = [0.001, -0.002, 0.05, 0.01, -0.004]
     c = tr.C
 
     def rates(t, x):
@@ -82,8 +83,10 @@ def test_nonlinear_free_run_against_dop853(bolted):
         constant = (1.0 - share) * plant.constant[0] + share * plant.constant[1]
         fx, fz, fm = qbar * forces(plant, alpha, surface, qhat) + constant + 0.04 * plant.engine
         states = np.array([alpha - plant.trim_alpha_rad, qhat, surface - plant.trim_elevator_rad])
-        lift = per_record[PerRecord.trim.start] + common[Common.lift] @ states
-        moment = per_record[PerRecord.offsets.stop - 1] + common[Common.moment] @ states
+        lift = per_record[SHORT_PERIOD.per_record.trim.start] + common[LONGITUDINAL.row("CL")] @ states
+        moment = (
+            per_record[SHORT_PERIOD.per_record.offsets.stop - 1] + common[LONGITUDINAL.row("Cm")] @ states
+        )
         fz -= qbar * c.wing_area_m2 * lift
         fm += (
             qbar * c.wing_area_m2 * c.chord_m * moment
@@ -101,14 +104,15 @@ def test_nonlinear_free_run_against_dop853(bolted):
     solved = solve_ivp(
         lambda t, x: rates(t, x)[0],
         (0.0, end),
-        per_record[PerRecord.motion_start],
+        per_record[SHORT_PERIOD.per_record.motion_start],
         "DOP853",
         t,
         rtol=1e-12,
         atol=1e-14,
     )
     expected = (
-        np.array([rates(s, x)[1] for s, x in zip(t, solved.y.T, strict=True)]) + per_record[PerRecord.bias]
+        np.array([rates(s, x)[1] for s, x in zip(t, solved.y.T, strict=True)])
+        + per_record[SHORT_PERIOD.per_record.bias]
     )
     made = tr.record(
         np.zeros((len(t), 3)), elevator, theta, 16, v=speed, density=density, ground=ground, plant_=plant
@@ -220,7 +224,7 @@ def test_declared_terms_at_one_state():
 def test_spectrum_of_the_gust(rolloff, tolerance):
     """MIL-F-8785C, 3.7.1: Dryden's exactly; von Karman's from 0.5 to 600 rad/s but for the level."""
     common, per_record = tr.still()
-    common[Common.rolloff] = rolloff - 0.5
+    common[SHORT_PERIOD.common.rolloff] = rolloff - 0.5
     length, v = 840.419, tr.V
     model = tr.model(None, common, per_record)
     model = model._replace(gusts=model.gusts._replace(length_m=length))
@@ -254,10 +258,10 @@ def test_spectrum_of_the_gust(rolloff, tolerance):
 def test_common_inertia_leaves_the_linear_model_alone():
     """Its derivatives are those of the pitch acceleration, so that only the tables' curvature sees it."""
     common, per_record = tr.still()
-    common[Common.derivatives] = 0.02 * tr.TRUTH
+    common[SHORT_PERIOD.common.derivatives] = 0.02 * tr.TRUTH
     made = tr.record(np.zeros((len(tr.T), 3)), lambda t: tr.doublet(t, DEG))
     plain = respond(made, tr.SETTINGS, Change(), common, per_record, free_run=True).e
-    common[Common.inertia] = 0.05
+    common[SHORT_PERIOD.common.inertia] = 0.05
     heavy = respond(made, tr.SETTINGS, Change(), common, per_record, free_run=True).e
     tr.close(heavy - heavy[0], plain - plain[0], 1e-9)
 
@@ -267,10 +271,10 @@ def test_common_inertia_is_the_declared_one_s_factor_with_other_derivatives():
     plant = tr.curved()
     made = tr.record(np.zeros((len(tr.T), 3)), lambda t: tr.doublet(t, DEG), plant_=plant)
     common, per_record = tr.still()
-    common[Common.inertia] = 0.05
+    common[SHORT_PERIOD.common.inertia] = 0.05
     found = respond(made, tr.SETTINGS, Change(), common, per_record, free_run=True).e
     by_hand, _ = tr.still()
-    by_hand[Common.moment] = 0.05 * plant.derivatives[Common.moment]
+    by_hand[LONGITUDINAL.row("Cm")] = 0.05 * plant.derivatives[LONGITUDINAL.row("Cm")]
     change = Change(declared=(DeclaredTerm("inertia", 1.05),))
     np.testing.assert_allclose(
         found, respond(made, tr.SETTINGS, change, by_hand, per_record, free_run=True).e, rtol=1e-12
@@ -282,12 +286,16 @@ def test_common_prior_is_what_is_declared():
     plant = tr.plant()
     made = tr.record(np.zeros((len(tr.T), 3)), 0.0, plant_=plant)
     covariance = np.linalg.inv(common_prior([made], tr.SETTINGS))
-    at = Common.inertia
+    at = SHORT_PERIOD.common.inertia
     std = tr.GTM.file.mass.inertia_yy.std / tr.GTM.file.mass.inertia_yy.value
     np.testing.assert_allclose(
-        covariance[Common.derivatives, Common.derivatives], plant.derivative_cov, rtol=1e-9
+        covariance[SHORT_PERIOD.common.derivatives, SHORT_PERIOD.common.derivatives],
+        plant.derivative_cov,
+        rtol=1e-9,
     )
     assert covariance[at, at] == pytest.approx(std**2, rel=1e-9)
     np.testing.assert_allclose(
-        covariance[at, Common.moment], -(std**2) * plant.derivatives[Common.moment], rtol=1e-9
+        covariance[at, LONGITUDINAL.row("Cm")],
+        -(std**2) * plant.derivatives[LONGITUDINAL.row("Cm")],
+        rtol=1e-9,
     )

@@ -12,7 +12,7 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import AeroTerm, Change, ReadingTerm, SensorTerm, StateTerm, SurfaceTerm
 from airtruth.tracing.inference.optimise import initial_parameters
 from airtruth.tracing.model.linearise import gain
-from airtruth.tracing.model.parameters import Common, PerRecord
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.response import LOST, External, filter_inputs, respond
 from airtruth.units import DEG, G0
 
@@ -265,8 +265,8 @@ def test_innovations_are_those_of_the_steady_kalman_filter(shares):
     rng = np.random.default_rng(5)
     made = tr.fly(rng, sigma_w=0.3, amplitude=0.5 * DEG)
     common, per_record = tr.still()
-    per_record[PerRecord.log_gust] = np.log(0.3)
-    common[Common.colour] = [*shares, np.log(0.08 / 0.1)]
+    per_record[SHORT_PERIOD.per_record.log_gust] = np.log(0.3)
+    common[SHORT_PERIOD.common.colour] = [*shares, np.log(0.08 / 0.1)]
     found = respond(made, tr.SETTINGS, Change(), common, per_record)
     a, b, c, d = tr.motion(sigma_w=0.3)
     variance = tr.SETTINGS.noise**2
@@ -333,8 +333,8 @@ def test_innovations_of_a_true_model_are_white_and_of_the_stated_covariance(shar
     """20 records of 200 samples: the mean square of 12 000 whitened values is 1 within 4 sqrt(2/12000)."""
     rng = np.random.default_rng(6)
     common, per_record = tr.still()
-    per_record[PerRecord.log_gust] = np.log(0.3)
-    common[Common.colour] = [share, share, share, np.log(0.08 / 0.1)]
+    per_record[SHORT_PERIOD.per_record.log_gust] = np.log(0.3)
+    common[SHORT_PERIOD.common.colour] = [share, share, share, np.log(0.08 / 0.1)]
     whitened = []
     for _ in range(20):
         made = tr.fly(rng, sigma_w=0.3, amplitude=DEG, slow_share=share)
@@ -352,7 +352,7 @@ def test_a_lost_motion_leaves_no_sample_undefined():
     one = tr.fly(np.random.default_rng(2), amplitude=2.0 * DEG, sigma_w=0.0, name="a")
     problem = tr.problem([one])
     start = initial_parameters(problem, tr.NOTHING)
-    start.common[Common.derivatives] += [0.0, 0.0, 0.0, 0.0, 1e4, 0.0]
+    start.common[SHORT_PERIOD.common.derivatives] += [0.0, 0.0, 0.0, 0.0, 1e4, 0.0]
     runs = [
         respond(one, problem.settings, Change(), start.common, start.per_record[0], free_run=True).e
         for _ in range(2)
@@ -385,8 +385,8 @@ def whitened_az(slope, vane_std_rad, change=None, shown=1.0):
     y[-1, 0] = 1.0 * DEG
     y[-1, 2] += shown * lift * (tr.TRUTH[0] + slope) * 0.5 * DEG
     common, per_record = tr.still()
-    common[Common.rotary] = -0.5
-    per_record[PerRecord.log_gust] = np.log(1.0)
+    common[SHORT_PERIOD.common.rotary] = -0.5
+    per_record[SHORT_PERIOD.per_record.log_gust] = np.log(1.0)
     flown = respond(
         tr.record(y, 0.0, plant_=over_break(slope)), settings, change or Change(), common, per_record
     )
@@ -428,7 +428,7 @@ def test_a_straight_lift_curve_has_the_innovations_of_a_linear_filter():
     y[-1, 0] = 1.0 * DEG
     y[-1, 2] -= 0.5 * tr.DENSITY * tr.V**2 * tr.C.wing_area_m2 / tr.C.mass_kg * tr.TRUTH[0] * DEG
     common, per_record = tr.still()
-    common[Common.rotary] = -0.5
-    per_record[PerRecord.log_gust] = np.log(1.0)
+    common[SHORT_PERIOD.common.rotary] = -0.5
+    per_record[SHORT_PERIOD.per_record.log_gust] = np.log(1.0)
     linear = respond(tr.record(y, 0.0), settings, Change(), common, per_record)
     assert straight == pytest.approx(float((linear.e @ linear.white.T)[-1, 2]), abs=1e-6)

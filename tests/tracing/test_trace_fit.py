@@ -13,14 +13,7 @@ from airtruth.tracing.inference.hypothesis import Hypothesis, unconstrained_by
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import Sensitivities, likelihood_terms, sensitivities_of
 from airtruth.tracing.inference.whitening import NO_WHITENER, Whitener, autoregression
-from airtruth.tracing.model.parameters import (
-    COMMON_STEP,
-    PER_RECORD_STEP,
-    Common,
-    Layout,
-    Parameters,
-    PerRecord,
-)
+from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
 from airtruth.tracing.model.response import respond, respond_to
 from airtruth.tracing.model.settings import common_prior, per_record_prior
 from airtruth.units import DEG
@@ -41,9 +34,9 @@ def off_optimum():
     problem = tr.problem([tr.fly(np.random.default_rng(1), samples=150)], settings=settings)
     point = tr.point(problem.records, [0.012, 0.2])
     common, per_record = point.common.copy(), point.per_record.copy()
-    common[Common.derivatives] = 0.5 * MORE
-    common[Common.log_noise] = [0.05, -0.08, 0.03]
-    common[Common.rotary :] = [0.3, 0.1, -0.2, 0.03, 0.1, 0.2, 0.4, 0.1, -0.3]
+    common[SHORT_PERIOD.common.derivatives] = 0.5 * MORE
+    common[SHORT_PERIOD.common.log_noise] = [0.05, -0.08, 0.03]
+    common[SHORT_PERIOD.common.rotary :] = [0.3, 0.1, -0.2, 0.03, 0.1, 0.2, 0.4, 0.1, -0.3]
     per_record[0] += [0.001, 0.01, 0.3, -0.2, 0.002, 0.003, 0.02, 0.003, -0.0004, 0.2]
     return problem, Parameters(common, per_record, point.sizes)
 
@@ -58,8 +51,8 @@ def test_derivatives_in_levels_can_be_left_out(off_optimum):
     problem, point = off_optimum
     every = sensitivities_of(problem, 0, TWO, point)
     without = sensitivities_of(problem, 0, TWO, point, with_levels=False)
-    layout = Layout(len(point.sizes))
-    levels = [*Common.noise, layout.per_record.start + PerRecord.log_gust]
+    layout = point.layout
+    levels = [*SHORT_PERIOD.common.noise, layout.per_record.start + SHORT_PERIOD.per_record.log_gust]
     rest = np.setdiff1d(np.arange(layout.total), levels)
     assert np.abs(every.w[levels]).any(axis=(1, 2)).all()
     assert not without.t[levels].any()
@@ -70,22 +63,22 @@ def test_derivatives_in_levels_can_be_left_out(off_optimum):
 
 def moved(point, i, h):
     common, sizes, per_record = point.common.copy(), point.sizes.copy(), point.per_record.copy()
-    if i < Common.size:
+    if i < SHORT_PERIOD.common.size:
         common[i] += h
-    elif i < Common.size + sizes.size:
-        sizes[i - Common.size] += h
+    elif i < SHORT_PERIOD.common.size + sizes.size:
+        sizes[i - SHORT_PERIOD.common.size] += h
     else:
-        per_record[0, i - Common.size - sizes.size] += h
+        per_record[0, i - SHORT_PERIOD.common.size - sizes.size] += h
     return Parameters(common, per_record, sizes)
 
 
 @pytest.mark.grid
-@pytest.mark.parametrize("name", [*Common.names, "delay", "arm", *PerRecord.names])
+@pytest.mark.parametrize("name", [*SHORT_PERIOD.common.names, "delay", "arm", *SHORT_PERIOD.per_record.names])
 def test_gradient_is_that_of_the_likelihood(off_optimum, name):
     """Central differences of the negative log-likelihood itself; the fit's are one-sided, steps as in the model."""
     problem, point = off_optimum
-    names = [*Common.names, "delay", "arm", *PerRecord.names]
-    steps = [*COMMON_STEP, 1e-3, 0.01, *PER_RECORD_STEP]
+    names = [*SHORT_PERIOD.common.names, "delay", "arm", *SHORT_PERIOD.per_record.names]
+    steps = [*SHORT_PERIOD.common.step, 1e-3, 0.01, *SHORT_PERIOD.per_record.step]
     i = names.index(name)
     _, gradient, information = likelihood_terms(
         sensitivities_of(problem, 0, TWO, point), NO_WHITENER, levels=True
@@ -109,8 +102,8 @@ def test_information_is_the_expected_curvature():
     for _ in range(40):
         problem = tr.problem([tr.fly(rng, samples=120, sigma_w=0.3)])
         point = tr.point(problem.records)
-        per_record = np.zeros((1, PerRecord.size))
-        per_record[0, PerRecord.log_gust] = np.log(0.3)
+        per_record = np.zeros((1, SHORT_PERIOD.per_record.size))
+        per_record[0, SHORT_PERIOD.per_record.log_gust] = np.log(0.3)
         made = sensitivities_of(problem, 0, tr.NOTHING, replace(point, per_record=per_record))
         # the first second starts from a gust that the filter does not know
         late = Sensitivities(made.r[25:], made.logdet, made.t[:, 25:], made.w, made.white)
@@ -140,7 +133,7 @@ def recovered(noise, sigma_w, seed, hypothesis=tr.NOTHING, sizes=(), levels=True
     problem = tr.problem(records)
     start = initial_parameters(problem, hypothesis)
     if not levels:
-        start.per_record[:, PerRecord.log_gust] = np.log(0.05)
+        start.per_record[:, SHORT_PERIOD.per_record.log_gust] = np.log(0.05)
     found = fit(problem, hypothesis, replace(start, sizes=np.array(sizes, dtype=float)), free_levels=levels)
     assert found is not None
     assert found.converged
@@ -154,7 +147,7 @@ def test_noise_free_records_give_the_derivatives_back():
     """
     found = recovered(np.zeros(3), 0.0, 3, levels=False)
     error = np.sqrt(np.diag(found.covariance)[:6])
-    assert (np.abs(found.point.common[Common.derivatives] - MORE) < error).all()
+    assert (np.abs(found.point.common[SHORT_PERIOD.common.derivatives] - MORE) < error).all()
     assert (error[3:] < 0.2 * np.abs(MORE[3:])).all()
     np.testing.assert_allclose(found.point.common[[3, 5]], MORE[[3, 5]], rtol=0.05)
 
@@ -163,15 +156,19 @@ def test_noise_free_records_give_the_derivatives_back():
 def test_noisy_records_give_the_derivatives_within_their_errors(seed):
     found = recovered(tr.SETTINGS.noise, 0.3, seed)
     error = np.sqrt(np.diag(found.covariance)[:6])
-    assert (np.abs(found.point.common[Common.derivatives] - MORE) < 3.0 * error).all()
+    assert (np.abs(found.point.common[SHORT_PERIOD.common.derivatives] - MORE) < 3.0 * error).all()
     # three records of 0.3 m/s: the mean log level is within 0.5 (one correlation time is a whole record)
-    assert found.point.per_record[:, PerRecord.log_gust].mean() == pytest.approx(np.log(0.3), abs=0.5)
-    np.testing.assert_allclose(found.point.common[Common.log_noise], 0.0, atol=0.15)
+    assert found.point.per_record[:, SHORT_PERIOD.per_record.log_gust].mean() == pytest.approx(
+        np.log(0.3), abs=0.5
+    )
+    np.testing.assert_allclose(found.point.common[SHORT_PERIOD.common.log_noise], 0.0, atol=0.15)
 
 
 def test_an_effect_that_is_not_there_has_no_size():
     found = recovered(tr.SETTINGS.noise, 0.3, 7, Hypothesis(Change(), (KINK,)), [0.0])
-    assert abs(found.point.sizes[0]) < 3.0 * np.sqrt(found.covariance[Common.size, Common.size])
+    assert abs(found.point.sizes[0]) < 3.0 * np.sqrt(
+        found.covariance[SHORT_PERIOD.common.size, SHORT_PERIOD.common.size]
+    )
 
 
 def test_a_rival_out_of_reach_ends_a_search_early():
@@ -272,10 +269,14 @@ def test_order_of_records_does_not_matter(three):
     error = np.sqrt(np.diag(one.covariance))
     assert again.cost == pytest.approx(one.cost, rel=1e-8)
     np.testing.assert_allclose(
-        again.point.common / error[: Common.size], one.point.common / error[: Common.size], atol=1e-6
+        again.point.common / error[: SHORT_PERIOD.common.size],
+        one.point.common / error[: SHORT_PERIOD.common.size],
+        atol=1e-6,
     )
     np.testing.assert_allclose(
-        again.point.sizes / error[Common.size :], one.point.sizes / error[Common.size :], atol=1e-6
+        again.point.sizes / error[SHORT_PERIOD.common.size :],
+        one.point.sizes / error[SHORT_PERIOD.common.size :],
+        atol=1e-6,
     )
     np.testing.assert_allclose(again.point.per_record, one.point.per_record[order], atol=1e-7)
 
@@ -314,7 +315,10 @@ def test_a_curvature_is_found_whatever_angle_it_is_about(about, slope):
     plant = tr.plant()
     plant = replace(plant, alpha_rad=plant.alpha_rad + 0.1, trim_alpha_rad=0.1)
     common, per_record = tr.still()
-    per_record[PerRecord.alpha], per_record[PerRecord.trim.start] = 0.1, -10.0 * (0.1 - about) ** 2
+    per_record[SHORT_PERIOD.per_record.index("alpha0")], per_record[SHORT_PERIOD.per_record.trim.start] = (
+        0.1,
+        -10.0 * (0.1 - about) ** 2,
+    )
     records = []
     for amplitude in (3.0, -3.0, 2.0):
         made = tr.fly(rng, amplitude=amplitude * DEG, name=str(amplitude))
@@ -333,8 +337,8 @@ def test_a_curvature_is_found_whatever_angle_it_is_about(about, slope):
     null = fit(problem, declared, initial_parameters(problem, declared))
     found = fit(problem, hypothesis, replace(null.point, sizes=np.array([5.0])))
     std = np.sqrt(np.diag(found.covariance))
-    assert abs(found.point.sizes[0] - 10.0) < 3.0 * std[Common.size]
-    assert std[Common.size] < 1.5
+    assert abs(found.point.sizes[0] - 10.0) < 3.0 * std[SHORT_PERIOD.common.size]
+    assert std[SHORT_PERIOD.common.size] < 1.5
     assert abs(found.point.common[0] - slope) < 3.0 * std[0]
 
 
@@ -374,18 +378,18 @@ def test_slow_noise_is_told_from_white(share):
     problem = tr.problem(records, settings=replace(tr.SETTINGS, coloured=True))
     start = initial_parameters(problem, tr.NOTHING)
     common = start.common.copy()
-    common[Common.colour_shares] = 0.2
+    common[SHORT_PERIOD.common.colour_shares] = 0.2
     found = fit(problem, tr.NOTHING, replace(start, common=common))
     std = np.sqrt(np.diag(found.covariance))
-    at = Common.colour_shares
+    at = SHORT_PERIOD.common.colour_shares
     if share == 0.0:
         assert (found.point.common[at] < 0.1).all()
         return
     assert found.converged
     assert (np.abs(found.point.common[at] - share) < 3.0 * std[at]).all()
     assert (
-        abs(found.point.common[Common.log_colour_time] - np.log(0.08 / 0.1))
-        < 3.0 * std[Common.log_colour_time]
+        abs(found.point.common[SHORT_PERIOD.common.log_colour_time] - np.log(0.08 / 0.1))
+        < 3.0 * std[SHORT_PERIOD.common.log_colour_time]
     )
     assert (std[at] < 0.2).all()
 
@@ -394,8 +398,8 @@ def test_white_records_know_no_slow_noise():
     """Its shares are no parameters then: they stay at none, and no derivative is made for them."""
     problem = tr.problem([tr.fly(np.random.default_rng(84))])
     found = fit(problem, tr.NOTHING, initial_parameters(problem, tr.NOTHING))
-    np.testing.assert_array_equal(found.point.common[Common.colour], 0.0)
-    np.testing.assert_array_equal(found.sensitivities[0].t[Common.colour], 0.0)
+    np.testing.assert_array_equal(found.point.common[SHORT_PERIOD.common.colour], 0.0)
+    np.testing.assert_array_equal(found.sensitivities[0].t[SHORT_PERIOD.common.colour], 0.0)
 
 
 def test_a_step_from_which_the_motion_diverges_has_no_derivative(monkeypatch):

@@ -16,7 +16,7 @@ from airtruth.tracing.inference.cross_validate import leave_one_out, one_by_the_
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.model.compile import compile_change
-from airtruth.tracing.model.parameters import Common, PerRecord
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.response import respond
 from airtruth.tracing.selection import acceptance
 from airtruth.units import DEG
@@ -107,7 +107,7 @@ def test_records_left_out_fit_worse_than_records_fitted(fitted):
         for i in range(len(problem.records))
     ]
     loss = likelihood.sum() - np.sum(inside)
-    assert 0.0 < loss < 3.0 * (Common.size + 1)
+    assert 0.0 < loss < 3.0 * (SHORT_PERIOD.common.size + 1)
 
 
 def test_assess_changes_nothing_that_it_is_given(fitted):
@@ -139,13 +139,13 @@ def test_a_model_that_flies_badly_is_assessed_at_its_best(fitted, level_m_s):
     """Half of the static stability is missing: the record needs strong gusts, from wherever the search begins."""
     problem, found = fitted
     common = found.point.common.copy()
-    common[Common.Cmalpha] += 0.9
+    common[SHORT_PERIOD.common.index("Cmalpha")] += 0.9
     begin = found.point.per_record[0].copy()
-    begin[PerRecord.log_gust] = np.log(level_m_s)
+    begin[SHORT_PERIOD.per_record.log_gust] = np.log(level_m_s)
     near = assess(problem, 0, ONE, common, found.point.sizes, begin)
     far = assess(problem, 0, ONE, common, found.point.sizes)
     assert far.likelihood == pytest.approx(near.likelihood, abs=0.5)
-    assert near.per_record[PerRecord.log_gust] > np.log(0.3)
+    assert near.per_record[SHORT_PERIOD.per_record.log_gust] > np.log(0.3)
 
 
 def test_a_free_run_without_slopes_ends_where_it_began(fitted, monkeypatch):
@@ -180,13 +180,13 @@ def test_free_run_of_a_clean_record_has_no_error():
     """Initial state, biases and trim coefficients are free, and there is nothing else in the record."""
     blank = tr.record(np.zeros((200, 3)), lambda t: tr.doublet(t))
     common, per_record = tr.still()
-    per_record[PerRecord.motion_start], per_record[PerRecord.offsets] = (
+    per_record[SHORT_PERIOD.per_record.motion_start], per_record[SHORT_PERIOD.per_record.offsets] = (
         [0.01, 0.02],
         [0.002, 0.003, 0.05, 0.01, -0.002],
     )
     y = -respond(blank, tr.SETTINGS, Change(), common, per_record, free_run=True).e
     problem = tr.problem([replace(blank, signals=replace(blank.signals, y=y))])
-    found = assess(problem, 0, tr.NOTHING, np.zeros(Common.size), np.zeros(0))
+    found = assess(problem, 0, tr.NOTHING, np.zeros(SHORT_PERIOD.common.size), np.zeros(0))
     assert (found.free_run < 0.05 * tr.SETTINGS.noise).all()
 
 
@@ -196,7 +196,7 @@ def test_floor_is_the_standard_deviation_of_the_gust_response(sigma_w):
     made = tr.fly(np.random.default_rng(31), sigma_w=sigma_w, samples=100)
     problem = tr.problem([made])
     common, per_record = tr.still()
-    per_record[PerRecord.log_gust] = np.log(sigma_w)
+    per_record[SHORT_PERIOD.per_record.log_gust] = np.log(sigma_w)
     found = noise_floor(made, problem.settings, compile_change(Change()), common, per_record)
     a, _, c, _ = tr.motion(sigma_w=sigma_w)
     drive = np.diag([0.0, 0.0, 2.0 * tr.V / tr.LENGTH_W, *np.zeros(5)])

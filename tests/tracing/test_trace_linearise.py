@@ -9,7 +9,7 @@ from scipy.linalg import block_diag, expm, solve_discrete_are
 
 from airtruth.tracing.model.kernel_input import AirPoint
 from airtruth.tracing.model.linearise import delay_system, gain, linearise, process_intensity
-from airtruth.tracing.model.parameters import CORE, DELAY_ORDER, PerRecord, state_layout
+from airtruth.tracing.model.parameters import CORE, DELAY_ORDER, SHORT_PERIOD, state_layout
 
 WHITE = np.array([0.0, 0.0, 0.0, 0.1])
 SLOW = np.array([0.7 * tr.SETTINGS.noise[0], 0.0, 0.5 * tr.SETTINGS.noise[2], 0.08])
@@ -19,7 +19,7 @@ SLOW = np.array([0.7 * tr.SETTINGS.noise[0], 0.0, 0.5 * tr.SETTINGS.noise[2], 0.
 def linearised(lags=None, sigma_w=0.3, delays=None, colour=WHITE):
     """A, C and the model about the trim."""
     _, per_record = tr.still()
-    per_record[PerRecord.log_gust] = np.log(sigma_w)
+    per_record[SHORT_PERIOD.per_record.log_gust] = np.log(sigma_w)
     model = tr.model(None, None, per_record)
     lags = np.zeros(3) if lags is None else lags
     delays = np.zeros(3) if delays is None else delays

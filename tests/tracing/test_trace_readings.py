@@ -15,7 +15,7 @@ from airtruth.physics.terms import Change, ReadingTerm, StateTerm
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.compensate import Compensation, Condition, compensated_log
 from airtruth.tracing.inference.optimise import initial_parameters
-from airtruth.tracing.model.parameters import PerRecord
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.records import FINE
 from airtruth.tracing.model.response import respond
 from airtruth.units import DEG, KT
@@ -34,7 +34,7 @@ BENDING = Change(
 def read(problem, change):
     """Innovations of the first record in calm air, where the filter does not correct its motion."""
     start = initial_parameters(problem, tr.NOTHING)
-    start.per_record[0, PerRecord.log_gust] = np.log(1e-6)
+    start.per_record[0, SHORT_PERIOD.per_record.log_gust] = np.log(1e-6)
     return respond(problem.records[0], problem.settings, change, start.common, start.per_record[0]).e
 
 
@@ -66,7 +66,7 @@ def test_the_filter_changes_the_lag_of_the_vane_with_the_dynamic_pressure():
     )
     change = increment(shape).describe({"bend_1": -0.2, "bend_2": 0.0, "bend_3": -0.1})
     start = initial_parameters(problem, tr.NOTHING)
-    start.per_record[0, PerRecord.log_gust] = np.log(1e-6)
+    start.per_record[0, SHORT_PERIOD.per_record.log_gust] = np.log(1e-6)
     alpha = s.y[:, 0] - respond(one, problem.settings, Change(), start.common, start.per_record[0]).e[:, 0]
     truth = {
         "alpha_rad": alpha[None, :],

@@ -11,7 +11,7 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import likelihood_terms, marginal_information
 from airtruth.tracing.inference.robust import MEMORY_S, inflation, long_run, mean_share, scatter
-from airtruth.tracing.model.parameters import Common, PerRecord
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.settings import common_prior, per_record_prior
 
 pytestmark = pytest.mark.slow
@@ -38,18 +38,21 @@ def fitted(seed, amount):
 
 def whole(p, found):
     """The same ratio from the matrix of all parameters, nothing eliminated."""
-    m, n = Common.size + 1, len(p.records)
-    slopes, information = [], np.zeros((m + n * PerRecord.size, m + n * PerRecord.size))
-    information[: Common.size, : Common.size] = common_prior(p.records, p.settings)
+    m, n = SHORT_PERIOD.common.size + 1, len(p.records)
+    slopes, information = (
+        [],
+        np.zeros((m + n * SHORT_PERIOD.per_record.size, m + n * SHORT_PERIOD.per_record.size)),
+    )
+    information[: SHORT_PERIOD.common.size, : SHORT_PERIOD.common.size] = common_prior(p.records, p.settings)
     middle = information.copy()
     for i, (record, t) in enumerate(zip(p.records, found.sensitivities, strict=True)):
         _, _, h = likelihood_terms(t, found.whitener, levels=True)
-        at = np.r_[:m, m + i * PerRecord.size : m + (i + 1) * PerRecord.size]
+        at = np.r_[:m, m + i * SHORT_PERIOD.per_record.size : m + (i + 1) * SHORT_PERIOD.per_record.size]
         prior = per_record_prior(record, p.settings)[1]
         information[np.ix_(at, at)] += h + block_diag(np.zeros((m, m)), prior)
         rows = np.array([[float(np.sum(a * r)) for a in t.t[:, k]] for k, r in enumerate(t.r)])
         rows += 0.5 * np.array([[np.trace(w) - r @ w @ r for w in t.w] for r in t.r])
-        full = np.zeros((len(rows), m + n * PerRecord.size))
+        full = np.zeros((len(rows), m + n * SHORT_PERIOD.per_record.size))
         full[:, at] = rows - rows.mean(axis=0)
         slopes.append(full)
     for record, x in zip(p.records, slopes, strict=True):
@@ -91,8 +94,8 @@ def test_long_run_variance_by_hand():
 
 
 def test_slow_noise_widens_and_white_noise_hardly_does():
-    white = [inflation(*fitted(seed, 0.0))[Common.size] for seed in range(4)]
-    slow = [inflation(*fitted(seed, 4.0))[Common.size] for seed in range(4)]
+    white = [inflation(*fitted(seed, 0.0))[SHORT_PERIOD.common.size] for seed in range(4)]
+    slow = [inflation(*fitted(seed, 4.0))[SHORT_PERIOD.common.size] for seed in range(4)]
     assert np.mean(white) < 1.1
     assert np.mean(slow) > 1.15
 
@@ -109,7 +112,7 @@ def test_records_that_disagree_widen():
     for records in (alike, [other, *alike[1:]]):
         p = problem(records)
         found = fit(p, HYPOTHESIS, initial_parameters(p, HYPOTHESIS))
-        ratios.append(scatter(p, found)[Common.size])
+        ratios.append(scatter(p, found)[SHORT_PERIOD.common.size])
     assert ratios[0] < 2.0
     assert ratios[1] > 1.2 * ratios[0]
 
@@ -119,12 +122,12 @@ def test_scatter_by_hand():
     rng = np.random.default_rng(5)
     p = problem([fly(rng, samples=200, amplitude=a, name=f"r{a}") for a in (0.035, -0.035, 0.03)])
     found = fit(p, HYPOTHESIS, initial_parameters(p, HYPOTHESIS))
-    m = Common.size + 1
+    m = SHORT_PERIOD.common.size + 1
     gradients = np.array(
         [-likelihood_terms(t, found.whitener, levels=True)[1][:m] for t in found.sensitivities]
     )
     middle = 3.0 * np.cov(gradients.T)
-    middle[: Common.size, : Common.size] += common_prior(p.records, p.settings)
+    middle[: SHORT_PERIOD.common.size, : SHORT_PERIOD.common.size] += common_prior(p.records, p.settings)
     pieces = [likelihood_terms(t, found.whitener, levels=True) for t in found.sensitivities]
     inverse = np.linalg.inv(
         marginal_information(p.priors(found.hypothesis), found.point, pieces, levels=True).information

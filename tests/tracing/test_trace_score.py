@@ -11,7 +11,7 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import AeroTerm, Change
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.whitening import NO_WHITENER, autoregression
-from airtruth.tracing.model.parameters import PerRecord
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.response import respond
 from airtruth.tracing.selection.score_test import directions, holm, table
 from airtruth.units import DEG
@@ -247,7 +247,10 @@ def test_the_score_of_a_curvature_is_that_of_a_refit_beside_a_free_slope():
     plant = tr.plant()
     plant = replace(plant, alpha_rad=plant.alpha_rad + 0.1, trim_alpha_rad=0.1)
     common, per_record = tr.still()
-    per_record[PerRecord.alpha], per_record[PerRecord.trim.start] = 0.1, -0.07
+    per_record[SHORT_PERIOD.per_record.index("alpha0")], per_record[SHORT_PERIOD.per_record.trim.start] = (
+        0.1,
+        -0.07,
+    )
     made = tr.fly(rng, amplitude=1.5 * DEG)
     made = replace(
         made, signals=replace(made.signals, theta_rad=np.full_like(made.signals.theta_rad, 0.1)), plant=plant

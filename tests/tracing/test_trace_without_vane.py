@@ -13,7 +13,7 @@ from airtruth.physics.reconstruction import COLUMNS
 from airtruth.physics.terms import Change
 from airtruth.tracing import trace
 from airtruth.tracing.model.linearise import discrete, process_intensity
-from airtruth.tracing.model.parameters import Common, PerRecord
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.response import filter_inputs, kernel_input, respond
 from airtruth.tracing.model.settings import declared_change, initial_per_record, settings_of
 from airtruth.tracing.model.steady import linearise_at_reference
@@ -35,8 +35,8 @@ def noisy(seed):
 
 def own_of(one):
     own = initial_per_record(one, WITHOUT)
-    own[PerRecord.alpha] = 0.0
-    own[PerRecord.log_gust] = np.log(0.3)
+    own[SHORT_PERIOD.per_record.index("alpha0")] = 0.0
+    own[SHORT_PERIOD.per_record.log_gust] = np.log(0.3)
     return own
 
 
@@ -51,8 +51,8 @@ def test_the_filter_is_that_of_two_outputs():
     """Innovations of q and az have the covariance C P C' + R of the Kalman filter whose outputs are these two (SciPy)."""
     one = noisy(1)
     own = own_of(one)
-    made = respond(one, WITHOUT, Change(), np.zeros(Common.size), own)
-    kernel = kernel_input(filter_inputs(one, Change()), WITHOUT, np.zeros(Common.size), own)
+    made = respond(one, WITHOUT, Change(), np.zeros(SHORT_PERIOD.common.size), own)
+    kernel = kernel_input(filter_inputs(one, Change()), WITHOUT, np.zeros(SHORT_PERIOD.common.size), own)
     n = kernel.model.states.size
     a, c = np.empty((n, n)), np.empty((3, n))
     linearise_at_reference(kernel, a, c)
@@ -72,7 +72,9 @@ def test_a_reconstructed_alpha_has_no_say():
     another = 0.1 * np.sin(np.arange(150))
     other.signals.y[:, 0] = another - another.mean() + one.signals.y[:, 0].mean()
     own = own_of(one)
-    first, second = (respond(r, WITHOUT, Change(), np.zeros(Common.size), own) for r in (one, other))
+    first, second = (
+        respond(r, WITHOUT, Change(), np.zeros(SHORT_PERIOD.common.size), own) for r in (one, other)
+    )
     moved = (second.e - first.e)[:, 1:] / SETTINGS.noise[1:]
     assert np.abs(moved).max() < 1e-6
     whitened = second.e @ second.white.T

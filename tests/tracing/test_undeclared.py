@@ -81,7 +81,8 @@ def test_the_declared_aircraft_lacks_nothing(answers):
     for name in nothing:
         assert answers[name]["verdict"] == "none"
         assert answers[name]["effects"] == []
-        assert answers[name]["updated_aircraft"] is None
+        assert answers[name]["refined"]
+        assert answers[name]["updated_aircraft"] is not None
 
 
 def test_what_the_library_does_not_hold_is_not_called_known_without_reserve(answers):

@@ -13,7 +13,7 @@ from airtruth.physics import short_period
 from airtruth.physics.terms import Change
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.model.parameters import Common, Parameters, PerRecord
+from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
 from airtruth.tracing.model.plant import linear
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord
 from airtruth.tracing.model.response import filter_inputs, filter_model, respond
@@ -212,9 +212,9 @@ NOTHING = Hypothesis(Change())
 
 def still():
     """Shared and local parameters at zero, gusts next to none."""
-    local = np.zeros(PerRecord.size)
-    local[PerRecord.log_gust] = -30.0
-    return np.zeros(Common.size), local
+    local = np.zeros(SHORT_PERIOD.per_record.size)
+    local[SHORT_PERIOD.per_record.log_gust] = -30.0
+    return np.zeros(SHORT_PERIOD.common.size), local
 
 
 def model(change=None, common=None, per_record=None, plant_=None, settings=SETTINGS):
@@ -229,7 +229,7 @@ def model(change=None, common=None, per_record=None, plant_=None, settings=SETTI
 def point(records, sizes=(), settings=SETTINGS):
     """Where a search begins."""
     return Parameters(
-        np.zeros(Common.size),
+        np.zeros(SHORT_PERIOD.common.size),
         np.stack([initial_per_record(r, settings) for r in records]),
         np.array(sizes, dtype=float),
     )

@@ -15,8 +15,9 @@ import numpy as np
 
 from airtruth.aircraft.create import write_new
 from airtruth.aircraft.dynamics import ALPHA_DOT, declared_dynamics
-from airtruth.aircraft.file import Aircraft
+from airtruth.aircraft.file import FILE, Aircraft
 from airtruth.aircraft.jsbsim.short_period import TrimPoint
+from airtruth.aircraft.origin import UNKNOWN, Origin
 from airtruth.aircraft.write import changed
 from airtruth.physics.terms import Change, declared_total, term_value
 from airtruth.quantity import Quantity
@@ -64,6 +65,7 @@ def write_corrected(
     change: Change,
     out_folder: Path,
     note: str = "",
+    origin: Origin = UNKNOWN,
 ) -> Aircraft:
     """Write a folder with a generated JSBSim model and aircraft.toml that both hold a change.
 
@@ -75,6 +77,7 @@ def write_corrected(
     change : terms to add, alpha counted from zero; terms in the air are left out.
     out_folder : folder to write, new or empty; the JSBSim model takes its name.
     note : added to the heads of both files.
+    origin : standard deviations and source of the numbers of the change.
 
     Returns
     -------
@@ -96,7 +99,13 @@ def write_corrected(
     with tempfile.TemporaryDirectory() as folder:
         reference = reference_point(aircraft, values, at, whole)
         plain = write_new(static, derivatives, reference, Path(folder) / out_folder.name)
-        return changed(plain, whole, out_folder, note)
+        return changed(plain, whole, out_folder, note, origin=origin, declared=_text(aircraft))
+
+
+def _text(aircraft: Aircraft) -> str | None:
+    """aircraft.toml of the declared aircraft, which the new one changes; None for an aircraft in memory."""
+    path = aircraft.folder / FILE
+    return path.read_bytes().decode() if path.is_file() else None
 
 
 __all__ = ["reference_point", "write_corrected"]

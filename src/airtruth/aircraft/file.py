@@ -33,8 +33,8 @@ class Sensor(Strict):
 
     noise_std: white, one sample to the next [unit of the channel]; bias, quantum, minimum, maximum
     likewise; scale: factor [-]; lag: time constant [s]; delay, hold (sample and hold) [s];
-    x, z: position ahead of and below the CG [m] (vane, accelerometer); alpha_slope: relative change of the airspeed with the
-    angle of attack about its mean [1/rad].
+    x, y, z: position ahead of, right of and below the CG [m] (vane, accelerometer); alpha_slope: relative change of the
+    airspeed with the angle of attack about its mean [1/rad].
     """
 
     noise_std: Quantity = Quantity(value=0.0)
@@ -47,6 +47,7 @@ class Sensor(Strict):
     minimum: Quantity | None = None
     maximum: Quantity | None = None
     x: Quantity = Quantity(value=0.0)
+    y: Quantity = Quantity(value=0.0)
     z: Quantity = Quantity(value=0.0)
     alpha_slope: Quantity = Quantity(value=0.0)
 
@@ -66,7 +67,7 @@ class Sensor(Strict):
 
 
 class Actuator(Strict):
-    """First-order elevator servo; the delay counts from command to surface."""
+    """First-order servo of a control surface; the delay counts from command to surface."""
 
     bandwidth: qt.Frequency
     rate_limit: qt.Rate
@@ -97,15 +98,21 @@ class Geometry(Strict):
 
 
 class MassProperties(Strict):
-    """Mass, pitch inertia about the CG, and CG behind the leading edge of the MAC as a fraction of it."""
+    """Mass, inertias about the CG, and CG behind the leading edge of the MAC as a fraction of it.
+
+    inertia_xx, inertia_zz and inertia_xz, the integral of x z dm, serve the lateral-directional motion.
+    """
 
     mass: qt.Mass
     inertia_yy: qt.Inertia
     cg: qt.Ratio = Quantity(value=0.25)
+    inertia_xx: qt.Inertia | None = None
+    inertia_zz: qt.Inertia | None = None
+    inertia_xz: qt.Inertia | None = None
 
     @model_validator(mode="after")
     def _positive(self) -> MassProperties:
-        qt.require_positive(self, ("mass", "inertia_yy"))
+        qt.require_positive(self, ("mass", "inertia_yy", "inertia_xx", "inertia_zz"))
         return self
 
 
@@ -166,9 +173,11 @@ class Dynamics(Strict):
             for s in self.states
         ]
         for t in self.aero:
+            named.append(("aero: coefficient", t.coefficient, terms.COEFFICIENTS))
             named.append((f"aero {t.coefficient}: signal", t.signal, (*terms.SIGNALS, *states)))
             named.append((f"aero {t.coefficient}: factor", t.factor, ("", *terms.FACTORS)))
         for r in self.readings:
+            named.append(("readings: channel", r.channel, terms.READINGS))
             named.append((f"readings {r.channel}: signal", r.signal, (*terms.MEASURED, *measured)))
             named.append((f"readings {r.channel}: behind", r.behind, ("", *measured)))
         for name, value, allowed in named:
@@ -196,6 +205,8 @@ class AircraftFile(Strict):
     tail: Tail | None = None
     jsbsim: JsbsimModel | None = None
     elevator_actuator: Actuator | None = None
+    aileron_actuator: Actuator | None = None
+    rudder_actuator: Actuator | None = None
     dynamics: Dynamics | None = None
     derivatives: dict[str, qt.Ratio] = Field(default_factory=dict)
     sensors: dict[str, Sensor] = Field(default_factory=dict)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final
 
 from pydantic import ValidationError
 
@@ -11,6 +12,14 @@ from airtruth.aircraft.file import FILE, Aircraft, AircraftFile
 from airtruth.aircraft.probe import Constants, probe
 from airtruth.documents import read_toml
 from airtruth.errors import AircraftError, choices
+
+_AGREE: Final = (
+    "wing_area_m2",
+    "chord_m",
+    "mass_kg",
+    *(f"inertia_{axes}_kg_m2" for axes in ("xx", "yy", "zz", "xz")),
+)
+"""Constants in which aircraft.toml and the JSBSim model have to agree."""
 
 
 def find(name: str | Path, near: Path | None = None) -> Path:
@@ -109,9 +118,13 @@ def _constants(file: AircraftFile, model: Constants | None) -> Constants:
             "inertia_yy_kg_m2": file.mass.inertia_yy.value,
             "cg_fraction": file.mass.cg.value,
         }
+        further = {
+            f"inertia_{axes}_kg_m2": getattr(file.mass, f"inertia_{axes}") for axes in ("xx", "zz", "xz")
+        }
+        base |= {name: stated.value for name, stated in further.items() if stated is not None}
     constants = Constants.model_validate(base)
     if model and (file.geometry or file.mass):
-        for field in ("wing_area_m2", "chord_m", "mass_kg", "inertia_yy_kg_m2"):
+        for field in _AGREE:
             stated, flown = getattr(constants, field), getattr(model, field)
             if abs(stated - flown) > 1e-3 * abs(flown):
                 raise AircraftError(

@@ -7,9 +7,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from airtruth.aircraft import Sensor
+from airtruth.aircraft.origin import UNKNOWN, Origin
 from airtruth.errors import ConfigurationError
+from airtruth.physics.composition import CAUSES
 from airtruth.physics.sensor_errors import KINDS
-from airtruth.physics.terms import CAUSES, DECLARED, Change, SensorTerm, SurfaceTerm
+from airtruth.physics.terms import DECLARED, Change, SensorTerm, SurfaceTerm
 
 
 def effective(change: Change) -> Change:
@@ -40,10 +42,19 @@ def _neutral_surface(term: SurfaceTerm) -> bool:
     return math.isinf(term.value) if term.kind == "rate_limit" else term.value == 0.0
 
 
-def fitted(sensors: Mapping[str, Sensor], terms: Iterable[SensorTerm]) -> dict[str, Sensor]:
+def fitted(
+    sensors: Mapping[str, Sensor], terms: Iterable[SensorTerm], origin: Origin = UNKNOWN
+) -> dict[str, Sensor]:
     """Return the declared sensors with the errors of terms added, see `airtruth.physics.sensor_errors.ErrorKind`.
 
-    A channel without a sensor gets one with these errors alone.
+    A channel without a sensor gets one with these errors alone. The standard deviation of a sum is that of the term, of
+    a product that of the term times the declared factor: the declared error counts as known, as in a trace.
+
+    Parameters
+    ----------
+    sensors : declared sensors by channel.
+    terms : errors to add.
+    origin : source and standard deviations of the terms.
 
     Raises
     ------
@@ -61,6 +72,9 @@ def fitted(sensors: Mapping[str, Sensor], terms: Iterable[SensorTerm]) -> dict[s
                 f"{term.channel}: the total {term.kind} would be {value:g} s and cannot be negative; "
                 f"{declared.value:g} s is declared, so the effect can reduce it by {declared.value:g} s at most"
             )
-        changed = declared.model_copy(update={"value": value})
+        std = origin.std.get(term)
+        if std is not None and kind.is_factor:
+            std *= abs(declared.value)
+        changed = origin.stated(declared, value, std)
         result[term.channel] = sensor.model_copy(update={kind.key: changed})
     return result

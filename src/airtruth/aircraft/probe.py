@@ -18,18 +18,24 @@ from airtruth.isolation.limits import Limits
 from airtruth.isolation.protocol import IsolatedError, Task
 from airtruth.logs.temporary import private_folder, remove
 from airtruth.quantity import Strict
+from airtruth.units import FT, SLUG
 
 _LIMITS: Final = Limits(seconds=60.0, memory_bytes=3_000_000_000)
 """Limits of JSBSim while it loads a model (judgement: far above those of any shipped model, and a user still waits for the
 message)."""
 _MODULES: Final = ("airtruth.aircraft.probe_child", "jsbsim")
 """Modules of the process that loads a model."""
+_WRITTEN: Final = ("six_axes", "rotary_gust", "roll_gust", "yaw_gust")
+"""Entries of the [jsbsim] table with a property that flights write."""
 _OUTPUT_LINES: Final = 6
 """Lines of JSBSim's output that an error quotes [-] (judgement: its own message and what precedes it)."""
 
 
 class Constants(Strict):
-    """Geometry and mass of a model as loaded: S [m2], c and span [m], mass [kg], Iyy [kg m2].
+    """Geometry and mass of a model as loaded: S [m2], c and span [m], mass [kg], inertias about the CG [kg m2].
+
+    inertia_xx_kg_m2, inertia_zz_kg_m2, inertia_xz_kg_m2 are 0 where neither the model nor aircraft.toml states them; Ixz is the
+    integral of x z dm.
 
     cg_fraction is the position of the CG behind the leading edge of the MAC, as a fraction of it; 0.25 for a model
     that does not state it.
@@ -41,6 +47,9 @@ class Constants(Strict):
     mass_kg: float
     inertia_yy_kg_m2: float
     cg_fraction: float = 0.25
+    inertia_xx_kg_m2: float = 0.0
+    inertia_zz_kg_m2: float = 0.0
+    inertia_xz_kg_m2: float = 0.0
 
 
 def probe(folder: Path, jsbsim_json: str) -> Constants:
@@ -100,6 +109,8 @@ def _explain(error: IsolatedError, output: Path) -> str:
 def _refuse_control(folder: Path, table: dict[str, Any]) -> None:
     names = [*table["set"], *table["declare"], table["elevator"]["command"], *table["throttle"]["command"]]
     names += (table["lateral"] or {}).values()
+    names += [table[name]["command"] for name in ("aileron", "rudder") if table[name]]
+    names += [table[name] for name in _WRITTEN if table[name]]
     for name in filter(controls_simulation, names):
         raise AircraftError(
             f"{folder}: [jsbsim] writes {name}: an aircraft must not stop, trim, rewind or re-time the simulation; "
@@ -128,6 +139,20 @@ def model_file(folder: Path, root: str, model: str) -> Path:
     if root == "." and own.is_file():
         return own
     return model_root(folder, root)[1] / model / f"{model}.xml"
+
+
+def constants_of(fdm: Any) -> Constants:
+    """Constants of the model that an executive has loaded."""
+    return Constants(
+        wing_area_m2=fdm["metrics/Sw-sqft"] * FT**2,
+        chord_m=fdm["metrics/cbarw-ft"] * FT,
+        span_m=fdm["metrics/bw-ft"] * FT,
+        mass_kg=fdm["inertia/mass-slugs"] * SLUG,
+        inertia_yy_kg_m2=fdm["inertia/iyy-slugs_ft2"] * SLUG * FT**2,
+        inertia_xx_kg_m2=fdm["inertia/ixx-slugs_ft2"] * SLUG * FT**2,
+        inertia_zz_kg_m2=fdm["inertia/izz-slugs_ft2"] * SLUG * FT**2,
+        inertia_xz_kg_m2=-fdm["inertia/ixz-slugs_ft2"] * SLUG * FT**2,  # JSBSim's ixz is -Ixz
+    )
 
 
 def load_model(fdm: Any, folder: Path, root: str, model: str) -> bool:

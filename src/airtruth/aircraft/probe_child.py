@@ -7,10 +7,9 @@ import os
 from pathlib import Path
 from typing import Any
 
-from airtruth.aircraft.probe import load_model, model_file, model_root
+from airtruth.aircraft.probe import constants_of, load_model, model_file, model_root
 from airtruth.errors import choices
 from airtruth.isolation.protocol import Reply
-from airtruth.units import FT, SLUG
 
 
 def load(folder: str, jsbsim_json: str, output: str) -> Reply:
@@ -55,22 +54,16 @@ def _load(folder: Path, table: dict[str, Any]) -> dict[str, Any]:
         fdm.run_ic()
     except (jsbsim.BaseError, RuntimeError, KeyError) as error:
         return {"error": f"JSBSim refused {xml}: {error}"}
-    return {
-        "constants": {
-            "wing_area_m2": fdm["metrics/Sw-sqft"] * FT**2,
-            "chord_m": fdm["metrics/cbarw-ft"] * FT,
-            "span_m": fdm["metrics/bw-ft"] * FT,
-            "mass_kg": fdm["inertia/mass-slugs"] * SLUG,
-            "inertia_yy_kg_m2": fdm["inertia/iyy-slugs_ft2"] * SLUG * FT**2,
-        }
-    }
+    return {"constants": constants_of(fdm).model_dump()}
 
 
 def _named(table: dict[str, Any]) -> list[str]:
     elevator, throttle = table["elevator"], table["throttle"]
     names = [elevator["command"], elevator["surface"], *throttle["command"], *throttle["trim"], *table["set"]]
     names += [*(table["augmentation"] or {}).values(), *(table["lateral"] or {}).values()]
-    return names + ([table["rotary_gust"]] if table["rotary_gust"] else [])
+    for surface in filter(None, (table["aileron"], table["rudder"])):
+        names += [surface["command"], surface["surface"]]
+    return names + [table[key] for key in ("six_axes", "rotary_gust", "roll_gust", "yaw_gust") if table[key]]
 
 
 def _explain_missing(fdm: Any, missing: list[str]) -> str:

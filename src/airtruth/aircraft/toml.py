@@ -21,6 +21,9 @@ _UNITS: Final = {
     "area": "m2",
     "mass": "kg",
     "inertia_yy": "kg_m2",
+    "inertia_xx": "kg_m2",
+    "inertia_zz": "kg_m2",
+    "inertia_xz": "kg_m2",
     "cg": "",
     "bandwidth": "hz",
     "rate_limit": "rad_s",
@@ -53,10 +56,9 @@ def write(file: AircraftFile, heading: str) -> str:
             continue
         if name == "sensors":
             for channel, sensor in table.items():
-                unit = next(iter(UNITS[SIGNALS[channel].dimension]))
-                lines += _table(f"sensors.{channel}", _stated(sensor), _SENSOR_UNITS, unit)
+                lines += _table((name, channel), _stated(sensor))
         elif isinstance(table, Mapping):
-            lines += _table(name, table, {}, "")
+            lines += _table((name,), table)
         elif isinstance(table, Dynamics):
             for key, rows in table:
                 for row in rows:
@@ -65,7 +67,7 @@ def write(file: AircraftFile, heading: str) -> str:
                         *(f"{k} = {toml_value(v)}" for k, v in asdict(row).items()),
                     ]
         else:
-            lines += _table(name, _stated(table), _UNITS, "")
+            lines += _table((name,), _stated(table))
     return "\n".join(lines) + "\n"
 
 
@@ -73,27 +75,46 @@ def _stated(model: Any) -> dict[str, Any]:
     return {k: getattr(model, k) for k in type(model).model_fields if k in model.model_fields_set}
 
 
-def _table(name: str, entries: Mapping[str, Any], units: Mapping[str, str], unit: str) -> list[str]:
-    plain, tables = [f"\n[{name}]"], []
+def unit_of(path: tuple[str | int, ...]) -> str:
+    """SI unit of a quantity.
+
+    Parameters
+    ----------
+    path : its keys from the top of the file.
+
+    Examples
+    --------
+    >>> unit_of(("mass", "inertia_yy")), unit_of(("sensors", "q_rad_s", "bias"))
+    ('kg_m2', 'rad_s')
+    """
+    key = str(path[-1])
+    if path[0] != "sensors":
+        return _UNITS.get(key, "")
+    return _SENSOR_UNITS.get(key, next(iter(UNITS[SIGNALS[str(path[1])].dimension])))
+
+
+def _table(path: tuple[str, ...], entries: Mapping[str, Any]) -> list[str]:
+    plain, tables = [f"\n[{'.'.join(path)}]"], []
     for key, value in entries.items():
         if value is None:
             continue
         if isinstance(value, Quantity):
-            plain.append(f"{key} = {_quantity(value, units.get(key, unit))}")
+            plain.append(f"{key} = {quantity(value, unit_of((*path, key)))}")
         elif isinstance(value, Mapping):
             if value:
                 inner = ", ".join(f"{toml_value(k)} = {toml_value(v)}" for k, v in value.items())
                 plain.append(f"{key} = {{ {inner} }}")
         elif hasattr(value, "model_fields_set"):
-            tables += _table(f"{name}.{key}", _stated(value), units, unit)
+            tables += _table((*path, key), _stated(value))
         else:
             plain.append(f"{key} = {toml_value(value)}")
     return plain + tables
 
 
-def _quantity(quantity: Quantity, unit: str) -> str:
-    parts = [f"value = {quantity.value!r}"]
+def quantity(stated: Quantity, unit: str) -> str:
+    """A quantity as a table in braces, in its SI unit; "" for a ratio."""
+    parts = [f"value = {stated.value!r}"]
     parts += [f"unit = {toml_value(unit)}"] if unit else []
-    parts += [f"std = {quantity.std!r}"] if quantity.std else []
-    parts += [f"source = {toml_value(quantity.source)}"] if quantity.source else []
+    parts += [f"std = {stated.std!r}"] if stated.std else []
+    parts += [f"source = {toml_value(stated.source)}"] if stated.source else []
     return f"{{ {', '.join(parts)} }}"

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
-import xml.etree.ElementTree as ET
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
+from xml.etree.ElementTree import Element, SubElement
 
 from airtruth import aircraft as planes
 from airtruth.aircraft import Aircraft, AircraftFile, JsbsimModel
@@ -19,14 +20,16 @@ from airtruth.aircraft.jsbsim import mass_balance as declared_xml
 from airtruth.aircraft.jsbsim import surface as surface_xml
 from airtruth.aircraft.jsbsim.mass_balance import Masses
 from airtruth.aircraft.neutral import effective, fitted
+from airtruth.aircraft.origin import MARK, UNKNOWN, Origin, Term, number_of
+from airtruth.aircraft.toml_patch import patched
 from airtruth.errors import AircraftError, ConfigurationError, StoreError
 from airtruth.logs import ledger
 from airtruth.logs.atomic import new_folder
 from airtruth.physics.resolution import linear_terms
 from airtruth.physics.terms import AeroTerm, Change, declared_total
 
-MARK: Final = "changed by airtruth"
-"""In the heads of both files of a changed aircraft."""
+_QUANTITIES: Final = {"mass": "mass", "inertia_yy": "inertia", "cg": "cg"}
+"""Entry of [mass] -> quantity of a `DeclaredTerm`."""
 HIGHEST_HZ: Final = 400.0
 """Simulation rate up to which a written delay holds, unless another is asked for [Hz]."""
 
@@ -39,21 +42,24 @@ class Corrections:
     ----------
     increments : name of `airtruth.physics.short_period.PARAMETERS` -> increment [1/rad]; may leave some out.
     alpha_rad, elevator_rad : the trim, where lift and moment stay as they are [rad].
+    std : standard deviations of the increments, of those that have one [1/rad].
     """
 
     increments: Mapping[str, float]
     alpha_rad: float
     elevator_rad: float
+    std: Mapping[str, float] = field(default_factory=dict)
 
-    def terms(self) -> tuple[AeroTerm, ...]:
-        """The increments as terms.
+    def terms(self) -> dict[str, AeroTerm]:
+        """The increments as terms, by the names of the derivatives.
 
         Raises
         ------
         ConfigurationError
             If a name is not a derivative.
         """
-        return linear_terms(self.increments, self.alpha_rad, self.elevator_rad)
+        terms = linear_terms(self.increments, self.alpha_rad, self.elevator_rad)
+        return dict(zip(self.increments, terms, strict=True))
 
 
 def write_aircraft(
@@ -63,8 +69,11 @@ def write_aircraft(
     note: str = "",
     derivatives: Corrections | None = None,
     highest_hz: float = HIGHEST_HZ,
+    origin: Origin = UNKNOWN,
 ) -> Path:
     """Copy an aircraft's folder with a change written in, in its JSBSim model and its aircraft.toml.
+
+    Both files keep every line, comment and unit that the change does not concern.
 
     The copy is complete: models that ship with JSBSim are copied out of its package, with their engines and systems.
     Neutral terms write nothing. Terms in the air do not belong to an aircraft and are left out.
@@ -77,6 +86,7 @@ def write_aircraft(
     note : added to the heads of both files: the reason of the change.
     derivatives : increments of the declared derivatives, to be added as well.
     highest_hz : simulation rate up to which a delay is valid [Hz]; above it the delay is shorter.
+    origin : standard deviations and source of the numbers; both files state them beside each.
 
     Returns
     -------
@@ -91,7 +101,7 @@ def write_aircraft(
     StoreError
         If the folder is not empty or cannot be written.
     """
-    return changed(aircraft, change, out_folder, note, derivatives, highest_hz).folder
+    return changed(aircraft, change, out_folder, note, derivatives, highest_hz, origin).folder
 
 
 def changed(
@@ -101,11 +111,21 @@ def changed(
     note: str = "",
     derivatives: Corrections | None = None,
     highest_hz: float = HIGHEST_HZ,
+    origin: Origin = UNKNOWN,
+    declared: str | None = None,
 ) -> Aircraft:
-    """Write as `write_aircraft`, and return the aircraft, read back and checked."""
+    """Write as `write_aircraft`, and return the aircraft, read back and checked.
+
+    Parameters
+    ----------
+    declared : text of the aircraft.toml to change; None for that in the aircraft's folder.
+    """
     plane = aircraft if isinstance(aircraft, Aircraft) else planes.load(aircraft)
     if derivatives is not None:
-        change = replace(change, aero=change.aero + derivatives.terms())
+        terms = derivatives.terms()
+        change = replace(change, aero=change.aero + tuple(terms.values()))
+        stated: dict[Term, float] = {terms[name]: std for name, std in derivatives.std.items()}
+        origin = replace(origin, std={**origin.std, **stated})
     change = effective(change)
     if change.derivatives:
         raise ConfigurationError(
@@ -119,12 +139,12 @@ def changed(
             "`airtruth aircraft new` writes one"
         )
     require_new(out_folder)
-    heading = _heading(plane, change, note)
+    heading = f"{plane.name}, {MARK}. {note}".rstrip()
     with new_folder(out_folder) as folder:
         if file.jsbsim is not None:
-            _write_model(plane, file.jsbsim, change, folder, heading, highest_hz)
-        text = toml_text.write(_changed_file(plane, change, folder.name), heading)
-        (folder / planes.FILE).write_text(text, encoding="utf-8")
+            _write_model(plane, file.jsbsim, change, folder, heading, highest_hz, origin)
+        text = _aircraft_text(plane, _changed_file(plane, change, folder.name, origin), heading, declared)
+        (folder / planes.FILE).write_bytes(text.encode())
         ledger.add_folder(folder, "aircraft")
     return planes.load(out_folder)
 
@@ -152,22 +172,23 @@ def require_new(folder: Path, *, force: bool = False) -> None:
         raise StoreError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
 
 
-def _heading(plane: Aircraft, change: Change, note: str) -> str:
-    lines = [f"{plane.name}, {MARK}. Every quantity in SI."]
-    lines += [note] if note else []
-    for field in fields(Change):
-        lines += [
-            f"{field.name}: {_entries(term)}" for term in getattr(change, field.name) if field.name != "air"
-        ]
-    return "\n".join(lines)
-
-
-def _entries(term: Any) -> str:
-    return ", ".join(f"{f.name} = {getattr(term, f.name)}" for f in fields(term))
+def _aircraft_text(plane: Aircraft, file: AircraftFile, heading: str, declared: str | None) -> str:
+    """aircraft.toml with the changed content; an aircraft in memory, of no folder, is written whole."""
+    path = plane.folder / planes.FILE
+    head = heading.partition("\n")[0]
+    if declared is None and not path.is_file():
+        return toml_text.write(file, head)
+    return patched(path.read_bytes().decode() if declared is None else declared, file, head)
 
 
 def _write_model(
-    plane: Aircraft, model: JsbsimModel, change: Change, out: Path, heading: str, highest_hz: float
+    plane: Aircraft,
+    model: JsbsimModel,
+    change: Change,
+    out: Path,
+    heading: str,
+    highest_hz: float,
+    origin: Origin,
 ) -> None:
     read = model_files.read(plane.folder, model)
     model_files.copy(read, out)
@@ -177,49 +198,51 @@ def _write_model(
         mass_kg=constants.mass_kg, inertia_kg_m2=constants.inertia_yy_kg_m2, chord_m=constants.chord_m
     )
     declared_xml.write(root, change.declared, masses, where)
-    _write_functions(root, model, change.in_motion, where, highest_hz)
+    _write_functions(root, model, change.in_motion, where, highest_hz, origin)
     if change.in_aircraft or change.readings:
-        _document(root, heading)
+        declared = [f"{t.quantity}: {number_of(t)!r}{origin.words(t)}" for t in change.declared]
+        _document(root, [*heading.splitlines(), *declared])
     model_files.write(read, out / f"{out.name}.xml")
 
 
 def _write_functions(
-    root: ET.Element, model: JsbsimModel, change: Change, where: str, highest_hz: float
+    root: Element, model: JsbsimModel, change: Change, where: str, highest_hz: float, origin: Origin
 ) -> None:
     factor = declared_total(change.declared, "elevator")
-    signals = {name for t in change.aero for name in (t.signal, t.factor)} | {s.signal for s in change.states}
-    surface = bool(change.surface) or factor != 1.0
-    if not surface and not change.aero:
+    moved = bool(change.surface) or factor != 1.0
+    if not moved and not change.aero:
         return
     aerodynamics = root.find("aerodynamics")
     if aerodynamics is None:
         raise AircraftError(f"{where}: the model has no <aerodynamics>")
-    elevator, control = model.elevator, root.find("flight_control")
-    named = surface_xml.names(control, elevator.surface)
+    named = surface_xml.names(root, model.elevator.surface)
+    surface = surface_xml.Surface(named, model.elevator.surface_rad, moved)
     components = surface_xml.Components()
-    if surface or "elevator" in signals:
-        components += surface_xml.chain(named, elevator.surface_rad, change.surface, factor, highest_hz)
-    if surface:
+    if moved:
+        components += surface_xml.chain(surface, change.surface, factor, highest_hz, origin)
         components += surface_xml.redirect(aerodynamics, named, where)
     if change.aero:
         components += aerodynamics_xml.write(
-            aerodynamics, change.aero, change.states, named, elevator.surface_rad, model.rotary_gust, where
+            aerodynamics, change.aero, change.states, surface, model.rotary_gust, origin, where
         )
+    if not components.parts:
+        return
+    control = root.find("flight_control")
     if control is None:
-        control = ET.SubElement(root, "flight_control", {"name": "Effects"})
+        control = SubElement(root, "flight_control", {"name": "Effects"})
     control.extend(surface_xml.channel(components))
 
 
-def _document(root: ET.Element, heading: str) -> None:
+def _document(root: Element, lines: Sequence[str]) -> None:
     header = root.find("fileheader")
     if header is None:
-        header = ET.Element("fileheader")
+        header = Element("fileheader")
         root.insert(0, header)
-    for line in heading.splitlines():
-        ET.SubElement(header, "note").text = line
+    for line in lines:
+        SubElement(header, "note").text = line
 
 
-def _changed_file(plane: Aircraft, change: Change, model_name: str) -> AircraftFile:
+def _changed_file(plane: Aircraft, change: Change, model_name: str, origin: Origin) -> AircraftFile:
     """aircraft.toml of the copy: the model beside it, its mass, inertia and CG, and the sensors."""
     file = plane.file
     updates: dict[str, Any] = {}
@@ -227,22 +250,29 @@ def _changed_file(plane: Aircraft, change: Change, model_name: str) -> AircraftF
     if file.jsbsim is not None:
         updates["jsbsim"] = file.jsbsim.model_copy(update={"model": model_name, "root": "."})
     if file.mass is not None:
-        mass, inertia = declared_total(change.declared, "mass"), declared_total(change.declared, "inertia")
         old = file.mass
-        updates["mass"] = old.model_copy(
-            update={
-                "mass": old.mass.model_copy(update={"value": old.mass.value * mass}),
-                "inertia_yy": old.inertia_yy.model_copy(update={"value": old.inertia_yy.value * inertia}),
-                "cg": old.cg.model_copy(update={"value": old.cg.value + shift}),
-            }
-        )
+        values = {
+            "mass": old.mass.value * declared_total(change.declared, "mass"),
+            "inertia_yy": old.inertia_yy.value * declared_total(change.declared, "inertia"),
+            "cg": old.cg.value + shift,
+        }
+        scales = {"mass": old.mass.value, "inertia_yy": old.inertia_yy.value, "cg": 1.0}
+        moved = {
+            key: origin.stated(getattr(old, key), value, origin.std_of(_QUANTITIES[key], scales[key]))
+            for key, value in values.items()
+            if value != getattr(old, key).value
+        }
+        if moved:
+            updates["mass"] = old.model_copy(update=moved)
     if shift and file.tail is not None and file.tail.arm is not None:
         arm = file.tail.arm
-        shorter = arm.model_copy(update={"value": arm.value - shift * plane.chord_m})
+        std = origin.std_of("cg", plane.chord_m)
+        both = None if std is None else math.hypot(arm.std, std)
+        shorter = origin.stated(arm, arm.value - shift * plane.chord_m, both)
         updates["tail"] = file.tail.model_copy(update={"arm": shorter})
     dynamics = with_change(file.dynamics, change)
     if dynamics is not None:
         updates["dynamics"] = dynamics
     if change.sensors:
-        updates["sensors"] = fitted(file.sensors, change.sensors)
+        updates["sensors"] = fitted(file.sensors, change.sensors, origin)
     return file.model_copy(update=updates)

@@ -7,6 +7,7 @@ SI and radians.
 """
 
 from airtruth.api.campaigns import fly, list_effects, load_aircraft, verify
+from airtruth.api.exports import export
 from airtruth.api.logs import check, find_manoeuvres, import_log, read_log
 from airtruth.api.models import close_loop, identify, report, trace
 from airtruth.api.plans import plan
@@ -14,6 +15,7 @@ from airtruth.api.plans import plan
 __all__ = [
     "check",
     "close_loop",
+    "export",
     "find_manoeuvres",
     "fly",
     "identify",

@@ -166,6 +166,7 @@ def check(
     aircraft: AircraftSource | None = None,
     *,
     run_ids: Collection[str] | None = None,
+    motion: str = "longitudinal",
     force: bool = False,
 ) -> CheckResult:
     """Check the channels of logs against each other: biases, scales, arms, lags, with their uncertainty.
@@ -175,12 +176,14 @@ def check(
     logs : logs of one instrumentation; all their runs are assessed together, with noise of their own.
     aircraft : aircraft whose declared sensor errors are taken as known; None assumes ideal sensors.
     run_ids : runs to use, a string is one of them; None for all.
+    motion : "longitudinal" or "lateral".
     force : continue although a log contradicts physics; the result lists the faults.
 
     Raises
     ------
     LogError
-        If a log breaks the contract or contradicts physics, or no run is long enough and has an elevator that moves.
+        If a log breaks the contract or contradicts physics, lacks a channel of the motion, or no run is long enough and has a
+        control surface that moves.
     AircraftError, StoreError
         If the aircraft or a log cannot be read.
 
@@ -188,8 +191,9 @@ def check(
     --------
     >>> checked = at.check("out/light", "gtm")
     """
-    from airtruth.checks.kinematics import check_logs
+    from airtruth.checks.motions import check_motions
     from airtruth.logs.sources import named_logs
 
     declared = None if aircraft is None else load_aircraft(aircraft)
-    return check_logs(list(named_logs(logs, run_ids=run_ids)), declared, force=force)
+    named = list(named_logs(logs, run_ids=run_ids))
+    return check_motions(named, declared, motion=motion, force=force)[motion]

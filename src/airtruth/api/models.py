@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,20 +23,23 @@ if TYPE_CHECKING:
 def identify(
     logs: Logs,
     aircraft: AircraftSource,
-    methods: Sequence[str | Method] = ("iv-f1",),
+    methods: Sequence[str | Method] | None = None,
     options: Options | None = None,
     *,
+    motion: str | None = None,
     joint: bool = False,
     force: bool = False,
 ) -> IdentificationResult:
-    """Estimate the six short-period derivatives of every run.
+    """Estimate the derivatives of every run: of the short period, of the lateral-directional motion, or both.
 
     Parameters
     ----------
     logs : logs of one aircraft.
     aircraft : aircraft, for its mass, inertia and reference lengths.
-    methods : names of estimators or `airtruth.identification.Method` objects, one or a sequence; see docs/methods.md.
+    methods : names of estimators or `airtruth.identification.Method` objects, one or a sequence; see docs/methods.md. None
+        takes iv-f1, and iv-lowpass for the lateral motion.
     options : choices of the estimators; None for the defaults.
+    motion : "longitudinal" or "lateral"; None for each that the records excite and have the channels for.
     joint : whether all runs share one estimate per method.
     force : continue although a log contradicts physics; the result records the faults.
 
@@ -44,7 +48,8 @@ def identify(
     IdentificationResult
         Its ``to_frame()`` has one row per run and method (per method if ``joint``): run_id, method, converged,
         iterations, for each derivative [1/rad, rates as q c/(2V)], wn_rad_s [rad/s] and zeta [-] the value, NAME_std,
-        NAME_lower and NAME_upper, and status.
+        NAME_lower and NAME_upper, and status. Where both motions are answered it is that of the longitudinal one, and
+        ``motions`` has both by name.
 
     Raises
     ------
@@ -63,11 +68,26 @@ def identify(
     (12, True)
     """
     from airtruth.arguments import require_type
-    from airtruth.identification import identify
+    from airtruth.identification import answers, identify
     from airtruth.identification.options import Options
 
     require_type("options", options, Options, "IdentificationOptions")
-    return identify(logs, load_aircraft(aircraft), methods, options, joint=joint, force=force)
+    declared = load_aircraft(aircraft)
+    asked, notes = answers(logs, declared, methods, motion)
+    first, *others = [
+        identify(
+            logs,
+            declared,
+            one.methods,
+            options,
+            joint=joint,
+            force=force,
+            motion=one.motion,
+            excited=one.excited,
+        )
+        for one in asked
+    ]
+    return replace(first, notes=(*first.notes, *notes), others=tuple(others))
 
 
 def trace(
@@ -142,7 +162,7 @@ def close_loop(
     -------
     LoopResult
         Its ``to_frame()`` has one row per method and derivative [1/rad, rates as q c/(2V)]: declared value, mean
-        and standard error before and after.
+        and standard error before and after, and the same method on simulated records of the same inputs.
 
     Raises
     ------

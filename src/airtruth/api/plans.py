@@ -16,7 +16,11 @@ if TYPE_CHECKING:
 
 @overload
 def plan(
-    campaign: FilePath | Campaign, *, records: int | None = None, pressure: str = "constant"
+    campaign: FilePath | Campaign,
+    *,
+    records: int | None = None,
+    pressure: str = "constant",
+    motion: str | None = None,
 ) -> ForecastResult: ...
 
 
@@ -69,6 +73,7 @@ def plan(
     *,
     records: int | None = None,
     pressure: str = "constant",
+    motion: str | None = None,
     split: Sequence[str] = (),
     derivatives: Sequence[str] = (),
     trace: FilePath | None = None,
@@ -79,8 +84,7 @@ def plan(
     out: FilePath | None = None,
     force: bool = False,
 ) -> ForecastResult | SplitResult | NarrowResult:
-    """Predict the standard errors of a campaign (the Cramer-Rao bound), or compute the flight that separates effects or
-    determines derivatives.
+    """Predict the standard errors of a campaign (Cramer-Rao bound), or compute the flight that answers a question best.
 
     Parameters
     ----------
@@ -89,6 +93,7 @@ def plan(
     records : number of records; None for the campaign's runs, as many as separate the effects with 95 % probability, or 6
         for derivatives and increments.
     pressure : "constant", the airspeed is not an output of the filter, or "measured", it is one.
+    motion : "longitudinal" or "lateral", to predict; None for the first of which the campaign moves a control.
     split : keys of two or more effects to separate.
     derivatives : names of derivatives to determine with the smallest standard errors; a string is one of them.
     trace : folder of a trace, or its trace.json. Without ``split`` and ``derivatives`` its verdict decides: tied effects are
@@ -119,7 +124,7 @@ def plan(
     ((6,), (6,))
     """
     from airtruth.arguments import as_path, names, require_type
-    from airtruth.design import Limits, forecast
+    from airtruth.design import Limits, PlanOptions, forecast
     from airtruth.errors import ConfigurationError
 
     require_type("limits", limits, Limits, "Limits")
@@ -133,16 +138,16 @@ def plan(
             raise ConfigurationError(
                 "plan: aircraft, limits, sizes and out apply to a computed input: state split, derivatives or trace"
             )
-        return forecast(campaign_of(campaign), records, pressure)
-    from airtruth.design import PlanOptions
+        return forecast(campaign_of(campaign), records, pressure, motion=motion)
+    if motion is not None:
+        raise ConfigurationError("plan: motion applies to a predicted accuracy; leave it out")
     from airtruth.design.from_files import Stated, planned_from
 
     options = PlanOptions(limits or Limits(), records, seed)
     source = base_campaign(None if campaign is None else campaign_of(campaign), trace is not None, aircraft)
-    target = None if out is None else as_path("out", out)
-    answer = None if trace is None else as_path("trace", trace)
-    stated = Stated(split, sizes or {}, derivatives, answer)
-    return planned_from(source, stated, aircraft, options, target, force=force)
+    stated = Stated(split, sizes or {}, derivatives, None if trace is None else as_path("trace", trace))
+    to = None if out is None else as_path("out", out)
+    return planned_from(source, stated, aircraft, options, to, force=force)
 
 
 def base_campaign(

@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.channels import LATERAL, SIGNALS
+from airtruth.checks.excitation import turns
 from airtruth.checks.fault import Fault
+from airtruth.checks.rotation import bank_coupling, heading_rate, pitch_coupling, side_gravity, sideslip_turn
 from airtruth.checks.spectra import integral
 from airtruth.logs.flight_log import Batch, FlightLog
 from airtruth.logs.store import STATED_UNITS
+from airtruth.physics.motion import LATERAL as MOTION
 from airtruth.physics.reconstruction import is_reconstructed
 from airtruth.units import G0, UNITS
 
@@ -29,6 +32,8 @@ OTHERS: Final = frozenset(
     }
 )  # fmt: skip
 """Columns that resemble a channel and are none: flaps, the flight path and the position."""
+SIDE: Final = ("beta_rad", "p_rad_s", "r_rad_s", "phi_rad", "psi_rad", "ay_m_s2")
+"""Channels of the lateral motion that move where the aircraft rolls or yaws."""
 ALIKE: Final = 0.84
 """Similarity (`difflib`) above which a column is taken for a misspelt channel; elevator_cmd_rad has 0.89."""
 COPIED: Final = 1e-9
@@ -65,7 +70,8 @@ SPIKE_SHARE: Final = 0.01
 
 def names(log: FlightLog) -> Iterator[Fault]:
     """Columns that resemble a channel that the log lacks."""
-    absent = [name for name in SIGNALS if name not in log.channels and name not in LATERAL]
+    recorded = {"p_rad_s", "r_rad_s"} <= set(log.channels)
+    absent = [n for n in SIGNALS if n not in log.channels and (recorded or n not in LATERAL)]
     for column in log.channels:
         if column in SIGNALS or column.casefold() in OTHERS:
             continue
@@ -169,16 +175,18 @@ def _plain(unit: str) -> str:
 def copies(batch: Batch, aircraft: Aircraft | None, prescribed: bool = False) -> Iterator[tuple[str, str]]:
     """Pairs of channels that hold the same values, up to a factor and a constant, in every run.
 
-    The elevator and its command differ by the declared actuator, unless the surface was prescribed.
+    A surface and its command differ by the declared actuator, unless the surface was prescribed.
     """
-    named = {n: v for n, v in batch.channels.items() if n in SIGNALS and n not in LATERAL}
+    turning = turns(batch.channels, batch.dt_s).all() if "p_rad_s" in batch.channels else False
+    named = {n: v for n, v in batch.channels.items() if n in SIGNALS and (turning or n not in LATERAL)}
     moving = {n: v for n, v in named.items() if (v.std(axis=1) > MOVED).all()}
     actuator = aircraft.file.elevator_actuator if aircraft is not None else None
+    lateral_pairs = [{c.channel, c.command} for c in MOTION.controls]
     for one, other in combinations(moving, 2):
         pair = {one, other}
-        if pair == {"altitude_m", "density_kg_m3"} or (
-            pair == {"elevator_rad", "elevator_command_rad"} and (actuator is None or prescribed)
-        ):
+        if pair == {"altitude_m", "density_kg_m3"} or pair in lateral_pairs:
+            continue
+        if pair == {"elevator_rad", "elevator_command_rad"} and (actuator is None or prescribed):
             continue
         a, b = (moving[n] - moving[n].mean(axis=1, keepdims=True) for n in (one, other))
         product = np.einsum("rn,rn->r", a, b) ** 2
@@ -195,10 +203,23 @@ def constant(batch: Batch) -> Iterator[tuple[str, Bools, float]]:
     ]
     still = {n: np.ptp(c[n], axis=1) == 0.0 for n in judged}
     moving = sum((~still[n]).astype(int) for n in judged if n != "elevator_rad")
+    aside = {"p_rad_s", "r_rad_s"} <= c.keys()
+    turning = turns(c, batch.dt_s) if aside else np.zeros(len(batch.run_ids), dtype=np.bool_)
     for name in judged:
         bad = still[name] & (moving > 0)
+        if name == "elevator_rad":
+            bad &= ~turning  # a manoeuvre of roll or yaw needs none
         if bad.any():
             yield name, np.asarray(bad), float(bad.sum())
+    for name in (n for n in SIDE if n in c and aside):
+        bad = turning & (np.ptp(c[name], axis=1) == 0.0)
+        if bad.any():
+            yield name, np.asarray(bad), float(bad.sum())
+    for control in MOTION.controls:
+        if {control.channel, control.command} <= c.keys():
+            bad = (np.ptp(c[control.channel], axis=1) == 0.0) & (np.ptp(c[control.command], axis=1) > 0.0)
+            if bad.any():
+                yield control.channel, np.asarray(bad), float(bad.sum())
 
 
 def dropouts(batch: Batch) -> Iterator[tuple[str, Bools, int]]:
@@ -207,7 +228,8 @@ def dropouts(batch: Batch) -> Iterator[tuple[str, Bools, int]]:
     A channel that is about zero (a rate) drops out only where it jumps to zero and back: at rest it may be zero, and so may a
     coarse sample on its way from one sign to the other.
     """
-    for name in ("alpha_rad", "q_rad_s", "az_m_s2", "theta_rad", "ax_m_s2", "airspeed_m_s", "density_kg_m3"):
+    pitch = ("alpha_rad", "q_rad_s", "az_m_s2", "theta_rad", "ax_m_s2", "airspeed_m_s", "density_kg_m3")
+    for name in (*pitch, *SIDE):
         x = batch.channels.get(name)
         if x is None:
             continue
@@ -248,7 +270,8 @@ def spikes(batch: Batch) -> Iterator[tuple[str, Bools, int]]:
         return
     from scipy.ndimage import median_filter
 
-    for name in ("alpha_rad", "q_rad_s", "az_m_s2", "theta_rad", "ax_m_s2", "airspeed_m_s", "altitude_m"):
+    pitch = ("alpha_rad", "q_rad_s", "az_m_s2", "theta_rad", "ax_m_s2", "airspeed_m_s", "altitude_m")
+    for name in (*pitch, *SIDE):
         x = batch.channels.get(name)
         if x is None:
             continue
@@ -284,10 +307,12 @@ def frozen(batch: Batch) -> Iterator[tuple[str, Bools, float]]:
 
 def _required(c: Mapping[str, Array], dt_s: float) -> dict[str, Array]:
     """Channels as the others require them, up to a constant and a slope."""
-    result: dict[str, Array] = {}
+    result = _required_aside(c, dt_s)
     if not {"alpha_rad", "q_rad_s", "az_m_s2", "airspeed_m_s"} <= c.keys():
         return result
     turned = integral(c["q_rad_s"], dt_s)
+    if {"phi_rad", "r_rad_s"} <= c.keys():
+        turned = turned + integral(pitch_coupling(c["q_rad_s"], c["r_rad_s"], c["phi_rad"]), dt_s)
     if "theta_rad" in c:
         result["theta_rad"] = turned
         result["q_rad_s"] = np.gradient(c["theta_rad"], dt_s, axis=1)
@@ -298,6 +323,31 @@ def _required(c: Mapping[str, Array], dt_s: float) -> dict[str, Array]:
     result.setdefault("q_rad_s", np.gradient(c["alpha_rad"] - path, dt_s, axis=1))
     slope = np.gradient(c["alpha_rad"], dt_s, axis=1)
     result["az_m_s2"] = c["airspeed_m_s"] * (slope - c["q_rad_s"])
+    return result
+
+
+def _required_aside(c: Mapping[str, Array], dt_s: float) -> dict[str, Array]:
+    """The lateral channels likewise."""
+    result: dict[str, Array] = {}
+    if not {"p_rad_s", "r_rad_s", "airspeed_m_s"} <= c.keys():
+        return result
+    p, r = c["p_rad_s"], c["r_rad_s"]
+    q, phi, theta, alpha = (
+        c.get(n, np.zeros_like(p)) for n in ("q_rad_s", "phi_rad", "theta_rad", "alpha_rad")
+    )
+    roll, yaw = bank_coupling(q, r, phi, theta), heading_rate(q, r, phi, theta)
+    if "phi_rad" in c:
+        result["phi_rad"] = integral(p + roll, dt_s)
+        result["p_rad_s"] = np.gradient(phi, dt_s, axis=1) - roll
+    if "psi_rad" in c:
+        result["psi_rad"] = integral(yaw, dt_s)
+        result["r_rad_s"] = np.gradient(np.unwrap(c["psi_rad"], axis=1), dt_s, axis=1)
+    if "beta_rad" in c and "ay_m_s2" in c and "phi_rad" in c:
+        turn, pull = sideslip_turn(p, r, alpha), side_gravity(theta, phi)
+        result["beta_rad"] = integral(turn + (c["ay_m_s2"] + pull) / c["airspeed_m_s"], dt_s)
+        slope = np.gradient(c["beta_rad"], dt_s, axis=1)
+        result["ay_m_s2"] = c["airspeed_m_s"] * (slope - turn) - pull
+        result.setdefault("r_rad_s", p * np.sin(alpha) + (c["ay_m_s2"] + pull) / c["airspeed_m_s"] - slope)
     return result
 
 

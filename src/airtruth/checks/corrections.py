@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.channels import LATERAL, SIGNALS
+from airtruth.checks.excitation import turned
 from airtruth.checks.relation import ATMOSPHERE_M
+from airtruth.checks.rotation import side_gravity
 from airtruth.checks.stated import Stated
 from airtruth.checks.together import Runs
 from airtruth.physics.atmosphere import density_kg_m3
+from airtruth.physics.motion import MOTIONS
 from airtruth.units import DEG, FT, G0, KT, SLUG, UNITS
 
 Array = NDArray[np.float64]
@@ -108,9 +111,9 @@ def _unit_corrections(name: str, stated: Stated | None) -> Iterator[Correction]:
     own = next(iter(units))
     signed = dimension in _SIGNED
     if signed:
-        yield Correction(
-            (name,), "sign", "opposite sign", _setting(name, stated, sign=True), _scaled(name, -1.0)
-        )
+        sides = name in ("aileron_rad", "aileron_command_rad")
+        words = "opposite sign (left and right mixed up)" if sides else "opposite sign"
+        yield Correction((name,), "sign", words, _setting(name, stated, sign=True), _scaled(name, -1.0))
     taken = own if stated is None else stated.unit
     to_si, taken_words = units.get(taken, (UNITS[dimension].get(taken, 1.0), taken.replace("_", "/")))
     found = [
@@ -167,8 +170,16 @@ _SENSES: Final = (
     ("alpha_rad", "theta_rad", "q_rad_s"),
     ("elevator_rad", "elevator_command_rad"),
     ("az_m_s2", "ax_m_s2"),
+    ("phi_rad", "p_rad_s"),
+    ("psi_rad", "r_rad_s"),
+    ("beta_rad", "ay_m_s2"),
+    ("aileron_rad", "aileron_command_rad"),
+    ("rudder_rad", "rudder_command_rad"),
 )
-"""Groups of channels whose positive sense a recorder may have the other way round: pitch axis, elevator, specific force."""
+"""Groups of channels whose positive sense a recorder may have the other way round: pitch axis, elevator, specific force, roll,
+yaw, side, aileron, rudder."""
+_SURFACES: Final = tuple(n for m in MOTIONS.values() for c in m.controls for n in (c.channel, c.command))
+"""Control surfaces and their commands."""
 
 
 def _shared(names: tuple[str, ...], single: Sequence[Correction]) -> Iterator[Correction]:
@@ -180,7 +191,10 @@ def _shared(names: tuple[str, ...], single: Sequence[Correction]) -> Iterator[Co
     single : corrections of single channels.
     """
     turns = tuple(n for n in names if SIGNALS[n].dimension in ("angle", "angular_rate"))
-    groups = [*(g for k in range(2, len(turns) + 1) for g in combinations(turns, k)), _SENSES[-1]]
+    pitch = tuple(n for n in turns if n not in LATERAL)
+    groups = [*(g for k in range(2, len(pitch) + 1) for g in combinations(pitch, k)), _SENSES[2]]
+    if pitch != turns:
+        groups += _of_all_axes(turns)
     for code, tried in (("unit", groups), ("sign", list(_SENSES))):
         by_mistake: dict[str, dict[str, Correction]] = {}
         for one in single:
@@ -191,6 +205,21 @@ def _shared(names: tuple[str, ...], single: Sequence[Correction]) -> Iterator[Co
                 parts = tuple(of_channel[n] for n in group if n in of_channel)
                 if len(parts) > 1 and (code == "sign" or len(parts) == len(group)):
                     yield _together(parts)
+
+
+def _of_all_axes(turns: tuple[str, ...]) -> list[tuple[str, ...]]:
+    """Groups of angles and rates that one recorder converts, and the specific forces."""
+    side = tuple(n for n in turns if n in LATERAL)
+    rates = tuple(n for n in turns if SIGNALS[n].dimension == "angular_rate")
+    surfaces = tuple(n for n in turns if n in _SURFACES)
+    attitude = tuple(n for n in turns if n in ("phi_rad", "theta_rad", "psi_rad"))
+    angles = tuple(n for n in turns if n not in rates)
+    motion = tuple(n for n in turns if n not in surfaces)
+    found = [turns, angles, motion, rates, surfaces, attitude, ("az_m_s2", "ax_m_s2", "ay_m_s2")]
+    found += [
+        tuple(n for n in group if n in side) for group in (turns, angles, motion, rates, surfaces, attitude)
+    ]
+    return [*dict.fromkeys(found)]
 
 
 def _together(parts: tuple[Correction, ...]) -> Correction:
@@ -208,6 +237,8 @@ def _together(parts: tuple[Correction, ...]) -> Correction:
 def _gravity(c: Channels, name: str) -> Array:
     """Share of gravity in an accelerometer that an acceleration without gravity lacks [m/s2]."""
     theta = c.get("theta_rad", np.zeros_like(c[name]))
+    if name == "ay_m_s2":
+        return -side_gravity(theta, c.get("phi_rad", np.zeros_like(c[name])))
     return -G0 * np.cos(theta) if name == "az_m_s2" else G0 * np.sin(theta)
 
 
@@ -249,6 +280,8 @@ def _swaps(names: tuple[str, ...]) -> Iterator[Correction]:
     for one, other in combinations(names, 2):
         if (one in _STATE_OF_FLIGHT) != (other in _STATE_OF_FLIGHT):
             continue
+        if (one in LATERAL) != (other in LATERAL) and SIGNALS[one].dimension != SIGNALS[other].dimension:
+            continue
         yield Correction(
             (one, other),
             "swapped",
@@ -265,16 +298,15 @@ def _standard(c: Channels) -> Array:
 
 def _lags(names: tuple[str, ...]) -> Iterator[Correction]:
     """Lags of a slow vane: without them its weak response passes for a wrong airspeed."""
-    if "alpha_rad" not in names:
-        return
-    for lag in LAGS_S:
+    vanes = [n for n in ("alpha_rad", "beta_rad") if n in names]
+    for name, lag in product(vanes, LAGS_S):
         yield Correction(
-            ("alpha_rad",),
+            (name,),
             "lag",
             f"about {lag:g} s late",
             "`airtruth check` measures the lag; declare it under [sensors] of the aircraft",
-            lambda c, dt_s, lag=lag: {  # type: ignore[misc]
-                "alpha_rad": c["alpha_rad"] + lag * np.gradient(c["alpha_rad"], dt_s, axis=1)
+            lambda c, dt_s, n=name, lag=lag: {  # type: ignore[misc]
+                n: c[n] + lag * np.gradient(c[n], dt_s, axis=1)
             },
             2.0,
             True,
@@ -309,14 +341,15 @@ def catalogue(runs: Runs, stated: Mapping[str, Stated] | None = None) -> list[Co
     stated : what the mapping states of the channels: a mistake is a difference from that. Empty if no mapping is known.
     """
     stated = stated or {}
-    names = tuple(name for name in runs.channels if name in SIGNALS and name not in LATERAL)
+    turning = turned(runs)
+    names = tuple(name for name in runs.channels if name in SIGNALS and (turning or name not in LATERAL))
     result: list[Correction] = []
     for name in names:
         if SIGNALS[name].dimension in _UNITS:
             result += _unit_corrections(name, stated.get(name))
         if SIGNALS[name].dimension == "acceleration":
             result += _gravity_corrections(name)
-        if name in _SENSES[1]:
+        if name in _SURFACES:
             result += _pulses(name, runs, stated.get(name))
     return [*result, *_shared(names, result), *_scales(names), *_swaps(names), *_lags(names)]
 

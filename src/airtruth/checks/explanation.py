@@ -22,10 +22,12 @@ from numpy.typing import NDArray
 from airtruth.aircraft import Aircraft
 from airtruth.checks.corrections import Correction, catalogue
 from airtruth.checks.evidence import relations
+from airtruth.checks.excitation import turned
 from airtruth.checks.means import LIMITS, ranges
 from airtruth.checks.relation import Relation
 from airtruth.checks.stated import Stated
 from airtruth.checks.together import Runs
+from airtruth.physics.motion import MOTIONS
 
 Array = NDArray[np.float64]
 
@@ -33,6 +35,8 @@ SUSPECT: Final = 9.0
 """Sum of squared distances above which corrections are tried; the clean logs of the tests are mostly below it."""
 GAIN: Final = 7.0
 """Least decrease of the sum for a certain mistake: a likelihood ratio of exp(3.5)."""
+PASSED: Final = 1.0
+"""Squared distance up to which a test has passed: one standard deviation."""
 REST: Final = 0.4
 """Largest share of the sum that a certain mistake may leave."""
 PARTIAL: Final = 6.0
@@ -132,9 +136,16 @@ def _trials(
     stated: Mapping[str, Stated],
     made: Sequence[Correction] = (),
 ) -> list[Trial]:
-    """Every correction that may be made beside those that were made already."""
+    """Every correction that may be made beside those that were made already.
+
+    Of a record in all axes those with a channel that no failed test has are left out: they are many.
+    """
     found = []
+    failing = {n for t in results if np.max(t.distance) > PASSED for n in t.channels}
+    everything = not turned(runs)
     for correction in catalogue(runs, stated):
+        if not everything and not failing.issuperset(correction.channels):
+            continue
         if any(_excludes(one, correction) for one in made):
             continue
         changed = runs.changed(correction.apply)
@@ -213,10 +224,9 @@ def odd_ones(
 
 def _stills(changed: Runs, correction: Correction) -> bool:
     """Whether a correction makes a surface too small to have moved the aircraft."""
-    name = "elevator_rad"
-    if name not in correction.channels:
-        return False
-    return float(changed.each(lambda c, dt_s: np.ptp(c[name], axis=1)).max()) < LEAST_INPUT_RAD
+    surfaces = [c.channel for m in MOTIONS.values() for c in m.controls if c.channel in correction.channels]
+    ranges_rad = [changed.each(lambda c, dt_s, n=n: np.ptp(c[n], axis=1)).max() for n in surfaces]  # type: ignore[misc]
+    return any(float(x) < LEAST_INPUT_RAD for x in ranges_rad)
 
 
 def _leaves(changed: Runs, correction: Correction, results: Sequence[Relation]) -> bool:

@@ -13,14 +13,14 @@ from airtruth.aircraft import Aircraft
 from airtruth.channels import REQUIRED
 from airtruth.checks import poor
 from airtruth.checks.gate import admit
-from airtruth.checks.kinematics_average import averaged
-from airtruth.checks.kinematics_bias import FIELDS, mean_of, ramps, ramps_of, rms
+from airtruth.checks.kinematics_bias import rms
+from airtruth.checks.kinematics_findings import bias_of, cause_of, drift, errors_of
 from airtruth.checks.kinematics_fit import limits_of, problem_of
-from airtruth.checks.kinematics_model import ERRORS, Record, thinned
-from airtruth.checks.kinematics_search import Search, completed, price, search
+from airtruth.checks.kinematics_model import ERRORS, LONGITUDINAL, Record, thinned
+from airtruth.checks.kinematics_search import Search, completed, search
 from airtruth.checks.kinematics_vaneless import untestable, without_vane
 from airtruth.checks.kinematics_words import NAMED, conclusions, verdict_of
-from airtruth.checks.result import Cause, CheckResult, Finding, State
+from airtruth.checks.result import CheckResult, Finding
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog, batches
 from airtruth.logs.validate import validate
@@ -39,6 +39,8 @@ LONGEST_ARM_M: Final = 40.0
 """Largest arm where no chord is known [m]: judgement, half the length of the largest aircraft."""
 USUAL_ARM_M: Final = 10.0
 """Arm that is not unusual where no chord is known [m]: judgement."""
+ROTATION: Final = ("p_rad_s", "r_rad_s", "phi_rad", "beta_rad")
+"""Channels without one of which the wings count as level."""
 AIRSPEED: Final = ("sensor_delay:airspeed_m_s", "airspeed_alpha_slope")
 """Errors that the equation of airspeed shows."""
 ATTITUDE: Final = ("gyro_lag", "attitude_lag", "sensor_delay:theta_rad", "sensor_delay:q_rad_s", "gyro_scale")
@@ -120,12 +122,12 @@ def check_kinematics(
         usual = {name: size for name, size in usual.items() if name in ATTITUDE}
     found = completed(search(problem_of(records, equations, known, limits), usual), usual)
     airspeed = () if computed else _airspeed(found)
-    findings = (*_errors(found, usual), *airspeed, *_biases(found, biases or {}))
+    findings = (*errors_of(found, usual), *airspeed, *_biases(found, biases or {}))
     findings = _scale_or_bias(findings)
     verdict = verdict_of(found, findings)
     if verdict == "failed":
         findings = tuple(replace(f, state="not assessed") if f.state in NAMED else f for f in findings)
-    causes = tuple(_cause(found, i, findings) for i in range(len(found.tried)))
+    causes = tuple(cause_of(found, i, findings) for i in range(len(found.tried)))
     words = conclusions(verdict, found, findings, causes)
     if computed:
         verdict, words = without_vane(verdict, words)
@@ -161,7 +163,9 @@ def declared_errors(aircraft: Aircraft) -> dict[str, float]:
 def declared_biases(aircraft: Aircraft) -> dict[str, float]:
     """Biases that aircraft.toml declares, channel -> SI, as `check_kinematics` takes them."""
     sensors = aircraft.file.sensors
-    biases = {channel: sensors[channel].errors().bias for channel in FIELDS if channel in sensors}
+    biases = {
+        channel: sensors[channel].errors().bias for channel in LONGITUDINAL.fields if channel in sensors
+    }
     return {channel: bias for channel, bias in biases.items() if bias != 0.0}
 
 
@@ -169,7 +173,8 @@ def _records(logs: Sequence[FlightLog]) -> tuple[list[Record], list[str]]:
     """Runs worth judging, with the channels that all of them have, and remarks on absent ones."""
     records: list[Record] = []
     runs = sum(len(log.run_ids) for log in logs)
-    present = {n: all(n in log.channels for log in logs) for n in ("ax_m_s2", "theta_rad")}
+    optional = ("ax_m_s2", "theta_rad", *ROTATION)
+    present = {n: all(n in log.channels for log in logs) for n in optional}
     for log in logs:
         for run, run_id in enumerate(log.run_ids):
             rows = log.rows(run)
@@ -180,8 +185,8 @@ def _records(logs: Sequence[FlightLog]) -> tuple[list[Record], list[str]]:
             if not long_enough or min(np.ptp(x) for x in (elevator, q, alpha)) == 0.0:
                 continue
             if len(records) < MOST_RECORDS:
-                ax, theta = (log.channels[n][rows] if there else None for n, there in present.items())
-                records.append(thinned(Record(run_id, dt, airspeed, alpha, q, az, elevator, ax, theta)))
+                further = (log.channels[n][rows] if there else None for n, there in present.items())
+                records.append(thinned(Record(run_id, dt, airspeed, alpha, q, az, elevator, *further)))
     if not records:
         raise LogError(
             f"no run can be assessed: {runs} runs are shorter than about two seconds, or elevator, "
@@ -222,33 +227,6 @@ def _candidates(records: Sequence[Record], chord_m: float | None) -> dict[str, f
     return result
 
 
-def _errors(found: Search, usual: Mapping[str, float]) -> list[Finding]:
-    result = []
-    for name, size in usual.items():
-        error = ERRORS[name]
-        one = averaged(found, name, usual)
-        smallest = float(np.sqrt(price(found.problem)) * one.alone)
-        inside = [name in e.names for e in found.equals]
-        state: State = "present" if all(inside) else "one of" if any(inside) else "not needed"
-        if state == "not needed" and smallest > size:
-            state = "not shown"
-        result.append(
-            Finding(
-                name,
-                error.unit,
-                error.meaning,
-                one.value,
-                one.std,
-                one.lower,
-                one.upper,
-                found.problem.start(name),
-                smallest,
-                state,
-            )
-        )
-    return result
-
-
 def _airspeed(found: Search) -> list[Finding]:
     """Delay and position error of airspeed, by the equation of airspeed alone.
 
@@ -256,12 +234,13 @@ def _airspeed(found: Search) -> list[Finding]:
     pneumatic lines, which no log states. It therefore has no part in the errors of the other instruments.
     """
     problem, one = found.problem, found.best.fit
-    if problem.records[0].ax is None or problem.records[0].theta is None:
+    first = problem.records[0]
+    if first.channel("ax") is None or first.channel("theta") is None:
         return []
     known = {**problem.known, **dict(zip(one.names, one.value, strict=True))}
     usual = {name: ERRORS[name].usual for name in AIRSPEED}
     alone = problem_of(problem.records, ("airspeed",), known, problem.limits, lines=problem.lines)
-    return _errors(completed(search(alone, usual), usual), usual)
+    return errors_of(completed(search(alone, usual), usual), usual)
 
 
 def _biases(found: Search, known: Mapping[str, float]) -> list[Finding]:
@@ -269,45 +248,28 @@ def _biases(found: Search, known: Mapping[str, float]) -> list[Finding]:
     problem, one = found.problem, found.best.fit
     scale = dict(zip(one.names, one.value, strict=True)).get("vane_scale", problem.start("vane_scale"))
     if "alpha" not in problem.equations:
-        turn, turn_std = _drift(found, "theta", known)
+        turn, turn_std = drift(found, "theta", known)
         meaning = "constant in q, by the drift of its integral from theta"
-        return [_bias(found, "gyro_bias", "rad/s", meaning, -turn, turn_std)]
-    ramp, std = _drift(found, "alpha", known)
+        return [bias_of(found, "gyro_bias", "rad/s", meaning, -turn, turn_std)]
+    ramp, std = drift(found, "alpha", known)
     ramp, std = -ramp / scale, std / scale
     if "theta" not in problem.equations:
         meaning = "constants in q and az, which theta would separate"
-        return [_bias(found, "gyro_bias + accelerometer_bias/V", "rad/s", meaning, ramp, std)]
-    turn, turn_std = _drift(found, "theta", known)
+        return [bias_of(found, "gyro_bias + accelerometer_bias/V", "rad/s", meaning, ramp, std)]
+    turn, turn_std = drift(found, "theta", known)
     meaning = "constant in q, by the drift of its integral from theta"
-    result = [_bias(found, "gyro_bias", "rad/s", meaning, -turn, turn_std)]
-    airspeed = float(np.mean([r.airspeed.mean() for r in problem.records]))
+    result = [bias_of(found, "gyro_bias", "rad/s", meaning, -turn, turn_std)]
+    airspeed = float(np.mean([np.asarray(r.channel("airspeed")).mean() for r in problem.records]))
     meaning = "constant in az, by the drift of the integral of q + az/V from alpha"
     bias, spread = airspeed * (ramp + turn), airspeed * float(np.hypot(std, turn_std))
-    result.append(_bias(found, "accelerometer_bias", "m/s2", meaning, bias, spread))
-    if problem.records[0].ax is not None:
+    result.append(bias_of(found, "accelerometer_bias", "m/s2", meaning, bias, spread))
+    if problem.records[0].channel("ax") is not None:
         meaning = (
             "constant in ax + az alpha - g (theta - alpha): biases that airspeed alone does not separate"
         )
-        slope, slope_std = _drift(found, "airspeed", known)
-        result.append(_bias(found, "forward_bias", "m/s2", meaning, -slope, slope_std))
+        slope, slope_std = drift(found, "airspeed", known)
+        result.append(bias_of(found, "forward_bias", "m/s2", meaning, -slope, slope_std))
     return result
-
-
-def _drift(found: Search, equation: str, known: Mapping[str, float]) -> tuple[Array, float]:
-    """Ramp of an equation and the one that known biases make, (2,), and the standard error of the first."""
-    slopes, stds = ramps(found.problem, found.best.fit, equation, found.enlargement)
-    mean, std = mean_of(slopes, stds)
-    expected, _ = mean_of(ramps_of(known, found.problem, found.best.fit, equation), stds)
-    return np.array([mean, expected]), std
-
-
-def _bias(found: Search, name: str, unit: str, meaning: str, sizes: Array, std: float) -> Finding:
-    """Finding of a bias; ``sizes`` are the estimated and the declared one."""
-    value, declared = float(sizes[0]), float(sizes[1]) or 0.0  # not -0.0
-    smallest = float(np.sqrt(price(found.problem))) * std
-    state: State = "present" if abs(value - declared) > smallest else "not needed"
-    half = 1.96 * std
-    return Finding(name, unit, meaning, value, std, value - half, value + half, declared, smallest, state)
 
 
 def _scale_or_bias(findings: tuple[Finding, ...]) -> tuple[Finding, ...]:
@@ -323,30 +285,6 @@ def _scale_or_bias(findings: tuple[Finding, ...]) -> tuple[Finding, ...]:
         scale = replace(scale, value=needed, std=std, lower=needed - 1.96 * std, upper=needed + 1.96 * std)
     both = {bias.name: replace(bias, state="one of"), scale.name: replace(scale, state="one of")}
     return tuple(both.get(f.name, f) for f in findings)
-
-
-def _cause(found: Search, place: int, findings: Sequence[Finding]) -> Cause:
-    one = found.tried[place]
-    of_name = {f.name: f for f in findings}
-    errors = []
-    for name, value, std in zip(one.fit.names, one.fit.value, one.fit.std, strict=True):
-        spread = float(std) * float(np.sqrt(found.enlargement))
-        half = 1.96 * spread
-        errors.append(
-            replace(
-                of_name[name],
-                value=float(value),
-                std=spread,
-                lower=float(value) - half,
-                upper=float(value) + half,
-            )
-        )
-    return Cause(
-        tuple(errors),
-        one.fit.statistic,
-        one.cost - found.best.cost,
-        any(one.names == e.names for e in found.equals),
-    )
 
 
 __all__ = [

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.checks.kinematics_fit import Fit
-from airtruth.checks.kinematics_model import ERRORS
 from airtruth.checks.kinematics_search import Search
 
 Array = NDArray[np.float64]
@@ -78,7 +77,10 @@ def averaged(found: Search, name: str, usual: Mapping[str, float]) -> Estimate:
     drawn, share = drawn[order], share[order] / share.sum()
     lower, upper = np.interp([0.025, 0.975], np.cumsum(share), drawn)
     limit = found.problem.limits[name][0]
-    if ERRORS[name].kind in ("lag", "delay") and (lower - limit) * ONE_SIDED < upper - lower:
+    if (
+        found.problem.kinematics.errors[name].kind in ("lag", "delay")
+        and (lower - limit) * ONE_SIDED < upper - lower
+    ):
         lower, upper = np.array([limit, np.interp(0.95, np.cumsum(share), drawn)])
     centre = float(share @ drawn)
     spread = float(np.sqrt(share @ (drawn - centre) ** 2))

@@ -4,31 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import toeplitz
 
 from airtruth.checks.kinematics_fit import Fit, Problem
-from airtruth.checks.kinematics_model import ERRORS, Record, compare
+from airtruth.checks.kinematics_record import Kinematics, Samples
 
 Array = NDArray[np.float64]
 
 SHARE: Final = 8
 """The autocovariance of a residual is taken up to this part of the record [-]: judgement."""
-
-CHANNELS: Final = {"theta": "theta_rad", "alpha": "alpha_rad", "airspeed": "airspeed_m_s"}
-"""Channel that an equation predicts."""
-FIELDS: Final = {
-    "airspeed_m_s": "airspeed",
-    "alpha_rad": "alpha",
-    "theta_rad": "theta",
-    "q_rad_s": "q",
-    "ax_m_s2": "ax",
-    "az_m_s2": "az",
-}
-"""Field of a record that holds a channel whose bias the equations show."""
 
 
 def ramps(problem: Problem, one: Fit, equation: str, enlargement: float = 1.0) -> tuple[Array, Array]:
@@ -40,11 +28,15 @@ def ramps(problem: Problem, one: Fit, equation: str, enlargement: float = 1.0) -
     Parameters
     ----------
     problem, one : records and fitted errors.
-    equation : "theta", "alpha" or "airspeed".
+    equation : of the kinematics.
     enlargement : factor on the variances of the fitted errors.
     """
     errors = dict(zip(one.names, one.value, strict=True))
     slopes, stds = [], []
+
+    def step(name: str) -> float:
+        return problem.kinematics.errors[name].step
+
     for record in problem.records:
         e = _difference(problem, record, errors, equation)
         n = len(e)
@@ -54,8 +46,7 @@ def ramps(problem: Problem, one: Fit, equation: str, enlargement: float = 1.0) -
         reach = np.cumsum(weights[::-1])[::-1][1:]
         own = _variance(steps - steps.mean(), reach)
         moved = [
-            (_difference(problem, record, {**errors, n: errors[n] + ERRORS[n].step}, equation) - e)
-            / ERRORS[n].step
+            (_difference(problem, record, {**errors, n: errors[n] + step(n)}, equation) - e) / step(n)
             for n in one.names
         ]
         share = np.array(moved).reshape(len(moved), n) @ weights
@@ -76,15 +67,17 @@ def ramps_of(biases: Mapping[str, float], problem: Problem, one: Fit, equation: 
     slopes = []
     for record in problem.records:
         left = _difference(problem, record, errors, equation) - _difference(
-            problem, _unbiased(record, biases), errors, equation
+            problem, _unbiased(problem.kinematics, record, biases), errors, equation
         )
         slopes.append(_weights(len(left), record.dt_s) @ left)
     return np.array(slopes)
 
 
-def _unbiased(record: Record, biases: Mapping[str, float]) -> Record:
-    readings = {n: getattr(record, FIELDS[n]) for n in biases}
-    return replace(record, **{FIELDS[n]: x - biases[n] for n, x in readings.items() if x is not None})
+def _unbiased(kinematics: Kinematics, record: Samples, biases: Mapping[str, float]) -> Samples:
+    own = {n: kinematics.fields[n] for n in biases if n in kinematics.fields}
+    readings = {n: record.channel(name) for n, name in own.items()}
+    changed: dict[str, Any] = {own[n]: x - biases[n] for n, x in readings.items() if x is not None}
+    return replace(record, **changed)
 
 
 def _weights(samples: int, dt_s: float) -> Array:
@@ -93,8 +86,8 @@ def _weights(samples: int, dt_s: float) -> Array:
     return np.asarray(t / (t @ t) / dt_s)
 
 
-def _difference(problem: Problem, record: Record, errors: Mapping[str, float], equation: str) -> Array:
-    return compare(record, {**problem.known, **errors})[equation]
+def _difference(problem: Problem, record: Samples, errors: Mapping[str, float], equation: str) -> Array:
+    return problem.kinematics.compare(record, {**problem.known, **errors}, (equation,))[equation]
 
 
 def _variance(e: Array, weights: Array) -> float:
@@ -119,10 +112,13 @@ def rms(problem: Problem, one: Fit) -> dict[str, float]:
     errors = {**problem.known, **dict(zip(one.names, one.value, strict=True))}
     parts: dict[str, list[Array]] = {}
     for record in problem.records:
-        for equation, e in compare(record, errors).items():
+        compared = problem.kinematics.compare(record, errors, tuple(problem.kinematics.channels))
+        for equation, e in compared.items():
             basis = np.stack([np.ones(len(e)), np.linspace(-1.0, 1.0, len(e))])
-            parts.setdefault(CHANNELS[equation], []).append(e - (e @ np.linalg.pinv(basis)) @ basis)
+            parts.setdefault(problem.kinematics.channels[equation], []).append(
+                e - (e @ np.linalg.pinv(basis)) @ basis
+            )
     return {channel: float(np.sqrt(np.mean(np.concatenate(p) ** 2))) for channel, p in parts.items()}
 
 
-__all__ = ["FIELDS", "mean_of", "ramps", "ramps_of", "rms"]
+__all__ = ["mean_of", "ramps", "ramps_of", "rms"]

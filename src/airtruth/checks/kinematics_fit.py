@@ -1,17 +1,19 @@
-"""Sizes of instrument errors: the least energy of the elevator's motion in the whitened differences."""
+"""Sizes of instrument errors: the least energy of the control surfaces' motion in the whitened differences."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.checks.kinematics_lines import Lines, Weight, lines_of, weigh
-from airtruth.checks.kinematics_model import ERRORS, Record, compare, stacked
+from airtruth.checks.kinematics_lines import Lines, Weight, lines_of, weigh, without
+from airtruth.checks.kinematics_model import LONGITUDINAL
+from airtruth.checks.kinematics_record import Kinematics, Samples, stacked
+from airtruth.physics.sensor_errors import KINDS
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -72,19 +74,19 @@ class _Stack:
     ----------
     record, lines : the records as one, and the lines that they share.
     equations : of each record.
-    std, ramp : (records, equations, lines) of `Weight`.
+    std : (records, equations, lines) of `Weight`; trends : (records, equations, trends, lines).
     rows : (records, equations, lines) where each line is among all whitened ones.
     """
 
-    record: Record
+    record: Samples
     lines: Lines
     equations: tuple[str, ...]
     std: Array
-    ramp: Array
+    trends: Array
     rows: NDArray[np.int64]
 
 
-def _stacks_of(records: Sequence[Record], lines: Sequence[Lines], weight: Weight) -> list[_Stack]:
+def _stacks_of(records: Sequence[Samples], lines: Sequence[Lines], weight: Weight) -> list[_Stack]:
     sizes = [len(line.keep) * len(std) for line, std in zip(lines, weight.std, strict=True)]
     first = np.concatenate([[0], np.cumsum(sizes)])
     result = []
@@ -97,7 +99,7 @@ def _stacks_of(records: Sequence[Record], lines: Sequence[Lines], weight: Weight
                 lines=lines[numbers[0]],
                 equations=tuple(weight.std[numbers[0]]),
                 std=std,
-                ramp=np.array([weight.ramps[i] for i in numbers]),
+                trends=np.array([weight.trends[i] for i in numbers]),
                 rows=np.array([first[i] + own for i in numbers]),
             )
         )
@@ -111,39 +113,42 @@ class Problem:
     Attributes
     ----------
     records, lines : of each record.
-    equations : equations that are used, of `airtruth.checks.kinematics_model.compare`.
+    equations : equations that are used, of the kinematics.
     known : errors that are declared, name -> value.
     limits : name -> smallest and largest value.
     weight : common weight of all fits.
+    kinematics : of the motion.
+    enlarged : equation -> factor on its noise for motion that no error explains.
     """
 
-    records: tuple[Record, ...]
+    records: tuple[Samples, ...]
     lines: tuple[Lines, ...]
     equations: tuple[str, ...]
     known: Mapping[str, float]
     limits: Mapping[str, tuple[float, float]]
     weight: Weight
+    kinematics: Kinematics = LONGITUDINAL
+    enlarged: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def _stacks(self) -> list[_Stack]:
         return _stacks_of(self.records, self.lines, self.weight)
 
     def white(self, errors: Mapping[str, float]) -> Array:
-        """(rows,) whitened lines at given errors, the others as declared; the ramp of each difference is taken out."""
+        """(rows,) whitened lines at given errors, the others as declared; the trends of each difference are taken out."""
         white = np.empty(len(self.weight.span))
         for stack in self._stacks:
-            every = compare(stack.record, {**self.known, **errors}, self.equations)
+            every = self.kinematics.compare(stack.record, {**self.known, **errors}, self.equations)
             lines = (
                 stack.lines.of(np.stack([every[equation] for equation in stack.equations], axis=1))
                 / stack.std
             )
-            along = np.einsum("...n,...n->...", lines, stack.ramp)
-            white[stack.rows] = lines - along[..., None] * stack.ramp
+            white[stack.rows] = without(lines, stack.trends)
         return white
 
     def start(self, name: str) -> float:
         """Value without a further error: the declared one, or none."""
-        return self.known.get(name, ERRORS[name].neutral)
+        return self.known.get(name, self.kinematics.errors[name].neutral)
 
     def moments(self, errors: Mapping[str, float]) -> Array:
         """(m,) components of the whitened lines along the pooled motions of the elevator."""
@@ -152,17 +157,20 @@ class Problem:
     def slope(self, name: str, errors: Mapping[str, float], moments: Array) -> Array:
         """(m,) derivative of the moments by one error; ``moments`` are those at the errors."""
         value = errors.get(name, self.start(name))
-        step = ERRORS[name].step if value < self.limits[name][1] - ERRORS[name].step else -ERRORS[name].step
+        step = self.kinematics.errors[name].step
+        step = step if value < self.limits[name][1] - step else -step
         return (self.moments({**errors, name: value + step}) - moments) / step
 
 
 def problem_of(
-    records: Sequence[Record],
+    records: Sequence[Samples],
     equations: Sequence[str],
     known: Mapping[str, float],
     limits: Mapping[str, tuple[float, float]],
     errors: Mapping[str, float] | None = None,
     lines: Sequence[Lines] | None = None,
+    kinematics: Kinematics = LONGITUDINAL,
+    enlarged: Mapping[str, float] | None = None,
 ) -> Problem:
     """Weigh records at given errors.
 
@@ -171,11 +179,43 @@ def problem_of(
     records, equations, known, limits : see `Problem`.
     errors : errors at which the noise is assessed; None for those declared.
     lines : lines of the records; None makes them.
+    kinematics : of the motion.
+    enlarged : see `Problem`; None for no factor.
     """
-    lines = tuple(lines or (lines_of(r) for r in records))
-    differences = [compare(r, {**known, **(errors or {})}) for r in records]
-    weight = weigh(records, lines, differences, equations)
-    return Problem(tuple(records), lines, tuple(equations), known, limits, weight)
+    enlarged = dict(enlarged or {})
+    lines = tuple(lines or (lines_of(r, kinematics) for r in records))
+    at = {**known, **(errors or {})}
+    differences = [kinematics.compare(r, at, equations) for r in records]
+    weight = weigh(records, lines, differences, equations, kinematics, enlarged)
+    made = Problem(tuple(records), lines, tuple(equations), known, limits, weight, kinematics, enlarged)
+    base = made.white(errors or {})
+    for name, step in kinematics.offsets.items():
+        moved = made.white({**(errors or {}), name: step}) - base
+        made = replace(made, weight=_freed(made.weight, moved))
+    return made
+
+
+def _freed(weight: Weight, moved: Array) -> Weight:
+    """Weight whose motions leave the direction ``moved`` (rows,) of an unknown constant free: their moments along it vanish."""
+    own, start = [], 0
+    for record in weight.own:
+        parts = []
+        for columns in record:
+            stop = start + columns.shape[0]
+            parts.append(_blind(columns, moved[start:stop]))
+            start = stop
+        own.append(tuple(parts))
+    return replace(weight, span=_blind(weight.span, moved), own=tuple(own))
+
+
+def _blind(columns: Array, moved: Array) -> Array:
+    """Orthonormal columns (n, k - 1) of the part of the span whose moments with a signal (n,) vanish."""
+    along = columns.T @ moved
+    size = float(np.linalg.norm(along))
+    if size <= 1e-12:
+        return columns
+    _, _, right = np.linalg.svd(along[None] / size)
+    return np.asarray(columns @ right[1:].T)
 
 
 def fit(
@@ -232,7 +272,7 @@ def fit(
     if not fresh:
         slopes = _slopes(problem, names, value, moments)
     edge = EDGE * (high - low)
-    least = np.array([ERRORS[n].kind in ("lag", "delay") for n in names])
+    least = np.array([problem.kinematics.errors[n].kind in ("lag", "delay") for n in names])
     at = ((value <= low + edge) & ~least | (value >= high - edge)) & (
         np.abs(value - np.array([problem.start(n) for n in names])) > edge
     )
@@ -269,22 +309,21 @@ def _inverse(normal: Array) -> Array:
     return np.asarray(np.linalg.pinv(unit, rcond=1e-10, hermitian=True) / np.outer(size, size))
 
 
-def limits_of(records: Sequence[Record], longest_arm_m: float) -> dict[str, tuple[float, float]]:
+def limits_of(
+    records: Sequence[Samples], longest_arm_m: float, kinematics: Kinematics = LONGITUDINAL
+) -> dict[str, tuple[float, float]]:
     """Smallest and largest value of each error.
 
     A lag or a delay may last an eighth of the shortest record. An arm may be as long as ``longest_arm_m``.
     """
     longest = min(r.duration_s for r in records) / 8.0
-    result = {}
-    for name, error in ERRORS.items():
-        result[name] = {
-            "scale": SCALES,
-            "lag": (0.0, longest),
-            "delay": (0.0, longest),
-            "arm": (-longest_arm_m, longest_arm_m),
-            "alpha_slope": ALPHA_SLOPES,
-        }[error.kind]
-    return result
+    ranges = {
+        "ratio": SCALES,
+        "time": (0.0, longest),
+        "length": (-longest_arm_m, longest_arm_m),
+        "per_angle": ALPHA_SLOPES,
+    }
+    return {name: ranges[KINDS[error.kind].dimension] for name, error in kinematics.errors.items()}
 
 
 __all__ = ["Fit", "Problem", "fit", "limits_of", "problem_of"]

@@ -1,4 +1,4 @@
-"""One weight for all causes: the lines of the cosine transform, their noise, and the motion of the elevator.
+"""One weight for all causes: the lines of the cosine transform, their noise, and the motion of the control surfaces.
 
 The difference between a measured channel and its reconstruction is noise, moving air and the motion that an error
 leaves. Gusts move alpha and airspeed but no inertial quantity, and the aircraft answers them, so that least squares
@@ -21,12 +21,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct
-from scipy.signal import lfilter
 
-from airtruth.checks.kinematics_model import Record
-from airtruth.checks.samples import integral, lagged
-from airtruth.numerics.prefilter import butterworth, zero_phase
-from airtruth.numerics.srivc import simulate, srivc
+from airtruth.checks.kinematics_model import LONGITUDINAL
+from airtruth.checks.kinematics_record import Kinematics, Samples
 
 Array = NDArray[np.float64]
 
@@ -42,13 +39,6 @@ error exceed the 95 % point of the absolute test (`studies.check_study --calibra
 lines, where it leaves little evidence of noise."""
 FLOOR: Final = 1e-3
 """Accuracy of a reconstruction from samples as a share of the motion [-]: judgement; test_kinematics measures it."""
-CUTOFF_HZ: Final = 5.0
-"""Cutoff of the low-pass that smooths the measured elevator [Hz], lowered for slow records: judgement."""
-_LAGS: Final = (0.3, 1.0, 3.0)
-"""Time constants of the low-passes of the simulated pitch rate, over the period of the motion per radian [-]."""
-_BANK_HZ: Final = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
-"""Corner frequencies of the low-passes of the elevator where no model is identified [Hz]: judgement, an octave
-apart."""
 WHITTLE_STEPS: Final = 60
 """Multiplicative steps for a spectrum [-]: judgement; more change it by less than its uncertainty."""
 
@@ -61,14 +51,14 @@ class Lines:
     ----------
     keep : (lines,) numbers of the lines that are used.
     hz : (lines,) their frequencies [Hz].
-    basis : (k, lines) motions that the elevator causes.
-    ramp : (lines,) lines of a ramp.
+    basis : (k, lines) motions that the control surfaces cause.
+    trends : (trends, lines) lines of a ramp, and of higher powers of time.
     """
 
     keep: NDArray[np.int64]
     hz: Array
     basis: Array
-    ramp: Array
+    trends: Array
 
     def of(self, x: Array) -> Array:
         """Lines of (..., samples)."""
@@ -84,49 +74,26 @@ class Weight:
     std : for each record, equation -> (lines,) standard deviation of the noise.
     span : (rows, m) orthonormal columns over the lines of all records and equations: the pooled instruments.
     own : for each record and equation, (lines, k) orthonormal columns.
-    ramps : for each record and equation, (lines,) the whitened ramp of unit length.
+    trends : for each record and equation, (trends, lines) the whitened trends, orthonormal.
     degrees : degrees of freedom of the noise of one equation near the motion [-].
     """
 
     std: tuple[dict[str, Array], ...]
     span: Array
     own: tuple[tuple[Array, ...], ...]
-    ramps: tuple[tuple[Array, ...], ...]
+    trends: tuple[tuple[Array, ...], ...]
     degrees: float
 
 
-def lines_of(record: Record) -> Lines:
-    """Lines of a record and the motions that its elevator causes.
-
-    From the second-order transfer function of elevator to pitch rate that fits the record (SRIVC): simulated q, q',
-    its integral and lags of that; the elevator. Where none fits, the elevator through a bank of low-passes.
-    """
-    samples, dt = len(record.q), record.dt_s
+def lines_of(record: Samples, kinematics: Kinematics = LONGITUDINAL) -> Lines:
+    """Lines of a record and the motions that its control surfaces cause."""
+    samples, dt = record.length, record.dt_s
     hz = np.arange(samples) / (2.0 * samples * dt)
     keep = np.flatnonzero((hz >= LOW_HZ) & (hz <= min(HIGH_HZ, HIGH_RATE / dt)))
-    rows = dct(_motions(record), axis=-1, norm="ortho")[:, keep]
-    ramp = dct(np.linspace(-1.0, 1.0, samples), norm="ortho")[keep]
-    return Lines(keep, hz[keep], np.asarray(rows), ramp)
-
-
-def _motions(record: Record) -> Array:
-    dt = record.dt_s
-    elevator = (record.elevator - record.elevator[0])[None]
-    smooth = zero_phase(record.elevator[None], butterworth(min(CUTOFF_HZ, 0.2 / dt), 4, dt))
-    smooth = (smooth - smooth[:, :1])[0]
-    model = srivc(elevator, record.q[None], dt, 2, 2, 3.0, "foh")
-    if not np.isfinite(model.a).all():
-        rows = [smooth]
-        for corner in _BANK_HZ:
-            pole = np.exp(-2.0 * np.pi * corner * dt)
-            rows.append(lfilter([1.0 - pole], [1.0, -pole], smooth))
-        return np.array(rows)
-    q = simulate(model, elevator, dt, "foh")[0]
-    unit = 1.0 / np.sqrt(max(float(model.a[0, 1]), 1e-6))
-    once = integral(q, dt)
-    rows = [q, np.gradient(q, dt), once, smooth]
-    rows += [lagged(once, dt, share * unit) for share in _LAGS]
-    return np.array(rows)
+    rows = dct(kinematics.motions(record), axis=-1, norm="ortho")[:, keep]
+    base = np.linspace(-1.0, 1.0, samples)
+    trends = [dct(base**power, norm="ortho")[keep] for power in range(1, kinematics.trends + 1)]
+    return Lines(keep, hz[keep], np.asarray(rows), np.array(trends))
 
 
 def noise_spectrum(y: Array, hz: Array, outside: Array, floor: float) -> Array:
@@ -159,54 +126,78 @@ def noise_spectrum(y: Array, hz: Array, outside: Array, floor: float) -> Array:
 
 
 def weigh(
-    records: Sequence[Record],
+    records: Sequence[Samples],
     lines: Sequence[Lines],
     differences: Sequence[Mapping[str, Array]],
     equations: Sequence[str],
+    kinematics: Kinematics = LONGITUDINAL,
+    enlarged: Mapping[str, float] | None = None,
 ) -> Weight:
-    """Estimate the noise of each record and equation, and whiten the motions of the elevator.
+    """Estimate the noise of each record and equation, and whiten the motions of the control surfaces.
 
     Parameters
     ----------
     records, lines : of each record.
     differences : of each record, equation -> (samples,) difference at the errors where the noise is judged.
     equations : equations that are used.
+    kinematics : of the motion.
+    enlarged : equation -> factor on the noise for motion that no error explains; 1 without an entry.
     """
-    stds, own, ramps, blocks = [], [], [], []
+    stds, own, trends, blocks = [], [], [], []
     count = lines[0].basis.shape[0]
     for record, line, difference in zip(records, lines, differences, strict=True):
         std, mine, rising = {}, [], []
         block = []
         for place, equation in enumerate(equations):
             y = line.of(difference[equation])
-            outside = np.vstack([line.basis, line.ramp[None]])
-            s = noise_spectrum(y, line.hz, outside, _floor(record, line, equation))
+            outside = np.vstack([line.basis, line.trends])
+            s = noise_spectrum(y, line.hz, outside, _floor(record, line, kinematics, equation))
+            if enlarged and equation in enlarged:
+                s = enlarged[equation] * s
             std[equation] = s
-            ramp = line.ramp / s
-            ramp = ramp / np.linalg.norm(ramp)
+            steps = _orthonormal_rows(line.trends / s)
             white = line.basis / s
-            white = white - np.outer(white @ ramp, ramp)
+            for step in steps:
+                white = white - np.outer(white @ step, step)
             mine.append(_orthonormal(white))
-            rising.append(ramp)
+            rising.append(steps)
             part = np.zeros((len(s), count * len(equations)))
             part[:, place * count : (place + 1) * count] = _padded(white, count).T
             block.append(part)
         stds.append(std)
         own.append(tuple(mine))
-        ramps.append(tuple(rising))
+        trends.append(tuple(rising))
         blocks.append(np.concatenate(block))
     span = _orthonormal(np.concatenate(blocks).T)
-    degrees = sum(len(line.keep) - count - 1 for line in lines) / LINES_PER_DEGREE
-    return Weight(tuple(stds), span, tuple(own), tuple(ramps), max(degrees, 3.0))
+    degrees = sum(len(line.keep) - count - len(line.trends) for line in lines) / LINES_PER_DEGREE
+    return Weight(tuple(stds), span, tuple(own), tuple(trends), max(degrees, 3.0))
+
+
+def without(rows: Array, directions: Array) -> Array:
+    """Rows (..., n) less their components along orthonormal directions (..., k, n)."""
+    for k in range(directions.shape[-2]):
+        direction = directions[..., k, :]
+        along = np.einsum("...n,...n->...", rows, direction)
+        rows = rows - along[..., None] * direction
+    return rows
+
+
+def _orthonormal_rows(rows: Array) -> Array:
+    """(k, n) rows orthonormal in their order (Gram and Schmidt)."""
+    result: list[Array] = []
+    for row in rows:
+        rest = without(row, np.array(result)) if result else row
+        result.append(rest / np.linalg.norm(rest))
+    return np.array(result)
 
 
 def _padded(rows: Array, count: int) -> Array:
     return np.concatenate([rows, np.zeros((count - len(rows), rows.shape[1]))])[:count]
 
 
-def _floor(record: Record, line: Lines, equation: str) -> float:
+def _floor(record: Samples, line: Lines, kinematics: Kinematics, equation: str) -> float:
     """Smallest standard deviation of a line: the accuracy of the reconstruction."""
-    channel = {"theta": record.theta, "alpha": record.alpha, "airspeed": record.airspeed}[equation]
+    channel = record.channel(kinematics.fields[kinematics.channels[equation]])
     assert channel is not None
     return FLOOR * max(float(np.std(line.of(channel))), 1e-12)
 
@@ -219,4 +210,4 @@ def _orthonormal(rows: Array) -> Array:
     return np.asarray(right[singular > 1e-5 * singular[0]].T)
 
 
-__all__ = ["Lines", "Weight", "lines_of", "noise_spectrum", "weigh"]
+__all__ = ["Lines", "Weight", "lines_of", "noise_spectrum", "weigh", "without"]

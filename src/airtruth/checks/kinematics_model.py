@@ -1,6 +1,6 @@
 """Kinematics in the vertical plane: theta, alpha and airspeed that follow from rates and specific forces.
 
-No aerodynamic model enters. In the plane of symmetry, wings level, in air at rest (R. V. Jategaonkar,
+No aerodynamic model enters. In the plane of symmetry, here wings level, in air at rest (R. V. Jategaonkar,
 *Flight Vehicle System Identification*, 2006, eqs 10.7 and 10.8 without lateral motion, in wind axes):
 
     theta' = q
@@ -17,41 +17,38 @@ measured one. Constants and ramps, which biases leave in the integrals, are free
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.checks.kinematics_record import InstrumentError, Kinematics, Samples, stacked, thinned
+from airtruth.checks.pitch_motions import pitch_motions
+from airtruth.checks.rotation import alpha_coupling, pitch_coupling
 from airtruth.checks.samples import derivative, earlier, integral, lagged
-from airtruth.numerics.prefilter import butterworth, zero_phase
 from airtruth.physics.sensor_errors import KINDS, Kind, error_name
 from airtruth.physics.sensors import vane_equation
-from airtruth.units import G0, UNITS, printed
+from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
 EQUATIONS: Final = ("theta", "alpha", "airspeed")
 """Equations that are integrated, by the channel that they predict."""
-RATE_HZ: Final = 25.0
-"""Smallest sample rate after thinning [Hz]: judgement; the motion of a pitching aircraft lies below 5 Hz."""
 
 
 @dataclass(frozen=True)
-class Record:
-    """One run, channels of one length; or several runs of one length and period, channels (runs, samples).
+class Record(Samples):
+    """Record of the longitudinal motion.
 
     Attributes
     ----------
-    run_id : name of the run.
-    dt_s : sample period [s].
     airspeed, alpha, q, az, elevator : (samples,) [m/s], [rad], [rad/s], [m/s2], [rad].
     ax, theta : (samples,) [m/s2], [rad]; None where the log has none.
+    p, r, phi, beta : (samples,) [rad/s], [rad]; without one of them the wings count as level.
     """
 
-    run_id: str
-    dt_s: float
     airspeed: Array
     alpha: Array
     q: Array
@@ -59,16 +56,10 @@ class Record:
     elevator: Array
     ax: Array | None = None
     theta: Array | None = None
-
-    @property
-    def duration_s(self) -> float:
-        """Length of the record [s]."""
-        return float(self.dt_s * self.q.shape[-1])
-
-    @cached_property
-    def t(self) -> Array:
-        """(samples,) time from the first sample [s]."""
-        return np.asarray(np.arange(self.q.shape[-1]) * self.dt_s)
+    p: Array | None = None
+    r: Array | None = None
+    phi: Array | None = None
+    beta: Array | None = None
 
     @cached_property
     def turned(self) -> Array:
@@ -80,74 +71,16 @@ class Record:
         """(samples,) derivative of the measured pitch rate [rad/s2]."""
         return derivative(self.q, self.dt_s)
 
-
-_CHANNELS: Final = ("airspeed", "alpha", "q", "az", "elevator", "ax", "theta")
-"""Channels of a record."""
-
-
-def stacked(records: Sequence[Record]) -> list[tuple[tuple[int, ...], Record]]:
-    """Records of one length, period and set of channels as one, each with the numbers of its runs."""
-    alike: dict[tuple[object, ...], list[int]] = {}
-    for i, r in enumerate(records):
-        alike.setdefault((r.dt_s, len(r.q), r.ax is None, r.theta is None), []).append(i)
-    result = []
-    for numbers in alike.values():
-        own = [records[i] for i in numbers]
-        joined = {
-            n: None if getattr(own[0], n) is None else np.stack([getattr(r, n) for r in own])
-            for n in _CHANNELS
-        }
-        result.append((tuple(numbers), replace(own[0], **joined)))  # type: ignore[arg-type]
-    return result
-
-
-def thinned(record: Record) -> Record:
-    """Record with every k-th sample, at least `RATE_HZ`, all channels through one low-pass without lag."""
-    every = int(1.0 / (record.dt_s * RATE_HZ) + 1e-6)
-    if every < 2:
-        return record
-    period = every * record.dt_s
-    sos = butterworth(0.4 / period, 4, record.dt_s)
-
-    def thin(x: Array | None) -> Array | None:
-        return None if x is None else np.ascontiguousarray(zero_phase(x[None], sos)[0, ::every])
-
-    channels = {n: thin(getattr(record, n)) for n in _CHANNELS}
-    return replace(record, dt_s=period, **channels)  # type: ignore[arg-type]
-
-
-@dataclass(frozen=True)
-class InstrumentError:
-    """An error that the kinematics can show.
-
-    Attributes
-    ----------
-    channel, kind : of `airtruth.physics.sensor_errors`, which name it.
-    usual : size that is not unusual, the standard deviation of its prior [SI; of an arm in chords].
-    step : step of its derivative [SI].
-    meaning : definition, for people.
-    """
-
-    channel: str
-    kind: Kind
-    usual: float
-    step: float
-    meaning: str
-
-    @property
-    def name(self) -> str:
-        """Name that effects and results share."""
-        return error_name(self.channel, self.kind)
-
-    @property
-    def unit(self) -> str:
-        """Unit as it is printed, "-" for none."""
-        return printed(next(iter(UNITS[KINDS[self.kind].dimension]))) or "-"
-
-    @property
-    def neutral(self) -> float:
-        """Value without error."""
-        return KINDS[self.kind].neutral
+    @cached_property
+    def rotated(self) -> tuple[Array, Array] | None:
+        """(samples,) parts of theta and alpha that roll, yaw and bank make [rad]; None with the wings level."""
+        p, r, phi, beta = self.p, self.r, self.phi, self.beta
+        if p is None or r is None or phi is None or beta is None:
+            return None
+        theta = self.theta if self.theta is not None else self.alpha
+        lift = G0 * np.cos(self.alpha) * np.cos(theta) * (np.cos(phi) - 1.0) / self.airspeed
+        alpha = alpha_coupling(p, r, self.alpha, beta) + lift
+        return integral(pitch_coupling(self.q, r, phi), self.dt_s), integral(alpha, self.dt_s)
 
 
 _ALL: Final = (
@@ -205,6 +138,8 @@ def compare(
     if record.theta is not None:
         attitude = _late(turned, dt, error("theta_rad", "delay"), error("theta_rad", "lag"))
         result["theta"] = record.theta - attitude
+        if record.rotated is not None:
+            result["theta"] = result["theta"] - record.rotated[0]
     q = earlier(record.q + q_lag * record.q_dot, dt, q_delay) / q_scale
     # the mean of alpha stays, because a constant of it is not determined
     middle = _mean(record.alpha)
@@ -222,6 +157,8 @@ def compare(
     force = az * np.cos(alpha) - ax * np.sin(alpha) + G0 * np.cos(theta - alpha)
     # the integral of x q_dot/V is x q/V up to the change of V, which does not matter over a manoeuvre
     turning = turned + arm * (q - q[..., :1]) / airspeed + integral(force / airspeed, dt)
+    if record.rotated is not None:
+        turning = turning + record.rotated[1]
     vane = vane_equation(turning, q, error("alpha_rad", "arm"), airspeed)
     vane = _late(vane, dt, error("alpha_rad", "delay"), error("alpha_rad", "lag"))
     result["alpha"] = record.alpha - error("alpha_rad", "scale") * vane
@@ -243,4 +180,27 @@ def _late(x: Array, dt_s: float, delay_s: float, lag_s: float) -> Array:
     return lagged(earlier(x, dt_s, -delay_s), dt_s, lag_s)
 
 
-__all__ = ["ERRORS", "InstrumentError", "Record", "compare", "stacked", "thinned"]
+LONGITUDINAL: Final = Kinematics(
+    errors=ERRORS,
+    channels={"theta": "theta_rad", "alpha": "alpha_rad", "airspeed": "airspeed_m_s"},
+    fields={
+        "airspeed_m_s": "airspeed",
+        "alpha_rad": "alpha",
+        "theta_rad": "theta",
+        "q_rad_s": "q",
+        "ax_m_s2": "ax",
+        "az_m_s2": "az",
+    },
+    compare=compare,
+    motions=lambda record: pitch_motions(record.elevator, record.q, record.dt_s),
+    controls="the elevator",
+    same=(
+        frozenset({"vane_arm", "accelerometer_arm"}),
+        frozenset({"accelerometer_scale", "airspeed_scale"}),
+    ),
+    telling={"gyro_scale": 0.05, "vane_scale": 0.15, "vane_lag": 0.1},
+)
+"""The kinematics of the longitudinal motion (`telling`: judgement; a smaller error does not change a derivative by more than its
+usual uncertainty)."""
+
+__all__ = ["ERRORS", "LONGITUDINAL", "InstrumentError", "Record", "compare", "stacked", "thinned"]

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scipy.stats import f as fisher
 from scipy.stats import t as student
 
+from airtruth.checks.kinematics_energy import absolute
 from airtruth.checks.kinematics_fit import Fit, Problem, fit, problem_of
-from airtruth.checks.kinematics_model import ERRORS
 
 Array = NDArray[np.float64]
 
@@ -28,15 +28,6 @@ FALSE: Final = 1e-3
 in 1.4 % of the records."""
 EQUAL: Final = 5e-3
 """Probability that noise alone makes the true set worse than another one by more than the margin [-]: judgement."""
-SAME: Final = (
-    frozenset({"vane_arm", "accelerometer_arm"}),
-    frozenset({"accelerometer_scale", "airspeed_scale"}),
-)
-"""Pairs of errors that move alpha in the same way: the kinematics shows the difference of the arms and the ratio of the
-scales, so that no set has both."""
-MOST: Final = 3
-"""Largest number of errors in a set [-]: judgement; a real record, which no kinematic model of few terms explains exactly, takes
-up any further error."""
 BEAM: Final = 4
 """Sets that are continued with a further error [-]: judgement."""
 TRIED: Final = 7
@@ -130,7 +121,14 @@ def search(problem: Problem, usual: Mapping[str, float]) -> Search:
             stable = True
             break
         problem = problem_of(
-            problem.records, problem.equations, problem.known, problem.limits, errors, problem.lines
+            problem.records,
+            problem.equations,
+            problem.known,
+            problem.limits,
+            errors,
+            problem.lines,
+            problem.kinematics,
+            problem.enlarged,
         )
     ranked = _ranked(problem, best, usual)
     scale, _ = _scale(problem, [f for f in best.values() if f.sound], usual)
@@ -148,19 +146,6 @@ def search(problem: Problem, usual: Mapping[str, float]) -> Search:
         p_value=float(fisher.sf(statistic / max(degrees, 1), max(degrees, 1), _noise_degrees(problem))),
         stable=stable,
     )
-
-
-def absolute(problem: Problem, one: Fit) -> tuple[float, int]:
-    """Energy of the elevator's motion that a fit leaves in each record and equation, and its degrees of freedom."""
-    white = problem.white(dict(zip(one.names, one.value, strict=True)))
-    start, total, degrees = 0, 0.0, -len(one.names)
-    for own in problem.weight.own:
-        for columns in own:
-            stop = start + columns.shape[0]
-            total += float(np.sum((columns.T @ white[start:stop]) ** 2))
-            degrees += columns.shape[1]
-            start = stop
-    return total, degrees
 
 
 def _noise_degrees(problem: Problem) -> float:
@@ -188,7 +173,7 @@ def _hints(problem: Problem, usual: Mapping[str, float]) -> list[_Hint]:
     result = []
     for name in usual:
         declared, high = problem.start(name), problem.limits[name][1]
-        shares = (0.0, *STARTS) if ERRORS[name].kind in ("lag", "delay") else (0.0,)
+        shares = (0.0, *STARTS) if problem.kinematics.errors[name].kind in ("lag", "delay") else (0.0,)
         for share in shares:
             start = declared + share * (high - declared)
             moments = problem.moments({name: start}) if share else base
@@ -221,7 +206,7 @@ def _sets(
     _grow(problem, known, [known[frozenset()]], [(h,) for h in hints])
     pairs = [(a, b) for a, b in combinations(hints, 2) if a.name != b.name]
     _grow(problem, known, [known[frozenset()]], pairs)
-    for size in range(1, MOST):
+    for size in range(1, problem.kinematics.most):
         sound = [f for k, f in known.items() if len(k) == size and f.sound]
         layer = sorted(sound, key=lambda f: f.statistic + _improbability(problem, f, usual))[:BEAM]
         if not layer:
@@ -250,7 +235,7 @@ def _grow(
         promises: dict[frozenset[str], tuple[float, int]] = {}
         for i, hints in enumerate(more):
             names = frozenset(h.name for h in hints)
-            if names & errors.keys() or _doubled(names | errors.keys()):
+            if names & errors.keys() or _doubled(problem, names | errors.keys()):
                 continue
             promised = _promised(moments, slopes, hints), i
             promises[names] = min(promised, promises.get(names, promised))
@@ -265,8 +250,8 @@ def _grow(
                 known[key] = better
 
 
-def _doubled(names: frozenset[str]) -> bool:
-    return any(pair <= names for pair in SAME)
+def _doubled(problem: Problem, names: frozenset[str]) -> bool:
+    return any(len(group & names) > 1 for group in problem.kinematics.same)
 
 
 def _pruned(
@@ -277,7 +262,7 @@ def _pruned(
 ) -> dict[frozenset[str], Fit]:
     """Add the leading sets less each of their errors, and the best one with each error exchanged for another."""
     sets = dict(sets)
-    for _ in range(MOST):
+    for _ in range(problem.kinematics.most):
         added = False
         best = _ranked(problem, sets, usual)[0]
         less = [sets[best.names - {n}] for n in best.names if best.names - {n} in sets]
@@ -321,7 +306,7 @@ def _costs(problem: Problem, fits: Sequence[Fit], usual: Mapping[str, float], ex
     sizes = np.array([_improbability(problem, f, usual) for f in fits])
     if exact:
         return np.asarray(rest + sizes + price(problem) * np.array([len(f.names) for f in fits]))
-    steps = [_inexact(FALSE, count - k - 1, count) for k in range(MOST + 2)]
+    steps = [_inexact(FALSE, count - k - 1, count) for k in range(problem.kinematics.most + 2)]
     prices = np.concatenate([[0.0], np.cumsum(steps)])
     level = count * (1.0 + np.log(np.maximum(rest / count, 1.0)))
     return np.asarray(level + sizes + price(problem) + prices[[len(f.names) for f in fits]])
@@ -379,10 +364,11 @@ def _equals(ranked: Sequence[Explanation], most: float) -> tuple[Explanation, ..
 def completed(found: Search, usual: Mapping[str, float]) -> Search:
     """Search whose explanations were each fitted with every further candidate, in place of one of the same motion."""
     tried = {e.names: e.fit for e in (*found.unsound, *found.tried)}
-    for one in found.equals[: MOST + 1]:
+    for one in found.equals[: found.problem.kinematics.most + 1]:
         errors = dict(zip(one.fit.names, one.fit.value, strict=True))
         for name in usual:
-            twins = {n for pair in SAME if name in pair for n in pair} - {name}
+            same = found.problem.kinematics.same
+            twins = {n for group in same if name in group for n in group} - {name}
             start = {n: v for n, v in errors.items() if n not in twins}
             key = frozenset(start) | {name}
             if key not in tried:
@@ -394,4 +380,4 @@ def completed(found: Search, usual: Mapping[str, float]) -> Search:
     )
 
 
-__all__ = ["Explanation", "Search", "absolute", "completed", "price", "search"]
+__all__ = ["DOUBT", "Explanation", "Search", "absolute", "completed", "price", "search"]

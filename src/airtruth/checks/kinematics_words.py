@@ -11,9 +11,6 @@ from airtruth.units import G0
 
 AGREES: Final = 0.05
 """Probability of the absolute test below which the channels are not called consistent."""
-TELLING: Final = {"gyro_scale": 0.05, "vane_scale": 0.15, "vane_lag": 0.1}
-"""Sizes that records have to show before the channels are called consistent [SI]: judgement; a smaller error does not
-change a derivative by more than its usual uncertainty."""
 NAMED: Final = ("present", "one of")
 """States of an error that an explanation has; a check that failed names none."""
 _LIKE_FRICTION: Final = ("vane_lag", "sensor_delay:alpha_rad")
@@ -26,7 +23,8 @@ def verdict_of(found: Search, findings: Sequence[Finding]) -> Verdict:
         return "failed"
     states = {f.state for f in findings if f.name != "forward_bias"}
     if not found.best.names and not states & set(NAMED):
-        telling = all(f.smallest <= TELLING.get(f.name, f.smallest) for f in findings)
+        needed = found.problem.kinematics.telling
+        telling = all(f.smallest <= needed.get(f.name, f.smallest) for f in findings)
         return "agrees" if telling and found.p_value > AGREES else "cannot_tell"
     return "one_of" if "one of" in states else "errors"
 
@@ -49,7 +47,8 @@ def conclusions(
     result = _headline(verdict, found, findings, causes)
     if verdict != "agrees" and found.enlargement > 1.0:
         result.append(
-            f"The errors do not explain all motion that follows the elevator (p = {found.p_value:.1g}), so the sensor noise is "
+            f"The errors do not explain all motion that follows {found.problem.kinematics.controls} "
+            f"(p = {found.p_value:.1g}), so the sensor noise is "
             f"multiplied by {found.enlargement**0.5:.2g}. The motion has terms outside this check (sideslip, roll, "
             "flexibility or other sensor errors)."
         )
@@ -89,7 +88,8 @@ def _headline(
             f"Larger errors than these would have been seen: {limits}.",
         ]
     if verdict == "cannot_tell":
-        weak = [f for f in findings if f.name in TELLING and f.smallest > TELLING[f.name]]
+        needed = found.problem.kinematics.telling
+        weak = [f for f in findings if f.smallest > needed.get(f.name, f.smallest)]
         reasons = [
             f"{f.name} below {f.smallest:.2g}{'' if f.unit == '-' else ' ' + f.unit} would not be seen"
             for f in weak

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.channels import LATERAL, SIGNALS
+from airtruth.channels import SIGNALS
 from airtruth.checks.relation import ATMOSPHERE_M, Relation, finite, informed_everywhere
 from airtruth.checks.together import Runs
 from airtruth.physics.atmosphere import density_kg_m3
@@ -20,8 +20,8 @@ Channels = Mapping[str, Array]
 OUTSIDE: Final = 1000.0
 """Distance of a channel that leaves the range of flight [-]; larger than any sum of the others that matters."""
 LIMITS: Final = {
-    **{name: (-one.limit, one.limit) for name, one in SIGNALS.items() if name not in LATERAL},
-    "elevator_rad": (-45.0 * DEG, 45.0 * DEG),
+    **{name: (-one.limit, one.limit) for name, one in SIGNALS.items()},
+    **dict.fromkeys(("elevator_rad", "aileron_rad", "rudder_rad"), (-45.0 * DEG, 45.0 * DEG)),
     "throttle": (-0.05, 1.05),
 }
 """Range of every sample, SI (judgement: no aircraft leaves it; one degree taken as one radian usually does)."""
@@ -97,6 +97,8 @@ GYRO_STD_RAD_S: Final = 0.01
 """Tolerance of the mean of q [rad/s], where no theta replaces its integral (0.6 deg/s, a MEMS gyroscope's bias)."""
 PATH_SHARE: Final = 0.5
 """Tolerance of the curvature of the path as a share of itself [-]: slow gusts change alpha and not the path."""
+BANKED: Final = 0.05
+"""Sine of the bank above which the pitch rate replaces the change of pitch attitude [-] (judgement)."""
 END_S: Final = 0.3
 """Samples at both ends of a run whose means are the end values [s]."""
 SPREAD_LIMIT: Final = 1.0
@@ -110,7 +112,7 @@ PATH: Final = ("az_m_s2", "theta_rad", "alpha_rad", "airspeed_m_s", "q_rad_s")
 def gravity(runs: Runs, level: NDArray[np.bool_] | None = None) -> list[Relation]:
     """Means of az and ax against those that gravity and the path require.
 
-    Without alpha the path is taken as straight, with the tolerance of a turn.
+    Without alpha the path is taken as straight, with the tolerance of a turn. In a bank that is recorded the turn is known.
 
     Parameters
     ----------
@@ -130,11 +132,15 @@ def gravity(runs: Runs, level: NDArray[np.bool_] | None = None) -> list[Relation
             return np.stack([c["az_m_s2"].mean(axis=1), gravity, np.zeros_like(speed)], axis=1)
         alpha = c["alpha_rad"]
         path = theta - alpha if theta is not None else np.zeros_like(alpha)
+        phi = c.get("phi_rad")
+        upright = np.cos(path) if phi is None else np.cos(path) * np.cos(phi)
         turn, turn_std = _slope(alpha, dt_s)
         pitch, gyro_std = (
-            (_slope(theta, dt_s)[0], 0.0) if theta is not None else (q.mean(axis=1), GYRO_STD_RAD_S)
+            (_slope(theta, dt_s)[0], 0.0)
+            if theta is not None and (phi is None or _is_level(phi))
+            else (q.mean(axis=1), GYRO_STD_RAD_S)
         )
-        required = -G0 * np.cos(path).mean(axis=1) + speed * (turn - pitch)
+        required = -G0 * upright.mean(axis=1) + speed * (turn - pitch)
         path_std = PATH_SHARE * speed * np.abs(turn - pitch)
         std = np.sqrt((speed * gyro_std) ** 2 + (speed * turn_std) ** 2 + path_std**2)
         return np.stack([c["az_m_s2"].mean(axis=1), required, std], axis=1)
@@ -143,7 +149,7 @@ def gravity(runs: Runs, level: NDArray[np.bool_] | None = None) -> list[Relation
     turning = (mean < required) if level is None else (mean < required) & ~level
     load_std = np.where(turning | (not vane), TURN_STD, LOAD_STD) * G0
     path = tuple(name for name in PATH if name in names)
-    result = [_mean_test("az_mean", path, mean, required, np.sqrt(load_std**2 + std**2), LOAD_STD * G0)]
+    result = [mean_test("az_mean", path, mean, required, np.sqrt(load_std**2 + std**2), LOAD_STD * G0)]
     if {"theta_rad", "ax_m_s2"} <= names:
 
         def required_ax(c: Channels, dt_s: float) -> Array:
@@ -157,9 +163,14 @@ def gravity(runs: Runs, level: NDArray[np.bool_] | None = None) -> list[Relation
         channels = ("ax_m_s2", "theta_rad", "alpha_rad", "q_rad_s", "airspeed_m_s")
         used = tuple(name for name in channels if name in names)
         result.append(
-            _mean_test("ax_mean", used, mean, required, np.hypot(AXIAL_STD_M_S2, std), AXIAL_STD_M_S2)
+            mean_test("ax_mean", used, mean, required, np.hypot(AXIAL_STD_M_S2, std), AXIAL_STD_M_S2)
         )
     return result
+
+
+def _is_level(phi: Array) -> bool:
+    """Whether no bank matters to the pitch rate."""
+    return bool(np.abs(np.sin(phi)).max() < BANKED)
 
 
 def _slope(x: Array, dt_s: float) -> tuple[Array, Array]:
@@ -173,7 +184,7 @@ def _slope(x: Array, dt_s: float) -> tuple[Array, Array]:
     return rate, SPREAD_LIMIT * rest.std(axis=1) * np.sqrt(2.0) / length_s
 
 
-def _mean_test(
+def mean_test(
     name: str, channels: tuple[str, ...], mean: Array, required: Array, std: Array, common: float
 ) -> Relation:
     """Distance of means from the required ones; ``common`` is the part of std that all runs share."""
@@ -194,4 +205,4 @@ def _with_all(distance: Array) -> Array:
     return finite(np.append(distance, np.median(distance)))
 
 
-__all__ = ["LEVEL", "LIMITS", "MEANS", "OUTSIDE", "air", "gravity", "ranges"]
+__all__ = ["LEVEL", "LIMITS", "MEANS", "OUTSIDE", "air", "gravity", "mean_test", "ranges"]

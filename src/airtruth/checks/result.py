@@ -189,15 +189,27 @@ def digits_of(size: float) -> int:
 
 def tables(result: CheckResult) -> tuple[Table, Table]:
     """Errors, and sets of errors, as tables for people."""
+    open_ones = undetermined(result)
     rows: list[tuple[Cell, ...]] = [
-        (f.name, f.unit, f.value, f.std, f.lower, f.upper, f.declared, f.smallest, f.state)
+        (
+            f.name,
+            f.unit,
+            *((math.nan,) * 4 if f.name in open_ones else (f.value, f.std, f.lower, f.upper)),
+            f.declared,
+            f.smallest,
+            f.state,
+        )
         for f in result.findings
     ]
+    words = (
+        f"{', '.join(open_ones)}: the records determine no size unless the other errors are known; the sets below state the "
+        "size in each",
+    )
     found = flat(
         title=f"Errors of sensors in {len(result.run_ids)} run{'s' * (len(result.run_ids) > 1)}, 95 % intervals",
         columns=("error", "unit", "estimate", "std", "lower", "upper", "declared", "smallest shown", "state"),
         rows=tuple(rows),
-        notes=tuple(f"{f.name}: {f.meaning}" for f in result.findings),
+        notes=(*(words if open_ones else ()), *(f"{f.name}: {f.meaning}" for f in result.findings)),
     )
     rows = [
         (_judged(c, result), c.distance, c.statistic, "; ".join(_size(f) for f in c.errors) or "none")
@@ -213,6 +225,20 @@ def tables(result: CheckResult) -> tuple[Table, Table]:
         ),
     )
     return found, causes
+
+
+UNDETERMINED: Final = 3.0
+"""Standard error over all sets, relative to that within a possible set, from which an error has no size of its own [-]:
+judgement; the sets that hold it then differ by more than the noise."""
+
+
+def undetermined(result: CheckResult) -> tuple[str, ...]:
+    """Errors of a possible set whose size depends on the other errors, so that their average over all sets determines nothing."""
+    within: dict[str, float] = {}
+    for cause in result.possible:
+        for f in cause.errors:
+            within.setdefault(f.name, f.std)
+    return tuple(f.name for f in result.findings if f.std > UNDETERMINED * within.get(f.name, math.inf))
 
 
 def _judged(one: Cause, result: CheckResult) -> str:
@@ -238,4 +264,14 @@ def _size(one: Finding) -> str:
     return f"{one.name} {one.value:.{digits}f}" + ("" if one.unit == "-" else f" {one.unit}")
 
 
-__all__ = ["Cause", "CheckResult", "Finding", "State", "Verdict", "digits_of", "shown", "tables"]
+__all__ = [
+    "Cause",
+    "CheckResult",
+    "Finding",
+    "State",
+    "Verdict",
+    "digits_of",
+    "shown",
+    "tables",
+    "undetermined",
+]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -37,7 +38,7 @@ def evidence(test: Relation, row: int = -1) -> str:
             f"density_kg_m3 averages {f[0]:.3g} kg/m3, where the standard atmosphere has {f[2]:.3g} kg/m3 at the "
             f"altitude_m of {f[1]:.5g} m"
         )
-    if test.name in ("az_mean", "ax_mean"):
+    if test.name in ("az_mean", "ax_mean", "ay_mean"):
         return f"{name} averages {f[0]:.3g} m/s2, where gravity and the path require {f[1]:.3g} +- {f[2]:.2g} m/s2"
     if test.name == "theta":
         return (
@@ -49,6 +50,29 @@ def evidence(test: Relation, row: int = -1) -> str:
             f"alpha_rad changes by {f[0]:.3g} +- {f[2]:.2g} of the integral of q_rad_s and by {f[1]:.3g} +- {f[3]:.2g} "
             "of that of (az + g cos(gamma))/V, where 1 and 1 are required"
         )
+    if test.name in ("phi", "psi"):
+        rate = test.channels[0]
+        return (
+            f"{test.channels[1]} changes by {f[0]:.3g} +- {f[1]:.2g} of the integral of {rate} and its coupling (squared "
+            f"correlation {f[2]:.2f}), where 1 is required"
+        )
+    if test.name == "beta":
+        return f"the rate of beta_rad is {_shares(f)}, where 1 is required of each"
+    if test.name == "side_slope":
+        return (
+            f"ay_m_s2 changes by {-f[0]:.2g} +- {f[1]:.2g} g per radian of beta_rad, where sideslip from the right pushes to the "
+            f"left, usually by about {f[2]:.2g} g"
+        )
+    if test.name in ("aileron", "rudder"):
+        side = "rolls" if test.name == "aileron" else "yaws"
+        return (
+            f"with the other causes held, {name} changes the rate of {test.channels[1]} by {f[0]:+.3g} +- {f[1]:.2g} 1/s2, where "
+            f"a positive {test.name} {side} to the left"
+        )
+    if test.name == "aileron_size":
+        return f"the steady roll rate is {f[0]:.3g} 1/s of {name}, where 3 to 15 1/s is usual"
+    if test.name == "rudder_size":
+        return f"the steady sideslip is {f[0]:.3g} of {name}, where 0.4 to 1.6 is usual"
     if test.name == "elevator":
         return (
             f"with alpha and q held, elevator_rad changes q' by {f[0]:+.3g} +- {f[1]:.2g} 1/s2, where a trailing edge "
@@ -60,10 +84,24 @@ def evidence(test: Relation, row: int = -1) -> str:
         )
     if test.name == "command":
         return (
-            f"elevator_rad follows {f[0]:.3g} +- {f[1]:.2g} of elevator_command_rad after {1e3 * f[2]:+.0f} "
+            f"{test.channels[1]} follows {f[0]:.3g} +- {f[1]:.2g} of {name} after {1e3 * f[2]:+.0f} "
             f"+- {1e3 * f[3]:.0f} ms, where a positive factor and a delay are required"
         )
     return f"the records give {test.name} = {f[0]:.3g} +- {f[1]:.2g}, where about {f[2]:.3g} is expected"
+
+
+SHARES: Final = (
+    ("of the sum of turn, gravity by bank and ay/V",),
+    ("of p sin(alpha) - r cos(alpha)", "of gravity by bank and ay/V"),
+    ("of p sin(alpha) - r cos(alpha)", "of gravity by bank", "of ay/V"),
+)
+"""Causes of the rate of beta, by the number that were told apart."""
+
+
+def _shares(f: Sequence[float]) -> str:
+    """Factors of the rate of beta, of as many causes as were told apart."""
+    causes = SHARES[sum(map(math.isfinite, f[:3])) - 1]
+    return " and ".join(f"{f[i]:.3g} +- {f[3 + i]:.2g} {words}" for i, words in enumerate(causes))
 
 
 def runs(run_ids: Sequence[str], total: int) -> str:

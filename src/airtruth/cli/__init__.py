@@ -2,6 +2,7 @@
 
 from airtruth.cli import (
     aircraft,
+    export,
     fly,
     identify,
     importing,
@@ -20,6 +21,7 @@ from airtruth.cli.entry import main
 __all__ = [
     "aircraft",
     "app",
+    "export",
     "fly",
     "identify",
     "importing",

@@ -25,6 +25,7 @@ ORDER: Final = (
     "check",
     "effects",
     "report",
+    "export",
     "verify",
     "schema",
     "aircraft",

@@ -10,6 +10,8 @@ import typer
 
 from airtruth.cli.completion import METHOD_NAMES, complete_aircraft, complete_effect, complete_method
 
+MotionName = Literal["longitudinal", "lateral"]
+"""Choices of --motion, those of `airtruth.physics.motion.MOTIONS`."""
 Condition = Literal["motion", "record", "window"]
 """Choices of --condition, those of `airtruth.identification.options.CONDITIONS`."""
 Covariance = Literal["none", "paper", "white", "coloured", "corrected"]
@@ -33,6 +35,22 @@ OnCluster = Annotated[
         "--cluster",
         metavar="ADDRESS",
         help="Work on a Dask cluster: local:N, tcp://HOST:PORT, tls://HOST:PORT or a scheduler file.",
+    ),
+]
+Terms = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--term",
+        metavar="NAME",
+        help="Nonlinear term to free in the lateral regressions, may be repeated: alpha, products with the angle of attack; "
+        "beta, beta |beta|.",
+    ),
+]
+OfMotion = Annotated[
+    MotionName | None,
+    typer.Option(
+        "--motion",
+        help="Motion to identify. Default: each that the records excite and have the channels for.",
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]

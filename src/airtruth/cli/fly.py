@@ -9,6 +9,7 @@ import typer
 
 from airtruth.cli.application import app
 from airtruth.cli.arguments import PROCESSORS, CampaignFile, OnCluster, Quiet
+from airtruth.cli.early import require_file
 from airtruth.cli.output import notice, print_result
 from airtruth.cli.progress import loading, progress_bar
 from airtruth.errors import FAILED_RUNS
@@ -44,6 +45,7 @@ def fly(
 ) -> None:
     """Fly a campaign in JSBSim and write its flight logs."""
     with loading("fly", quiet):
+        require_file(campaign, "campaign file", "`airtruth new campaign --out FILE.toml` writes one")
         from airtruth.cluster import workers
         from airtruth.logs.manifest import MANIFEST
         from airtruth.logs.remote import location

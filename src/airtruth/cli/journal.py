@@ -24,7 +24,11 @@ FIRST_LINE: Final = "# airtruth log"
 
 Verbose = Annotated[
     bool,
-    typer.Option("--verbose", "-v", help="Show on stderr which files are read and written, and the times."),
+    typer.Option(
+        "--verbose",
+        "-v",
+        help="Show on stderr which files are read and written, and the times; trace prints every table.",
+    ),
 ]
 """Option of every command."""
 LogFile = Annotated[
@@ -117,6 +121,11 @@ def journal(verbose: bool, file: Path | None) -> Iterator[None]:
         LOGGER.propagate = propagate
 
 
+def is_verbose() -> bool:
+    """Whether the journal of this command is shown."""
+    return any(isinstance(handler, _Stream) for handler in LOGGER.handlers)
+
+
 def _begin() -> None:
     from airtruth import __version__
 
@@ -178,4 +187,4 @@ def _opened(file: Path) -> logging.FileHandler:
         raise write_error(file, error) from None
 
 
-__all__ = ["LOGGER", "Application", "LogFile", "Verbose", "journal"]
+__all__ = ["LOGGER", "Application", "LogFile", "Verbose", "is_verbose", "journal"]

@@ -27,6 +27,12 @@ def check(
     each: Annotated[
         bool, typer.Option("--each", help="One check for each file instead of one for all.")
     ] = False,
+    motion: Annotated[
+        str | None,
+        typer.Option(
+            metavar="longitudinal|lateral", help="Motion to check; without it, each that the logs support."
+        ),
+    ] = None,
     force: Force = False,
     json_: Json = False,
     quiet: Quiet = False,
@@ -37,8 +43,9 @@ def check(
     with loading("check", quiet):
         require_names(log, aircraft)
         from airtruth import aircraft as planes
-        from airtruth.checks.kinematics import check_logs
+        from airtruth.checks.motions import check_motions
         from airtruth.logs.sources import named_logs
+        from airtruth.physics.motion import MOTIONS
 
     declared = planes.load(aircraft) if aircraft else None
     named = list(named_logs(log, run_ids=run))
@@ -46,13 +53,19 @@ def check(
     answers = []
     with progress_bar("check", "files" if each else "checks", quiet) as advance:
         for number, group in enumerate(groups, start=1):
-            answers.append(([name for name, _ in group], check_logs(group, declared, force=force)))
+            results = check_motions(group, declared, motion=motion, force=force)
+            answers.append(([name for name, _ in group], results))
             advance(number, len(groups), 0)
     if json_:
-        documents = [{"file": files[0], "files": files, **result.to_dict()} for files, result in answers]
+        documents = []
+        for files, results in answers:
+            own = {name: {"file": files[0], "files": files, **one.to_dict()} for name, one in results.items()}
+            documents.append(own if len(own) > 1 else next(iter(own.values())))
         print_result(json.dumps(documents[0] if len(documents) == 1 else documents, indent=1))
         return
-    for _, result in answers:
-        for sentence in result.forced:
+    for _, results in answers:
+        for sentence in next(iter(results.values())).forced:
             notice(sentence)
-        print_result(result.summary())
+        for name, result in results.items():
+            heading = f"{MOTIONS[name].heading}\n\n" if len(results) > 1 else ""
+            print_result(heading + result.summary())

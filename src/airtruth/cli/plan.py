@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from airtruth.cli.application import app
-from airtruth.cli.arguments import Json, PlanPressure, Quiet, Replace
+from airtruth.cli.arguments import Json, MotionName, PlanPressure, Quiet, Replace
 from airtruth.cli.completion import complete_aircraft, complete_derivative, complete_effect
 from airtruth.cli.early import require_file, require_names
 from airtruth.cli.output import print_result
@@ -18,7 +18,7 @@ from airtruth.errors import ConfigurationError
 from airtruth.units import DEG
 
 if TYPE_CHECKING:
-    from airtruth.design import Limits
+    from airtruth.design import ForecastResult, Limits
 
 _OF_INPUT: Final = (
     "size",
@@ -34,7 +34,7 @@ _OF_INPUT: Final = (
     "force",
 )
 """Parameters that apply to a computed input alone."""
-_OF_PREDICTION: Final = ("pressure",)
+_OF_PREDICTION: Final = ("pressure", "motion")
 """Those that apply to a predicted accuracy alone."""
 
 
@@ -62,6 +62,12 @@ def plan(
             help="constant: the filter does not use the airspeed as a measurement; measured: it does."
         ),
     ] = "constant",
+    motion: Annotated[
+        MotionName | None,
+        typer.Option(
+            help="Motion whose accuracy is predicted. Default: each of which the campaign moves a control."
+        ),
+    ] = None,
     split: Annotated[
         str | None,
         typer.Option(
@@ -138,10 +144,9 @@ def plan(
             require_file(trace, "folder", "`airtruth trace LOG --aircraft A --out DIR` writes it")
         require_names(aircraft=aircraft, effects=[] if split is None else _listed("--split", split))
         from airtruth.api.plans import base_campaign
-        from airtruth.design import ForecastResult, NarrowResult, PlanOptions, SplitResult, forecast
+        from airtruth.design import PlanOptions
         from airtruth.design.from_files import Stated, planned_from
 
-    result: ForecastResult | SplitResult | NarrowResult
     predicts = split is None and derivative is None and trace is None
     _require_of(context, predicts)
     if predicts:
@@ -149,18 +154,48 @@ def plan(
             raise ConfigurationError(
                 "plan: state a CAMPAIGN.toml, --split A,B, --derivative NAME or --from DIR"
             )
-        with progress_bar("plan", "kinds of runs", quiet) as advance:
-            result = forecast(campaign, records, pressure, advance)
-    else:
-        stated = Stated(
-            _listed("--split", split), _sizes(size or []), _listed("--derivative", derivative), trace
-        )
-        limits = _limits(amplitude_deg, rate_deg_s, alpha_deg, load_factor, length_s, airspeed_percent)
-        options = PlanOptions(limits, records, seed)
-        with status("plan", quiet) as step:
-            base = base_campaign(campaign, trace is not None, aircraft)
-            result = planned_from(base, stated, aircraft, options, out, force=force, step=step)
+        forecasts = _forecasts(campaign, records, pressure, motion, quiet)
+        print_result(_json(forecasts) if json_ else _text(forecasts))
+        return
+    stated = Stated(_listed("--split", split), _sizes(size or []), _listed("--derivative", derivative), trace)
+    limits = _limits(amplitude_deg, rate_deg_s, alpha_deg, load_factor, length_s, airspeed_percent)
+    options = PlanOptions(limits, records, seed)
+    with status("plan", quiet) as step:
+        base = base_campaign(campaign, trace is not None, aircraft)
+        result = planned_from(base, stated, aircraft, options, out, force=force, step=step)
     print_result(json.dumps(result.to_dict(), indent=1) if json_ else result.summary())
+
+
+def _forecasts(
+    campaign: Path, records: int | None, pressure: PlanPressure, motion: MotionName | None, quiet: bool
+) -> list[ForecastResult]:
+    """The accuracy of the motion, or of each of which the campaign moves a control."""
+    from airtruth.design import forecast, moved_motions
+    from airtruth.simulation.campaign.plan import make
+
+    made = make(campaign)
+    found = []
+    for name in moved_motions(made.campaign) if motion is None else (motion,):
+        with progress_bar("plan", "kinds of runs", quiet) as advance:
+            found.append(forecast(made, records, pressure, advance, name))
+    return found
+
+
+def _json(forecasts: list[ForecastResult]) -> str:
+    """One object, or one of each motion under its name."""
+    import json
+
+    objects = {one.motion: one.to_dict() for one in forecasts}
+    return json.dumps(objects if len(forecasts) > 1 else objects[forecasts[0].motion], indent=1)
+
+
+def _text(forecasts: list[ForecastResult]) -> str:
+    """The tables, each under the heading of its motion where there are several."""
+    from airtruth.physics.motion import MOTIONS
+
+    if len(forecasts) == 1:
+        return forecasts[0].summary()
+    return "\n\n".join(f"{MOTIONS[one.motion].heading}\n{one.summary()}" for one in forecasts)
 
 
 def _require_of(context: typer.Context, predicts: bool) -> None:

@@ -10,6 +10,7 @@ import typer
 from airtruth.cli.application import app
 from airtruth.cli.arguments import Quiet, Replace
 from airtruth.cli.completion import complete_aircraft
+from airtruth.cli.early import require_file, require_names
 from airtruth.cli.output import print_result
 from airtruth.cli.progress import working
 
@@ -52,6 +53,12 @@ def report(
     quiet: Quiet = False,
 ) -> None:
     """Write one self-contained HTML page and its tables as CSV and LaTeX, or its figures for papers."""
+    require_file(
+        folder,
+        "folder or file",
+        "give the folder of a trace, a loop or an identified campaign, or a file of estimates",
+    )
+    require_names(aircraft=aircraft)
     from airtruth.api import report as write_report
 
     with working("report", quiet):

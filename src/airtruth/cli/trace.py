@@ -27,8 +27,16 @@ from airtruth.cli.arguments import (
 )
 from airtruth.cli.compilation import compile_filter
 from airtruth.cli.early import require_names
+from airtruth.cli.journal import is_verbose
 from airtruth.cli.output import notice, print_result
-from airtruth.cli.progress import TRACE_STEPS, announced_compilation, loading, progress_bar, status
+from airtruth.cli.progress import (
+    LOOP_STEPS,
+    TRACE_STEPS,
+    announced_compilation,
+    loading,
+    progress_bar,
+    status,
+)
 from airtruth.errors import FAILED_RUNS
 
 if TYPE_CHECKING:
@@ -117,7 +125,7 @@ def _perform(task: TraceTask, cluster: str | None, *, as_json: bool, quiet: bool
     with (
         workers(cluster) as on,
         announced_compilation(task.command, quiet),
-        status(task.command, quiet, TRACE_STEPS) as advance,
+        status(task.command, quiet, TRACE_STEPS if task.methods is None else LOOP_STEPS) as advance,
     ):
         if on is None:
             summary = perform(task, advance)
@@ -127,7 +135,21 @@ def _perform(task: TraceTask, cluster: str | None, *, as_json: bool, quiet: bool
             if ended.error is not None:
                 raise ended.error
             summary = ended.summary
-    print_result(task.answer.read_text(encoding="utf-8").rstrip() if as_json else summary.rstrip())
+    if as_json:
+        summary = task.answer.read_text(encoding="utf-8")
+    elif is_verbose() and task.methods is None:
+        summary = _details(task.answer)
+    print_result(summary.rstrip())
+
+
+def _details(answer: Path) -> str:
+    from airtruth.documents import read_json
+    from airtruth.errors import StoreError
+    from airtruth.tracing.answer import TraceAnswer
+    from airtruth.tracing.presentation.text import as_trace_text
+
+    document = read_json(answer, StoreError, "run the same command again")
+    return as_trace_text(TraceAnswer.from_dict(document, str(answer)))
 
 
 def _trace_each(

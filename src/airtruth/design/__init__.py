@@ -1,7 +1,7 @@
 """Design of experiments: accuracy of a campaign before it is flown; the input that separates effects or narrows estimates."""
 
 from airtruth.design.band import BandQuestion
-from airtruth.design.bound import ForecastResult, forecast
+from airtruth.design.bound import ForecastResult, forecast, moved_motions
 from airtruth.design.flight import PlanOptions
 from airtruth.design.limits import Limits
 from airtruth.design.narrow_result import NarrowResult
@@ -19,6 +19,7 @@ __all__ = [
     "PlanOptions",
     "SplitResult",
     "forecast",
+    "moved_motions",
     "narrow",
     "split",
 ]

@@ -30,7 +30,7 @@ from airtruth.tracing.accepted import IncrementTable
 from airtruth.tracing.answer import Z95, AcceptedEffect
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem, sensitivities_of
-from airtruth.tracing.model.parameters import Common, Parameters, size_index
+from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
 from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.selection.increments import CELLS
@@ -155,8 +155,8 @@ class BandQuestion:
         draws = []
         for _ in range(DRAWS // 2):
             size = _SPREAD * float(np.clip(rng.standard_normal(), -_MOST, _MOST))
-            common = np.zeros(Common.size)
-            common[Common.derivatives] = root @ rng.standard_normal(6)
+            common = np.zeros(SHORT_PERIOD.common.size)
+            common[SHORT_PERIOD.common.derivatives] = root @ rng.standard_normal(6)
             draws += [(1.0 + size, common), (1.0 - size, -common)]
         return Band(
             model=model_of(bench.aircraft, campaign, bench.condition, fitted_of(records)),
@@ -252,7 +252,9 @@ class Band:
         if found is None:
             return None
         basis = refitted(problem, hypothesis, found, model.records)
-        directions = found.t[[size_index(k) for k in range(len(sizes))]].reshape(len(sizes), -1)
+        directions = found.t[SHORT_PERIOD.common.size : SHORT_PERIOD.common.size + len(sizes)].reshape(
+            len(sizes), -1
+        )
         across = np.stack([beyond(basis, d) for d in directions])
         information = model.records * (across @ across.T) + np.diag(hypothesis.size_precision)
         return np.asarray(np.linalg.pinv(information, hermitian=True))

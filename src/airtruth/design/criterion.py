@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from airtruth.design.bench import Flown
 from airtruth.design.question import Hypothesised, typical_sizes
 from airtruth.design.separation import Distance, Experiment, Member, Model
-from airtruth.tracing.model.parameters import Common
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.records import TraceRecord
 
 Array = NDArray[np.float64]
@@ -97,7 +97,7 @@ class Criterion:
     def differences(self, record: TraceRecord) -> tuple[Array, Array]:
         """Predicted outputs (samples, 3) under the first hypothesis, and under its nearest rival at its best-fitting size."""
         experiment = Experiment(self.model, record)
-        still = np.zeros(Common.size)
+        still = np.zeros(SHORT_PERIOD.common.size)
         y = experiment.outputs(self.members[0], still)
         tried = [(m, experiment.distance(y, m.effect, m.sizes, still)) for m in self.members[1:]]
         rival, nearest = min(tried, key=lambda pair: pair[1].sigma)
@@ -120,7 +120,7 @@ def criterion(
     assert first.std is not None
     leader = first.member(first.sizes)
     experiment = Experiment(model, reference)
-    still = np.zeros(Common.size)
+    still = np.zeros(SHORT_PERIOD.common.size)
     y = experiment.outputs(leader, still)
     relative = float(first.std[0] / abs(first.sizes[0])) if first.sizes[0] else 0.0
     members, std = [leader], [first.std]
@@ -134,8 +134,8 @@ def criterion(
     unknowns = []
     for _ in range(DRAWS // 2):
         sizes = np.clip(rng.standard_normal(1), -_MOST_SIZES, _MOST_SIZES)
-        common = np.zeros(Common.size)
-        common[Common.derivatives] = root @ rng.standard_normal(6)
+        common = np.zeros(SHORT_PERIOD.common.size)
+        common[SHORT_PERIOD.common.derivatives] = root @ rng.standard_normal(6)
         unknowns += [Unknown(sizes, common), Unknown(-sizes, -common)]
     return Criterion(model, tuple(members), tuple(std), tuple(unknowns))
 
@@ -146,7 +146,7 @@ def _imitation(experiment: Experiment, y: Array, h: Hypothesised) -> Array:
     Where the best fit is immaterial the effect does not imitate these outputs, and its typical size counts: at the neutral
     value it would be no effect, from which no input separates another.
     """
-    still = np.zeros(Common.size)
+    still = np.zeros(SHORT_PERIOD.common.size)
     tried: list[Distance] = []
     for start in _starts(h):
         tried.append(experiment.distance(y, h.effect, start, still))

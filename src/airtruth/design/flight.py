@@ -19,17 +19,9 @@ from airtruth.design.limits import Limits
 from airtruth.design.separation import Model
 from airtruth.errors import AirtruthError, ConfigurationError
 from airtruth.physics.gust_figures import GustScales, gust_scales
-from airtruth.simulation.campaign.file import (
-    NO_GUST,
-    Campaign,
-    Choice,
-    ConditionTable,
-    Constant,
-    Distribution,
-    ManoeuvreTable,
-    Normal,
-    Uniform,
-)
+from airtruth.simulation.campaign.file import NO_GUST, Campaign, ConditionTable
+from airtruth.simulation.campaign.manoeuvre_table import ManoeuvreTable
+from airtruth.simulation.campaign.tables import Choice, Constant, Distribution, Normal, Uniform
 from airtruth.simulation.manoeuvres import Manoeuvre
 from airtruth.simulation.simulator import Condition, jsbsim_model
 from airtruth.tracing.conditions import gust_length_m

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,7 @@ from airtruth.errors import ConfigurationError
 from airtruth.identification.condition import AircraftConstants
 from airtruth.identification.likelihood.cramer_rao import experiment_bound
 from airtruth.identification.likelihood.fit import fit
-from airtruth.identification.likelihood.options import CHANNELS, FilterOptions
+from airtruth.identification.likelihood.options import FilterOptions
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.gust_figures import GustScales
 
@@ -79,22 +79,23 @@ class LinearExperiment:
         return Batch(("plan",), self.dt_s, t_s, channels), options
 
 
-def sensor_noise(sensors: Mapping[str, Sensor], aircraft: Aircraft, pressure: str) -> dict[str, float]:
+def sensor_noise(
+    sensors: Mapping[str, Sensor], aircraft: Aircraft, channels: Sequence[str]
+) -> dict[str, float]:
     """Standard deviation of the noise of each sensor that the bound needs [SI].
 
     Parameters
     ----------
     sensors : channel -> sensor.
     aircraft : named in the message.
-    pressure : "measured" counts the airspeed.
+    channels : outputs of the filter.
 
     Raises
     ------
     ConfigurationError
         If a sensor has no noise.
     """
-    needed = [c for n, c in CHANNELS.items() if n != "airspeed" or pressure == "measured"]
-    noise = {c: sensors[c].noise_std.value if c in sensors else 0.0 for c in needed}
+    noise = {c: sensors[c].noise_std.value if c in sensors else 0.0 for c in channels}
     lacking = [c for c, std in noise.items() if std <= 0.0]
     if lacking:
         raise ConfigurationError(

@@ -13,6 +13,7 @@ from airtruth.design.flight import gusts
 from airtruth.design.information import LinearExperiment, sensor_noise
 from airtruth.design.narrow_result import Quantity
 from airtruth.errors import ConfigurationError, choices
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.physics.terms import Change, DerivativeTerm
 from airtruth.simulation.campaign.file import Campaign
@@ -76,7 +77,8 @@ class DerivativeQuestion:
             If a sensor has no noise.
         """
         aircraft, covariance = bench.aircraft, bench.plant.derivative_cov
-        noise = sensor_noise(campaign.sensors.apply(aircraft.file.sensors), aircraft, "constant")
+        outputs = [output.channel for output in LONGITUDINAL.outputs]
+        noise = sensor_noise(campaign.sensors.apply(aircraft.file.sensors), aircraft, outputs)
         experiment = LinearExperiment(
             aircraft,
             noise,

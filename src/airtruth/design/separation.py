@@ -25,7 +25,7 @@ from airtruth.effects.effect import Effect, Parameter
 from airtruth.physics.terms import Change
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import Sensitivities, TraceProblem, sensitivities_of
-from airtruth.tracing.model.parameters import Common, Layout, Parameters, PerRecord
+from airtruth.tracing.model.parameters import SHORT_PERIOD, Layout, Parameters
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.response import respond
 from airtruth.tracing.model.settings import Settings, initial_per_record
@@ -41,9 +41,13 @@ _HALVINGS: Final = 2
 """Times that a step which does not help is halved [-] (judgement)."""
 _SETTLED: Final = 0.01
 """Relative fall of d^2 below which the search ends [-] (judgement: half a percent of the separation)."""
-_FREE: Final = np.array([i for i in range(Common.colour.start) if i not in Common.noise])
+_FREE: Final = np.array(
+    [i for i in range(SHORT_PERIOD.common.colour.start) if i not in SHORT_PERIOD.common.noise]
+)
 """Common parameters that are refitted: all but those of the noise, on which the mean of the innovations does not depend."""
-_OWN: Final = np.array([i for i in range(PerRecord.size) if i != PerRecord.log_gust])
+_OWN: Final = np.array(
+    [i for i in range(SHORT_PERIOD.per_record.size) if i != SHORT_PERIOD.per_record.log_gust]
+)
 """Parameters of a record that are refitted: all but the gust level, likewise."""
 
 
@@ -90,7 +94,7 @@ class Model:
     def own(self, record: TraceRecord) -> Array:
         """(per-record,) parameters of a flight in these gusts."""
         values = initial_per_record(record, self.settings)
-        values[PerRecord.log_gust] = np.log(self.gust_m_s)
+        values[SHORT_PERIOD.per_record.log_gust] = np.log(self.gust_m_s)
         return values
 
 
@@ -120,12 +124,12 @@ class Experiment:
     def __init__(self, model: Model, record: TraceRecord) -> None:
         self.model = model
         self.record = flown_by(
-            model, record, model.hypothesis((), record), np.zeros(0), np.zeros(Common.size)
+            model, record, model.hypothesis((), record), np.zeros(0), np.zeros(SHORT_PERIOD.common.size)
         )
         problem = TraceProblem((self.record,), model.settings)
         self._problem = problem
         own = model.own(self.record)
-        point = Parameters(np.zeros(Common.size), own[None], np.zeros(0))
+        point = Parameters(np.zeros(SHORT_PERIOD.common.size), own[None], np.zeros(0))
         found = sensitivities_of(problem, 0, model.hypothesis((), self.record), point)
         self.sound = found is not None
         if found is None:
@@ -214,7 +218,7 @@ def refitted(problem: TraceProblem, hypothesis: Hypothesis, found: Sensitivities
     found : sensitivities of the record; those by sizes do not count.
     records : number of equal records that are fitted together.
     """
-    layout = Layout(len(found.t) - Common.size - PerRecord.size)
+    layout = Layout(SHORT_PERIOD, len(found.t) - SHORT_PERIOD.common.size - SHORT_PERIOD.per_record.size)
     nuisance = np.concatenate([_FREE, layout.per_record.start + _OWN])
     t = found.t[nuisance].reshape(len(nuisance), -1).T
     priors = problem.priors(hypothesis)

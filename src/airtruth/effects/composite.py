@@ -1,6 +1,7 @@
 """Effects that move several derivatives together: tail, wing, flow, ice, and the derivatives themselves.
 
-Each is a `DerivativeTerm`; `airtruth.physics.composition` gives the direction of the six derivatives per unit of it.
+Each is a `DerivativeTerm`; `airtruth.physics.composition` gives the direction of the six derivatives per unit of it. The
+priors are judgement: tail and wing that lose lift rather than gain it, and the accuracy of first-order contributions.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from airtruth.effects.effect import Effect, Parameter, factor
+from airtruth.effects.effect import Effect, Parameter, Prior, factor
 from airtruth.physics.terms import Change, DerivativeTerm
 
 Values = Mapping[str, float]
@@ -58,6 +59,7 @@ EFFECTS: Final = (
         distinguished_by="Elevator and pitch damping change by the same share; elevator_effectiveness leaves Cmq and "
         "Cmalpha as they are.",
         in_derivatives=True,
+        prior=Prior(0.3, -1.0, 0.05, shape=0.25),
     ),
     Effect(
         name="wing_effectiveness",
@@ -69,6 +71,7 @@ EFFECTS: Final = (
         f"follows it; {_TAIL}. Material: 3 %, below the usual uncertainty of CLalpha.",
         distinguished_by="The elevator keeps its effectiveness. A normal accelerometer separates it from cg_shift.",
         in_derivatives=True,
+        prior=Prior(0.15, -0.6, 0.05, shape=0.3),
     ),
     Effect(
         name="dynamic_pressure",
@@ -81,6 +84,7 @@ EFFECTS: Final = (
         distinguished_by="All six derivatives change by the same share; airspeed_scale also changes the rate of "
         "rotation of the flight path.",
         in_derivatives=True,
+        prior=Prior(0.05, -0.35, 0.5),
     ),
     Effect(
         name="aerodynamic_center",
@@ -102,6 +106,7 @@ EFFECTS: Final = (
         source=f"dCmalpha = -CLalpha dx; {_TAIL}. Material: 1 % of the chord.",
         distinguished_by="A shift of the CG also changes Cmq and Cmde, by little.",
         in_derivatives=True,
+        prior=Prior(0.05, -0.15, 0.15, log_odds=-4.0),
     ),
     Effect(
         name="icing",
@@ -125,6 +130,7 @@ EFFECTS: Final = (
         distinguished_by="Pitch damping changes by a third of the share of the others; with tail_effectiveness by an "
         "equal share.",
         in_derivatives=True,
+        prior=Prior(1.0, 0.0, 4.0, shape=0.4, log_odds=-5.0),
     ),
     Effect(
         name="derivatives",

@@ -7,8 +7,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
+from airtruth.channels import SIGNALS
 from airtruth.errors import ConfigurationError, choices
-from airtruth.physics.terms import Change
+from airtruth.physics.composition import PARTS
+from airtruth.physics.motion import MOTIONS, Motion
+from airtruth.physics.terms import LATE, Change
 from airtruth.quantity import LARGEST
 from airtruth.units import UNITS, printed
 
@@ -144,6 +147,25 @@ def factor(meaning: str, low: float, high: float, material: float) -> Parameter:
 
 
 @dataclass(frozen=True)
+class Prior:
+    """What is known before any record of an effect that explains changed derivatives, in the units of its size.
+
+    Attributes
+    ----------
+    std : standard deviation of the size [-]; low, high : its plausible range.
+    shape : relative uncertainty of each element of its direction [-]; the default is of one that follows from definitions,
+        second order in the size (judgement).
+    log_odds : logarithm of its prior odds [-]; the default is of a usual cause, one in twenty (judgement).
+    """
+
+    std: float
+    low: float
+    high: float
+    shape: float = 0.02
+    log_odds: float = -3.0
+
+
+@dataclass(frozen=True)
 class Effect:
     """A physical effect that a declared model may lack.
 
@@ -159,6 +181,8 @@ class Effect:
     distinguished_by : manoeuvre or sensor that separates it from effects with a similar response, as a sentence.
     in_derivatives : whether it changes the six derivatives alone, by an amount that depends on the aircraft at its trim
         (`airtruth.physics.terms.DerivativeTerm`).
+    prior : of an effect that explains changed derivatives; None of any other.
+    event : what moves it together with other effects of the same event; empty for an effect of its own.
     """
 
     name: str
@@ -170,6 +194,8 @@ class Effect:
     variant: str = ""
     distinguished_by: str = ""
     in_derivatives: bool = False
+    prior: Prior | None = None
+    event: str = ""
 
     def for_aircraft(self, derivatives: Mapping[str, float]) -> Effect:
         """The effect with the material sizes of an aircraft, see `Parameter.for_aircraft`."""
@@ -183,9 +209,44 @@ class Effect:
     @property
     def channels(self) -> tuple[str, ...]:
         """Columns of a log on which it acts as an error of a sensor, sorted."""
-        middle = {p.name: 0.5 * (p.low + p.high) for p in self.parameters}
-        change = self.describe(middle)
+        change = self._example
         return tuple(sorted({t.channel for t in change.sensors} | {t.channel for t in change.readings}))
+
+    @property
+    def _example(self) -> Change:
+        """The terms that it changes, at one step from neutral."""
+        return self.describe({p.name: p.value(p.step) for p in self.parameters})
+
+    @property
+    def quantity(self) -> str:
+        """Declared quantity, or cause of changed derivatives, whose error it is; empty for any other effect."""
+        change = self._example
+        names = (*(t.quantity for t in change.declared), *(t.cause for t in change.derivatives))
+        return names[0] if len(names) == 1 else ""
+
+    @property
+    def divides(self) -> bool:
+        """Whether its factor divides coefficients, as that of a mass or an inertia does."""
+        return any(d.divides for m in MOTIONS.values() for d in m.declared if d.name == self.quantity)
+
+    @property
+    def late_signal(self) -> str:
+        """Channel whose reading it delays, or "surface"; empty for any other effect. Its size is a time [s]."""
+        change = self._example
+        if any(term.kind in LATE for term in change.surface):
+            return "surface"
+        return next((term.channel for term in change.sensors if term.kind in LATE), "")
+
+    @property
+    def variant_channel(self) -> str | None:
+        """The variant where it is a column of a log."""
+        return self.variant if self.variant in SIGNALS else None
+
+    def applies_to(self, motion: Motion) -> bool:
+        """Whether every name in its terms is one of a motion."""
+        names = self._example.names()
+        parts = names & PARTS.keys()
+        return names - parts <= motion.names and all(PARTS[name].motion == motion.name for name in parts)
 
     def change(self, values: Mapping[str, float]) -> Change:
         """Return the terms that the effect changes at these values.

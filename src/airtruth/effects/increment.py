@@ -11,8 +11,8 @@ function is zero at the trim and constant outside the range in which it was lear
 is a straight line of slope c/w: the slope of a function that nothing declares, and beside a declared derivative the part
 by which a bend within the cell moves the mean slope away from it. c is left out of an increment of CX, whose declared
 slope is a parameter of its own, and of a lag that changes. A step behind a play is a straight line over one cell and constant
-on either side of it: it comes at a larger s than it goes. The bends b_k and c have independent normal priors, which is
-the prior of an integrated random walk: a penalised linear spline.
+on either side of it: the step switches on at a larger s than it switches off. The bends b_k and c have independent normal priors,
+which is the prior of an integrated random walk: a penalised linear spline.
 
 Source: S. N. Wood, Generalized Additive Models, 2nd ed., 2017, sections 5.3 and 5.8 (splines as normal priors);
 D. Ruppert, M. P. Wand and R. J. Carroll, Semiparametric Regression, 2003, section 3.5 (truncated lines).

@@ -1,17 +1,23 @@
-"""Errors in declared mass properties, elevator effectiveness and thrust line."""
+"""Errors in declared mass properties, elevator effectiveness and thrust line.
+
+The priors are judgement: usual errors of declarations.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from airtruth.effects.effect import Effect, Parameter, factor
-from airtruth.physics.terms import Change, DeclaredTerm, Quantity
+from airtruth.effects.effect import Effect, Parameter, Prior, factor
+from airtruth.physics.terms import Change, DeclaredTerm
 
 Values = Mapping[str, float]
 
+LOADING: Final = "loading"
+"""Event that moves mass, inertia and CG together: an undeclared load, or a lost part."""
 
-def _change(quantity: Quantity, parameter: str) -> Callable[[Values], Change]:
+
+def _change(quantity: str, parameter: str) -> Callable[[Values], Change]:
     def describe(values: Values) -> Change:
         return Change(declared=(DeclaredTerm(quantity, values[parameter]),))
 
@@ -28,6 +34,7 @@ EFFECTS: Final = (
         source="Forces and moments of the elevator times factor; written as deflection times factor, exact where they "
         "are linear in it. Material: 5 %, the usual uncertainty of a wind-tunnel Cmde.",
         distinguished_by="It is known only as accurately as Cmde and CLde are declared.",
+        prior=Prior(0.3, -0.7, 1.0),
     ),
     Effect(
         name="mass_error",
@@ -37,6 +44,8 @@ EFFECTS: Final = (
         explanation="The aircraft is heavier or lighter than declared, with the declared CG and pitch inertia.",
         source="Newton's second law. Material: 2 %, the accuracy of a weighing with the fuel estimated.",
         distinguished_by="Weigh the aircraft. A scale error of the airspeed has a similar effect on az.",
+        prior=Prior(0.1, -0.3, 0.4),
+        event=LOADING,
     ),
     Effect(
         name="inertia_error",
@@ -46,6 +55,8 @@ EFFECTS: Final = (
         explanation="The pitch inertia differs from the declared one.",
         source="Euler's equation. Material: 5 %, the accuracy of a swing test.",
         distinguished_by="It scales Cmalpha, Cmq and Cmde together, and is known only as accurately as they are declared.",
+        prior=Prior(0.15, -0.4, 0.6),
+        event=LOADING,
     ),
     Effect(
         name="cg_shift",
@@ -67,6 +78,8 @@ EFFECTS: Final = (
         source="Moment transfer: dCm = CL dx + ...; Etkin and Reid, Dynamics of Flight, 3rd ed., 1996, ch. 2. "
         "Material: 1 % of the chord.",
         distinguished_by="Two loadings; with one, Cmalpha and Cmq absorb it.",
+        prior=Prior(0.05, -0.15, 0.15, log_odds=-2.0),
+        event=LOADING,
     ),
     Effect(
         name="thrust_moment",

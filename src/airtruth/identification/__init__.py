@@ -1,5 +1,6 @@
-"""Identification: the six short-period derivatives of a flight log, by regression and by likelihood."""
+"""Identification: the derivatives of a motion from flight logs, by regression and by likelihood."""
 
+from airtruth.identification.answers import Answer, answers
 from airtruth.identification.condition import AircraftConstants
 from airtruth.identification.diagnostics import Diagnostics, diagnose, residuals
 from airtruth.identification.estimates import (
@@ -10,7 +11,7 @@ from airtruth.identification.estimates import (
     estimates_table,
     quantities,
 )
-from airtruth.identification.methods import METHODS, Method
+from airtruth.identification.methods import LATERAL_METHODS, METHODS, Method
 from airtruth.identification.options import AuxiliaryModel, Options
 from airtruth.identification.regression.auxiliary import linear_auxiliary
 from airtruth.identification.regression.covariance import COVARIANCES
@@ -24,14 +25,17 @@ from airtruth.identification.result import (
     settings_of,
 )
 from airtruth.identification.run import identified, identify, identify_batch, identify_joint
-from airtruth.identification.store import require_mergeable, write_estimates
+from airtruth.identification.store import FILES, beside, require_mergeable, write_estimates
 from airtruth.identification.tables import overview
 
 __all__ = [
     "COVARIANCES",
+    "FILES",
+    "LATERAL_METHODS",
     "METHODS",
     "SENTENCES",
     "AircraftConstants",
+    "Answer",
     "AuxiliaryModel",
     "Diagnostics",
     "Estimates",
@@ -43,6 +47,8 @@ __all__ = [
     "Source",
     "SpooledResult",
     "Status",
+    "answers",
+    "beside",
     "diagnose",
     "estimates_table",
     "identified",

@@ -12,28 +12,35 @@ from airtruth.identification.options import Options
 from airtruth.identification.reconstructed import with_reconstruction
 from airtruth.identification.regression.solve import regress_batch, regress_joint
 from airtruth.logs.flight_log import Batch
+from airtruth.physics.motion import LONGITUDINAL, Motion
 
 
 def identify_batch(
-    batch: Batch, constants: AircraftConstants, name: str | Method, options: Options | None = None
+    batch: Batch,
+    constants: AircraftConstants,
+    name: str | Method,
+    options: Options | None = None,
+    motion: Motion = LONGITUDINAL,
 ) -> Estimates:
-    """Estimate the six derivatives of each run; nothing is checked.
+    """Estimate the derivatives of a motion for each run; nothing is checked.
 
     A result does not depend on the other runs of the batch.
 
     Parameters
     ----------
     batch : runs of one length and sample period, as `airtruth.logs.flight_log.batches` makes them.
-    constants : aircraft, any object with wing_area_m2, chord_m, mass_kg, inertia_yy_kg_m2.
-    name : method, a key of `airtruth.identification.METHODS`, or a `Method`.
+    constants : aircraft, any object with wing_area_m2, chord_m, mass_kg, inertia_yy_kg_m2; for the lateral-directional motion
+        also span_m, inertia_xx_kg_m2, inertia_zz_kg_m2, inertia_xz_kg_m2.
+    name : method of the motion, a key of `airtruth.identification.METHODS`, or a `Method`.
     options : choices; None for the defaults.
+    motion : whose derivatives are estimated.
 
     Raises
     ------
     ConfigurationError
         If the method does not exist.
     """
-    chosen = method(name)
+    chosen = method(name, motion)
 
     def estimate(parts: Sequence[Batch], options: Options) -> Estimates:
         if chosen.estimate is not None:
@@ -45,7 +52,11 @@ def identify_batch(
 
 
 def identify_joint(
-    parts: Sequence[Batch], constants: OneOrEach, name: str | Method, options: Options | None = None
+    parts: Sequence[Batch],
+    constants: OneOrEach,
+    name: str | Method,
+    options: Options | None = None,
+    motion: Motion = LONGITUDINAL,
 ) -> Estimates:
     """One estimate for all runs together; nothing is checked.
 
@@ -56,14 +67,14 @@ def identify_joint(
     ----------
     parts : batches; lengths and rates may differ.
     constants : of all batches, or one entry for each: mass and inertia may differ.
-    name, options : as in `identify_batch`.
+    name, options, motion : as in `identify_batch`.
 
     Raises
     ------
     ConfigurationError
         If the method does not exist, or estimates each run alone.
     """
-    chosen = method(name)
+    chosen = method(name, motion)
     if chosen.estimate is not None and chosen.estimate_joint is None:
         raise ConfigurationError(
             f"method {chosen.name} has no estimate_joint: identify each run, or give the Method that function"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from airtruth.charts import Cells, Chart, Colour, Mark, Panel, Rule
 from airtruth.numerics.order_statistics import quantiles
-from airtruth.physics.short_period import MODAL, PARAMETERS, UNITS
+from airtruth.physics.motion import LONGITUDINAL, Motion, motion_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,8 +19,6 @@ Array = NDArray[np.float64]
 
 _MIDDLE: Final = (0.025, 0.975)
 """Quantiles between which 95 % of the runs lie [-]."""
-_NAMES: Final = (*PARAMETERS, *MODAL)
-"""Parameters of the panels."""
 _COLUMNS: Final = 4
 """Panels side by side [-] (judgement)."""
 
@@ -60,19 +58,21 @@ def intervals_chart(
     """
     frames = estimates if callable(estimates) else lambda: [estimates]
     runs, first, methods = 0, "", dict[str, None]()
+    motion = LONGITUDINAL
     for frame in frames():
+        motion = motion_of(frame.columns)
         runs += frame["run_id"].nunique()
         first = first or str(frame["run_id"].iloc[0] if len(frame) else "")
         methods |= dict.fromkeys(map(str, frame["method"].unique()))
-    marks = _marks(frames, list(methods), single=runs == 1)
+    marks = _marks(frames, list(methods), motion, single=runs == 1)
     panels = tuple(
         Panel(
-            x_label=f"{name.removesuffix('_rad_s')} [{UNITS[name]}]",
+            x_label=f"{name.removesuffix('_rad_s')} [{motion.units[name]}]",
             rows=tuple(methods),
             marks=tuple(row[name] for row in marks if name in row),
             rules=_rules(references, name),
         )
-        for name in _NAMES
+        for name in _names(motion)
     )
     percent = f"{100.0 * confidence:g} % interval"
     words = (
@@ -104,7 +104,8 @@ def runs_chart(
     spread = _SPREAD * (1.0 - 1.0 / max(len(methods), 1))  # marks of one run stay nearer than those of two
     offsets = np.linspace(-spread, spread, len(methods))
     panels = []
-    for name in PARAMETERS:
+    motion = motion_of(estimates.columns)
+    for name in motion.parameters:
         marks = [
             Mark(
                 runs.index(str(run)) + float(offsets[methods.index(method)]),
@@ -125,7 +126,7 @@ def runs_chart(
         ]
         rules = _rules(references, name)
         panels.append(
-            Panel(x_label=f"{name} [{UNITS[name]}]", rows=tuple(runs), marks=tuple(marks), rules=rules)
+            Panel(x_label=f"{name} [{motion.units[name]}]", rows=tuple(runs), marks=tuple(marks), rules=rules)
         )
     title = "Estimates of each run"
     return Chart(
@@ -145,15 +146,16 @@ def _rules(references: Mapping[str, Mapping[str, float]] | None, name: str) -> t
     )
 
 
-def correlation_chart(correlations: Mapping[str, Array], of: str) -> Chart:
+def correlation_chart(correlations: Mapping[str, Array], of: str, motion: Motion = LONGITUDINAL) -> Chart:
     """Draw the correlation matrix of the estimates of each method.
 
     Parameters
     ----------
-    correlations : method -> (6, 6) correlation in the order of `PARAMETERS` [-].
+    correlations : method -> correlation in the order of ``motion.parameters`` [-].
     of : what was correlated, a sentence.
+    motion : whose derivatives they are.
     """
-    short = tuple(name.replace("alpha", "\u03b1").replace("de", "\u03b4") for name in PARAMETERS)
+    short = tuple(name.replace("alpha", "\u03b1").replace("de", "\u03b4") for name in motion.parameters)
     panels = tuple(
         Panel(
             title=method,
@@ -166,46 +168,51 @@ def correlation_chart(correlations: Mapping[str, Array], of: str) -> Chart:
 
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
-def _marks(frames: Frames, methods: Sequence[str], *, single: bool) -> list[dict[str, Mark]]:
+def _marks(frames: Frames, methods: Sequence[str], motion: Motion, *, single: bool) -> list[dict[str, Mark]]:
     """Marks in the row of each method, of the parameters that have a finite estimate of a converged run."""
     if not methods:
         return []
+    names = _names(motion)
     # by columns: numpy adds those of a single part as it adds those of all runs
-    total, count = (np.zeros((2, len(methods), len(_NAMES))) for _ in range(2))
+    total, count = (np.zeros((2, len(methods), len(names))) for _ in range(2))
     for frame in frames():
         for i, method in enumerate(methods):
-            half = 0.5 * (_values(frame, method, "_upper") - _values(frame, method, "_lower"))
-            for kind, columns in enumerate((_values(frame, method), half)):
+            half = 0.5 * (_values(frame, method, names, "_upper") - _values(frame, method, names, "_lower"))
+            for kind, columns in enumerate((_values(frame, method, names), half)):
                 for k, column in enumerate(columns.T):
                     finite = column[np.isfinite(column)]
                     total[kind, i, k] += finite.sum()
                     count[kind, i, k] += finite.size
-    ends = quantiles(lambda: (_side_by_side(frame, methods) for frame in frames()), _MIDDLE)
-    low, high = ends.reshape(2, len(methods), len(_NAMES)).tolist()
+    ends = quantiles(lambda: (_side_by_side(frame, methods, names) for frame in frames()), _MIDDLE)
+    low, high = ends.reshape(2, len(methods), len(names)).tolist()
     centre, width = (total / count).tolist()
     return [
         {
             name: Mark(i, c, c - w, c + w, None if single else (low[i][k], high[i][k]))
-            for k, (name, c, w) in enumerate(zip(_NAMES, centre[i], width[i], strict=True))
+            for k, (name, c, w) in enumerate(zip(names, centre[i], width[i], strict=True))
             if count[0, i, k]
         }
         for i in range(len(methods))
     ]
 
 
-def _side_by_side(frame: pd.DataFrame, methods: Sequence[str]) -> Array:
+def _names(motion: Motion) -> tuple[str, ...]:
+    return (*motion.parameters, *motion.modal)
+
+
+def _side_by_side(frame: pd.DataFrame, methods: Sequence[str], names: Sequence[str]) -> Array:
     """(runs, methods x parameters) estimates of the converged runs, filled up with NaN."""
-    columns = [_values(frame, method) for method in methods]
-    block = np.full((max(map(len, columns)), len(methods) * len(_NAMES)), np.nan)
+    columns = [_values(frame, method, names) for method in methods]
+    block = np.full((max(map(len, columns)), len(methods) * len(names)), np.nan)
     for i, own in enumerate(columns):
-        block[: len(own), i * len(_NAMES) : (i + 1) * len(_NAMES)] = own
+        block[: len(own), i * len(names) : (i + 1) * len(names)] = own
     return block
 
 
-def _values(frame: pd.DataFrame, method: str, end: str = "") -> Array:
+def _values(frame: pd.DataFrame, method: str, names: Sequence[str], end: str = "") -> Array:
     """(runs, parameters) estimates of the converged runs of a method, or bounds of their intervals."""
     own = frame[(frame["method"] == method) & frame["converged"]]
-    return np.asarray(own[[name + end for name in _NAMES]], dtype=np.float64)
+    return np.asarray(own[[name + end for name in names]], dtype=np.float64)
 
 
 __all__ = ["COLOURS", "Frames", "correlation_chart", "intervals_chart", "runs_chart"]

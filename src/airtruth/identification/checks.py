@@ -18,6 +18,7 @@ from airtruth.identification.methods import METHODS, Method
 from airtruth.identification.options import Options
 from airtruth.logs.flight_log import Batch, FlightLog, batches
 from airtruth.numerics.prefilter import butterworth, edge_samples, zero_phase
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -25,28 +26,39 @@ Bools = NDArray[np.bool_]
 EDGES: Final = 4
 """Least length of a record over the extension of the zero-phase filter [-]; judgement."""
 STILL: Final = 1.0
-"""Low-passed motion of the elevator over its remainder, below which there is no excitation [-]; judgement: white
+"""Low-passed motion of a surface over its remainder, below which there is no excitation [-]; judgement: white
 noise alone gives about one half."""
 EARLY: Final = 0.2
-"""Largest share of the elevator's range inside the trim window [-]; judgement."""
+"""Largest share of a surface's range inside the trim window [-]; judgement."""
 AIRSPEED_FACTOR: Final = 1.5
 """Largest ratio of --airspeed-m-s to the mean measured airspeed, either way [-]; judgement: the dynamic pressure
 then differs by a factor of 2.3."""
 
-_MOVING: Final = ("alpha_rad", "q_rad_s", "az_m_s2", "elevator_rad")
-"""Channels that change in every manoeuvre."""
+_SLOW: Final = ("airspeed_m_s",)
+"""Channels that a manoeuvre may leave constant."""
 _SHOWN: Final = 3
 """Runs that a message names [-]; judgement."""
 
 
-def check_channels(log: FlightLog, methods: Sequence[Method]) -> None:
-    """Check that the log has the channels of the methods.
+def check_channels(log: FlightLog, methods: Sequence[Method], motion: Motion = LONGITUDINAL) -> None:
+    """Check that the log has the channels of the motion and of the methods.
 
     Raises
     ------
     LogError
-        Naming the channel that a method lacks.
+        Naming the channel that is lacking.
     """
+    for name in motion.required:
+        if name not in log.channels:
+            raise LogError(
+                f"the {motion.name} motion needs the channel {name}, which the log lacks; map it on import, or use --motion "
+                f"{LONGITUDINAL.name if motion is LATERAL else LATERAL.name}"
+            )
+    if motion is LATERAL and not {"beta_rad", "phi_rad", "psi_rad"} & set(log.channels):
+        raise LogError(
+            "the lateral motion needs beta_rad, or phi_rad or psi_rad to reconstruct it, and the log has none of them; map one "
+            "on import"
+        )
     for chosen in methods:
         for name in chosen.channels:
             if name not in log.channels:
@@ -87,7 +99,9 @@ class Unfit:
     cure: str = "leave these runs out"
 
 
-def fit_runs(log: FlightLog, options: Options) -> tuple[FlightLog, tuple[str, ...]]:
+def fit_runs(
+    log: FlightLog, options: Options, motion: Motion = LONGITUDINAL
+) -> tuple[FlightLog, tuple[str, ...]]:
     """Return the runs that can be identified, and a sentence for each reason for which a minority was left out.
 
     The rule is that of `airtruth.checks.gate.admit`.
@@ -99,7 +113,7 @@ def fit_runs(log: FlightLog, options: Options) -> tuple[FlightLog, tuple[str, ..
     LogError
         If half of the runs or more are too short, constant or not excited, naming runs and channels.
     """
-    found = [one for batch in batches(log) for one in unfit(batch, options)]
+    found = [one for batch in batches(log) for one in unfit(batch, options, motion)]
     bad = {run_id for one in found for run_id in one.run_ids}
     if not bad:
         return log, ()
@@ -109,7 +123,7 @@ def fit_runs(log: FlightLog, options: Options) -> tuple[FlightLog, tuple[str, ..
     return rest, tuple(left_out(one.run_ids, len(log), len(rest), one.sentence) for one in found)
 
 
-def unfit(batch: Batch, options: Options) -> list[Unfit]:
+def unfit(batch: Batch, options: Options, motion: Motion = LONGITUDINAL) -> list[Unfit]:
     """Return runs of one length and rate that cannot be identified: too short, constant, or not excited.
 
     Raises
@@ -141,26 +155,28 @@ def unfit(batch: Batch, options: Options) -> list[Unfit]:
             ids = tuple(batch.run_ids[i] for i in np.flatnonzero(which))
             result.append(Unfit(ids, sentence.replace("{runs}", _named(batch, which)), cure))
 
-    for name in _MOVING:
+    for name in motion.required:
+        if name in _SLOW:
+            continue
         constant = np.ptp(channels[name], axis=1) == 0.0
         note(constant, f"{name} is constant in {{runs}}: the sensor was not recorded, or nothing moved")
-    elevator = zero_phase(channels["elevator_rad"], sos)
-    moved, noise = elevator.std(axis=1), (channels["elevator_rad"] - elevator).std(axis=1)
-    note(
-        (moved < STILL * noise) & (np.ptp(channels["elevator_rad"], axis=1) > 0.0),
-        "elevator_rad: no excitation in {runs}: the surface moves less than its own noise; identification needs a manoeuvre",
-    )
-    if options.trim == "mean" or options.condition == "window":
-        early = _early(batch, options, elevator)
-        sentence = (
-            f"the elevator already moves within the trim window of {options.trim_window_s:g} s in {{runs}}"
+    for control in motion.controls:
+        surface = channels[control.channel]
+        smooth = zero_phase(surface, sos)
+        note(
+            (smooth.std(axis=1) < STILL * (surface - smooth).std(axis=1)) & (np.ptp(surface, axis=1) > 0.0),
+            f"{control.channel}: no excitation in {{runs}}: the surface moves less than its own noise; identification needs a "
+            "manoeuvre",
         )
-        note(early, sentence, "shorten trim_window_s, or use trim = 'intercept'")
+        if options.trim == "mean" or options.condition == "window":
+            early = _early(batch, options, smooth)
+            sentence = f"the {control.name} already moves within the trim window of {options.trim_window_s:g} s in {{runs}}"
+            note(early, sentence, "shorten trim_window_s, or use trim = 'intercept'")
     return result
 
 
-def _early(batch: Batch, options: Options, elevator: Array) -> Bools:
-    """Runs whose elevator moves within the trim window."""
+def _early(batch: Batch, options: Options, surface: Array) -> Bools:
+    """Runs whose surface (runs, samples) moves within the trim window."""
     samples = round(options.trim_window_s / batch.dt_s)
     if not 1 <= samples < batch.t_s.shape[1]:
         raise ConfigurationError(
@@ -168,7 +184,7 @@ def _early(batch: Batch, options: Options, elevator: Array) -> Bools:
             f"{batch.t_s.shape[1] * batch.dt_s:.3g} s at {1.0 / batch.dt_s:.4g} Hz; "
             "it must hold a sample and end inside the record"
         )
-    return np.asarray(np.ptp(elevator[:, :samples], axis=1) > EARLY * np.ptp(elevator, axis=1))
+    return np.asarray(np.ptp(surface[:, :samples], axis=1) > EARLY * np.ptp(surface, axis=1))
 
 
 def _named(batch: Batch, which: Bools) -> str:

@@ -21,6 +21,7 @@ from airtruth.identification.condition import AircraftConstants
 from airtruth.identification.options import CUTOFF_SHARE
 from airtruth.logs.flight_log import Batch
 from airtruth.numerics.prefilter import butterworth, edge_samples, zero_phase
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 from airtruth.physics.reconstruction import is_reconstructed
 from airtruth.physics.sensor_errors import SensorErrors
 
@@ -28,8 +29,10 @@ Array = NDArray[np.float64]
 Taken = Mapping[str, Mapping[str, float]]
 """Errors that are taken out: channel -> field of `SensorErrors` -> value [SI]."""
 
-CHANNELS: Final = ("airspeed_m_s", "alpha_rad", "q_rad_s", "az_m_s2", "elevator_rad")
-"""Channels that the estimators read and an instrument measures."""
+CHANNELS: Final[Mapping[str, tuple[str, ...]]] = {
+    motion.name: ("airspeed_m_s", *motion.channels) for motion in (LONGITUDINAL, LATERAL)
+}
+"""Channels that the estimators of a motion read and an instrument measures."""
 CUTOFF_HZ: Final = 12.5
 """Cutoff of the low-pass before a rate is taken, or the share `CUTOFF_SHARE` of a lower sample rate [Hz] (judgement: with
 an accelerometer 0.3 m ahead in the GTM, CLde of filter-error errs by 10 % with 5 Hz, which takes the steps of the elevator
@@ -45,17 +48,23 @@ _WORDS: Final = {
     "alpha_slope_per_rad": "{0:.6g} per rad of alpha",
 }
 """Errors that are taken out, by the field of `SensorErrors`, in words."""
-_PLACED: Final = {"alpha_rad": ("x_m",), "az_m_s2": ("x_m", "z_m")}
+_PLACED: Final = {
+    "alpha_rad": ("x_m",),
+    "az_m_s2": ("x_m", "z_m"),
+    "beta_rad": ("x_m", "z_m"),
+    "ay_m_s2": ("x_m", "z_m"),
+}
 """Channels that depend on the position of their instrument, and on which part of it."""
 _WHOLE: Final = 1e-6
 """Part of a sample by which a delay may differ from whole samples [-] (rounding of decimal figures)."""
 
 
-def taken_out(constants: AircraftConstants) -> dict[str, dict[str, float]]:
+def taken_out(constants: AircraftConstants, motion: Motion = LONGITUDINAL) -> dict[str, dict[str, float]]:
     """Errors that are taken out: channel -> field of `SensorErrors` -> value [SI]; {} for an object without sensors."""
     if not isinstance(constants, Aircraft):
         return {}
-    stated = {name: constants.file.sensors[name] for name in CHANNELS if name in constants.file.sensors}
+    sensors = constants.file.sensors
+    stated = {name: sensors[name] for name in CHANNELS[motion.name] if name in sensors}
     found = {name: _effective(name, sensor.errors()) for name, sensor in stated.items()}
     return {name: errors for name, errors in found.items() if errors}
 
@@ -111,7 +120,7 @@ def as_ideal(batch: Batch, taken: Taken) -> Batch:
     for name, own in errors.items():
         if name in _PLACED:
             channels[name] = channels[name] + _moved(name, own, channels, sos, batch.dt_s)
-    if "airspeed_m_s" in errors:
+    if "airspeed_m_s" in errors and "alpha_rad" in channels:
         channels["airspeed_m_s"] = channels["airspeed_m_s"] / errors["airspeed_m_s"].slope(
             channels["alpha_rad"]
         )
@@ -152,7 +161,16 @@ def _rate(x: Array, sos: Array, dt_s: float) -> Array:
 
 
 def _moved(name: str, own: SensorErrors, channels: Mapping[str, Array], sos: Array, dt_s: float) -> Array:
-    """Value at the CG less the reading, by `airtruth.physics.sensors.vane_alpha` and `accelerometer_az`."""
+    """Value at the CG less the reading, by `airtruth.physics.sensors.vane_alpha` and `accelerometer_az`.
+
+    Sideslip and side force: beta_vane = beta + x r/V - z p/V, ay = ay_cg + x r' - z p'; the products of rates with pitch
+    rate and bank, a hundredth of these, are left out.
+    """
+    if name in ("beta_rad", "ay_m_s2"):
+        p, r = channels["p_rad_s"], channels["r_rad_s"]
+        if name == "beta_rad":
+            return np.asarray((own.z_m * p - own.x_m * r) / channels["airspeed_m_s"])
+        return np.asarray(own.z_m * _rate(p, sos, dt_s) - own.x_m * _rate(r, sos, dt_s))
     q = channels["q_rad_s"]
     if name == "alpha_rad":
         return np.asarray(q * own.x_m / channels["airspeed_m_s"])

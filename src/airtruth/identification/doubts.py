@@ -5,7 +5,7 @@ differences.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -20,23 +20,12 @@ from airtruth.identification.estimates import (
     half_width,
     point_values,
 )
+from airtruth.identification.expected import EXPECTED
 from airtruth.numerics.order_statistics import Blocks, medians
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL, Motion
 
 Array = NDArray[np.float64]
 
-SIZES: Final = {"CLalpha": 5.0, "CLq": 30.0, "CLde": 1.0, "Cmalpha": 1.0, "Cmq": 30.0, "Cmde": 1.5}
-"""Magnitudes of the derivatives of ordinary aircraft [-]: judgement. A derivative whose standard deviation exceeds its
-magnitude is not determined."""
-TERMS: Final = {
-    "CLalpha": "lift by angle of attack",
-    "CLq": "lift by pitch rate",
-    "CLde": "lift of the elevator",
-    "Cmalpha": "pitch stiffness",
-    "Cmq": "pitch damping",
-    "Cmde": "moment of the elevator",
-}
-"""Physical meaning of each derivative."""
 SHARE: Final = 0.3
 """Least part of a direction that its sentence names [-]: judgement."""
 APART: Final = 3.0
@@ -60,6 +49,9 @@ CHANGES: Final = 0.2
 """Range of the dynamic pressure in a record over its mean from which a method that takes it for constant is in doubt [-]. In 180
 records of a small aircraft, the 95 % intervals of Cmalpha by iv-f1 contain the truth in 0.90 of those with a smaller range and in
 0.27 of the others (`python -m studies.small_aircraft_intervals --flights 30 --method iv-f1`)."""
+COLOURED: Final = 0.2
+"""Correlation of neighbouring innovations from which they count as coloured [-] (judgement: intervals of a white noise are then
+too narrow by a factor of sqrt(1.2/0.8), 1.2)."""
 SOME: Final = 0.1
 """Least share of the records that the sentence about it needs [-] (judgement)."""
 LIKELY: Final = (
@@ -78,8 +70,11 @@ def doubts(parts: Parts, dt_s: float = 0.0) -> list[str]:
     dt_s : longest sample period of the records [s]; with 0 no differences are in doubt.
     """
     own: list[_Method] = []
-    contradictions: list[_Contradiction] = [_Contradiction(name) for name in PARAMETERS]
+    contradictions: list[_Contradiction] = []
     for part in parts():
+        contradictions = contradictions or [
+            _Contradiction(part[0].motion, name) for name in part[0].motion.parameters
+        ]
         own = own or [_Method(estimates) for estimates in part]
         for method, estimates in zip(own, part, strict=True):
             method.add(estimates)
@@ -88,6 +83,7 @@ def doubts(parts: Parts, dt_s: float = 0.0) -> list[str]:
     result: list[str] = []
     for i, method in enumerate(own):
         result += method.missing()
+        result += method.not_white()
         result += method.undetermined(_variances(parts, i))
         result += method.dulled(dt_s)
     result = [sentence for method in own for sentence in method.wrong_signs()] + result
@@ -132,6 +128,27 @@ def changing_pressure(
     )
 
 
+def curvature(curved: Mapping[tuple[str, str], int], runs: int) -> Iterator[str]:
+    """Sentences about coefficients that are not linear in at least a share `SOME` of the records.
+
+    Parameters
+    ----------
+    curved : number of runs that show a term of a coefficient: (term, coefficient) -> runs.
+    runs : number of all runs.
+    """
+    words = {"alpha": "with the angle of attack", "beta": "with sideslip"}
+    for term, change in words.items():
+        names = [
+            name for (own, name), count in curved.items() if own == term and count >= max(SOME * runs, 1)
+        ]
+        if names:
+            most = max(curved[term, name] for name in names)
+            yield (
+                f"the derivatives of {' and '.join(names)} change {change}{_some(most, runs)}: the intervals of a linear model "
+                f"do not allow for that; --term {term} frees the change in ls, iv-lowpass, iv-f1 and frequency."
+            )
+
+
 def _variances(parts: Parts, method: int) -> Blocks:
     """Blocks of the variances of a method, of the runs that have a covariance."""
     return lambda: (_variance(part[method])[_known(part[method])] for part in parts())
@@ -150,33 +167,20 @@ def _some(count: int, runs: int) -> str:
     return "" if runs == 1 else f" in {count} of {runs} runs"
 
 
-_SIZE: Final = np.array([SIZES[name] for name in PARAMETERS])
-"""`SIZES` in the order of the derivatives [-]."""
-_SIGNS: Final = {
-    "CLalpha": (1.0, "lift slope of the wrong sign, which no aircraft has below the stall"),
-    "CLde": (1.0, "lift of the elevator of the wrong sign, which no elevator behind the CG has"),
-    "Cmalpha": (-1.0, "pitch stiffness of the wrong sign, which no stable aircraft has"),
-    "Cmq": (-1.0, "pitch damping of the wrong sign, which no tail gives"),
-    "Cmde": (-1.0, "moment of the elevator of the wrong sign, which no elevator behind the CG has"),
-}
-"""Sign of each derivative, and what the other one is (B. Etkin and L. D. Reid, *Dynamics of Flight*, 3rd ed., 1996, chapters 2
-and 5).
-
-A canard is declared with the sign of its deflection turned. CLq is left out: it is small and of either sign without a tail.
-"""
-
-
 class _Method:
     """What the runs of one method have in common: counts, sums, and the first run of each kind."""
 
     def __init__(self, first: Estimates) -> None:
         self.name, self.covariance_name = first.method, first.covariance_name
+        self.names, self.expected = first.motion.parameters, EXPECTED[first.motion.name]
+        self.size = np.array([self.expected.sizes[name] for name in self.names])
+        self.coloured, self.memory = 0, 0.0
         self.runs = self.bare = self.aperiodic = self.known = self.open = 0
         self.absent: Counter[int] = Counter()
         self.periodic, self.summed_rad_s = 0, 0.0
-        self.open_ones = np.zeros(len(PARAMETERS))
-        self.relative = np.zeros((len(PARAMETERS),) * 2)
-        self.wrong = dict.fromkeys(_SIGNS, 0)
+        self.open_ones = np.zeros(len(self.names))
+        self.relative = np.zeros((len(self.names),) * 2)
+        self.wrong = dict.fromkeys(self.expected.signs, 0)
         self.example: dict[str, tuple[float, float, float]] = {}
 
     def add(self, one: Estimates) -> None:
@@ -184,7 +188,7 @@ class _Method:
         self.runs += len(one.run_ids)
         absent = ~np.isfinite(one.theta).all(axis=1)
         self.absent.update(int(s) for s in one.status[absent])
-        frequency = point_values(one)[:, len(PARAMETERS)]
+        frequency = point_values(one)[:, len(self.names)]
         periodic = np.isfinite(frequency)
         self.aperiodic += int((~absent & ~periodic).sum())
         sound = periodic & one.converged
@@ -193,14 +197,22 @@ class _Method:
         self.bare += int((~absent & ~np.isfinite(deviations(one)).all(axis=1)).sum())
         known = _known(one)
         self.known += int(known.sum())
-        open_ones = _variance(one)[known] / (_SIZE * _SIZE) > 1.0
+        limit = np.broadcast_to(self.size, one.theta.shape)
+        if self.expected.by_interval:
+            limit = np.abs(one.theta) / half_width(one.confidence)
+        open_ones = _variance(one)[known] > limit[known] ** 2
         self.open_ones += open_ones.sum(axis=0)
         self.open += int(open_ones.any(axis=1).sum())
         chosen = np.flatnonzero(known)[open_ones.any(axis=1)]
-        self.relative += (one.covariance[chosen] / np.outer(_SIZE, _SIZE)).sum(axis=0)
+        self.relative += (one.covariance[chosen] / np.outer(self.size, self.size)).sum(axis=0)
+        if one.memory is not None:
+            with np.errstate(invalid="ignore"):
+                coloured = one.memory > COLOURED
+            self.coloured += int(coloured.sum())
+            self.memory += float(one.memory[coloured].sum())
         half = half_width(one.confidence) * deviations(one)
-        for name, (sign, _) in _SIGNS.items():
-            i = PARAMETERS.index(name)
+        for name, (sign, _) in self.expected.signs.items():
+            i = self.names.index(name)
             value, width = one.theta[:, i], half[:, i]
             with np.errstate(invalid="ignore"):
                 wrong = sign * value + width < 0.0
@@ -218,8 +230,8 @@ class _Method:
             yield f"{self.name}: no estimate{_some(count, self.runs)}: {why}."
         if self.aperiodic:
             yield (
-                f"{self.name}: no frequency and damping ratio{_some(self.aperiodic, self.runs)}: with these derivatives the "
-                "short period is not an oscillation about a stable trim (its stiffness is negative)."
+                f"{self.name}: no frequency and damping ratio{_some(self.aperiodic, self.runs)}: with these derivatives "
+                f"{self.expected.modal}."
             )
         if self.bare:
             why = (
@@ -229,18 +241,38 @@ class _Method:
             )
             yield f"{self.name}: no intervals{_some(self.bare, self.runs)}: {why}."
 
+    def not_white(self) -> Iterator[str]:
+        """Innovations with a memory in at least half of the runs: the model lacks what they hold."""
+        if self.coloured and 2 * self.coloured >= self.runs:
+            still = self.name == "output-error"
+            cause = "turbulence, which this method lacks, or " if still else ""
+            cure = "Use filter-error, or look" if still else "Look"
+            yield (
+                f"Warning: {self.name}: the residuals are not white{_some(self.coloured, self.runs)}: neighbouring ones have a "
+                f"correlation of {self.memory / self.coloured:.2g} on average. The cause is {cause}aerodynamics that the linear "
+                f"model lacks; the intervals are too narrow, and the estimates can be wrong. {cure} for the cause "
+                "(`airtruth trace`)."
+            )
+
     def undetermined(self, variances: Blocks) -> Iterator[str]:
         """Parameters that most of the runs leave open, and the direction in which they may change together."""
         named = np.flatnonzero(2.0 * self.open_ones >= max(self.known, 1))
         if not named.size:
             return
+        std = np.sqrt(medians(variances))
+        which = ", ".join(f"{self.names[i]} (standard deviation {std[i]:.2g})" for i in named)
+        if self.expected.by_interval:
+            yield (
+                f"{self.name}: the records do not determine {which}{_some(self.open, self.known)}: the interval contains zero. "
+                "Do not use these values; more or longer records with --joint determine them better."
+            )
+            return
         values, vectors = np.linalg.eigh(self.relative / self.open)
         direction = vectors[:, -1] / np.abs(vectors[:, -1]).max()
-        std = np.sqrt(medians(variances))
-        which = ", ".join(f"{PARAMETERS[i]} (standard deviation {std[i]:.2g})" for i in named)
         parts = [i for i in np.argsort(-np.abs(direction)) if abs(direction[i]) >= SHARE]
         together = " with ".join(
-            f"{TERMS[PARAMETERS[i]]} ({direction[i] * np.sqrt(values[-1]) * _SIZE[i]:+.2g} in {PARAMETERS[i]})"
+            f"{self.expected.terms[self.names[i]]} "
+            f"({direction[i] * np.sqrt(values[-1]) * self.size[i]:+.2g} in {self.names[i]})"
             for i in parts
         )
         yield (
@@ -251,7 +283,7 @@ class _Method:
 
     def wrong_signs(self) -> Iterator[str]:
         """Derivatives whose interval excludes the sign that physics requires: the reason first, then the number."""
-        for name, (_, words) in _SIGNS.items():
+        for name, (_, words) in self.expected.signs.items():
             if name in self.example:
                 value, lower, upper = self.example[name]
                 yield (
@@ -261,7 +293,7 @@ class _Method:
 
     def dulled(self, dt_s: float) -> Iterator[str]:
         """Share of the motion that central differences lose, where it is more than `DULLED`."""
-        if self.name not in DIFFERENCING or not self.periodic:
+        if self.name not in DIFFERENCING or not self.periodic or self.names != LONGITUDINAL.parameters:
             return
         wn_rad_s = self.summed_rad_s / self.periodic
         share = 1.0 - float(np.sinc(wn_rad_s * dt_s / np.pi))
@@ -276,15 +308,16 @@ class _Method:
 class _Contradiction:
     """Runs whose methods contradict each other on a derivative by more than the magnitude of the derivative."""
 
-    def __init__(self, name: str) -> None:
-        self.name, self.runs, self.count = name, 0, 0
+    def __init__(self, motion: Motion, name: str) -> None:
+        self.name, self.index, self.runs, self.count = name, motion.index(name), 0, 0
+        self.size = EXPECTED[motion.name].sizes[name]
         self.example = ""
 
     def add(self, estimates: Sequence[Estimates]) -> None:
         """Add a part."""
         if len(estimates) < 2 or any(e.run_ids != estimates[0].run_ids for e in estimates):
             return
-        i = PARAMETERS.index(self.name)
+        i = self.index
         runs = np.arange(len(estimates[0].run_ids))
         value = np.array([e.theta[:, i] for e in estimates])
         std = np.array([deviations(e)[:, i] for e in estimates])
@@ -293,7 +326,7 @@ class _Contradiction:
         highest = np.argmax(np.where(known, value, -np.inf), axis=0)
         with np.errstate(invalid="ignore"):
             gap = value[highest, runs] - value[lowest, runs]
-            apart = (gap > SIZES[self.name]) & (gap > APART * np.hypot(std[highest, runs], std[lowest, runs]))
+            apart = (gap > self.size) & (gap > APART * np.hypot(std[highest, runs], std[lowest, runs]))
         apart &= known.sum(axis=0) > 1
         self.runs += runs.size
         self.count += int(apart.sum())
@@ -312,4 +345,4 @@ class _Contradiction:
             )
 
 
-__all__ = ["DIFFERENCING", "SIZES", "doubts"]
+__all__ = ["DIFFERENCING", "doubts"]

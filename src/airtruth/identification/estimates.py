@@ -5,18 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from airtruth.physics.short_period import MODAL, PARAMETERS, Scale, modal, system
+from airtruth.identification.covariance_columns import correlation_columns
+from airtruth.identification.record_constants import Constants
+from airtruth.physics.lateral import LateralScale, lateral_modal, lateral_modes
+from airtruth.physics.motion import LONGITUDINAL, Motion
+from airtruth.physics.short_period import Scale, modal, system
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
+AnyScale = Scale | LateralScale
+"""Factors of a flight condition, those of the motion."""
+S = TypeVar("S", bound=Scale | LateralScale)
 
 
 class Status(IntEnum):
@@ -52,13 +59,15 @@ class Estimates:
     ----------
     method : name of the method.
     run_ids : names of the runs; of a joint estimate the single name "joint".
-    theta : (runs, 6) in the order of PARAMETERS [-]; NaN where there is no estimate.
-    covariance : (runs, 6, 6) by the rule ``covariance_name``.
+    theta : (runs, derivatives) in the order of ``motion.parameters`` [-]; NaN where there is no estimate.
+    covariance : (runs, derivatives, derivatives) by the rule ``covariance_name``.
     covariance_name : name of the covariance: of `COVARIANCES`, or the method's own.
     status : (runs,) values of `Status`.
     iterations : (runs,) iterations of the instrumental variables; 0 for least squares.
     scale : factors (runs,) of the flight condition that theta refers to.
     confidence : probability of the intervals [-].
+    motion : whose derivatives they are.
+    memory : (runs,) largest correlation of neighbouring innovations of an output [-]; None where the method makes none.
     """
 
     method: str
@@ -68,8 +77,10 @@ class Estimates:
     covariance_name: str
     status: NDArray[np.int8]
     iterations: NDArray[np.int32]
-    scale: Scale
+    scale: AnyScale
     confidence: float
+    motion: Motion = LONGITUDINAL
+    memory: Array | None = None
 
     @property
     def converged(self) -> NDArray[np.bool_]:
@@ -116,7 +127,8 @@ class Estimates:
             covariance=self.covariance[part],
             status=self.status[part],
             iterations=self.iterations[part],
-            scale=Scale(*(np.asarray(getattr(self.scale, f))[part] for f in Scale.__dataclass_fields__)),
+            scale=chosen(self.scale, part),
+            memory=None if self.memory is None else self.memory[part],
         )
 
 
@@ -126,12 +138,12 @@ Parts = Callable[[], Iterable[Sequence[Estimates]]]
 
 @dataclass(frozen=True)
 class Quantities:
-    """The six derivatives and the modal parameters with their uncertainty.
+    """The derivatives and the modal parameters with their uncertainty.
 
     Attributes
     ----------
-    names : CLalpha ... Cmde [-], wn_rad_s [rad/s], zeta [-].
-    value, std, lower, upper : (runs, 8); the interval is symmetric and normal.
+    names : those of the motion, derivatives first: CLalpha ... Cmde [-], wn_rad_s [rad/s], zeta [-].
+    value, std, lower, upper : (runs, quantities); the interval is symmetric and normal.
     """
 
     names: tuple[str, ...]
@@ -163,19 +175,31 @@ def concatenated(parts: Sequence[Estimates], run_ids: Sequence[str]) -> Estimate
         covariance=np.concatenate([part.covariance for part in parts])[order],
         status=np.concatenate([part.status for part in parts])[order],
         iterations=np.concatenate([part.iterations for part in parts])[order],
-        scale=Scale(*(getattr(scale, f)[order] for f in Scale.__dataclass_fields__)),
+        scale=chosen(scale, order),
+        memory=_joined_memory([part.memory for part in parts], order),
     )
 
 
-def joined(scales: Sequence[Scale]) -> Scale:
+def _joined_memory(parts: Sequence[Array | None], order: slice | NDArray[np.int64]) -> Array | None:
+    known = [part for part in parts if part is not None]
+    return np.concatenate(known)[order] if len(known) == len(parts) else None
+
+
+def chosen(scale: S, runs: slice | NDArray[np.int64]) -> S:
+    """Factors of some runs."""
+    return type(scale)(*(np.asarray(getattr(scale, f))[runs] for f in scale.__dataclass_fields__))
+
+
+def joined(scales: Sequence[S]) -> S:
     """Factors (runs,) of several batches, one after another."""
-    return Scale(*(np.concatenate([getattr(s, f) for s in scales]) for f in Scale.__dataclass_fields__))
+    first = scales[0]
+    return type(first)(*(np.concatenate([getattr(s, f) for s in scales]) for f in first.__dataclass_fields__))
 
 
-def mean_scale(scales: Sequence[Scale]) -> Scale:
+def mean_scale(scales: Sequence[S]) -> S:
     """Factors (1,): their means over the runs of several batches."""
     scale = joined(scales)
-    return Scale(*(getattr(scale, f).mean(keepdims=True) for f in Scale.__dataclass_fields__))
+    return type(scale)(*(getattr(scale, f).mean(keepdims=True) for f in scale.__dataclass_fields__))
 
 
 def modal_jacobian(theta: Array, s: Scale) -> Array:
@@ -206,16 +230,24 @@ def modal_jacobian(theta: Array, s: Scale) -> Array:
     return np.stack([d_wn, d_zeta], axis=-2)
 
 
-def modal_with_covariance(theta: Array, covariance: Array, s: Scale) -> tuple[Array, Array]:
-    """wn [rad/s] and zeta [-], (..., 2), and their covariance (..., 2, 2), by the delta method."""
-    jacobian = modal_jacobian(theta, s)
-    return np.stack(modal(theta, s), axis=-1), jacobian @ covariance @ np.swapaxes(jacobian, -1, -2)
+def modal_values(theta: Array, s: AnyScale) -> Array:
+    """Modal parameters (..., modes) in the order of the motion's ``modal``."""
+    return lateral_modal(theta, s) if isinstance(s, LateralScale) else np.stack(modal(theta, s), axis=-1)
+
+
+def modal_with_covariance(theta: Array, covariance: Array, s: AnyScale) -> tuple[Array, Array]:
+    """Modal parameters (..., modes) and their covariance (..., modes, modes), by the delta method."""
+    if isinstance(s, LateralScale):
+        values, jacobian = lateral_modes(theta, s)
+    else:
+        values, jacobian = np.stack(modal(theta, s), axis=-1), modal_jacobian(theta, s)
+    return values, jacobian @ covariance @ np.swapaxes(jacobian, -1, -2)
 
 
 def quantities(estimates: Estimates) -> Quantities:
     """Values, standard deviations and intervals of derivatives and modal parameters."""
-    modal, modal_covariance = modal_with_covariance(estimates.theta, estimates.covariance, estimates.scale)
-    value = np.concatenate([estimates.theta, modal], axis=-1)
+    modes, modal_covariance = modal_with_covariance(estimates.theta, estimates.covariance, estimates.scale)
+    value = np.concatenate([estimates.theta, modes], axis=-1)
     variance = np.concatenate(
         [
             np.diagonal(estimates.covariance, axis1=-2, axis2=-1),
@@ -225,18 +257,17 @@ def quantities(estimates: Estimates) -> Quantities:
     )
     std = np.sqrt(np.where(variance >= 0.0, variance, np.nan))
     half = half_width(estimates.confidence) * std
-    return Quantities(PARAMETERS + MODAL, value, std, value - half, value + half)
+    motion = estimates.motion
+    return Quantities(motion.parameters + motion.modal, value, std, value - half, value + half)
 
 
 def point_values(estimates: Estimates) -> Array:
-    """(runs, 8) derivatives [-], wn [rad/s] and zeta [-]: those of `quantities`, without their uncertainty."""
-    return np.concatenate(
-        [estimates.theta, np.stack(modal(estimates.theta, estimates.scale), axis=-1)], axis=-1
-    )
+    """(runs, quantities) derivatives and modal parameters: those of `quantities`, without their uncertainty."""
+    return np.concatenate([estimates.theta, modal_values(estimates.theta, estimates.scale)], axis=-1)
 
 
 def deviations(estimates: Estimates) -> Array:
-    """(runs, 6) standard deviations of the derivatives [-]: those of `quantities`; NaN for a negative variance."""
+    """(runs, derivatives) standard deviations of the derivatives [-]: those of `quantities`; NaN for a negative variance."""
     variance = np.diagonal(estimates.covariance, axis1=-2, axis2=-1)
     return np.asarray(np.sqrt(np.where(variance >= 0.0, variance, np.nan)))
 
@@ -246,8 +277,16 @@ def half_width(confidence: float) -> float:
     return float(ndtri(0.5 + 0.5 * confidence))
 
 
-def estimates_table(estimates: Estimates) -> pd.DataFrame:
-    """One row per run: run_id, method, converged, iterations, then NAME, NAME_std, ..._upper, then status."""
+def estimates_table(estimates: Estimates, constants: Constants | None = None) -> pd.DataFrame:
+    """One row per run: run_id, method, converged, iterations, then NAME, NAME_std, ..._upper, then status.
+
+    Behind them, correlations of the derivatives (`correlation_columns`) and, with the constants, the flight condition:
+    airspeed_m_s, density_kg_m3 (for the mass of the constants, also of a run that states another mass).
+
+    Parameters
+    ----------
+    constants : of the aircraft; None leaves the flight condition out.
+    """
     import pandas as pd
 
     q = quantities(estimates)
@@ -263,4 +302,12 @@ def estimates_table(estimates: Estimates) -> pd.DataFrame:
         columns[f"{name}_lower"] = q.lower[:, i]
         columns[f"{name}_upper"] = q.upper[:, i]
     columns["status"] = np.array(list(SENTENCES.values()), dtype=object)[estimates.status].tolist()
+    columns |= correlation_columns(estimates.covariance, estimates.motion.parameters)
+    if constants is not None:
+        scale = estimates.scale
+        airspeed = np.broadcast_to(scale.airspeed_m_s, len(estimates.run_ids))
+        per_mass = scale.force if isinstance(scale, LateralScale) else scale.normal
+        pressure = per_mass * constants.mass_kg / constants.wing_area_m2
+        columns["airspeed_m_s"] = airspeed
+        columns["density_kg_m3"] = 2.0 * pressure / airspeed**2
     return pd.DataFrame(columns)

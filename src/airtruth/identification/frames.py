@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError
 from airtruth.identification.estimates import Estimates, deviations, half_width, quantities
-from airtruth.physics.short_period import PARAMETERS, UNITS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,7 +53,7 @@ def cov_params(estimates: Estimates, run_id: str | None = None) -> pd.DataFrame:
     Parameters
     ----------
     estimates : of one method.
-    run_id : run whose (6, 6) matrix is returned; None for all runs, a row for each run and derivative.
+    run_id : run whose matrix is returned; None for all runs, a row for each run and derivative.
 
     Raises
     ------
@@ -63,7 +62,7 @@ def cov_params(estimates: Estimates, run_id: str | None = None) -> pd.DataFrame:
     """
     import pandas as pd
 
-    names = list(PARAMETERS)
+    names = list(estimates.motion.parameters)
     if run_id is None:
         rows = estimates.covariance.reshape(-1, len(names))
         return pd.DataFrame(rows, index=_both(estimates), columns=names)
@@ -82,7 +81,7 @@ def tidy(estimates: Sequence[Estimates]) -> pd.DataFrame:
 
     Parameters
     ----------
-    estimates : one for each method. Quantities are the derivatives, wn_rad_s and zeta.
+    estimates : one for each method. Quantities are the derivatives and the modal parameters.
     """
     import pandas as pd
 
@@ -95,7 +94,7 @@ def tidy(estimates: Sequence[Estimates]) -> pd.DataFrame:
                     "method": one.method,
                     "run_id": np.repeat(np.array(one.run_ids, dtype=object), len(q.names)),
                     "parameter": list(q.names) * len(one.run_ids),
-                    "unit": [UNITS[name] for name in q.names] * len(one.run_ids),
+                    "unit": [one.motion.units[name] for name in q.names] * len(one.run_ids),
                     "estimate": q.value.ravel(),
                     "std": q.std.ravel(),
                     "lower": q.lower.ravel(),
@@ -111,13 +110,15 @@ def _by_run(estimates: Estimates, values: NDArray[np.float64]) -> pd.DataFrame:
     import pandas as pd
 
     index = pd.Index(estimates.run_ids, name="run_id")
-    return pd.DataFrame(values, index=index, columns=list(PARAMETERS))
+    return pd.DataFrame(values, index=index, columns=list(estimates.motion.parameters))
 
 
 def _both(estimates: Estimates) -> pd.MultiIndex:
     import pandas as pd
 
-    return pd.MultiIndex.from_product([estimates.run_ids, PARAMETERS], names=["run_id", "parameter"])
+    return pd.MultiIndex.from_product(
+        [estimates.run_ids, estimates.motion.parameters], names=["run_id", "parameter"]
+    )
 
 
 __all__ = ["bse", "conf_int", "cov_params", "params", "tidy"]

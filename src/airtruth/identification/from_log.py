@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -21,6 +21,9 @@ from airtruth.identification.condition import AircraftConstants, pressure_range
 from airtruth.identification.declared_sensors import as_ideal, taken_out
 from airtruth.identification.doubts import CHANGES
 from airtruth.identification.estimates import Estimates, concatenated
+from airtruth.identification.excited import excited_runs
+from airtruth.identification.lateral.methods import curvature_of
+from airtruth.identification.lateral.observation import assumed
 from airtruth.identification.methods import Method
 from airtruth.identification.options import Options
 from airtruth.identification.record_constants import Part, differing, with_constants
@@ -28,11 +31,15 @@ from airtruth.identification.result import Source
 from airtruth.logs.flight_log import Batch, FlightLog
 from airtruth.logs.sources import IN_MEMORY
 from airtruth.logs.store import read_log
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 
 
 @dataclass(frozen=True)
 class LogTask:
-    """One log to identify, and how; a file is relative to ``folder``, since a worker has another working folder."""
+    """One log to identify, and how; a file is relative to ``folder``, since a worker has another working folder.
+
+    With ``excited`` the runs that do not excite the motion are left alone.
+    """
 
     folder: Path
     entry: Path | FlightLog
@@ -41,6 +48,8 @@ class LogTask:
     plane: AircraftConstants
     force: bool
     joint: bool
+    motion: Motion = LONGITUDINAL
+    excited: bool = False
 
     @property
     def source(self) -> str:
@@ -53,7 +62,8 @@ class FromLog:
     """What one log gives: its runs and notes, the estimates of each method, or the parts of a joint estimate.
 
     ``dt_s`` is its longest sample period [s]; ``noisy`` are the runs whose airspeed is smoothed; ``changes`` are the runs whose
-    `pressure_range` exceeds `CHANGES`, with it; ``measures`` are those of `airtruth.checks.poor`.
+    `pressure_range` exceeds `CHANGES`, with it. ``curved`` counts the runs that show a nonlinear term of a coefficient;
+    ``measures`` are those of `airtruth.checks.poor`.
     """
 
     run_ids: tuple[str, ...]
@@ -67,6 +77,7 @@ class FromLog:
     stated: dict[str, list[tuple[str, float, float]]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     forced: list[str] = field(default_factory=list)
+    curved: Counter[tuple[str, str]] = field(default_factory=Counter)
 
 
 def results_of(
@@ -120,23 +131,32 @@ def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made
     """
     entry = task.entry
     log = read_log(task.folder / entry) if isinstance(entry, Path) else entry
+    if task.excited:
+        log = log.select(excited_runs(log, task.motion))
     found = FromLog(tuple(log.run_ids))
+    if not found.run_ids:
+        return found
     log = _checked(log, task, found)
+    quiet = _quiet if task.motion is LONGITUDINAL else _as_measured
     try:
-        log, left_out = fit_runs(log, task.options)
+        log, left_out = fit_runs(log, task.options, task.motion)
         found.notes += left_out
         found.run_ids = tuple(log.run_ids)
         for run_id, name, own, declared in differing(log.metadata, log.run_ids, task.plane):
             found.stated.setdefault(name, []).append((run_id, own, declared))
         servo_s = task.plane.servo_time_s if isinstance(task.plane, Aircraft) else 0.0
-        taken = taken_out(task.plane)
+        taken = taken_out(task.plane, task.motion)
+        if task.motion is LATERAL:
+            found.notes += assumed(log.channels)
         parts = [
-            replace(p, batch=replace(as_ideal(_quiet(p.batch, found), taken), servo_s=servo_s))
-            for p in with_constants(log, task.plane)
+            replace(p, batch=replace(as_ideal(quiet(p.batch, found), taken), servo_s=servo_s))
+            for p in with_constants(log, task.plane, task.motion)
         ]
+        if task.motion is LATERAL:
+            found.curved = curvature_of(parts, task.options)
         for part in parts:
             found.dt_s = max(found.dt_s, part.batch.dt_s)
-            if len(found.measures) < poor.MOST_RUNS:
+            if task.motion is LONGITUDINAL and len(found.measures) < poor.MOST_RUNS:
                 found.measures += poor.measured(part.batch)
             ranges = zip(part.batch.run_ids, pressure_range(part.batch).tolist(), strict=True)
             found.changes += [(run_id, changed) for run_id, changed in ranges if changed > CHANGES]
@@ -150,10 +170,15 @@ def from_log(task: LogTask, estimated: Callable[[Estimates], None] = lambda made
         found.parts = parts
         return found
     for chosen in task.methods:
-        made = [identify_batch(p.batch, p.constants, chosen, task.options) for p in parts]
+        made = [identify_batch(p.batch, p.constants, chosen, task.options, task.motion) for p in parts]
         found.estimates[chosen.name] = concatenated(made, log.run_ids)
         estimated(found.estimates[chosen.name])
     return found
+
+
+def _as_measured(batch: Batch, found: FromLog) -> Batch:
+    """The runs as they are: the lateral estimators low-pass the airspeed."""
+    return batch
 
 
 def _quiet(batch: Batch, found: FromLog) -> Batch:
@@ -181,7 +206,7 @@ def _checked(log: FlightLog, task: LogTask, found: FromLog) -> FlightLog:
         (found.forced if fault.certain else found.notes).append(fault.sentence)
     prefix = f"{source}: " if source else ""
     try:
-        check_channels(log, task.methods)
+        check_channels(log, task.methods, task.motion)
     except LogError as error:
         raise LogError(f"{prefix}{error}") from None
     sentence = airspeed_fault(log, task.options)

@@ -17,6 +17,7 @@ from airtruth.arguments import names
 from airtruth.errors import ConfigurationError, choices
 from airtruth.identification.condition import AircraftConstants, Observation, OneOrEach
 from airtruth.identification.estimates import Estimates
+from airtruth.identification.lateral.methods import ESTIMATORS
 from airtruth.identification.likelihood.method import (
     estimate_filter_error,
     estimate_output_error,
@@ -31,6 +32,7 @@ from airtruth.identification.regression.lowpass import estimated_elevator, iv_pr
 from airtruth.identification.regression.rows import Problem
 from airtruth.identification.signals import COMMAND, ELEVATOR
 from airtruth.logs.flight_log import Batch
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 
 Array = NDArray[np.float64]
 
@@ -216,13 +218,29 @@ METHODS: Final[dict[str, Method]] = merged(OWN, entry_points(group=GROUP))
 """The estimators by name, with those of other packages."""
 
 
+LATERAL_METHODS: Final[dict[str, Method]] = {
+    name: Method(name, own.title, own.source, estimate=own.estimate, estimate_joint=own.estimate_joint)
+    for name, own in ESTIMATORS.items()
+}
+"""The estimators of the lateral-directional motion by name."""
+OF_MOTION: Final[Mapping[str, Mapping[str, Method]]] = {
+    LONGITUDINAL.name: METHODS,
+    LATERAL.name: LATERAL_METHODS,
+}
+"""Estimators by the name of the motion."""
+DEFAULT: Final[Mapping[str, str]] = {LONGITUDINAL.name: "iv-f1", LATERAL.name: "iv-lowpass"}
+"""Estimator that is used where none is named, by the name of the motion."""
+
+
 def title(name: str) -> str:
     """Name of an estimator in tables; of one that is not in `METHODS`, the name itself."""
     return METHODS[name].title if name in METHODS else name
 
 
-def chosen_methods(given: str | Method | Iterable[str | Method]) -> list[Method]:
-    """Return the estimators of names or `Method` objects, each once.
+def chosen_methods(
+    given: str | Method | Iterable[str | Method], motion: Motion = LONGITUDINAL
+) -> list[Method]:
+    """Return the estimators of a motion by names or `Method` objects, each once.
 
     Raises
     ------
@@ -235,7 +253,7 @@ def chosen_methods(given: str | Method | Iterable[str | Method]) -> list[Method]
     plain = iter(names("methods", [one for one in each if not isinstance(one, Method)], "ls"))
     result: dict[str, Method] = {}
     for one in each:
-        found = method(one if isinstance(one, Method) else next(plain))
+        found = method(one if isinstance(one, Method) else next(plain), motion)
         if result.setdefault(found.name, found) != found:
             raise ConfigurationError(f"methods: two methods have the name {found.name!r}; rename one")
     return list(result.values())
@@ -258,18 +276,20 @@ def regression(chosen: Method) -> Callable[[Observation, Options], Problem]:
     return chosen.pose
 
 
-def method(name: str | Method) -> Method:
-    """The estimator of that name; a `Method` is returned as it is.
+def method(name: str | Method, motion: Motion = LONGITUDINAL) -> Method:
+    """The estimator of a motion of that name; a `Method` is returned as it is.
 
     Raises
     ------
     ConfigurationError
         If there is none; the message lists those that exist. If a `Method` has the name of another one in `METHODS`.
     """
+    known = OF_MOTION[motion.name]
     if isinstance(name, Method):
-        if METHODS.get(name.name, name) != name:
+        if known.get(name.name, name) != name:
             raise ConfigurationError(f"a method {name.name!r} exists already; choose another name")
         return name
-    if name not in METHODS:
-        raise ConfigurationError(f"method {name!r} does not exist: {choices(name, METHODS)}")
-    return METHODS[name]
+    if name not in known:
+        missing = f"does not exist for the {motion.name} motion" if name in METHODS else "does not exist"
+        raise ConfigurationError(f"method {name!r} {missing}: {choices(name, known)}")
+    return known[name]

@@ -27,6 +27,8 @@ CONDITIONS: Final = ("motion", "record", "window")
 """Values of ``condition``."""
 PRESSURES: Final = ("method", "constant", "measured")
 """Values of ``pressure``."""
+TERMS: Final = ("alpha", "beta")
+"""Values in ``terms``."""
 COVARIANCE_NAMES: Final = ("none", "paper", "white", "coloured", "corrected")
 """Values of ``covariance``."""
 
@@ -67,6 +69,9 @@ class Options:
         the data (`airtruth.identification.regression.frequency.band_of`).
     confidence : probability of the intervals [-].
     auxiliary : model that makes the instruments; None is the linear short-period model.
+    terms : nonlinear terms that are free in each equation of the lateral regressions: "alpha", the products of the signals
+        with the angle of attack about its mean, and "beta", beta |beta|. They widen the intervals; the derivatives of
+        ls, iv-lowpass, iv-f1 and frequency are then those at the mean angle of attack and small sideslip.
     """
 
     cutoff_hz: float | None = None
@@ -82,6 +87,7 @@ class Options:
     band_hz: tuple[float, float] | None = None
     confidence: float = 0.95
     auxiliary: AuxiliaryModel | None = None
+    terms: tuple[str, ...] = ()
 
     def cutoff_of(self, dt_s: float) -> float:
         """Cutoff of the pre-filter for a sample period [s]: the one that is set, or the automatic one [Hz].
@@ -124,6 +130,10 @@ class Options:
                 raise ConfigurationError(
                     f"option {name} = {value!r}: must be a number between {low:g} and {high:g}"
                 )
+        if isinstance(self.terms, str) or not set(self.terms) <= set(TERMS):
+            raise ConfigurationError(
+                f"option terms = {self.terms!r}: must be a tuple of some of {', '.join(TERMS)}"
+            )
         if self.band_hz is not None and not _is_band(self.band_hz):
             raise ConfigurationError(
                 f"option band_hz = {self.band_hz!r}: must be a lower and a higher frequency, both above 0"

@@ -15,6 +15,7 @@ from airtruth.aircraft import Aircraft
 from airtruth.errors import ConfigurationError, LogError, choices
 from airtruth.identification.condition import AircraftConstants
 from airtruth.logs.flight_log import Batch, FlightLog, batches
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 
 
 @dataclass(frozen=True)
@@ -27,11 +28,23 @@ class Constants:
     inertia_yy_kg_m2: float
 
 
-NAMES: Final = tuple(f.name for f in fields(Constants))
+@dataclass(frozen=True)
+class LateralValues(Constants):
+    """Constants of an aircraft whose lateral-directional motion is identified: further b [m], Ixx, Izz, Ixz [kg m2]."""
+
+    span_m: float
+    inertia_xx_kg_m2: float
+    inertia_zz_kg_m2: float
+    inertia_xz_kg_m2: float
+
+
+NAMES: Final = tuple(f.name for f in fields(LateralValues))
 """Names of the constants."""
+_SIGNED: Final = ("inertia_xz_kg_m2",)
+"""Constants that may be zero or negative."""
 CG: Final = "cg_mac"
 """Centre of gravity aft of the leading edge of the mean aerodynamic chord, in chords [-]; only differences count."""
-REFERENCE: Final = ("wing_area_m2", "chord_m")
+REFERENCE: Final = ("wing_area_m2", "chord_m", "span_m")
 """Constants that normalise the derivatives, which a joint estimate therefore needs in common."""
 
 
@@ -68,8 +81,10 @@ def stated(metadata: Mapping[str, object], run_id: str) -> dict[str, float]:
         if name not in (*NAMES, CG):
             raise LogError(f"record_constants of run {run_id!r}: {name!r}: {choices(name, (*NAMES, CG))}")
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not 0.0 < value < np.inf:
-            raise LogError(f"record_constants of run {run_id!r}: {name} = {value!r}: must be above 0")
+        least = -np.inf if name in _SIGNED else 0.0
+        if not number or not least < value < np.inf:
+            must = "finite" if name in _SIGNED else "above 0"
+            raise LogError(f"record_constants of run {run_id!r}: {name} = {value!r}: must be {must}")
         known[name] = float(value)
     return known
 
@@ -87,15 +102,49 @@ def of_run(constants: AircraftConstants, metadata: Mapping[str, object], run_id:
         return constants
     if isinstance(constants, Aircraft):  # its declared sensors remain
         return constants.model_copy(update={"constants": constants.constants.model_copy(update=known)})
-    return Constants(**{name: known.get(name, getattr(constants, name)) for name in NAMES})
+    kind = (
+        LateralValues if all(name in known or stated_value(constants, name) for name in NAMES) else Constants
+    )
+    return kind(**{f.name: known.get(f.name, stated_value(constants, f.name)) for f in fields(kind)})
 
 
-def values_of(constants: AircraftConstants) -> Constants:
-    """The four constants alone."""
-    return Constants(**{name: float(getattr(constants, name)) for name in NAMES})
+def stated_value(constants: object, name: str) -> float:
+    """A constant of an aircraft, or of the table of constants within; 0 where it states none."""
+    within = getattr(constants, "constants", None)
+    value = getattr(constants, name, getattr(within, name, 0.0))
+    return float(value) if value is not None else 0.0
 
 
-def with_constants(log: FlightLog, constants: AircraftConstants) -> Iterator[Part]:
+def values_of(constants: AircraftConstants, motion: Motion = LONGITUDINAL) -> Constants:
+    """The constants that the identification of a motion needs, alone.
+
+    Raises
+    ------
+    ConfigurationError
+        If the aircraft lacks one that the lateral-directional motion needs, naming it.
+    """
+    kind = LateralValues if motion is LATERAL else Constants
+    values = {f.name: stated_value(constants, f.name) for f in fields(kind)}
+    if motion is LATERAL:
+        lacking = [name for name, value in values.items() if not value > 0.0 and name not in _SIGNED]
+        if lacking:
+            key, _, _ = lacking[0].partition("_kg" if "_kg" in lacking[0] else "_m")
+            table = "geometry" if "span" in key or "wing" in key else "mass"
+            raise ConfigurationError(
+                f"the {motion.name} motion needs {lacking[0]}, which the aircraft lacks; state {key} under [{table}] in "
+                "aircraft.toml, or use --motion longitudinal"
+            )
+        if values["inertia_xz_kg_m2"] ** 2 >= values["inertia_xx_kg_m2"] * values["inertia_zz_kg_m2"]:
+            raise ConfigurationError(
+                f"inertia_xz of the aircraft = {values['inertia_xz_kg_m2']:g} kg m2: its square must be below inertia_xx times "
+                "inertia_zz; correct [mass] in aircraft.toml"
+            )
+    return kind(**values)
+
+
+def with_constants(
+    log: FlightLog, constants: AircraftConstants, motion: Motion = LONGITUDINAL
+) -> Iterator[Part]:
     """Batches of a log whose runs share their constants and centre of gravity.
 
     Raises
@@ -109,7 +158,8 @@ def with_constants(log: FlightLog, constants: AircraftConstants) -> Iterator[Par
         for run, run_id in enumerate(batch.run_ids):
             own = of_run(constants, log.metadata, run_id)
             cg = stated(log.metadata, run_id).get(CG)
-            key = (*astuple(values_of(own)), -1.0 if cg is None else cg)
+            values = values_of(own, motion)
+            key = (*astuple(values), -1.0 if cg is None else cg)
             groups.setdefault(key, []).append(run)
             owners.setdefault(key, (own, cg))
         for key, runs in groups.items():
@@ -128,7 +178,7 @@ def by_loading(parts: Sequence[Part]) -> dict[float | None, list[Part]]:
     groups: dict[float | None, list[Part]] = {}
     for part in parts:
         for name in REFERENCE:
-            a, b = (float(getattr(one.constants, name)) for one in (first, part))
+            a, b = (stated_value(one.constants, name) for one in (first, part))
             if a != b:
                 raise ConfigurationError(
                     f"--joint: {name} is {a:.6g} in run {first.batch.run_ids[0]!r} and {b:.6g} in run "
@@ -149,10 +199,10 @@ def differing(
 ) -> list[tuple[str, str, float, float]]:
     """(run, name, value of the record, value of the aircraft) where a record states another value."""
     return [
-        (run, name, value, float(getattr(constants, name)))
+        (run, name, value, stated_value(constants, name))
         for run in run_ids
         for name, value in stated(metadata, run).items()
-        if name != CG and value != float(getattr(constants, name))
+        if name != CG and value != stated_value(constants, name)
     ]
 
 

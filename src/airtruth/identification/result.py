@@ -20,6 +20,7 @@ from airtruth.identification.options import Options
 from airtruth.identification.record_constants import Constants, values_of
 from airtruth.logs.histories import Histories
 from airtruth.logs.sources import Logs
+from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.result import shortened
 from airtruth.table import Table, as_html, as_text
 
@@ -48,6 +49,7 @@ class Settings:
     aircraft : name of the aircraft.
     constants : its constants.
     sensors : errors of its instruments that are taken out of the records (`declared_sensors.taken_out`).
+    motion : whose derivatives are estimated.
     """
 
     options: Options
@@ -55,12 +57,18 @@ class Settings:
     aircraft: str
     constants: Constants
     sensors: Taken = field(default_factory=dict)
+    motion: Motion = LONGITUDINAL
 
     def to_dict(self) -> dict[str, Any]:
         """The settings in types that JSON has."""
         options = {f.name: getattr(self.options, f.name) for f in dataclasses.fields(self.options)}
         if self.options.auxiliary is not None:
             options["auxiliary"] = getattr(self.options.auxiliary, "__qualname__", "custom")
+        # files of older versions do not name the terms
+        if self.options.terms:
+            options["terms"] = list(self.options.terms)
+        else:
+            del options["terms"]
         if self.options.band_hz is not None:
             options["band_hz"] = list(self.options.band_hz)
         return {
@@ -69,13 +77,23 @@ class Settings:
             "aircraft": self.aircraft,
             "constants": dataclasses.asdict(self.constants),
             **({"sensors": {name: dict(own) for name, own in self.sensors.items()}} if self.sensors else {}),
+            # files of older versions hold the longitudinal motion and do not name it
+            **({} if self.motion is LONGITUDINAL else {"motion": self.motion.name}),
         }
 
 
-def settings_of(aircraft: AircraftConstants, options: Options, joint: bool) -> Settings:
-    """Settings of an identification of this aircraft."""
+def settings_of(
+    aircraft: AircraftConstants, options: Options, joint: bool, motion: Motion = LONGITUDINAL
+) -> Settings:
+    """Settings of an identification of this aircraft.
+
+    Raises
+    ------
+    ConfigurationError
+        If the aircraft lacks a constant that the motion needs.
+    """
     name = aircraft.name if isinstance(aircraft, Aircraft) else type(aircraft).__name__
-    return Settings(options, joint, name, values_of(aircraft), taken_out(aircraft))
+    return Settings(options, joint, name, values_of(aircraft, motion), taken_out(aircraft, motion), motion)
 
 
 RUNS_PER_FRAME: Final = 2000
@@ -84,7 +102,7 @@ RUNS_PER_FRAME: Final = 2000
 
 @dataclass(frozen=True)
 class IdentificationResult:
-    """Estimates of the six derivatives by one or more methods, with their provenance.
+    """Estimates of the derivatives of a motion by one or more methods, with their provenance.
 
     Attributes
     ----------
@@ -95,6 +113,7 @@ class IdentificationResult:
     version : of airtruth.
     sources : logs that were read from files.
     logs : the logs as they were given, which figures read again.
+    others : results of the other motions that the same logs answer; the summary has each under its heading.
     """
 
     estimates: tuple[Estimates, ...]
@@ -104,6 +123,17 @@ class IdentificationResult:
     version: str
     sources: tuple[Source, ...]
     logs: Logs | None = field(default=None, repr=False, compare=False)
+    others: tuple[IdentificationResult, ...] = ()
+
+    @property
+    def motion(self) -> str:
+        """Name of the motion whose derivatives are estimated."""
+        return self.settings.motion.name
+
+    @property
+    def motions(self) -> dict[str, IdentificationResult]:
+        """Name of each motion that is answered -> its result."""
+        return {one.motion: one for one in (self, *self.others)}
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -131,11 +161,12 @@ class IdentificationResult:
     def to_frame(self) -> pd.DataFrame:
         """One row per run and method, the columns of estimates.parquet (docs/methods.md).
 
-        run_id, method, converged, iterations; NAME, NAME_std, NAME_lower, NAME_upper of each of CLalpha ... Cmde [-],
-        wn_rad_s [rad/s] and zeta [-]; status. Runs keep their order, and each run the order of
+        run_id, method, converged, iterations; NAME, NAME_std, NAME_lower, NAME_upper of each derivative [-] and modal
+        parameter; status; NAME_OTHER_corr, the correlations of the derivatives [-]; airspeed_m_s and density_kg_m3, the
+        flight condition of the estimate. Runs keep their order, and each run the order of
         the methods.
         """
-        return _frame(self.estimates)
+        return _frame(self.estimates, self.settings.constants)
 
     def tidy(self) -> pd.DataFrame:
         """One row for each method, run and quantity, see `airtruth.identification.frames.tidy`."""
@@ -145,11 +176,15 @@ class IdentificationResult:
 
     def frames(self) -> Iterator[pd.DataFrame]:
         """The rows of `to_frame` in parts of up to `RUNS_PER_FRAME` runs, so that the memory need not hold them all."""
-        return frames_of(self._parts)
+        return frames_of(self._parts, self.settings.constants)
 
     def summary(self) -> str:
         """Estimates of each method with their intervals, or mean and spread over runs; then the notes."""
-        return as_text(self.table())
+        if not self.others:
+            return as_text(self.table())
+        return "\n\n".join(
+            f"{r.settings.motion.heading}\n{as_text(r.table())}" for r in self.motions.values()
+        )
 
     def table(self) -> Table:
         """The table of `summary`."""
@@ -202,7 +237,7 @@ class IdentificationResult:
         return as_figure(intervals_chart(self.to_frame(), confidence=self.estimates[0].confidence))
 
     def histories(self) -> Histories | None:
-        """Records of the logs beside the simulations by each method; None where the logs are unknown.
+        """Records of the logs beside the simulations by each method; None where the logs are unknown, and for the lateral motion.
 
         Raises
         ------
@@ -211,7 +246,7 @@ class IdentificationResult:
         """
         from airtruth.identification.simulated import simulated_records
 
-        if self.logs is None:
+        if self.logs is None or self.settings.motion is not LONGITUDINAL:
             return None
         return simulated_records(
             self.logs, self.to_frame(), self.settings.constants, taken=self.settings.sensors
@@ -255,18 +290,18 @@ class SpooledResult:
 
     def frames(self) -> Iterator[pd.DataFrame]:
         """The rows of `to_frame` in parts."""
-        return frames_of(self.parts)
+        return frames_of(self.parts, self.settings.constants)
 
     def summary(self) -> str:
         """`IdentificationResult.summary`."""
         return as_text(table_of(self.parts, self.forced, self.notes))
 
 
-def frames_of(parts: Parts) -> Iterator[pd.DataFrame]:
+def frames_of(parts: Parts, constants: Constants) -> Iterator[pd.DataFrame]:
     """Rows of contract 2 in frames of up to `RUNS_PER_FRAME` runs."""
     for estimates in parts():
         for first in range(0, len(estimates[0].run_ids), RUNS_PER_FRAME):
-            yield _frame([e.rows(first, first + RUNS_PER_FRAME) for e in estimates])
+            yield _frame([e.rows(first, first + RUNS_PER_FRAME) for e in estimates], constants)
 
 
 def json_of(frames: Iterable[pd.DataFrame]) -> Iterator[str]:
@@ -284,10 +319,10 @@ def table_of(parts: Parts, forced: Iterable[str], notes: Iterable[str]) -> Table
     return dataclasses.replace(tables.overview_of(parts), notes=(*overridden, *notes))
 
 
-def _frame(estimates: Sequence[Estimates]) -> pd.DataFrame:
+def _frame(estimates: Sequence[Estimates], constants: Constants) -> pd.DataFrame:
     """Rows of several methods for the same runs: run by run, and of each run the methods in their order."""
     import pandas as pd
 
-    table = pd.concat([estimates_table(e) for e in estimates], ignore_index=True)
+    table = pd.concat([estimates_table(e, constants) for e in estimates], ignore_index=True)
     order = np.arange(len(table)).reshape(len(estimates), -1).T.ravel()
     return table.iloc[order].reset_index(drop=True)

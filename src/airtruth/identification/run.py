@@ -1,10 +1,11 @@
-"""Identify: logs in, estimates of the six derivatives out.
+"""Identify: logs in, estimates of the derivatives of a motion out.
 
 `identify` checks logs and streams files; `identify_batch` and `identify_joint` estimate from arrays.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -19,7 +20,7 @@ from airtruth.errors import ConfigurationError
 from airtruth.identification.batch import identify_batch, identify_joint
 from airtruth.identification.condition import AircraftConstants, takes_constant
 from airtruth.identification.declared_sensors import declared_words, taken_out
-from airtruth.identification.doubts import changing_pressure, doubts, smoothed_airspeed
+from airtruth.identification.doubts import changing_pressure, curvature, doubts, smoothed_airspeed
 from airtruth.identification.estimates import Estimates, concatenated
 from airtruth.identification.from_log import FromLog, LogTask, results_of
 from airtruth.identification.loading import at_one_cg, mean_cg
@@ -36,6 +37,7 @@ from airtruth.identification.result import (
 from airtruth.identification.spool import Spool
 from airtruth.logs.owners import Owners
 from airtruth.logs.sources import Logs, sources
+from airtruth.physics.motion import LONGITUDINAL, Motion
 
 Progress = Callable[[int, int, int], None]
 """Called with the number of logs done, of all logs, and of runs without a converged estimate."""
@@ -51,8 +53,10 @@ def identify(
     force: bool = False,
     advance: Progress = lambda done, total, failed: None,
     cluster: Cluster | None = None,
+    motion: Motion = LONGITUDINAL,
+    excited: bool = False,
 ) -> IdentificationResult:
-    """Check logs and estimate the six derivatives: one row per run and method, or per method if joint.
+    """Check logs and estimate the derivatives of a motion: one row per run and method, or per method if joint.
 
     Files are read one at a time, so that the memory holds one log and the estimates; a joint estimate holds
     all runs. Mass, inertia and reference lengths that a log states for a run (``record_constants``) replace
@@ -71,6 +75,8 @@ def identify(
     advance : called after each method of each log with the number of those that are done, of all of them, and of the
         runs that did not converge.
     cluster : whose workers identify the logs, in place of this process; they see the files under the same names.
+    motion : whose derivatives are estimated.
+    excited : leave runs alone that do not excite the motion (`airtruth.identification.excited`).
 
     Raises
     ------
@@ -89,11 +95,10 @@ def identify(
     >>> result.to_frame().loc[0, ["run_id", "method", "converged"]].tolist()
     ['r1', 'ls', True]
     """
-    chosen = chosen_methods(methods)
+    chosen = chosen_methods(methods, motion)
     made: list[Sequence[Estimates]] = []
-    work = _worked(
-        made.append, _Request(logs, aircraft, chosen, options or Options(), joint, force), advance, cluster
-    )
+    request = _Request(logs, aircraft, chosen, options or Options(), joint, force, motion, excited)
+    work = _worked(made.append, request, advance, cluster)
     if joint:
         estimates = tuple(work.joint())
     else:
@@ -125,12 +130,14 @@ def identified(
     advance: Progress = lambda done, total, failed: None,
     cluster: Cluster | None = None,
     folder: Path | None = None,
+    motion: Motion = LONGITUDINAL,
+    excited: bool = False,
 ) -> Iterator[IdentificationResult | SpooledResult]:
     """Identify logs as `identify` does, with the estimates of single runs in a temporary file and not in memory.
 
     Parameters
     ----------
-    logs, aircraft, methods, options, joint, force, advance, cluster : as in `identify`.
+    logs, aircraft, methods, options, joint, force, advance, cluster, motion, excited : as in `identify`.
     folder : local folder of the temporary file; None for the system's.
 
     Yields
@@ -145,12 +152,21 @@ def identified(
     """
     if joint:
         yield identify(
-            logs, aircraft, methods, options, joint=True, force=force, advance=advance, cluster=cluster
+            logs,
+            aircraft,
+            methods,
+            options,
+            joint=True,
+            force=force,
+            advance=advance,
+            cluster=cluster,
+            motion=motion,
+            excited=excited,
         )
         return
-    chosen = chosen_methods(methods)
+    chosen = chosen_methods(methods, motion)
     with Spool(folder) as spool:
-        request = _Request(logs, aircraft, chosen, options or Options(), False, force)
+        request = _Request(logs, aircraft, chosen, options or Options(), False, force, motion, excited)
         work = _worked(spool.add, request, advance, cluster)
         yield SpooledResult(
             parts=spool.parts,
@@ -173,6 +189,8 @@ class _Request:
     options: Options
     joint: bool
     force: bool
+    motion: Motion
+    excited: bool
 
 
 def _worked(
@@ -187,13 +205,23 @@ def _worked(
     work = _Work(
         asked.methods,
         asked.options,
-        settings_of(plane, asked.options, asked.joint),
+        settings_of(plane, asked.options, asked.joint, asked.motion),
         lambda failed: advance(next(steps), total, failed),
         keep,
-        notes=declared_words(taken_out(plane)),
+        notes=declared_words(taken_out(plane, asked.motion)),
     )
     tasks = (
-        LogTask(Path.cwd(), entry, asked.methods, asked.options, plane, asked.force, asked.joint)
+        LogTask(
+            Path.cwd(),
+            entry,
+            asked.methods,
+            asked.options,
+            plane,
+            asked.force,
+            asked.joint,
+            asked.motion,
+            asked.excited,
+        )
         for entry in entries
     )
     for log, found in results_of(tasks, work.estimated, cluster):
@@ -218,6 +246,7 @@ class _Work:
     sources: list[Source] = field(default_factory=list)
     noisy: list[str] = field(default_factory=list)
     changes: list[tuple[str, float]] = field(default_factory=list)
+    curved: Counter[tuple[str, str]] = field(default_factory=Counter)
     measures: list[poor.Record] = field(default_factory=list)
     runs: int = 0
     failed: int = 0
@@ -247,6 +276,7 @@ class _Work:
         self.dt_s = max(self.dt_s, found.dt_s)
         self.noisy += found.noisy
         self.changes += found.changes
+        self.curved += found.curved
         self.measures += found.measures
         self.runs += len(found.run_ids)
         if found.origin is not None:
@@ -262,6 +292,7 @@ class _Work:
             *_stated(self.stated),
             *smoothed_airspeed(self.noisy, self.runs),
             *changing_pressure(constant, self.changes, self.runs),
+            *curvature(self.curved, self.runs),
         )
 
     def joint(self) -> Iterator[Estimates]:
@@ -275,7 +306,11 @@ class _Work:
         for chosen in self.methods:
             each = {
                 cg: identify_joint(
-                    [p.batch for p in parts], [p.constants for p in parts], chosen, self.options
+                    [p.batch for p in parts],
+                    [p.constants for p in parts],
+                    chosen,
+                    self.options,
+                    self.settings.motion,
                 )
                 for cg, parts in groups.items()
             }

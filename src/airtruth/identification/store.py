@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 
 from airtruth.errors import LogError, StoreError
@@ -21,9 +20,26 @@ from airtruth.identification.stored import KEY, KEYS, Stored, open_stored
 from airtruth.logs import ledger
 from airtruth.logs.remote import location
 from airtruth.logs.tables import write_parts
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FILE: Final = "estimates.parquet"
 """Name of the file of estimates in a campaign folder."""
+FILES: Final[Mapping[str, str]] = {LONGITUDINAL.name: FILE, LATERAL.name: "estimates-lateral.parquet"}
+"""The same by the name of the motion."""
+
+
+def beside(path: Path, motion: Motion) -> Path:
+    """File of the estimates of a motion beside that of the longitudinal one.
+
+    Examples
+    --------
+    >>> beside(Path("out/light.parquet"), LATERAL).name
+    'light-lateral.parquet'
+    """
+    return path if motion is LONGITUDINAL else path.with_name(f"{path.stem}-{motion.name}{path.suffix}")
 
 
 def require_mergeable(
@@ -96,6 +112,8 @@ def _write(
             path, map(_table, _merged(old, result, methods) if old.methods else result.frames()), metadata
         )
     except _OtherRunsError:
+        import pandas as pd
+
         kept = pd.concat(list(old.frames()), ignore_index=True)
         write_parts(
             path,
@@ -116,6 +134,8 @@ def _merged(
     old: Stored, result: IdentificationResult | SpooledResult, methods: Sequence[str]
 ) -> Iterator[pd.DataFrame]:
     """Rows of a file and of a result that have the same runs, in parts."""
+    import pandas as pd
+
     parts = iter(old.frames())
     waiting = next(parts)
     for rows in result.frames():
@@ -138,6 +158,8 @@ def _merged(
 
 def _together(old: pd.DataFrame, rows: pd.DataFrame, methods: Sequence[str]) -> pd.DataFrame:
     """Rows of a file, those that others replace left out, with the others: runs in the order of their first appearance."""
+    import pandas as pd
+
     keys = list(KEYS)
     kept = old[~old.set_index(keys).index.isin(rows.set_index(keys).index)]
     whole = pd.concat([part for part in (kept, rows) if len(part)], ignore_index=True)
@@ -161,6 +183,15 @@ def _kept(path: Path, methods: Sequence[str], settings: Mapping[str, Any], force
         if force:
             return _NOTHING
         raise
+    named = settings.get("motion", LONGITUDINAL.name)
+    stored = {record.get("motion", LONGITUDINAL.name) for record in old.records.values()}
+    if stored - {named}:
+        if force:
+            return _NOTHING
+        raise StoreError(
+            f"{path}: holds estimates of the {min(stored)} motion, and these are of the {named} motion; choose another --out, "
+            "or replace the whole file with --force"
+        )
     other = other_constants(old.records, settings["constants"])
     own = settings.get("sensors", {})
     if not other and any(record.get("sensors", {}) != own for record in old.records.values()):
@@ -236,4 +267,4 @@ def _joined(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
     return {**new, "sources": [*sources, *new["sources"]], **both}
 
 
-__all__ = ["FILE", "other_constants", "require_mergeable", "write_estimates"]
+__all__ = ["FILE", "FILES", "beside", "other_constants", "require_mergeable", "write_estimates"]

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, NotRequired
+from typing import TYPE_CHECKING, Any, Final, NotRequired
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 from typing_extensions import TypedDict
@@ -16,14 +15,15 @@ from typing_extensions import TypedDict
 from airtruth.errors import StoreError
 from airtruth.logs.store import read_metadata, read_table
 from airtruth.logs.tables import Kind, group_ends, read_group, read_rows, require_kinds
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import motion_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 KEY: Final = "estimates"
 """Key of the file-level JSON that holds a record for each method."""
 KEYS: Final = ("run_id", "method")
 """Columns that identify a row."""
-MODAL: Final = ("wn_rad_s", "zeta")
-"""Columns beside the derivatives, which older files may lack."""
 _STEP: Final = "choose another --out, or replace it with --force"
 """Next step of a user whose file cannot be merged into."""
 
@@ -37,6 +37,7 @@ class Record(TypedDict):
     aircraft: str
     constants: dict[str, float]
     sensors: NotRequired[dict[str, dict[str, float]]]
+    motion: NotRequired[str]
     sources: list[tuple[str, str, int]]
     notes: list[str]
     forced: list[str]
@@ -108,6 +109,8 @@ def open_stored(path: Path) -> Stored:
 
 def _methods_in_order(path: Path) -> tuple[str, ...]:
     """Methods of a file whose rows ascend by run; none where they do not, or where anything is wrong with it."""
+    import pandas as pd
+
     methods: dict[str, None] = {}
     last = pd.DataFrame()
     try:
@@ -127,9 +130,11 @@ def _methods_in_order(path: Path) -> tuple[str, ...]:
 
 
 def _require_estimates(path: Path, frame: pd.DataFrame) -> None:
-    if not {*KEYS, *PARAMETERS} <= set(frame.columns):
+    motion = motion_of(frame.columns)
+    if not {*KEYS, *motion.parameters} <= set(frame.columns):
         raise StoreError(f"{path}: is not a file of estimates; {_STEP}")
-    names = (*PARAMETERS, *(n for n in MODAL if n in frame))
+    # older files may lack the modal parameters
+    names = (*motion.parameters, *(n for n in motion.modal if n in frame))
     present = [
         name + end for name in names for end in ("", "_std", "_lower", "_upper") if name + end in frame
     ]

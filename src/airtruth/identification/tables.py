@@ -21,8 +21,8 @@ from airtruth.identification.estimates import (
     quantities,
 )
 from airtruth.identification.methods import title
-from airtruth.physics.short_period import MODAL, PARAMETERS, UNITS
-from airtruth.table import Cell, Group, Interval, Number, Pair, Table, flat
+from airtruth.physics.motion import LONGITUDINAL, Motion, motion_of
+from airtruth.table import Cell, Group, Interval, Number, Table, Uncertain, flat
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,7 +55,7 @@ def details(estimates: Estimates, run_id: str | None = None) -> Table:
     rows: list[tuple[Cell, ...]] = [
         (
             name,
-            UNITS[name],
+            estimates.motion.units[name],
             float(q.value[run, i]),
             float(q.std[run, i]),
             float(q.lower[run, i]),
@@ -90,7 +90,7 @@ def _distribution(estimates: Estimates) -> Table:
         std = std[np.isfinite(std)]
         stated = float(np.sqrt(np.mean(std**2))) if std.size else math.nan
         error = spread / math.sqrt(value.size) if value.size > 1 else math.nan
-        rows.append((name, UNITS[name], mean, error, spread, stated))
+        rows.append((name, estimates.motion.units[name], mean, error, spread, stated))
     return flat(
         title=f"{title(estimates.method)}, {count} of {len(estimates.run_ids)} runs converged",
         columns=("parameter", "unit", "mean", "standard error", "spread over runs", "stated std (rms)"),
@@ -113,7 +113,7 @@ def _outcomes(estimates: Estimates) -> tuple[str, ...]:
 
 
 def comparison(estimates: Sequence[Estimates], run_id: str | None = None) -> Table:
-    """Methods side by side: estimate and deviation of one run, or mean and spread over converged runs.
+    """Methods side by side: estimate of one run or mean over the converged runs, with its standard error.
 
     Parameters
     ----------
@@ -127,7 +127,6 @@ def comparison(estimates: Sequence[Estimates], run_id: str | None = None) -> Tab
     """
     tables = [details(e, run_id) for e in estimates]
     single = run_id is not None or len(estimates[0].run_ids) == 1
-    value, deviation = (2, 3) if single else (2, 4)
     columns: list[str] = ["parameter", "unit"]
     for e in estimates:
         columns += [e.method, f"{e.method} +-"]
@@ -135,9 +134,9 @@ def comparison(estimates: Sequence[Estimates], run_id: str | None = None) -> Tab
     for i, first in enumerate(tables[0].rows):
         cells: list[Cell] = [first[0], first[1]]
         for table in tables:
-            cells += [table.rows[i][value], table.rows[i][deviation]]
+            cells += [table.rows[i][2], table.rows[i][3]]  # the estimate or the mean, and its standard error
         rows.append(tuple(cells))
-    shown = "estimate and its standard deviation" if single else "mean and spread over runs"
+    shown = "estimate and its standard error" if single else "mean over the runs and its standard error"
     return flat(
         title=f"{len(estimates)} methods: {shown}",
         columns=tuple(columns),
@@ -147,25 +146,31 @@ def comparison(estimates: Sequence[Estimates], run_id: str | None = None) -> Tab
 
 
 def overview(estimates: pd.DataFrame, confidence: float = 0.95) -> Table:
-    """Estimates of contract 2, a column per method: one run with its intervals, or mean and standard deviation.
+    """Estimates of contract 2, a column per method: one run with its intervals, or mean and standard error over the runs.
 
     Parameters
     ----------
     estimates : rows of estimates.parquet, see `airtruth.identification.result.IdentificationResult.to_frame`.
     confidence : probability of their intervals [-].
     """
-    names = [*PARAMETERS, *MODAL]
+    motion = motion_of(estimates.columns)
+    names = _names(motion)
     by_method = {str(name): rows for name, rows in estimates.groupby("method", sort=False)}
     if all(len(rows) == 1 for rows in by_method.values()):
-        return _single({name: rows.iloc[0] for name, rows in by_method.items()}, confidence)
+        return _single({name: rows.iloc[0] for name, rows in by_method.items()}, confidence, motion)
     return _spread(
         lambda: (
             {
                 m: (rows[names].to_numpy(np.float64), rows["converged"].to_numpy())
                 for m, rows in by_method.items()
             },
-        )
+        ),
+        motion,
     )
+
+
+def _names(motion: Motion) -> list[str]:
+    return [*motion.parameters, *motion.modal]
 
 
 def overview_of(parts: Parts) -> Table:
@@ -174,23 +179,34 @@ def overview_of(parts: Parts) -> Table:
     for part in parts():
         runs, first = runs + len(part[0].run_ids), part if first is None else first
     if first is not None and runs == 1:
-        return _single({e.method: estimates_table(e).iloc[0] for e in first}, first[0].confidence)
-    return _spread(lambda: ({e.method: (point_values(e), e.converged) for e in part} for part in parts()))
-
-
-def _single(by_method: Mapping[str, pd.Series], confidence: float) -> Table:
-    cells = {name: _intervals(run) for name, run in by_method.items()}
-    converged = {name: int(run["converged"]) for name, run in by_method.items()}
-    return _overview(
-        f"Estimates with {100.0 * confidence:g} % intervals", cells, converged, dict.fromkeys(by_method, 1)
+        rows = {e.method: estimates_table(e).iloc[0] for e in first}
+        return _single(rows, first[0].confidence, first[0].motion)
+    motion = LONGITUDINAL if first is None else first[0].motion
+    return _spread(
+        lambda: ({e.method: (point_values(e), e.converged) for e in part} for part in parts()), motion
     )
 
 
-def _spread(parts: Callable[[], Iterable[Mapping[str, tuple[Array, NDArray[np.bool_]]]]]) -> Table:
-    """Mean and standard deviation over the converged runs, from two passes over values (runs, 8) and convergence."""
+def _single(by_method: Mapping[str, pd.Series], confidence: float, motion: Motion) -> Table:
+    cells = {name: _intervals(run, motion) for name, run in by_method.items()}
+    converged = {name: int(run["converged"]) for name, run in by_method.items()}
+    return _overview(
+        f"Estimates with {100.0 * confidence:g} % intervals",
+        cells,
+        converged,
+        dict.fromkeys(by_method, 1),
+        motion,
+    )
+
+
+def _spread(
+    parts: Callable[[], Iterable[Mapping[str, tuple[Array, NDArray[np.bool_]]]]], motion: Motion
+) -> Table:
+    """Mean and its standard error over the converged runs, from two passes over values (runs, quantities) and convergence."""
     runs: Counter[str] = Counter()
     converged: Counter[str] = Counter()
-    count, total, squares = _Sums(), _Sums(), _Sums()
+    size = len(_names(motion))
+    count, total, squares = _Sums(size), _Sums(size), _Sums(size)
     for part in parts():
         for method, (values, good) in part.items():
             runs[method] += len(good)
@@ -205,23 +221,32 @@ def _spread(parts: Callable[[], Iterable[Mapping[str, tuple[Array, NDArray[np.bo
         std = {m: np.sqrt(np.where(count[m] > 1, squares[m] / (count[m] - 1), np.nan)) for m in runs}
     cells: dict[str, dict[str, Cell]] = {
         method: {
-            name: Pair(Number(mean[method][i]), Number(std[method][i], digits=2))
-            for i, name in enumerate((*PARAMETERS, *MODAL))
+            name: Uncertain(
+                Number(mean[method][i]), Number(std[method][i] / np.sqrt(count[method][i]), digits=2)
+            )
+            for i, name in enumerate(_names(motion))
         }
         for method in runs
     }
-    return _overview("Mean (standard deviation) over the converged runs", cells, converged, runs)
+    return _overview("Mean +- standard error over the converged runs", cells, converged, runs, motion)
 
 
 class _Sums(dict[str, Array]):
-    """Sums of each method over its runs, (8,)."""
+    """Sums of each method over its runs, (quantities,)."""
+
+    def __init__(self, size: int) -> None:
+        self.size = size
 
     def __missing__(self, method: str) -> Array:
-        return np.zeros(len(PARAMETERS) + len(MODAL))
+        return np.zeros(self.size)
 
 
 def _overview(
-    title: str, cells: Mapping[str, Mapping[str, Cell]], converged: Mapping[str, int], runs: Mapping[str, int]
+    title: str,
+    cells: Mapping[str, Mapping[str, Cell]],
+    converged: Mapping[str, int],
+    runs: Mapping[str, int],
+    motion: Motion,
 ) -> Table:
     return Table(
         title=title,
@@ -229,7 +254,7 @@ def _overview(
         groups=(
             Group(
                 "",
-                tuple((n, UNITS[n], *(c[n] for c in cells.values())) for n in (*PARAMETERS, *MODAL)),
+                tuple((n, motion.units[n], *(c[n] for c in cells.values())) for n in _names(motion)),
             ),
             Group(
                 "Runs",
@@ -243,8 +268,8 @@ def _overview(
     )
 
 
-def _intervals(run: pd.Series) -> dict[str, Cell]:
+def _intervals(run: pd.Series, motion: Motion) -> dict[str, Cell]:
     return {
         name: Interval(Number(run[name]), Number(run[f"{name}_lower"]), Number(run[f"{name}_upper"]))
-        for name in (*PARAMETERS, *MODAL)
+        for name in _names(motion)
     }

@@ -327,10 +327,10 @@ def _runs(path: Path, column: pa.ChunkedArray) -> tuple[tuple[str, ...], NDArray
         raise LogError(f"{path}: the log has no rows; fly or import it again")
     encoded = column if pa.types.is_dictionary(column.type) else column.dictionary_encode()
     encoded = encoded.unify_dictionaries().combine_chunks()
-    index = encoded.indices.to_numpy()
+    index = np.from_dlpack(encoded.indices)
     starts = np.flatnonzero(np.diff(index, prepend=-1))
-    ids = encoded.dictionary.take(pa.array(index[starts])).to_pylist()
-    return tuple(ids), np.append(starts, len(index)).astype(np.int64)
+    names = encoded.dictionary.to_pylist()
+    return tuple(names[i] for i in index[starts].tolist()), np.append(starts, len(index)).astype(np.int64)
 
 
 def _select(
@@ -359,7 +359,16 @@ def _select(
 def _floats(column: pa.ChunkedArray, keep: slice | NDArray[np.int64]) -> Array:
     if pa.types.is_decimal(column.type):
         column = column.cast(pa.float64())
-    return np.ascontiguousarray(column.to_numpy()[keep], dtype=np.float64)
+    return np.ascontiguousarray(_numbers(column)[keep], dtype=np.float64)
+
+
+def _numbers(column: pa.ChunkedArray) -> NDArray[Any]:
+    """The column as numpy has it; `to_numpy` imports pandas, which takes longer than to identify a log."""
+    kind = column.type
+    plain = pa.types.is_float32(kind) or pa.types.is_float64(kind) or pa.types.is_integer(kind)
+    if column.null_count or not plain or not column.num_chunks:
+        return np.asarray(column.to_numpy())
+    return np.concatenate([np.from_dlpack(chunk) for chunk in column.chunks])
 
 
 __all__ = [

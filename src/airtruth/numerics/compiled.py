@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection
 from typing import Any, Final, TypeVar
 
 from numba import njit
-from numba.extending import register_jitable
+from numba.extending import overload, register_jitable
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -25,6 +25,8 @@ _WITHOUT_ENTRY: Final[dict[str, Any]] = {
 array of the tuples that it passes, which takes three quarters of the time of the filter."""
 _UNCOUNTED: Final[dict[str, Any]] = {"_nrt": False, **_WITHOUT_ENTRY}
 """The same for a function that counts no references to arrays."""
+_BY_TYPES: Final[Any] = {"error_model": "numpy", **_UNCOUNTED}
+"""The same as one argument."""
 shared: Final = register_jitable(error_model="numpy")
 """Decorator of a small function that kernels and Python call: from Python it is the plain function."""
 
@@ -43,10 +45,27 @@ def inner(function: F, fastmath: Collection[str] = ()) -> F:
     return compiled
 
 
+def by_types(choose: Callable[..., Callable[..., object]]) -> Callable[[F], F]:
+    """Decorate a function that only kernels call and whose body depends on the types of its arguments.
+
+    Parameters
+    ----------
+    choose : numba's types of the arguments -> what is compiled for them, a function that calls an `inner` one.
+    """
+
+    choose.__annotations__.clear()  # numba compares the signature with that of what it returns
+
+    def decorate(function: F) -> F:
+        overload(function, jit_options=_BY_TYPES)(choose)
+        return function
+
+    return decorate
+
+
 def allocating(function: F) -> F:
     """Compile a function as `inner` does, but one that allocates arrays."""
     compiled: F = njit(error_model="numpy", **_WITHOUT_ENTRY)(function)
     return compiled
 
 
-__all__ = ["allocating", "inner", "shared"]
+__all__ = ["allocating", "by_types", "inner", "shared"]

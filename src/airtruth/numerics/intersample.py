@@ -118,7 +118,7 @@ def _moving_cells(increments: Array, decay: Array) -> Array:
     moves = increments[:, 1:] - decay[:, None] * increments[:, :-1]
     noise = np.median(np.abs(increments), axis=1, keepdims=True)
     least = np.maximum(_NOISE * noise, _STILL * np.abs(increments).max(axis=1, keepdims=True))
-    size = moves**4  # the noise of the many cells at rest adds little
+    size = np.square(np.square(moves))  # the noise of the many cells at rest adds little
     share = np.divide(size, size + least**4, out=np.zeros_like(size), where=least > 0.0)
     return np.asarray(share.sum(axis=1))
 

@@ -9,7 +9,7 @@ M. B. Bragg et al., Effect of Ice Accretion on Aircraft Flight Dynamics, AIAA 20
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
@@ -17,6 +17,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.short_period import CL_ALPHA, CL_DE, CL_Q, CM_ALPHA, CM_DE, CM_Q
 
 Array = NDArray[np.float64]
@@ -97,8 +98,48 @@ def _tail(derivatives: Array, geometry: TailGeometry) -> tuple[float, float, flo
     return a, arm, float(slope * wing)
 
 
+def _centre(derivatives: Array, _geometry: TailGeometry) -> Array:
+    part = np.zeros_like(derivatives)
+    part[CM_ALPHA] = -derivatives[CL_ALPHA]
+    return part
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the aircraft, or a property of the flow, that moves several derivatives.
+
+    Attributes
+    ----------
+    neutral : value that changes nothing: 1 of a factor, 0 of a shift or of a severity.
+    direction : derivatives (6,) and geometry -> change of the derivatives per unit, at the neutral value.
+    motion : name of the motion whose derivatives they are.
+    """
+
+    neutral: float
+    direction: Callable[[Array, TailGeometry], Array]
+    motion: str = LONGITUDINAL.name
+
+
+PARTS: Final[Mapping[str, Part]] = MappingProxyType(
+    {
+        "tail": Part(1.0, tail_part),
+        "wing": Part(1.0, wing_part),
+        "dynamic_pressure": Part(1.0, lambda derivatives, _: derivatives.copy()),
+        "aerodynamic_center": Part(0.0, _centre),
+        "icing": Part(0.0, lambda derivatives, _: np.array(ICED) * derivatives),
+    }
+)
+"""Causes by name: tail, wing and dynamic pressure are factors, the aerodynamic centre counts aft in chords, and icing is a
+severity, 1 for the reference ice."""
+CAUSES: Final[Mapping[str, float]] = MappingProxyType(
+    {name: part.neutral for name, part in PARTS.items()} | dict.fromkeys(LONGITUDINAL.parameters, 0.0)
+)
+"""Causes of a change of the derivatives (`airtruth.physics.terms.DerivativeTerm`) -> neutral value; a derivative is its own
+cause."""
+
+
 def directions(derivatives: Array, geometry: TailGeometry) -> Mapping[str, Array]:
-    """Change of the six apparent derivatives per unit of each declared quantity, at its neutral value.
+    """Change of the six apparent derivatives per unit of each declared quantity and each part, at its neutral value.
 
     Parameters
     ----------
@@ -106,28 +147,24 @@ def directions(derivatives: Array, geometry: TailGeometry) -> Mapping[str, Array
 
     Returns
     -------
-    quantity -> (6,). "mass" and "inertia" are factors on what divides the coefficients; "cg" and "aerodynamic_center"
-    count aft in chords; "icing" is a severity, 1 for the reference ice; the others are factors.
+    quantity or part -> (6,). A factor on the mass or an inertia divides its coefficients, the effectiveness of a control
+    multiplies its derivatives, and "cg" counts aft in chords.
     """
-    lift, moment = derivatives.copy(), derivatives.copy()
-    lift[[CM_ALPHA, CM_Q, CM_DE]] = 0.0
-    moment[[CL_ALPHA, CL_Q, CL_DE]] = 0.0
-    transfer, elevator, centre = np.zeros(6), np.zeros(6), np.zeros(6)
-    transfer[[CM_ALPHA, CM_Q, CM_DE]] = derivatives[[CL_ALPHA, CL_Q, CL_DE]]
-    elevator[[CL_DE, CM_DE]] = derivatives[[CL_DE, CM_DE]]
-    centre[CM_ALPHA] = -derivatives[CL_ALPHA]
+    found = {}
+    for quantity in LONGITUDINAL.declared:
+        if quantity.divides:
+            divided = np.zeros_like(derivatives)
+            for row in map(LONGITUDINAL.row, quantity.divides):
+                divided[row] = derivatives[row]
+            found[quantity.name] = -divided
+    for control in LONGITUDINAL.controls:
+        found[control.name] = np.zeros_like(derivatives)
+        column = LONGITUDINAL.column(control.name)
+        found[control.name][column] = derivatives[column]
+    found["cg"] = np.zeros_like(derivatives)
+    found["cg"][LONGITUDINAL.row("Cm")] = derivatives[LONGITUDINAL.row("CL")]
     return MappingProxyType(
-        {
-            "mass": -lift,
-            "inertia": -moment,
-            "cg": transfer,
-            "elevator": elevator,
-            "tail": tail_part(derivatives, geometry),
-            "wing": wing_part(derivatives, geometry),
-            "dynamic_pressure": derivatives.copy(),
-            "aerodynamic_center": centre,
-            "icing": np.array(ICED) * derivatives,
-        }
+        found | {name: part.direction(derivatives, geometry) for name, part in PARTS.items()}
     )
 
 
@@ -151,4 +188,14 @@ def cg_transfer(shift: float) -> Array:
     return matrix
 
 
-__all__ = ["ICED", "TailGeometry", "cg_transfer", "directions", "tail_part", "wing_part"]
+__all__ = [
+    "CAUSES",
+    "ICED",
+    "PARTS",
+    "Part",
+    "TailGeometry",
+    "cg_transfer",
+    "directions",
+    "tail_part",
+    "wing_part",
+]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -79,18 +79,21 @@ class Figures:
     ----------
     scales : function of level and altitude [ft].
     lowest_ft, highest_ft : range of altitudes that it covers [ft].
+    side : the gust whose standard deviation and scale length the side gust v has.
     """
 
     scales: Callable[[str, float], GustScales]
     lowest_ft: float
     highest_ft: float
+    side: Literal["u", "w"]
 
 
 FIGURES: Final[dict[str, Figures]] = {
-    "gtm": Figures(_gtm, 800.0, 7000.0),
-    "mil-f-8785c": Figures(_mil_f_8785c, 10.0, 80000.0),
+    "gtm": Figures(_gtm, 800.0, 7000.0, side="w"),
+    "mil-f-8785c": Figures(_mil_f_8785c, 10.0, 80000.0, side="u"),
 }
-"""Sources of gust figures by name."""
+"""Sources of gust figures by name. The GTM simulator gives v the figures of w, the specification those of u (sigma_u = sigma_v,
+Lu = Lv: 3.7.2 and 3.7.3.4)."""
 
 
 def gust_scales(figures: str, level: str, altitude_m: float, factor: float = 1.0) -> GustScales:
@@ -126,4 +129,21 @@ def gust_scales(figures: str, level: str, altitude_m: float, factor: float = 1.0
     return GustScales(factor * s.sigma_u_m_s, factor * s.sigma_w_m_s, s.length_u_m, s.length_w_m)
 
 
-__all__ = ["FIGURES", "LEVELS", "Figures", "GustScales", "gust_scales"]
+def side_gust(figures: str, scales: GustScales) -> tuple[float, float]:
+    """Standard deviation [m/s] and scale length [m] of the side gust v.
+
+    Parameters
+    ----------
+    figures : key of `FIGURES`.
+    scales : of u and w.
+
+    Examples
+    --------
+    >>> side_gust("gtm", GustScales(1.2, 0.8, 900.0, 800.0))
+    (0.8, 800.0)
+    """
+    side = FIGURES[figures].side
+    return getattr(scales, f"sigma_{side}_m_s"), getattr(scales, f"length_{side}_m")
+
+
+__all__ = ["FIGURES", "LEVELS", "Figures", "GustScales", "gust_scales", "side_gust"]

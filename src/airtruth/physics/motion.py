@@ -10,137 +10,22 @@ Identification", eqs (2)-(4) (short period).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import Final, Literal
+from typing import Final
 
-Reference = Literal["chord", "span"]
-"""Reference length of a moment coefficient and of a nondimensional rate."""
-
-
-@dataclass(frozen=True)
-class State:
-    """A state of the linear model.
-
-    Attributes
-    ----------
-    name : short name.
-    channel : column of the flight log with its measurement.
-    """
-
-    name: str
-    channel: str
-
-
-@dataclass(frozen=True)
-class Control:
-    """A control surface.
-
-    Attributes
-    ----------
-    name : of the control in files and messages.
-    channel, command : columns of the measured surface and of its command [rad].
-    actuator : table of aircraft.toml with its servo.
-    symbol : its part in the names of derivatives.
-    """
-
-    name: str
-    channel: str
-    command: str
-    actuator: str
-    symbol: str
-
-
-@dataclass(frozen=True)
-class Output:
-    """A measured output of the motion.
-
-    Attributes
-    ----------
-    name : short name.
-    channel : column of the flight log.
-    late : whether it needs the accelerations of the motion; the filter updates with the other outputs first.
-    """
-
-    name: str
-    channel: str
-    late: bool = False
-
-
-@dataclass(frozen=True)
-class Coefficient:
-    """An aerodynamic coefficient about the centre of gravity.
-
-    Attributes
-    ----------
-    name : symbol.
-    description : the force or moment, with its positive sense.
-    length : reference length of a moment; None for a force.
-    sign : of the force or moment along the body axis per coefficient: lift acts along -z.
-    """
-
-    name: str
-    description: str
-    length: Reference | None
-    sign: int = 1
-
-
-@dataclass(frozen=True)
-class Signal:
-    """A signal that drives the coefficients.
-
-    Attributes
-    ----------
-    name : of the signal in terms of effects.
-    symbol : its part in the names of derivatives.
-    channel : column of the flight log behind it.
-    length : reference length l of a nondimensional rate, x l/(2 V); None for an angle [rad].
-    """
-
-    name: str
-    symbol: str
-    channel: str
-    length: Reference | None = None
-
-    @property
-    def unit(self) -> str:
-        """Unit of a derivative with respect to the signal."""
-        return "1/rad" if self.length is None else "-"
-
-
-@dataclass(frozen=True)
-class Derivative:
-    """A derivative: a coefficient and the signal that drives it.
-
-    Attributes
-    ----------
-    name : the symbols of both.
-    row, column : numbers of the coefficient and of the signal in the motion.
-    unit : "1/rad", or "-" with respect to a nondimensional rate.
-    """
-
-    name: str
-    row: int
-    column: int
-    unit: str
-
-
-@dataclass(frozen=True)
-class Mode:
-    """A modal parameter of the linear model.
-
-    Attributes
-    ----------
-    name : column of tables, with its unit.
-    unit : in tables.
-    description : in words.
-    """
-
-    name: str
-    unit: str
-    description: str
+from airtruth.physics.motion_parts import (
+    Coefficient,
+    Control,
+    Declared,
+    Derivative,
+    Mode,
+    Output,
+    Signal,
+    State,
+)
 
 
 @dataclass(frozen=True)
@@ -158,8 +43,8 @@ class Motion:
     coefficients : rows of the derivatives.
     signals : columns of the derivatives.
     implicit : coefficient and state whose rate drives it, the term that makes the equations implicit.
-    gusts : gust components that enter the motion.
-    declared : quantities of aircraft.toml that scale or shift the derivatives.
+    gusts : gust components that enter the motion; the filter estimates the first.
+    declared : quantities of aircraft.toml that scale or shift the coefficients.
     modes : modal parameters of the linear model.
     required : columns without which no analysis is possible; air density or altitude is needed beside them.
     """
@@ -174,9 +59,13 @@ class Motion:
     signals: tuple[Signal, ...]
     implicit: tuple[str, str]
     gusts: tuple[str, ...]
-    declared: tuple[str, ...]
+    declared: tuple[Declared, ...]
     modes: tuple[Mode, ...]
     required: tuple[str, ...]
+
+    def __reduce__(self) -> tuple[Callable[[str], Motion], tuple[str]]:
+        """Pickle the name: a motion is the same object in every process."""
+        return _named, (self.name,)
 
     @cached_property
     def derivatives(self) -> tuple[Derivative, ...]:
@@ -214,6 +103,30 @@ class Motion:
         """Columns of outputs and controls."""
         return (*self.output_channels, *(control.channel for control in self.controls))
 
+    @cached_property
+    def neutral(self) -> Mapping[str, float]:
+        """Declared quantity, or control whose effectiveness is one -> value of an error that changes nothing."""
+        return MappingProxyType(
+            {d.name: d.neutral for d in self.declared} | {c.name: 1.0 for c in self.controls}
+        )
+
+    @cached_property
+    def names(self) -> frozenset[str]:
+        """Names that a term of an effect may have if it concerns the motion."""
+        return frozenset(
+            (
+                *(c.name for c in self.coefficients),
+                *(s.name for s in self.signals),
+                *self.parameters,
+                *self.neutral,
+                *self.channels,
+                *self.known,
+                *(f"sigma_{component}" for component in self.gusts),
+                f"{self.implicit[1]}_dot_hat",
+                "qbar",
+            )
+        )
+
     @property
     def shape(self) -> tuple[int, int]:
         """Numbers of coefficients and of signals."""
@@ -233,6 +146,22 @@ class Motion:
         3
         """
         return self.parameters.index(name)
+
+    def at(self, coefficient: str, signal: str) -> int:
+        """Position of the derivative of a coefficient with respect to a signal.
+
+        Raises
+        ------
+        ValueError
+            If the motion lacks the coefficient or the signal.
+
+        Examples
+        --------
+        >>> LONGITUDINAL.at("Cm", "elevator")
+        5
+        """
+        of = [(c.name, s.name) for c in self.coefficients for s in self.signals]
+        return of.index((coefficient, signal))
 
     def row(self, coefficient: str) -> slice:
         """Positions of the derivatives of a coefficient.
@@ -275,9 +204,9 @@ LONGITUDINAL: Final = Motion(
     controls=(Control("elevator", "elevator_rad", "elevator_command_rad", "elevator_actuator", "de"),),
     known=("airspeed_m_s", "density_kg_m3", "theta_rad"),
     outputs=(
-        Output("alpha", "alpha_rad"),
-        Output("q", "q_rad_s"),
-        Output("az", "az_m_s2", late=True),
+        Output("alpha", "alpha_rad", "vane"),
+        Output("q", "q_rad_s", "gyro"),
+        Output("az", "az_m_s2", "accelerometer", late=True),
     ),
     coefficients=(
         Coefficient("CL", "lift, along -z", None, -1),
@@ -289,8 +218,13 @@ LONGITUDINAL: Final = Motion(
         Signal("elevator", "de", "elevator_rad"),
     ),
     implicit=("CL", "alpha"),
-    gusts=("u", "w"),
-    declared=("mass", "inertia_yy", "cg", "thrust_arm"),
+    gusts=("w", "u"),
+    declared=(
+        Declared("mass", 1.0, divides=("CL",)),
+        Declared("inertia", 1.0, divides=("Cm",)),
+        Declared("cg"),
+        Declared("thrust_arm"),
+    ),
     modes=(
         Mode("wn_rad_s", "rad/s", "natural frequency of the short period"),
         Mode("zeta", "-", "damping ratio of the short period"),
@@ -314,11 +248,11 @@ LATERAL: Final = Motion(
     ),
     known=("airspeed_m_s", "density_kg_m3", "alpha_rad", "theta_rad", "q_rad_s"),
     outputs=(
-        Output("beta", "beta_rad"),
-        Output("p", "p_rad_s"),
-        Output("r", "r_rad_s"),
-        Output("phi", "phi_rad"),
-        Output("ay", "ay_m_s2", late=True),
+        Output("beta", "beta_rad", "vane"),
+        Output("p", "p_rad_s", "gyro"),
+        Output("r", "r_rad_s", "gyro"),
+        Output("phi", "phi_rad", "attitude"),
+        Output("ay", "ay_m_s2", "accelerometer", late=True),
     ),
     coefficients=(
         Coefficient("CY", "side force, to the right", None),
@@ -334,7 +268,14 @@ LATERAL: Final = Motion(
     ),
     implicit=("CY", "beta"),
     gusts=("v", "p", "r"),
-    declared=("mass", "inertia_xx", "inertia_zz", "inertia_xz", "cg", "cg_y"),
+    declared=(
+        Declared("mass", 1.0, divides=("CY",)),
+        Declared("inertia_xx", 1.0, divides=("Cl",)),
+        Declared("inertia_zz", 1.0, divides=("Cn",)),
+        Declared("inertia_xz"),
+        Declared("cg"),
+        Declared("cg_y"),
+    ),
     modes=(
         Mode("dutch_roll_wn_rad_s", "rad/s", "natural frequency of the Dutch roll"),
         Mode("dutch_roll_zeta", "-", "damping ratio of the Dutch roll"),
@@ -348,17 +289,15 @@ LATERAL: Final = Motion(
 MOTIONS: Final[Mapping[str, Motion]] = MappingProxyType({m.name: m for m in (LONGITUDINAL, LATERAL)})
 """Name -> motion, in the order of answers."""
 
-__all__ = [
-    "LATERAL",
-    "LONGITUDINAL",
-    "MOTIONS",
-    "Coefficient",
-    "Control",
-    "Derivative",
-    "Mode",
-    "Motion",
-    "Output",
-    "Reference",
-    "Signal",
-    "State",
-]
+
+def motion_of(columns: Iterable[str]) -> Motion:
+    """The motion whose derivatives are among the columns of a table of estimates; the longitudinal one if none is."""
+    names = set(columns)
+    return next((m for m in MOTIONS.values() if names.issuperset(m.parameters)), LONGITUDINAL)
+
+
+def _named(name: str) -> Motion:
+    return MOTIONS[name]
+
+
+__all__ = ["LATERAL", "LONGITUDINAL", "MOTIONS", "Motion", "motion_of"]

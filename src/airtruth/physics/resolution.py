@@ -8,22 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError, choices
-from airtruth.physics.composition import TailGeometry, directions
-from airtruth.physics.short_period import CL_ALPHA, CL_DE, CL_Q, PARAMETERS
-from airtruth.physics.terms import CAUSES, AeroTerm, Change, DerivativeTerm
+from airtruth.physics.composition import CAUSES, TailGeometry, directions
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.terms import AeroTerm, Change, DerivativeTerm
 
 Array = NDArray[np.float64]
-
-_LIFT: Final = (CL_ALPHA, CL_Q, CL_DE)
-"""Indices of the derivatives of lift."""
-_SIGNAL_OF: Final = {"alpha": "alpha", "q": "qhat", "de": "elevator"}
-"""Signal of a derivative, by the end of its name."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +26,7 @@ class LinearPoint:
 
     Attributes
     ----------
-    derivatives : (6,) in the order of `airtruth.physics.short_period.PARAMETERS` [-].
+    derivatives : (6,) in the order of `airtruth.physics.motion.LONGITUDINAL` [-].
     alpha_rad, elevator_rad : the trim [rad].
     geometry : what is declared of the tail.
     """
@@ -64,8 +58,9 @@ def derivative_increments(
     ConfigurationError
         If a cause is not known.
     """
-    unit = dict(directions(derivatives, geometry)) | dict(zip(PARAMETERS, np.eye(6), strict=True))
-    total = np.zeros(6)
+    names = LONGITUDINAL.parameters
+    unit = dict(directions(derivatives, geometry)) | dict(zip(names, np.eye(len(names)), strict=True))
+    total = np.zeros(len(names))
     for term in terms:
         if term.cause not in CAUSES:
             raise ConfigurationError(f"cause {term.cause!r}: {choices(term.cause, CAUSES)}")
@@ -90,8 +85,8 @@ def resolved(change: Change, at: LinearPoint) -> Change:
         return change
     amounts = derivative_increments(change.derivatives, at.derivatives, at.geometry)
     # a derivative of lift counts across the flight path, a term of CL along -z of the body
-    amounts[list(_LIFT)] /= np.cos(at.alpha_rad)
-    named = {name: float(x) for name, x in zip(PARAMETERS, amounts, strict=True) if x != 0.0}
+    amounts[LONGITUDINAL.row("CL")] /= np.cos(at.alpha_rad)
+    named = {name: float(x) for name, x in zip(LONGITUDINAL.parameters, amounts, strict=True) if x != 0.0}
     terms = linear_terms(named, at.alpha_rad, at.elevator_rad)
     return replace(change, aero=change.aero + terms, derivatives=())
 
@@ -103,7 +98,7 @@ def linear_terms(
 
     Parameters
     ----------
-    increments : name of `airtruth.physics.short_period.PARAMETERS` -> increment [1/rad]; may leave some out.
+    increments : derivative of `airtruth.physics.motion.LONGITUDINAL` -> increment [1/rad]; may leave some out.
     alpha_rad, elevator_rad : the trim [rad].
 
     Raises
@@ -114,10 +109,12 @@ def linear_terms(
     at = {"alpha": alpha_rad, "elevator": elevator_rad, "qhat": 0.0}
     terms = []
     for name, amount in increments.items():
-        if name not in PARAMETERS:
-            raise ConfigurationError(f"derivative {name!r}: {choices(name, PARAMETERS)}")
-        signal = _SIGNAL_OF[name[2:]]
-        terms.append(AeroTerm("CL" if name.startswith("CL") else "Cm", signal, "linear", amount, at[signal]))
+        if name not in LONGITUDINAL.parameters:
+            raise ConfigurationError(f"derivative {name!r}: {choices(name, LONGITUDINAL.parameters)}")
+        derivative = LONGITUDINAL.derivatives[LONGITUDINAL.index(name)]
+        signal = LONGITUDINAL.signals[derivative.column].name
+        coefficient = LONGITUDINAL.coefficients[derivative.row].name
+        terms.append(AeroTerm(coefficient, signal, "linear", amount, at[signal]))
     return tuple(terms)
 
 

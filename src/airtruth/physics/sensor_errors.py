@@ -15,9 +15,12 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.channels import LATERAL
+from airtruth.physics.motion import MOTIONS
+
 Array = NDArray[np.float64]
 
-Kind = Literal["bias", "scale", "lag", "delay", "arm", "alpha_slope"]
+Kind = Literal["bias", "scale", "lag", "delay", "arm", "arm_down", "alpha_slope"]
 """Errors that an effect may add to those declared."""
 
 
@@ -68,16 +71,16 @@ KINDS: Final[Mapping[str, ErrorKind]] = {
     "maximum": ErrorKind("maximum", neutral=np.inf),
     "arm": ErrorKind("x", "length"),
     "arm_down": ErrorKind("z", "length"),
+    "arm_right": ErrorKind("y", "length"),
     "alpha_slope": ErrorKind("alpha_slope", "per_angle"),
 }
 """Every kind of error by its name."""
 
 INSTRUMENTS: Final[Mapping[str, str]] = {
     "airspeed_m_s": "airspeed",
-    "alpha_rad": "vane",
     "theta_rad": "attitude",
-    "q_rad_s": "gyro",
-    "az_m_s2": "accelerometer",
+    **{output.channel: output.instrument for motion in MOTIONS.values() for output in motion.outputs},
+    "psi_rad": "attitude",
 }
 """Instrument of a channel, as its errors are named."""
 
@@ -96,7 +99,7 @@ class SensorErrors:
     quantum : size of a quantisation step, rounding to nearest [unit of the channel]; 0 for none.
     minimum, maximum : ends of the range [unit of the channel].
     hold_s : update period of a slower instrument, which holds its value between updates [s]; 0 for none.
-    x_m, z_m : position ahead of and below the centre of gravity [m]; it matters to alpha_rad, ax_m_s2, az_m_s2.
+    x_m, y_m, z_m : position ahead of, right of and below the centre of gravity [m]; it matters to vanes and accelerometers.
     alpha_slope_per_rad : relative change of the reading with the angle of attack about its mean [1/rad]; of airspeed_m_s alone,
         the position error of a static source.
     """
@@ -113,6 +116,7 @@ class SensorErrors:
     x_m: float = 0.0
     z_m: float = 0.0
     alpha_slope_per_rad: float = 0.0
+    y_m: float = 0.0
 
     @property
     def lead_s(self) -> float:
@@ -180,10 +184,13 @@ def error_name(channel: str, kind: Kind) -> str:
 
     Examples
     --------
-    >>> error_name("alpha_rad", "scale"), error_name("q_rad_s", "delay")
-    ('vane_scale', 'sensor_delay:q_rad_s')
+    >>> error_name("alpha_rad", "scale"), error_name("q_rad_s", "delay"), error_name("beta_rad", "arm")
+    ('vane_scale', 'sensor_delay:q_rad_s', 'vane_arm:beta_rad')
     """
-    return f"sensor_delay:{channel}" if kind == "delay" else f"{INSTRUMENTS[channel]}_{kind}"
+    if kind == "delay":
+        return f"sensor_delay:{channel}"
+    name = f"{INSTRUMENTS[channel]}_{kind.replace('arm_down', 'arm_z')}"
+    return f"{name}:{channel}" if channel in LATERAL else name
 
 
 __all__ = ["INSTRUMENTS", "KINDS", "ErrorKind", "Kind", "SensorErrors", "error_name"]

@@ -1,11 +1,12 @@
 """Sensor equations: from the motion of the centre of gravity to the reading of an instrument.
 
-Body axes x forward, z down, origin at the centre of gravity; q nose-up positive.
+Body axes x forward, y right, z down, origin at the centre of gravity; p right wing down, q nose-up, r nose right positive.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from airtruth.physics.sensor_errors import SensorErrors
 
 Array = NDArray[np.float64]
+
+_ACCELEROMETERS: Final = ("ax_m_s2", "ay_m_s2", "az_m_s2")
+"""Channels of specific force along x, y, z."""
 
 
 def measure(errors: SensorErrors, truth: Array, dt_s: float, normals: Array) -> Array:
@@ -149,27 +153,79 @@ def accelerometer_az(
     return np.asarray(az_m_s2, dtype=np.float64) - q_dot * x_m - np.square(q) * z_m
 
 
+def vane_beta(
+    beta_rad: ArrayLike,
+    p_rad_s: ArrayLike,
+    r_rad_s: ArrayLike,
+    x_m: float,
+    z_m: float,
+    airspeed_m_s: ArrayLike,
+) -> Array:
+    """Sideslip at a vane (x, z) from the centre of gravity, beta + x r/V - z p/V [rad], to first order in the rates.
+
+    The vane moves to the right with r x - p z, the y component of omega x r.
+    """
+    beta, p, r, v = (np.asarray(x, dtype=np.float64) for x in (beta_rad, p_rad_s, r_rad_s, airspeed_m_s))
+    return np.asarray(beta + (x_m * r - z_m * p) / v)
+
+
+def rotation_acceleration(
+    rates_rad_s: ArrayLike, rates_dot_rad_s2: ArrayLike, arm_m: tuple[float, float, float]
+) -> Array:
+    """Acceleration of a point that is fixed to a rotating body, against its origin: omega_dot x r + omega x (omega x r).
+
+    Parameters
+    ----------
+    rates_rad_s, rates_dot_rad_s2 : (3, ...) p, q, r [rad/s] and their derivatives [rad/s2].
+    arm_m : x, y, z of the point [m].
+
+    Returns
+    -------
+    (3, ...) components along x, y, z [m/s2].
+    """
+    p, q, r = np.asarray(rates_rad_s, dtype=np.float64)
+    p_dot, q_dot, r_dot = np.asarray(rates_dot_rad_s2, dtype=np.float64)
+    x, y, z = arm_m
+    return np.stack(
+        [
+            q_dot * z - r_dot * y + p * q * y + p * r * z - (q * q + r * r) * x,
+            r_dot * x - p_dot * z + p * q * x + q * r * z - (p * p + r * r) * y,
+            p_dot * y - q_dot * x + p * r * x + q * r * y - (p * p + q * q) * z,
+        ]
+    )
+
+
 def at_instrument(channel: str, truth: Mapping[str, Array], errors: SensorErrors) -> Array:
-    """True value of a channel where its instrument is: the arms of vane and accelerometers and the position error applied.
+    """True value of a channel where its instrument is: the arms of vanes and accelerometers and the position error applied.
 
     Parameters
     ----------
     channel : column of a log.
     truth : channel -> values of one shape at the centre of gravity [SI]; alpha_rad needs q_rad_s and airspeed_m_s,
-        the accelerometers need q_rad_s and q_dot_rad_s2; airspeed_m_s with a position error needs alpha_rad.
+        the accelerometers need q_rad_s and q_dot_rad_s2; airspeed_m_s with a position error needs alpha_rad. In a flight
+        that rolls and yaws they need p_rad_s, r_rad_s, p_dot_rad_s2 and r_dot_rad_s2 as well.
     errors : position of the instrument.
 
     Returns
     -------
     Values of that shape [unit of the channel]; those of ``truth`` itself where the position does not matter.
     """
-    x, z = errors.x_m, errors.z_m
+    x, y, z = arm = errors.x_m, errors.y_m, errors.z_m
     if channel == "airspeed_m_s" and errors.alpha_slope_per_rad != 0.0:
         return truth[channel] * errors.slope(truth["alpha_rad"])
-    if x == 0.0 and z == 0.0:
+    if arm == (0.0, 0.0, 0.0):
         return truth[channel]
+    rolls = "p_rad_s" in truth
     if channel == "alpha_rad":
-        return vane_alpha(truth["alpha_rad"], truth["q_rad_s"], x, truth["airspeed_m_s"])
+        alpha = vane_alpha(truth["alpha_rad"], truth["q_rad_s"], x, truth["airspeed_m_s"])
+        return alpha + truth["p_rad_s"] * y / truth["airspeed_m_s"] if rolls and y != 0.0 else alpha
+    if channel == "beta_rad":
+        beta, p, r = (truth[name] for name in ("beta_rad", "p_rad_s", "r_rad_s"))
+        return vane_beta(beta, p, r, x, z, truth["airspeed_m_s"])
+    if channel in _ACCELEROMETERS and rolls:
+        rates, changes = ([truth[f"{axis}_{unit}"] for axis in "pqr"] for unit in ("rad_s", "dot_rad_s2"))
+        moved: Array = rotation_acceleration(rates, changes, arm)[_ACCELEROMETERS.index(channel)]
+        return truth[channel] + moved
     if channel == "az_m_s2":
         return accelerometer_az(truth["az_m_s2"], truth["q_dot_rad_s2"], x, truth["q_rad_s"], z)
     if channel == "ax_m_s2":
@@ -185,6 +241,8 @@ __all__ = [
     "hold",
     "lag",
     "measure",
+    "rotation_acceleration",
     "vane_alpha",
+    "vane_beta",
     "vane_equation",
 ]

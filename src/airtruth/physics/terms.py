@@ -13,9 +13,8 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS
 from airtruth.physics.sensor_errors import Kind
-from airtruth.physics.short_period import PARAMETERS
 
 Array = NDArray[np.float64]
 
@@ -27,6 +26,8 @@ FACTORS: Final = ("alpha", "elevator", "qhat")
 """Signals by which an `AeroTerm` may be multiplied: those of the six derivatives."""
 MEASURED: Final = ("alpha", "elevator", "qhat", "qbar")
 """Signals that a log measures; a `ReadingTerm` names one of these or a state."""
+COEFFICIENTS: Final = (*(c.name for c in LONGITUDINAL.coefficients), "CX")
+"""Coefficients of an `AeroTerm`; the axial force changes the airspeed and ax alone."""
 READINGS: Final = LONGITUDINAL.output_channels
 """Channels of a `ReadingTerm`, the outputs of the filter."""
 ELEVATOR: Final = "elevator_rad"
@@ -42,25 +43,12 @@ FORMULAS: Final[Mapping[str, str]] = {
 """The same functions as text, s the signal."""
 STATE_KINDS: Final = ("lag", "mode", "play")
 """Kinds of a `StateTerm`; their order numbers them for compiled code."""
-Quantity = Literal["mass", "inertia", "elevator", "cg", "thrust_arm"]
-"""Quantities that an aircraft declares and an effect may change."""
 DECLARED: Final[Mapping[str, float]] = {
-    "mass": 1.0,
-    "inertia": 1.0,
-    "elevator": 1.0,
-    "cg": 0.0,
-    "thrust_arm": 0.0,
+    name: value for m in MOTIONS.values() for name, value in m.neutral.items()
 }
-"""Neutral value of each `Quantity`: 1 for a factor, 0 for a shift; their order numbers them for compiled code."""
-CAUSES: Final[Mapping[str, float]] = {
-    "tail": 1.0,
-    "wing": 1.0,
-    "dynamic_pressure": 1.0,
-    "aerodynamic_center": 0.0,
-    "icing": 0.0,
-    **dict.fromkeys(PARAMETERS, 0.0),
-}
-"""Causes of a change of the six derivatives (`DerivativeTerm`) and their neutral values; a derivative is its own cause."""
+"""Quantity that an aircraft declares and an effect may change -> neutral value: 1 for a factor, 0 for a shift."""
+LATE: Final = ("delay", "lag")
+"""Kinds of terms that delay a signal."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +107,7 @@ class AeroTerm:
     factor_at : origin of the factor [unit of the factor].
     """
 
-    coefficient: Literal["CL", "Cm", "CX"]
+    coefficient: str
     signal: str
     shape: Literal["linear", "quadratic", "above", "below"]
     amplitude: float
@@ -152,7 +140,7 @@ class ReadingTerm:
         f(qbar) (x - s). Empty for none.
     """
 
-    channel: Literal["alpha_rad", "q_rad_s", "az_m_s2"]
+    channel: str
     signal: str
     shape: Literal["linear", "quadratic", "above", "below"]
     amplitude: float
@@ -216,12 +204,13 @@ class DeclaredTerm:
 
     Attributes
     ----------
-    quantity : "mass", "inertia" (Iyy), "elevator" (all forces and moments of the surface's deflection from trim): a
-        factor, neutral 1. "cg": shift of the CG aft [chords]; "thrust_arm": shift of the thrust line down, nose-up
-        positive [m]: neutral 0. Sensors keep their position relative to the CG; a `SensorTerm` moves them.
+    quantity : key of `DECLARED`. "mass", "inertia" (Iyy), the name of a control (all forces and moments of the surface's
+        deflection from trim): a factor, neutral 1. "cg": shift of the CG aft [chords]; "thrust_arm": shift of the thrust
+        line down, nose-up positive [m]: neutral 0. Sensors keep their position relative to the CG; a `SensorTerm` moves
+        them.
     """
 
-    quantity: Quantity
+    quantity: str
     value: float
 
 
@@ -251,9 +240,9 @@ class DerivativeTerm:
 
     Attributes
     ----------
-    cause : key of `CAUSES`: "tail", "wing" (lift and moment of the part) and "dynamic_pressure": a factor, neutral 1.
-        "aerodynamic_center": its shift aft [chords]; "icing": severity, 1 for the reference ice; the name of a
-        derivative: its increment: neutral 0.
+    cause : key of `airtruth.physics.composition.CAUSES`: "tail", "wing" (lift and moment of the part) and
+        "dynamic_pressure": a factor, neutral 1. "aerodynamic_center": its shift aft [chords]; "icing": severity, 1 for the
+        reference ice; the name of a derivative: its increment: neutral 0.
     value : see ``cause``.
     """
 
@@ -325,6 +314,16 @@ class Change:
         """
         late = sum(t.value for t in self.sensors if (t.channel, t.kind) == (ELEVATOR, "delay"))
         return (SurfaceTerm("delay", -late), *self.surface) if late != 0.0 else self.surface
+
+    def names(self) -> frozenset[str]:
+        """Every name of its terms that a motion has to have; states of its own are none."""
+        found = {t.quantity for t in self.declared} | {t.cause for t in self.derivatives}
+        found |= {t.channel for t in self.sensors} | {t.level for t in self.air}
+        found |= {name for r in self.readings for name in (r.channel, r.signal)} | {
+            x.signal for x in self.states
+        }
+        found |= {name for t in self.aero for name in (t.coefficient, t.signal, t.factor)}
+        return frozenset(found - {"", *(state.name for state in self.states)})
 
     @property
     def in_motion(self) -> Change:

@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 
 from airtruth.documents import read_json
 from airtruth.errors import LogError, StoreError, choices
+from airtruth.identification import FILES
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.reporting.columns import Kind, flags, numbers, read_columns, texts
 from airtruth.reporting.paper.published import ESTIMATED
 from airtruth.reporting.partial import Sample
@@ -214,7 +216,12 @@ def read_campaign(folder: Path) -> Campaign:
 def writers(folder: Path) -> tuple[str, str]:
     """The commands that write the truth and the estimates of a folder, for messages."""
     shown = quote(str(folder))
-    return f"`airtruth fly CAMPAIGN.toml --out {shown}`", f"`airtruth identify {shown} --aircraft AIRCRAFT`"
+    # a campaign of lateral records has estimates of the lateral motion alone, which tables and reports do not show
+    motion = f" --motion {LONGITUDINAL.name}" if (folder / FILES[LATERAL.name]).exists() else ""
+    return (
+        f"`airtruth fly CAMPAIGN.toml --out {shown}`",
+        f"`airtruth identify {shown} --aircraft AIRCRAFT{motion}`",
+    )
 
 
 def read_estimates(path: Path, writer: str) -> pa.Table:

@@ -30,15 +30,10 @@ from airtruth.physics.sensor_errors import KINDS as ERROR_KINDS
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.quantity import FromTable
 from airtruth.simulation.campaign.effect_table import EffectTable
-from airtruth.simulation.campaign.file import (
-    NO_GUST,
-    GustTable,
-    ManoeuvreTable,
-    SensorTable,
-    Table,
-    distribution,
-)
-from airtruth.simulation.manoeuvres import KINDS
+from airtruth.simulation.campaign.file import NO_GUST, GustTable, SensorTable
+from airtruth.simulation.campaign.manoeuvre_table import InputTable, ManoeuvreTable
+from airtruth.simulation.campaign.tables import Table, distribution
+from airtruth.simulation.manoeuvres import CONTROLS, KINDS
 from airtruth.units import UNITS
 
 Schema = dict[str, Any]
@@ -46,7 +41,8 @@ Schema = dict[str, Any]
 NAMES: Final[Mapping[tuple[type[BaseModel], str], tuple[str, ...]]] = {
     (GustTable, "figures"): tuple(FIGURES),
     (GustTable, "level"): (NO_GUST, *LEVELS),
-    (ManoeuvreTable, "kind"): tuple(KINDS),
+    **{(table, "kind"): tuple(KINDS) for table in (InputTable, ManoeuvreTable)},
+    **{(table, "control"): CONTROLS for table in (InputTable, ManoeuvreTable)},
 }
 """Fields whose names a validator tests -> the names."""
 _BOUNDS: Final = ("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum")

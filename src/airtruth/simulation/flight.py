@@ -9,13 +9,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
+from airtruth.aircraft.model import SurfaceProperties
+from airtruth.channels import SIGNALS
 from airtruth.errors import ConfigurationError, FlightError
-from airtruth.simulation.readings import READ, channels, require_sound
+from airtruth.simulation.attitude import straight_attitude
+from airtruth.simulation.lateral_feedback import LateralFeedback, Loop
+from airtruth.simulation.readings import READ, READ_LATERAL, channels, lateral_channels, require_sound
 from airtruth.simulation.simulator import Executive
 from airtruth.simulation.trim import Trim
 from airtruth.units import FT
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LateralInputs:
+    """Lateral inputs of one run in six axes, at the times of `Inputs`; (samples,) each.
+
+    Attributes
+    ----------
+    aileron_rad, rudder_rad : commands, deviations from trim [rad]; aileron (right - left)/2, trailing edges down positive,
+        rudder trailing edge left positive.
+    gust_v_m_s : velocity of the air to the right of the flight direction [m/s], or None.
+    gust_p_rad_s, gust_r_rad_s : rotation of the air about body x and z [rad/s], or None.
+    feedback : yaw damper and bank hold, or None.
+    """
+
+    aileron_rad: Array
+    rudder_rad: Array
+    gust_v_m_s: Array | None = None
+    gust_p_rad_s: Array | None = None
+    gust_r_rad_s: Array | None = None
+    feedback: LateralFeedback | None = None
 
 
 @dataclass(frozen=True)
@@ -29,7 +54,8 @@ class Inputs:
     gust_q_rad_s : rotation of the air, nose-up positive, -dw/dx [rad/s], or None.
     q_error_rad_s, theta_error_rad : sensor errors fed into the augmentation, or None.
     damper_gain_s, attitude_gain : gains of the augmentation [s], [-].
-    surface : the command drives the surface itself, past the actuator.
+    surface : the commands drive the surfaces themselves, past the actuators.
+    lateral : lateral inputs of a run in six axes; None for fixed lateral controls in air without lateral gusts.
     """
 
     command_rad: Array
@@ -41,6 +67,7 @@ class Inputs:
     damper_gain_s: float = 0.0
     attitude_gain: float = 0.0
     surface: bool = False
+    lateral: LateralInputs | None = None
 
 
 class Flight:
@@ -68,7 +95,12 @@ class Flight:
         self._elevator = model.elevator
         self._augmentation = model.augmentation
         self._rotary = model.rotary_gust
-        self._read = executive.nodes([*READ, model.elevator.surface])
+        self._lateral: list[SurfaceProperties] = []
+        read = [*READ, model.elevator.surface]
+        if trim.condition.six_axes:
+            self._lateral = [surface for surface in (model.aileron, model.rudder) if surface is not None]
+            read += [*READ_LATERAL, *(surface.surface for surface in self._lateral)]
+        self._read = executive.nodes(read)
 
     def fly(self, inputs: Inputs) -> dict[str, Array]:
         """Fly one run.
@@ -77,22 +109,53 @@ class Flight:
         -------
         dict
             Channels of `airtruth.simulation.readings.channels`, with elevator_command_rad and throttle, (records,)
-            each [SI]; record k is the state at the time k record_every dt.
+            each [SI]; record k is the state at the time k record_every dt. In six axes also those of
+            `airtruth.simulation.readings.lateral_channels`, with aileron_command_rad and rudder_command_rad. The commands are
+            those of the inputs, without feedback.
 
         Raises
         ------
         FlightError
             If the state leaves the range in which the simulation has a meaning, or the model ends the simulation.
         ConfigurationError
-            If the inputs need an augmentation or a rotary gust that the aircraft lacks.
+            If the inputs need an augmentation or a rotary gust that the aircraft lacks, or lateral inputs meet a trim of the
+            pitch plane.
         """
+        if inputs.lateral is not None and not self._lateral:
+            raise ConfigurationError(
+                "lateral inputs need a trim in six axes; state wings-level or no-sideslip in the condition"
+            )
         columns = self._simulate(inputs)
         require_sound(columns, self._record_every * self._executive.dt_s, "the flight")
+        own, controls, mass = len(READ) + 1, self.trim.controls, self.trim.mass_kg
         command = inputs.command_rad[:: self._record_every]
-        return channels(columns, self.trim.mass_kg, self._elevator.surface_rad) | {
-            "elevator_command_rad": self.trim.controls.elevator_command_rad + command,
-            "throttle": np.full(columns.shape[1], self.trim.controls.throttle),
+        result = channels(columns[:own], mass, self._elevator.surface_rad) | {
+            "elevator_command_rad": controls.elevator_command_rad + command,
+            "throttle": np.full(columns.shape[1], controls.throttle),
         }
+        if not self._lateral:
+            return result
+        result |= lateral_channels(columns[own:], mass, *(surface.surface_rad for surface in self._lateral))
+        names = ("aileron_command_rad", "rudder_command_rad")
+        commands = (c[:: self._record_every] for c in self._lateral_commands(inputs))
+        return result | dict(zip(names, commands, strict=True))
+
+    def _lateral_commands(self, inputs: Inputs) -> tuple[Array, Array]:
+        """Commands of aileron and rudder at every step [rad]."""
+        at, lateral = self.trim.controls, inputs.lateral
+        still = np.zeros_like(inputs.command_rad)
+        aileron, rudder = (still, still) if lateral is None else (lateral.aileron_rad, lateral.rudder_rad)
+        return at.aileron_command_rad + aileron, at.rudder_command_rad + rudder
+
+    @property
+    def _theta_rad(self) -> float:
+        """Pitch attitude of the trim [rad]."""
+        at, gamma = self.trim, self.trim.condition.gamma_rad
+        if not at.condition.six_axes:
+            return at.alpha_rad + gamma
+        return straight_attitude(
+            at.alpha_rad, at.controls.sideslip_rad, at.controls.bank_rad, gamma
+        ).theta_rad
 
     def _simulate(self, inputs: Inputs) -> Array:
         renewed = self._executive.renewed() if self._flown else self._executive
@@ -103,7 +166,8 @@ class Flight:
         executive, trim = self._executive, self.trim
         fdm = executive.fdm
         controls = trim.controls
-        setters, series = self._inputs(inputs)
+        loop = self._loop(inputs)
+        setters, series = self._inputs(inputs, loop)
         fdm.set_trim_status(True)
         fdm.reset_to_initial_conditions(2)  # a reset without run_ic, which settle() does
         executive.configure()
@@ -120,24 +184,38 @@ class Flight:
         records = [get() for get in gets]
         run, every = fdm.run, self._record_every
         extend = records.extend
-        steps = list(zip(*(values[1:] for values in series), strict=True))
-        for first in range(0, len(steps) - every + 1, every):
+        fed = () if loop is None else loop.setters
+        pairs = zip(setters, series, strict=True)
+        moving = [(s, v) for s, v in pairs if v.count(v[0]) < len(v) or s in fed]
+        count = len(series[0]) - 1
+        steps = list(zip(*(values[1:] for _, values in moving), strict=True)) or [()] * count
+        write = _writer([setter for setter, _ in moving])
+        for first in range(0, count - every + 1, every):
+            if loop is not None:
+                loop.sample(first)
             for values in steps[first : first + every]:
-                for setter, value in zip(setters, values):  # noqa: B905 (hot loop)
-                    setter(value)
+                write(*values)
                 if not run():
                     raise FlightError(f"the model ended the flight at {fdm.get_sim_time():.3f} s")
             extend([get() for get in gets])
         return np.array(records).reshape(-1, len(gets)).T
 
-    def _inputs(self, inputs: Inputs) -> tuple[list[Callable[[float], None]], list[list[float]]]:
+    def _loop(self, inputs: Inputs) -> Loop | None:
+        """The feedback of a run, connected to the motion."""
+        if inputs.lateral is None or inputs.lateral.feedback is None:
+            return None
+        motion = self._executive.nodes([SIGNALS[name].jsbsim for name in ("p_rad_s", "r_rad_s", "phi_rad")])
+        reads = [node.get_double_value for node in motion]
+        return Loop(inputs.lateral.feedback, self._executive.dt_s, self.trim.controls.bank_rad, reads)
+
+    def _inputs(
+        self, inputs: Inputs, loop: Loop | None
+    ) -> tuple[list[Callable[[float], object]], list[list[float]]]:
         """Setters and their values at every step; the elevator first."""
         executive, elevator = self._executive, self._elevator
         absolute = self.trim.controls.elevator_command_rad + inputs.command_rad
-        late = 0 if inputs.surface else elevator.command_frames
-        command = np.concatenate([np.repeat(absolute[:1], late), absolute[: len(absolute) - late]])
         pairs = [
-            (elevator.command, command * elevator.command_per_rad),
+            (elevator.command, _in_time(elevator, absolute, inputs)),
             ("atmosphere/gust-north-fps", inputs.gust_u_m_s / FT),
             ("atmosphere/gust-down-fps", inputs.gust_w_m_s / FT),
         ]
@@ -151,8 +229,34 @@ class Flight:
             pairs.append((self._augmentation.q_error, inputs.q_error_rad_s))
         if self._augmentation is not None and inputs.theta_error_rad is not None:
             pairs.append((self._augmentation.theta_error, inputs.theta_error_rad))
+        aileron = len(pairs)
+        if self._lateral:
+            pairs += self._lateral_inputs(inputs)
         setters = [executive.node(name).set_double_value for name, _ in pairs]
+        if loop is not None:
+            fed = slice(aileron, aileron + len(self._lateral))
+            setters[fed] = loop.added(setters[fed], [surface.command_per_rad for surface in self._lateral])
         return setters, [np.asarray(values, dtype=np.float64).tolist() for _, values in pairs]
+
+    def _lateral_inputs(self, inputs: Inputs) -> list[tuple[str, Array]]:
+        """Properties and values of the lateral inputs, the commands of aileron and rudder first."""
+        commands = zip(self._lateral, self._lateral_commands(inputs), strict=True)
+        pairs = [(surface.command, _in_time(surface, values, inputs)) for surface, values in commands]
+        lateral, model = inputs.lateral, self._executive.model
+        if lateral is None:
+            return pairs
+        if lateral.gust_v_m_s is not None:
+            pairs.append(("atmosphere/gust-east-fps", lateral.gust_v_m_s / FT))
+        for name, key, values in (
+            (model.roll_gust, "roll_gust", lateral.gust_p_rad_s),
+            (model.yaw_gust, "yaw_gust", lateral.gust_r_rad_s),
+        ):
+            if values is None:
+                continue
+            if name is None:
+                raise ConfigurationError(f"the aircraft has no property for a rotary gust (jsbsim.{key})")
+            pairs.append((name, values))
+        return pairs
 
     def _engage(self, inputs: Inputs) -> None:
         if inputs.damper_gain_s == 0.0 and inputs.attitude_gain == 0.0:
@@ -164,7 +268,33 @@ class Flight:
         fdm, names = self._executive.fdm, self._augmentation
         fdm[names.damper_gain] = inputs.damper_gain_s
         fdm[names.attitude_gain] = inputs.attitude_gain
-        fdm[names.theta_reference] = self.trim.alpha_rad + self.trim.condition.gamma_rad
+        fdm[names.theta_reference] = self._theta_rad
+
+
+def _writer(setters: Sequence[Callable[[float], object]]) -> Callable[..., object]:
+    """One call that writes a value with each setter; without a loop, which takes twice the time."""
+    match setters:
+        case []:
+            return lambda: None
+        case [a]:
+            return a
+        case [a, b]:
+            return lambda x, y: (a(x), b(y))
+        case [a, b, c]:
+            return lambda x, y, z: (a(x), b(y), c(z))
+        case [a, b, c, d, e]:  # aileron, rudder and three gusts
+            return lambda v, w, x, y, z: (a(v), b(w), c(x), d(y), e(z))
+        case [a, b, c, *rest]:
+            others = _writer(rest)
+            return lambda x, y, z, *more: (a(x), b(y), c(z), others(*more))
+    raise AssertionError("setters are a list")
+
+
+def _in_time(surface: SurfaceProperties, absolute_rad: Array, inputs: Inputs) -> Array:
+    """Values to write of a command, later by the frames between reading it and acting on it."""
+    late = 0 if inputs.surface else surface.command_frames
+    command = np.concatenate([np.repeat(absolute_rad[:1], late), absolute_rad[: len(absolute_rad) - late]])
+    return command * surface.command_per_rad
 
 
 def fly_all(

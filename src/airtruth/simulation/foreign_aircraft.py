@@ -15,7 +15,12 @@ from airtruth.aircraft.file import FILE
 from airtruth.aircraft.jsbsim import files
 from airtruth.aircraft.jsbsim.bypass import bypass
 from airtruth.aircraft.jsbsim.confine import model_files
-from airtruth.aircraft.model import ElevatorProperties, LateralProperties, ThrottleProperties
+from airtruth.aircraft.model import (
+    ElevatorProperties,
+    LateralProperties,
+    SurfaceProperties,
+    ThrottleProperties,
+)
 from airtruth.aircraft.probe import Constants, wheel_root
 from airtruth.aircraft.write import require_new
 from airtruth.errors import AircraftError, StoreError, choices
@@ -25,13 +30,14 @@ from airtruth.isolation.protocol import IsolatedError, Task
 from airtruth.logs import ledger
 from airtruth.logs.atomic import new_folder
 from airtruth.quantity import Quantity
-from airtruth.simulation.survey.envelope import EnvelopeRow, FlightTest
-from airtruth.units import DEG, FT, G0, KT
+from airtruth.simulation.survey import words
+from airtruth.simulation.survey.words import REPORT
+from airtruth.units import DEG, G0
 
 CAMPAIGN: Final = "first.toml"
 """Name of the campaign that is written beside aircraft.toml."""
-REPORT: Final = "SURVEY.txt"
-"""Name of the report in the folder."""
+LATERAL_CAMPAIGN: Final = "lateral.toml"
+"""Name of the campaign in six axes, where aileron and rudder are found and a record with them keeps to its range."""
 _LIMITS: Final = Limits(seconds=900.0, memory_bytes=4_000_000_000)
 """Limits of a survey (judgement: four engines and a slow machine need two minutes)."""
 _STICK_RAD: Final = 25.0 * DEG
@@ -43,8 +49,17 @@ _SENSORS: Final = {
     "elevator_rad": 0.02 * DEG,
 }
 """Noise of the sensors of a new aircraft [units of the channels] (judgement: good flight-test instruments)."""
-_TURN: Final = (1.6, 0.3, 1.2)
-"""Step of a manoeuvre: turn of the short period in it [rad], shortest and longest step [s] (judgement)."""
+_LATERAL_SENSORS: Final = {
+    "beta_rad": 0.05 * DEG,
+    "p_rad_s": 0.05 * DEG,
+    "r_rad_s": 0.05 * DEG,
+    "phi_rad": 0.05 * DEG,
+    "psi_rad": 0.05 * DEG,
+    "ay_m_s2": 0.005 * G0,
+    "aileron_rad": 0.02 * DEG,
+    "rudder_rad": 0.02 * DEG,
+}
+"""The same for the lateral motion."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +75,7 @@ class ForeignAircraft:
     flight : the first condition, derivatives and test flight there; empty where it cannot fly.
     cause : why it cannot fly; "" where it can.
     has_campaign : whether a record was identified in which it keeps to its range, for `CAMPAIGN`.
+    has_lateral_campaign : the same in six axes, for `LATERAL_CAMPAIGN`.
     """
 
     aircraft: Aircraft
@@ -69,6 +85,7 @@ class ForeignAircraft:
     flight: tuple[str, ...]
     cause: str
     has_campaign: bool
+    has_lateral_campaign: bool = False
 
     @property
     def flies(self) -> bool:
@@ -91,15 +108,17 @@ class ForeignAircraft:
         for title, entries in sections:
             if entries:
                 lines += ["", f"{title}:", *(f"  {entry}" for entry in entries)]
+        name = self.aircraft.name
+        if self.has_campaign or self.has_lateral_campaign:
+            lines += ["", "next:"]
         if self.has_campaign:
-            name = self.aircraft.name
             lines += [
-                "",
-                "next:",
                 f"  airtruth fly {quote(str(folder / CAMPAIGN))} --out out/{name}",
                 f"  airtruth identify out/{name} --aircraft {quote(str(folder))}",
                 f"  airtruth trace out/{name} --aircraft {quote(str(folder))} --out out/{name}-trace",
             ]
+        if self.has_lateral_campaign:
+            lines.append(f"  airtruth fly {quote(str(folder / LATERAL_CAMPAIGN))} --out out/{name}-lateral")
         return "\n".join(lines)
 
 
@@ -163,13 +182,15 @@ def _written(
     """Write the folder of a surveyed model."""
     sections = ("notes", "decisions")
     notes, decisions = (tuple(str(x) for x in facts[key]) for key in sections)
-    decisions += (
-        "sensors: the noise of alpha, q, az and elevator in aircraft.toml is an assumption; state your own",
-    )
+    decisions += ("sensors: the noise of every channel in aircraft.toml is an assumption; state your own",)
     table = _table(facts["jsbsim"], out.name, model, root)
-    rows, flight = _rows(facts), _flight(facts)
+    flight = words.flight(facts) + tuple(f"six axes: {line}" for line in words.lateral(facts))
+    lateral = words.lateral_campaign(out.name, facts) if facts["condition"] else ""
     file = AircraftFile.model_construct(
-        name=out.name, description=f"{model} of JSBSim", jsbsim=table, sensors=_sensors()
+        name=out.name,
+        description=f"{model} of JSBSim",
+        jsbsim=table,
+        sensors=_sensors(table.aileron is not None),
     )
     heading = f"{model} of JSBSim, surveyed by airtruth; {REPORT} has the report. Author and licence: the JSBSim file."
     with new_folder(out) as made:
@@ -180,9 +201,13 @@ def _written(
         (made / FILE).write_text(toml.write(file, heading), encoding="utf-8")
         unread = Aircraft(folder=out, file=file, constants=Constants.model_validate(facts["constants"]))
         records = facts["flight"] is not None and facts["flight"]["duration_s"] > 0.0
-        written = ForeignAircraft(unread, notes, decisions, rows, flight, str(facts["cause"]), records)
+        written = ForeignAircraft(
+            unread, notes, decisions, words.rows(facts), flight, str(facts["cause"]), records, bool(lateral)
+        )
         if records:
-            (made / CAMPAIGN).write_text(_campaign(out.name, facts), encoding="utf-8")
+            (made / CAMPAIGN).write_text(words.campaign(out.name, facts), encoding="utf-8")
+        if lateral:
+            (made / LATERAL_CAMPAIGN).write_text(lateral, encoding="utf-8")
         (made / REPORT).write_text(written.summary() + "\n", encoding="utf-8")
         ledger.add_folder(made, "aircraft")
     return replace(written, aircraft=load(out))
@@ -238,7 +263,7 @@ def _survey(folder: Path, model: str, root: str) -> Mapping[str, Any]:
 
 def _table(found: Mapping[str, Any], name: str, model: str, root: Literal[".", "wheel"]) -> JsbsimModel:
     """The [jsbsim] table with the entries that differ from their defaults."""
-    elevator = {k: v for k, v in found["elevator"].items() if v != ElevatorProperties.model_fields[k].default}
+    elevator = _stated(ElevatorProperties, found["elevator"])
     entries: dict[str, Any] = {
         "model": name if root == "." else model,
         "root": root,
@@ -246,94 +271,23 @@ def _table(found: Mapping[str, Any], name: str, model: str, root: Literal[".", "
         "throttle": ThrottleProperties(command=tuple(found["throttle"]["command"])),
     }
     entries |= {key: found[key] for key in ("set", "declare", "engine_start_s") if found[key]}
+    for name in ("aileron", "rudder"):
+        if found[name] is not None:
+            entries[name] = SurfaceProperties(**_stated(SurfaceProperties, found[name]))
     if found["lateral"] is not None:
         entries["lateral"] = LateralProperties(**found["lateral"])
     return JsbsimModel(**entries)
 
 
-def _sensors() -> dict[str, Sensor]:
+def _stated(kind: type[SurfaceProperties], found: Mapping[str, Any]) -> dict[str, Any]:
+    """Entries of a control's table that differ from their defaults."""
+    return {k: v for k, v in found.items() if v != kind.model_fields[k].default}
+
+
+def _sensors(lateral: bool) -> dict[str, Sensor]:
+    noise = _SENSORS | (_LATERAL_SENSORS if lateral else {})
     source = "assumed by airtruth"
-    return {name: Sensor(noise_std=Quantity(value=std, source=source)) for name, std in _SENSORS.items()}
+    return {name: Sensor(noise_std=Quantity(value=std, source=source)) for name, std in noise.items()}
 
 
-def _rows(facts: Mapping[str, Any]) -> tuple[str, ...]:
-    return tuple(_row(EnvelopeRow(**row)) for row in facts["envelope"])
-
-
-def _row(row: EnvelopeRow) -> str:
-    text = f"{row.altitude_m / FT:6.0f} ft: {row.trimmed} of {row.tried} speeds trimmed"
-    if not row.trimmed:
-        return text
-    slow, fast = (v / KT for v in row.eas_m_s)
-    alpha = " to ".join(f"{a / DEG:.1f}" for a in row.alpha_rad)
-    if any(row.throttle):
-        lever = "throttle " + " to ".join(f"{x:.2f}" for x in row.throttle)
-    else:
-        lever = "flight path " + " to ".join(f"{x / DEG:.1f}" for x in row.gamma_rad) + " deg"
-    return f"{text}, {slow:.0f} to {fast:.0f} kt EAS, alpha {alpha} deg, {lever}"
-
-
-def _flight(facts: Mapping[str, Any]) -> tuple[str, ...]:
-    at = facts["condition"]
-    if at is None:
-        return ()
-    flight = FlightTest(**facts["flight"])
-    derivatives = ", ".join(f"{name} {value:.4g}" for name, value in flight.derivatives.items())
-    lines = [
-        f"{at['eas_m_s'] / KT:.1f} kt EAS, {at['altitude_m'] / FT:.0f} ft, flight path {at['gamma_rad'] / DEG:.2f} deg",
-        derivatives,
-        f"short period {flight.wn_rad_s:.3g} rad/s, damping {flight.zeta:.2f}",
-    ]
-    if flight.alpha_range_deg:
-        still, moved = flight.alpha_range_deg
-        lines.append(
-            f"{flight.duration_s:g} s with fixed controls: alpha moves {still:.2g} deg; with a doublet of "
-            f"{flight.amplitude_deg:g} deg {moved:.2g} deg"
-        )
-    if flight.derivatives["Cmalpha"] > 0.0:
-        lines.append(
-            "the aircraft is unstable at every airspeed that was trimmed at this altitude (Cmalpha above 0)"
-        )
-    if flight.fault:
-        lines.append(f"another record fails: {flight.fault}")
-    return tuple(lines)
-
-
-def _campaign(name: str, facts: Mapping[str, Any]) -> str:
-    at, flight = facts["condition"], FlightTest(**facts["flight"])
-    wn, duration, amplitude = flight.wn_rad_s, flight.duration_s, flight.amplitude_deg
-    turn, shortest, longest = _TURN
-    step = longest if not wn > 0.0 else min(max(turn / wn, shortest), longest)
-    return f"""# Six records in light turbulence at the first condition of {REPORT}; every key: docs/campaigns.md
-schema = 1
-name = "{name}"
-title = "{name}: doublets and 3-2-1-1 in light turbulence"
-aircraft = "{FILE}" # beside this file
-runs = 6
-seed = 1
-duration_s = {duration:g}
-
-[condition]
-eas_m_s = {at["eas_m_s"]:.6g}
-altitude_m = {at["altitude_m"]:.6g}
-flight_path_deg = {at["gamma_rad"] / DEG:.6g}
-
-[[manoeuvre]]
-kind = "doublet"
-amplitude_deg = {amplitude:g}
-start_s = 1.0
-step_s = {step:.2f}
-
-[[manoeuvre]]
-kind = "3211"
-amplitude_deg = {0.8 * amplitude:g}
-start_s = 1.0
-step_s = {0.6 * step:.2f}
-
-[gust]
-figures = "mil-f-8785c"
-level = "light"
-"""
-
-
-__all__ = ["CAMPAIGN", "REPORT", "ForeignAircraft", "new_from_jsbsim"]
+__all__ = ["CAMPAIGN", "LATERAL_CAMPAIGN", "REPORT", "ForeignAircraft", "new_from_jsbsim"]

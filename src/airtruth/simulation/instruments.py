@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
+from airtruth.channels import LATERAL
 from airtruth.physics import sensors
 from airtruth.physics.readings import reading_increments
 from airtruth.physics.sensor_errors import SensorErrors
@@ -30,7 +31,12 @@ LOGGED: Final = (
     "altitude_m",
     "density_kg_m3",
 )
-"""Channels of a log, in the order of its columns."""
+"""Channels of a log in the pitch plane, in the order of its columns."""
+
+
+def logged(lateral: bool) -> tuple[str, ...]:
+    """Channels of the log of a flight, with the lateral ones where it rolls and yaws."""
+    return (*LOGGED, *LATERAL) if lateral else LOGGED
 
 
 @dataclass(frozen=True)
@@ -88,7 +94,8 @@ def log_channels(
 
     Parameters
     ----------
-    truth : channel -> (runs, records) noise-free values at the CG, q_dot_rad_s2 among them.
+    truth : channel -> (runs, records) noise-free values at the CG, q_dot_rad_s2 among them, and with the lateral channels
+        p_dot_rad_s2 and r_dot_rad_s2.
     fitted : channel -> errors of its instrument; a channel without an instrument is logged as it is.
     noise : channel -> (runs, records) standard normals for the channels with noise.
     dt_s : period of the records [s].
@@ -98,11 +105,11 @@ def log_channels(
     Returns
     -------
     dict
-        Channel of `LOGGED` -> (runs, samples).
+        Channel of `logged` -> (runs, samples).
     """
     result = {}
     more = {} if readings is None else readings.increments(truth, dt_s)
-    for name in LOGGED:
+    for name in logged("beta_rad" in truth):
         values = truth[name]
         if name in fitted:
             values = sensors.at_instrument(name, truth, fitted[name]) + more.get(name, 0.0)

@@ -1,4 +1,4 @@
-"""Elevator manoeuvres: commands as functions of time, sampled for the simulator.
+"""Manoeuvres of a control: commands as functions of time, sampled for the simulator.
 
 The simulator reads the command at its own steps and moves linearly between them. The sample at an edge is the mean of
 both sides: the ramp that replaces the edge is centred on it, and the command neither leads nor lags by half a step.
@@ -19,6 +19,12 @@ from airtruth.errors import ConfigurationError, choices
 Array = NDArray[np.float64]
 
 
+ELEVATOR: Final = "elevator"
+"""Control of the pitch plane."""
+LATERAL_CONTROLS: Final = ("aileron", "rudder")
+"""Controls of the lateral-directional motion."""
+CONTROLS: Final = (ELEVATOR, *LATERAL_CONTROLS)
+"""Controls that a manoeuvre moves."""
 MOST_HARMONICS: Final = 500
 """Harmonics of a multisine [-] (judgement: a band of 0.1 to 5 Hz over 100 s)."""
 HIGHEST_HARMONIC: Final = 5000
@@ -33,14 +39,15 @@ _ROWS: Final = 20_000
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """One elevator manoeuvre about the trim.
+    """One manoeuvre of a control about the trim.
 
     Attributes
     ----------
     kind : key of `KINDS`.
-    amplitude_rad : peak of the command, trailing edge down positive [rad]; negative reverses the manoeuvre.
+    amplitude_rad : peak of the command [rad], with the sign of the control's channel in `airtruth.channels`; negative
+        reverses the manoeuvre.
     start_s : first edge [s].
-    step_s : length of one unit step [s] (doublet, 3-2-1-1, pulse).
+    step_s : length of one unit step [s] (doublet, 3-2-1-1, 1-2-1, pulse).
     length_s : length of a multisine or sweep [s].
     lowest_hz, highest_hz : band of a multisine or sweep [Hz].
     part : which of ``parts`` interleaved, mutually orthogonal multisines (0, 1, ...).
@@ -50,6 +57,7 @@ class Manoeuvre:
         relative to each other [-], and phases of the cosines [rad].
     times_s, values_rad : samples of a replayed record, deviation from its trim [s, rad].
     surface : the replay drives the surface itself, past the actuator.
+    control : one of `CONTROLS`.
     """
 
     kind: str
@@ -70,6 +78,7 @@ class Manoeuvre:
     times_s: Array = field(default_factory=lambda: np.zeros(0))
     values_rad: Array = field(default_factory=lambda: np.zeros(0))
     surface: bool = False
+    control: str = ELEVATOR
 
 
 def sample(manoeuvre: Manoeuvre, t_s: Array) -> Array:
@@ -111,6 +120,7 @@ def end_s(manoeuvre: Manoeuvre) -> float:
 _STEPS: Final[dict[str, tuple[tuple[float, float], ...]]] = {
     "doublet": ((1.0, 1.0), (1.0, -1.0)),
     "3211": ((3.0, 1.0), (2.0, -1.0), (1.0, 1.0), (1.0, -1.0)),
+    "121": ((1.0, 1.0), (2.0, -1.0), (1.0, 1.0)),
     "pulse": ((1.0, 1.0),),
     "step": ((0.0, 0.0), (np.inf, 1.0)),
 }

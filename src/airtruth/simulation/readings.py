@@ -23,6 +23,15 @@ READ: Final = (
     "accelerations/qdot-rad_sec2",
 )
 """Properties that `channels` takes, in its order; the surface's own property follows them."""
+_LATERAL_STATE: Final = ("beta_rad", "p_rad_s", "r_rad_s", "phi_rad", "psi_rad")
+"""Lateral channels with a JSBSim property of their own."""
+READ_LATERAL: Final = (
+    *(SIGNALS[name].jsbsim for name in _LATERAL_STATE),
+    "forces/fby-total-lbs",
+    "accelerations/pdot-rad_sec2",
+    "accelerations/rdot-rad_sec2",
+)
+"""Properties that `lateral_channels` takes, in its order; those of aileron and rudder follow them."""
 MOST_ALPHA_RAD: Final = 1.5
 """Largest angle of attack of a sound flight [rad] (judgement: 86 deg, beyond any table)."""
 
@@ -53,12 +62,42 @@ def channels(columns: Array, mass_kg: float, surface_rad: float) -> dict[str, Ar
     }
 
 
+def lateral_channels(
+    columns: Array, mass_kg: float, aileron_rad: float, rudder_rad: float
+) -> dict[str, Array]:
+    """Convert properties to the lateral channels of a log that exist without sensors, p_dot_rad_s2 and r_dot_rad_s2.
+
+    Parameters
+    ----------
+    columns : (10, records) values of `READ_LATERAL` and of the properties of aileron and rudder [JSBSim's units].
+    mass_kg : mass of the aircraft [kg].
+    aileron_rad, rudder_rad : radians per unit of the surfaces' properties.
+
+    Returns
+    -------
+    dict
+        Channel -> (records,) values at the centre of gravity [SI]; bank and heading without jumps of a turn.
+    """
+    *state, fy, p_dot, r_dot, aileron, rudder = columns
+    result = {name: column * SIGNALS[name].to_si for name, column in zip(_LATERAL_STATE, state, strict=True)}
+    for name in ("phi_rad", "psi_rad"):
+        start = np.remainder(result[name][:1] + np.pi, 2.0 * np.pi) - np.pi
+        result[name] = np.unwrap(np.concatenate([start, result[name]]))[1:]
+    return result | {
+        "ay_m_s2": fy * (SLUG * FT / mass_kg),
+        "p_dot_rad_s2": p_dot,
+        "r_dot_rad_s2": r_dot,
+        "aileron_rad": aileron * aileron_rad,
+        "rudder_rad": rudder * rudder_rad,
+    }
+
+
 def require_sound(columns: Array, record_s: float, flight: str) -> None:
     """Refuse a flight that left the range in which the simulation has a meaning.
 
     Parameters
     ----------
-    columns : (10, records) as in `channels`.
+    columns : (10 or more, records) as in `channels`.
     record_s : time between two records [s].
     flight : subject of the message.
 
@@ -78,4 +117,4 @@ def require_sound(columns: Array, record_s: float, flight: str) -> None:
         )
 
 
-__all__ = ["MOST_ALPHA_RAD", "READ", "channels", "require_sound"]
+__all__ = ["MOST_ALPHA_RAD", "READ", "READ_LATERAL", "channels", "lateral_channels", "require_sound"]

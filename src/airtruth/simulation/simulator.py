@@ -7,17 +7,19 @@ the last bits, and a result must not depend on earlier runs.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterable
 from dataclasses import astuple, dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import jsbsim
 
 from airtruth.aircraft import Aircraft, JsbsimModel
+from airtruth.aircraft.model import SurfaceProperties
 from airtruth.aircraft.probe import load_model, model_root
 from airtruth.errors import AircraftError
+from airtruth.simulation.attitude import straight_attitude
+from airtruth.simulation.quiet import no_files
 from airtruth.units import FT, KT, SLUG
 
 _AB3: Final = 4.0
@@ -43,27 +45,40 @@ _PLANET: Final = Path(__file__).with_name("flat_planet.xml")
 """A planet that is flat and does not rotate, see docs/design.md."""
 
 
+Straight = Literal["pitch-plane", "wings-level", "no-sideslip"]
+"""How a straight flight is held: in the pitch plane, or in six axes with sideslip or with bank as the unknown."""
+
+
 @dataclass(frozen=True)
 class Condition:
-    """A steady flight condition, wings level, in calm air.
+    """A steady straight flight condition in calm air.
 
     Attributes
     ----------
     eas_m_s : equivalent airspeed [m/s].
     altitude_m : geometric altitude above sea level in the standard atmosphere [m].
     gamma_rad : flight-path angle, climb positive [rad].
+    straight : in the pitch plane, or in six axes with the wings level or without sideslip.
     """
 
     eas_m_s: float
     altitude_m: float
     gamma_rad: float = 0.0
+    straight: Straight = "pitch-plane"
+
+    @property
+    def six_axes(self) -> bool:
+        """Whether the aircraft flies in six axes."""
+        return self.straight != "pitch-plane"
 
 
 @dataclass(frozen=True)
 class Controls:
     """Elevator command [rad], trailing edge down positive, and throttle, 0 to 1 [-].
 
-    aileron, rudder : commands that hold an asymmetric aircraft straight, -1 to 1 [-]; bank_rad : its bank [rad].
+    aileron, rudder : commands that hold an asymmetric aircraft straight in a longitudinal flight, -1 to 1 [-].
+    aileron_command_rad, rudder_command_rad : commands in six axes [rad].
+    bank_rad, sideslip_rad : attitude to the air in which the controls hold the aircraft [rad].
     """
 
     elevator_command_rad: float
@@ -71,11 +86,14 @@ class Controls:
     aileron: float = 0.0
     rudder: float = 0.0
     bank_rad: float = 0.0
+    aileron_command_rad: float = 0.0
+    rudder_command_rad: float = 0.0
+    sideslip_rad: float = 0.0
 
 
 @dataclass(frozen=True)
 class Response:
-    """Accelerations in body axes [m/s2], [rad/s2] and the surface [rad] in one state."""
+    """Accelerations in body axes [m/s2], [rad/s2] and the surfaces [rad] in one state."""
 
     u_dot_m_s2: float
     w_dot_m_s2: float
@@ -84,6 +102,8 @@ class Response:
     v_dot_m_s2: float = 0.0
     p_dot_rad_s2: float = 0.0
     r_dot_rad_s2: float = 0.0
+    aileron_rad: float = 0.0
+    rudder_rad: float = 0.0
 
     def differs(self, other: Response) -> float:
         """Largest difference to another response [m/s2], [rad/s2], [rad]; infinite where one is not finite."""
@@ -109,6 +129,7 @@ class Executive:
         self.aircraft = aircraft
         self.model = jsbsim_model(aircraft)
         self.dt_s = dt_s
+        self.six_axes = False
         self.fdm = jsbsim.FGFDMExec(str(model_root(aircraft.folder, self.model.root)[0]))
         self.fdm.set_debug_level(0)
         self.fdm.load_planet(str(_PLANET), False)
@@ -117,7 +138,7 @@ class Executive:
             self.fdm[name] = value
         if not load_model(self.fdm, aircraft.folder, self.model.root, self.model.model):
             raise AircraftError(f"{aircraft.folder}: JSBSim refused the model {self.model.model!r}")
-        _no_files(self.fdm)
+        no_files(self.fdm)
         self._manager = self.fdm.get_property_manager()
         self._propulsion = self.fdm.get_propulsion()
         self._has_engines = self._propulsion.get_num_engines() > 0
@@ -133,9 +154,14 @@ class Executive:
             self.fdm[name] = _AB3
 
     def configure(self) -> None:
-        """Write the properties that aircraft.toml sets (engines running, gear up)."""
+        """Write the properties that aircraft.toml sets (engines running, gear up), and that of the six axes."""
         for name, value in self.model.set.items():
             self.fdm[name] = value
+        self._choose_axes()
+
+    def _choose_axes(self) -> None:
+        if self.model.six_axes is not None:
+            self.fdm[self.model.six_axes] = float(self.six_axes)
 
     def renewed(self) -> Executive:
         """Return an executive in which nothing has run: itself, or a new one if it has engines, which keep their state."""
@@ -173,6 +199,9 @@ class Executive:
         controls: Controls,
         q_rad_s: float = 0.0,
         engines_s: float | None = None,
+        *,
+        p_rad_s: float = 0.0,
+        r_rad_s: float = 0.0,
     ) -> None:
         """Put the aircraft into a state at time zero, with lags, filters and engines settled.
 
@@ -180,11 +209,14 @@ class Executive:
         ----------
         condition : airspeed, altitude and flight path.
         alpha_rad : angle of attack [rad].
-        controls : elevator command and throttle.
+        controls : commands, throttle, bank and sideslip.
         q_rad_s : pitch rate [rad/s].
         engines_s : longest time for which engines and filters run, instead of that of the model [s].
+        p_rad_s, r_rad_s : roll and yaw rate [rad/s].
         """
         fdm = self.fdm
+        self.six_axes = condition.six_axes
+        self._choose_axes()
         fdm.set_trim_status(True)  # actuators pass their input through
         for name, value in (
             ("ic/h-sl-ft", condition.altitude_m / FT),
@@ -197,13 +229,25 @@ class Executive:
             ("ic/alpha-rad", alpha_rad),
             ("ic/beta-rad", 0.0),
             ("ic/gamma-rad", condition.gamma_rad),
-            ("ic/p-rad_sec", 0.0),
+            ("ic/p-rad_sec", p_rad_s),
             ("ic/q-rad_sec", q_rad_s),
-            ("ic/r-rad_sec", 0.0),
+            ("ic/r-rad_sec", r_rad_s),
         ):
             fdm[name] = value
+        if self.six_axes:
+            self._orient(alpha_rad, controls, condition.gamma_rad)
         self.hold(controls)
         self.settle(engines_s)
+
+    def _orient(self, alpha_rad: float, controls: Controls, gamma_rad: float) -> None:
+        """Write attitude and velocity of a straight flight with sideslip and bank, which JSBSim's own angles disturb."""
+        fdm, speed = self.fdm, self.fdm["ic/vt-fps"]
+        at = straight_attitude(alpha_rad, controls.sideslip_rad, controls.bank_rad, gamma_rad)
+        fdm["ic/psi-true-rad"] = at.psi_rad
+        fdm["ic/theta-rad"] = at.theta_rad
+        fdm["ic/phi-rad"] = controls.bank_rad
+        for axis, part in zip("uvw", at.velocity, strict=True):
+            fdm[f"ic/{axis}-fps"] = speed * part
 
     def hold(self, controls: Controls) -> None:
         """Write the controls, the throttle's trim included."""
@@ -215,6 +259,13 @@ class Executive:
         if self.model.lateral is not None:
             self.fdm[self.model.lateral.aileron] = controls.aileron
             self.fdm[self.model.lateral.rudder] = controls.rudder
+        if self.six_axes:
+            for surface, command_rad in (
+                (self.model.aileron, controls.aileron_command_rad),
+                (self.model.rudder, controls.rudder_command_rad),
+            ):
+                if surface is not None:
+                    self.fdm[surface.command] = command_rad * surface.command_per_rad
 
     def change_controls(self, controls: Controls, engines_s: float) -> None:
         """Write other controls in the present state, and let filters and engines follow for a time [s]."""
@@ -275,7 +326,7 @@ class Executive:
         return [name for name in names if self._manager.hasNode(name)]
 
     def respond(self) -> Response:
-        """Return accelerations and surface in the present state."""
+        """Return accelerations and surfaces in the present state."""
         fdm = self.fdm
         return Response(
             u_dot_m_s2=fdm["accelerations/udot-ft_sec2"] * FT,
@@ -285,7 +336,15 @@ class Executive:
             v_dot_m_s2=fdm["accelerations/vdot-ft_sec2"] * FT,
             p_dot_rad_s2=fdm["accelerations/pdot-rad_sec2"],
             r_dot_rad_s2=fdm["accelerations/rdot-rad_sec2"],
+            aileron_rad=self._angle(self.model.aileron),
+            rudder_rad=self._angle(self.model.rudder),
         )
+
+    def _angle(self, surface: SurfaceProperties | None) -> float:
+        """Angle of a lateral surface [rad]; 0 in the pitch plane."""
+        if surface is None or not self.six_axes:
+            return 0.0
+        return float(self.fdm[surface.surface]) * surface.surface_rad
 
     def surroundings(self) -> tuple[float, float, float]:
         """Return true airspeed [m/s], air density [kg/m3] and mass [kg] in the present state."""
@@ -294,36 +353,6 @@ class Executive:
             self.fdm["atmosphere/rho-slugs_ft3"] * SLUG / FT**3,
             self.fdm["inertia/mass-slugs"] * SLUG,
         )
-
-
-class _Silent(jsbsim.FGLogger):
-    """Logger that discards JSBSim's messages: stdout belongs to results, and the probe has shown them."""
-
-    def set_level(self, level: object) -> None:
-        """Discard."""
-
-    def message(self, message: str) -> None:
-        """Discard."""
-
-    def file_location(self, filename: str, line: int) -> None:
-        """Discard."""
-
-    def format(self, format: object) -> None:
-        """Discard."""
-
-    def flush(self) -> None:
-        """Discard."""
-
-
-jsbsim.set_logger(_Silent())
-
-
-def _no_files(fdm: Any) -> None:
-    """Discard the output files that some models write at every start."""
-    number = 0
-    while fdm.set_output_filename(number, os.devnull):
-        number += 1
-    fdm.disable_output()
 
 
 def jsbsim_model(aircraft: Aircraft) -> JsbsimModel:

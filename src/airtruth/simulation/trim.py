@@ -25,8 +25,8 @@ _AIM: Final = 1e-11
 _START: Final = ((4.0, 0.0, 0.4), (8.0, 0.0, 0.7), (1.0, 0.0, 0.2), (12.0, 0.0, 0.6))
 """Starts, tried in turn: angle of attack [deg], elevator command [rad], throttle [-] (judgement)."""
 _STEPS: Final = np.array([1e-5, 1e-5, 1e-4, 1e-4, 1e-4, 1e-5])
-"""Steps of the differences in angle of attack [rad], elevator command [rad], throttle [-], aileron and rudder [-] and
-bank [rad]."""
+"""Steps of the differences in angle of attack [rad], elevator command [rad], throttle [-], aileron and rudder [-], in six axes
+[rad], and bank or sideslip [rad]."""
 _LARGEST_STEP: Final = np.array([4.0 * DEG, 0.2, 0.15, 0.3, 0.3, 5.0 * DEG])
 """Largest Newton step, same order (judgement: the thrust of an engine is flat near full throttle)."""
 _ITERATIONS: Final = 40
@@ -60,8 +60,9 @@ class Trim:
     alpha_rad, elevator_rad : angle of attack and surface [rad].
     controls : elevator command and throttle.
     airspeed_m_s, density_kg_m3, mass_kg : true airspeed [m/s], air density [kg/m3], mass [kg].
-    residual : largest of |u_dot|, |w_dot| [m/s2] and |q_dot| [rad/s2], with lateral properties also of |v_dot|,
-        |p_dot| and |r_dot|.
+    residual : largest of |u_dot|, |w_dot| [m/s2] and |q_dot| [rad/s2], with lateral properties or in six axes also of
+        |v_dot|, |p_dot| and |r_dot|.
+    aileron_rad, rudder_rad : surfaces in six axes [rad].
     """
 
     condition: Condition
@@ -72,6 +73,8 @@ class Trim:
     density_kg_m3: float
     mass_kg: float
     residual: float
+    aileron_rad: float = 0.0
+    rudder_rad: float = 0.0
 
 
 class _Problem:
@@ -85,9 +88,16 @@ class _Problem:
         model = self.executive.model
         self.throttle = throttle if model.throttle.command else 0.0
         self.glides = self.throttle is not None
-        self.count = 6 if model.lateral is not None else 3
-        self.thrifty = self.glides or model.engine_start_s > 0.0 or model.lateral is not None
+        self.count = 6 if condition.six_axes or model.lateral is not None else 3
+        if condition.six_axes and (model.aileron is None or model.rudder is None):
+            raise TrimError(
+                f"{aircraft.name} has no lateral controls: a trim in six axes needs jsbsim.aileron and jsbsim.rudder in "
+                "aircraft.toml"
+            )
+        self.thrifty = self.glides or model.engine_start_s > 0.0 or self.count == 6
         self.names = list(_NAMES[: self.count])
+        if condition.straight == "wings-level":
+            self.names[5] = "sideslip"
         self.steps, self.largest = _STEPS[: self.count].copy(), _LARGEST_STEP[: self.count].copy()
         self.low, self.high = _LIMITS[0][: self.count].copy(), _LIMITS[1][: self.count].copy()
         if self.glides:
@@ -103,7 +113,13 @@ class _Problem:
     def controls(self, x: Array) -> Controls:
         """Controls of a vector of unknowns."""
         throttle = float(x[2]) if self.throttle is None else self.throttle
-        return Controls(float(x[1]), throttle, *map(float, x[3:]))
+        if not self.condition.six_axes:
+            return Controls(float(x[1]), throttle, *map(float, x[3:]))
+        aileron, rudder, angle = map(float, x[3:])
+        free = "sideslip_rad" if self.condition.straight == "wings-level" else "bank_rad"
+        return Controls(
+            float(x[1]), throttle, aileron_command_rad=aileron, rudder_command_rad=rudder, **{free: angle}
+        )
 
     def path(self, x: Array) -> Condition:
         """Condition of a vector of unknowns."""
@@ -136,8 +152,8 @@ def trim(
     """Solve u_dot = w_dot = q_dot = 0 for angle of attack, elevator and throttle by Newton's method.
 
     An aircraft with lateral properties is held straight as well: v_dot = p_dot = r_dot = 0 by aileron, rudder and bank,
-    without sideslip. Where the throttle is given, and for an aircraft without one, which glides, the flight-path angle takes
-    its place.
+    without sideslip. In six axes, sideslip takes the place of bank where the condition has the wings level. Where the throttle is
+    given, and for an aircraft without one, which glides, the flight-path angle takes its place.
 
     Parameters
     ----------
@@ -151,7 +167,8 @@ def trim(
     Raises
     ------
     TrimError
-        If no start leads to a residual below the tolerance; the message has the residual and the limit reached.
+        If no start leads to a residual below the tolerance; the message has the residual and the limit reached. In six axes,
+        also if the aircraft has no aileron or no rudder.
     """
     problem = _Problem(aircraft, condition, dt_s, throttle)
     best: tuple[float, Array] | None = None
@@ -174,7 +191,10 @@ def _near(problem: _Problem, trim: Trim | None) -> list[Array]:
         return []
     c = trim.controls
     third = trim.condition.gamma_rad if problem.glides else c.throttle
-    every = (trim.alpha_rad, c.elevator_command_rad, third, c.aileron, c.rudder, c.bank_rad)
+    every = [trim.alpha_rad, c.elevator_command_rad, third, c.aileron, c.rudder, c.bank_rad]
+    if problem.condition.six_axes:
+        level = problem.condition.straight == "wings-level"
+        every[3:] = c.aileron_command_rad, c.rudder_command_rad, c.sideslip_rad if level else c.bank_rad
     return [np.array(every[: problem.count])]
 
 
@@ -233,6 +253,8 @@ def _result(problem: _Problem, x: Array) -> Trim:
         density_kg_m3=density,
         mass_kg=mass,
         residual=float(np.max(np.abs(problem.accelerations(at)))),
+        aileron_rad=at.aileron_rad,
+        rudder_rad=at.rudder_rad,
     )
 
 
@@ -245,6 +267,8 @@ def _explain(problem: _Problem, x: Array, size: float, tolerance: float) -> str:
     ]
     cause = f"; it ended at the limit of {' and '.join(at)}" if at else ""
     lever = f"flight path {x[2] / DEG:.1f} deg" if problem.glides else f"throttle {x[2]:.2f}"
+    if condition.six_axes:
+        lever += "".join(f", {n} {v / DEG:.1f} deg" for n, v in zip(problem.names[3:], x[3:], strict=True))
     return (
         f"{name} cannot be trimmed at EAS {condition.eas_m_s / KT:.1f} kt, {condition.altitude_m / FT:.0f} ft, "
         f"flight path {condition.gamma_rad / DEG:.1f} deg: residual {size:.2e} (allowed {tolerance:.0e} in SI) at "

@@ -56,10 +56,21 @@ _ALL: Final = (
             f"data/campaigns/{name}.toml"
             for name in (
                 *("light", "light-fit", "moderate", "moderate-fit"),
+                *("lateral", "lateral_multisine", "combined"),
                 *("foreign-c172x", "foreign-f16", "foreign-T38"),
             )
         ),
         ("airtruth fly data/campaigns/foreign-c172x.toml --out out/c172x",),
+    ),
+    Example(
+        "lateral",
+        "ailerons and rudder of the GTM in light turbulence: steps in both signs, and orthogonal multisines",
+        ("data/campaigns/lateral.toml", "data/campaigns/lateral_multisine.toml"),
+        (
+            "airtruth plan data/campaigns/lateral.toml",
+            "airtruth fly data/campaigns/lateral.toml --out out/lateral",
+            "airtruth identify out/lateral --aircraft gtm",
+        ),
     ),
     Example(
         "vane",

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from airtruth.table.model import Cell, Interval, Number, Pair, Table, flat
+from airtruth.table.model import Cell, Interval, Number, Pair, Table, Uncertain, flat
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,6 +24,9 @@ LABEL: Final = "label"
 
 SECOND: Final = " (in brackets)"
 """Ending of the column that holds the second numbers of a column of pairs."""
+
+ERROR: Final = " (standard error)"
+"""Ending of the column that holds the standard errors of a column of estimates."""
 
 LOWER: Final = " (lower)"
 """Ending of the column that holds the lower ends of a column of intervals."""
@@ -109,6 +112,8 @@ def _parts(cell: Cell) -> dict[str, str | float | int | None]:
     """Ending of the column -> plain value; a number that is not finite is None."""
     if isinstance(cell, Pair):
         return {"": _finite(cell.first), SECOND: _finite(cell.second)}
+    if isinstance(cell, Uncertain):
+        return {"": _finite(cell.value), ERROR: _finite(cell.error)}
     if isinstance(cell, Interval):
         return {"": _finite(cell.value), LOWER: _finite(cell.lower), UPPER: _finite(cell.upper)}
     if isinstance(cell, Number | float):

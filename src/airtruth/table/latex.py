@@ -80,7 +80,7 @@ def _table(
 
 
 def _escaped(words: str) -> str:
-    return words.translate(_SPECIAL).replace("$|$$|$", r"$\|$")
+    return words.translate(_SPECIAL).replace("$|$$|$", r"$\|$").replace("+-", r"$\pm$")
 
 
 def _cells(row: Row, symbols: Mapping[str, str]) -> Iterator[str]:

@@ -54,7 +54,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Pair:
-    """A number followed by a second one in brackets: a mean and its standard deviation, for example."""
+    """A number followed by a second one in brackets, as published tables print it; an estimate with its error is `Uncertain`."""
 
     first: Number
     second: Number
@@ -64,8 +64,19 @@ class Pair:
 
 
 @dataclass(frozen=True)
+class Uncertain:
+    """An estimate with its standard error: ``4.526 +- 0.022``; without a finite error, the number alone."""
+
+    value: Number
+    error: Number
+
+    def __str__(self) -> str:
+        return f"{self.value} +- {self.error}" if math.isfinite(self.error.value) else str(self.value)
+
+
+@dataclass(frozen=True)
 class Interval:
-    """A number and the ends of its interval."""
+    """A number and the ends of its 95 % interval: ``4.79 [4.37, 5.20]``."""
 
     value: Number
     lower: Number
@@ -75,7 +86,7 @@ class Interval:
         return f"{self.value} [{self.lower}, {self.upper}]"
 
 
-Cell = str | float | int | Number | Pair | Interval
+Cell = str | float | int | Number | Pair | Uncertain | Interval
 """A cell; a bare float is shown with `DIGITS` significant digits."""
 
 Row = tuple[Cell, ...]
@@ -182,6 +193,7 @@ __all__ = [
     "Pair",
     "Row",
     "Table",
+    "Uncertain",
     "fixed",
     "flat",
     "shown",

@@ -150,6 +150,25 @@ class DeclaredModel:
 
 
 @dataclass(frozen=True)
+class RefinedDerivative:
+    """A derivative that the records determine better than the declaration does [1/rad, rates as q c/(2V)].
+
+    Attributes
+    ----------
+    declared : declared value.
+    estimate, std : of the records and the declaration together.
+    """
+
+    declared: float
+    estimate: float
+    std: float
+
+    def to_dict(self) -> dict[str, float]:
+        """Keys of trace.json."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+@dataclass(frozen=True)
 class Alternative:
     """A set of effects and its posterior weight among the sets that were compared [-]."""
 
@@ -202,6 +221,7 @@ class TraceAnswer:
         *after* [-].
     alternatives : sets of effects, each with its posterior weight; inclusion : effect -> its probability.
     axial_force : errors of ax as declared, and with the increments of CX; None where ax was not compared.
+    refined : derivative -> its refinement, where nothing is missing and the updated aircraft has the refined derivatives.
     """
 
     verdict: VerdictName
@@ -227,6 +247,7 @@ class TraceAnswer:
     inclusion: dict[str, float] = field(default_factory=dict)
     credit: dict[str, float] = field(default_factory=dict)
     axial_force: AxialErrors | None = None
+    refined: dict[str, RefinedDerivative] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return verdict, effects and model in a line."""
@@ -336,6 +357,7 @@ __all__ = [
     "Evidence",
     "ParameterEstimate",
     "RecordNames",
+    "RefinedDerivative",
     "TraceAnswer",
     "VerdictName",
     "answer_path",

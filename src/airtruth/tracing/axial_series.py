@@ -24,7 +24,7 @@ from airtruth.physics.terms import Change, SensorTerm, declared_total
 from airtruth.simulation.disposable import isolated
 from airtruth.simulation.probe import forces_over_alpha
 from airtruth.tracing.compensate import Compensation, compensated_batch
-from airtruth.tracing.model.parameters import PerRecord
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import FINE, TraceRecord
 from airtruth.tracing.model.remainder import looked_up
@@ -113,7 +113,7 @@ def axial_series(
     ----------
     logs : with the channel ax; they hold the records.
     records : of a trace with a JSBSim model.
-    own : parameters of each record, see `airtruth.tracing.model.parameters.PerRecord`; biases of vane and gyro count.
+    own : parameters of each record, see `airtruth.tracing.model.parameters.RecordEntries`; biases of vane and gyro count.
     change : the declared errors of the sensors with the accepted effects.
 
     Raises
@@ -140,11 +140,11 @@ def axial_series(
             if run_id in by_run:
                 channels = {name: values[row] for name, values in undone.channels.items()}
                 record, parameters = by_run[run_id]
-                for name, bias in zip(_BIASED, parameters[PerRecord.bias], strict=False):
+                for name, bias in zip(_BIASED, parameters[SHORT_PERIOD.per_record.bias], strict=False):
                     channels[name] = channels[name] - bias
                 # the record's own airspeed is low-passed, and lacks the declared errors alone
                 ratio = channels[_SPEED] / batch.channels[_SPEED][row]
-                bias_rad = float(parameters[PerRecord.bias][0])
+                bias_rad = float(parameters[SHORT_PERIOD.per_record.bias][0])
                 found[run_id] = _series(
                     channels, record, ratio, bias_rad, between[id(record.plant)], change, aircraft
                 )

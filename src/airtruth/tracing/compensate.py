@@ -127,7 +127,7 @@ def compensation_of(result: TraceResult) -> Compensation:
         treatments.append(treatment_of(effect.key, change))
         total = total + change
     aero, states = _measurable(total)
-    increment = fit.point.common[: len(short_period.PARAMETERS)]
+    increment = fit.point.common[fit.point.of.common.derivatives]
     records = result.case.fitted.records
     return Compensation(
         conditions=tuple(

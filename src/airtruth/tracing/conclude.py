@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -23,6 +23,7 @@ from airtruth.tracing.answer import (
     Derivatives,
     Evidence,
     RecordNames,
+    RefinedDerivative,
     TraceAnswer,
     VerdictName,
 )
@@ -37,10 +38,11 @@ from airtruth.tracing.declared_model import (
     detectable_causes,
     explaining_effects,
     inclusion,
+    refined_derivatives,
     remaining_evidence,
     with_axial_force,
 )
-from airtruth.tracing.friction import LATE_VANE, imitated_lag_s
+from airtruth.tracing.friction import imitated_lag_s, is_late_vane
 from airtruth.tracing.increment_table import in_physical_terms, increment_rows, least_certain
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, derivative_likelihood
 from airtruth.tracing.inference.homogeneity import Homogeneity, homogeneity
@@ -48,7 +50,6 @@ from airtruth.tracing.inference.hypothesis import is_curvature
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.inference.robust import robust_covariance
 from airtruth.tracing.intervals import at_measured_alpha, estimates, widened_by_profile, widened_by_rejected
-from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.notes import notes
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.record_differences import CERTAIN, DIFFERENCES, differences
@@ -68,6 +69,8 @@ from airtruth.tracing.tolerances import tolerances
 from airtruth.units import FT, KT
 
 Array = NDArray[np.float64]
+Publish = Callable[[bool], tuple[str | None, Replay | None]]
+"""From whether derivatives are refined to the folder of the updated aircraft and the records flown again, each None for none."""
 
 _TRACEABLE: Final = 4.0
 """Root of the noncentrality from which an effect counts as traceable [-] (judgement: after Holm's correction at 5 %
@@ -77,8 +80,7 @@ over 33 candidates such an effect is significant in four of five flights, as nor
 def conclude(
     stages: Stages,
     rounds: Sequence[SearchRound],
-    updated_aircraft: str | None = None,
-    replay: Replay | None = None,
+    publish: Publish | None = None,
     forced: Sequence[str] = (),
     axial: AxialForce | None = None,
 ) -> TraceAnswer:
@@ -87,8 +89,7 @@ def conclude(
     Parameters
     ----------
     stages, rounds : assessed stages, and rounds of the search.
-    updated_aircraft : folder of the updated aircraft, None where none was written.
-    replay : records flown again in JSBSim, None where nothing was flown again.
+    publish : writes the updated aircraft and flies it; None to write nothing.
     forced : faults of the logs that the caller overruled.
     axial : what ax shows; None where it was not compared.
     """
@@ -116,6 +117,8 @@ def conclude(
     if verdict == "unexplained" and declared.consistent:
         anomaly = remaining = Anomaly(DIFFERENCES, agreement.statistic, agreement.degrees, agreement.p_value)
     errors = stage_errors(stages)
+    refined = _refined(stages, declared) if verdict == "none" else {}
+    updated_aircraft, replay = (None, None) if publish is None else publish(bool(refined))
     return TraceAnswer(
         verdict=verdict,
         provisional=case.held is None
@@ -152,7 +155,14 @@ def conclude(
         inclusion=inclusion(sets),
         credit=credit(stated, stages),
         axial_force=None if axial is None else axial.errors,
+        refined=refined,
     )
+
+
+def _refined(stages: Stages, declared: DeclaredModel) -> dict[str, RefinedDerivative]:
+    """The refined derivatives, none where the held-out records deny them."""
+    denied = confirmation(stages, "declared", "before") is False
+    return {} if denied else refined_derivatives(declared)
 
 
 def _reserved(
@@ -164,7 +174,7 @@ def _reserved(
     agreement: Homogeneity,
 ) -> tuple[str, ...]:
     """Each reason against relying on the effects, and how the records differ, in words."""
-    late = any(e.key in LATE_VANE for e in effects)
+    late = any(is_late_vane(e.key) for e in effects)
     lag_s = imitated_lag_s(problem, last.reported) if late else 0.0
     differ = differences(agreement, [r.signals.run_id for r in problem.records], bool(effects))
     return (*reservations(effects, sets, declared.p_value, last.p_value_of(FRICTION), lag_s), *differ)
@@ -211,7 +221,7 @@ def _effect(
         for c in own.candidates
         if c is not best and c.score.effect.name != effect.name and c.gain <= best.gain
     ]
-    own_covariance = covariance[Common.size :, Common.size :][span, span]
+    own_covariance = covariance[final.layout.sizes, final.layout.sizes][span, span]
     stated = estimates(effect, final.point.sizes[span], own_covariance)
     if own.profile is not None:
         stated = widened_by_profile(effect, stated, own.profile)
@@ -229,7 +239,7 @@ def _effect(
         other_variants=tuple(
             sorted(c.score.effect.variant for c in others if c.score.effect.name == effect.name)
         ),
-        channel=effect.variant if effect.name == "sensor_delay" else None,
+        channel=effect.variant_channel,
         about_alpha_rad=final.hypothesis.trim_alpha_rad + shift if is_curvature(effect) else None,
     )
     if isinstance(effect, Increment):
@@ -316,11 +326,12 @@ def _derivatives(case: Case, rounds: Sequence[SearchRound], covariance: Array) -
     def named(values: Array) -> dict[str, float]:
         return dict(zip(PARAMETERS, values.tolist(), strict=True))
 
+    rows = rounds[-1].null.layout.of.common.derivatives
     return Derivatives(
         declared=named(declared),
-        before=named(declared + before_fit(rounds).point.common[Common.derivatives]),
-        after=named(declared + rounds[-1].null.point.common[Common.derivatives]),
-        after_std=named(np.sqrt(np.diag(covariance)[Common.derivatives])),
+        before=named(declared + before_fit(rounds).point.common[rows]),
+        after=named(declared + rounds[-1].null.point.common[rows]),
+        after_std=named(np.sqrt(np.diag(covariance)[rows])),
     )
 
 

@@ -19,15 +19,15 @@ _ERRORS: Final = 2.0
 denied in one of ten cases, measured in tests/tracing/test_confirmation.py)."""
 
 
-def confirmation(stages: Stages) -> bool | None:
-    """Whether *after* is no worse than *before* on held-out records; None without either of them.
+def confirmation(stages: Stages, first: str = "before", second: str = "after") -> bool | None:
+    """Whether a stage is no worse than an earlier one on held-out records; None without either of them.
 
     Two sums over the samples of all held-out records are tested against their long-run variance: the difference of the
     log-likelihoods of the innovations, and that of the squared residuals of the free runs over the noise floor.
     """
-    if stages.case.held is None or "after" not in stages.models:
+    if stages.case.held is None or second not in stages.models:
         return None
-    before, after = stages.held["before"], stages.held["after"]
+    before, after = stages.held[first], stages.held[second]
     lags = [round(MEMORY_S / r.signals.dt_s) for r in stages.case.held.records]
     free = _free_run_gains(before, after, stages.case.held.settings.measured)
     return not (_worse(_likelihood_gains(before, after), lags) or _worse(free, lags))

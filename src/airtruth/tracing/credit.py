@@ -11,7 +11,7 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.tracing.answer import AcceptedEffect
 from airtruth.tracing.inference.assess import own_likelihood
-from airtruth.tracing.model.parameters import Common
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.explanation import DERIVATIVES
 from airtruth.tracing.selection.release import size_in_derivatives
@@ -59,8 +59,9 @@ def _without(model: StageModel, effect: AcceptedEffect, case: Case) -> StageMode
         return replace(model, common=common)
     cause = next(c for c in case.declared.causes if c.key == effect.name)
     (estimate,) = effect.parameters.values()
-    size = EFFECTS[cause.key].parameters[0].size(estimate.value)
-    common[Common.derivatives] -= size_in_derivatives(cause.key, size) * cause.direction
+    own = EFFECTS[cause.key]
+    size = own.parameters[0].size(estimate.value)
+    common[SHORT_PERIOD.common.derivatives] -= size_in_derivatives(own, size) * cause.direction
     return replace(model, common=common)
 
 

@@ -23,16 +23,15 @@ from airtruth.tracing.answer import (
     DeclaredModel,
     DerivativeShift,
     ParameterEstimate,
+    RefinedDerivative,
 )
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, contradiction
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.model.parameters import Common, size_index
 from airtruth.tracing.selection.anomaly import DERIVATIVES_MOVED, Anomaly
 from airtruth.tracing.selection.explanation import DERIVATIVES, CauseSet, size_of
 from airtruth.tracing.selection.ranking import TIE
 from airtruth.tracing.selection.release import (
     CONTRADICTED,
-    DIVISORS,
     DeclaredCauses,
     Release,
     size_in_derivatives,
@@ -93,6 +92,26 @@ def declared_model(
     )
 
 
+def refined_derivatives(declared: DeclaredModel) -> dict[str, RefinedDerivative]:
+    """Derivatives about which the records alone know more than the declaration.
+
+    The precision of an estimate is that of the declaration plus that of the records; the latter is the larger one where the
+    variance of the estimate is below half the declared variance.
+
+    Examples
+    --------
+    >>> shift = DerivativeShift(-1.79, 0.09, -1.97, 0.02, (-2.01, -1.93), -2.0)
+    >>> vague = DerivativeShift(4.8, 0.24, 4.7, 0.2, (4.3, 5.1), -0.4)
+    >>> refined_derivatives(DeclaredModel(True, 4.0, 6, 0.68, {"Cmalpha": shift, "CLalpha": vague}))
+    {'Cmalpha': RefinedDerivative(declared=-1.79, estimate=-1.97, std=0.02)}
+    """
+    return {
+        name: RefinedDerivative(s.declared, s.estimate, s.std)
+        for name, s in declared.shifts.items()
+        if 2.0 * s.std**2 < s.declared_std**2
+    }
+
+
 def with_axial_force(declared: DeclaredModel, along: Sequence[AcceptedEffect]) -> DeclaredModel:
     """The test of the declared model with the axial force, which the derivatives and the anomaly do not contain.
 
@@ -130,17 +149,17 @@ def remaining_evidence(problem: TraceProblem, last: SearchRound) -> Anomaly:
 def _apparent_shift(last: SearchRound, covariance: Array, causes: DeclaredCauses) -> tuple[Array, Array]:
     """(6,) Shift of the derivatives with what carried causes bring, to first order, and its standard deviation."""
     point, hypothesis = last.null.point, last.null.hypothesis
-    shift = point.common[Common.derivatives].copy()
+    shift = point.common[point.of.common.derivatives].copy()
     slopes = np.zeros((len(PARAMETERS), len(covariance)))
-    slopes[:, Common.derivatives] = np.eye(len(PARAMETERS))
+    slopes[:, point.of.common.derivatives] = np.eye(len(PARAMETERS))
     directions = {c.key: c.direction for c in causes.causes}
-    for key in (e.key for e in hypothesis.effects if e.key in directions):
-        number = hypothesis.span(key).start
+    for effect in (e for e in hypothesis.effects if e.key in directions):
+        number = hypothesis.span(effect.key).start
         in_filter = float(point.sizes[number])
-        size = size_in_derivatives(key, in_filter)
-        slope = (1.0 + in_filter) ** -2 if key in DIVISORS else 1.0
-        shift += size * directions[key]
-        slopes[:, size_index(number)] = slope * directions[key]
+        size = size_in_derivatives(effect, in_filter)
+        slope = (1.0 + in_filter) ** -2 if effect.divides else 1.0
+        shift += size * directions[effect.key]
+        slopes[:, last.null.layout.size(number)] = slope * directions[effect.key]
     return shift, np.sqrt(np.diag(slopes @ covariance @ slopes.T))
 
 
@@ -295,17 +314,19 @@ def _estimates(
             for i, name in enumerate(PARAMETERS)
             if name in best.wrong
         }
-    first = EFFECTS[key].parameters[0]
+    effect = EFFECTS[key]
+    first = effect.parameters[0]
     if key in [e.key for e in last.null.hypothesis.effects]:
         number = last.null.hypothesis.span(key).start
-        std_size = float(np.sqrt(max(covariance[size_index(number), size_index(number)], 0.0)))
+        at = last.null.layout.size(number)
+        std_size = float(np.sqrt(max(covariance[at, at], 0.0)))
         return {first.name: _normal(first.value(float(last.null.point.sizes[number])), std_size)}
     at = best.causes.index(key)
     size, std_size = best.sizes[at], best.size_std[at]
     low, value, high = (
-        first.value(size_in_filter(key, s)) for s in (size - Z95 * std_size, size, size + Z95 * std_size)
+        first.value(size_in_filter(effect, s)) for s in (size - Z95 * std_size, size, size + Z95 * std_size)
     )
-    slope = value**2 if key in DIVISORS else 1.0
+    slope = value**2 if effect.divides else 1.0
     return {first.name: ParameterEstimate(value, std_size * slope, (low, high))}
 
 
@@ -336,6 +357,7 @@ __all__ = [
     "detectable_causes",
     "explaining_effects",
     "inclusion",
+    "refined_derivatives",
     "remaining_evidence",
     "traceable_errors",
     "with_axial_force",

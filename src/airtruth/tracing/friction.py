@@ -6,15 +6,19 @@ from typing import Final
 
 import numpy as np
 
+from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.model.parameters import PerRecord
+from airtruth.tracing.model.settings import VANE
 from airtruth.tracing.selection.omnibus import views
 from airtruth.units import DEG
 
-LATE_VANE: Final = frozenset({"vane_lag", "sensor_delay:alpha_rad"})
-"""Effects that make the vane late, by a time [s]."""
 PLAUSIBLE_RAD: Final = 0.1 * DEG
 """Half width of the play of a plausible vane with friction [rad] (judgement: a dry bearing or a potentiometer)."""
+
+
+def is_late_vane(key: str) -> bool:
+    """Whether an effect of the library makes the vane late, by a time [s]."""
+    return key in EFFECTS and EFFECTS[key].late_signal == VANE
 
 
 def imitated_lag_s(problem: TraceProblem, fitted: PosteriorFit) -> float:
@@ -31,11 +35,11 @@ def imitated_lag_s(problem: TraceProblem, fitted: PosteriorFit) -> float:
     problem, fitted : records, and a fit of them; the motion is the one that the filter predicts.
     """
     airspeed_m_s = np.array([r.signals.airspeed_m_s.mean() for r in problem.records])
-    gust_rad = np.exp(fitted.point.per_record[:, PerRecord.log_gust]) / airspeed_m_s
+    gust_rad = np.exp(fitted.point.per_record[:, problem.layout.per_record.log_gust]) / airspeed_m_s
     if gust_rad.min() <= PLAUSIBLE_RAD:
         return 0.0
     rate_rad_s = np.concatenate([np.diff(v.alpha_rad) / v.dt_s for v in views(fitted, problem)])
     return float(PLAUSIBLE_RAD * np.abs(rate_rad_s).mean() / np.square(rate_rad_s).mean())
 
 
-__all__ = ["LATE_VANE", "PLAUSIBLE_RAD", "imitated_lag_s"]
+__all__ = ["PLAUSIBLE_RAD", "imitated_lag_s", "is_late_vane"]

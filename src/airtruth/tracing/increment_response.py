@@ -54,12 +54,12 @@ def response(derivatives: Array, scale: short_period.Scale, lift: Array, moment:
     (3, runs, samples) alpha [rad], q [rad/s], az [m/s2].
     """
     runs, samples = lift.shape
-    every = np.broadcast_to(derivatives, (runs, 6))
+    every = np.broadcast_to(derivatives, (runs, derivatives.shape[-1]))
     a, _ = short_period.system(every, scale)
     u = np.stack([-scale.lift[:, None] * lift, scale.moment[:, None] * moment], axis=2)
     # x' = A x + u, u' = (u1 - u0)/dt: one exponential gives the exact step (Franklin, Powell and Workman,
     # Digital Control of Dynamic Systems, 3rd ed., 1998, 6.3.2, triangle hold)
-    whole = np.zeros((runs, 6, 6))
+    whole = np.zeros((runs, 3 * 2, 3 * 2))  # states, u and u'
     whole[:, :2, :2] = a * dt_s
     whole[:, :2, 2:4] = np.eye(2) * dt_s
     whole[:, 2:4, 4:] = np.eye(2)

@@ -174,14 +174,62 @@ def disagreement(check: CheckResult | None, answer: TraceAnswer, dt_s: float) ->
     return result
 
 
+def names_a_sensor(answer: TraceAnswer) -> bool:
+    """Whether an answer names an error that a kinematic check compares."""
+    return any(_key(e.name, e.channel) in ERRORS for e in answer.effects)
+
+
+def excluded(check: CheckResult | None, answer: TraceAnswer) -> list[str]:
+    """A sentence about each error of a sensor that an answer names and a check of all records excludes, without a final period.
+
+    A check excludes an error if no set that it allows holds the error, or one that looks the same to the trace, although the
+    records would show the size that the trace estimates.
+
+    Parameters
+    ----------
+    check : of all records, held-out ones included; None where they allow none.
+    """
+    if check is None or check.verdict not in ("errors", "one_of", "agrees"):
+        return []
+    findings = {f.name: f for f in check.findings}
+    allowed = {f.name.partition(":")[0] for cause in check.possible for f in cause.errors}
+    result = []
+    for effect in answer.effects:
+        key = _key(effect.name, effect.channel)
+        found = findings.get(key)
+        alike = {name.partition(":")[0] for name in (key, *effect.indistinguishable_from)}
+        if found is None or found.state != "not needed" or alike & allowed or not effect.parameters:
+            continue
+        neutral, visible = (
+            _beyond_declared(replace(found, value=found.declared + x)) for x in (0.0, found.smallest)
+        )
+        if abs(next(iter(effect.parameters.values())).value - neutral) > abs(visible - neutral):
+            words = " or ".join(cause.name.replace(" + ", " with ") for cause in check.possible)
+            result.append(
+                f"the trace names {key}, and the kinematic check of all records, held-out ones included, excludes it "
+                f"(possible there: {words}); inspect `airtruth check`"
+            )
+    return result
+
+
 def _margin(one: Finding, dt_s: float) -> float:
     """Difference that is none: for a time, a share of the sample period [s]."""
     return _SAMPLES * dt_s if one.unit == "s" else 0.0
 
 
-def with_contradictions(answer: TraceAnswer, check: CheckResult | None, dt_s: float) -> TraceAnswer:
-    """The answer with its contradictions to a check, which make its effects provisional; ``dt_s`` as of `disagreement`.
+def with_contradictions(
+    answer: TraceAnswer, check: CheckResult | None, dt_s: float, whole: CheckResult | None = None
+) -> TraceAnswer:
+    """The answer with its contradictions to a check, which make its effects provisional.
 
+    Parameters
+    ----------
+    check : of the fitted records.
+    dt_s : as of `disagreement`.
+    whole : check of all records; what it alone excludes is a note, and does not make the answer provisional.
+
+    Notes
+    -----
     Where the channels contradict each other beyond doubt, something is missing, although the whole of the records fits the
     declared aircraft: a sensor that was late in one record, for example.
     """
@@ -194,6 +242,7 @@ def with_contradictions(answer: TraceAnswer, check: CheckResult | None, dt_s: fl
             "missing effect explains it; run `airtruth check` on single records, because an error may be in one of them alone"
         )
         answer = replace(answer, verdict="unexplained", anomaly=left, remaining=left)
+    found += excluded(whole, answer) if not found else []
     return replace(answer, provisional=provisional, notes=(*answer.notes, *found))
 
 
@@ -203,7 +252,9 @@ def _key(name: str, channel: str | None) -> str:
 
 __all__ = [
     "disagreement",
+    "excluded",
     "kinematic_check",
+    "names_a_sensor",
     "sets_of",
     "starts_of",
     "with_contradictions",

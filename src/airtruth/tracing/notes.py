@@ -13,7 +13,7 @@ from airtruth.quantity import Quantity
 from airtruth.table import significant
 from airtruth.tracing.answer import DeclaredModel
 from airtruth.tracing.model.compile import CHANNELS
-from airtruth.tracing.model.parameters import COLOUR_TIME_S, Common
+from airtruth.tracing.model.parameters import COLOUR_TIME_S, SHORT_PERIOD
 from airtruth.tracing.replay import disagreement, worsened
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.stage_errors import Errors, PerChannel, Replay
@@ -122,13 +122,14 @@ def within_assumed_uncertainty(declared: DeclaredModel, stated: Mapping[str, Qua
 
 def _correlated_noise(common: Array) -> Iterator[str]:
     shares = {
-        channel: float(share) for channel, share in zip(CHANNELS, common[Common.colour_shares], strict=True)
+        channel: float(share)
+        for channel, share in zip(CHANNELS, common[SHORT_PERIOD.common.colour_shares], strict=True)
     }
     named = [
         f"{100.0 * share:.0f} % of {channel}" for channel, share in shares.items() if share > _WORTH_A_NOTE
     ]
     if named:
-        time_s = COLOUR_TIME_S * math.exp(common[Common.log_colour_time])
+        time_s = COLOUR_TIME_S * math.exp(common[SHORT_PERIOD.common.log_colour_time])
         yield (
             f"the sensor noise is correlated in time: {', '.join(named)} of the noise variance, over {time_s:.2g} s"
         )

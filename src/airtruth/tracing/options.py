@@ -9,7 +9,7 @@ from typing import Final
 
 from airtruth.arguments import names, require_whole
 from airtruth.effects.effect import Effect
-from airtruth.effects.registry import EFFECTS, GROUP
+from airtruth.effects.registry import EFFECTS
 from airtruth.errors import ConfigurationError, choices
 
 MODELS: Final = ("aircraft", "linear")
@@ -28,8 +28,8 @@ class TraceOptions:
         the only one.
     threads : number of records processed at a time; the answer does not depend on it.
     seed : seed of the random draws behind p-values, 0 or more.
-    effects : keys of the candidates, a string is one of them; a name without a variant selects all of its variants; an
-        `Effect` of the library, as `list_effects` returns it, stands for its key; None for the library.
+    effects : candidates, one or a sequence; None for the library. A key of the library, a name without a variant for all of
+        its variants, or an `Effect`, which need not be in the library.
     time_budget_s : time after which the search starts no new step [s]; None for no limit. The answer then depends on the
         machine, is provisional, and lists the omitted steps.
     increments : whether increments are learned from the residual of the named effects; None where the whole library is
@@ -69,29 +69,41 @@ class TraceOptions:
         if self.threads < 1:
             raise ConfigurationError(f"--jobs {self.threads}: must be at least 1")
         require_whole("seed", self.seed, 0)
-        if isinstance(self.effects, Effect):
-            object.__setattr__(self, "effects", (_key(self.effects),))
-        elif (
-            self.effects is not None
-            and not isinstance(self.effects, str)
-            and isinstance(self.effects, Iterable)
-        ):
-            keys = tuple(_key(one) if isinstance(one, Effect) else one for one in self.effects)
-            object.__setattr__(self, "effects", keys)
-        for name, example in (("hold_out", "light-00001"), ("effects", "elevator_delay")):
-            value = getattr(self, name)
-            if value is not None:
-                object.__setattr__(self, name, names(name, value, example))
+        if self.hold_out is not None:
+            object.__setattr__(self, "hold_out", names("hold_out", self.hold_out, "light-00001"))
+        if self.effects is not None:
+            object.__setattr__(self, "effects", _candidates(self.effects))
         if self.time_budget_s is not None and not 0.0 <= self.time_budget_s < math.inf:
             raise ConfigurationError(
                 f"--time-budget {self.time_budget_s}: must be a number of seconds, 0 or more"
             )
 
 
-def _key(effect: Effect) -> str:
-    """Key of an effect of the library."""
-    if EFFECTS.get(effect.key) != effect:
+def _candidates(given: str | Effect | Iterable[str | Effect]) -> tuple[str | Effect, ...]:
+    """Keys of the library, and effects that are not in it."""
+    if isinstance(given, Effect):
+        return (_candidate(given),)
+    several = () if isinstance(given, str) or not isinstance(given, Iterable) else tuple(given)
+    if not any(isinstance(one, Effect) for one in several):
+        return names("effects", given, "elevator_delay")  # type: ignore[arg-type]  # it refuses other types
+    keys = iter(names("effects", [one for one in several if not isinstance(one, Effect)], "elevator_delay"))
+    return tuple(_candidate(one) if isinstance(one, Effect) else next(keys) for one in several)
+
+
+def _candidate(effect: Effect) -> str | Effect:
+    """The key of an effect of the library, or the effect itself."""
+    known = EFFECTS.get(effect.key)
+    if known == effect:
+        return effect.key
+    if known is not None:
         raise ConfigurationError(
-            f"effects: {effect.key} is no effect of the library; an entry point of the group {GROUP} adds it, see docs/effects.md"
+            f"effects: the library has another effect with the key {effect.key}; give yours another name or variant"
         )
-    return effect.key
+    if effect.in_derivatives:
+        raise ConfigurationError(
+            f"effects: {effect.key} changes the derivatives by a cause, which only the library can; state its aero terms"
+        )
+    return effect
+
+
+__all__ = ["MODELS", "TraceOptions"]

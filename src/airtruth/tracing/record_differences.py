@@ -11,7 +11,8 @@ LEVEL: Final = 1e-4
 """Probability of the agreement of the records below which names are provisional [-] (judgement: none of 80 nulls of the
 blind trials is below)."""
 CERTAIN: Final = 1e-6
-"""The same below which an answer without a cause is not that nothing is missing [-] (judgement: beyond doubt)."""
+"""Probability of the agreement of the records below which the verdict "none" becomes "unexplained" [-] (judgement: beyond
+doubt)."""
 DIFFERENCES: Final = "the differences between the records"
 """Where the evidence shows."""
 _AGREE: Final = 0.01

@@ -44,8 +44,8 @@ def flown_again(stages: Stages, aircraft: Aircraft, updated: str | Path | None) 
 
     Returns
     -------
-    Errors of both aircraft; None for an aircraft without a JSBSim model, for a trace with the linear model, and where
-    the motion leaves the range of the simulation.
+    Errors of both aircraft; an empty `Replay` for an aircraft without a JSBSim model, for a trace with the linear model, and
+    where the motion leaves the range of the simulation.
 
     Raises
     ------

@@ -14,9 +14,9 @@ from airtruth.effects.increment import NAME
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.answer import DECLARED_LEVEL, Alternative
-from airtruth.tracing.friction import LATE_VANE, PLAUSIBLE_RAD
+from airtruth.tracing.friction import PLAUSIBLE_RAD, is_late_vane
 from airtruth.tracing.model.settings import VANE
-from airtruth.tracing.selection.explanation import DERIVATIVES, USUAL_SIZES
+from airtruth.tracing.selection.explanation import DERIVATIVES, events
 from airtruth.units import DEG
 
 MANY: Final = 3
@@ -41,8 +41,6 @@ UNUSUAL: Final = 3.0
 """Size of a named cause over the standard deviation of its prior from which the names are provisional [-] (convention)."""
 _AXIAL: Final = "CX"
 """Coefficient whose increments a wrong angle of attack imitates: ax shows them, after the effects of the other channels."""
-_ONE_EVENT: Final = frozenset({"cg_shift", "mass_error", "inertia_error"})
-"""Effects that one event brings, and which count as one cause: a load that is not declared, or a lost part."""
 
 
 def reservations(
@@ -107,7 +105,7 @@ def reservations(
             "names are provisional"
         )
     of_vane = [e.key for e in named if e.key in EFFECTS and EFFECTS[e.key].channels == (VANE,)]
-    late = [e.key for e in named if e.key in LATE_VANE and 0.0 < _value(e) <= friction_lag_s]
+    late = [e.key for e in named if is_late_vane(e.key) and 0.0 < _value(e) <= friction_lag_s]
     if of_vane and friction_p_value <= DOUBT:
         found.append(
             f"the vane moves less than gyro and accelerometer show where the motion turns (p = {friction_p_value:.2g} beside "
@@ -173,10 +171,11 @@ def _contains_neutral(effect: AcceptedEffect) -> bool:
 def _deviation(effect: AcceptedEffect) -> float:
     """Size of a cause that moves the derivatives, over the standard deviation of its prior; 0 for any other effect [-]."""
     stated = _size(effect)
-    if stated is None or effect.key not in USUAL_SIZES:
+    prior = EFFECTS[effect.key].prior if effect.key in EFFECTS else None
+    if stated is None or prior is None:
         return 0.0
     first, estimate = stated
-    return abs(first.size(estimate.value)) / USUAL_SIZES[effect.key]
+    return abs(first.size(estimate.value)) / prior.std
 
 
 def _size(effect: AcceptedEffect) -> tuple[Parameter, ParameterEstimate] | None:
@@ -189,9 +188,8 @@ def _size(effect: AcceptedEffect) -> tuple[Parameter, ParameterEstimate] | None:
 
 
 def causes(named: Sequence[AcceptedEffect]) -> int:
-    """Number of separate causes among named effects; CG, mass and inertia count as one."""
-    apart = [e for e in named if e.name not in _ONE_EVENT]
-    return len(apart) + (len(apart) < len(named))
+    """Number of separate causes among named effects; those of one event count as one."""
+    return events([e.key for e in named])
 
 
 __all__ = [

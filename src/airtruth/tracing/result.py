@@ -14,6 +14,7 @@ from airtruth.result import shortened
 from airtruth.tracing.accepted import AcceptedEffect
 from airtruth.tracing.answer import ANSWER, TraceAnswer
 from airtruth.tracing.prepare import Case
+from airtruth.tracing.presentation.brief import as_brief_text
 from airtruth.tracing.presentation.html import as_trace_html
 from airtruth.tracing.presentation.text import as_trace_text
 from airtruth.tracing.selection.rounds import SearchRound
@@ -64,7 +65,11 @@ class TraceResult:
         return self.answer.effects
 
     def summary(self) -> str:
-        """The text that `airtruth trace` prints, the verdict first."""
+        """The text that `airtruth trace` prints: one screen, the verdict first."""
+        return as_brief_text(self.answer)
+
+    def details(self) -> str:
+        """The text of `airtruth trace --verbose`: every table, candidate and note."""
         return as_trace_text(self.answer)
 
     def to_frame(self) -> pd.DataFrame:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,7 @@ from airtruth.tracing.conclude import conclude
 from airtruth.tracing.declared_model import declared_p_value
 from airtruth.tracing.kinematic_start import (
     kinematic_check,
+    names_a_sensor,
     sets_of,
     starts_of,
     with_contradictions,
@@ -49,6 +50,7 @@ from airtruth.tracing.selection.search import search
 from airtruth.tracing.selection.settled import total_cost
 from airtruth.tracing.selection.significance import LEVEL
 from airtruth.tracing.selection.weights import with_rival
+from airtruth.tracing.stage_errors import Replay
 from airtruth.tracing.stages import assess_stages
 from airtruth.tracing.update import updated_folder, write_update
 
@@ -114,20 +116,25 @@ def _traced(
     advance("compare ax with the declared axial force")
     axial = axial_force(stages, checked, declared, rounds[-1].gls) if options.learns else None
     origin = provenance_of(logs, declared, options)
-    dt_s = _longest_period_s(case)
-    if out is None:
-        answer = with_contradictions(conclude(stages, rounds, forced=forced, axial=axial), kinematics, dt_s)
-        answer = replace(answer, notes=(*remarks, *answer.notes))
-        return TraceResult(answer, rounds, stages, origin)
-    advance("write the updated aircraft")
-    atomic.remove_file(out / ANSWER)  # an interrupted trace has no answer, not one of another trace
-    contradicted = declared_p_value(rounds) <= DECLARED_LEVEL
-    updated = write_update(case, rounds, declared, out, contradicted, axial)
-    replay = flown_again(stages, declared, updated)
-    answer = with_contradictions(conclude(stages, rounds, updated, replay, forced, axial), kinematics, dt_s)
+
+    def publish(refined: bool) -> tuple[str | None, Replay | None]:
+        if out is None:
+            return None, None
+        advance("write the updated aircraft")
+        atomic.remove_file(out / ANSWER)  # an interrupted trace has no answer, not one of another trace
+        refit = refined or declared_p_value(rounds) <= DECLARED_LEVEL
+        updated = write_update(case, rounds, declared, out, refit, axial)
+        return updated, flown_again(stages, declared, updated)
+
+    answer = conclude(stages, rounds, publish, forced, axial)
+    whole = kinematics
+    if held and kinematics is not None and names_a_sensor(answer):
+        whole = kinematic_check(checked, declared, ())
+    answer = with_contradictions(answer, kinematics, _longest_period_s(case), whole)
     answer = replace(answer, notes=(*remarks, *answer.notes))
     result = TraceResult(answer, rounds, stages, origin)
-    result.write(out)
+    if out is not None:
+        result.write(out)
     return result
 
 
@@ -139,9 +146,8 @@ def provenance_of(logs: Logs, aircraft: Aircraft, options: TraceOptions) -> Prov
     StoreError, ConfigurationError
         If a file cannot be read, or a log does not exist.
     """
-    stated = {
-        name: value for name, value in asdict(options).items() if name != "threads"
-    }  # which changes nothing
+    stated = {f.name: getattr(options, f.name) for f in fields(options) if f.name != "threads"}
+    stated["effects"] = options.keys  # the number of threads changes nothing
     words = {name: "default" if value is None else _words(value) for name, value in stated.items()}
     digests = digests_of(logs, aircraft.folder)
     return Provenance(__version__, aircraft.name, words, digests, str(aircraft.folder.resolve()))
@@ -243,10 +249,13 @@ def _with_later_colour(
 
 def _effects(options: TraceOptions) -> list[Effect]:
     """The requested candidates, each once; a name without a variant selects all of its variants."""
-    if options.keys is None:
+    if options.effects is None:
         return [effect for effect in EFFECTS.values() if not effect.in_derivatives]
     found: dict[str, Effect] = {}
-    for key in options.keys:
+    for key in options.effects:
+        if isinstance(key, Effect):
+            found[key.key] = key
+            continue
         matching = {k: e for k, e in EFFECTS.items() if key in (k, e.name)}
         if not matching:
             raise ConfigurationError(

@@ -13,7 +13,7 @@ from airtruth.tracing.inference.feedback import responds_to_motion
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.compile import CHANNELS
-from airtruth.tracing.model.parameters import Common
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.acceptance import Candidate
 from airtruth.tracing.selection.rounds import SearchRound
@@ -86,7 +86,7 @@ def assess_stages(case: Case, rounds: Sequence[SearchRound]) -> Stages:
     null, last = before_fit(rounds), rounds[-1].null
     # noise levels are those of the stage before: with the declared ones only the declared model would be assessed
     declared = null.point.common.copy()
-    declared[[*range(Common.derivatives.stop), Common.inertia]] = 0.0
+    declared[[*range(SHORT_PERIOD.common.derivatives.stop), SHORT_PERIOD.common.inertia]] = 0.0
     models = {
         "declared": StageModel(case.hypothesis, declared, np.zeros(0), null.point.per_record, False),
         "before": _model(null),

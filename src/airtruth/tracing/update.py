@@ -9,43 +9,55 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airtruth.aircraft import FILE, Aircraft
 from airtruth.aircraft.corrected import write_corrected
 from airtruth.aircraft.jsbsim.short_period import TrimPoint
-from airtruth.aircraft.write import MARK, Corrections, write_aircraft
+from airtruth.aircraft.origin import MARK, UNKNOWN, Origin, rounded
+from airtruth.aircraft.write import Corrections, write_aircraft
 from airtruth.effects.increment import Increment
 from airtruth.errors import StoreError
 from airtruth.logs import atomic
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.physics.terms import DECLARED, AeroTerm, Change, ReadingTerm, SensorTerm, declared_total
+from airtruth.quantity import Quantity
 from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
 from airtruth.tracing.axial_force import AxialForce
 from airtruth.tracing.increment_table import increment_table
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import robust_covariance
-from airtruth.tracing.model.parameters import Common
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.response import moved_past_sensors_m
 from airtruth.tracing.model.settings import VANE
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.rounds import SearchRound
+from airtruth.tracing.update_origin import source_text, with_spread
 from airtruth.units import G0
+
+Array = NDArray[np.float64]
 
 WITHOUT_EFFECTS: Final = "without_effects"
 """Folder beside that of the updated aircraft: one without a JSBSim model, as it flies without the accepted effects."""
 _WITH_ARM: Final = (VANE, "az_m_s2")
 """Channels whose reading depends on where their sensor is."""
+_DECIMALS: Final = 6
+"""Decimals of the trim about which the derivatives are refitted [rad] (judgement: finer than any sensor of angles)."""
 _Term = TypeVar("_Term", AeroTerm, ReadingTerm)
 
 
-def accepted_change(case: Case, rounds: Sequence[SearchRound], chord_m: float) -> Change:
-    """The accepted effects at their estimated sizes, with sensors that a shift of the CG has moved relative to it."""
-    final = rounds[-1].reported
-    change = final.hypothesis.added(final.point.sizes)
+def accepted_change(case: Case, fit: PosteriorFit, sizes: Array, chord_m: float) -> Change:
+    """The effects of a fit at some sizes, with sensors that a shift of the CG has moved relative to it.
+
+    Parameters
+    ----------
+    fit : hypothesis and common parameters; sizes : of its effects.
+    """
+    change = fit.hypothesis.added(sizes)
     shift = declared_total(change.declared, "cg")
     if shift == DECLARED["cg"]:
         return change
-    moved_m = moved_past_sensors_m(final.point.common, shift, chord_m)
+    moved_m = moved_past_sensors_m(fit.point.common, shift, chord_m)
     arms = (SensorTerm(c, "arm", moved_m) for c in _WITH_ARM if c != VANE or case.has_vane)
     return replace(change, sensors=(*change.sensors, *arms))
 
@@ -89,7 +101,7 @@ def write_update(
     rounds: Sequence[SearchRound],
     aircraft: Aircraft,
     out: Path,
-    contradicted: bool = False,
+    refit: bool = False,
     axial: AxialForce | None = None,
 ) -> str | None:
     """Write the aircraft with the accepted effects and the refitted derivatives to OUT/aircraft/NAME.
@@ -100,8 +112,8 @@ def write_update(
 
     Parameters
     ----------
-    contradicted : whether the records contradict the declared model; its derivatives are then refitted although no
-        effect was accepted.
+    refit : whether the refitted derivatives are written although no effect was accepted: the records contradict the
+        declared ones, or determine them better.
     axial : increments of CX that ax shows; None for none.
 
     Returns
@@ -114,80 +126,91 @@ def write_update(
         If the model cannot take the effect, or the folder cannot be written; as `updated_folder`.
     """
     folder = updated_folder(aircraft, out)
-    change = accepted_change(case, rounds, aircraft.constants.chord_m)
+    fit = rounds[-1].reported
+    covariance = robust_covariance(case.fitted, fit)
+    shift = case.fitted.alpha_shift_rad
+
+    def change_at(sizes: Array) -> Change:
+        return from_zero_alpha(accepted_change(case, fit, sizes, aircraft.constants.chord_m), shift)
+
+    change, std = with_spread(change_at, fit.point.sizes, covariance[fit.layout.sizes, fit.layout.sizes])
     along = () if axial is None else axial.increments
     change += Change() if axial is None else axial.change
     released = rounds[-1].null.hypothesis.spread is not None
-    refits = released or contradicted
-    if change == Change() and not refits and aircraft.file.jsbsim is not None:
+    if change == Change() and not (released or refit) and aircraft.file.jsbsim is not None:
         atomic.remove_folder(folder)
         return None
-    fit = rounds[-1].reported
-    plants = [record.plant for record in case.fitted.records]
-    shift = case.fitted.alpha_shift_rad
-    change = from_zero_alpha(change, shift)
-    increments = dict(zip(PARAMETERS, fit.point.common[Common.derivatives].tolist(), strict=True))
+    origin = Origin(source_text([r.signals.run_id for r in case.fitted.records]), std)
     release = rounds[-1].release
     causes = release.sets[0].effects if released and release is not None else ()
     names = dict.fromkeys([*(e.key for e in fit.hypothesis.effects), *(e.key for e in along), *causes])
-    found = ", ".join(names) or "no effect of the library explains the residual"
-    note = f"Traced from measured records: {found}."
-    corrections = None
-    refitted = bool(np.isfinite(list(increments.values())).all())
-    alpha = float(np.mean([p.trim_alpha_rad for p in plants])) + shift
-    elevator = float(np.mean([p.trim_elevator_rad for p in plants]))
-    if refitted:
-        aircraft = _with_derivatives(aircraft, increments)
-        note += " Derivatives refitted: " + ", ".join(f"{k} {v:+.4g}" for k, v in increments.items()) + "."
+    found = ", ".join(names) or "none of the library"
+    note = f"Effects: {found}. Derivatives refitted. Source: {origin.source}."
     note += "".join(f"\n{line}" for line in (*_bands(case, fit), *map(_band, along)))
-    if aircraft.file.jsbsim is None:
-        at = _measured_trim(case, alpha, elevator)
-        _write_flying(_with_std(aircraft, case, fit), at, change, folder, note)
-        _write_flying(aircraft, at, Change(), folder.parents[1] / WITHOUT_EFFECTS / aircraft.name, note)
+    corrections = _corrections(case, fit, covariance)
+    updated = _with_derivatives(aircraft, corrections, corrections.std, origin.source)
+    if aircraft.file.jsbsim is not None:
+        with atomic.new_folder(folder) as new:
+            write_aircraft(updated, change, new, note, corrections, origin=origin)
         return str(folder)
-    if refitted:
-        corrections = Corrections(increments, alpha, elevator)
-    with atomic.new_folder(folder) as new:
-        write_aircraft(aircraft, change, new, note, corrections)
+    _write_flying(updated, case, corrections, change, folder, note, origin)
+    without = _with_derivatives(aircraft, corrections, {}, origin.source)
+    _write_flying(
+        without, case, corrections, Change(), folder.parents[1] / WITHOUT_EFFECTS / aircraft.name, note
+    )
     return str(folder)
 
 
-def _measured_trim(case: Case, alpha_rad: float, elevator_rad: float) -> TrimPoint:
-    """The trim of the fitted records, in level flight."""
-    signals = [record.signals for record in case.fitted.records]
-    return TrimPoint(
-        airspeed_m_s=float(np.mean([s.airspeed_m_s[0] for s in signals])),
-        density_kg_m3=float(np.mean([s.density_kg_m3[0] for s in signals])),
-        alpha_rad=alpha_rad,
-        elevator_rad=elevator_rad,
-        az_m_s2=-G0 * math.cos(alpha_rad),
+def _corrections(case: Case, fit: PosteriorFit, covariance: Array) -> Corrections:
+    """The refitted derivatives, about the mean trim of the fitted records."""
+    values = fit.point.common[SHORT_PERIOD.common.derivatives].tolist()
+    deviations = np.sqrt(np.diag(covariance)[SHORT_PERIOD.common.derivatives]).tolist()
+    std = dict(zip(PARAMETERS, deviations, strict=True))
+    plants = [record.plant for record in case.fitted.records]
+    alpha = float(np.mean([p.trim_alpha_rad for p in plants])) + case.fitted.alpha_shift_rad
+    return Corrections(
+        {name: rounded(value, std[name]) for name, value in zip(PARAMETERS, values, strict=True)},
+        round(alpha, _DECIMALS),
+        round(float(np.mean([p.trim_elevator_rad for p in plants])), _DECIMALS),
+        std,
     )
 
 
-def _write_flying(aircraft: Aircraft, at: TrimPoint, change: Change, folder: Path, note: str) -> None:
+def _write_flying(
+    aircraft: Aircraft,
+    case: Case,
+    trim: Corrections,
+    change: Change,
+    folder: Path,
+    note: str,
+    origin: Origin = UNKNOWN,
+) -> None:
+    """An aircraft without a JSBSim model, as one that flies in level flight at the trim of the fitted records."""
+    signals = [record.signals for record in case.fitted.records]
+    at = TrimPoint(
+        airspeed_m_s=float(np.mean([s.airspeed_m_s[0] for s in signals])),
+        density_kg_m3=float(np.mean([s.density_kg_m3[0] for s in signals])),
+        alpha_rad=trim.alpha_rad,
+        elevator_rad=trim.elevator_rad,
+        az_m_s2=-G0 * math.cos(trim.alpha_rad),
+    )
     with atomic.new_folder(folder) as new:
-        write_corrected(aircraft, aircraft.file.derivatives, at, change, new, note)
+        write_corrected(aircraft, aircraft.file.derivatives, at, change, new, note, origin)
 
 
-def _with_std(aircraft: Aircraft, case: Case, fit: PosteriorFit) -> Aircraft:
-    """The aircraft with the standard deviations of the refitted derivatives, which contain the declared ones."""
-    std = np.sqrt(np.diag(robust_covariance(case.fitted, fit))[Common.derivatives])
-    refitted = {
-        name: aircraft.file.derivatives[name].model_copy(update={"std": float(value)})
-        for name, value in zip(PARAMETERS, std, strict=True)
-    }
-    file = aircraft.file.model_copy(update={"derivatives": refitted})
-    return aircraft.model_copy(update={"file": file})
+def _with_derivatives(
+    aircraft: Aircraft, corrections: Corrections, std: Mapping[str, float], source: str
+) -> Aircraft:
+    """The aircraft with other [derivatives]: all that one without a JSBSim model has, and beside a model what it flies.
 
-
-def _with_derivatives(aircraft: Aircraft, increments: Mapping[str, float]) -> Aircraft:
-    """The aircraft with other [derivatives]: all that one without a JSBSim model has, and beside a model what it flies."""
-    declared = aircraft.file.derivatives
+    Parameters
+    ----------
+    std : standard deviations of the refitted derivatives, which contain the declared ones; without one that stays.
+    """
+    increments = corrections.increments
     moved = {
-        name: q.model_copy(
-            update={"value": q.value + increments.get(name, 0.0), "source": "refitted by a trace"}
-        )
-        for name, q in declared.items()
+        name: Quantity(value=q.value + increments[name], std=std.get(name, q.std), source=source)
+        for name, q in aircraft.file.derivatives.items()
     }
     file = aircraft.file.model_copy(update={"derivatives": moved})
     return aircraft.model_copy(update={"file": file})

@@ -24,13 +24,16 @@ from airtruth.aircraft.jsbsim.functions import (
     prop,
     step,
 )
-from airtruth.aircraft.jsbsim.surface import Components, Names
+from airtruth.aircraft.jsbsim.surface import Components, Surface
+from airtruth.aircraft.origin import Origin
 from airtruth.errors import AircraftError, ConfigurationError, choices
 from airtruth.physics.terms import FORMULAS, SIGNALS, AeroTerm, StateTerm, shape_of
 from airtruth.units import PSF
 
 _ALPHA_DOT: Final = "aero/alphadot-rad_sec"
 """Property of alpha_dot over ground, one step old [rad/s]."""
+_PROPERTIES: Final = {"alpha": "aero/alpha-rad"}
+"""Signal -> property of JSBSim that holds it in SI."""
 _LEAST_BENDS: Final = 3
 """Least number of bends that are written as a table [-]; a single break is a formula (convention)."""
 _ROUNDING: Final = 1e-9
@@ -86,9 +89,9 @@ def write(
     aerodynamics: Element,
     terms: Sequence[AeroTerm],
     states: Sequence[StateTerm],
-    named: Names,
-    surface_rad: float,
+    surface: Surface,
     rotary_gust: str | None,
+    origin: Origin,
     where: str,
 ) -> Components:
     """Add the terms to the axes, and return the components that have to run in a control channel.
@@ -97,9 +100,9 @@ def write(
     ----------
     aerodynamics : the model's element, changed.
     terms, states : see `airtruth.physics.terms`.
-    named : names of the new properties.
-    surface_rad : radians per unit of the surface's property.
+    surface : names of the new properties, and the surface that causes the forces.
     rotary_gust : property that holds the rotation of the air [rad/s], or None.
+    origin : standard deviations and source, for the descriptions.
     where : subject of error messages.
 
     Raises
@@ -109,7 +112,7 @@ def write(
     AircraftError
         If the model has no axis that can carry lift.
     """
-    root = f"aero/{named.label}/"
+    root = f"aero/{surface.names.label}/"
     twice = {s.name for s in states if sum(o.name == s.name for o in states) > 1}
     if twice:
         raise ConfigurationError(
@@ -118,23 +121,28 @@ def write(
     made: dict[str, str] = {}
     functions: list[Element] = []
     memory = Components()
+    held = {s.signal for s in states}  # a state reads the signal of the step before, which a function keeps
     factors = [t.factor for t in terms if t.factor]
     for name in dict.fromkeys([s.signal for s in states] + [t.signal for t in terms] + factors):
         if name in (s.name for s in states):
             continue
+        direct = _PROPERTIES.get(name, surface.direct if name == "elevator" else None)
+        if direct is not None and name not in held:
+            made[name] = direct
+            continue
         made[name] = f"{root}{name.replace('_', '-')}"
-        extra, more = _signal(name, made[name], named.effective, surface_rad, rotary_gust)
+        extra, more = _signal(name, made[name], surface, rotary_gust)
         functions += extra
         memory += more
     for state in states:
         made[state.name] = f"{root}state-{state.name}"
-        functions.append(_state(state, made[state.name], made[state.signal]))
+        functions.append(_state(state, made[state.name], made[state.signal], origin.words(state)))
         memory += _memory(state, made[state.name], made[state.signal])
     by_coefficient: dict[str, list[str]] = {"CL": [], "Cm": [], "CX": []}
     learned, single = _grouped(terms)
     for number, group in enumerate(learned, start=1):
         output = f"{root}{group[0].coefficient}-table-{number}"
-        functions += _table(output, group, made[group[0].signal])
+        functions += _table(output, group, made[group[0].signal], origin.source and f"; {origin.source}")
         if group[0].factor:
             slope, output = output, f"{output}-increment"
             words = f"{group[0].coefficient} by {group[0].factor}, at = {group[0].factor_at!r}"
@@ -142,10 +150,10 @@ def write(
         by_coefficient[group[0].coefficient].append(output)
     for number, term in enumerate(single, start=1):
         output = f"{root}{term.coefficient}-{number}"
-        formula = op("product", term.amplitude, _shape(term, op("sum", made[term.signal], -term.at)))
+        formula = op("product", term.amplitude, _shape(term, _from(made[term.signal], term.at)))
         if term.factor:
             formula.append(_factor(term, made))
-        functions.append(function(output, _description(term), formula))
+        functions.append(function(output, _description(term) + origin.words(term), formula))
         by_coefficient[term.coefficient].append(output)
     first = next((i for i, e in enumerate(aerodynamics) if e.tag == "axis"), len(aerodynamics))
     for offset, element in enumerate(functions):
@@ -180,7 +188,7 @@ def _is_constant_beyond(group: Sequence[AeroTerm]) -> bool:
     return True
 
 
-def _table(output: str, group: Sequence[AeroTerm], signal: str) -> list[Element]:
+def _table(output: str, group: Sequence[AeroTerm], signal: str, source: str) -> list[Element]:
     """The bends as a table, which JSBSim holds constant outside, and a flag that is 1 there."""
     points = sorted({term.at for term in group})
     values = [math.fsum(t.amplitude * float(shape_of(t, point)) for t in group) for point in points]
@@ -192,7 +200,7 @@ def _table(output: str, group: Sequence[AeroTerm], signal: str) -> list[Element]
     words = f"{first.coefficient} over {first.signal}, learned from {points[0]!r} to {points[-1]!r}, constant outside"
     outside = op("ifthen", op("or", op("lt", signal, points[0]), op("gt", signal, points[-1])), 1.0, 0.0)
     return [
-        function(output, words, table),
+        function(output, words + source, table),
         function(f"{output}-outside", f"1 where {first.signal} is outside the table's range", outside),
     ]
 
@@ -204,7 +212,12 @@ def _description(term: AeroTerm) -> str:
 
 def _factor(term: AeroTerm, made: Mapping[str, str]) -> Element:
     """The factor of a term, from its origin; ``made``: signal -> property."""
-    return op("sum", made[term.factor], -term.factor_at)
+    return _from(made[term.factor], term.factor_at)
+
+
+def _from(source: str, at: float) -> Element:
+    """A property, counted from an origin."""
+    return op("sum", source, -at) if at else prop(source)
 
 
 def _shape(term: AeroTerm, deviation: Element) -> Element:
@@ -216,14 +229,13 @@ def _shape(term: AeroTerm, deviation: Element) -> Element:
 
 
 def _signal(
-    name: str, output: str, surface: str, surface_rad: float, rotary_gust: str | None
+    name: str, output: str, surface: Surface, rotary_gust: str | None
 ) -> tuple[list[Element], Components]:
     if name == "alpha":
-        return [
-            function(output, "Angle of attack of the air at the CG [rad]", prop("aero/alpha-rad"))
-        ], Components()
+        words = "Angle of attack of the air at the CG [rad]"
+        return [function(output, words, prop(_PROPERTIES[name]))], Components()
     if name == "elevator":
-        formula = op("product", surface_rad, surface)
+        formula = op("product", surface.unit_rad, surface.source)
         return [
             function(output, "Surface as the air sees it, trailing edge down [rad]", formula)
         ], Components()
@@ -249,19 +261,20 @@ def _signal(
     raise ConfigurationError(f"signal {name!r}: {choices(name, SIGNALS)}, or a state of the change")
 
 
-def _state(state: StateTerm, output: str, source: str) -> Element:
+def _state(state: StateTerm, output: str, source: str, origin: str) -> Element:
     if state.kind == "lag":
         later = lag(state.time_s, source, f"{output}-input-before", f"{output}-before")
-        return function(output, f"Lag of {state.signal}, tau = {state.time_s!r} s", from_start(source, later))
+        words = f"Lag of {state.signal}, tau = {state.time_s!r} s{origin}"
+        return function(output, words, from_start(source, later))
     if state.kind == "play":
-        half, words = state.half_width, f"Play of {state.signal}, half width {state.half_width!r}"
+        half, words = state.half_width, f"Play of {state.signal}, half width {state.half_width!r}{origin}"
         low, high = op("difference", source, half), op("sum", source, half)
         return function(
             output, words, from_start(source, op("max", low, op("min", high, f"{output}-before")))
         )
     return function(
         output,
-        f"Mode driven by {state.signal}, wn = {1.0 / state.time_s!r} rad/s, zeta = {state.damping!r}",
+        f"Mode driven by {state.signal}, wn = {1.0 / state.time_s!r} rad/s, zeta = {state.damping!r}{origin}",
         from_start(source, _mode(state, output, source)),
     )
 
@@ -296,37 +309,30 @@ def _memory(state: StateTerm, output: str, source: str) -> Components:
 
 
 def _to_axes(aerodynamics: Element, by_coefficient: dict[str, list[str]], root: str, where: str) -> None:
-    moments: list[Element | float | str] = []
+    pressure = "aero/qbar-psf", "metrics/Sw-sqft"
     if by_coefficient["Cm"]:
-        moments.append(
-            op(
-                "product",
-                "aero/qbar-psf",
-                "metrics/Sw-sqft",
-                "metrics/cbarw-ft",
-                op("sum", *by_coefficient["Cm"], 0.0),
-            )
-        )
+        formula = op("product", *pressure, "metrics/cbarw-ft", _sum(by_coefficient["Cm"]))
+        words = "Increments of Cm about the CG [lbf ft]"
+        _axis(aerodynamics, "PITCH").append(function(f"{root}moment-lbsft", words, formula))
     for coefficient, force in _FORCES.items():
         if not by_coefficient[coefficient]:
             continue
         total = f"{root}{force.total}-lbs"
         words = f"Sum of the increments of {coefficient}: force along {force.direction} of the body [lbf]"
-        pressure = "aero/qbar-psf", "metrics/Sw-sqft"
-        formula = op("product", *pressure, op("sum", *by_coefficient[coefficient], 0.0))
+        formula = op("product", *pressure, _sum(by_coefficient[coefficient]))
         first = next((i for i, e in enumerate(aerodynamics) if e.tag == "axis"), len(aerodynamics))
         aerodynamics.insert(first, function(total, words, formula))
         for name, share in _shares(aerodynamics, force, total, where).items():
             words = f"Increments of {coefficient} [lbf]"
             _axis(aerodynamics, name).append(function(f"{root}{force.total}-{name}-lbs", words, share))
         # JSBSim applies forces at its reference point; this takes them back to the CG
-        moments.append(op("product", -1.0, _arm(aerodynamics, force.across), total))
-    if moments:
-        _axis(aerodynamics, "PITCH").append(
-            function(
-                f"{root}moment-lbsft", "Increments of Cm about the CG [lbf ft]", op("sum", *moments, 0.0)
-            )
-        )
+        shift = op("product", -1.0, _arm(aerodynamics, force.across), total)
+        words = f"Increments of {coefficient} taken to the CG [lbf ft]"
+        _axis(aerodynamics, "PITCH").append(function(f"{root}{force.total}-moment-lbsft", words, shift))
+
+
+def _sum(properties: Sequence[str]) -> Element:
+    return op("sum", *properties) if len(properties) > 1 else prop(properties[0])
 
 
 def _arm(aerodynamics: Element, across: str) -> Element:

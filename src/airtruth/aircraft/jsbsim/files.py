@@ -1,16 +1,17 @@
-"""A JSBSim model's files: read with comments kept, and copied so that the copy needs nothing else."""
+"""A JSBSim model's files: read with their places, changed without a byte more than the change, and copied whole."""
 
 from __future__ import annotations
 
-import re
 import shutil
-import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
+from xml.etree.ElementTree import Element
+from xml.parsers.expat import ExpatError
 
 from airtruth.aircraft import JsbsimModel
 from airtruth.aircraft.jsbsim.confine import controls_simulation, model_files
+from airtruth.aircraft.jsbsim.document import Document, parse
 from airtruth.aircraft.probe import model_file, wheel_root
 from airtruth.errors import AircraftError, StoreError
 
@@ -18,7 +19,6 @@ _SECTIONS: Final = ("flight_control", "aerodynamics", "mass_balance", "propulsio
 """Sections of a model that may be in a file of their own."""
 _KINDS: Final = {"engine": "Engines", "systems": "Systems"}
 """Folder of the JSBSim package -> folder of a model that holds copies from it."""
-ET.register_namespace("xsi", "http://www.w3.org/2001/XMLSchema-instance")
 
 
 @dataclass(frozen=True)
@@ -27,14 +27,16 @@ class Model:
 
     Attributes
     ----------
-    prolog : text before the root element.
     root : root element, with the sections from files of their own.
     source : file of the root element.
+    document : that file.
+    sections : file of each section of its own, and its content.
     """
 
-    prolog: str
-    root: ET.Element
+    root: Element
     source: Path
+    document: Document
+    sections: tuple[tuple[Path, Document], ...] = ()
 
 
 def read(folder: Path, model: JsbsimModel) -> Model:
@@ -50,24 +52,29 @@ def read(folder: Path, model: JsbsimModel) -> Model:
         If a file cannot be read or is not XML.
     """
     path = model_file(folder, model.root, model.model)
-    text = _text(path)
-    root = _parse(text, path)
+    document = _parsed(path)
+    root = document.root
+    sections = []
     for section in list(root):
         name = section.get("file") if isinstance(section.tag, str) and section.tag in _SECTIONS else None
         if name:
             file = path.parent / (name if name.endswith(".xml") else f"{name}.xml")
-            root[list(root).index(section)] = _parse(_text(file), file)
+            own = _parsed(file)
+            document.stand_in(section, own.root)
+            sections.append((file, own))
     for child in [c for c in root if c.tag in ("output", "input")]:
         root.remove(child)  # a copy must not open files or sockets of its own
     _without_control(root)
-    start = re.search(r"<fdm_config[\s>]", text)
-    return Model(text[: start.start()] if start else "", root, path)
+    return Model(root, path, document, tuple(sections))
 
 
 def write(model: Model, path: Path) -> None:
-    """Write a model's XML."""
-    ET.indent(model.root, "  ")
-    path.write_text(model.prolog + ET.tostring(model.root, encoding="unicode") + "\n", encoding="utf-8")
+    """Write a model's XML with the changes of its tree; its sections in files of their own go beside it."""
+    path.write_bytes(model.document.patched())
+    for file, section in model.sections:
+        target = path.parent / _copied_to(model.source.parent.resolve(), file.resolve())
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(section.patched())
 
 
 def copy(read_model: Model, out: Path) -> None:
@@ -86,27 +93,30 @@ def copy(read_model: Model, out: Path) -> None:
         for source in model_files(read_model.source, wheel_root()):
             if source.resolve() == read_model.source.resolve():
                 continue
-            inside = source.is_relative_to(folder)
-            target = out / (
-                source.relative_to(folder) if inside else f"{_KINDS[source.parent.name]}/{source.name}"
-            )
+            target = out / _copied_to(folder, source)
             target.parent.mkdir(parents=True, exist_ok=True)
             _copy_file(source, target)
     except OSError as error:
         raise StoreError(f"{out}: cannot be written ({error}); choose another folder") from None
 
 
+def _copied_to(folder: Path, source: Path) -> Path:
+    """Path of a copy relative to that of the model."""
+    if source.is_relative_to(folder):
+        return source.relative_to(folder)
+    return Path(_KINDS[source.parent.name]) / source.name
+
+
 def _copy_file(source: Path, target: Path) -> None:
     """Copy a file without what a copy may not have: XML entities, which are replaced by their values, and control of JSBSim."""
-    text = _text(source)
-    root = _parse(text, source)
-    if _without_control(root) or "<!DOCTYPE" in text:
-        target.write_text(ET.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
+    document = _parsed(source)
+    if _without_control(document.root) or document.content != source.read_bytes():
+        target.write_bytes(document.patched())
     else:
         shutil.copyfile(source, target)
 
 
-def _without_control(root: ET.Element) -> bool:
+def _without_control(root: Element) -> bool:
     """Remove the outputs that stop or re-time the simulation, as those of a crash; whether there were any.
 
     Models of the JSBSim package may have them, a copy may not.
@@ -119,15 +129,13 @@ def _without_control(root: ET.Element) -> bool:
     return found
 
 
-def _text(path: Path) -> str:
+def _parsed(path: Path) -> Document:
     try:
-        return path.read_text(encoding="utf-8")
+        content = path.read_bytes()
+        content.decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise AircraftError(f"{path}: cannot be read ({error})") from None
-
-
-def _parse(text: str, path: Path) -> ET.Element:
     try:
-        return ET.fromstring(text, ET.XMLParser(target=ET.TreeBuilder(insert_comments=True)))
-    except ET.ParseError as error:
+        return parse(content)
+    except ExpatError as error:
         raise AircraftError(f"{path}: not valid XML: {error}") from None

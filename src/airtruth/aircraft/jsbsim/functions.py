@@ -1,4 +1,4 @@
-"""Builders of JSBSim's function language, in which formulas read as formulas."""
+"""Builders of JSBSim's function language, in which formulas read as formulas; <p> and <v> are its short names."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ _SMALLEST_STEP_S: Final = 1e-6
 
 def value(number: float) -> Element:
     """A constant with all its digits."""
-    element = Element("value")
+    element = Element("v")
     element.text = repr(float(number))
     return element
 
 
 def prop(name: str) -> Element:
     """The value of a property."""
-    element = Element("property")
+    element = Element("p")
     element.text = name
     return element
 

@@ -95,7 +95,9 @@ def _add(parent: Element, tag: str, more: float, kind: str, where: str, unit: st
             f"{where}: <{parent.tag}> has no <{tag}>, which the effect has to change; add it to the model"
         )
     factor = _TO_SI[(unit or element.get("unit") or _DEFAULTS[kind]).upper()]
-    element.text = f" {float(element.text or 0.0) + more / factor!r} "
+    text = element.text or ""
+    number = float(text or 0.0) + more / factor
+    element.text = text.replace(text.strip(), repr(number)) if text.strip() else repr(number)
 
 
 def _location(parent: Element) -> Element:

@@ -95,11 +95,13 @@ def _metrics(c: Constants) -> str:
 
 
 def _mass_balance(c: Constants) -> str:
-    inertia = c.inertia_yy_kg_m2 / (SLUG * FT**2)  # JSBSim's factors for SI have six digits
-    return f"""  <mass_balance>
-    <ixx unit="SLUG*FT2"> {_n(inertia)} </ixx>
+    unit = SLUG * FT**2  # JSBSim's factors for SI have six digits
+    inertia = c.inertia_yy_kg_m2 / unit
+    return f"""  <mass_balance negated_crossproduct_inertia="false">
+    <ixx unit="SLUG*FT2"> {_n(c.inertia_xx_kg_m2 / unit or inertia)} </ixx>
     <iyy unit="SLUG*FT2"> {_n(inertia)} </iyy>
-    <izz unit="SLUG*FT2"> {_n(inertia)} </izz>
+    <izz unit="SLUG*FT2"> {_n(c.inertia_zz_kg_m2 / unit or inertia)} </izz>
+    <ixz unit="SLUG*FT2"> {_n(c.inertia_xz_kg_m2 / unit)} </ixz>
     <emptywt unit="LBS"> {_n(c.mass_kg / LB)} </emptywt>
     <location name="CG" unit="IN"> {_ORIGIN} </location>
   </mass_balance>"""

@@ -7,17 +7,21 @@ Components are functions with a memory of their own. Unlike JSBSim's actuator th
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 from xml.etree.ElementTree import Element
 
 from airtruth.aircraft.jsbsim.functions import component, declaration, from_start, lag, op, prop, step
+from airtruth.aircraft.origin import Origin
 from airtruth.errors import AircraftError
 from airtruth.physics.terms import SurfaceTerm
 
 _CHANNEL: Final = "Effects"
-"""Name of the channels that hold effects; by it a second change recognises the first."""
+"""Name of the channels that hold effects."""
+_PROPERTY: Final = re.compile(r"(?:aero|fcs)/(effects(?:-\d+)?)/")
+"""Names of properties of a change; by them a second change recognises the first."""
 
 
 @dataclass(frozen=True)
@@ -46,13 +50,45 @@ class Names:
         return self.earlier[-1] if self.earlier else self.surface
 
 
-def names(control: Element | None, surface: str) -> Names:
-    """Return names that no earlier change uses."""
-    channels = [] if control is None else [c for c in control.findall("channel") if c.get("name") == _CHANNEL]
-    outputs = [(o.text or "").strip() for c in channels for o in c.iter("output")]
-    labels = [f"effects-{k}" if k > 1 else "effects" for k in range(1, len(channels) + 2)]
+def names(root: Element, surface: str) -> Names:
+    """Return names that no earlier change uses.
+
+    Parameters
+    ----------
+    root : root element of the model; surface : the surface's own property.
+    """
+    words = [w for e in root.iter() if isinstance(e.tag, str) for w in (e.text or "", e.get("name", ""))]
+    taken = {label for word in words for label in _PROPERTY.findall(word)}
+    outputs = {(o.text or "").strip() for o in root.iter("output")}
+    labels = [f"effects-{k}" if k > 1 else "effects" for k in range(1, len(taken) + 2)]
     earlier = [f"fcs/{label}/elevator" for label in labels if f"fcs/{label}/elevator" in outputs]
-    return Names(labels[-1], surface, tuple(earlier))
+    return Names(next(label for label in labels if label not in taken), surface, tuple(earlier))
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The surface that causes the forces.
+
+    Attributes
+    ----------
+    names : names of the properties of the change.
+    unit_rad : radians per unit of the surface's property.
+    moved : whether the change puts something between the measured surface and the air.
+    """
+
+    names: Names
+    unit_rad: float
+    moved: bool
+
+    @property
+    def source(self) -> str:
+        """Its property [units of the measured surface]."""
+        return self.names.effective if self.moved else self.names.source
+
+    @property
+    def direct(self) -> str | None:
+        """Its property where that is in radians, trailing edge down."""
+        return self.source if self.unit_rad == 1.0 else None
 
 
 @dataclass(frozen=True)
@@ -67,43 +103,42 @@ class Components:
 
 
 def chain(
-    named: Names, surface_rad: float, terms: Sequence[SurfaceTerm], factor: float, highest_hz: float
+    surface: Surface, terms: Sequence[SurfaceTerm], effectiveness: float, highest_hz: float, origin: Origin
 ) -> Components:
     """Return the chain of elements from the measured surface to the one that causes the forces.
 
     Parameters
     ----------
-    named : names of the properties.
-    surface_rad : radians per unit of the surface's property.
+    surface : names of the properties, and the unit of the surface.
     terms : in sequence.
-    factor : effectiveness of the surface [-].
+    effectiveness : factor on the surface [-].
     highest_hz : highest simulation rate for which a delay is valid [Hz]; it sets the number of samples kept.
+    origin : standard deviations and source, for the descriptions.
     """
     result = Components()
+    named, unit = surface.names, abs(surface.unit_rad)
     last = named.source
-    unit = abs(surface_rad)
     for number, term in enumerate(terms, start=1):
-        output = f"{named.effective}-{number}"
+        output, words = f"{named.effective}-{number}", origin.words(term)
         if term.kind == "delay":
-            result += _delay(last, output, term.value, highest_hz)
+            result += _delay(last, output, term.value, highest_hz, words)
         elif term.kind == "lag":
-            result += _lag(last, output, term.value)
+            result += _lag(last, output, term.value, words)
         elif term.kind == "rate_limit":
-            result += _rate_limit(last, output, term.value, unit)
+            result += _rate_limit(last, output, term.value, unit, words)
         else:
-            result += _backlash(last, output, term.value, unit)
+            result += _backlash(last, output, term.value, unit, words)
         last = output
-    formula = op("product", factor, last)
-    return result + _component(
-        named.effective, f"Surface as the air sees it; effectiveness {factor!r}", formula
-    )
+    formula = op("product", effectiveness, last)
+    words = f"Surface as the air sees it; effectiveness {effectiveness!r}"
+    return result + _component(named.effective, words + origin.of_declared("elevator"), formula)
 
 
 def _component(output: str, description: str, formula: Element) -> Components:
     return Components((component(output, description, formula),), (output,))
 
 
-def _delay(source: str, output: str, delay_s: float, highest_hz: float) -> Components:
+def _delay(source: str, output: str, delay_s: float, highest_hz: float, origin: str) -> Components:
     """A shift register read between two of its samples: exact for whole steps, linear between them."""
     length = max(1, math.ceil(round(delay_s * highest_hz, 9)))
     taps = [f"{output}-before-{k}" for k in range(1, length + 1)]
@@ -112,7 +147,7 @@ def _delay(source: str, output: str, delay_s: float, highest_hz: float) -> Compo
         points += [float(number), tap]
     result = _component(
         output,
-        f"Delay of {delay_s!r} s, at simulation rates up to {highest_hz:g} Hz",
+        f"Delay of {delay_s!r} s, at simulation rates up to {highest_hz:g} Hz{origin}",
         from_start(source, op("interpolate1d", *points)),
     )
     for tap, previous in zip(reversed(taps), [*reversed(taps[:-1]), source], strict=True):
@@ -120,26 +155,27 @@ def _delay(source: str, output: str, delay_s: float, highest_hz: float) -> Compo
     return result
 
 
-def _lag(source: str, output: str, time_s: float) -> Components:
+def _lag(source: str, output: str, time_s: float, origin: str) -> Components:
     before = f"{output}-input-before"
     formula = from_start(source, lag(time_s, source, before, output))
     memory = _component(before, "", prop(source))
-    return _component(output, f"First-order lag, time constant {time_s!r} s", formula) + memory
+    return _component(output, f"First-order lag, time constant {time_s!r} s{origin}", formula) + memory
 
 
-def _rate_limit(source: str, output: str, rate_rad_s: float, unit: float) -> Components:
+def _rate_limit(source: str, output: str, rate_rad_s: float, unit: float, origin: str) -> Components:
     reach = op("product", rate_rad_s / unit, step())
     back = op("product", -rate_rad_s / unit, step())
     move = op("max", back, op("min", reach, op("difference", source, output)))
-    return _component(output, f"Rate limit {rate_rad_s!r} rad/s", from_start(source, op("sum", output, move)))
+    words = f"Rate limit {rate_rad_s!r} rad/s{origin}"
+    return _component(output, words, from_start(source, op("sum", output, move)))
 
 
-def _backlash(source: str, output: str, width_rad: float, unit: float) -> Components:
+def _backlash(source: str, output: str, width_rad: float, unit: float, origin: str) -> Components:
     half = 0.5 * width_rad / unit
     pushed = op("max", op("difference", source, half), op("min", op("sum", source, half), output))
     return _component(
         output,
-        f"Backlash {width_rad!r} rad in all, the surface starts in its middle",
+        f"Backlash {width_rad!r} rad in all, the surface starts in its middle{origin}",
         from_start(source, pushed),
     )
 

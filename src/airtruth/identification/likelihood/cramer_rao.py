@@ -114,13 +114,12 @@ def bound(
         information += de @ update.inverse @ de.T
         across += de @ update.inverse @ columns
         normal += columns.T @ update.inverse @ columns
-        rows = _innovation_rows(value, slope)
-        information += _by_innovations(update, rows, state.spread)
+        information += _by_innovations(value, slope, update, state.spread)
         if k + 1 < u.shape[0]:
             _advance_mean(
                 value, slope, state, update, de, columns, u[k] + bend[k + 1], u[k + 1] + bend[k + 1]
             )
-            _advance_spread(value, slope, state, update, rows)
+            _advance_spread(value, slope, state, update)
             _advance_covariance(value, slope, state, update)
     whole = information - across @ np.linalg.solve(normal, across.T)
     return np.asarray(np.linalg.inv(whole), dtype=np.float64)
@@ -140,21 +139,16 @@ def _updated(value: Matrices, slope: Matrices, state: _Moments) -> _Update:
     return _Update(covariance, inverse, gain, gain_p, d_covariance, d_gain, d_gain_p)
 
 
-def _innovation_rows(value: Matrices, slope: Matrices) -> Array:
-    """de (free, outputs, states of the filter and of its derivatives): the derivatives of the innovations."""
-    count, m, n = slope.c.shape
-    rows = np.zeros((count, m, n * (1 + count)))
-    rows[:, :, :n] = -slope.c
-    for i in range(count):
-        rows[i, :, n * (1 + i) : n * (2 + i)] = -value.c
-    return rows
-
-
-def _by_innovations(update: _Update, rows: Array, spread: Array) -> Array:
+def _by_innovations(value: Matrices, slope: Matrices, update: _Update, spread: Array) -> Array:
     """Information (free, free) of the innovations at one sample."""
-    count, m, _ = rows.shape
-    flat = rows.reshape(count * m, -1)
-    moments = (flat @ spread @ flat.T).reshape(count, m, count, m)
+    count, m, n = slope.c.shape
+
+    def innovations(columns: Array) -> Array:
+        """Derivatives of the innovations (free m, ...) of columns of states of the filter and of its derivatives."""
+        blocks = columns.reshape(1 + count, n, -1)
+        return np.asarray(-(slope.c @ blocks[0] + value.c @ blocks[1:]).reshape(count * m, -1))
+
+    moments = innovations(innovations(spread).T).reshape(count, m, count, m)
     whitened = update.inverse @ update.d_covariance
     own: Array = np.einsum("iajb,ab->ij", moments, update.inverse)
     of_variance: Array = 0.5 * np.einsum("iab,jba->ij", whitened, whitened)
@@ -178,17 +172,23 @@ def _advance_mean(
     state.unknowns = value.phi @ state.unknowns + update.gain_p @ columns
 
 
-def _advance_spread(value: Matrices, slope: Matrices, state: _Moments, update: _Update, rows: Array) -> None:
-    """Propagate the covariance of the filter's state and of its derivatives."""
-    count, m, n = slope.c.shape
-    advance, drive = np.zeros_like(state.spread), np.zeros((state.spread.shape[0], m))
-    advance[:n, :n], drive[:n] = value.phi, update.gain_p
-    for i in range(count):
-        at = slice(n * (1 + i), n * (2 + i))
-        advance[at, :n] = slope.phi[i] + update.gain_p @ rows[i, :, :n]
-        advance[at, at] = value.phi - update.gain_p @ value.c
-        drive[at] = update.d_gain_p[i]
-    state.spread = advance @ state.spread @ advance.T + drive @ update.covariance @ drive.T
+def _advance_spread(value: Matrices, slope: Matrices, state: _Moments, update: _Update) -> None:
+    """Propagate the covariance of the filter's state and of its derivatives, block by block.
+
+    x+ = phi x + phi K e, and of a derivative x_i+ = (phi - phi K c) x_i + (phi_i - phi K c_i) x + (phi K)_i e.
+    """
+    count, _, n = slope.c.shape
+    closed, across = value.phi - update.gain_p @ value.c, slope.phi - update.gain_p @ slope.c
+
+    def advanced(columns: Array) -> Array:
+        blocks = columns.reshape(1 + count, n, -1)
+        result = closed @ blocks
+        result[0] = value.phi @ blocks[0]
+        result[1:] += across @ blocks[0]
+        return np.asarray(result.reshape(columns.shape))
+
+    drive = np.concatenate([update.gain_p[None], update.d_gain_p]).reshape(n * (1 + count), -1)
+    state.spread = advanced(advanced(state.spread).T) + drive @ update.covariance @ drive.T
 
 
 def _advance_covariance(value: Matrices, slope: Matrices, state: _Moments, update: _Update) -> None:

@@ -12,19 +12,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Generic
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.identification.condition import AircraftConstants, OneOrEach, each_batch, observe
-from airtruth.identification.estimates import JOINT, Estimates, mean_scale
+from airtruth.identification.estimates import JOINT, Estimates, S, mean_scale
 from airtruth.identification.likelihood.kalman import score
 from airtruth.identification.likelihood.kalman_kernel import Signals
-from airtruth.identification.likelihood.options import CHANNELS, FilterOptions, free_parameters
+from airtruth.identification.likelihood.options import (
+    CHANNELS,
+    FilterOptions,
+    declared_values,
+    free_parameters,
+    prior_weights,
+)
 from airtruth.identification.likelihood.predictor import Layout, Term, extended, layout, short_period
 from airtruth.identification.likelihood.pressure import products, with_pressure, with_trim_moment
-from airtruth.identification.likelihood.scoring import Maxima, Scored, maximise
+from airtruth.identification.likelihood.scoring import Maxima, Scored, Search, maximise
 from airtruth.identification.options import Options
 from airtruth.logs.flight_log import Batch
 from airtruth.numerics.intersample import decay_of, servo_bend
@@ -40,14 +46,13 @@ _FLOOR: Final = 1e-5
 
 
 @dataclass(frozen=True)
-class Records:
+class Records(Generic[S]):
     """Runs of one length as the filter reads them.
 
     Attributes
     ----------
     dt_s : sample period [s].
-    signals : outputs relative to their first sample; elevator relative to its first sample [rad] and further
-        inputs.
+    signals : outputs and surfaces relative to their first sample, and further inputs.
     layout : the predictor's arrays.
     scale : factors of shape (runs,).
     """
@@ -55,10 +60,10 @@ class Records:
     dt_s: float
     signals: Signals
     layout: Layout
-    scale: Scale
+    scale: S
 
 
-def records(batch: Batch, constants: AircraftConstants, options: FilterOptions) -> Records:
+def records(batch: Batch, constants: AircraftConstants, options: FilterOptions) -> Records[Scale]:
     """Signals and predictor of a batch; nothing is checked.
 
     The elevator between samples has the area of the cubic through the four nearest samples, and the
@@ -117,13 +122,8 @@ def fit(
         declare 0 stays 0.
     """
     data = records(batch, constants, options)
-    free = free_parameters(options)
     each = np.tile(options.levels, (start.shape[0], 1)) if levels is None else levels
-
-    def evaluate(z: Array, active: Ints) -> Scored:
-        return scored(data, z, active, free)
-
-    maxima = maximise(evaluate, start, each, options)
+    maxima = maximum_of_each(data, start, _search(options, each))
     return _estimates(maxima, batch.run_ids, data.scale, options)
 
 
@@ -141,7 +141,36 @@ def fit_joint(
     start : (6,) start of the search.
     """
     data = [records(batch, own, options) for batch, own in each_batch(parts, constants)]
-    free = free_parameters(options)
+    maxima = joint_maximum(data, start, _search(options, options.levels[None, :]))
+    return _estimates(maxima, (JOINT,), mean_scale([part.scale for part in data]), options)
+
+
+def _search(options: FilterOptions, levels: Array) -> Search:
+    """Search of the derivatives and the levels about their declared values (groups, levels)."""
+    count, free = len(PARAMETERS), free_parameters(options)
+    return Search(
+        declared=declared_values(options, levels),
+        free=free,
+        weight=prior_weights(options),
+        # all between the derivatives and the moment of the trim
+        level=slice(count, int(np.searchsorted(free, count + levels.shape[1]))),
+        tolerance=options.tolerance,
+        maximum_iterations=options.maximum_iterations,
+    )
+
+
+def maximum_of_each(data: Records[S], start: Array, search: Search) -> Maxima:
+    """Maximum of the likelihood of each run, from its start (runs, derivatives)."""
+
+    def evaluate(z: Array, active: Ints) -> Scored:
+        return scored(data, z, active, search.free)
+
+    return maximise(evaluate, start, search)
+
+
+def joint_maximum(data: Sequence[Records[S]], start: Array, search: Search) -> Maxima:
+    """Maximum of the likelihood of all runs, which share derivatives and levels, from a start (derivatives,)."""
+    free = search.free
 
     def evaluate(z: Array, active: Ints) -> Scored:
         cost, gradient, information = (
@@ -157,11 +186,28 @@ def fit_joint(
             information += i.sum(axis=0)
         return cost, gradient, information
 
-    maxima = maximise(evaluate, start[None, :], options.levels[None, :], options)
-    return _estimates(maxima, (JOINT,), mean_scale([part.scale for part in data]), options)
+    return maximise(evaluate, start[None, :], search)
 
 
-def scored(data: Records, z: Array, active: Ints, free: Ints) -> Scored:
+def memory_of(data: Records[S], z: Array) -> Array:
+    """(runs,) largest correlation of neighbouring innovations of an output [-]: near zero for a sound model.
+
+    Parameters
+    ----------
+    z : (runs, parameters) as in `scored`; a run whose row is not finite has NaN.
+    """
+    result = np.full(len(z), np.nan)
+    known = np.flatnonzero(np.isfinite(z).any(axis=1))
+    # a level of zero has no logarithm
+    free = np.empty(0, dtype=np.int64)
+    e = score(data.layout, known, z[known], free, data.signals, data.dt_s).innovations
+    with np.errstate(invalid="ignore"):
+        product = (e[:, 1:] * e[:, :-1]).mean(axis=1) / (e * e).mean(axis=1)
+    result[known] = product.max(axis=1)
+    return result
+
+
+def scored(data: Records[S], z: Array, active: Ints, free: Ints) -> Scored:
     """Negative log-likelihood, gradient and information of the runs ``active``, no prior.
 
     Parameters

@@ -50,6 +50,8 @@ TRIM_MOMENT_PRIOR: Final = 0.03
 an arm of a third of the chord."""
 OUTPUTS: Final = ("alpha", "q", "az")
 """Outputs of the predictor."""
+READ: Final = tuple(CHANNELS[name] for name in OUTPUTS)
+"""Their channels."""
 _FLOOR: Final = 1e-4
 """Least noise of a sensor over the spread of its signal [-]; judgement."""
 _GAUSSIAN: Final = 1.4826
@@ -115,16 +117,19 @@ def declare(options: Options, gust_m_s: float, noise: Array) -> FilterOptions:
     )
 
 
-def sensor_noise(batch: Batch, constants: AircraftConstants) -> Array:
-    """(runs, 3) standard deviation of the white noise of alpha [rad], q [rad/s], az [m/s2].
+def sensor_noise(
+    batch: Batch,
+    constants: AircraftConstants,
+    channels: Sequence[str] = READ,
+) -> Array:
+    """(runs, channels) standard deviation of the white noise of outputs [SI].
 
     From aircraft.toml, and where that states none from the median of the third differences of the record,
     which a motion slow against the sample rate does not enter.
     """
     stated = constants.file.sensors if isinstance(constants, Aircraft) else {}
     columns = []
-    for name in OUTPUTS:
-        channel = CHANNELS[name]
+    for channel in channels:
         values = batch.channels[channel]
         std = stated[channel].noise_std.value if channel in stated else 0.0
         if std > 0.0:

@@ -38,6 +38,12 @@ _W2: Final = math.sqrt(1.5) * (1.0 / math.sqrt(3.0) - 1.0)
 """Share of the state w2 [-], likewise."""
 
 
+W_SHARES: Final = {"w1": _W1, "w2": _W2}
+"""Shares of the two states of a transverse gust in it, over its standard deviation [-]."""
+W_START: Final = ((1.0, 0.5), (0.5, 0.5))
+"""Covariance of these states in a stationary gust [-]."""
+
+
 @dataclass(frozen=True)
 class Term:
     """One product in a matrix of x' = A x + B u + noise (Q), y = C x + D u + bias + noise (R).
@@ -158,7 +164,7 @@ def short_period(
         Term("C", "az", "u", -2.0 * G0 / v, ("sigma_u",)),
         Term("C", "airspeed", "u", 1.0, ("sigma_u",)),
     ]
-    for state, weight in (("w1", _W1), ("w2", _W2)):
+    for state, weight in W_SHARES.items():
         terms += [
             Term("A", "alpha", state, -lift * weight / v, ("CLalpha", "sigma_w")),
             Term("A", "q", state, moment * weight / v, ("Cmalpha", "sigma_w")),
@@ -174,7 +180,7 @@ def short_period(
         parameters=(*PARAMETERS, *levels),
         logarithmic=levels,
         terms=tuple(t for t in terms if t.matrix not in "CDR" or t.row in outputs),
-        start=((("u",), ((1.0,),)), (("w1", "w2"), ((1.0, 0.5), (0.5, 0.5)))),
+        start=((("u",), ((1.0,),)), (("w1", "w2"), W_START)),
     )
 
 

@@ -10,12 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.identification.estimates import Status
-from airtruth.identification.likelihood.options import (
-    FilterOptions,
-    declared_values,
-    free_parameters,
-    prior_weights,
-)
 from airtruth.numerics import levenberg_marquardt as solver
 from airtruth.numerics import normal_equations
 from airtruth.numerics.levenberg_marquardt_options import Damping, Options, Stopping
@@ -32,6 +26,28 @@ RIDGE: Final = 1e-14
 below rounding of the information."""
 LARGEST: Final = 1e6
 """Size of a derivative that counts as divergence [-]; judgement: the largest plausible one, CLq, is of order 100."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """Parameters of a likelihood, their prior, and how to search; derivatives come first, then the levels.
+
+    Attributes
+    ----------
+    declared : (groups, parameters) centres of the prior: 0 for derivatives, logarithms of the levels.
+    free : indices of the estimated parameters.
+    weight : (free,) inverse variances of the prior; 0 for derivatives.
+    level : positions of the levels among the free parameters.
+    tolerance : length of the last step [standard errors].
+    maximum_iterations : steps after which a fit is reported as not converged.
+    """
+
+    declared: Array
+    free: Ints
+    weight: Array
+    level: slice
+    tolerance: float
+    maximum_iterations: int
 
 
 @dataclass(frozen=True)
@@ -124,38 +140,31 @@ class _Posterior:
         return x + step
 
 
-def maximise(
-    evaluate: Callable[[Array, Ints], Scored], start: Array, levels: Array, options: FilterOptions
-) -> Maxima:
+def maximise(evaluate: Callable[[Array, Ints], Scored], start: Array, search: Search) -> Maxima:
     """Maximise the likelihood of each group.
 
     Parameters
     ----------
     evaluate : (z (active, parameters), active) -> `Scored` of those groups.
-    start : (groups, 6) derivatives.
-    levels : (groups, levels) declared values: centre of the prior and start of the search.
-    options : which levels are estimated, their prior, and how to search.
+    start : (groups, derivatives); levels start at the centre of their prior.
+    search : parameters, prior, and how to search.
     """
-    six = start.shape[1]
-    free = free_parameters(options)
-    declared = declared_values(options, levels)
-    # of the free parameters, the levels: all between the derivatives and the moment of the trim
-    level = slice(six, int(np.searchsorted(free, six + levels.shape[1])))
-    problems = _Posterior(evaluate, declared, prior_weights(options), free, level)
+    count, free, declared = start.shape[1], search.free, search.declared
+    problems = _Posterior(evaluate, declared, search.weight, free, search.level)
     x = declared[:, free]
-    x[:, :six] = start
+    x[:, :count] = start
     how = Options(
-        iterations=options.maximum_iterations,
+        iterations=search.maximum_iterations,
         damping=DAMPING,
         # the decrement of the last step: tolerance^2/2 for a step of `tolerance` standard errors
-        stopping=Stopping(undamped=0.5 * options.tolerance**2),
+        stopping=Stopping(undamped=0.5 * search.tolerance**2),
     )
     end = solver.minimise(problems, x, how)
     z = declared.copy()
     z[:, free] = end.x
     status = np.array([_STATUS[s] for s in end.status], dtype=np.int8)
     ended = np.isin(status, (Status.CONVERGED, Status.MAXIMUM_ITERATIONS))
-    status[ended & ~(np.abs(z[:, :six]) < LARGEST).all(axis=1)] = Status.DIVERGED
+    status[ended & ~(np.abs(z[:, :count]) < LARGEST).all(axis=1)] = Status.DIVERGED
     covariance = np.full((len(z), free.size, free.size), np.nan)
     for group in range(len(z)):
         point = end.at[group]

@@ -92,7 +92,7 @@ def repeat(
 
     Parameters
     ----------
-    step : (theta (active, 6), active, iteration from 0) -> the next theta, (active, 6) or (1, 6) if joint.
+    step : (theta (active, derivatives), active, iteration from 0) -> the next theta, of one row if joint.
     usable, failed : as in `airtruth.identification.regression.rows.Equations`.
     start, tolerance, maximum_iterations : as in `iterate`.
     runs : number of runs.
@@ -113,7 +113,7 @@ def repeat(
         if active.size == 0:
             break
         members = np.arange(runs) if joint else active
-        previous = np.broadcast_to(theta, (runs, 6)) if joint else theta[active]
+        previous = np.broadcast_to(theta, (runs, theta.shape[1])) if joint else theta[active]
         simulable = usable(previous, members)
         if joint:
             simulable = np.array([bool(simulable.all())])

@@ -59,10 +59,12 @@ def estimates_report(title: str, identified: Identified) -> Report:
         f"Overridden by --force: {s}" for record in identified.records.values() for s in record["forced"]
     ]
     runs, runs_drawn = runs_section(frame, None, references, identified.confidence)
-    if identified.correlations is None:
-        correlation, correlated = correlation_section(scattered_correlations(frame), _OVER_RUNS)
-    else:
-        correlation, correlated = correlation_section(identified.correlations)
+    stated = stated_correlations(frame)
+    correlation, correlated = (
+        correlation_section(stated)
+        if stated
+        else correlation_section(scattered_correlations(frame), _OVER_RUNS)
+    )
     sections = [
         records_section(histories, identified.reason, SIMULATED),
         Section("Estimates of all methods", "estimates", data_table(table, "estimates")),
@@ -124,7 +126,6 @@ def identification_report(result: IdentificationResult, aircraft: Aircraft | Non
         histories=histories,
         reason="The result holds no logs, so the records are not shown.",
         declared=declared,
-        correlations=stated_correlations(result.estimates),
     )
     return estimates_report(f"Identification of {result.settings.aircraft}", identified)
 

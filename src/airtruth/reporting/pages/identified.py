@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import AirtruthError, ConfigurationError, StoreError
@@ -48,7 +47,6 @@ class Identified:
     records : method -> how its rows were made; empty in old files.
     histories : records against model, None where they cannot be simulated; ``reason`` says why.
     declared : derivatives of the declared aircraft, None where it was not given.
-    correlations : method -> (6, 6) correlation of its estimates by its covariance; None where the covariance is not known.
     """
 
     frame: pd.DataFrame
@@ -56,7 +54,6 @@ class Identified:
     histories: Histories | None
     reason: str = ""
     declared: Declared | None = None
-    correlations: Mapping[str, NDArray[np.float64]] | None = None
 
     @property
     def confidence(self) -> float:

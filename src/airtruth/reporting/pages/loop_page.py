@@ -56,6 +56,10 @@ def stored_loop_report(folder: Path) -> Report:
         raise StoreError(f"{path}: is not the result of a loop; {cure}")
     answer = TraceAnswer.from_dict(document.get("trace"), str(path))
     changes, treatments = _stored(document, path, cure)
+    try:
+        loop_table(changes, treatments, answer.derivatives)
+    except (KeyError, ValueError):
+        raise StoreError(f"{path}: does not hold every derivative of every method once; {cure}") from None
     histories = read_records(folder / "trace", cure)
     frames = {
         stage: read_stored(folder / f"estimates-{stage}.parquet")[0]
@@ -83,10 +87,6 @@ def _stored(
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
         raise StoreError(f"{path}: is incomplete ({where}: {first['msg'].lower()}); {cure}") from None
-    try:
-        loop_table(changes, treatments)
-    except (KeyError, ValueError):
-        raise StoreError(f"{path}: does not hold every derivative of every method once; {cure}") from None
     return changes, treatments
 
 
@@ -97,7 +97,7 @@ def _report(
     treatments: Sequence[Treatment],
     frames: Mapping[str, pd.DataFrame],
 ) -> Report:
-    table = loop_table(changes, treatments)
+    table = loop_table(changes, treatments, answer.derivatives)
     names = tuple(asdict(changes[0])) if changes else ("method", "derivative")
     long = flat(table.title, names, [tuple(asdict(change).values()) for change in changes])
     chart = loop_chart(changes)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from airtruth.charts import Chart
 from airtruth.charts import as_html as chart_html
 from airtruth.identification.charts import correlation_chart, runs_chart
-from airtruth.identification.estimates import Estimates
+from airtruth.identification.covariance_columns import covariance_of
 from airtruth.physics.short_period import MODAL, PARAMETERS
 from airtruth.reporting.pages.page import Section, data_table
 from airtruth.table import Group, Number, Row, Table, flat
@@ -89,16 +89,16 @@ def _runs_table(kept: pd.DataFrame, total: int) -> Table:
     return replace(flat("Estimates of each run", columns, rows, notes), keys=2)
 
 
-def stated_correlations(estimates: tuple[Estimates, ...]) -> dict[str, Array]:
+def stated_correlations(frame: pd.DataFrame) -> dict[str, Array]:
     """Method -> correlation by its covariance, mean over the converged runs; methods without one are left out."""
     found = {}
-    for own in estimates:
-        covariance = own.covariance[own.converged]
+    for method, own in frame[frame["converged"]].groupby("method", sort=False):
+        covariance = covariance_of(own)
         finite = np.isfinite(covariance).all(axis=(1, 2))
         if finite.any():
             matrix = _correlation(covariance[finite].mean(axis=0))
             if matrix is not None:
-                found[own.method] = matrix
+                found[str(method)] = matrix
     return found
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -18,15 +17,18 @@ from airtruth.logs import store
 from airtruth.logs.digest import sha256_of
 from airtruth.logs.flight_log import PRESCRIBED, FlightLog
 from airtruth.logs.names import chunk_file
-from airtruth.physics import dryden
 from airtruth.physics.short_period import MODAL, PARAMETERS
 from airtruth.simulation import instruments as measure
-from airtruth.simulation import manoeuvres
 from airtruth.simulation.campaign import streams
+from airtruth.simulation.campaign.air import air_of
 from airtruth.simulation.campaign.effects import EFFECTS
+from airtruth.simulation.campaign.inputs import commands
 from airtruth.simulation.campaign.plan import Plan, PlannedRun
-from airtruth.simulation.flight import Flight, Inputs
+from airtruth.simulation.flight import Flight, Inputs, LateralInputs
+from airtruth.simulation.lateral_feedback import LateralFeedback
 from airtruth.simulation.linearise import Linearisation, linearise
+from airtruth.simulation.linearise_lateral import LateralLinearisation, lateral_truth, linearise_lateral
+from airtruth.simulation.manoeuvres import ELEVATOR, LATERAL_CONTROLS, sample
 from airtruth.simulation.simulator import STOPS, Condition
 from airtruth.simulation.trim import Trim, trim
 
@@ -93,11 +95,12 @@ class FlownChunk:
 
 @dataclass(frozen=True)
 class Prepared:
-    """A flight condition, trimmed, linearised and loaded."""
+    """A flight condition, trimmed, linearised and loaded; the lateral derivatives only in six axes."""
 
     trim: Trim
     linear: Linearisation
     flight: Flight
+    lateral: LateralLinearisation | None = None
 
 
 class Pilot:
@@ -110,13 +113,14 @@ class Pilot:
         dynamic = measure.needs_every_step(models, 1.0 / plan.campaign.log_hz, self._readings)
         self._record_every = 1 if dynamic else plan.log_every
         self._noisy = tuple(
-            name for name in measure.LOGGED if name in models and models[name].noise_std > 0.0
+            name
+            for name in measure.logged(plan.campaign.lateral)
+            if name in models and models[name].noise_std > 0.0
         )
         self._models = models
         self._prepared: OrderedDict[Condition, Prepared] = OrderedDict()
         self._kept: list[BaseException] = []  # the destructor of an executive that failed aborts the process
-        time = np.arange(plan.samples, dtype=np.float64) * plan.dt_s
-        self._shapes = [manoeuvres.sample(m, time) for m in plan.manoeuvres]
+        self._shapes = [[sample(m, plan.t_s) for m in inputs] for inputs in plan.inputs]
 
     def fly_chunk(
         self,
@@ -186,6 +190,7 @@ class Pilot:
                 trim=at_trim,
                 linear=linearise(plan.aircraft, at_trim, plan.dt_s),
                 flight=Flight(plan.aircraft, at_trim, plan.dt_s, self._record_every),
+                lateral=linearise_lateral(plan.aircraft, at_trim, plan.dt_s) if at.six_axes else None,
             )
         self._prepared[at] = prepared
         if len(self._prepared) > _CACHED_CONDITIONS:
@@ -202,18 +207,19 @@ class Pilot:
         """
         plan = self.plan
         prepared = self.prepared(run.condition)
-        gust = self._gust(prepared.trim, run)
-        manoeuvre = plan.manoeuvres[run.manoeuvre]
-        amplitude = 1.0 if manoeuvre.kind == "replay" else run.amplitude_rad
-        gains = plan.campaign.augmentation
+        air = air_of(plan, run, prepared.trim.airspeed_m_s)
+        flown = plan.inputs[run.manoeuvre]
+        amplitudes = [run.amplitude_of(number) for number in range(len(flown))]
+        command = commands(flown, self._shapes[run.manoeuvre], amplitudes)
+        gains, still = plan.campaign.augmentation, np.zeros(plan.samples)
         inputs = Inputs(
-            command_rad=amplitude * self._shapes[run.manoeuvre],
-            gust_u_m_s=gust[:, 0],
-            gust_w_m_s=gust[:, 1],
-            gust_q_rad_s=-gust[:, 2] if plan.campaign.gust.rotary else None,
+            command_rad=command.get(ELEVATOR, still),
+            gust_u_m_s=air.u_m_s,
+            gust_w_m_s=air.w_m_s,
+            gust_q_rad_s=air.q_rad_s,
             damper_gain_s=gains.damper_gain_s,
             attitude_gain=gains.attitude_gain,
-            surface=manoeuvre.surface,
+            surface=flown[0].surface,
         )
         if gains.damper_gain_s or gains.attitude_gain:
             inputs = replace(
@@ -221,19 +227,27 @@ class Pilot:
                 q_error_rad_s=self._error("q_rad_s", run),
                 theta_error_rad=self._error("theta_rad", run),
             )
+        if plan.campaign.lateral:
+            aileron, rudder = (command.get(name, still) for name in LATERAL_CONTROLS)
+            turning = LateralInputs(aileron, rudder, air.v_m_s, air.p_rad_s, air.r_rad_s, self._feedback(run))
+            inputs = replace(inputs, lateral=turning)
         return prepared.flight.fly(inputs)
 
-    def _gust(self, at: Trim, run: PlannedRun) -> Array:
-        gust, samples = self.plan.campaign.gust, self.plan.samples
-        sigma_u, sigma_w = run.sigma_u_m_s, run.sigma_w_m_s
-        if sigma_u == 0.0 and sigma_w == 0.0:
-            return np.zeros((samples, 3))
-        span = self.plan.aircraft.constants.span_m if gust.rotary else None
-        unit = _unit_gust(run.length_u_m, run.length_w_m, at.airspeed_m_s, span, self.plan.dt_s)
-        states = unit.phi.shape[-1]
-        normals = streams.normals(self.plan.seed, run.run, streams.GUST, samples * states)
-        velocities = dryden.simulate(unit, normals.reshape(1, samples, states), gust.start)[0]
-        return np.asarray(velocities * np.array([sigma_u, sigma_w, sigma_w])[: velocities.shape[1]])
+    def _feedback(self, run: PlannedRun) -> LateralFeedback | None:
+        """The yaw damper and the bank hold, which see the noise and bias of the logged sensors."""
+        gains = self.plan.campaign.augmentation
+        if not gains.lateral:
+            return None
+        return LateralFeedback(
+            p_error_rad_s=self._error("p_rad_s", run),
+            r_error_rad_s=self._error("r_rad_s", run),
+            phi_error_rad=self._error("phi_rad", run),
+            yaw_damper_gain_s=gains.yaw_damper_gain_s,
+            roll_damper_gain_s=gains.roll_damper_gain_s,
+            bank_gain=gains.bank_gain,
+            washout_s=gains.yaw_damper_washout_s,
+            every=self.plan.log_every,
+        )
 
     def _error(self, channel: str, run: PlannedRun) -> Array:
         """Noise and bias that the augmentation's own sensor adds, the same as in the log."""
@@ -268,8 +282,18 @@ class Pilot:
         )
 
 
-def flown_runs(plan: Plan, runs: Sequence[PlannedRun]) -> list[tuple[Trim, Linearisation, dict[str, Array]]]:
-    """Fly single runs of a plan; trim, derivatives and noise-free channels of each.
+@dataclass(frozen=True)
+class FlownRun:
+    """A single run that was flown: trim, derivatives, those of the lateral motion in six axes, and noise-free channels."""
+
+    trim: Trim
+    linear: Linearisation
+    lateral: LateralLinearisation | None
+    channels: dict[str, Array]
+
+
+def flown_runs(plan: Plan, runs: Sequence[PlannedRun]) -> list[FlownRun]:
+    """Fly single runs of a plan.
 
     Raises
     ------
@@ -278,21 +302,13 @@ def flown_runs(plan: Plan, runs: Sequence[PlannedRun]) -> list[tuple[Trim, Linea
     """
     pilot = Pilot(plan)
     prepared = ((run, pilot.prepared(run.condition)) for run in runs)
-    return [(at.trim, at.linear, pilot.channels(run)) for run, at in prepared]
-
-
-@lru_cache(maxsize=64)
-def _unit_gust(
-    length_u: float, length_w: float, airspeed: float, span: float | None, dt_s: float
-) -> dryden.DiscreteGust:
-    """Gusts of unit standard deviation; the rotary gust goes with w."""
-    return dryden.discretise(dryden.Dryden(1.0, 1.0, length_u, length_w, airspeed, span), dt_s)
+    return [FlownRun(at.trim, at.linear, at.lateral, pilot.channels(run)) for run, at in prepared]
 
 
 def _log_metadata(plan: Plan) -> Mapping[str, object]:
     """Metadata of a log, without gusts, draws or the truth."""
     known: dict[str, object] = {"aircraft": plan.aircraft.name, "sample_rate_hz": plan.campaign.log_hz}
-    if all(manoeuvre.surface for manoeuvre in plan.manoeuvres):
+    if all(inputs[0].surface for inputs in plan.inputs):
         known[PRESCRIBED] = True
     return known
 
@@ -302,7 +318,7 @@ def truth_row(run: PlannedRun, prepared: Prepared | None) -> dict[str, object]:
 
     Parameters
     ----------
-    run : the planned run.
+    run : the planned run; one in six axes has the lateral derivatives and modes as well.
     prepared : its flight condition; None for a run that failed.
     """
     result: dict[str, object] = {"run_id": run.run_id, "status": "ok" if prepared else "failed"}
@@ -321,6 +337,8 @@ def truth_row(run: PlannedRun, prepared: Prepared | None) -> dict[str, object]:
         "density_kg_m3": at.density_kg_m3 if at else np.nan,
         "dynamic_pressure_pa": 0.5 * at.density_kg_m3 * at.airspeed_m_s**2 if at else np.nan,
     }
+    if run.condition.six_axes:
+        result |= lateral_truth(prepared.lateral if prepared else None, at)
     for name in (
         "eas_m_s",
         "altitude_m",
@@ -329,6 +347,7 @@ def truth_row(run: PlannedRun, prepared: Prepared | None) -> dict[str, object]:
         "sigma_w_m_s",
         "length_u_m",
         "length_w_m",
+        *(("sigma_v_m_s", "length_v_m") if run.condition.six_axes else ()),
     ):
         result[name] = getattr(run, name)
     if run.effects is not None:

@@ -85,13 +85,15 @@ def aircraft(plane: Aircraft, change: Change, simulation_hz: float, nominal: Con
 
 
 def in_the_air(table: pd.DataFrame, change: Change) -> pd.DataFrame:
-    """Return a run table with the gust levels of the change."""
+    """Return a run table with the gust levels of the change; the side gust follows the vertical one."""
     declared = {name: table[f"{name}_m_s"].to_numpy() for name in ("sigma_u", "sigma_w")}
     other = {"sigma_u": declared["sigma_w"], "sigma_w": declared["sigma_u"]}
     flown = dict(declared)
     for level in {term.level for term in change.air}:
         factor = math.prod(term.factor for term in change.air if term.level == level)
         flown[level] = factor * np.where(declared[level] > 0.0, declared[level], other[level])
+        if level == "sigma_w" and "sigma_v_m_s" in table:
+            flown["sigma_v"] = factor * table["sigma_v_m_s"].to_numpy()
     return table.assign(**{f"{name}_m_s": values for name, values in flown.items()})
 
 

@@ -2,31 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final, Literal
+from typing import Any, ClassVar, Final, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-from pydantic import (
-    BeforeValidator,
-    Field,
-    ValidationError,
-    ValidationInfo,
-    field_validator,
-    model_validator,
-)
+from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
 
 from airtruth import quantity as qt
 from airtruth.aircraft import Sensor, sensor_tables
 from airtruth.documents import read_toml
-from airtruth.errors import ConfigurationError, choices
+from airtruth.errors import ConfigurationError
 from airtruth.physics.gust_figures import FIGURES, LEVELS
-from airtruth.quantity import Strict
 from airtruth.simulation.campaign.effect_table import EffectTable
-from airtruth.simulation.manoeuvres import KINDS, MOST_HARMONICS
-
-Array = NDArray[np.float64]
+from airtruth.simulation.campaign.manoeuvre_table import ManoeuvreTable
+from airtruth.simulation.campaign.tables import Constant, Draw, Table, one_of
+from airtruth.simulation.manoeuvres import ELEVATOR
 
 NO_GUST: Final = "none"
 """Gust level of calm air."""
@@ -36,133 +26,34 @@ MOST_STEPS: Final = 4e6
 """Simulation steps of a run [-] (judgement: an hour at 1 kHz; planning it takes 3 s)."""
 
 
-class Constant(Strict):
-    """One value for every run."""
-
-    value: float
-
-    def draw(self, rng: np.random.Generator, runs: int) -> Array:
-        """(runs,) values."""
-        return np.full(runs, self.value)
-
-
-class Normal(Strict):
-    """Normal distribution."""
-
-    mean: float
-    std: float = Field(ge=0.0)
-
-    def draw(self, rng: np.random.Generator, runs: int) -> Array:
-        """(runs,) values."""
-        return self.mean + self.std * rng.standard_normal(runs)
-
-
-class Uniform(Strict):
-    """Uniform distribution."""
-
-    low: float
-    high: float
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Uniform:
-        if self.low > self.high:
-            raise ValueError(f"low = {self.low:g} is above high = {self.high:g}")
-        return self
-
-    def draw(self, rng: np.random.Generator, runs: int) -> Array:
-        """(runs,) values."""
-        return self.low + (self.high - self.low) * rng.random(runs)
-
-
-class Choice(Strict):
-    """One of a list, each equally likely."""
-
-    choose: tuple[float, ...] = Field(min_length=1)
-
-    def draw(self, rng: np.random.Generator, runs: int) -> Array:
-        """(runs,) values."""
-        picked = np.floor(rng.random(runs) * len(self.choose)).astype(np.int64)
-        values: Array = np.array(self.choose, dtype=np.float64).take(picked)
-        return values
-
-
-Distribution = Constant | Normal | Uniform | Choice
-"""A distribution from which each run draws a value."""
-
-_DISTRIBUTIONS: Final[tuple[tuple[frozenset[str], type[Distribution]], ...]] = (
-    (frozenset({"value"}), Constant),
-    (frozenset({"mean", "std"}), Normal),
-    (frozenset({"low", "high"}), Uniform),
-    (frozenset({"choose"}), Choice),
-)
-"""Keys that a file states of a distribution, and its model."""
-
-
-def distribution(raw: Any) -> Any:
-    """Read a number or a table as a distribution.
-
-    Raises
-    ------
-    ValueError
-        If it is neither.
-    """
-    if isinstance(raw, bool):
-        raise ValueError("write a number or a distribution, not true or false")
-    if isinstance(raw, int | float):
-        return Constant(value=raw)
-    if isinstance(raw, Mapping):
-        for keys, model in _DISTRIBUTIONS:
-            if set(raw) == keys:
-                return model.model_validate(raw)
-    if isinstance(raw, Strict):
-        return raw
-    raise ValueError("write a number, { mean, std }, { low, high } or { choose = [...] }")
-
-
-Draw = Annotated[Distribution, BeforeValidator(distribution)]
-"""A field that a file states as a number or a distribution."""
-
-
-def _one_of(names: Iterable[str]) -> Callable[[str], str]:
-    def check(value: str) -> str:
-        if value not in names:
-            raise ValueError(f"{value!r} is not known; {choices(value, names)}")
-        return value
-
-    return check
-
-
-class Table(Strict):
-    """A table whose keys may end in a unit of their dimension in ``dimensions``."""
-
-    dimensions: ClassVar[dict[str, str]] = {}
-
-    @model_validator(mode="before")
-    @classmethod
-    def _to_si(cls, raw: Any) -> Any:
-        return qt.keys_to_si(raw, cls.dimensions) if isinstance(raw, Mapping) else raw
-
-
 class ConditionTable(Table):
-    """Where runs start: level or steady climb, EAS [m/s], geometric altitude [m], flight path [rad]."""
+    """Where runs start: level or steady climb, EAS [m/s], geometric altitude [m], flight path [rad].
+
+    straight: a lateral campaign trims with the wings level, or without sideslip and with a bank.
+    """
 
     dimensions: ClassVar[dict[str, str]] = {"eas": "speed", "altitude": "length", "flight_path": "angle"}
     eas: Draw
     altitude: Draw
     flight_path: Draw = Constant(value=0.0)
+    straight: Literal["wings-level", "no-sideslip"] = "wings-level"
 
 
 class GustTable(Table):
-    """Dryden gusts; ``factor`` multiplies the level's standard deviations."""
+    """Dryden gusts; ``factor`` multiplies the level's standard deviations.
+
+    lateral: side gusts, with ``rotary`` those in roll and yaw; where it is not stated, the lateral campaigns have them.
+    """
 
     figures: str = "gtm"
     level: str = NO_GUST
     factor: Draw = Constant(value=1.0)
     start: Literal["rest", "stationary"] = "stationary"
     rotary: bool = False
+    lateral: bool | None = None
 
-    _known_figures = field_validator("figures")(_one_of(FIGURES))
-    _known_level = field_validator("level")(_one_of((NO_GUST, *LEVELS)))
+    _known_figures = field_validator("figures")(one_of(FIGURES))
+    _known_level = field_validator("level")(one_of((NO_GUST, *LEVELS)))
 
 
 class WindTable(Table):
@@ -176,57 +67,6 @@ class WindTable(Table):
     dimensions: ClassVar[dict[str, str]] = {"along_track": "speed"}
     along_track: Draw = Constant(value=0.0)
     keeps: Literal["true_airspeed", "ground_speed"] = "true_airspeed"
-
-
-class ManoeuvreTable(Table):
-    """One manoeuvre; see `airtruth.simulation.manoeuvres.Manoeuvre`. file, run_id, channel: a log to replay."""
-
-    dimensions: ClassVar[dict[str, str]] = {
-        "amplitude": "angle",
-        "start": "time",
-        "step": "time",
-        "length": "time",
-        "lowest": "frequency",
-        "highest": "frequency",
-        "segments": "time",
-        "rise": "time",
-        "phases": "angle",
-    }
-    kind: str
-    amplitude: Draw = Constant(value=0.0)
-    start: float = Field(default=1.0, ge=0.0)
-    step: float = Field(default=0.5, gt=0.0)
-    length: float = Field(default=10.0, gt=0.0)
-    lowest: float = Field(default=0.2, gt=0.0)
-    highest: float = Field(default=3.0, gt=0.0)
-    part: int = Field(default=0, ge=0)
-    parts: int = Field(default=1, ge=1, le=MOST_HARMONICS)
-    segments: tuple[float, ...] = ()
-    levels: tuple[float, ...] = ()
-    rise: float = Field(default=0.0, ge=0.0)
-    harmonics: tuple[int, ...] = ()
-    weights: tuple[float, ...] = ()
-    phases: tuple[float, ...] = ()
-    file: str = ""
-    run_id: str = ""
-    channel: Literal["elevator_command_rad", "elevator_rad"] = "elevator_command_rad"
-    saturate: bool = False
-
-    _known_kind = field_validator("kind")(_one_of(KINDS))
-
-    @model_validator(mode="after")
-    def _complete(self) -> ManoeuvreTable:
-        if (self.kind == "replay") != bool(self.file):
-            raise ValueError("kind = 'replay' and file = '...' go together")
-        if self.kind != "replay" and "amplitude" not in self.model_fields_set:
-            raise ValueError(
-                "amplitude is missing: without it the elevator stays at its trim; write amplitude_deg"
-            )
-        if self.highest <= self.lowest:
-            raise ValueError("highest_hz must be above lowest_hz")
-        if self.part >= self.parts:
-            raise ValueError(f"part counts from 0 to parts - 1 = {self.parts - 1}")
-        return self
 
 
 class SensorTable(Table):
@@ -256,10 +96,24 @@ class SensorTable(Table):
 
 
 class AugmentationTable(Table):
-    """Gains of the aircraft's pitch damper [s] and attitude hold [-]."""
+    """Gains of the aircraft's pitch damper [s] and attitude hold [-], and of a yaw damper and a bank hold.
+
+    The latter two are flown beside the aircraft's model, see `airtruth.simulation.lateral_feedback`: yaw_damper_gain_s of the
+    yaw rate to the rudder [s], yaw_damper_washout_s the time constant of its high pass [s] or 0 for none, bank_gain of the
+    bank [-] and roll_damper_gain_s of the roll rate [s] to the aileron.
+    """
 
     damper_gain_s: float = 0.0
     attitude_gain: float = 0.0
+    yaw_damper_gain_s: float = 0.0
+    yaw_damper_washout_s: float = Field(default=0.0, ge=0.0)
+    bank_gain: float = 0.0
+    roll_damper_gain_s: float = 0.0
+
+    @property
+    def lateral(self) -> bool:
+        """Whether it moves aileron or rudder."""
+        return bool(self.yaw_damper_gain_s or self.bank_gain or self.roll_damper_gain_s)
 
 
 class Campaign(Table):
@@ -282,6 +136,30 @@ class Campaign(Table):
     sensors: SensorTable = SensorTable()
     augmentation: AugmentationTable = AugmentationTable()
     effect: tuple[EffectTable, ...] = ()
+
+    @property
+    def lateral(self) -> bool:
+        """Whether its flights roll and yaw: a manoeuvre or a feedback moves aileron or rudder, or there are side gusts."""
+        return (
+            bool(self.moved - {ELEVATOR})
+            or self.augmentation.lateral
+            or (self.gust.lateral is True and self.in_gusts)
+        )
+
+    @property
+    def moved(self) -> frozenset[str]:
+        """Controls that a manoeuvre moves."""
+        return frozenset(table.control for row in self.manoeuvre for table in row.inputs)
+
+    @property
+    def in_gusts(self) -> bool:
+        """Whether the air is not calm."""
+        return self.gust.level != NO_GUST
+
+    @property
+    def side_gusts(self) -> bool:
+        """Whether there are side gusts."""
+        return self.in_gusts and self.lateral and self.gust.lateral is not False
 
     def changed(self, changes: Mapping[str, int]) -> Campaign:
         """Return the campaign with another seed or number of runs.

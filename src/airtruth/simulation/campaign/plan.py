@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import re
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import pandas as pd
@@ -18,21 +20,30 @@ from airtruth.aircraft import Aircraft, Sensor, load
 from airtruth.aircraft.neutral import fitted
 from airtruth.errors import AirtruthError, ConfigurationError, TrimError
 from airtruth.logs.names import ordered_number
-from airtruth.logs.store import read_log
-from airtruth.physics import actuators, atmosphere
-from airtruth.physics.gust_figures import gust_scales
+from airtruth.physics import atmosphere
+from airtruth.physics.gust_figures import gust_scales, side_gust
 from airtruth.simulation.campaign import effects as with_effects
 from airtruth.simulation.campaign import file as campaign_file
-from airtruth.simulation.campaign import streams
-from airtruth.simulation.campaign.file import NO_GUST, Campaign, ManoeuvreTable
+from airtruth.simulation.campaign import streams, tables
+from airtruth.simulation.campaign.file import Campaign
+from airtruth.simulation.campaign.inputs import (
+    beyond_limits,
+    extreme_amplitudes,
+    in_words,
+    lacking,
+    read_input,
+)
 from airtruth.simulation.campaign.numbering import chunk_numbers, chunk_offsets
 from airtruth.simulation.disposable import isolated
 from airtruth.simulation.manoeuvres import Manoeuvre, end_s, sample
-from airtruth.simulation.simulator import Condition, jsbsim_model
+from airtruth.simulation.simulator import Condition, Straight, jsbsim_model
 from airtruth.simulation.trim import Trim, trim
-from airtruth.units import DEG, KT
+from airtruth.units import KT
 
 Array = NDArray[np.float64]
+
+_FURTHER: Final = re.compile(r"amplitude_\d+_rad")
+"""Columns of a run table with the amplitudes of the second input and those that follow."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +56,12 @@ class PlannedRun:
     eas_m_s, altitude_m, gamma_rad : flight condition, see `airtruth.simulation.simulator.Condition`.
     wind_m_s : constant wind along the track [m/s].
     manoeuvre : index in `Plan.manoeuvres`.
-    amplitude_rad : factor on a manoeuvre of unit amplitude [rad].
+    amplitude_rad : factor on the first input, of unit amplitude [rad].
     sigma_u_m_s, sigma_w_m_s, length_u_m, length_w_m : gusts [m/s], [m].
     effects : the flown effects as JSON; None without effects.
+    sigma_v_m_s, length_v_m : side gusts [m/s], [m].
+    straight : how the trim holds the aircraft straight, see `airtruth.simulation.simulator.Condition`.
+    further_amplitudes_rad : factors on the other inputs of the manoeuvre [rad]; entries beyond them are not numbers.
     """
 
     run: int
@@ -64,11 +78,19 @@ class PlannedRun:
     length_u_m: float
     length_w_m: float
     effects: str | None = None
+    sigma_v_m_s: float = 0.0
+    length_v_m: float = 1.0
+    straight: Straight = "pitch-plane"
+    further_amplitudes_rad: tuple[float, ...] = ()
+
+    def amplitude_of(self, number: int) -> float:
+        """Factor on an input of the manoeuvre, counted from 0 [rad]."""
+        return self.amplitude_rad if number == 0 else self.further_amplitudes_rad[number - 1]
 
     @property
     def condition(self) -> Condition:
         """Its flight condition."""
-        return Condition(self.eas_m_s, self.altitude_m, self.gamma_rad)
+        return Condition(self.eas_m_s, self.altitude_m, self.gamma_rad, self.straight)
 
 
 @dataclass(frozen=True)
@@ -81,9 +103,10 @@ class Plan:
     aircraft : aircraft to fly, the campaign's effects added.
     seed : seed of every draw.
     sensors : channel -> sensor, the campaign's entries applied.
-    manoeuvres : alternatives; run k flies number ``table.manoeuvre[k]``, scaled to its amplitude.
+    inputs : alternatives, each with one or more inputs; run k flies number ``table.manoeuvre[k]``, scaled to its amplitudes.
     table : one row per run: run, run_id, chunk, eas_m_s, altitude_m, gamma_rad, wind_m_s, manoeuvre,
-        amplitude_rad, sigma_u_m_s, sigma_w_m_s, length_u_m, length_w_m, and effects where there are any.
+        amplitude_rad, sigma_u_m_s, sigma_w_m_s, length_u_m, length_w_m; where there are any amplitude_2_rad and so on
+        (further inputs), sigma_v_m_s and length_v_m (side gusts), straight (lateral campaigns) and effects.
     digest : fingerprint of all this except the number of runs, by which a folder recognises its campaign.
     nominal : condition of the run of median airspeed and its trim, which no worker computes again.
     """
@@ -92,7 +115,7 @@ class Plan:
     aircraft: Aircraft
     seed: int
     sensors: dict[str, Sensor]
-    manoeuvres: tuple[Manoeuvre, ...]
+    inputs: tuple[tuple[Manoeuvre, ...], ...]
     table: pd.DataFrame
     digest: str
     nominal: tuple[Condition, Trim] | None = None
@@ -106,6 +129,11 @@ class Plan:
     def log_every(self) -> int:
         """Simulation steps per log sample."""
         return round(self.campaign.simulation_hz / self.campaign.log_hz)
+
+    @property
+    def t_s(self) -> Array:
+        """(samples,) times of the simulation [s]."""
+        return np.arange(self.samples, dtype=np.float64) * self.dt_s
 
     @property
     def samples(self) -> int:
@@ -140,15 +168,11 @@ def make(campaign: Path | str | Campaign, seed: int | None = None, runs: int | N
         path = Path(campaign)
         campaign = campaign_file.read(path, changes)
     aircraft = load(campaign.aircraft, near=path.parent)
-    model = jsbsim_model(aircraft)
-    if campaign.gust.rotary and model.rotary_gust is None:
+    lacks = lacking(campaign, jsbsim_model(aircraft))
+    if lacks:
         raise ConfigurationError(
-            f"{path}: gust.rotary: {aircraft.name} has no rotary_gust property in its aircraft.toml"
-        )
-    gains = campaign.augmentation
-    if (gains.damper_gain_s or gains.attitude_gain) and model.augmentation is None:
-        raise ConfigurationError(
-            f"{path}: augmentation: {aircraft.name} has no [jsbsim.augmentation] in its aircraft.toml"
+            f"{path}: "
+            + "; ".join(f"{key}: {aircraft.name} has no {what} in its aircraft.toml" for key, what in lacks)
         )
     try:
         effects = with_effects.read(campaign)
@@ -156,7 +180,7 @@ def make(campaign: Path | str | Campaign, seed: int | None = None, runs: int | N
         table = with_effects.state(with_effects.in_the_air(table, effects), campaign)
         flown = with_effects.aircraft(aircraft, effects, campaign.simulation_hz, _nominal(table))
         sensors = fitted(campaign.sensors.apply(aircraft.file.sensors), effects.sensors)
-        manoeuvres = tuple(_manoeuvre(m, path.parent) for m in campaign.manoeuvre)
+        inputs = tuple(tuple(read_input(i, path.parent) for i in row.inputs) for row in campaign.manoeuvre)
     except ConfigurationError as error:
         raise ConfigurationError(f"{path}: {error}") from None
     plan = Plan(
@@ -164,16 +188,19 @@ def make(campaign: Path | str | Campaign, seed: int | None = None, runs: int | N
         aircraft=flown,
         seed=campaign.seed,
         sensors=sensors,
-        manoeuvres=manoeuvres,
+        inputs=inputs,
         table=table,
-        digest=_digest(campaign, flown, manoeuvres),
+        digest=_digest(campaign, flown, inputs),
     )
     return _checked(plan, path)
 
 
 def planned_runs(table: pd.DataFrame) -> list[PlannedRun]:
     """Return the rows of a run table."""
-    columns = {str(name): table[name].tolist() for name in table.columns}
+    further = [name for name in table.columns if _FURTHER.fullmatch(name)]
+    columns = {str(name): table[name].tolist() for name in table.columns if name not in further}
+    if further:
+        columns["further_amplitudes_rad"] = list(map(tuple, table[further].to_numpy().tolist()))
     return [PlannedRun(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
 
 
@@ -186,7 +213,7 @@ def chunk_runs(plan: Plan, chunk: int) -> list[PlannedRun]:
 def _run_table(campaign: Campaign, seed: int) -> pd.DataFrame:
     runs = campaign.runs
 
-    def draw(name: str, distribution: campaign_file.Distribution) -> Array:
+    def draw(name: str, distribution: tables.Distribution) -> Array:
         return distribution.draw(streams.plan_stream(seed, name), runs)
 
     number = np.arange(runs)
@@ -210,7 +237,15 @@ def _run_table(campaign: Campaign, seed: int) -> pd.DataFrame:
             )
     kind = number % len(campaign.manoeuvre)
     amplitudes = np.stack([draw(f"amplitude {k}", m.amplitude) for k, m in enumerate(campaign.manoeuvre)])
+    further = {}
+    for j in range(1, max(len(m.inputs) for m in campaign.manoeuvre)):
+        drawn = [
+            draw(f"amplitude {k} {j}", m.inputs[j].amplitude) if j < len(m.inputs) else np.full(runs, np.nan)
+            for k, m in enumerate(campaign.manoeuvre)
+        ]
+        further[f"amplitude_{j + 1}_rad"] = np.stack(drawn)[kind, number]
     gusts = _gust_columns(campaign, altitude, factor)
+    trimmed = {"straight": campaign.condition.straight} if campaign.lateral else {}
     return pd.DataFrame(
         {
             "run": number,
@@ -222,52 +257,38 @@ def _run_table(campaign: Campaign, seed: int) -> pd.DataFrame:
             "wind_m_s": wind,
             "manoeuvre": kind,
             "amplitude_rad": amplitudes[kind, number],
+            **further,
             **gusts,
+            **trimmed,
         }
     )
 
 
 def _gust_columns(campaign: Campaign, altitude: Array, factor: Array) -> dict[str, Array]:
-    names = ("sigma_u_m_s", "sigma_w_m_s", "length_u_m", "length_w_m")
-    if campaign.gust.level == NO_GUST:
+    figures, level = campaign.gust.figures, campaign.gust.level
+    names = ["sigma_u_m_s", "sigma_w_m_s", "length_u_m", "length_w_m"]
+    if not campaign.in_gusts:
         return {name: np.full(len(altitude), 0.0 if name.startswith("sigma") else 1.0) for name in names}
     unique, inverse = np.unique(altitude, return_inverse=True)
-    scales = [gust_scales(campaign.gust.figures, campaign.gust.level, float(h)) for h in unique]
-    columns = {name: np.array([getattr(s, name) for s in scales])[inverse] for name in names}
+    scales = [gust_scales(figures, level, float(h)) for h in unique]
+    rows = [tuple(s) for s in scales]
+    if campaign.side_gusts:
+        names += ["sigma_v_m_s", "length_v_m"]
+        rows = [(*s, *side_gust(figures, s)) for s in scales]
+    columns = {
+        name: np.array(values)[inverse] for name, values in zip(names, zip(*rows, strict=True), strict=True)
+    }
     return {name: values * factor if name.startswith("sigma") else values for name, values in columns.items()}
 
 
-def _manoeuvre(table: ManoeuvreTable, folder: Path) -> Manoeuvre:
-    """The manoeuvre at unit amplitude; a replay at its own."""
-    timed = ("start_s", "step_s", "length_s", "segments_s", "rise_s")
-    shaped = ("lowest_hz", "highest_hz", "part", "parts", "levels", "harmonics", "weights", "phases_rad")
-    common = {name: getattr(table, re.sub("_(s|hz|rad)$", "", name)) for name in (*timed, *shaped)}
-    if table.kind != "replay":
-        return Manoeuvre(table.kind, amplitude_rad=1.0, **common)
-    log = read_log(folder / table.file, columns=[table.channel])
-    if table.run_id and table.run_id not in log.run_ids:
-        raise ConfigurationError(
-            f"{folder / table.file}: no run {table.run_id!r}; it holds {', '.join(log.run_ids[:10])}"
-        )
-    rows = log.rows(log.run_ids.index(table.run_id) if table.run_id else 0)
-    values = log.channels[table.channel][rows]
-    return Manoeuvre(
-        "replay",
-        start_s=table.start,
-        times_s=log.t_s[rows],
-        values_rad=values - values[0],
-        surface=table.channel == "elevator_rad",
-    )
-
-
-def _digest(campaign: Campaign, aircraft: Aircraft, manoeuvres: tuple[Manoeuvre, ...]) -> str:
+def _digest(campaign: Campaign, aircraft: Aircraft, inputs: tuple[tuple[Manoeuvre, ...], ...]) -> str:
     content = hashlib.sha256(campaign.model_dump_json(by_alias=True, exclude={"runs"}).encode())
     content.update(f"{__version__} {version('jsbsim')} {version('numpy')}".encode())
     for file in sorted(
         p for p in aircraft.folder.rglob("*") if p.is_file() and p.suffix in (".xml", ".toml")
     ):
         content.update(file.relative_to(aircraft.folder).as_posix().encode() + b"\0" + file.read_bytes())
-    for m in manoeuvres:
+    for m in itertools.chain(*inputs):
         content.update(
             np.ascontiguousarray(m.times_s).tobytes() + np.ascontiguousarray(m.values_rad).tobytes()
         )
@@ -277,23 +298,27 @@ def _digest(campaign: Campaign, aircraft: Aircraft, manoeuvres: tuple[Manoeuvre,
 def _checked(plan: Plan, path: Path) -> Plan:
     """The plan with its nominal trim, or every problem of the campaign that can be known before the flight."""
     problems: list[str] = []
-    t = np.arange(plan.samples, dtype=np.float64) * plan.dt_s
     nominal = _nominal_trims(plan, problems)
-    for number, (manoeuvre, table) in enumerate(zip(plan.manoeuvres, plan.campaign.manoeuvre, strict=True)):
-        where = f"manoeuvre.{number}"
-        try:
-            shape = sample(manoeuvre, t)
-        except AirtruthError as error:
-            problems.append(f"{where}: {error}")
-            continue
-        if end_s(manoeuvre) > plan.campaign.duration + 1e-9:
-            problems.append(
-                f"{where}: it ends at {end_s(manoeuvre):g} s, after the run of {plan.campaign.duration:g} s; "
-                "lengthen duration_s or shorten the manoeuvre"
-            )
+    for number, (inputs, row) in enumerate(zip(plan.inputs, plan.campaign.manoeuvre, strict=True)):
+        shapes = []
+        for place, manoeuvre in enumerate(inputs):
+            where = f"manoeuvre.{number}" + (f".also.{place - 1}" if place else "")
+            try:
+                shapes.append(sample(manoeuvre, plan.t_s))
+            except AirtruthError as error:
+                problems.append(f"{where}: {error}")
+                continue
+            if end_s(manoeuvre) > plan.campaign.duration + 1e-9:
+                problems.append(
+                    f"{where}: it ends at {end_s(manoeuvre):g} s, after the run of {plan.campaign.duration:g} s; "
+                    "lengthen duration_s or shorten the manoeuvre"
+                )
         rows = plan.table[plan.table["manoeuvre"] == number]
-        if nominal and len(rows) and not table.saturate:
-            problems += [f"{where}: {p}" for p in _saturation(plan, manoeuvre, shape, rows, nominal)]
+        saturates = any(table.saturate for table in row.inputs)
+        if nominal and len(rows) and len(shapes) == len(inputs) and not saturates:
+            amplitudes = extreme_amplitudes(rows, inputs)
+            found = beyond_limits(plan.aircraft, nominal[0], inputs, shapes, amplitudes, plan.dt_s)
+            problems += [f"manoeuvre.{number}: {p}" for p in found]
     if problems:
         raise ConfigurationError(f"{path}: {len(problems)} problem(s)\n  " + "\n  ".join(problems))
     return replace(plan, nominal=(_nominal(plan.table), nominal[0]))
@@ -317,36 +342,6 @@ def _nominal(table: pd.DataFrame) -> Condition:
     return nominal.condition
 
 
-def _saturation(
-    plan: Plan, manoeuvre: Manoeuvre, shape: Array, rows: pd.DataFrame, trims: list[Trim]
-) -> list[str]:
-    servo = plan.aircraft.file.elevator_actuator
-    if servo is None or manoeuvre.surface:
-        return []
-    amplitudes = (
-        np.array([1.0])
-        if manoeuvre.kind == "replay"
-        else rows["amplitude_rad"].agg(["min", "max"]).to_numpy()
-    )
-    command = trims[0].elevator_rad + amplitudes[:, None] * shape
-    low, high = servo.minimum.value, servo.maximum.value
-    allowed = f"allowed {low / DEG:g} to {high / DEG:g} deg"
-    if command.min() < low or command.max() > high:
-        return [
-            f"the command reaches {command.min() / DEG:.1f} to {command.max() / DEG:.1f} deg with the trim's "
-            f"{trims[0].elevator_rad / DEG:.1f} deg; {allowed}. Lower amplitude_deg, or state saturate = true"
-        ]
-    common = (plan.dt_s, servo.bandwidth.value)
-    free = actuators.respond(command, *common, np.inf, low, high, 0.0)
-    limited = actuators.respond(command, *common, servo.rate_limit.value, low, high, 0.0)
-    if np.abs(free - limited).max() > 1e-6:
-        return [
-            f"the surface would have to move faster than the servo's {servo.rate_limit.value / DEG:g} deg/s; "
-            "lower amplitude_deg, or state saturate = true"
-        ]
-    return []
-
-
 def describe(plan: Plan) -> str:
     """Describe the campaign as text."""
     c, t = plan.campaign, plan.table
@@ -363,11 +358,14 @@ def describe(plan: Plan) -> str:
         "wind_m_s": "wind [m/s]",
         "sigma_u_m_s": "sigma_u [m/s]",
         "sigma_w_m_s": "sigma_w [m/s]",
+        "sigma_v_m_s": "sigma_v [m/s]",
     }
     for name, label in shown.items():
+        if name not in t:
+            continue
         low, high = t[name].min(), t[name].max()
         lines.append(f"{label:<14} {low:.4g}" + (f" to {high:.4g}" if high > low else ""))
-    lines.append("manoeuvres " + ", ".join(m.kind for m in plan.manoeuvres))
+    lines.append("manoeuvres " + ", ".join(in_words(inputs) for inputs in plan.inputs))
     lines += [f"effect     {with_effects.text(effect)}" for effect in c.effect]
     return "\n".join(lines)
 

@@ -16,6 +16,7 @@ from airtruth.logs.names import chunk_file
 from airtruth.result import shortened
 from airtruth.simulation.campaign.chunk import FAILED, INTERRUPTED, OK, Outcome
 from airtruth.simulation.campaign.plan import Plan
+from airtruth.simulation.manoeuvres import ELEVATOR
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,6 +24,16 @@ if TYPE_CHECKING:
 
 PLOTTED: Final = {"elevator_rad": "elevator", "alpha_rad": "alpha", "q_rad_s": "q", "az_m_s2": "az"}
 """Channels, with their labels, that `CampaignResult.plot` shows: the input of the short period and its measured outputs."""
+PLOTTED_LATERAL: Final = {
+    "aileron_rad": "aileron",
+    "rudder_rad": "rudder",
+    "beta_rad": "beta",
+    "phi_rad": "phi",
+    "p_rad_s": "p",
+    "r_rad_s": "r",
+    "ay_m_s2": "ay",
+}
+"""Those of the lateral-directional motion."""
 SHOWN_REASONS: Final = 5
 """Reasons of failure that a summary lists (judgement: it stays on one screen); `to_frame` has them all."""
 
@@ -99,7 +110,7 @@ class CampaignResult:
         }
 
     def plot(self, run_id: str | None = None) -> Figure:
-        """Time histories of one run, as logged.
+        """Time histories of one run, as logged: of each motion whose controls the campaign moves.
 
         Parameters
         ----------
@@ -120,11 +131,17 @@ class CampaignResult:
         if shown not in flown:
             raise LogError(f"{self.folder}: run {shown!r} was not flown; {choices(shown, flown)}")
         chunk = int(self.plan.table["chunk"].iloc[flown[shown]])
-        log = read_log(self.folder / "logs" / chunk_file(chunk), run_ids=[shown], columns=list(PLOTTED))
+        campaign = self.plan.campaign
+        plotted = PLOTTED if ELEVATOR in campaign.moved or not campaign.lateral else {}
+        plotted = plotted | (PLOTTED_LATERAL if campaign.lateral else {})
+        log = read_log(self.folder / "logs" / chunk_file(chunk), run_ids=[shown], columns=list(plotted))
+        rows = math.ceil(len(plotted) / 2)
         with style.applied():
-            figure = style.new_figure(7.0, 5.0)
-            axes = np.asarray(figure.subplots(math.ceil(len(PLOTTED) / 2), 2, sharex=True)).ravel()
-            for ax, (channel, label) in zip(axes, PLOTTED.items(), strict=True):
+            figure = style.new_figure(7.0, 5.0 if rows == 2 else 1.9 * rows)
+            axes = np.asarray(figure.subplots(rows, 2, sharex=True)).ravel()
+            for ax in axes[len(plotted) :]:
+                ax.set_axis_off()
+            for ax, (channel, label) in zip(axes, plotted.items(), strict=False):
                 ax.plot(log.t_s, log.channels[channel], color=style.BLUE)
                 ax.set_ylabel(f"{label} [{SIGNALS[channel].unit}]")
             for ax in axes[-2:]:

@@ -18,6 +18,8 @@ GUST: Final = 0
 """Purpose of the gusts."""
 SENSORS: Final = {name: number for number, name in enumerate(SIGNALS, start=1)}
 """Purpose of the noise of each channel."""
+SIDE_GUST: Final = 255
+"""Purpose of the side gusts: the last, so that channels can be added."""
 _PURPOSES: Final = 256
 """Keys reserved for one run; more than there are purposes, so that channels can be added."""
 _PLAN: Final = 1 << 63
@@ -25,7 +27,7 @@ _PLAN: Final = 1 << 63
 
 
 def normals(seed: int, run: int, purpose: int, count: int) -> NDArray[np.float64]:
-    """(count,) standard normals of one run and purpose (`GUST` or one of `SENSORS`)."""
+    """(count,) standard normals of one run and purpose (`GUST`, `SIDE_GUST` or one of `SENSORS`)."""
     return _stream(seed, run * _PURPOSES + purpose).standard_normal(count)
 
 

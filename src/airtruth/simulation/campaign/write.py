@@ -8,7 +8,8 @@ from typing import Any
 from pydantic import BaseModel
 
 from airtruth.simulation.campaign.effect_table import EffectTable
-from airtruth.simulation.campaign.file import Campaign, Constant, Distribution, Table
+from airtruth.simulation.campaign.file import Campaign
+from airtruth.simulation.campaign.tables import Constant, Distribution, Table
 from airtruth.toml_values import toml_value
 from airtruth.units import UNITS
 
@@ -28,8 +29,15 @@ def as_toml(campaign: Campaign, heading: str = "") -> str:
             lines += ["", f"[{key}]", *_lines(value)]
         elif isinstance(value, tuple) and value and isinstance(value[0], BaseModel):
             for row in value:
-                lines += ["", f"[[{key}]]", *_lines(row)]
+                lines += _rows(key, row)
     return "\n".join(lines) + "\n"
+
+
+def _rows(key: str, row: BaseModel) -> list[str]:
+    """A table of an array, followed by the arrays of tables in it."""
+    lines = ["", f"[[{key}]]", *_lines(row)]
+    inner = [] if isinstance(row, EffectTable) else [e for e in _entries(row) if _is_table(e[1])]
+    return lines + [line for name, rows in inner for each in rows for line in _rows(f"{key}.{name}", each)]
 
 
 def _is_table(value: object) -> bool:
@@ -61,7 +69,7 @@ def _lines(model: BaseModel) -> list[str]:
         variant = {"variant": model.variant} if model.variant else {}
         stated = {"name": model.name, **variant, **model.parameters}
         return [f"{key} = {_value(value)}" for key, value in stated.items()]
-    return [f"{key} = {_value(value)}" for key, value in _entries(model)]
+    return [f"{key} = {_value(value)}" for key, value in _entries(model) if not _is_table(value)]
 
 
 def _value(value: Any) -> str:

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft, AircraftFile, JsbsimModel
-from airtruth.aircraft.probe import Constants
+from airtruth.aircraft.probe import Constants, constants_of
 from airtruth.simulation.simulator import Condition, Controls, Executive
-from airtruth.units import DEG, FT, G0, SLUG
+from airtruth.units import DEG, G0
 
 Array = NDArray[np.float64]
 
@@ -60,6 +60,7 @@ class Bench:
         q_rad_s: float = 0.0,
         speed: float = 1.0,
         throttle: float | None = None,
+        lateral: Mapping[str, float] | None = None,
     ) -> Executive:
         """An executive in a steady state.
 
@@ -67,6 +68,7 @@ class Bench:
         ----------
         writes : further properties, written after the controls.
         alpha_rad, q_rad_s : of the state; speed : over that of the condition; throttle : lever.
+        lateral : p_rad_s, r_rad_s, beta_rad or phi_rad of the state [rad/s], [rad]; the others are zero.
         """
         executive = Executive(self.aircraft, STEP_S)
         for name, value in (writes or {}).items():
@@ -75,7 +77,13 @@ class Bench:
         lever = self.throttle if throttle is None else throttle
         command = (writes or {}).get(self.model.elevator.command, 0.0) / self.model.elevator.command_per_rad
         alpha = self.alpha_rad if alpha_rad is None else alpha_rad
-        executive.initialise(condition, alpha, Controls(command, lever), q_rad_s)
+        rates = dict(lateral or {})
+        controls = Controls(
+            command, lever, bank_rad=rates.pop("phi_rad", 0.0), sideslip_rad=rates.pop("beta_rad", 0.0)
+        )
+        if lateral is not None:
+            condition = replace(condition, straight="wings-level")
+        executive.initialise(condition, alpha, controls, q_rad_s, **rates)
         return executive
 
 
@@ -88,14 +96,7 @@ def bench(folder: Path, model: JsbsimModel, altitude_m: float = 1500.0, lift: fl
     """
     unknown = Constants(wing_area_m2=1.0, chord_m=1.0, span_m=1.0, mass_kg=1.0, inertia_yy_kg_m2=1.0)
     first = Bench(folder, model, unknown, Condition(60.0, altitude_m))
-    fdm = first.at().fdm
-    constants = Constants(
-        wing_area_m2=fdm["metrics/Sw-sqft"] * FT**2,
-        chord_m=fdm["metrics/cbarw-ft"] * FT,
-        span_m=fdm["metrics/bw-ft"] * FT,
-        mass_kg=fdm["inertia/mass-slugs"] * SLUG,
-        inertia_yy_kg_m2=fdm["inertia/iyy-slugs_ft2"] * SLUG * FT**2,
-    )
+    constants = constants_of(first.at().fdm)
     return replace(first, constants=constants, condition=Condition(eas_of(constants, lift), altitude_m))
 
 

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from airtruth.aircraft.model import ElevatorProperties, LateralProperties
+from airtruth.aircraft.model import LateralProperties, SurfaceProperties
 from airtruth.errors import AircraftError
 from airtruth.simulation.survey.bench import Bench, read
 from airtruth.simulation.survey.names import ModelNames
@@ -20,9 +20,9 @@ _REACH: Final = 0.1
 """Command for which responses are measured, to both sides [units of the command] (judgement: a tenth of the stick)."""
 _MOVES: Final = 1e-6
 """Least change of a property by the command that counts as motion [its unit] (judgement: far above rounding)."""
-_PITCHES: Final = 1e-4
-"""Least change of the pitch acceleration that counts as an effect [rad/s2] (judgement)."""
-_FEEDBACK_RAD: Final = 1e-6
+_TURNS: Final = 1e-4
+"""Least change of an angular acceleration that counts as an effect [rad/s2] (judgement)."""
+FEEDBACK_RAD: Final = 1e-6
 """Motion of the surface at a held command that counts as feedback [rad] (as in `airtruth.simulation.probe`)."""
 _HELD_S: Final = (1.0, 3.0)
 """Times for which a state is held to see an integrator move a surface [s] (judgement: servos have settled)."""
@@ -30,25 +30,57 @@ _INTEGRATES: Final = 1e-3
 """Motion of a surface between these times that shows an integrator [its unit] (judgement)."""
 _STRAIGHT: Final = 1e-6
 """Lateral acceleration that counts as an asymmetry [m/s2], [rad/s2]: the tolerance of a trim."""
-_COMMAND: Final = re.compile(r"elev.*cmd|cmd.*elev|pitch.*cmd|stick|stabilator.*cmd", re.IGNORECASE)
-"""Other names of elevator commands (judgement)."""
-_SURFACE: Final = re.compile(r"elev|stab|htail|canard|pitch", re.IGNORECASE)
-"""Names of elevator surfaces (judgement)."""
 _UNITS: Final = (("-rad", 1.0), ("-deg", DEG), ("-norm", 0.0))
 """Ends of the names of surfaces in the order of preference, and radians per unit; 0 for unknown."""
 
 
 @dataclass(frozen=True)
-class Found:
-    """The elevator of a model.
+class Control:
+    """What is known of a control before a model is examined.
 
     Attributes
     ----------
-    elevator : its properties.
+    name : "elevator", "aileron" or "rudder".
+    standard : its command in JSBSim's own flight controls.
+    command, surface : names of other commands, and of surfaces (judgement).
+    acceleration : attribute of `airtruth.simulation.simulator.Response` that it changes; a positive surface lowers it.
+    moment, against : the moment, and the sense of motion for which a model may count its surface positive, in words.
+    axis : of the aerodynamics whose surfaces come first; "" for any.
+    """
+
+    name: str
+    standard: str
+    command: re.Pattern[str]
+    surface: re.Pattern[str]
+    acceleration: str
+    moment: str
+    against: str
+    axis: str = ""
+
+
+ELEVATOR: Final = Control(
+    "elevator",
+    STANDARD,
+    re.compile(r"elev.*cmd|cmd.*elev|pitch.*cmd|stick|stabilator.*cmd", re.IGNORECASE),
+    re.compile(r"elev|stab|htail|canard|pitch", re.IGNORECASE),
+    "q_dot_rad_s2",
+    "pitching",
+    "pitches the nose up",
+)
+"""The elevator, positive with the trailing edge down."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """A control of a model.
+
+    Attributes
+    ----------
+    surface : its properties.
     notes : what was found out; decisions : what the user has to decide.
     """
 
-    elevator: ElevatorProperties
+    surface: SurfaceProperties
     notes: tuple[str, ...]
     decisions: tuple[str, ...]
 
@@ -61,47 +93,70 @@ def elevator_of(bench: Bench, names: ModelNames) -> Found:
     AircraftError
         If no command pitches the aircraft, or no property of a surface moves with it.
     """
-    tried = [STANDARD, *(n for n in names.read if _COMMAND.search(n) and n != STANDARD)]
-    command, pitch = "", 0.0
+    return control_of(bench, names, ELEVATOR)
+
+
+def control_of(bench: Bench, names: ModelNames, control: Control) -> Found:
+    """Find the command that moves the aircraft about an axis and the surface that moves with it.
+
+    Raises
+    ------
+    AircraftError
+        If no command does, or no property of a surface moves with it.
+    """
+    tried = [
+        control.standard,
+        *(n for n in names.read if control.command.search(n) and n != control.standard),
+    ]
+    command, turn = "", 0.0
     start = bench.at()
     for name in [n for n in tried if start.fdm.get_property_manager().hasNode(n)]:
-        pitch = _pitch(bench, name)
-        if abs(pitch) > _PITCHES:
+        turn = effect_of(bench, name, control)
+        if abs(turn) > _TURNS:
             command = name
             break
     if not command:
         raise AircraftError(
-            f"no elevator: none of the commands {', '.join(tried[:6])} changes the pitching moment of the model"
+            f"no {control.name}: none of the commands {', '.join(tried[:6])} changes the {control.moment} moment of the model"
         )
-    surface, per_unit, decisions = _surface(bench, names, command)
+    surface, per_unit, decisions = _surface(bench, names, command, control)
     low, high = (float(read(bench.at({command: s * _REACH}), [surface])[0]) * per_unit for s in (-1.0, 1.0))
     slope = (high - low) / (2.0 * _REACH)
-    sign = -1.0 if pitch / slope > 0.0 else 1.0
+    sign = -1.0 if turn / slope > 0.0 else 1.0
     notes = [
-        f"elevator: command {command}, surface {surface}, {abs(slope) / DEG:.3g} deg per unit of the command about zero"
+        f"{control.name}: command {command}, surface {surface}, {abs(slope) / DEG:.3g} deg per unit of the command about zero"
     ]
     if sign < 0.0:
         notes.append(
-            "elevator: the model counts the surface positive when it pitches the nose up; logs have the other sign"
+            f"{control.name}: the model counts the surface positive when it {control.against}; logs have the other sign"
         )
-    found = ElevatorProperties(
+    found = SurfaceProperties(
         command=command, command_per_rad=sign / slope, surface=surface, surface_rad=sign * per_unit
     )
     return Found(found, tuple(notes), tuple(decisions))
 
 
-def _pitch(bench: Bench, command: str) -> float:
-    """Change of the pitch acceleration by a unit of a command [rad/s2]."""
-    low, high = (bench.at({command: s * _REACH}).respond().q_dot_rad_s2 for s in (-1.0, 1.0))
+def effect_of(bench: Bench, command: str, control: Control) -> float:
+    """Change of a control's angular acceleration by a unit of a command [rad/s2]."""
+    low, high = (
+        float(getattr(bench.at({command: s * _REACH}).respond(), control.acceleration)) for s in (-1.0, 1.0)
+    )
     return (high - low) / (2.0 * _REACH)
 
 
-def _surface(bench: Bench, names: ModelNames, command: str) -> tuple[str, float, list[str]]:
+def turns(bench: Bench, command: str, control: Control) -> bool:
+    """Whether a command changes the angular acceleration of a control."""
+    return abs(effect_of(bench, command, control)) > _TURNS
+
+
+def _surface(bench: Bench, names: ModelNames, command: str, control: Control) -> tuple[str, float, list[str]]:
     """Property of the surface, radians per unit, and what the user has to decide."""
     low, high = bench.at({command: -_REACH}), bench.at({command: _REACH})
     catalogue = [line.split(" ")[0] for line in low.fdm.get_property_catalog()]
     candidates = [
-        n for n in dict.fromkeys((*names.aerodynamic, *catalogue)) if _SURFACE.search(n) and n in catalogue
+        n
+        for n in dict.fromkeys((*names.aerodynamic, *catalogue))
+        if control.surface.search(n) and n in catalogue
     ]
     change = read(high, candidates) - read(low, candidates)
     moved = [
@@ -110,21 +165,22 @@ def _surface(bench: Bench, names: ModelNames, command: str) -> tuple[str, float,
         if abs(d) > _MOVES and "mag-" not in n and "cmd" not in n
     ]
     used = [n for n in moved if n in names.aerodynamic]
-    for group in (used, moved):
+    first = [n for n in moved if n in names.by_axis.get(control.axis, ())]
+    for group in (first, used, moved):
         for end, radians in _UNITS[:2]:
             for name in group:
                 if name.endswith(end):
                     return name, radians, []
     if not used:
         raise AircraftError(
-            f"no surface: no property of an elevator moves with {command}; state jsbsim.elevator.surface yourself"
+            f"no surface: no property of an {control.name} moves with {command}; state jsbsim.{control.name}.surface yourself"
         )
     name = used[0]
     return (
         name,
         1.0,
         [
-            f"jsbsim.elevator.surface_rad: {name} has no unit and no property of the same surface has one; a unit is "
+            f"jsbsim.{control.name}.surface_rad: {name} has no unit and no property of the same surface has one; a unit is "
             "taken as one radian, so that derivatives are per unit of it"
         ],
     )
@@ -151,7 +207,7 @@ def without_feedback(bench: Bench, names: ModelNames) -> tuple[Bench, list[str],
     The bench, notes, and decisions for the user.
     """
     moves = feedback_rad(bench)
-    if moves <= _FEEDBACK_RAD:
+    if moves <= FEEDBACK_RAD:
         return bench, [], []
     start = bench.at()
     manager = start.fdm.get_property_manager()
@@ -160,10 +216,7 @@ def without_feedback(bench: Bench, names: ModelNames) -> tuple[Bench, list[str],
             continue
         value = 0.0 if start.fdm[name] else 1.0
         switched = bench.known(set={**bench.model.set, name: value})
-        if (
-            feedback_rad(switched) <= _FEEDBACK_RAD
-            and abs(_pitch(switched, bench.model.elevator.command)) > _PITCHES
-        ):
+        if feedback_rad(switched) <= FEEDBACK_RAD and turns(switched, bench.model.elevator.command, ELEVATOR):
             return (
                 switched,
                 [f"augmentation: {name} = {value:g} switches the feedback to the elevator off"],
@@ -203,17 +256,21 @@ def lateral_of(bench: Bench) -> tuple[LateralProperties | None, list[str]]:
         )
         for name in (found.aileron, found.rudder)
     ]
-    if min(float(np.abs(e).max()) for e in effects) < _PITCHES:
+    if min(float(np.abs(e).max()) for e in effects) < _TURNS:
         return None, [f"asymmetric by {off:.2g} (SI) at zero sideslip, and aileron or rudder have no effect"]
     return found, ["asymmetric (torque, slipstream or shape): trimmed with aileron, rudder and a bank"]
 
 
 __all__ = [
+    "FEEDBACK_RAD",
     "STANDARD",
+    "Control",
     "Found",
+    "control_of",
     "elevator_of",
     "feedback_rad",
     "integrated",
     "lateral_of",
+    "turns",
     "without_feedback",
 ]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -30,6 +30,7 @@ class ModelNames:
     engines : tags of the root elements of the engines' files, for example "piston_engine".
     has_propeller : whether a thruster is a propeller.
     sensors : names of the `<sensor>`, `<accelerometer>`, `<gyro>` and `<magnetometer>` components.
+    by_axis : axis of the aerodynamics -> properties that its functions read.
     """
 
     aerodynamic: tuple[str, ...]
@@ -38,6 +39,7 @@ class ModelNames:
     engines: tuple[str, ...]
     sensors: tuple[str, ...]
     has_propeller: bool = False
+    by_axis: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def switches(self) -> list[str]:
@@ -54,6 +56,7 @@ def names_of(files: Sequence[Path]) -> ModelNames:
     engines: list[str] = []
     sensors: dict[str, None] = {}
     propeller = False
+    by_axis: dict[str, dict[str, None]] = {}
     for path in files:
         root = ET.fromstring(path.read_bytes())
         propeller = propeller or root.tag == "propeller"
@@ -62,6 +65,8 @@ def names_of(files: Sequence[Path]) -> ModelNames:
             continue
         for section in root.iter("aerodynamics"):
             aerodynamic.update(dict.fromkeys(_properties(section)))
+            for axis in section.iter("axis"):
+                by_axis.setdefault(str(axis.get("name")), {}).update(dict.fromkeys(_properties(axis)))
         read.update(dict.fromkeys(_properties(root)))
         for element in root.iter():
             if element.tag == "output":
@@ -71,7 +76,13 @@ def names_of(files: Sequence[Path]) -> ModelNames:
             if element.tag in ("sensor", "accelerometer", "gyro", "magnetometer") and element.get("name"):
                 sensors[str(element.get("name"))] = None
     return ModelNames(
-        tuple(aerodynamic), tuple(read), tuple(written), tuple(engines), tuple(sensors), propeller
+        tuple(aerodynamic),
+        tuple(read),
+        tuple(written),
+        tuple(engines),
+        tuple(sensors),
+        propeller,
+        {axis: tuple(found) for axis, found in by_axis.items()},
     )
 
 

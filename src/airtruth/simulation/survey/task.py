@@ -18,6 +18,8 @@ from airtruth.isolation.protocol import Reply
 from airtruth.simulation.survey import bench as benches
 from airtruth.simulation.survey import controls, engines, envelope
 from airtruth.simulation.survey.bench import Bench
+from airtruth.simulation.survey.lateral import with_lateral_controls
+from airtruth.simulation.survey.lateral_flight import flown_laterally
 from airtruth.simulation.survey.names import ModelNames, names_of
 
 _ABSENT: Final = re.compile(r"property (\S+) does not exist")
@@ -37,8 +39,8 @@ def survey(folder: str, model: str, root: str) -> Reply:
 
     Returns
     -------
-    Facts: "jsbsim" (the [jsbsim] table), "constants", "notes", "decisions", "envelope", "condition", "flight" and
-    "cause". If a fly-by-wire integrates, only "jsbsim" and "integrating", the surfaces that it moves.
+    Facts: "jsbsim" (the [jsbsim] table), "constants", "notes", "decisions", "envelope", "condition", "flight",
+    "lateral_flight" and "cause". If a fly-by-wire integrates, only "jsbsim" and "integrating", the surfaces that it moves.
 
     Raises
     ------
@@ -71,13 +73,16 @@ def _examined(folder: Path, model: JsbsimModel, names: ModelNames) -> dict[str, 
     found = controls.elevator_of(powered.bench, names)
     notes += found.notes
     decisions += found.decisions
-    bench = powered.bench.known(elevator=found.elevator)
+    bench = powered.bench.known(elevator=ElevatorProperties(**found.surface.model_dump()))
     bench, more, to_decide = controls.without_feedback(bench, names)
     notes += more
     decisions += to_decide
     integrating = controls.integrated(bench, names) if bench.model.elevator.feedback else []
     if bench.model.elevator.surface in integrating:
         return {"integrating": integrating, "jsbsim": bench.model.model_dump()}
+    bench, more, to_decide = with_lateral_controls(bench, names)
+    notes += more
+    decisions += to_decide
     lateral, more = controls.lateral_of(bench)
     notes += more
     bench = bench.known(lateral=lateral)
@@ -99,12 +104,15 @@ def _examined(folder: Path, model: JsbsimModel, names: ModelNames) -> dict[str, 
         "envelope": [asdict(row) for row in envelope.summary_rows(points)],
         "condition": None,
         "flight": None,
+        "lateral_flight": None,
         "cause": "" if at else envelope.cause(points, bench.model.elevator.feedback),
     }
     if at is not None:
         c = at.condition
         facts["condition"] = {"eas_m_s": c.eas_m_s, "altitude_m": c.altitude_m, "gamma_rad": c.gamma_rad}
         facts["flight"] = asdict(envelope.flown(bench.aircraft, at))
+        if bench.model.aileron is not None:
+            facts["lateral_flight"] = asdict(flown_laterally(bench.aircraft, at))
     return facts
 
 

@@ -22,13 +22,9 @@ from airtruth.tracing.model.linearise import process_intensity
 from airtruth.tracing.model.parameters import (
     CORE,
     GUST_1,
-    GUST_2,
     LEAD,
     OUTPUTS,
-    PER_RECORD_STEP,
-    Layout,
     Parameters,
-    PerRecord,
 )
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.response import Response, filter_inputs, kernel_input, respond, respond_to
@@ -177,7 +173,7 @@ class _OwnSearch:
         if at is None:
             return None
         cost, gradient, information = likelihood_terms(at, NO_WHITENER, levels=True)
-        rows, off = Layout(len(self.sizes)).per_record, own - self.mean
+        rows, off = point.layout.per_record, own - self.mean
         return _OwnEvaluated(
             cost + 0.5 * float(off @ self.precision @ off),
             gradient[rows] + self.precision @ off,
@@ -187,7 +183,7 @@ class _OwnSearch:
     def step(self, x: Array, at: Sequence[_OwnEvaluated], damping: Array, index: Ints) -> tuple[Array, Array]:
         gradient, information = np.array([a.gradient for a in at]), np.array([a.information for a in at])
         steps = scaled_step(gradient, information, damping)
-        level = PerRecord.log_gust
+        level = self.problem.layout.per_record.log_gust
         steps[:, level] = np.clip(steps[:, level], -_MOST_LOG_STEP, _MOST_LOG_STEP)
         bent = np.einsum("ni,nij,nj->n", steps, information, steps)
         return steps, -(gradient * steps).sum(axis=1) - 0.5 * bent
@@ -232,8 +228,8 @@ def free_run(
     """
     weight = 1.0 / noise_floor(record, settings, compiled, common, per_record)
     own = per_record.copy()
-    own[PerRecord.gusts] = 0.0
-    free = PerRecord.deterministic
+    own[settings.layout.per_record.gusts] = 0.0
+    free = settings.layout.per_record.deterministic
     mean, precision = per_record_prior(record, settings, unconstrained)
     prior = np.diag(precision)[free]
     residual = respond(record, settings, compiled, common, own, free_run=True).e
@@ -269,12 +265,12 @@ def _free_run_slopes(
     """Residual of a free run (samples, 3) and its weighted derivatives (own parameters but the gusts, samples * 3)."""
     given = filter_inputs(record, compiled)
     residual = respond_to(given, settings, common, own, free_run=True).e
-    columns = []
-    for i in PerRecord.deterministic:
+    columns, entries = [], settings.layout.per_record
+    for i in entries.deterministic:
         moved = own.copy()
-        moved[i] += PER_RECORD_STEP[i]
+        moved[i] += entries.step[i]
         e = respond_to(given, settings, common, moved, free_run=True).e
-        columns.append(((e - residual) * weight / PER_RECORD_STEP[i]).ravel())
+        columns.append(((e - residual) * weight / entries.step[i]).ravel())
     return residual, np.array(columns)
 
 
@@ -315,7 +311,7 @@ def fitted_noise_floor(
     samples = record.samples
     weight = 1.0 / noise_floor(record, settings, compiled, common, per_record)
     t = _free_run_slopes(record, settings, compiled, common, per_record, weight)[1]
-    free = PerRecord.deterministic
+    free = settings.layout.per_record.deterministic
     prior = np.diag(np.diag(per_record_prior(record, settings, unconstrained)[1])[free])
     flat = (y * weight[:, None]).reshape(-1, _DRAWS)
     left = flat - t.T @ np.linalg.solve(t @ t.T + prior, t @ flat)
@@ -349,7 +345,7 @@ def _gust_records(record: TraceRecord, linear: _LinearModel, seed: int) -> Array
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     rng = np.random.default_rng([seed, samples])
     x = np.zeros((n, _DRAWS))
-    x[[GUST_1, GUST_2]] = np.linalg.cholesky(GUST_COVARIANCE) @ rng.standard_normal((2, _DRAWS))
+    x[GUST_1 : GUST_1 + 2] = np.linalg.cholesky(GUST_COVARIANCE) @ rng.standard_normal((2, _DRAWS))
     x[LEAD:CORE] = x[GUST_1]
     if linear.noise >= 0:
         x[linear.noise :] = rng.standard_normal((OUTPUTS, _DRAWS))

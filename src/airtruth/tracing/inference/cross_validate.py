@@ -20,7 +20,6 @@ from airtruth.tracing.inference.posterior import (
     marginal_information,
 )
 from airtruth.tracing.inference.whitening import NO_WHITENER
-from airtruth.tracing.model.parameters import Common, Parameters
 
 Array = NDArray[np.float64]
 
@@ -58,12 +57,13 @@ def leave_one_out(problem: TraceProblem, fitted: PosteriorFit) -> LeftOut:
         alone = Priors(
             nothing, np.zeros_like(priors.sizes), np.zeros_like(priors.pull), priors.per_record[i : i + 1]
         )
-        there = Parameters(np.zeros(Common.size), point.per_record[i : i + 1], point.sizes)
+        there = replace(point, common=np.zeros(point.of.common.size), per_record=point.per_record[i : i + 1])
         gradient, information, _ = marginal_information(
             alone, there, terms[i : i + 1], levels=True, fixed=fixed
         )
         move = step_without(gradient, information, total, _RIDGE, _TOLD)
-        move[Common.nuisance] = np.clip(move[Common.nuisance], -_MOST_STEP, _MOST_STEP)
+        nuisance = point.of.common.nuisance
+        move[nuisance] = np.clip(move[nuisance], -_MOST_STEP, _MOST_STEP)
         sizes = point.sizes + _within_range(hypothesis, point.sizes, move[layout.sizes])
         return assess(problem, i, hypothesis, point.common + move[layout.common], sizes, point.per_record[i])
 

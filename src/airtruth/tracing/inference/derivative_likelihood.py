@@ -19,7 +19,6 @@ from scipy.stats import chi2
 
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import inflation, scatter
-from airtruth.tracing.model.parameters import Common
 
 Array = NDArray[np.float64]
 
@@ -70,7 +69,7 @@ def derivative_likelihood(
     ----------
     robust : whether its standard deviations contain serial correlation of the innovations and scatter between records.
     """
-    mode = fitted.point.common[Common.derivatives]
+    mode = fitted.point.common[problem.layout.common.derivatives]
     prior, information = _split(problem, fitted)
     ratio = _ratio(problem, fitted) if robust else np.ones(len(mode))
     peak = mode + np.linalg.pinv(information, hermitian=True) @ (prior @ mode)
@@ -95,7 +94,7 @@ def contradiction(problem: TraceProblem, fitted: PosteriorFit) -> Contradiction:
 
     Source: G. E. P. Box, J. R. Statist. Soc. A 143 (1980), the prior predictive check.
     """
-    mode = fitted.point.common[Common.derivatives]
+    mode = fitted.point.common[problem.layout.common.derivatives]
     tight = [i for i in range(mode.size) if i not in fitted.hypothesis.unconstrained]
     prior, information = _split(problem, fitted)
     ratio = _ratio(problem, fitted)
@@ -118,7 +117,7 @@ def contradiction(problem: TraceProblem, fitted: PosteriorFit) -> Contradiction:
 
 def _split(problem: TraceProblem, fitted: PosteriorFit) -> tuple[Array, Array]:
     """Precision of the derivatives by the prior of a fit, and their information in the records."""
-    own = Common.derivatives
+    own = problem.layout.common.derivatives
     prior = np.linalg.inv(np.linalg.inv(problem.priors(fitted.hypothesis).common)[own, own])
     information = np.linalg.inv(fitted.covariance[own, own]) - prior
     values, vectors = np.linalg.eigh(0.5 * (information + information.T))
@@ -127,7 +126,7 @@ def _split(problem: TraceProblem, fitted: PosteriorFit) -> tuple[Array, Array]:
 
 def _ratio(problem: TraceProblem, fitted: PosteriorFit) -> Array:
     """(6,) robust over plain standard deviations of the derivatives."""
-    own = Common.derivatives
+    own = problem.layout.common.derivatives
     return np.maximum(inflation(problem, fitted)[own], scatter(problem, fitted)[own])
 
 

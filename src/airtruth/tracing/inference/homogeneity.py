@@ -23,7 +23,6 @@ from scipy.stats import chi2
 from airtruth.numerics.normal_equations import scaled_inverse
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import MarginalSlope, inflation, marginal_slopes
-from airtruth.tracing.model.parameters import Common
 
 Array = NDArray[np.float64]
 
@@ -59,10 +58,9 @@ def homogeneity(problem: TraceProblem, fitted: PosteriorFit) -> Homogeneity:
     ----------
     problem, fitted : records, and a fit of them at its optimum.
     """
-    sizes = Common.size + np.setdiff1d(
-        np.arange(len(fitted.point.sizes)), [k - Common.size for k in fitted.hypothesis.fixed]
-    )
-    kept = np.concatenate([np.arange(Common.size)[Common.derivatives], sizes])
+    common = problem.layout.common
+    sizes = common.size + np.setdiff1d(np.arange(len(fitted.point.sizes)), fitted.hypothesis.fixed)
+    kept = np.concatenate([np.arange(common.size)[common.derivatives], sizes])
     of_records = marginal_slopes(problem, fitted)
     x = np.array([own.slope[kept] for own in of_records])
     h = np.array([own.information[np.ix_(kept, kept)] for own in of_records])

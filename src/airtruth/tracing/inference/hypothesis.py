@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect, Parameter
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import AeroTerm, Change
 from airtruth.tracing.model.compile import CompiledChange, compile_change
-from airtruth.tracing.model.parameters import Common, size_index
 
 Array = NDArray[np.float64]
 
@@ -108,9 +108,9 @@ class Hypothesis:
 
     @cached_property
     def fixed(self) -> tuple[int, ...]:
-        """Indices among common parameters and sizes of the sizes whose range is a single value."""
+        """Numbers of the sizes whose range is a single value."""
         ends = [self.effects[i].parameters[j].ends for i, j in self.parameters]
-        return tuple(size_index(k) for k, (low, high) in enumerate(ends) if low == high)
+        return tuple(k for k, (low, high) in enumerate(ends) if low == high)
 
     @cached_property
     def size_precision(self) -> Array:
@@ -135,8 +135,7 @@ def unconstrained_by(effect: Effect, trim_alpha_rad: float) -> tuple[int, ...]:
     cannot be declared and present in addition, so that the records have to determine them.
     """
     bent = {t.coefficient for t in _curved(effect) if t.at != trim_alpha_rad}
-    slopes = ((Common.CLalpha, "CL"), (Common.Cmalpha, "Cm"))
-    return tuple(i for i, coefficient in slopes if coefficient in bent)
+    return tuple(LONGITUDINAL.at(c.name, "alpha") for c in LONGITUDINAL.coefficients if c.name in bent)
 
 
 def is_curvature(effect: Effect) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit, Sensitivities
-from airtruth.tracing.model.parameters import Layout, Parameters
+from airtruth.tracing.model.parameters import Layout, ParameterLayout, Parameters
 
 
 def nearby(fitted: PosteriorFit, hypothesis: Hypothesis) -> tuple[Sensitivities, ...]:
@@ -20,14 +20,14 @@ def nearby(fitted: PosteriorFit, hypothesis: Hypothesis) -> tuple[Sensitivities,
     ----------
     fitted : a fit of the same records under the same settings.
     """
-    return reordered(fitted.sensitivities, fitted.hypothesis, hypothesis)
+    return reordered(fitted.sensitivities, fitted.layout.of, fitted.hypothesis, hypothesis)
 
 
 def reordered(
-    sensitivities: Sequence[Sensitivities], of: Hypothesis, hypothesis: Hypothesis
+    sensitivities: Sequence[Sensitivities], entries: ParameterLayout, of: Hypothesis, hypothesis: Hypothesis
 ) -> tuple[Sensitivities, ...]:
     """`nearby` of the derivatives of each record under a hypothesis ``of``."""
-    old, new = Layout(len(of.parameters)), Layout(len(hypothesis.parameters))
+    old, new = Layout(entries, len(of.parameters)), Layout(entries, len(hypothesis.parameters))
     rows = np.full(new.total, -1)
     rows[new.common] = np.arange(old.total)[old.common]
     rows[new.per_record] = np.arange(old.total)[old.per_record]

@@ -27,7 +27,7 @@ from airtruth.tracing.inference.posterior import (
     sensitivities_of,
 )
 from airtruth.tracing.inference.whitening import NO_WHITENER, Whitener
-from airtruth.tracing.model.parameters import BOUNDS, Common, Layout, Parameters, PerRecord
+from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.model.settings import Settings, initial_per_record
 
 Array = NDArray[np.float64]
@@ -147,7 +147,8 @@ class PosteriorSearch:
         return np.array(steps), np.array(promised)
 
     def _step(self, point: Parameters, at: Evaluated, damping: float) -> tuple[Array, float]:
-        fixed, ends = self.hypothesis.fixed, self._ends(point)
+        ends = self._ends(point)
+        fixed = tuple(point.layout.size(k) for k in self.hypothesis.fixed)
         while True:
             gradient, information, eliminated = marginal_information(
                 self.priors, point, at.terms, levels=self.levels, damping=damping, fixed=fixed
@@ -158,15 +159,16 @@ class PosteriorSearch:
                 break
             fixed += stopped
         own = np.stack([-(e.solved[:, 0] + e.solved[:, 1:] @ shared) for e in eliminated])
-        own[:, PerRecord.log_gust] = np.clip(own[:, PerRecord.log_gust], -_MOST_LOG_STEP, _MOST_LOG_STEP)
+        level = point.of.per_record.log_gust
+        own[:, level] = np.clip(own[:, level], -_MOST_LOG_STEP, _MOST_LOG_STEP)
         gain = float(-gradient @ shared)
         gain += sum(float(e.solved[:, 0] @ e.information @ e.solved[:, 0]) for e in eliminated)
         return np.concatenate([shared, own.ravel()]), 0.5 * gain
 
     def _ends(self, point: Parameters) -> list[tuple[int, float]]:
         """Indices of the common parameters and sizes at an end of their range, and 1 for the upper end, -1 for the lower."""
-        ranges = [(i, float(point.common[i]), low, high) for i, (low, high) in BOUNDS.items()]
-        first = Layout(len(point.sizes)).sizes.start
+        ranges = [(i, float(point.common[i]), low, high) for i, (low, high) in point.of.common.bounds.items()]
+        first = point.layout.sizes.start
         for k, size in enumerate(point.sizes):
             ranges.append((first + k, float(size), *self.hypothesis.parameter(k).ends))
         return [(i, 1.0 if at == high else -1.0) for i, at, low, high in ranges if at in (low, high)]
@@ -177,15 +179,15 @@ class PosteriorSearch:
 
     def _move(self, x: Array, step: Array) -> Array:
         point, moved = self.shape.of_vector(x), x + step
-        layout = Layout(len(point.sizes))
+        layout = point.layout
         for k, size in enumerate(point.sizes):
             low, high = self.hypothesis.parameter(k).ends
             room = _MOST_SIZE_STEP * (high - low)
             at = layout.sizes.start + k
             moved[at] = min(max(moved[at], max(low, size - room)), min(high, size + room))
-        nuisance = Common.nuisance
+        nuisance = point.of.common.nuisance
         moved[nuisance] = x[nuisance] + np.clip(step[nuisance], -_MOST_LOG_STEP, _MOST_LOG_STEP)
-        for i, (low, high) in BOUNDS.items():
+        for i, (low, high) in point.of.common.bounds.items():
             moved[i] = min(max(moved[i], low), high)
         return moved
 
@@ -272,9 +274,9 @@ def initial_parameters(
     sizes : where those of the effects start; None for zero.
     """
     own = np.stack([initial_per_record(record, problem.settings) for record in problem.records])
-    own[:, PerRecord.log_gust] = np.log(_ROUGH_M_S)
+    own[:, problem.layout.per_record.log_gust] = np.log(_ROUGH_M_S)
     first = np.zeros(len(hypothesis.parameters)) if sizes is None else sizes
-    point = Parameters(np.zeros(Common.size), own, first)
+    point = Parameters(np.zeros(problem.layout.common.size), own, first, problem.layout)
     priors = problem.priors(hypothesis)
     search = PosteriorSearch(
         problem, hypothesis, priors, NO_WHITENER, levels=False, shape=point, with_levels=False
@@ -286,7 +288,7 @@ def initial_parameters(
         made = [_without_effects(problem, i, plain, point) for i in range(len(problem.records))]
         known = [m for m in made if m is not None]
         if len(known) == len(made):
-            near = [Evaluated(np.inf, (), reordered(known, plain, hypothesis))]
+            near = [Evaluated(np.inf, (), reordered(known, problem.layout, plain, hypothesis))]
     return point.of_vector(minimise(search, point.vector[None, :], options, near=near).x[0])
 
 
@@ -307,13 +309,13 @@ def _covariance(search: PosteriorSearch, at: Evaluated) -> Array:
     """Inverse of the marginal information."""
     priors = search.priors
     empty = Parameters(
-        np.zeros(Common.size),
+        np.zeros(search.shape.of.common.size),
         np.stack([mean for mean, _ in priors.per_record]),
         np.zeros(len(search.hypothesis.parameters)),
+        search.shape.of,
     )
-    marginal = marginal_information(
-        priors, empty, at.terms, levels=search.levels, fixed=search.hypothesis.fixed
-    )
+    fixed = tuple(empty.layout.size(k) for k in search.hypothesis.fixed)
+    marginal = marginal_information(priors, empty, at.terms, levels=search.levels, fixed=fixed)
     return scaled_inverse(marginal.information, _RIDGE)
 
 

@@ -19,16 +19,7 @@ from numpy.typing import NDArray
 from airtruth.physics.terms import DECLARED
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.whitening import Whitener
-from airtruth.tracing.model.parameters import (
-    COMMON_STEP,
-    OUTPUTS,
-    PER_RECORD_STEP,
-    Common,
-    Layout,
-    Parameters,
-    PerRecord,
-    size_index,
-)
+from airtruth.tracing.model.parameters import OUTPUTS, Layout, ParameterLayout, Parameters
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.response import Response, filter_inputs, respond, respond_to
 from airtruth.tracing.model.settings import (
@@ -48,7 +39,7 @@ _DIVERGED: Final = 1e6
 """Whitened change of an innovation by one step of a difference from which the motion diverges [-] (judgement)."""
 _LOCATION_STEP: Final = 0.02
 """Step of the differences in a size over `airtruth.effects.effect.Parameter.step`, where the effect is present or the
-parameter is a location [-]; judgement: as `COMMON_STEP`."""
+parameter is a location [-]; judgement: as of `Entry`."""
 
 
 class Priors(NamedTuple):
@@ -81,6 +72,11 @@ class TraceProblem:
         own = tuple(per_record_prior(r, self.settings, free) for r in self.records)
         common = common_prior(self.records, self.settings, free, hypothesis.spread)
         return Priors(common, hypothesis.size_precision, hypothesis.size_pull, own)
+
+    @property
+    def layout(self) -> ParameterLayout:
+        """Free parameters of the motion."""
+        return self.settings.layout
 
     @property
     def declared_derivatives(self) -> Array:
@@ -165,7 +161,7 @@ class PosteriorFit:
     @property
     def layout(self) -> Layout:
         """Where its parameters are."""
-        return Layout(len(self.point.sizes))
+        return self.point.layout
 
     @property
     def innovations(self) -> list[Array]:
@@ -179,7 +175,7 @@ class PosteriorFit:
 
     def size_std(self, number: int) -> float:
         """Standard deviation of a size."""
-        i = size_index(number)
+        i = self.layout.size(number)
         return float(np.sqrt(max(self.covariance[i, i], 0.0)))
 
 
@@ -208,36 +204,36 @@ def sensitivities_of(
     base = respond_to(given, settings, common, own)
     if not np.isfinite(base.logdet):
         return None
-    layout = Layout(len(sizes))
+    layout, entries = point.layout, settings.layout
     differences = _Differences(base, layout.total)
 
     def put_size(k: int) -> None:
         p = hypothesis.parameter(k)
         h = _LOCATION_STEP * p.step if p.is_location or abs(sizes[k]) > p.step else p.step
         change = hypothesis.compiled(_moved(sizes, k, h))
-        differences.put(size_index(k), respond(record, settings, change, common, own), h)
+        differences.put(layout.size(k), respond(record, settings, change, common, own), h)
 
     if old is not None:
         differences.take(old)
         for k in range(len(sizes)):
-            if np.isnan(old.t[size_index(k), 0, 0]):
+            if np.isnan(old.t[layout.size(k), 0, 0]):
                 put_size(k)
         return differences.sensitivities if np.isfinite(differences.t).all() else None
     if not per_record_only:
         has_shift = given.compiled.declared["cg"] != DECLARED["cg"]
-        held = () if with_levels else Common.noise
+        held = () if with_levels else entries.common.noise
         for i in free_common(settings):
-            if i in held or (i == Common.mounting and not has_shift):
+            if i in held or (i == entries.common.mounting and not has_shift):
                 continue
-            h = COMMON_STEP[i]
+            h = entries.common.step[i]
             differences.put(i, respond_to(given, settings, _moved(common, i, h), own), h)
         for k in range(len(sizes)):
             put_size(k)
-    for i in range(PerRecord.size):
-        if i == PerRecord.log_gust and not with_levels:
+    for i in range(entries.per_record.size):
+        if i == entries.per_record.log_gust and not with_levels:
             continue
-        h = PER_RECORD_STEP[i]
-        steady = None if i == PerRecord.log_gust else base.steady
+        h = entries.per_record.step[i]
+        steady = None if i == entries.per_record.log_gust else base.steady
         moved = respond_to(given, settings, common, _moved(own, i, h), steady=steady)
         differences.put(layout.per_record.start + i, moved, h)
     if not (np.isfinite(differences.t).all() and np.isfinite(differences.w).all()):
@@ -352,7 +348,8 @@ def marginal_information(
     damping : on the per-record parameters [-].
     fixed : indices among common parameters and sizes that do not move.
     """
-    layout = Layout(len(terms[0].gradient) - Common.size - PerRecord.size)
+    of = point.of
+    layout = Layout(of, len(terms[0].gradient) - of.common.size - of.per_record.size)
     common, marginal, own = layout.common, layout.marginal, layout.per_record
     gradient, information = np.zeros(marginal.stop), np.zeros((marginal.stop, marginal.stop))
     information[common, common] = priors.common
@@ -361,7 +358,7 @@ def marginal_information(
     information[sizes, sizes] = priors.sizes
     gradient[sizes] = priors.sizes * point.sizes - priors.pull
     eliminated = []
-    level = PerRecord.log_gust
+    level = of.per_record.log_gust
     for (mean, precision), values, (_, g, h) in zip(priors.per_record, point.per_record, terms, strict=True):
         h_own = h[own, own] + precision
         g_own = g[own] + precision @ (values - mean)
@@ -373,12 +370,12 @@ def marginal_information(
         else:
             # where the record puts the level at none, the observed information: J'' = 4 s^2 J_ss + 2 J' in log s
             h_own[level, level] += 2.0 * max(g[own][level], 0.0)
-        h_own[np.diag_indices(PerRecord.size)] *= 1.0 + damping
+        h_own[np.diag_indices(of.per_record.size)] *= 1.0 + damping
         solved = np.linalg.solve(h_own, np.column_stack([g_own, h_mixed.T]))
         gradient += g[marginal] - h_mixed @ solved[:, 0]
         information += h[marginal, marginal] - h_mixed @ solved[:, 1:]
         eliminated.append(Eliminated(h_own, solved))
-    for i in (*(() if levels else Common.noise), *fixed):
+    for i in (*(() if levels else of.common.noise), *fixed):
         information[i], information[:, i] = 0.0, 0.0
         information[i, i] = 1.0
         gradient[i] = 0.0

@@ -25,7 +25,6 @@ from airtruth.tracing.inference.posterior import (
     likelihood_terms,
     marginal_information,
 )
-from airtruth.tracing.model.parameters import PerRecord
 
 Array = NDArray[np.float64]
 
@@ -126,7 +125,8 @@ def _slopes(problem: TraceProblem, fitted: PosteriorFit) -> list[tuple[Array, Ar
     """
     levels = fitted.whitener.order == 0
     layout = fitted.layout
-    kept = np.arange(PerRecord.size) if levels else np.delete(np.arange(PerRecord.size), PerRecord.log_gust)
+    entries = problem.layout.per_record
+    kept = np.arange(entries.size) if levels else np.delete(np.arange(entries.size), entries.log_gust)
     priors = problem.priors(fitted.hypothesis)
     result = []
     for (_, precision), at in zip(priors.per_record, fitted.sensitivities, strict=True):

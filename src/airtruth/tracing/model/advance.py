@@ -15,20 +15,24 @@ from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import inner
 from airtruth.numerics.discretise import step
-from airtruth.tracing.model.equations import (
+from airtruth.tracing.model.by_motion import (
     air_at,
-    hold_plays,
-    lead_decay,
+    equations_of,
     move_plays,
+    output_count,
     outputs,
     rates,
+    state_count,
 )
+from airtruth.tracing.model.equations import hold_plays, lead_decay
 from airtruth.tracing.model.kernel_input import FilterModel, GridSignals
 from airtruth.tracing.model.linearise import delay_system
-from airtruth.tracing.model.parameters import DELAY_ORDER, LEAD, LEAD_COUNT, OUTPUTS
+from airtruth.tracing.model.parameters import DELAY_ORDER, GUST_1, LEAD, LEAD_COUNT
 
 Array = NDArray[np.float64]
 
+_LEAD: Final = LEAD - GUST_1
+"""Position of the first low-passed copy among the states of the gusts [-]."""
 _PARTS: Final = 4
 """Parts of a step over which a signal is linear for the lag or the delay of its sensor [-]. With two parts, the error of a gyro
 delayed by 5.6 ms is 0.9 standard deviations of its noise, as root sum of squares over a record with 46 elevator steps."""
@@ -62,7 +66,7 @@ class Work(NamedTuple):
     Attributes
     ----------
     rate : (4, states) of the stages; tried : (states,) at a stage.
-    out, last : (outputs,) at the end and the start of a step; first : (2,) rates of alpha and q at its start.
+    out, last : (outputs,) at the end and the start of a step; first : rates of the motion at its start.
     ends : (parts + 1,) a signal at the ends of the parts of a step; held : (order,) states of a delay.
     """
 
@@ -81,27 +85,29 @@ def steps_of(model: FilterModel, dt_s: float, sub: int) -> Steps:
     for j in range(2):
         for i in range(LEAD_COUNT):
             decay[j, i], mean[j, i] = lead_decay(0.5 * (j + 1) * h, i)
-    phi = np.zeros((OUTPUTS, DELAY_ORDER, DELAY_ORDER))
-    early, late = np.zeros((OUTPUTS, DELAY_ORDER, 1)), np.zeros((OUTPUTS, DELAY_ORDER, 1))
+    count = model.sensors.scale.size
+    phi = np.zeros((count, DELAY_ORDER, DELAY_ORDER))
+    early, late = np.zeros((count, DELAY_ORDER, 1)), np.zeros((count, DELAY_ORDER, 1))
     unused = np.empty((DELAY_ORDER, DELAY_ORDER))
-    for i in range(OUTPUTS):
+    for i in range(count):
         if model.states.delay[i] >= 0:
             system = delay_system(model.sensors.delay_s[i])
             step(system, np.zeros(DELAY_ORDER), DELAY_ORDER, h / _PARTS, phi[i], early[i], late[i], unused)
     states = model.states
     forget = math.exp(-dt_s / model.sensors.slow_time_s) if states.noise >= 0 else 0.0
-    has_late_sensors = states.size > states.motion + (OUTPUTS if states.noise >= 0 else 0)
+    has_late_sensors = states.size > states.motion + (count if states.noise >= 0 else 0)
     return Steps(h, decay, mean, phi, early[:, :, 0].copy(), late[:, :, 0].copy(), forget, has_late_sensors)
 
 
-def work_of(states: int) -> Work:
-    """Arrays for a number of states."""
+def work_of(model: FilterModel) -> Work:
+    """Arrays for a model."""
+    states, count = model.states.size, model.sensors.scale.size
     return Work(
         np.zeros((4, states)),
         np.zeros(states),
-        np.zeros(OUTPUTS),
-        np.zeros(OUTPUTS),
-        np.zeros(2),
+        np.zeros(count),
+        np.zeros(count),
+        np.zeros(equations_of(model).states),
         np.zeros(_PARTS + 1),
         np.zeros(DELAY_ORDER),
     )
@@ -113,6 +119,8 @@ def advance_motion(
 ) -> None:
     """One Runge-Kutta step of motion, gusts and effects; the outputs at its start into ``work`` for late sensors."""
     h, rate, tried, motion = steps.h, work.rate, work.tried, model.states.motion
+    count = state_count(model)
+    lead = count + _LEAD
     for stage in range(4):
         share = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
         at = air_at(grid, point + (0 if stage == 0 else (2 if stage == 3 else 1)))
@@ -123,17 +131,19 @@ def advance_motion(
             j = 1 if stage == 3 else 0
             for i in range(LEAD_COUNT):
                 decay, mean = steps.decay[j, i], steps.mean[j, i]
-                tried[LEAD + i] = decay * x[LEAD + i] + (mean - decay) * x[2] + (1.0 - mean) * tried[2]
+                before = decay * x[lead + i] + (mean - decay) * x[count]
+                tried[lead + i] = before + (1.0 - mean) * tried[count]
         az = rates(tried, at, model, rate[stage])
         if stage == 0 and steps.has_late_sensors:
-            outputs(tried, rate[0, 1], az, at, model, work.last)
-            work.first[0], work.first[1] = rate[0, 0], rate[0, 1]
+            outputs(tried, rate[0], az, at, model, work.last)
+            for m in range(count):
+                work.first[m] = rate[0, m]
     for m in range(motion):
         slope = rate[0, m] + 2.0 * rate[1, m] + 2.0 * rate[2, m] + rate[3, m]
         x[m] += h / 6.0 * slope
     hold_plays(tried, x, model)
     for i in range(LEAD_COUNT):
-        x[LEAD + i] = tried[LEAD + i]
+        x[lead + i] = tried[lead + i]
     move_plays(x, air_at(grid, point + 2), model)
 
 
@@ -147,12 +157,12 @@ def advance_sensors(
     """
     at = air_at(grid, point + 2)
     az = rates(x, at, model, work.rate[0])
-    outputs(x, work.rate[0, 1], az, at, model, work.out)
+    outputs(x, work.rate[0], az, at, model, work.out)
     ends = work.ends
-    for i in range(OUTPUTS):
+    for i in range(output_count(model)):
         rise = work.out[i] - work.last[i]
         early = late = 0.0  # slopes over the step beyond those of a straight line
-        if i < 2:
+        if i < state_count(model):
             early = model.sensors.scale[i] * steps.h * work.first[i] - rise
             late = model.sensors.scale[i] * steps.h * work.rate[0, i] - rise
         for part in range(_PARTS + 1):

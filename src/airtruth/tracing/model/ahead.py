@@ -19,7 +19,7 @@ from airtruth.tracing.model.kernel_input import (
     SensorArrays,
 )
 from airtruth.tracing.model.linearise import linearise
-from airtruth.tracing.model.parameters import CORE, OUTPUTS, state_layout
+from airtruth.tracing.model.parameters import CORE, OUTPUTS, SHORT_PERIOD, state_layout
 from airtruth.tracing.model.steady import without_update
 from airtruth.tracing.model.tangent import matrices_along
 
@@ -29,10 +29,10 @@ _AT: Final = AirPoint(*[1.0] * len(AirPoint._fields))
 
 def _model() -> FilterModel:
     axis, ones, none = np.array([0.0, 1.0]), np.ones(OUTPUTS), np.empty(0)
-    whole = np.empty(0, dtype=np.int64)
+    whole, increments = np.empty(0, dtype=np.int64), np.zeros(SHORT_PERIOD.common.derivatives.stop)
     return FilterModel(
         AircraftArrays._make(
-            [*[1.0] * 12, np.zeros((2, 3)), np.zeros(6), axis, axis, axis, np.zeros((2, 2, 2, 3))]
+            [*[1.0] * 12, np.zeros((2, 3)), increments, axis, axis, axis, np.zeros((2, 2, 2, 3))]
         ),
         GustModel(*[1.0] * len(GustModel._fields)),
         EffectArrays(whole.reshape(0, 5), none, none, none, whole.reshape(0, 2), none, none, none),
@@ -58,7 +58,7 @@ def _filter() -> None:
 
 def _tangent() -> None:
     given = _given()
-    matrices_along(given, path_of(2, CORE), 1.0)
+    matrices_along(given, path_of(2, CORE, OUTPUTS), 1.0)
 
 
 KERNELS: Final[tuple[tuple[str, Callable[[], None]], ...]] = (

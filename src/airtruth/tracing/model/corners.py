@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import allocating, inner
 from airtruth.numerics.discretise import congruence, multiply, whitener
-from airtruth.tracing.model.equations import outputs, rates
+from airtruth.tracing.model.by_motion import output_count, outputs, rates
 from airtruth.tracing.model.kernel_input import AirPoint, FilterModel
 from airtruth.tracing.model.linearise import (
     FirstUpdate,
@@ -28,7 +28,7 @@ from airtruth.tracing.model.linearise import (
     first_update,
     update_gain,
 )
-from airtruth.tracing.model.parameters import DELAY_ORDER, OUTPUTS
+from airtruth.tracing.model.parameters import DELAY_ORDER
 
 Array = NDArray[np.float64]
 
@@ -114,9 +114,10 @@ def _moved(at: AirPoint, by_rad: float) -> AirPoint:
 
 def input_column(x: Array, at: AirPoint, model: FilterModel) -> Array:
     """(states,) slope of x' in the surface [1/rad], late sensors included."""
-    column, direct = np.zeros(x.size), np.empty(OUTPUTS)
+    count = model.sensors.scale.size
+    column, direct = np.zeros(x.size), np.empty(count)
     _input_differences(x, at, model, column, direct)
-    for i in range(OUTPUTS):
+    for i in range(count):
         lag, delay = model.states.lag[i], model.states.delay[i]
         if lag >= 0:
             column[lag] = direct[i] / model.sensors.lag_s[i]
@@ -129,14 +130,15 @@ def input_column(x: Array, at: AirPoint, model: FilterModel) -> Array:
 @njit(cache=True, nogil=True, error_model="numpy")
 def _input_differences(x: Array, at: AirPoint, model: FilterModel, column: Array, direct: Array) -> None:
     """Slopes in the surface of the rates of the motion and of the outputs."""
-    rate, y = np.zeros((2, x.size)), np.empty((2, OUTPUTS))
+    count = output_count(model)
+    rate, y = np.zeros((2, x.size)), np.empty((2, count))
     for side in range(2):
         moved = _moved(at, _STEP_RAD if side == 0 else -_STEP_RAD)
         az = rates(x, moved, model, rate[side])
-        outputs(x, rate[side, 1], az, moved, model, y[side])
+        outputs(x, rate[side], az, moved, model, y[side])
     for i in range(model.states.motion):
         column[i] = (rate[0, i] - rate[1, i]) / (2.0 * _STEP_RAD)
-    for i in range(OUTPUTS):
+    for i in range(count):
         direct[i] = (y[0, i] - y[1, i]) / (2.0 * _STEP_RAD)
 
 
@@ -161,7 +163,7 @@ def spread_of(a: Array, column: Array, dt_s: float) -> Array:
 def corrected(p: Array, k_gain: Array, c: Array) -> Array:
     """Covariance after an update, (I - K C) P, symmetric."""
     n = p.shape[0]
-    read, out = np.empty((OUTPUTS, n)), np.empty((n, n))
+    read, out = np.empty((c.shape[0], n)), np.empty((n, n))
     multiply(c, p, read)
     multiply(k_gain, read, out)
     for i in range(n):
@@ -187,18 +189,19 @@ def predicted(p: Array, corners: CornerNodes, node: int, corner_rad2: float) -> 
 def gain_at(
     p: Array, corners: CornerNodes, node: int, k_gain: Array, first: FirstUpdate, scale: Array
 ) -> tuple[float, float]:
-    """Gain of a prediction's covariance, the update by alpha and q, and the matrix that scales to the steady covariance.
+    """Gain of a prediction's covariance, the first update, and the matrix that scales to the steady covariance.
 
     Returns
     -------
     log|S| less the steady one (nan where S is no covariance), and the largest relative distance of S from it.
     """
-    pc, s = np.empty((p.shape[0], OUTPUTS)), np.empty((OUTPUTS, OUTPUTS))
+    count = k_gain.shape[1]
+    pc, s = np.empty((p.shape[0], count)), np.empty((count, count))
     covariance_of(p, corners.c[node], corners.variance, pc, s)
     away = 0.0
-    for i in range(OUTPUTS):
+    for i in range(count):
         away = max(away, abs(s[i, i] / corners.covariance[node, i, i] - 1.0))
-    white = np.zeros((OUTPUTS, OUTPUTS))
+    white = np.zeros((count, count))
     logdet = whitener(s, white)
     update_gain(pc, white, k_gain)
     first_update(pc, s, first)

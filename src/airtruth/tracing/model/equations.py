@@ -28,6 +28,7 @@ from airtruth.numerics.compiled import inner, shared
 from airtruth.physics.longitudinal import lower_point
 from airtruth.physics.sensors import vane_equation
 from airtruth.physics.terms import numbered_shape
+from airtruth.tracing.model.by_motion import Equations, register
 from airtruth.tracing.model.kernel_input import (
     AircraftArrays,
     AirPoint,
@@ -181,10 +182,7 @@ def _terms(
 
 @inner
 def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
-    """x' of the motion, the gusts and the effects' states into ``out``; returns az at the CG [m/s2].
-
-    A play has no x': that of a lag in its place serves the linearisation, and `hold_plays` and `move_plays` replace it.
-    """
+    """See `airtruth.tracing.model.by_motion.rates`; returns az at the CG [m/s2]."""
     aircraft, gusts = model.aircraft, model.gusts
     v, ground, qbar = at.airspeed_m_s, at.ground_m_s, at.qbar_pa
     upward = gust(x, gusts.rolloff)
@@ -272,14 +270,14 @@ def move_plays(x: Array, at: AirPoint, model: FilterModel) -> None:
             x[i] = min(max(x[i], s - half), s + half)
 
 
-def settle_effects(x: Array, alpha_rad: float, elevator_rad: float, model: FilterModel) -> None:
-    """Put the effects' states into equilibrium with a steady angle of attack and surface deflection [rad]."""
+def settle_effects(x: Array, at: AirPoint, model: FilterModel) -> None:
+    """Put the effects' states into equilibrium with the angle of attack of a state and a surface deflection."""
     for k in range(model.effects.time_s.size):
         signal, s = model.effects.state_index[k, 1], 0.0
         if signal == 0:
-            s = alpha_rad
+            s = x[0]
         elif signal == 1:
-            s = elevator_rad
+            s = effective_elevator(at.elevator_rad, model.aircraft)
         x[model.states.effect[k]] = s
 
 
@@ -318,18 +316,13 @@ def _add_readings(x: Array, alpha: float, at: AirPoint, model: FilterModel, y: A
 
 
 @inner
-def outputs(x: Array, q_dot: float, az: float, at: AirPoint, model: FilterModel, y: Array) -> None:
-    """What the sensors read without bias, lag, delay and noise: alpha [rad], q [rad/s], az [m/s2].
-
-    Parameters
-    ----------
-    q_dot, az : pitch acceleration [rad/s2] and az at the CG [m/s2].
-    """
+def outputs(x: Array, rate: Array, az: float, at: AirPoint, model: FilterModel, y: Array) -> None:
+    """alpha [rad], q [rad/s] and az [m/s2], see `airtruth.tracing.model.by_motion.outputs`."""
     scale, arm = model.sensors.scale, model.sensors.arm_m
     alpha = air_alpha(x, gust(x, model.gusts.rolloff), model.gusts.level_m_s, at)
     y[0] = _vane(alpha, x[1], arm[0], at.airspeed_m_s)
     y[1] = x[1]
-    y[2] = az - arm[2] * q_dot
+    y[2] = az - arm[2] * rate[1]
     _add_readings(x, alpha, at, model, y)
     for i in range(OUTPUTS):
         y[i] *= scale[i]
@@ -342,6 +335,8 @@ def lead_decay(dt_s: float, i: int) -> tuple[float, float]:
     return decay, (1.0 - decay) / r
 
 
+register(AircraftArrays, GridSignals, Equations(2, 2, rates, outputs, air_at, move_plays, settle_effects))
+
 __all__ = [
     "air_alpha",
     "air_at",
@@ -349,8 +344,6 @@ __all__ = [
     "gust",
     "hold_plays",
     "lead_decay",
-    "move_plays",
-    "outputs",
     "rates",
     "settle_effects",
 ]

@@ -16,24 +16,18 @@ from numpy.typing import NDArray
 from airtruth.numerics.ahead import awaited
 from airtruth.numerics.compiled import inner
 from airtruth.tracing.model.advance import Steps, Work, advance_motion, advance_sensors, steps_of, work_of
+from airtruth.tracing.model.by_motion import air_at, early_count, equations_of, output_count, outputs, rates
 from airtruth.tracing.model.corners import (
     corrected,
     gain_at,
     predicted,
     settled,
 )
-from airtruth.tracing.model.equations import (
-    air_at,
-    effective_elevator,
-    gust,
-    outputs,
-    rates,
-    settle_effects,
-)
+from airtruth.tracing.model.equations import gust
 from airtruth.tracing.model.gains import Gains, interpolate, scaled
 from airtruth.tracing.model.kernel_input import AirPoint, FilterModel, KernelInput
 from airtruth.tracing.model.linearise import FirstUpdate
-from airtruth.tracing.model.parameters import AZ, CORE, DELAY_ORDER, LEAD, OUTPUTS
+from airtruth.tracing.model.parameters import DELAY_ORDER, core_of, lead_of
 from airtruth.tracing.model.steady import SteadyFilter, without_update
 
 Array = NDArray[np.float64]
@@ -49,7 +43,7 @@ class Path(NamedTuple):
     ----------
     predicted, corrected : (samples, states) before and after the update; the last one has no update.
     k_gain : (samples, states, outputs) gain of the update.
-    first, direct : (samples, states, 2) and (samples, 2), (samples, states).
+    first, direct : (samples, states, early) and (samples, early), (samples, states).
     scale : (samples, outputs, outputs), from the innovation to that of the common covariance.
     """
 
@@ -61,19 +55,19 @@ class Path(NamedTuple):
     scale: Array
 
 
-def path_of(samples: int, states: int) -> Path:
+def path_of(samples: int, states: int, outputs: int) -> Path:
     """An empty path of a number of samples."""
     return Path(
         predicted=np.zeros((samples, states)),
         corrected=np.zeros((samples, states)),
-        k_gain=np.zeros((samples, states, OUTPUTS)),
-        first=FirstUpdate(np.zeros((samples, states, 2)), np.zeros((samples, 2))),
+        k_gain=np.zeros((samples, states, outputs)),
+        first=FirstUpdate(np.zeros((samples, states, outputs - 1)), np.zeros((samples, outputs - 1))),
         direct=np.zeros((samples, states)),
-        scale=np.zeros((samples, OUTPUTS, OUTPUTS)),
+        scale=np.zeros((samples, outputs, outputs)),
     )
 
 
-_NOT_KEPT: Final = path_of(0, 0)
+_NOT_KEPT: Final = path_of(0, 0, 1)
 """The path of a flight of which innovations alone are wanted."""
 
 
@@ -81,17 +75,19 @@ def _initial_state(given: KernelInput) -> Array:
     """The stated start; the gust at the tail and its copies, and the effects' states, in equilibrium with it."""
     model = given.model
     x = np.zeros(model.states.size)
-    x[:4] = given.start
-    x[LEAD:CORE] = given.start[2]
-    x[4] = gust(x, model.gusts.rolloff)
-    settle_effects(x, x[0], effective_elevator(given.grid.elevator_rad[0], model.aircraft), model)
+    states = equations_of(model).states
+    x[: given.start.size] = given.start
+    x[lead_of(states) : core_of(states)] = given.start[states]
+    x[given.start.size] = gust(x, model.gusts.rolloff)
+    at = type(given.reference)(*(column[0] for column in given.grid))
+    equations_of(model).settle(x, at, model)
     return x
 
 
 @inner
 def _settle_sensors(x: Array, out: Array, model: FilterModel) -> None:
     """Put the sensors' lags and delays into equilibrium with their inputs."""
-    for i in range(OUTPUTS):
+    for i in range(output_count(model)):
         if model.states.lag[i] >= 0:
             x[model.states.lag[i]] = out[i]
         if model.states.delay[i] >= 0:
@@ -114,11 +110,11 @@ def _reading(x: Array, value: float, i: int, model: FilterModel) -> float:
 
 
 @inner
-def _update(x: Array, k_gain: Array, e: Array) -> bool:
+def _update(x: Array, k_gain: Array, e: Array, model: FilterModel) -> bool:
     """x += K e; False if the motion leaves all bounds."""
     for i in range(x.size):
         total = 0.0
-        for m in range(OUTPUTS):
+        for m in range(output_count(model)):
             total += k_gain[i, m] * e[m]
         x[i] += total
         if not abs(x[i]) < _LOST:
@@ -130,7 +126,7 @@ def _update(x: Array, k_gain: Array, e: Array) -> bool:
 def _read(x: Array, at: AirPoint, model: FilterModel, work: Work) -> None:
     """What the sensors read before lags, delays and correlated noise, into ``work.out``."""
     az = rates(x, at, model, work.rate[0])
-    outputs(x, work.rate[0, 1], az, at, model, work.out)
+    outputs(x, work.rate[0], az, at, model, work.out)
 
 
 @inner
@@ -152,34 +148,41 @@ def innovation(
     work: Work,
     raw: Array,
 ) -> None:
-    """Innovation of a sample; that of az is predicted after the update by alpha and q.
+    """Innovation of a sample; that of the late output, az, is predicted after the update by the early ones, alpha and q.
 
     In a linear model this is the innovation of all three at once. Where the lift curve bends, az is predicted at an angle of
     attack that the vane has measured and not at one that a gust may have moved over the bend. A late accelerometer shows only
     a share of this bend, that of a change over the last sample period; the rest of its reading follows the update linearly.
     """
+    model, early = given.model, early_count(given.model)
     if k == 0:
-        _read(x, at, given.model, work)
-        _settle_sensors(x, work.out, given.model)
+        _read(x, at, model, work)
+        _settle_sensors(x, work.out, model)
     else:
-        outputs(x, 0.0, 0.0, at, given.model, work.out)
-    for i in range(2):
+        outputs(x, work.rate[0], 0.0, at, model, work.out)
+    for i in range(early):
         raw[i] = _residual(x, i, k, given, work)
-    late = given.model.states.lag[AZ] >= 0 or given.model.states.delay[AZ] >= 0
+    late = model.states.lag[early] >= 0 or model.states.delay[early] >= 0
     for i in range(x.size):
-        work.tried[i] = x[i] + first.gain[i, 0] * raw[0] + first.gain[i, 1] * raw[1]
+        total = x[i]
+        for m in range(early):
+            total += first.gain[i, m] * raw[m]
+        work.tried[i] = total
     bend = 0.0
     if late:
-        _read(x, at, given.model, work)
-        bend = -work.out[AZ]
+        _read(x, at, model, work)
+        bend = -work.out[early]
         for i in range(x.size):
             bend -= direct[i] * (work.tried[i] - x[i])
-    _read(work.tried, at, given.model, work)
-    raw[AZ] = _residual(work.tried, AZ, k, given, work) + first.share[0] * raw[0] + first.share[1] * raw[1]
+    _read(work.tried, at, model, work)
+    total = _residual(work.tried, early, k, given, work)
+    for m in range(early):
+        total += first.share[m] * raw[m]
+    raw[early] = total
     if late:
-        bend += work.out[AZ]
-        in_reading = 1.0 if given.model.states.lag[AZ] < 0 else 0.0
-        raw[AZ] += (in_reading - shown) * bend
+        bend += work.out[early]
+        in_reading = 1.0 if model.states.lag[early] < 0 else 0.0
+        raw[early] += (in_reading - shown) * bend
 
 
 @inner
@@ -187,26 +190,28 @@ def _keep(
     path: Path, k: int, x: Array, k_gain: Array, first: FirstUpdate, direct: Array, scale: Array, node: int
 ) -> None:
     """Keep what the filter uses at a sample, but for the corrected state."""
+    count = k_gain.shape[1]
     for i in range(x.size):
         path.predicted[k, i], path.direct[k, i] = x[i], direct[i]
-        for m in range(OUTPUTS):
+        for m in range(count):
             path.k_gain[k, i, m] = k_gain[i, m]
-        for m in range(2):
+        for m in range(count - 1):
             path.first.gain[k, i, m] = first.gain[i, m]
-    for m in range(2):
+    for m in range(count - 1):
         path.first.share[k, m] = first.share[m]
-    for i in range(OUTPUTS):
-        for m in range(OUTPUTS):
+    for i in range(count):
+        for m in range(count):
             path.scale[k, i, m] = scale[node, i, m]
 
 
 @inner
 def _keep_scaled(path: Path, k: int, scale: Array) -> None:
     """Put a further scale before the one that is kept."""
-    for i in range(OUTPUTS):
-        for m in range(OUTPUTS):
+    count = scale.shape[0]
+    for i in range(count):
+        for m in range(count):
             total = 0.0
-            for j in range(m, OUTPUTS):  # both are lower triangular
+            for j in range(m, count):  # both are lower triangular
                 total += path.scale[k, i, j] * scale[j, m]
             path.scale[k, i, m] = total
 
@@ -228,7 +233,8 @@ def _innovations(
         settled_gains.k_gain.copy(),
         FirstUpdate(first.gain.copy(), first.share.copy()),
     )
-    scale, raw, turned = np.empty((OUTPUTS, OUTPUTS)), np.empty(OUTPUTS), np.empty(OUTPUTS)
+    count = output_count(model)
+    scale, raw, turned = np.empty((count, count)), np.empty(count), np.empty(count)
     for k in range(samples):
         at = air_at(grid, k * given.sub)
         if scheduled:
@@ -239,9 +245,9 @@ def _innovations(
             if not math.isfinite(more):
                 return False, 0.0
             innovation(x, k, at, given, own_first, settled_gains.direct, steady.shown, work, raw)
-            for i in range(OUTPUTS):
+            for i in range(count):
                 turned[i] = 0.0
-                for m in range(OUTPUTS):
+                for m in range(count):
                     turned[i] += scale[i, m] * raw[m]
             more_logdet += more + scaled(steady.scale, node, turned, e, k)
             uncertain, is_steady = not settled(away), False
@@ -257,7 +263,7 @@ def _innovations(
                 _keep(path, k, x, now, settled_gains.first, settled_gains.direct, settled_gains.scale, 0)
         if k + 1 == samples:
             break
-        if not _update(x, now, raw):
+        if not _update(x, now, raw, model):
             return False, 0.0
         if keeps:
             for i in range(n):
@@ -291,7 +297,7 @@ def innovations(
     Whether the motion keeps its bounds, and the sum of log|S| beyond the common one.
     """
     steps = steps_of(given.model, given.dt_s, given.sub)
-    work = work_of(given.model.states.size)
+    work = work_of(given.model)
     sound, more = _innovations(given, steps, work, _initial_state(given), steady, e, path)
     return bool(sound), float(more)
 

@@ -76,8 +76,8 @@ class EffectArrays(NamedTuple):
     Attributes
     ----------
     term_index : (terms, 6) what it acts on (0 CL, 1 Cm, 2 + i the reading of output i), signal (-1 for a state), shape,
-        state (-1 for a signal), signal of its factor (-1 for none), row of ``state_index`` that is behind its signal by
-        another factor (-1 for none).
+        state (-1 for a signal), signal of its factor (-1 for none), row of ``state_index`` of the lag whose lag error x - s
+        multiplies the term (-1 for none).
     amplitude, origin, factor_origin : (terms,) of each term.
     state_index : (states, 2) kind (0 lag, 1 mode, 2 play), signal.
     time_s, damping, half_width : (states,) of each state [s], [-], [unit of the signal].

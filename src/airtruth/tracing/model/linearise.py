@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from airtruth.numerics.ahead import awaited
 from airtruth.numerics.compiled import allocating, inner
 from airtruth.numerics.discretise import multiply, riccati, step, whitener
-from airtruth.tracing.model.equations import gust, outputs, rates
+from airtruth.tracing.model.by_motion import equations_of, output_count, outputs, rates, state_count
+from airtruth.tracing.model.equations import gust
 from airtruth.tracing.model.kernel_input import AirPoint, FilterModel
-from airtruth.tracing.model.parameters import AZ, CORE, DELAY_ORDER, OUTPUTS
+from airtruth.tracing.model.parameters import CORE, DELAY_ORDER, GUST_1
 
 Array = NDArray[np.float64]
 
@@ -26,18 +27,20 @@ ANGLE_RAD: Final = 0.01
 """Half width of the central differences in angles [rad]. Judgement: wide enough to average a break of a table, so that
 the gain does not jump with the reference; the curvature of the sines over it is 2e-5."""
 RATE_RAD_S: Final = 0.05
-"""The same in the pitch rate [rad/s]."""
+"""Half width of the central differences in rates [rad/s]."""
+_GUSTS: Final = CORE - GUST_1
+"""Number of states of the gusts, which follow those of the motion [-]."""
 _GUST: Final = 0.1
-"""The same in a gust state that does not move alpha [-]."""
+"""Half width of the central differences in a gust state that does not move alpha [-]."""
 
 
 class FirstUpdate(NamedTuple):
-    """The update by alpha and q alone, which precedes that by az.
+    """The update by the early outputs alone, which precedes that by the late one.
 
     Attributes
     ----------
-    gain : (states, 2) gain of this update.
-    share : (2,) regression of the innovation of az on those of alpha and q.
+    gain : (states, early) gain of this update.
+    share : (early,) regression of the innovation of the late output on those of the early ones.
     """
 
     gain: Array
@@ -68,12 +71,14 @@ def delay_system(delay_s: float) -> Array:
 @allocating
 def _half_width(state: int, at: AirPoint, model: FilterModel) -> float:
     """Half width of the central difference in a state of the motion."""
-    if state == 1:
+    states = state_count(model)
+    core = states + _GUSTS
+    if 0 < state < states:
         return RATE_RAD_S
-    if state < 2 or state >= CORE:
+    if state < states or state >= core:
         return ANGLE_RAD
     # a gust that moves alpha as far as above, so that no level or rolloff shifts the breaks that are met
-    unit = np.zeros(CORE)
+    unit = np.zeros(core)
     unit[state] = 1.0
     moves = abs(model.gusts.level_m_s * gust(unit, model.gusts.rolloff)) / at.airspeed_m_s
     return ANGLE_RAD / moves if moves > 1e-9 else _GUST
@@ -94,7 +99,7 @@ def linearise(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array) ->
     a[:] = 0.0
     c[:] = 0.0
     _differences(x.copy(), at, model, a, c)
-    direct: Array = c[AZ].copy()
+    direct: Array = c[-1].copy()
     _add_sensors(model, a, c)
     return direct
 
@@ -103,24 +108,25 @@ def linearise(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array) ->
 @njit(cache=True, nogil=True, error_model="numpy")
 def _differences(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array) -> None:
     """Columns of A and C of the motion and the effects' states; ``x`` is moved and returns."""
-    rate, y = np.empty((2, x.size)), np.empty((2, OUTPUTS))
+    count = output_count(model)
+    rate, y = np.empty((2, x.size)), np.empty((2, count))
     for j in range(model.states.motion):
         h, middle = _half_width(j, at, model), x[j]
         for side in range(2):
             x[j] = middle + h if side == 0 else middle - h
             az = rates(x, at, model, rate[side])
-            outputs(x, rate[side, 1], az, at, model, y[side])
+            outputs(x, rate[side], az, at, model, y[side])
         x[j] = middle
         for i in range(model.states.motion):
             a[i, j] = (rate[0, i] - rate[1, i]) / (2.0 * h)
-        for i in range(OUTPUTS):
+        for i in range(count):
             c[i, j] = (y[0, i] - y[1, i]) / (2.0 * h)
 
 
 def _add_sensors(model: FilterModel, a: Array, c: Array) -> None:
     """Put lags, delays and correlated noise behind the outputs of the motion."""
     sensors, states = model.sensors, model.states
-    for i in range(OUTPUTS):
+    for i in range(len(c)):
         at = states.lag[i]
         if at >= 0:
             a[at] = c[i] / sensors.lag_s[i]
@@ -134,7 +140,7 @@ def _add_sensors(model: FilterModel, a: Array, c: Array) -> None:
             a[held, held] = system[:, :DELAY_ORDER]
             c[i, at + 1 : at + DELAY_ORDER : 2] -= 2.0
     if states.noise >= 0:
-        for i in range(OUTPUTS):
+        for i in range(len(c)):
             at = states.noise + i
             a[at, at] = -1.0 / sensors.slow_time_s
             c[i, at] = sensors.slow_std[i]
@@ -143,7 +149,7 @@ def _add_sensors(model: FilterModel, a: Array, c: Array) -> None:
 def process_intensity(airspeed_m_s: float, model: FilterModel) -> Array:
     """(states,) intensities [1/s] of the white noise that drives gusts and correlated noise."""
     process = np.zeros(model.states.size)
-    process[2] = 2.0 * airspeed_m_s / model.gusts.length_m
+    process[equations_of(model).states] = 2.0 * airspeed_m_s / model.gusts.length_m
     if model.states.noise >= 0:
         process[model.states.noise :] = 2.0 / model.sensors.slow_time_s
     return process
@@ -179,36 +185,41 @@ def discrete(a: Array, process: Array, dt_s: float) -> tuple[Array, Array]:
 def covariance_of(p: Array, c: Array, variance: Array, pc: Array, s: Array) -> None:
     """P C' and the covariance S = C P C' + R of the innovations."""
     for i in range(p.shape[0]):
-        for j in range(OUTPUTS):
+        for j in range(c.shape[0]):
             total = 0.0
             for k in range(p.shape[0]):
                 total += p[i, k] * c[j, k]
             pc[i, j] = total
     multiply(c, pc, s)
-    for i in range(OUTPUTS):
+    for i in range(c.shape[0]):
         s[i, i] += variance[i]
 
 
 @allocating
 def update_gain(pc: Array, white: Array, k_gain: Array) -> None:
     """K = P C' W' W."""
-    weight = np.empty((OUTPUTS, OUTPUTS))
-    for i in range(OUTPUTS):
-        for j in range(OUTPUTS):
+    count = white.shape[0]
+    weight = np.empty((count, count))
+    for i in range(count):
+        for j in range(count):
             weight[i, j] = 0.0
-            for k in range(OUTPUTS):
+            for k in range(count):
                 weight[i, j] += white[k, i] * white[k, j]
     multiply(pc, weight, k_gain)
 
 
-@inner
+@allocating
 def first_update(pc: Array, s: Array, first: FirstUpdate) -> None:
-    """Write the update by alpha and q.
+    """Write the update by the early outputs.
 
     Parameters
     ----------
     pc, s : P C' and the covariance of the innovations.
     """
+    early = first.share.size
+    if early != 2:
+        _first_of_many(pc, s, first)
+        return
     determinant = s[0, 0] * s[1, 1] - s[0, 1] * s[1, 0]
     for i in range(pc.shape[0]):
         first.gain[i, 0] = (pc[i, 0] * s[1, 1] - pc[i, 1] * s[1, 0]) / determinant
@@ -217,15 +228,34 @@ def first_update(pc: Array, s: Array, first: FirstUpdate) -> None:
     first.share[1] = (s[2, 1] * s[0, 0] - s[2, 0] * s[0, 1]) / determinant
 
 
+@allocating
+def _first_of_many(pc: Array, s: Array, first: FirstUpdate) -> None:
+    """`first_update` with any number of early outputs: S^-1 = W' W of their block."""
+    early = first.share.size
+    white = np.zeros((early, early))
+    whitener(s[:early, :early].copy(), white)
+    for j in range(early):
+        first.share[j] = 0.0
+        for i in range(pc.shape[0]):
+            first.gain[i, j] = 0.0
+        for m in range(early):
+            inverse = 0.0
+            for k in range(early):
+                inverse += white[k, m] * white[k, j]
+            first.share[j] += s[early, m] * inverse
+            for i in range(pc.shape[0]):
+                first.gain[i, j] += pc[i, m] * inverse
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def gain_of(
     phi: Array, c: Array, noise: Array, variance: Array
 ) -> tuple[Array, Array, Array, float, Array, FirstUpdate]:
-    """`gain` of a system in discrete time, the steady covariance of its prediction, and the update by alpha and q."""
-    n = phi.shape[0]
-    white, s = np.zeros((OUTPUTS, OUTPUTS)), np.zeros((OUTPUTS, OUTPUTS))
-    k_gain, pc = np.zeros((n, OUTPUTS)), np.empty((n, OUTPUTS))
-    first = FirstUpdate(np.zeros((n, 2)), np.zeros(2))
+    """`gain` of a system in discrete time, the steady covariance of its prediction, and the first update."""
+    n, count = phi.shape[0], c.shape[0]
+    white, s = np.zeros((count, count)), np.zeros((count, count))
+    k_gain, pc = np.zeros((n, count)), np.empty((n, count))
+    first = FirstUpdate(np.zeros((n, count - 1)), np.zeros(count - 1))
     p = riccati(phi, c, noise, variance)
     covariance_of(p, c, variance, pc, s)
     logdet = whitener(s, white)

@@ -1,144 +1,195 @@
 """Layout of the tracer's vectors: common and per-record parameters, sizes of effects, states of the filter.
 
-Every index and slice of these vectors is defined here, once, from the names of the elements.
+Every index and slice of these vectors follows from a motion, with name, unit, step, range and prior of each entry.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.physics.motion import LONGITUDINAL, Motion
+
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def _span(names: tuple[str, ...], first: str, last: str) -> slice:
-    """Slice from one name to another, both included."""
-    return slice(names.index(first), names.index(last) + 1)
+@dataclass(frozen=True)
+class Entry:
+    """One free parameter.
+
+    Attributes
+    ----------
+    name, unit : of the parameter; "-" for none.
+    step : of the one-sided differences [unit]; judgement: about 1e-3 of a declared standard deviation, large against rounding
+        and small against the curvature of the innovations.
+    bounds : its range [unit]; None for none.
+    std : standard deviation of its prior about zero [unit] (judgement); None where `airtruth.tracing.model.settings` states one.
+    """
+
+    name: str
+    unit: str
+    step: float
+    bounds: tuple[float, float] | None = None
+    std: float | None = None
 
 
-class Common:
+class Entries:
+    """The entries of a vector of parameters, by name.
+
+    Attributes
+    ----------
+    names, size : of the entries.
+    step : (size,) steps of the one-sided differences [units of the entries].
+    bounds : index of a bounded entry -> its range.
+    std : index of an entry with a prior of its own -> standard deviation.
+    """
+
+    def __init__(self, entries: Sequence[Entry]) -> None:
+        self.names = tuple(entry.name for entry in entries)
+        self.size = len(entries)
+        self.step = np.array([entry.step for entry in entries])
+        self.bounds = {i: e.bounds for i, e in enumerate(entries) if e.bounds is not None}
+        self.std = {i: e.std for i, e in enumerate(entries) if e.std is not None}
+
+    def index(self, name: str) -> int:
+        """Position of an entry.
+
+        Raises
+        ------
+        ValueError
+            If there is none of this name.
+        """
+        return self.names.index(name)
+
+    def span(self, first: str, last: str) -> slice:
+        """Slice from one name to another, both included."""
+        return slice(self.index(first), self.index(last) + 1)
+
+
+_PART: Final = (1e-3, (-0.75, 0.75), 0.5)
+"""Step, range and prior of a share less 1/2 [-] (judgement): none to all, and a quarter beyond for a form that is neither of the
+two."""
+_STEPS: Final = {"rad": 1e-5, "rad_s": 1e-4, "m_s2": 1e-3}
+"""Unit of a channel -> step of its bias and of its initial value [unit] (judgement)."""
+
+
+class CommonEntries(Entries):
     """Parameters that all records have in common; all are zero for the declared aircraft.
 
     Attributes
     ----------
-    derivatives : increments of the six derivatives, in the order of `airtruth.physics.short_period.PARAMETERS` [-];
-        lift, moment : their halves.
-    log_noise : logarithm of the noise of alpha, q and az over the declared noise.
+    derivatives : increments of the derivatives, in the order of the motion [-].
+    log_noise : logarithm of the noise of each output over the declared noise.
     rotary : share of the rotary gust less 1/2 [-]: 1/2 is all of the specification's, -1/2 is none.
     thrust : relative change of the thrust [-].
     rolloff : high-frequency rolloff of the gusts, less 1/2: -1/2 is Dryden's, 1/2 is von Karman's [-].
-    inertia : relative change of the pitch inertia at equal derivatives of the pitch acceleration [-]; it changes the
-        curvature of the tables alone.
+    inertia : relative change of the inertia at equal derivatives of the angular acceleration [-]; it changes the curvature of
+        the tables alone.
     mounting : share of a shift of the CG that moves the CG past the sensors, less 1/2 [-]: 1/2 if they are bolted to the
         airframe, -1/2 if they keep their declared distance from the CG.
-    colour_shares : share of the noise variance of alpha, q and az that is slow [-].
-    log_colour_time : logarithm of the correlation time of the correlated noise over `COLOUR_TIME_S`.
+    colour_shares : share of the noise variance of each output that is slow [-]; some white noise has to remain.
+    log_colour_time : logarithm of the correlation time of the correlated noise over `COLOUR_TIME_S`: 20 to 270 ms, because
+        slower noise cannot be told from motion.
     colour : shares and correlation time; noise : everything that describes the sensors' noise (indices).
+    nuisance : all but the derivatives.
     """
 
-    names: Final = (
-        "CLalpha",
-        "CLq",
-        "CLde",
-        "Cmalpha",
-        "Cmq",
-        "Cmde",
-        "log_noise_alpha",
-        "log_noise_q",
-        "log_noise_az",
-        "rotary",
-        "thrust",
-        "rolloff",
-        "inertia",
-        "mounting",
-        "colour_alpha",
-        "colour_q",
-        "colour_az",
-        "log_colour_time",
-    )
-    size: Final = len(names)
-    derivatives: Final = _span(names, "CLalpha", "Cmde")
-    lift: Final = _span(names, "CLalpha", "CLde")
-    moment: Final = _span(names, "Cmalpha", "Cmde")
-    CLalpha: Final = names.index("CLalpha")
-    Cmalpha: Final = names.index("Cmalpha")
-    log_noise: Final = _span(names, "log_noise_alpha", "log_noise_az")
-    rotary: Final = names.index("rotary")
-    thrust: Final = names.index("thrust")
-    rolloff: Final = names.index("rolloff")
-    inertia: Final = names.index("inertia")
-    mounting: Final = names.index("mounting")
-    colour_shares: Final = _span(names, "colour_alpha", "colour_az")
-    log_colour_time: Final = names.index("log_colour_time")
-    colour: Final = _span(names, "colour_alpha", "log_colour_time")
-    noise: Final = np.r_[log_noise, colour]
-    nuisance: Final = slice(derivatives.stop, size)
+    def __init__(self, motion: Motion) -> None:
+        outputs = [output.name for output in motion.outputs]
+        force_or_moment = [1e-3 if c.length is None else 1e-4 for c in motion.coefficients]
+        angle_or_rate = [1.0 if s.length is None else 100.0 for s in motion.signals]
+        super().__init__(
+            [
+                *(
+                    Entry(d.name, d.unit, force_or_moment[d.row] * angle_or_rate[d.column])
+                    for d in motion.derivatives
+                ),
+                *(Entry(f"log_noise_{name}", "-", 1e-4) for name in outputs),
+                Entry("rotary", "-", *_PART),
+                Entry("thrust", "-", 1e-3),
+                Entry("rolloff", "-", *_PART),
+                Entry("inertia", "-", 1e-3),
+                Entry("mounting", "-", *_PART),
+                *(Entry(f"colour_{name}", "-", 1e-3, (0.0, 0.95), 0.5) for name in outputs),
+                Entry("log_colour_time", "-", 1e-3, (-1.6, 1.0), 0.7),
+            ]
+        )
+        first, last = outputs[0], outputs[-1]
+        self.derivatives = slice(0, len(motion.derivatives))
+        self.log_noise = self.span(f"log_noise_{first}", f"log_noise_{last}")
+        self.rotary, self.thrust, self.rolloff = map(self.index, ("rotary", "thrust", "rolloff"))
+        self.inertia, self.mounting = map(self.index, ("inertia", "mounting"))
+        self.colour_shares = self.span(f"colour_{first}", f"colour_{last}")
+        self.log_colour_time = self.index("log_colour_time")
+        self.colour = self.span(f"colour_{first}", "log_colour_time")
+        self.noise = np.r_[self.log_noise, self.colour]
+        self.nuisance = slice(self.derivatives.stop, self.size)
 
 
-class PerRecord:
+class RecordEntries(Entries):
     """Parameters that each record has for itself.
 
     Attributes
     ----------
-    alpha, q : initial angle of attack [rad] and pitch rate [rad/s]; motion_start : both.
-    gusts : initial states of Dryden's filter [-]; start : motion and gusts.
-    bias : of alpha [rad], q [rad/s], az [m/s2].
-    trim : increments of CL and Cm at the trim [-].
+    motion_start : initial values of the states [their units].
+    gusts : initial states of the gust's filter [-]; start : motion and gusts.
+    bias : of each output [its unit].
+    trim : increments of the coefficients at the trim [-].
     offsets : biases and trim.
-    log_gust : logarithm of the standard deviation of the vertical gust [m/s].
-    deterministic : all but the gusts (indices): initial alpha and q, biases, trim.
+    log_gust : logarithm of the standard deviation of the gust [m/s].
+    deterministic : all but the gusts (indices): initial states, biases, trim.
     """
 
-    names: Final = (
-        "alpha0",
-        "q0",
-        "w1",
-        "w2",
-        "bias_alpha",
-        "bias_q",
-        "bias_az",
-        "CL0",
-        "Cm0",
-        "log_sigma_w",
-    )
-    size: Final = len(names)
-    alpha: Final = names.index("alpha0")
-    q: Final = names.index("q0")
-    motion_start: Final = _span(names, "alpha0", "q0")
-    gusts: Final = _span(names, "w1", "w2")
-    start: Final = _span(names, "alpha0", "w2")
-    bias: Final = _span(names, "bias_alpha", "bias_az")
-    trim: Final = _span(names, "CL0", "Cm0")
-    offsets: Final = _span(names, "bias_alpha", "Cm0")
-    log_gust: Final = names.index("log_sigma_w")
-    deterministic: Final = np.r_[motion_start, offsets]
+    def __init__(self, motion: Motion) -> None:
+        states, outputs, coefficients = motion.states, motion.outputs, motion.coefficients
+        gust = motion.gusts[0]
+        super().__init__(
+            [
+                *(Entry(f"{x.name}0", unit := _unit(x.channel), _STEPS[unit]) for x in states),
+                *(Entry(f"{gust}{i}", "-", 1e-3) for i in (1, 2)),
+                *(Entry(f"bias_{y.name}", unit := _unit(y.channel), _STEPS[unit]) for y in outputs),
+                *(Entry(f"{c.name}0", "-", 1e-5 if c.length is None else 1e-6) for c in coefficients),
+                Entry(f"log_sigma_{gust}", "-", 1e-4),
+            ]
+        )
+        self.motion_start = slice(0, len(states))
+        self.gusts = self.span(f"{gust}1", f"{gust}2")
+        self.start = slice(0, self.gusts.stop)
+        self.bias = slice(self.start.stop, self.start.stop + len(outputs))
+        self.trim = slice(self.bias.stop, self.bias.stop + len(coefficients))
+        self.offsets = slice(self.bias.start, self.trim.stop)
+        self.log_gust = self.index(f"log_sigma_{gust}")
+        self.deterministic = np.r_[self.motion_start, self.offsets]
 
 
-COMMON_STEP: Final = np.array(
-    [1e-3, 1e-1, 1e-3, 1e-4, 1e-2, 1e-4]  # derivatives
-    + [1e-4] * 3  # log noise
-    + [1e-3] * 9
-)
-"""Steps of the one-sided differences in `Common` [units there]; judgement: about 1e-3 of a declared standard deviation,
-large against rounding and small against the curvature of the innovations."""
-PER_RECORD_STEP: Final = np.array([1e-5, 1e-4, 1e-3, 1e-3, 1e-5, 1e-4, 1e-3, 1e-5, 1e-6, 1e-4])
-"""The same in `PerRecord`."""
+def _unit(channel: str) -> str:
+    """Unit in the name of a channel."""
+    return next(unit for unit in sorted(_STEPS, key=len, reverse=True) if channel.endswith(f"_{unit}"))
+
+
+class ParameterLayout:
+    """The parameters of a motion: those of all records and those of each record.
+
+    Attributes
+    ----------
+    motion : the motion.
+    common, per_record : entries of the vectors.
+    """
+
+    def __init__(self, motion: Motion) -> None:
+        self.motion = motion
+        self.common, self.per_record = CommonEntries(motion), RecordEntries(motion)
+
+
+SHORT_PERIOD: Final = ParameterLayout(LONGITUDINAL)
+"""Parameters of the short period."""
 COLOUR_TIME_S: Final = 0.1
 """Unit of the correlation time of correlated noise [s]."""
-BOUNDS: Final[dict[int, tuple[float, float]]] = {
-    Common.rotary: (-0.75, 0.75),
-    Common.rolloff: (-0.75, 0.75),
-    Common.mounting: (-0.75, 0.75),
-    **dict.fromkeys(range(Common.colour_shares.start, Common.colour_shares.stop), (0.0, 0.95)),
-    Common.log_colour_time: (-1.6, 1.0),
-}
-"""Range of the bounded common parameters [units there]; judgement. Gusts and the mounting of the sensors: none to all, and a
-quarter beyond for a form that is neither of the two. Correlated noise: some white noise has to remain, and the correlation time
-stays between 20 and 270 ms, because slower noise cannot be told from motion."""
 
 
 @dataclass(frozen=True)
@@ -147,14 +198,21 @@ class Parameters:
 
     Attributes
     ----------
-    common : (common,) see `Common`.
-    per_record : (records, per-record) see `PerRecord`.
+    common : (common,) see `CommonEntries`.
+    per_record : (records, per-record) see `RecordEntries`.
     sizes : (sizes,) of the effects, in their size coordinates.
+    of : entries of the vectors.
     """
 
     common: Array
     per_record: Array
     sizes: Array
+    of: ParameterLayout = SHORT_PERIOD
+
+    @property
+    def layout(self) -> Layout:
+        """Where the parameters of one record are."""
+        return Layout(self.of, self.sizes.size)
 
     @property
     def vector(self) -> Array:
@@ -164,22 +222,24 @@ class Parameters:
     @property
     def at_bounds(self) -> tuple[int, ...]:
         """Indices of the common parameters that are at an end of their range."""
-        return tuple(i for i, ends in BOUNDS.items() if self.common[i] in ends)
+        return tuple(i for i, ends in self.of.common.bounds.items() if self.common[i] in ends)
 
     def with_levels(self, other: Parameters) -> Parameters:
         """The parameters with the levels of noise and gusts of others for the same records."""
         common, per_record = self.common.copy(), self.per_record.copy()
-        common[Common.noise] = other.common[Common.noise]
-        per_record[:, PerRecord.log_gust] = other.per_record[:, PerRecord.log_gust]
-        return Parameters(common, per_record, self.sizes)
+        common[self.of.common.noise] = other.common[self.of.common.noise]
+        level = self.of.per_record.log_gust
+        per_record[:, level] = other.per_record[:, level]
+        return replace(self, common=common, per_record=per_record)
 
     def of_vector(self, vector: Array) -> Parameters:
         """Parameters of the same shape from such an array."""
-        layout = Layout(self.sizes.size)
-        return Parameters(
-            vector[layout.common],
-            vector[layout.marginal.stop :].reshape(self.per_record.shape),
-            vector[layout.sizes],
+        layout = self.layout
+        return replace(
+            self,
+            common=vector[layout.common],
+            per_record=vector[layout.marginal.stop :].reshape(self.per_record.shape),
+            sizes=vector[layout.sizes],
         )
 
 
@@ -189,54 +249,54 @@ class Layout:
 
     Attributes
     ----------
+    of : entries of the vectors.
     count : number of sizes.
     """
 
+    of: ParameterLayout
     count: int
 
     @property
     def common(self) -> slice:
         """Common parameters."""
-        return slice(0, Common.size)
+        return slice(0, self.of.common.size)
 
     @property
     def sizes(self) -> slice:
         """Sizes of the effects."""
-        return slice(Common.size, Common.size + self.count)
+        first = self.of.common.size
+        return slice(first, first + self.count)
+
+    def size(self, number: int) -> int:
+        """Index of a size."""
+        return self.of.common.size + number
 
     @property
     def marginal(self) -> slice:
         """Common parameters and sizes: what remains once the per-record parameters are eliminated."""
-        return slice(0, Common.size + self.count)
+        return slice(0, self.sizes.stop)
 
     @property
     def per_record(self) -> slice:
         """Per-record parameters."""
-        return slice(Common.size + self.count, self.total)
+        return slice(self.sizes.stop, self.total)
 
     @property
     def total(self) -> int:
         """Number of parameters."""
-        return Common.size + self.count + PerRecord.size
+        return self.of.common.size + self.count + self.of.per_record.size
 
 
-def size_index(number: int) -> int:
-    """Index of a size among common parameters and sizes."""
-    return Common.size + number
-
-
-ALPHA, Q, GUST_1, GUST_2, LATE_GUST = range(5)
-"""States of the motion over ground (alpha [rad], q [rad/s]), of Dryden's filter [-], and the gust at the tail [-]."""
+GUST_1: Final = len(LONGITUDINAL.states)
+"""First of the two states of Dryden's filter, behind those of the short period; the gust at the tail follows [-]."""
 LEAD_COUNT: Final = 3
 """Number of low-passed copies of the first gust state, which give the gusts their rolloff [-]."""
-LEAD: Final = LATE_GUST + 1
+LEAD: Final = GUST_1 + 3
 """First of these states."""
 CORE: Final = LEAD + LEAD_COUNT
 """States of the motion and the gusts; those of effects, of late sensors and of correlated noise follow [-]."""
-OUTPUTS: Final = 3
-"""Outputs of the filter, see `airtruth.tracing.model.compile.CHANNELS` [-]."""
-AZ: Final = 2
-"""Number of az among them."""
+OUTPUTS: Final = len(LONGITUDINAL.outputs)
+"""Outputs of the short period, see `airtruth.tracing.model.compile.CHANNELS` [-]."""
 DELAY_ORDER: Final = 8
 """States of a delay [-]. Judgement: two states bend the highest frequencies of von Karman gusts (a delay of 60 ms was
 estimated 3 ms long); eight keep the phase to one degree up to 11 rad."""
@@ -262,14 +322,25 @@ class StateLayout(NamedTuple):
     size: int
 
 
-def effect_states(kinds: list[str]) -> tuple[Ints, int]:
+def lead_of(states: int) -> int:
+    """First low-passed copy of a gust state, behind the states of the motion, of the gust's filter and the late gust."""
+    return states + LEAD - GUST_1
+
+
+def core_of(states: int) -> int:
+    """Number of states of a motion and its gusts."""
+    return states + CORE - GUST_1
+
+
+def effect_states(kinds: list[str], states: int = GUST_1) -> tuple[Ints, int]:
     """First state of each effect with states, and the number of states up to the last.
 
     Parameters
     ----------
     kinds : kind of each `airtruth.physics.terms.StateTerm`: a mode has two states, others have one.
+    states : number of states of the motion.
     """
-    first, at = [], CORE
+    first, at = [], core_of(states)
     for kind in kinds:
         first.append(at)
         at += 2 if kind == "mode" else 1
@@ -285,9 +356,10 @@ def state_layout(effect: Ints, motion: int, lags: Array, delays: Array, slow: bo
     lags, delays : (outputs,) of the sensors [s]; 0 for none.
     slow : whether the sensors have correlated noise.
     """
-    lag, delay = np.full(OUTPUTS, -1, dtype=np.int64), np.full(OUTPUTS, -1, dtype=np.int64)
+    outputs = len(lags)
+    lag, delay = np.full(outputs, -1, dtype=np.int64), np.full(outputs, -1, dtype=np.int64)
     at = motion
-    for i in range(OUTPUTS):
+    for i in range(outputs):
         if lags[i] > 0.0:
             lag[i] = at
             at += 1
@@ -295,31 +367,28 @@ def state_layout(effect: Ints, motion: int, lags: Array, delays: Array, slow: bo
             delay[i] = at
             at += DELAY_ORDER
     noise = at if slow else -1
-    return StateLayout(motion, effect, lag, delay, noise, at + (OUTPUTS if slow else 0))
+    return StateLayout(motion, effect, lag, delay, noise, at + (outputs if slow else 0))
 
 
 __all__ = [
-    "ALPHA",
-    "AZ",
-    "BOUNDS",
     "COLOUR_TIME_S",
-    "COMMON_STEP",
     "CORE",
     "DELAY_ORDER",
     "GUST_1",
-    "GUST_2",
-    "LATE_GUST",
     "LEAD",
     "LEAD_COUNT",
     "OUTPUTS",
-    "PER_RECORD_STEP",
-    "Common",
+    "SHORT_PERIOD",
+    "CommonEntries",
+    "Entries",
+    "Entry",
     "Layout",
+    "ParameterLayout",
     "Parameters",
-    "PerRecord",
-    "Q",
+    "RecordEntries",
     "StateLayout",
+    "core_of",
     "effect_states",
-    "size_index",
+    "lead_of",
     "state_layout",
 ]

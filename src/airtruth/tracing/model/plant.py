@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import AircraftError, TrimError
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.simulation.disposable import isolated
 from airtruth.simulation.linearise import linearise
@@ -22,6 +23,8 @@ from airtruth.units import DEG, G0
 
 Array = NDArray[np.float64]
 
+_LIFT, _MOMENT = LONGITUDINAL.row("CL"), LONGITUDINAL.row("Cm")
+"""Positions of the derivatives of lift and of the pitching moment."""
 RELATIVE_STD: Final = (0.05, 0.30, 0.10, 0.05, 0.15, 0.05)
 """Standard deviation of a declared derivative that states none, over its value [-] (judgement): smaller ones
 let a declared error pass for an effect, larger ones let the derivatives absorb an effect."""
@@ -251,8 +254,8 @@ def linear(
         for j, d in enumerate(axis):
             for k, q in enumerate(axis):
                 x = np.array([a, q, d])
-                values[i, j, k, 1] = -s * float(derivatives[:3] @ x) - c.mass_kg * G0 / pressure
-                values[i, j, k, 2] = s * chord * float(derivatives[3:] @ x) - engine_moment / pressure
+                values[i, j, k, 1] = -s * float(derivatives[_LIFT] @ x) - c.mass_kg * G0 / pressure
+                values[i, j, k, 2] = s * chord * float(derivatives[_MOMENT] @ x) - engine_moment / pressure
     return Plant(
         aircraft=aircraft,
         alpha_rad=axis,
@@ -299,7 +302,7 @@ def declared_covariance(aircraft: Aircraft, derivatives: Array) -> Array:
     lift, 1/Iyy on the three of moment; a CG aft by dx chords adds CLalpha dx, CLq dx, CLde dx to the moment.
     """
     stated = aircraft.file.derivatives
-    std = np.empty(6)
+    std = np.empty(len(PARAMETERS))
     for i, name in enumerate(PARAMETERS):
         quantity = stated.get(name)
         own = RELATIVE_STD[i] * abs(derivatives[i])
@@ -309,13 +312,13 @@ def declared_covariance(aircraft: Aircraft, derivatives: Array) -> Array:
     covariance = np.diag(std**2)
     mass = aircraft.file.mass
     if mass is not None:
-        for quantity, direction in (
-            (mass.mass, np.concatenate([derivatives[:3], np.zeros(3)])),
-            (mass.inertia_yy, np.concatenate([np.zeros(3), derivatives[3:]])),
-        ):
+        for quantity, row in ((mass.mass, _LIFT), (mass.inertia_yy, _MOMENT)):
+            direction = np.zeros(len(PARAMETERS))
+            direction[row] = derivatives[row]
             relative = quantity.std / quantity.value
             covariance += relative**2 * np.outer(direction, direction)
-        shift = np.concatenate([np.zeros(3), derivatives[:3]])
+        shift = np.zeros(len(PARAMETERS))
+        shift[_MOMENT] = derivatives[_LIFT]
         covariance += mass.cg.std**2 * np.outer(shift, shift)
     return covariance
 

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import Change
 from airtruth.tracing.model import filter as record_filter
 from airtruth.tracing.model.compile import CompiledChange, compile_change
@@ -21,7 +22,7 @@ from airtruth.tracing.model.kernel_input import (
     KernelInput,
     SensorArrays,
 )
-from airtruth.tracing.model.parameters import COLOUR_TIME_S, OUTPUTS, Common, PerRecord
+from airtruth.tracing.model.parameters import COLOUR_TIME_S, OUTPUTS, SHORT_PERIOD
 from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, nodes
 from airtruth.tracing.model.records import fine as on_grid
@@ -193,7 +194,7 @@ def respond(
 
     Parameters
     ----------
-    common, per_record : see `Common` and `PerRecord`.
+    common, per_record : see `CommonEntries` and `RecordEntries`.
     external : further signals.
     """
     given = filter_inputs(record, change)
@@ -239,7 +240,7 @@ def kernel_input(
     external: External | None = None,
 ) -> KernelInput:
     """What the compiled filter reads."""
-    lift, moment = per_record[PerRecord.trim]
+    lift, moment = per_record[settings.layout.per_record.trim]
     more = np.zeros_like(given.y)
     grid = given.grid._replace(lift=given.grid.lift + lift, moment=given.grid.moment + moment)
     if external is not None:
@@ -255,7 +256,7 @@ def kernel_input(
         corner_rad2=given.corner_rad2,
         dt_s=signals.dt_s,
         sub=signals.sub,
-        start=per_record[PerRecord.start],
+        start=per_record[settings.layout.per_record.start],
         reference_alpha_rad=given.reference_alpha_rad,
         reference=given.reference,
         model=filter_model(given, settings, common, per_record),
@@ -265,12 +266,12 @@ def kernel_input(
 def filter_model(given: FilterInputs, settings: Settings, common: Array, per_record: Array) -> FilterModel:
     """Aircraft, gusts, effects and sensors at a vector of parameters."""
     record, compiled = given.record, given.compiled
-    span = record.plant.aircraft.constants.span_m
+    span, entries = record.plant.aircraft.constants.span_m, settings.layout.common
     gusts = GustModel(
-        level_m_s=float(np.exp(per_record[PerRecord.log_gust])),
+        level_m_s=float(np.exp(per_record[settings.layout.per_record.log_gust])),
         length_m=record.gust_length_m,
-        rolloff=0.5 + float(common[Common.rolloff]),
-        rotary=0.5 + float(common[Common.rotary]),
+        rolloff=0.5 + float(common[entries.rolloff]),
+        rotary=0.5 + float(common[entries.rotary]),
         rotary_time_s=4.0 * span / (np.pi * given.reference.airspeed_m_s),
     )
     sensors = pack_sensors(compiled, settings, common, per_record, record.plant.aircraft.constants.chord_m)
@@ -286,9 +287,10 @@ def filter_model(given: FilterInputs, settings: Settings, common: Array, per_rec
 def pack_aircraft(plant: Plant, compiled: CompiledChange, common: Array) -> AircraftArrays:
     """The declared aircraft of a flight condition, with its changes and increments."""
     c, declared = plant.aircraft.constants, compiled.declared
-    inertia = float(common[Common.inertia])
-    increments = common[Common.derivatives].copy()
-    increments[Common.moment] += inertia * (plant.derivatives[Common.moment] + common[Common.moment])
+    entries, moment = SHORT_PERIOD.common, LONGITUDINAL.row("Cm")
+    inertia = float(common[entries.inertia])
+    increments = common[entries.derivatives].copy()
+    increments[moment] += inertia * (plant.derivatives[moment] + common[moment])
     return AircraftArrays(
         area_m2=c.wing_area_m2,
         chord_m=c.chord_m,
@@ -302,7 +304,7 @@ def pack_aircraft(plant: Plant, compiled: CompiledChange, common: Array) -> Airc
         thrust_arm_m=declared["thrust_arm"],
         thrust_n=float(plant.thrust[0]),
         thrust_slope_m2=float(plant.thrust[1]),
-        constant=plant.constant + common[Common.thrust] * plant.engine,
+        constant=plant.constant + common[entries.thrust] * plant.engine,
         increments=increments,
         alpha_rad=plant.alpha_rad,
         elevator_rad=plant.elevator_rad,
@@ -312,25 +314,26 @@ def pack_aircraft(plant: Plant, compiled: CompiledChange, common: Array) -> Airc
 
 
 def moved_past_sensors_m(common: Array, shift: float, chord_m: float) -> float:
-    """Distance by which a CG that lies ``shift`` chords aft has moved past the sensors [m]; see `Common.mounting`."""
-    return (0.5 + float(common[Common.mounting])) * shift * chord_m
+    """Distance by which a CG that lies ``shift`` chords aft has moved past the sensors [m]; see `CommonEntries.mounting`."""
+    return (0.5 + float(common[SHORT_PERIOD.common.mounting])) * shift * chord_m
 
 
 def pack_sensors(
     compiled: CompiledChange, settings: Settings, common: Array, per_record: Array, chord_m: float
 ) -> SensorArrays:
     """Errors and noise of the outputs' sensors."""
-    noise = (settings.noise * np.exp(common[Common.log_noise])) ** 2
-    share = np.clip(common[Common.colour_shares], 0.0, _MOST_SLOW)
+    entries = settings.layout.common
+    noise = (settings.noise * np.exp(common[entries.log_noise])) ** 2
+    share = np.clip(common[entries.colour_shares], 0.0, _MOST_SLOW)
     return SensorArrays(
-        bias=per_record[PerRecord.bias] + compiled.bias,
+        bias=per_record[settings.layout.per_record.bias] + compiled.bias,
         scale=compiled.scale,
         arm_m=compiled.arm_m + moved_past_sensors_m(common, compiled.declared["cg"], chord_m),
         lag_s=compiled.lag_s,
         delay_s=compiled.delay_s,
         variance=noise * (1.0 - share) + settings.resolution**2,
         slow_std=np.sqrt(noise * share),
-        slow_time_s=COLOUR_TIME_S * float(np.exp(common[Common.log_colour_time])),
+        slow_time_s=COLOUR_TIME_S * float(np.exp(common[entries.log_colour_time])),
     )
 
 

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.aircraft.dynamics import declared_dynamics
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.sensor_errors import KINDS, Kind
 from airtruth.physics.terms import Change, SensorTerm
 from airtruth.tracing.model.compile import CHANNELS
-from airtruth.tracing.model.parameters import Common, PerRecord
+from airtruth.tracing.model.parameters import SHORT_PERIOD, ParameterLayout
 from airtruth.tracing.model.plant import inertia_std
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.units import DEG
@@ -28,19 +29,12 @@ _CARRIED: Final[tuple[Kind, ...]] = ("arm", "lag", "delay", "scale")
 _UNCONSTRAINED_STD: Final = 10.0
 """Prior standard deviation of an unconstrained derivative in alpha [1/rad]: twice a lift slope (judgement)."""
 _UNCONSTRAINED_TRIM_STD: Final = 0.5
-"""The same of its coefficient at the trim [-]: a curvature of 40 about zero gives 0.4 at 0.1 rad (judgement)."""
-_ROTARY_STD: Final = 0.5
-"""Prior standard deviation of the share of the rotary gust [-]: none and all are one away from the middle (judgement)."""
-_ROLLOFF_STD: Final = 0.5
-"""The same of the rolloff between Dryden's and von Karman's spectrum [-] (judgement)."""
-_MOUNTING_STD: Final = 0.5
-"""The same of the share of a shift of the CG that moves the CG past the sensors [-] (judgement)."""
+"""Prior standard deviation of the coefficient at the trim beside an unconstrained derivative [-]: a curvature of 40 about zero
+gives 0.4 at 0.1 rad (judgement)."""
 _NOISE_STD: Final = 0.1
 """Prior standard deviation of the logarithm of declared noise [-]: data sheets are right within 10 % (judgement)."""
 _NOISE_UNKNOWN_STD: Final = 1.0
-"""The same where the noise is not declared [-]: a factor of e (judgement)."""
-_COLOUR_STD: Final = (0.5, 0.5, 0.5, 0.7)
-"""Prior standard deviations of the three shares of correlated noise and of the logarithm of its time [-] (judgement)."""
+"""Prior standard deviation of the logarithm of the noise where none is declared [-]: a factor of e (judgement)."""
 _NOISE: Final = (0.1 * DEG, 0.3 * DEG, 0.1)
 """Noise of alpha [rad], q [rad/s], az [m/s2] where none is declared: small flight-test instruments (judgement)."""
 _RESOLUTION: Final = 0.01
@@ -81,6 +75,7 @@ class Settings:
     trim_std : (2,) of CL and Cm at the trim, about those of the declared aircraft [-].
     coloured : whether part of the sensors' noise may be slow.
     resolution : (3,) standard deviation of what the model does not resolve of the outputs, beside the noise [same units].
+    layout : free parameters of the motion.
     """
 
     noise: Array
@@ -91,7 +86,8 @@ class Settings:
     thrust_std: float
     trim_std: Array
     coloured: bool = False
-    resolution: Array = field(default_factory=lambda: np.zeros(3))
+    resolution: Array = field(default_factory=lambda: np.zeros(len(LONGITUDINAL.outputs)))
+    layout: ParameterLayout = SHORT_PERIOD
 
     @property
     def measured(self) -> NDArray[np.bool_]:
@@ -177,17 +173,20 @@ def declared_change(aircraft: Aircraft, *, has_vane: bool = True) -> Change:
 
 def free_common(settings: Settings) -> tuple[int, ...]:
     """Indices of the common parameters that are free."""
-    return tuple(range(Common.size if settings.coloured else Common.colour.start))
+    common = settings.layout.common
+    return tuple(range(common.size if settings.coloured else common.colour.start))
 
 
 def initial_per_record(record: TraceRecord, settings: Settings) -> Array:
     """(per-record,) where the search for a record's own parameters starts."""
-    values = np.zeros(PerRecord.size)
+    entries, motion = settings.layout.per_record, settings.layout.motion
+    values = np.zeros(entries.size)
     y = record.signals.with_lead.y
     first = y[: min(_FIRST_SAMPLES, len(y))]
-    values[PerRecord.alpha] = first[:, 0].mean() - record.plant.alpha_shift_rad
-    values[PerRecord.q] = first[:, 1].mean()
-    values[PerRecord.log_gust] = np.log(settings.gust_m_s)
+    channels = [motion.output_channels.index(state.channel) for state in motion.states]
+    values[entries.motion_start] = [first[:, i].mean() for i in channels]
+    values[0] -= record.plant.alpha_shift_rad
+    values[entries.log_gust] = np.log(settings.gust_m_s)
     return values
 
 
@@ -200,14 +199,18 @@ def per_record_prior(
     ----------
     unconstrained : indices of the derivatives whose coefficient is not constrained by what is declared.
     """
-    std = np.ones(PerRecord.size)
-    std[PerRecord.motion_start] = _START_STD
-    std[PerRecord.bias] = settings.bias_std
-    free = [Common.CLalpha in unconstrained, Common.Cmalpha in unconstrained]
-    std[PerRecord.trim] = np.where(free, _UNCONSTRAINED_TRIM_STD, settings.trim_std)
-    std[PerRecord.log_gust] = settings.log_gust_std
+    entries, motion = settings.layout.per_record, settings.layout.motion
+    std = np.ones(entries.size)
+    std[entries.motion_start] = _START_STD
+    std[entries.bias] = settings.bias_std
+    free = [
+        bool({*range(*motion.row(c.name).indices(len(motion.parameters)))} & {*unconstrained})
+        for c in motion.coefficients
+    ]
+    std[entries.trim] = np.where(free, _UNCONSTRAINED_TRIM_STD, settings.trim_std)
+    std[entries.log_gust] = settings.log_gust_std
     precision = np.diag(std**-2.0)
-    precision[PerRecord.gusts, PerRecord.gusts] = np.linalg.inv(GUST_COVARIANCE)
+    precision[entries.gusts, entries.gusts] = np.linalg.inv(GUST_COVARIANCE)
     return initial_per_record(record, settings), precision
 
 
@@ -240,12 +243,14 @@ def common_prior(
     unconstrained : indices of the derivatives that are not constrained by what is declared.
     spread : (6, 6) covariance of the increments of the derivatives beyond the declared one; None for none.
     """
-    precision = np.zeros((Common.size, Common.size))
-    derivatives, inertia = Common.derivatives, Common.inertia
+    entries, motion = settings.layout.common, settings.layout.motion
+    precision = np.zeros((entries.size, entries.size))
+    derivatives, inertia = entries.derivatives, entries.inertia
     # an inertia larger by i makes the derivatives of the moment look smaller by i
     std = inertia_std(records[0].plant.aircraft)
     turn = np.zeros(derivatives.stop)
-    turn[Common.moment] = -declared_derivatives_of(records)[Common.moment]
+    for row in (motion.row(c.name) for c in motion.coefficients if c.length is not None):
+        turn[row] = -declared_derivatives_of(records)[row]
     covariance = declared_covariance_of(records) - std**2 * np.outer(turn, turn)
     covariance[list(unconstrained), list(unconstrained)] += _UNCONSTRAINED_STD**2
     if spread is not None:
@@ -254,13 +259,10 @@ def common_prior(
     precision[derivatives, derivatives] = own
     precision[inertia, derivatives] = precision[derivatives, inertia] = -own @ turn
     precision[inertia, inertia] = turn @ own @ turn + std**-2
-    diagonal = np.zeros(Common.size)
-    diagonal[Common.log_noise] = settings.noise_prior**-2
-    diagonal[Common.rotary] = _ROTARY_STD**-2
-    diagonal[Common.thrust] = settings.thrust_std**-2
-    diagonal[Common.rolloff] = _ROLLOFF_STD**-2
-    diagonal[Common.mounting] = _MOUNTING_STD**-2
-    diagonal[Common.colour] = np.array(_COLOUR_STD) ** -2.0
+    diagonal = np.zeros(entries.size)
+    diagonal[entries.log_noise] = settings.noise_prior**-2
+    diagonal[entries.thrust] = settings.thrust_std**-2
+    diagonal[list(entries.std)] = np.array(list(entries.std.values())) ** -2.0
     return precision + np.diag(diagonal)
 
 

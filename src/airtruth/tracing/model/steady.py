@@ -12,8 +12,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.tracing.model.by_motion import equations_of
 from airtruth.tracing.model.corners import CornerNodes, Corners, input_column, spread_of, stack, stacked
-from airtruth.tracing.model.equations import settle_effects
 from airtruth.tracing.model.kernel_input import AirPoint, FilterModel, KernelInput
 from airtruth.tracing.model.linearise import (
     FirstUpdate,
@@ -22,7 +22,6 @@ from airtruth.tracing.model.linearise import (
     linearise,
     process_intensity,
 )
-from airtruth.tracing.model.parameters import AZ, OUTPUTS
 from airtruth.tracing.model.schedule import UNSCHEDULED, Schedule
 
 Array = NDArray[np.float64]
@@ -31,10 +30,8 @@ Ints = NDArray[np.int64]
 
 _NONE: Final = np.zeros((0, 0))
 """A matrix that is not used."""
-_CERTAIN: Final = stacked([Corners(_NONE, _NONE, _NONE, _NONE, _NONE, np.zeros(OUTPUTS), _NONE, _NONE, 0.0)])
+_CERTAIN: Final = stacked([Corners(_NONE, _NONE, _NONE, _NONE, _NONE, np.zeros(0), _NONE, _NONE, 0.0)])
 """The recursion of a surface that is known everywhere."""
-_UNIT: Final = np.eye(OUTPUTS)[None]
-"""Scale of a single flight condition."""
 
 
 class SteadyFilter(NamedTuple):
@@ -42,14 +39,14 @@ class SteadyFilter(NamedTuple):
 
     Attributes
     ----------
-    k_gain : (nodes, states, outputs) of the update at each flight condition; first : the part of it that alpha and q have
-        alone, stacked likewise.
+    k_gain : (nodes, states, outputs) of the update at each flight condition; first : the part of it that the early outputs
+        have alone, stacked likewise.
     scale : (nodes, outputs, outputs) lower triangular, from the innovations of a condition to those of the common one, whose
         airspeed is nearest to the mean.
     white, covariance : (outputs, outputs) whitener W with W S W' = I, and S, of the common condition; logdet : log|S|.
     corners : recursion where the surface is uncertain.
-    direct : (nodes, states) slope of az at the CG's accelerometer before its lag and delay.
-    shown : share of a change of az since the last sample that its reading shows [-].
+    direct : (nodes, states) slope of the late output at the CG's accelerometer before its lag and delay.
+    shown : share of a change of the late output since the last sample that its reading shows [-].
     lower, share : see `airtruth.tracing.model.schedule.Schedule`; empty with a single node.
     """
 
@@ -88,7 +85,7 @@ def steady_filter(given: KernelInput, along: Schedule) -> SteadyFilter | None:
     """
     if not along.alpha_rad:
         mean = _at(given, given.reference_alpha_rad, given.reference)
-        return None if mean is None else _joined(given, [mean], mean, _UNIT, along)
+        return None if mean is None else _joined(given, [mean], mean, _unit(given.model), along)
     nodes = [_at(given, *point) for point in zip(along.alpha_rad, along.air, strict=True)]
     sound = [node for node in nodes if node is not None]
     if len(sound) < len(nodes):
@@ -96,8 +93,15 @@ def steady_filter(given: KernelInput, along: Schedule) -> SteadyFilter | None:
     away = [abs(air.airspeed_m_s - given.reference.airspeed_m_s) for air in along.air]
     common = sound[away.index(min(away))]
     root = np.linalg.inv(common.white)
-    scale = np.array([_UNIT[0] if node is common else np.tril(root @ node.white) for node in sound])
+    scale = np.array(
+        [_unit(given.model)[0] if node is common else np.tril(root @ node.white) for node in sound]
+    )
     return _joined(given, sound, common, scale, along)
+
+
+def _unit(model: FilterModel) -> Array:
+    """Scale of a single flight condition."""
+    return np.eye(model.sensors.scale.size)[None]
 
 
 def _joined(
@@ -117,7 +121,7 @@ def _joined(
         logdet=common.logdet,
         corners=stacked(corners) if corners else _CERTAIN,
         direct=stack([node.direct for node in nodes]),
-        shown=_shown(float(sensors.lag_s[AZ]), float(sensors.delay_s[AZ]), given.dt_s),
+        shown=_shown(float(sensors.lag_s[-1]), float(sensors.delay_s[-1]), given.dt_s),
         lower=along.lower,
         share=along.share,
     )
@@ -127,7 +131,7 @@ def _at(given: KernelInput, alpha_rad: float, air: AirPoint) -> _Condition | Non
     """The filter at one flight condition; None where its innovations have no covariance."""
     model = given.model
     n = model.states.size
-    a, c = np.empty((n, n)), np.empty((OUTPUTS, n))
+    a, c = np.empty((n, n)), np.empty((model.sensors.scale.size, n))
     x = _equilibrium(alpha_rad, air, model)
     direct = linearise(x, air, model, a, c)
     phi, noise = discrete(a, process_intensity(air.airspeed_m_s, model), given.dt_s)
@@ -151,13 +155,14 @@ def _shown(lag_s: float, delay_s: float, dt_s: float) -> float:
 
 def without_update(model: FilterModel) -> SteadyFilter:
     """The filter of a free run, whose state no measurement corrects."""
-    n, square = model.states.size, _UNIT[0]
+    n, unit = model.states.size, _unit(model)
+    count = len(unit[0])
     return SteadyFilter(
-        k_gain=np.zeros((1, n, OUTPUTS)),
-        first=FirstUpdate(np.zeros((1, n, 2)), np.zeros((1, 2))),
-        scale=_UNIT,
-        white=square,
-        covariance=square,
+        k_gain=np.zeros((1, n, count)),
+        first=FirstUpdate(np.zeros((1, n, count - 1)), np.zeros((1, count - 1))),
+        scale=unit,
+        white=unit[0],
+        covariance=unit[0],
         logdet=0.0,
         corners=_CERTAIN,
         direct=np.zeros((1, n)),
@@ -171,7 +176,7 @@ def _equilibrium(alpha_rad: float, air: AirPoint, model: FilterModel) -> Array:
     """(states,) at an angle of attack, effects' states in equilibrium with it."""
     x = np.zeros(model.states.size)
     x[0] = alpha_rad
-    settle_effects(x, alpha_rad, air.elevator_rad, model)
+    equations_of(model).settle(x, air, model)
     return x
 
 

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.settings import Settings
 
@@ -31,7 +31,7 @@ def with_surface_noise(record: TraceRecord, settings: Settings) -> TraceRecord:
     constants = plant.aircraft.constants
     qbar_pa = 0.5 * float(signals.density_kg_m3.mean()) * float(np.mean(signals.airspeed_m_s**2))
     moment = qbar_pa * constants.wing_area_m2 * constants.chord_m / constants.inertia_yy_kg_m2
-    turning = moment * abs(float(plant.derivatives[PARAMETERS.index("Cmde")]))
+    turning = moment * abs(float(plant.derivatives[LONGITUDINAL.at("Cm", "elevator")]))
     change = turning * float(np.sqrt(signals.surface_noise_rad2.max())) * signals.dt_s
     if change > _NEGLIGIBLE * float(settings.noise[1]):
         return record

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from airtruth.numerics.ahead import awaited
 from airtruth.numerics.compiled import inner
 from airtruth.tracing.model.advance import Steps, Work, advance_motion, advance_sensors, steps_of, work_of
-from airtruth.tracing.model.equations import air_alpha, air_at, effective_elevator, gust, rates
+from airtruth.tracing.model.by_motion import air_at, rates
+from airtruth.tracing.model.equations import air_alpha, effective_elevator, gust
 from airtruth.tracing.model.filter import Path, innovation, innovations, path_of
 from airtruth.tracing.model.kernel_input import AirPoint, GridSignals, KernelInput, SensorArrays
 from airtruth.tracing.model.linearise import FirstUpdate
@@ -203,7 +204,7 @@ def tangent_of(given: FilterInputs, settings: Settings, common: Array, per_recor
     Parameters
     ----------
     given : what the record gives to the filter.
-    common, per_record : see `Common` and `PerRecord`.
+    common, per_record : see `CommonEntries` and `RecordEntries`.
     """
     kernel = kernel_input(given, settings, common, per_record)
     # the differences move these
@@ -213,7 +214,7 @@ def tangent_of(given: FilterInputs, settings: Settings, common: Array, per_recor
     if steady is None:
         return None
     n, samples = kernel.model.states.size, len(kernel.y)
-    path, e = path_of(samples, n), np.full_like(kernel.y, LOST)
+    path, e = path_of(samples, n, OUTPUTS), np.full_like(kernel.y, LOST)
     if samples < 2 or not innovations(kernel, steady, e, path)[0]:
         return None
     matrices = matrices_along(kernel, path, steady.shown)
@@ -236,7 +237,7 @@ def matrices_along(given: KernelInput, path: Path, shown: float) -> Matrices:
         flown=np.zeros((every, POINTS, len(FLOWN))),
     )
     steps = steps_of(given.model, given.dt_s, given.sub)
-    _differences(given, steps, work_of(n), path, shown, matrices)
+    _differences(given, steps, work_of(given.model), path, shown, matrices)
     return matrices
 
 

@@ -5,33 +5,38 @@ from __future__ import annotations
 import math
 
 from airtruth.physics.short_period import PARAMETERS
-from airtruth.table import Number, Table, flat
+from airtruth.table import Number, Row, Table, Uncertain, flat
 from airtruth.tracing.answer import TraceAnswer
 
 
 def derivative_table(answer: TraceAnswer) -> Table:
-    """Return the six derivatives: declared, refitted without and with the effects, and the last's standard deviation."""
+    """Return the six derivatives with their standard errors: declared, refitted without and with the effects."""
     stated = answer.derivatives
-    rows = [("declared", stated.declared, 4), ("before", stated.before, 4)]
-    if answer.effects:
-        rows.append(("after", stated.after, 4))
-    rows.append(("std", stated.after_std, 2))
-    if answer.declared_model is not None:
-        shifts = answer.declared_model.shifts
-        rows.insert(1, ("declared std", {name: s.declared_std for name, s in shifts.items()}, 2))
-        rows.append(("shift/declared std", {name: s.sigma for name, s in shifts.items()}, 2))
+    shifts = {} if answer.declared_model is None else answer.declared_model.shifts
+    refitted = ("before", "after") if answer.effects else ("before",)
+    rows = [("declared", stated.declared, {name: s.declared_std for name, s in shifts.items()})]
+    rows += [
+        (name, getattr(stated, name), stated.after_std if name == refitted[-1] else {}) for name in refitted
+    ]
+    cells: list[Row] = [
+        (stage, *(_estimate(values, errors, name) for name in PARAMETERS)) for stage, values, errors in rows
+    ]
+    if shifts:
+        sigmas = (Number(shifts[d].sigma if d in shifts else math.nan, digits=2) for d in PARAMETERS)
+        cells.append(("shift/declared std", *sigmas))
     return flat(
         "Derivatives at the trim [1/rad, rates as q c/(2V)]",
         ("", *PARAMETERS),
-        [
-            (stage, *(Number(values.get(name, math.nan), digits=digits) for name in PARAMETERS))
-            for stage, values, digits in rows
-        ],
+        cells,
         (
-            "before: refitted without an effect; after: with the effects; std: standard deviation of the last of them. "
-            "declared std: mass, inertia and CG included.",
+            "before: refitted without an effect; after: with the effects; +-: standard error, of a declared value its standard "
+            "uncertainty with those of mass, inertia and CG.",
         ),
     )
+
+
+def _estimate(values: dict[str, float], errors: dict[str, float], name: str) -> Uncertain:
+    return Uncertain(Number(values.get(name, math.nan)), Number(errors.get(name, math.nan), digits=2))
 
 
 __all__ = ["derivative_table"]

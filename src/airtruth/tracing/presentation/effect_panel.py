@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from airtruth.channels import SIGNALS, shown
 from airtruth.charts import Band, Line, Mark, Panel, Rule
 from airtruth.effects.registry import EFFECTS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import READINGS, AeroTerm, Change, shape_of
 from airtruth.table import significant
 from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
@@ -96,10 +97,12 @@ def _curve(shown_: ShownRecord, terms: tuple[AeroTerm, ...]) -> Panel:
     )  # the linear model holds everywhere
     fine = np.linspace(ends[0], ends[-1], 201)
     declared = np.interp(fine, over, _declared_curve(plant, first))
-    derivative = (3 if first.coefficient == "Cm" else 0) + (0 if first.signal == "alpha" else 2)
     models = shown_.stages.models
-    before = declared + models["before"].common[derivative] * (fine - at)
-    after = declared + models["after"].common[derivative] * (fine - at)
+    before, after = declared, declared
+    if first.coefficient in [c.name for c in LONGITUDINAL.coefficients]:
+        derivative = LONGITUDINAL.at(first.coefficient, first.signal)
+        before = declared + models["before"].common[derivative] * (fine - at)
+        after = declared + models["after"].common[derivative] * (fine - at)
     for term in terms:
         if term.signal == first.signal and term.coefficient == first.coefficient:
             after = after + term.amplitude * shape_of(term, fine)

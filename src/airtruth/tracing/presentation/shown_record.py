@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from airtruth.physics.terms import Change
 from airtruth.tracing.inference.assess import Assessment
 from airtruth.tracing.model.compile import compile_change
-from airtruth.tracing.model.parameters import Common, PerRecord
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.response import respond
 from airtruth.tracing.stages import StageModel, Stages, free_run_floor
@@ -52,7 +52,7 @@ class ShownRecord:
     def free_run(self, model: StageModel, change: Change) -> Array:
         """(samples, 3) outputs of a simulation with the parameters of the second stage and another change."""
         local = self.after.per_record.copy()
-        local[PerRecord.gusts] = 0.0  # no gust
+        local[SHORT_PERIOD.per_record.gusts] = 0.0  # no gust
         settings = self.stages.case.fitted.settings
         compiled = compile_change(change)
         response = respond(self.record, settings, compiled, model.common, local, free_run=True)
@@ -70,7 +70,7 @@ class ShownRecord:
         without = model
         if model.hypothesis.spread is not None:
             common = model.common.copy()
-            common[Common.derivatives] = 0.0
+            common[SHORT_PERIOD.common.derivatives] = 0.0
             without = replace(model, common=common)
         return self.free_run(model, complete) - self.free_run(without, declared)
 

@@ -1,4 +1,4 @@
-"""The text that `airtruth trace` prints: verdict, effects, errors, candidates and the next flight."""
+"""The text of a trace in full: verdict, effects, errors, candidates and the next flight; `airtruth trace --verbose` prints it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from airtruth.tracing.presentation.candidates import probability, ranked
 from airtruth.tracing.presentation.derivative_table import derivative_table
 from airtruth.tracing.presentation.error_table import axial_words, error_table
 from airtruth.tracing.presentation.tolerances import tolerance_table
-from airtruth.tracing.selection.explanation import DERIVATIVES, EXPLAINING
+from airtruth.tracing.selection.explanation import DERIVATIVES
 from airtruth.units import printed
 
 MOST_CANDIDATES: Final = 8
@@ -26,23 +26,23 @@ FAR_SIGMA: Final = 2.0
 
 
 def as_trace_text(answer: TraceAnswer) -> str:
-    """The answer of a trace as plain text."""
+    """The answer of a trace as plain text, with every table."""
     tolerances = tolerance_table(answer)
     blocks = [
-        [*textwrap.wrap(verdict(answer), WIDTH), *textwrap.wrap(_records(answer), WIDTH)],
+        [*textwrap.wrap(verdict(answer), WIDTH), *textwrap.wrap(records_line(answer), WIDTH)],
         *([effect_line(e), *effect_details(e, answer.credit.get(e.key))] for e in answer.effects),
         as_text(error_table(answer)).rstrip("\n").splitlines(),
         *([as_text(tolerances).rstrip("\n").splitlines()] if tolerances else []),
-        *([_wrapped("Axial force", axial_words(answer.axial_force))] if answer.axial_force else []),
+        *([wrapped("Axial force", axial_words(answer.axial_force))] if answer.axial_force else []),
         as_text(derivative_table(answer)).rstrip("\n").splitlines(),
-        *([_wrapped("Sets of causes", _sets(answer))] if len(answer.alternatives) > 1 else []),
-        ["Candidates, accepted effects first, then by significance:", *_candidate_lines(answer)],
-        _wrapped("Smallest traceable sizes", "; ".join(detectable(answer)) + "."),
-        _wrapped("Next flight", answer.next_flight),
+        *([wrapped("Sets of causes", sets_line(answer))] if len(answer.alternatives) > 1 else []),
+        ["Candidates, accepted effects first, then by significance:", *candidate_lines(answer)],
+        wrapped("Smallest traceable sizes", "; ".join(detectable(answer)) + "."),
+        wrapped("Next flight", answer.next_flight),
     ]
     if answer.updated_aircraft:
         blocks.append([f"Updated aircraft: {answer.updated_aircraft}"])
-    blocks += [_wrapped("Note", note + ".") for note in answer.notes]
+    blocks += [wrapped("Note", note + ".") for note in answer.notes]
     return "\n\n".join("\n".join(block) for block in blocks)
 
 
@@ -69,7 +69,7 @@ def _conclusion(answer: TraceAnswer) -> str:
         own = "" if declared is None else f"; {probability(declared.p_value)} for the declared model"
         return (
             f"None: the declared aircraft explains these records ({probability(answer.anomaly.p_value)} for a missing "
-            f"effect{own}); they show no missing effect."
+            f"effect{own}); they show no missing effect.{_refinement(answer)}"
         )
     if answer.verdict == "unexplained":
         return (
@@ -81,6 +81,15 @@ def _conclusion(answer: TraceAnswer) -> str:
     if alike:
         sentence += f", or an effect that looks the same in these records: {', '.join(alike)}"
     return sentence + "."
+
+
+def _refinement(answer: TraceAnswer) -> str:
+    """Derivatives that the updated aircraft has from the records, in a sentence; empty for none."""
+    refined = [
+        f"{name} {significant(r.estimate)} +- {significant(r.std, 2)} (declared {significant(r.declared)})"
+        for name, r in answer.refined.items()
+    ]
+    return f" They refine {_listed(refined)}." if refined else ""
 
 
 def headline(answer: TraceAnswer) -> str:
@@ -132,7 +141,7 @@ def _causes(answer: TraceAnswer) -> str:
     return "; ".join(parts)
 
 
-def _sets(answer: TraceAnswer) -> str:
+def sets_line(answer: TraceAnswer) -> str:
     """Sets of causes with their posterior weights."""
     shown = answer.alternatives[:MOST_CANDIDATES]
     sets = "; ".join(f"{' + '.join(s.effects) or 'none'} {100.0 * s.weight:.0f} %" for s in shown)
@@ -141,7 +150,7 @@ def _sets(answer: TraceAnswer) -> str:
 
 
 def _in_derivatives(name: str) -> bool:
-    return name in EXPLAINING or name == DERIVATIVES
+    return name == DERIVATIVES or (name in EFFECTS and EFFECTS[name].prior is not None)
 
 
 def _listed(names: list[str]) -> str:
@@ -292,9 +301,10 @@ def detectable(answer: TraceAnswer) -> Iterator[str]:
         yield f"{name} {significant(value, 2)} {unit}".rstrip()
 
 
-def _candidate_lines(answer: TraceAnswer) -> Iterator[str]:
+def candidate_lines(answer: TraceAnswer, most: int = MOST_CANDIDATES) -> Iterator[str]:
+    """The foremost candidates, one line each, how many others there are, and those that cannot be tested."""
     testable = [r for r in ranked(answer) if r.candidate.testable]
-    shown = testable[:MOST_CANDIDATES]
+    shown = testable[:most]
     width = max((len(r.candidate.key) for r in shown), default=0)
     for r in shown:
         c = r.candidate
@@ -310,7 +320,8 @@ def _candidate_lines(answer: TraceAnswer) -> Iterator[str]:
         )
 
 
-def _records(answer: TraceAnswer) -> str:
+def records_line(answer: TraceAnswer) -> str:
+    """Fitted and held-out records, and the model."""
     records = answer.records
     held = ", ".join(records.held_out) or "none"
     model = "forces probed in JSBSim" if answer.model == "aircraft" else "linear short-period model"
@@ -319,13 +330,15 @@ def _records(answer: TraceAnswer) -> str:
     return f"{fitted}, held out: {held}; {model}."
 
 
-def _wrapped(heading: str, words: str) -> list[str]:
+def wrapped(heading: str, words: str) -> list[str]:
+    """A paragraph behind its heading."""
     return textwrap.wrap(f"{heading}: {words}", WIDTH, subsequent_indent="  ")
 
 
 __all__ = [
     "FAR_SIGMA",
     "as_trace_text",
+    "candidate_lines",
     "detectable",
     "effect_details",
     "effect_line",
@@ -333,6 +346,9 @@ __all__ = [
     "increment_words",
     "interval",
     "largest_words",
+    "records_line",
+    "sets_line",
     "unit_of",
     "verdict",
+    "wrapped",
 ]

@@ -14,12 +14,13 @@ from scipy.stats import chi2
 from airtruth.aircraft.dynamics import declared_dynamics
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.inference.assess import Assessment, noise_floor
 from airtruth.tracing.inference.cross_validate import LeftOut, leave_one_out, one_by_the_other
 from airtruth.tracing.inference.feedback import responds_to_motion
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import MEMORY_S, inflation, long_run
-from airtruth.tracing.model.parameters import OUTPUTS, Common, PerRecord, size_index
+from airtruth.tracing.model.parameters import OUTPUTS
 from airtruth.tracing.model.plant import alpha_dot
 from airtruth.tracing.selection.score_test import Score
 
@@ -46,8 +47,8 @@ IMPROBABLE: Final = 0.001
 _ALPHA_DOT: Final = "alpha_dot_hat"
 """Signal of a term in alpha_dot c/(2V)."""
 _SLIGHT: Final = 0.25
-"""Share of a declared size by which an effect may exceed the removal of all of it [-] (judgement: a flight tells a term in
-alpha_dot to about that)."""
+"""Overshoot allowed to an effect that cancels a declared term, as a fraction of that term [-] (judgement: a flight tells a
+term in alpha_dot to about that)."""
 _ERRORS: Final = 2.0
 """Standard errors that count as a difference [-] (convention)."""
 _FREE_ERRORS: Final = 3.0
@@ -145,7 +146,7 @@ def assess_candidate(
     """
     size, std = _size(s, own)
     few = len(problem.records) < _SEVERAL
-    excess = float(inflation(problem, own, unbiased=few)[size_index(_first_size(s, own))])
+    excess = float(inflation(problem, own, unbiased=few)[own.layout.size(_first_size(s, own))])
     left_out = tested_on_left_out(problem, own, reference, gain)
     reasons = [
         *_fit_reasons(s, own, gain, least, excess),
@@ -264,7 +265,9 @@ def declared_part(problem: TraceProblem, effect: Effect) -> float:
         if term.signal == _ALPHA_DOT:
             like = (term.coefficient, term.signal)
             own = sum(t.amplitude for t in stated if (t.coefficient, t.signal) == like)
-            return own + float(alpha_dot(plant)[("CL", "Cm").index(term.coefficient)])
+            return own + float(
+                alpha_dot(plant)[[c.name for c in LONGITUDINAL.coefficients].index(term.coefficient)]
+            )
     return 0.0
 
 
@@ -331,7 +334,7 @@ def declared_probability(problem: TraceProblem, own: PosteriorFit) -> float:
     Source: G. E. P. Box, J. R. Statist. Soc. A 143 (1980), the prior predictive check. The mode is nearer to the
     prior than the maximum of the likelihood, so the check is conservative.
     """
-    off = own.point.common[Common.derivatives]
+    off = own.point.common[own.point.of.common.derivatives]
     tight = [i for i in range(off.size) if i not in own.hypothesis.unconstrained]
     covariance = problem.declared_covariance[np.ix_(tight, tight)]
     return float(chi2.sf(float(off[tight] @ np.linalg.solve(covariance, off[tight])), len(tight)))
@@ -343,8 +346,8 @@ def own_probability(problem: TraceProblem, own: PosteriorFit) -> float:
     for (middle, precision), local in zip(
         problem.priors(own.hypothesis).per_record, own.point.per_record, strict=True
     ):
-        off = (local - middle)[PerRecord.offsets]
-        total += float(off**2 @ np.diag(precision)[PerRecord.offsets])
+        off = (local - middle)[own.point.of.per_record.offsets]
+        total += float(off**2 @ np.diag(precision)[own.point.of.per_record.offsets])
         count += off.size
     return float(chi2.sf(total, count))
 

@@ -105,12 +105,11 @@ def _most_probable(
         return t
 
     further = problem.each(extended, range(len(problem.records)))
-    k = len(null.point.sizes)
     sensitivities = [
-        inserted(base, k, t, np.zeros((len(t), 3, 3)))
+        inserted(base, null.layout.sizes.stop, t, np.zeros((len(t), 3, 3)))
         for base, t in zip(null.sensitivities, further, strict=True)
     ]
-    gradient, information = projected(null, problem, sensitivities, NO_WHITENER, len(stds))
+    gradient, information = projected(null, problem, sensitivities, NO_WHITENER)
     scaled = information * np.outer(stds, stds) + np.eye(len(stds))
     amounts = -np.linalg.solve(scaled, stds * gradient)
     limit = float(chi2.ppf(_PLAUSIBLE, len(stds)))

@@ -22,7 +22,6 @@ from airtruth.tracing.inference.posterior import (
 )
 from airtruth.tracing.inference.whitening import Whitener
 from airtruth.tracing.model.compile import CompiledChange, compile_change
-from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.model.response import Response, respond
 
 Array = NDArray[np.float64]
@@ -93,17 +92,16 @@ def _with(
         t[i] = (moved.e - e.e) @ base.white.T / step
         w[i] = base.white @ ((moved.covariance - e.covariance) / step) @ base.white.T
         more[i] = (moved.more_logdet - e.more_logdet) / step
-    return inserted(base, len(null.point.sizes), t, w, more)
+    return inserted(base, null.layout.sizes.stop, t, w, more)
 
 
-def inserted(base: Sensitivities, k: int, t: Array, w: Array, more: Array | None = None) -> Sensitivities:
-    """Sensitivities with further directions after the ``k`` sizes.
+def inserted(base: Sensitivities, at: int, t: Array, w: Array, more: Array | None = None) -> Sensitivities:
+    """Sensitivities with further directions from an index, that after the sizes.
 
     Parameters
     ----------
     t, w, more : (directions, samples, 3), (directions, 3, 3) and (directions,), as of `Sensitivities`; None is zero.
     """
-    at = Common.size + k
     added = np.zeros(len(t)) if more is None else more
     return Sensitivities(
         base.r,
@@ -124,14 +122,13 @@ def with_freedoms(
     levels: bool = False,
 ) -> tuple[Array, Array]:
     """`projected`, each direction with the derivatives that its effect leaves unconstrained."""
-    count = len(tried)
-    gradient, information = projected(null, problem, sensitivities, whitener, count, levels)
+    gradient, information = projected(null, problem, sensitivities, whitener, levels)
     kept = null.hypothesis.unconstrained
     freedoms = [null.hypothesis.plus(d.effect).unconstrained for d in tried]
     for free in sorted({f for f in freedoms if f != kept}):
         rows = [i for i, f in enumerate(freedoms) if f == free]
         freer = replace(null, hypothesis=replace(null.hypothesis, also_unconstrained=free))
-        g, h = projected(freer, problem, sensitivities, whitener, count, levels)
+        g, h = projected(freer, problem, sensitivities, whitener, levels)
         gradient[rows] = g[rows]
         information[rows], information[:, rows] = h[rows], h[:, rows]
     return gradient, information
@@ -142,22 +139,20 @@ def projected(
     problem: TraceProblem,
     sensitivities: Sequence[Sensitivities],
     whitener: Whitener,
-    count: int,
     levels: bool = False,
 ) -> tuple[Array, Array]:
     """Gradient and information of further directions, nuisance parameters eliminated, priors included.
 
     Parameters
     ----------
-    sensitivities : of each record, with ``count`` directions after the sizes of the null.
+    sensitivities : of each record, with the directions after the sizes of the null.
     levels : whether noise and gust levels count.
     """
-    k = len(null.point.sizes)
     terms = [likelihood_terms(t, whitener, levels) for t in sensitivities]
     gradient, information, _ = marginal_information(
         problem.priors(null.hypothesis), null.point, terms, levels=levels, fixed=null.point.at_bounds
     )
-    return eliminated(gradient, information, range(Common.size + k, len(gradient)))
+    return eliminated(gradient, information, range(null.layout.sizes.stop, len(gradient)))
 
 
 def eliminated(gradient: Array, information: Array, kept: Sequence[int]) -> tuple[Array, Array]:

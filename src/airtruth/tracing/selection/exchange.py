@@ -26,7 +26,6 @@ from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import Candidate, is_plausible
 from airtruth.tracing.selection.budget import Advance, may_begin
-from airtruth.tracing.selection.late import late_signal
 from airtruth.tracing.selection.refit import losses_without, refit_scored
 from airtruth.tracing.selection.rounds import MOST_EFFECTS, SearchRound
 from airtruth.tracing.selection.significance import REMAINS
@@ -130,7 +129,7 @@ def _predicted(problem: TraceProblem, last: PosteriorFit, effects: Sequence[Effe
 
 def _places(effects: Sequence[Effect]) -> frozenset[str]:
     """Names of effects, those that delay a signal by its channel."""
-    return frozenset(late_signal(e) or e.name for e in effects)
+    return frozenset(e.late_signal or e.name for e in effects)
 
 
 def _scored(rounds: Sequence[SearchRound], last: PosteriorFit) -> SearchRound:
@@ -153,18 +152,18 @@ def other_kinds(
     """
     twins: dict[str, list[Effect]] = {}
     for effect in effects:
-        signal = late_signal(effect)
+        signal = effect.late_signal
         if signal:
             twins.setdefault(signal, []).append(effect)
     own = last.hypothesis.effects
     late_s: dict[str, float] = {}
     for effect in own:
-        signal = late_signal(effect)
+        signal = effect.late_signal
         if signal:
             late_s[signal] = late_s.get(signal, 0.0) + float(_sizes(last, effect.key).sum())
     if len(late_s) < 2:
         return
-    rest = tuple(e for e in own if not late_signal(e))
+    rest = tuple(e for e in own if not e.late_signal)
     begin = [_sizes(last, e.key) for e in rest]
     for late in itertools.product(*(twins[signal] for signal in late_s)):
         if {e.key for e in (*late, *rest)} != {e.key for e in own}:

@@ -13,13 +13,14 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from airtruth.effects.effect import Prior
+from airtruth.effects.registry import EFFECTS
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood
 
@@ -33,10 +34,6 @@ WRONG_BY: Final = (3.0, 10.0)
 MOST_CAUSES: Final = 3
 """Largest number of physical causes in a set, besides wrong declarations [-] (judgement: six derivatives do not tell
 more apart)."""
-_LOG_CAUSE: Final = -3.0
-"""Logarithm of the prior odds of a usual physical cause [-] (judgement: one in twenty)."""
-LOADING: Final = ("mass_error", "inertia_error", "cg_shift")
-"""Causes that one event, a change of the loading, moves together."""
 _LOG_SAME_EVENT: Final = -1.0
 """Logarithm of the prior odds of each further cause of the same event [-] (judgement: one in three)."""
 _LOG_WRONG: Final = -1.0
@@ -45,13 +42,12 @@ the most frequent cause)."""
 REFERENCE: Final = 4.0
 """Log-evidence that a single cause of usual size costs beyond one for its parameter [-]: prior odds of 3.0 and an Occam
 factor of 2.0; it makes sets comparable with the refit of an effect, whose size has no prior."""
-_CERTAIN_SHAPE: Final = 0.02
-"""Relative uncertainty of a direction that follows from definitions [-] (judgement: second order in the size)."""
 AS_PROBABLE: Final = 0.1
 """Posterior weight over that of the most probable effects from which fewer effects are preferred [-] (judgement: a further cause
 is named where the odds for it are strong, from ten to one by H. Jeffreys, Theory of Probability, 3rd ed. (1961), appendix B)."""
 _AS_PROBABLE_IN_EVENT: Final = 0.5
-"""The same for a further cause of the same event [-] (judgement: a changed loading changes CG, mass and inertia, as a rule)."""
+"""Posterior weight over that of the most probable effects from which fewer effects of the same event are preferred [-]
+(judgement: a changed loading changes CG, mass and inertia, as a rule)."""
 _NEGLIGIBLE: Final = 60.0
 """Log-posterior behind the most probable set from which a set is left out [-] (judgement: twice what a refit may still change).
 """
@@ -66,23 +62,19 @@ class Cause:
     Attributes
     ----------
     key : of the effect; direction : (6,) change of the derivatives per unit of size.
-    std : prior standard deviation of the size [-]; low, high : its plausible range.
-    shape : relative uncertainty of each element of the direction [-].
-    log_odds : logarithm of its prior odds [-].
+    prior, event : as of `airtruth.effects.effect.Effect`.
     """
 
     key: str
     direction: Array
-    std: float
-    low: float
-    high: float
-    shape: float = _CERTAIN_SHAPE
-    log_odds: float = _LOG_CAUSE
+    prior: Prior
+    event: str = ""
 
     def most_probable(self, size: float, std: float) -> float:
         """Size within its plausible range that is most probable, where records tell ``size`` with an error of ``std`` [-]."""
-        told = size * self.std**2 / (self.std**2 + std**2)
-        return min(max(told, self.low), self.high)
+        prior = self.prior
+        told = size * prior.std**2 / (prior.std**2 + std**2)
+        return min(max(told, prior.low), prior.high)
 
 
 @dataclass(frozen=True)
@@ -120,45 +112,16 @@ class CauseSet:
         )
 
 
-@dataclass(frozen=True)
-class _Prior:
-    """What a cause is known to be like before any record: see `Cause`."""
-
-    quantity: str
-    std: float
-    low: float
-    high: float
-    shape: float = _CERTAIN_SHAPE
-    log_odds: float = _LOG_CAUSE
-
-
-_PRIORS: Final[Mapping[str, _Prior]] = MappingProxyType(
-    {
-        "mass_error": _Prior("mass", 0.1, -0.3, 0.4),
-        "inertia_error": _Prior("inertia", 0.15, -0.4, 0.6),
-        "cg_shift": _Prior("cg", 0.05, -0.15, 0.15, log_odds=-2.0),
-        "elevator_effectiveness": _Prior("elevator", 0.3, -0.7, 1.0),
-        "tail_effectiveness": _Prior("tail", 0.3, -1.0, 0.05, shape=0.25),
-        "wing_effectiveness": _Prior("wing", 0.15, -0.6, 0.05, shape=0.3),
-        "dynamic_pressure": _Prior("dynamic_pressure", 0.05, -0.35, 0.5),
-        "aerodynamic_center": _Prior("aerodynamic_center", 0.05, -0.15, 0.15, log_odds=-4.0),
-        "icing": _Prior("icing", 1.0, 0.0, 4.0, shape=0.4, log_odds=-5.0),
-    }
-)
-"""Prior of each cause, in the units of its size: factors less one, shifts over the chord, severity (judgement: usual
-errors of declarations, tail and wing that lose lift rather than gain it, and the accuracy of first-order textbook
-contributions)."""
-EXPLAINING: Final = tuple(_PRIORS)
-"""Keys of the physical causes."""
-USUAL_SIZES: Final[Mapping[str, float]] = MappingProxyType({key: p.std for key, p in _PRIORS.items()})
-"""Key of a physical cause -> standard deviation of its size before any record."""
-
-
 def causes_of(directions: Mapping[str, Array]) -> tuple[Cause, ...]:
-    """Every cause with its direction, see `airtruth.physics.composition.directions`."""
+    """Every effect with a prior as a cause, those of one event first.
+
+    Parameters
+    ----------
+    directions : see `airtruth.physics.composition.directions`.
+    """
+    effects = sorted(EFFECTS.values(), key=lambda e: not e.event)
     return tuple(
-        Cause(key, directions[p.quantity], p.std, p.low, p.high, p.shape, p.log_odds)
-        for key, p in _PRIORS.items()
+        Cause(e.key, directions[e.quantity], e.prior, e.event) for e in effects if e.prior is not None
     )
 
 
@@ -211,9 +174,9 @@ def simplest_first(sets: Sequence[CauseSet]) -> tuple[CauseSet, ...]:
 
 
 def events(effects: Sequence[str]) -> int:
-    """Number of effects; those of a changed loading come together."""
-    other = sum(key not in LOADING for key in effects)
-    return other + (len(effects) > other)
+    """Number of effects by their keys; those of one event come together."""
+    own = [EFFECTS[key].event if key in EFFECTS else "" for key in effects]
+    return own.count("") + len(set(own) - {""})
 
 
 def least_cost(sets: Sequence[CauseSet]) -> float:
@@ -235,14 +198,14 @@ def size_of(likelihood: DerivativeLikelihood, cause: Cause) -> tuple[float, floa
     The declared derivatives keep their declared uncertainty, so that size over standard deviation is standard normal
     where they are right.
     """
-    certain = replace(cause, shape=0.0, low=-np.inf, high=np.inf)
+    certain = replace(cause, prior=replace(cause.prior, shape=0.0, low=-np.inf, high=np.inf))
     only = _evidence(likelihood, (certain,), ((),), 1.0)
     return float(only.sizes[0, 0]), float(only.size_std[0, 0])
 
 
 def predicted_cost(likelihood: DerivativeLikelihood, causes: Sequence[Cause]) -> float:
     """Negative log-posterior that a fit of these causes reaches, sizes without a prior, to first order in them."""
-    turned = np.eye(6) + likelihood.information @ likelihood.declared
+    turned = np.eye(len(likelihood.vector)) + likelihood.information @ likelihood.declared
     seen = np.linalg.solve(turned, likelihood.vector)
     directions = np.array([c.direction for c in causes])
     told = directions @ np.linalg.solve(turned, likelihood.information) @ directions.T
@@ -287,29 +250,32 @@ def _evidence(
 ) -> _Evidence:
     """One set of physical causes with each set of wrong declarations, see `WRONG_BY`."""
     information, vector, declared = likelihood.information, likelihood.vector, likelihood.declared
+    size, unit = len(vector), np.eye(len(vector))
     own = np.repeat(declared[None], len(subsets), axis=0)
     for i, subset in enumerate(subsets):
         at = list(subset)
         own[i, at, at] += (wrong_by**2 - 1.0) * np.diag(declared)[at]
-    directions = np.array([c.direction for c in chosen]).reshape(len(chosen), len(PARAMETERS))
-    shape = np.array([c.shape for c in chosen])
-    sizes = np.tile([c.std for c in chosen], (len(subsets), 1))
+    directions = np.array([c.direction for c in chosen]).reshape(len(chosen), size)
+    shape = np.array([c.prior.shape for c in chosen])
+    sizes = np.tile([c.prior.std for c in chosen], (len(subsets), 1))
     given = np.column_stack([information, vector])
     for _ in range(2):  # the uncertainty of a direction goes with the size
-        about = own + np.einsum("nk,k,ki->ni", sizes**2, shape**2, directions**2)[:, :, None] * np.eye(6)
-        both = np.linalg.solve(np.eye(6) + information @ about, np.broadcast_to(given, (len(subsets), 6, 7)))
-        told, seen = both[..., :6], both[..., 6]
+        about = own + np.einsum("nk,k,ki->ni", sizes**2, shape**2, directions**2)[:, :, None] * unit
+        both = np.linalg.solve(
+            unit + information @ about, np.broadcast_to(given, (len(subsets), *given.shape))
+        )
+        told, seen = both[..., :size], both[..., size]
         size_information = np.einsum("ki,nij,lj->nkl", directions, told, directions)
         size_covariance = np.linalg.pinv(size_information, hermitian=True)
         sizes = np.einsum("nkl,li,ni->nk", size_covariance, directions, seen)
     std = np.sqrt(np.maximum(np.diagonal(size_covariance, axis1=1, axis2=2), 0.0))
-    prior = np.einsum("k,ki,kj->ij", np.array([c.std**2 for c in chosen]), directions, directions)
+    prior = np.einsum("k,ki,kj->ij", np.array([c.prior.std**2 for c in chosen]), directions, directions)
     covariance = about + prior
-    turned = np.eye(6) + covariance @ information
+    turned = unit + covariance @ information
     gained = 0.5 * np.einsum(
         "i,ni->n", vector, np.linalg.solve(turned, (covariance @ vector)[..., None])[..., 0]
     )
-    least = np.linalg.slogdet(np.eye(6) + declared @ information)[1]
+    least = np.linalg.slogdet(unit + declared @ information)[1]
     occam = 0.5 * (np.linalg.slogdet(turned)[1] - least)
     in_range = _in_range(chosen, sizes, std)
     wrong = np.array([len(subset) for subset in subsets])
@@ -321,9 +287,11 @@ def _evidence(
 
 def _log_odds(chosen: Sequence[Cause]) -> float:
     """Logarithm of the prior odds of physical causes."""
-    loading = [c.log_odds for c in chosen if c.key in LOADING]
-    others = sum(c.log_odds for c in chosen if c.key not in LOADING)
-    return others + (loading[0] + _LOG_SAME_EVENT * (len(loading) - 1) if loading else 0.0)
+    total = sum(c.prior.log_odds for c in chosen if not c.event)
+    for event in dict.fromkeys(c.event for c in chosen if c.event):
+        together = [c.prior.log_odds for c in chosen if c.event == event]
+        total += together[0] + _LOG_SAME_EVENT * (len(together) - 1)
+    return total
 
 
 def _in_range(chosen: Sequence[Cause], sizes: Array, std: Array) -> Array:
@@ -339,10 +307,11 @@ def _in_range(chosen: Sequence[Cause], sizes: Array, std: Array) -> Array:
     for k, c in enumerate(chosen):
         weight = np.zeros(len(sizes))
         np.divide(1.0, std[:, k] ** 2, out=weight, where=std[:, k] > 0.0)
-        spread = 1.0 / np.sqrt(weight + c.std**-2)
+        prior = c.prior
+        spread = 1.0 / np.sqrt(weight + prior.std**-2)
         middle = weight * sizes[:, k] * spread**2
-        after = ndtr((c.high - middle) / spread) - ndtr((c.low - middle) / spread)
-        before = ndtr(c.high / c.std) - ndtr(c.low / c.std)
+        after = ndtr((prior.high - middle) / spread) - ndtr((prior.low - middle) / spread)
+        before = ndtr(prior.high / prior.std) - ndtr(prior.low / prior.std)
         total += np.log(np.maximum(after, _LEAST_SHARE) / before)
     return total
 
@@ -350,11 +319,8 @@ def _in_range(chosen: Sequence[Cause], sizes: Array, std: Array) -> Array:
 __all__ = [
     "AS_PROBABLE",
     "DERIVATIVES",
-    "EXPLAINING",
-    "LOADING",
     "MOST_CAUSES",
     "REFERENCE",
-    "USUAL_SIZES",
     "WRONG_BY",
     "Cause",
     "CauseSet",

@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from airtruth.effects.increment import Increment
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.readings import reading_increments
-from airtruth.physics.short_period import PARAMETERS
 from airtruth.physics.terms import READINGS
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import inflation, robust_covariance
-from airtruth.tracing.model.parameters import size_index
 from airtruth.tracing.model.records import FINE, TraceRecord
 from airtruth.tracing.selection.acceptance import (
     IMMATERIAL,
@@ -56,15 +55,9 @@ _LEAST_DECLARED: Final = 1e-3
 """Least declared derivative with which an increment is compared [-] (judgement: one that is declared as zero)."""
 _FLOWN: Final = (0.02, 0.98)
 """Quantiles of the flown signal between which the swing counts [-] (judgement)."""
-_DERIVATIVE: Final[Mapping[str, str]] = {
-    "alpha": "alpha",
-    "elevator": "de",
-    "qhat": "q",
-    "alpha_dot_hat": "q",
-    "qbar": "alpha",
-}
-"""Derivative with which an increment over a signal is compared; a moment by alpha' with the damping, one by the dynamic
-pressure with what the angle of attack does in the same records."""
+_DERIVATIVE: Final[Mapping[str, str]] = {"alpha_dot_hat": "qhat", "qbar": "alpha"}
+"""Signal of the derivative with which an increment over another signal is compared: a moment by alpha' with the damping, one
+by the dynamic pressure with what the angle of attack does in the same records."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +146,7 @@ def fitted_bends(own: PosteriorFit, effect: Increment, covariance: Array) -> tup
     own : a fit with the increment; covariance : of its common parameters and sizes.
     """
     first = own.hypothesis.span(effect.key).start
-    at = slice(size_index(first), size_index(first) + effect.bends)
+    at = slice(own.layout.size(first), own.layout.size(first) + effect.bends)
     return own.point.sizes[first : first + effect.bends], covariance[at, at]
 
 
@@ -175,7 +168,7 @@ def assessed(problem: TraceProblem, own: FittedIncrement, reference: Reference) 
     """A refitted increment with the tests that it fails."""
     gain = 2.0 * own.log_evidence
     ratios = inflation(problem, own.fit)
-    first = size_index(own.fit.hypothesis.span(own.effect.key).start)
+    first = own.fit.layout.size(own.fit.hypothesis.span(own.effect.key).start)
     excess = float(np.mean(ratios[first : first + own.effect.bends] ** 2))
     left_out = tested_on_left_out(problem, own.fit, reference, gain)
     swing = relative_swing(problem, own.fit, own.effect)
@@ -225,7 +218,8 @@ def relative_swing(problem: TraceProblem, own: PosteriorFit, effect: Increment) 
     if shape.of_reading:
         return _share_of_channel(problem.records, own, effect)
     bends, _ = fitted_bends(own, effect, own.covariance)
-    index = PARAMETERS.index(f"{shape.acts_on}{_DERIVATIVE[shape.factor or shape.signal]}")
+    by = shape.factor or shape.signal
+    index = LONGITUDINAL.at(shape.acts_on, _DERIVATIVE.get(by, by))
     declared = max(abs(float(problem.declared_derivatives[index])), _LEAST_DECLARED)
     if not shape.cells:
         return abs(float(bends[0])) / declared

@@ -21,7 +21,7 @@ from airtruth.effects.increment import Memory, Shape
 from airtruth.physics.terms import READINGS
 from airtruth.tracing.inference.posterior import PosteriorFit, Sensitivities, TraceProblem
 from airtruth.tracing.model.linearise import ANGLE_RAD, RATE_RAD_S
-from airtruth.tracing.model.parameters import OUTPUTS, Common
+from airtruth.tracing.model.parameters import OUTPUTS
 from airtruth.tracing.model.response import filter_inputs
 from airtruth.tracing.model.tangent import FLOWN, POINTS, Tangent, propagated, tangent_of
 from airtruth.tracing.selection.direction import inserted
@@ -171,7 +171,7 @@ def _of_record(
     motion = Motion(tangent)
     trims = {"alpha": record.plant.trim_alpha_rad, "qhat": 0.0, "elevator": record.plant.trim_elevator_rad}
     linear = np.stack([motion.signal(name) - trims[name] for name in _FACTORS], axis=-1)
-    count, derivatives = len(_FACTORS), base.t[Common.derivatives]
+    count, derivatives = len(_FACTORS), base.t[null.point.of.common.derivatives]
     force = np.zeros((*linear.shape[:2], 2, 2 * count))
     for k in range(2):
         force[:, :, k, k * count : (k + 1) * count] = linear
@@ -191,7 +191,7 @@ def _of_record(
         e = _changes(block, motion) @ base.white.T
         parts.append(e + np.tensordot(np.concatenate(slopes).reshape(-1, 2 * count), by_gain, axes=1))
     t = np.concatenate(parts) if parts else np.zeros((0, *base.r.shape))
-    return inserted(base, len(point.sizes), t, np.zeros((len(t), OUTPUTS, OUTPUTS)))
+    return inserted(base, point.layout.sizes.stop, t, np.zeros((len(t), OUTPUTS, OUTPUTS)))
 
 
 def _size(shape: Shape) -> int:

@@ -250,7 +250,7 @@ def screen(
     if sensitivities is None:
         return []
     effects = [increment(s) for s in tried]
-    gradient, information = projected(null, problem, sensitivities, whitener, sum(e.bends for e in effects))
+    gradient, information = projected(null, problem, sensitivities, whitener)
     found, first = [], 0
     for e in effects:
         span = slice(first, first + e.bends)

@@ -18,7 +18,6 @@ from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import OUTDONE, Candidate, has_converged
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import best_rival, starts_in_place_of
-from airtruth.tracing.selection.late import late_signal
 from airtruth.tracing.selection.ranking import TIE, gains_of
 from airtruth.tracing.selection.refit import Refit
 from airtruth.tracing.selection.rounds import SearchRound
@@ -97,9 +96,9 @@ def _beside_the_others(
 
 def _twins(one: Effect, effects: Sequence[Effect], taken: Collection[str]) -> Iterator[Effect]:
     """Effects that delay the same signal as another: what one explains the others explain nearly as well."""
-    late = late_signal(one)
+    late = one.late_signal
     for effect in effects:
-        is_twin = late != "" and late_signal(effect) == late
+        is_twin = late != "" and effect.late_signal == late
         if is_twin and effect.key not in taken and len(effect.parameters) == len(one.parameters):
             yield effect
 

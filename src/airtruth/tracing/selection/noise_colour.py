@@ -25,7 +25,7 @@ from airtruth.tracing.inference.posterior import (
     sensitivities_of,
 )
 from airtruth.tracing.inference.whitening import NO_WHITENER
-from airtruth.tracing.model.parameters import BOUNDS, Common, Parameters
+from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.direction import eliminated
 
@@ -44,7 +44,7 @@ LATER_LEVEL: Final = 5e-4
 """Largest significance level of the three scores together beside accepted effects [-] (judgement)."""
 FIRST_SHARE: Final = 0.2
 """Share of correlated noise at which a search begins [-] (judgement; at zero the correlation time has no effect)."""
-SHARES: Final = np.r_[Common.colour_shares]
+SHARES: Final = np.r_[SHORT_PERIOD.common.colour_shares]
 """Indices of the shares among the common parameters."""
 
 
@@ -93,10 +93,11 @@ def beside(case: Case, null: PosteriorFit, level: float = LEVEL) -> tuple[Case, 
     common = null.point.common.copy()
     common[SHARES] = np.where(z > 0.0, FIRST_SHARE, 0.0)
     again = fit(slow, hypothesis, replace(null.point, common=common))
+    entries = slow.layout.common
     if (
         again is None
         or not again.converged
-        or any(again.point.common[i] == BOUNDS[i][1] for i in np.r_[Common.colour])
+        or any(again.point.common[i] == entries.bounds[i][1] for i in np.r_[entries.colour])
     ):
         return case, null.point
     held = None if case.held is None else replace(case.held, settings=settings)

@@ -107,12 +107,11 @@ def anomalies(null: PosteriorFit, problem: TraceProblem, whitener: Whitener) -> 
         return _tangents(null, problem, index, [s for series in built[index].values() for s in series])
 
     extra = problem.each(one, range(len(problem.records)))
-    k = len(null.point.sizes)
     extended = [
-        inserted(base, k, t, np.zeros((len(t), 3, 3)))
+        inserted(base, null.layout.sizes.stop, t, np.zeros((len(t), 3, 3)))
         for base, t in zip(null.sensitivities, extra, strict=True)
     ]
-    gradient, information = projected(null, problem, extended, whitener, len(extra[0]))
+    gradient, information = projected(null, problem, extended, whitener)
     found, at = [], 0
     for name, series in built[0].items():
         span = slice(at, at + len(series))

@@ -1,7 +1,7 @@
 """Named effects, and derivatives released from their declaration, that what was accepted later makes unnecessary.
 
-The first effect of a search describes, badly, what others describe better. Beside released derivatives or a learned increment
-it may have nothing left to describe, and an answer that kept it would name an effect that the aircraft has not got.
+The first accepted effect may be an approximation that later effects make unnecessary. Beside released derivatives or a learned
+increment it may have nothing left to describe, and an answer that kept it would name an effect that the aircraft lacks.
 """
 
 from __future__ import annotations

@@ -19,7 +19,6 @@ from airtruth.tracing.inference.derivative_likelihood import (
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import converged_fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.model.parameters import Common
 from airtruth.tracing.selection.explanation import (
     WRONG_BY,
     Cause,
@@ -38,8 +37,6 @@ _REFITS: Final = 4
 """Number of sets that are refitted in the filter [-] (judgement: each costs a refit)."""
 _HOPELESS: Final = 30.0
 """Log-posterior behind the best set from which a set is not refitted [-] (judgement: more than a curve explains)."""
-DIVISORS: Final = ("mass_error", "inertia_error")
-"""Causes whose factor divides the coefficients."""
 
 
 @dataclass(frozen=True)
@@ -184,8 +181,10 @@ def _as_effects(
     for key, told, std in zip(s.causes, s.sizes, s.size_std, strict=True):
         hypothesis = hypothesis.plus(effects[key])
         low, high = effects[key].parameters[0].reach
-        size = min(max(size_in_filter(key, causes[key].most_probable(told, std)), low), high)
-        away[Common.derivatives] -= size_in_derivatives(key, size) * causes[key].direction
+        size = min(max(size_in_filter(effects[key], causes[key].most_probable(told, std)), low), high)
+        away[problem.layout.common.derivatives] -= (
+            size_in_derivatives(effects[key], size) * causes[key].direction
+        )
         sizes.append(size)
     first = np.array(sizes)
     own = from_declared(problem, null, hypothesis, first, rival)
@@ -210,14 +209,14 @@ def _corrected(
     return tuple(sorted(every, key=lambda s: s.cost))
 
 
-def size_in_filter(key: str, size: float) -> float:
+def size_in_filter(effect: Effect, size: float) -> float:
     """Size of a cause's effect in the filter: a mass or inertia divides the coefficients."""
-    return size / (1.0 - size) if key in DIVISORS else size
+    return size / (1.0 - size) if effect.divides else size
 
 
-def size_in_derivatives(key: str, size: float) -> float:
+def size_in_derivatives(effect: Effect, size: float) -> float:
     """Inverse of `size_in_filter`."""
-    return size / (1.0 + size) if key in DIVISORS else size
+    return size / (1.0 + size) if effect.divides else size
 
 
 def explained(problem: TraceProblem, free: PosteriorFit, declared: DeclaredCauses) -> tuple[CauseSet, ...]:

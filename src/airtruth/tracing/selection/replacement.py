@@ -13,8 +13,8 @@ from airtruth.tracing.selection.significance import BEYOND_DOUBT, REMAINS
 STRONG_ODDS: Final = float(np.log(AS_PROBABLE))
 """Log-posterior, negative, by which a set of fewer effects may be behind."""
 KINEMATIC_ODDS: Final = -5.0
-"""The same of a set that explains the kinematics where the other does not [-] (judgement: odds of 150, as the kinematic check
-excludes the true set with a probability of 0.005)."""
+"""Log-posterior by which a set that explains the kinematics may be behind one that does not [-] (judgement: odds of 150, as the
+kinematic check excludes the true set with a probability of 0.005)."""
 CLEAN: Final = 0.05
 """Probability of the remaining anomaly from which a search explains the records, so that no tied effect is tried
 instead [-] (convention)."""
@@ -44,9 +44,10 @@ class Outcome:
 def required_lead(old: Outcome, new: Outcome, lead: float) -> float:
     """Log-posterior by which a new search has to lead the old one; negative where it may be behind, infinite where it is refused.
 
-    Fewer effects are enough unless the odds against them are strong, and so is as much where they alone leave no anomaly. The
-    kinematics need no aerodynamics. Where both searches leave an anomaly beyond doubt, the aerodynamics are wrong, and the
-    kinematics tell errors of sensors better than the filter: a search that agrees with them does not give way to another one.
+    A simpler set wins unless the odds against it are strong; a set of as many effects wins without a lead if it alone leaves no
+    anomaly. The kinematics need no aerodynamics. Where both searches leave an anomaly beyond doubt, the aerodynamics are wrong,
+    and the kinematics tell errors of sensors better than the filter: a search that agrees with them does not give way to another
+    one.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.profile import Profile, best_location, location_index
 from airtruth.tracing.inference.whitening import Whitener, autoregression
-from airtruth.tracing.model.parameters import Common, Parameters
+from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection import score_test
 from airtruth.tracing.selection.absorbed import refit_absorbed
 from airtruth.tracing.selection.acceptance import SUPERSEDED, SURPASSED, UNSUPPORTED, Candidate, has_converged
@@ -61,8 +61,9 @@ NOTHING_KNOWN: Final[Mapping[str, float]] = MappingProxyType({})
 NOTHING_DECLARED: Final = DeclaredCauses(wrong_allowed=False)
 """No explanation of a contradiction: the declared derivatives are not tested."""
 _STRAINED: Final = 15.0
-"""Log-posterior that an explanation of the derivatives loses to derivatives without a prior, from which effects are
-refitted from the declared aircraft [-] (judgement: one physical cause loses 6, two wrong declarations lose 8)."""
+"""Loss of log-posterior against unconstrained derivatives above which a sensor error may be hidden in an explanation of the
+derivatives, so that effects are refitted from the declared aircraft [-] (judgement: one physical cause loses 6, two wrong
+declarations lose 8)."""
 _RELEASE_LEADS: Final = 30.0
 """Gain in 2 log L by which released derivatives have to lead for no effect to be followed beside them [-] (judgement: what a
 later effect may still add to it)."""
@@ -310,11 +311,9 @@ def _refit_whitened(problem: TraceProblem, null: PosteriorFit, whitener: Whitene
         near=null,
     )
     if again is not None:
-        std = np.sqrt(np.diag(null.covariance)[Common.derivatives])
-        if (
-            np.abs(again.point.common[Common.derivatives] - null.point.common[Common.derivatives])
-            < _FAR * std
-        ).all():
+        rows = null.layout.of.common.derivatives
+        std = np.sqrt(np.diag(null.covariance)[rows])
+        if (np.abs(again.point.common[rows] - null.point.common[rows]) < _FAR * std).all():
             return again
     return (
         fit(problem, null.hypothesis, null.point, whitener, iterations=0, free_levels=False, near=null)

@@ -28,10 +28,9 @@ from airtruth.tracing.inference.posterior import (
     marginal_information,
 )
 from airtruth.tracing.inference.whitening import NO_WHITENER
-from airtruth.tracing.model.parameters import Common, Parameters, PerRecord, size_index
+from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.direction import eliminated, extended_by
 from airtruth.tracing.selection.explanation import REFERENCE
-from airtruth.tracing.selection.late import late_signal
 from airtruth.tracing.selection.score_test import directions, perceptible_step
 
 Array = NDArray[np.float64]
@@ -87,9 +86,10 @@ class _Quadratic:
         h = self.marginal.information
         push = self.marginal.gradient[rest] + h[np.ix_(rest, self.columns)] @ step[self.columns]
         step[rest] = scaled_step(push, h[np.ix_(rest, rest)], 0.0)
-        common = self.last.point.common + _limited(step[: Common.size], Common.nuisance)
+        point, entries = self.last.point, self.last.point.of
+        common = point.common + _limited(step[: entries.common.size], entries.common.nuisance)
         own = np.stack([-(e.solved[:, 0] + e.solved[:, 1:] @ step) for e in self.marginal.eliminated])
-        per_record = self.last.point.per_record + [_limited(o, PerRecord.log_gust) for o in own]
+        per_record = point.per_record + [_limited(o, entries.per_record.log_gust) for o in own]
         every = [np.array([x[i], *self.locations[i]]) for i in chosen]
         for i, own_sizes in zip(chosen, every, strict=True):
             own_sizes[0] = np.clip(own_sizes[0], *self.effects[i].parameters[0].reach)
@@ -134,7 +134,7 @@ def _quadratic(problem: TraceProblem, last: PosteriorFit, effects: Sequence[Effe
     marginal = marginal_information(
         problem.priors(last.hypothesis), last.point, terms, levels=True, fixed=last.point.at_bounds
     )
-    own_columns = [size_index(last.hypothesis.span(e.key).start) for e in members]
+    own_columns = [last.layout.size(last.hypothesis.span(e.key).start) for e in members]
     first = len(marginal.gradient) - len(tried)
     g, h = eliminated(marginal.gradient, marginal.information, range(first, len(marginal.gradient)))
     raw = np.diag(h)
@@ -209,9 +209,7 @@ def minima(slope: Array, information: Array, chosen: NDArray[np.int64]) -> tuple
 
 def _may_join(a: Effect, b: Effect) -> bool:
     """Whether two effects may be in one set: not two variants of one, but delays of two channels."""
-    return a.name != b.name or (
-        late_signal(a) != late_signal(b) and "" not in (late_signal(a), late_signal(b))
-    )
+    return a.name != b.name or (a.late_signal != b.late_signal and "" not in (a.late_signal, b.late_signal))
 
 
 def _room(effect: Effect) -> tuple[float, float]:

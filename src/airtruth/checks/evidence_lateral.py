@@ -1,0 +1,233 @@
+"""Physical tests of the lateral-directional channels: roll, yaw, sideslip, side force, aileron and rudder.
+
+The relations of `airtruth.checks.rotation`:
+
+    phi   = integral of p + (q sin phi + r cos phi) tan theta
+    psi   = integral of (q sin phi + r cos phi)/cos theta
+    beta' = (p sin a - r cos a) + g cos theta sin phi/V + ay/V
+
+An aileron of positive sign rolls to the left and a rudder of positive sign yaws to the left; sideslip from the right pushes to
+the left. A log whose every lateral channel has the opposite sense is the mirror image of a flight, which no test tells from one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.checks.excitation import moves, turns
+from airtruth.checks.factors import command_test, factor_test, follows_test, of_moving, sign_test
+from airtruth.checks.lateral_model import driven
+from airtruth.checks.means import mean_test
+from airtruth.checks.relation import Relation, finite
+from airtruth.checks.rotation import bank_coupling, heading_rate, side_gravity, sideslip_turn
+from airtruth.checks.spectra import integral, regress, spectrum
+from airtruth.checks.together import Runs
+from airtruth.physics.motion import LATERAL
+from airtruth.units import G0
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Channels = Mapping[str, Array]
+Signal = Callable[[Channels, float], Array]
+
+ATTITUDE_STD: Final = 0.15
+"""Tolerance of the factors of bank and heading on the integrals of their rates [-]: scale and lag of gyroscopes."""
+BETA_STD: Final = (0.25, 0.35, 10.0)
+"""Tolerances of the factors of the rate of beta on the turn, gravity and ay [-] (judgement).
+
+Lag of a vane; that of ay is free, because an arm of 1 m of a vane or an accelerometer can change it by 2.
+"""
+RATES: Final = {"aileron_rad": "p_rad_s", "rudder_rad": "r_rad_s"}
+"""Surface -> rate that it drives."""
+BALANCED: Final = {
+    "aileron_rad": ("p_rad_s", float(np.log(6.0)), 0.9),
+    "rudder_rad": ("beta_rad", 0.0, 0.9),
+}
+"""Surface -> channel whose derivative balances it, logarithm of the usual ratio of both derivatives and its tolerance.
+
+Steady roll rate over aileron is 3 to 15 1/s, steady sideslip over rudder 0.4 to 1.6 (aircraft of Klein and Morelli and of
+Jategaonkar; the GTM has 9 1/s and 0.8).
+"""
+CLEAR: Final = 200.0
+"""First-stage F above which two causes of sideslip are told apart [-]: twenty times that of one (judgement)."""
+SIGNIFICANT: Final = 3.0
+"""Standard deviations by which both derivatives differ from zero where their ratio is tested [-]."""
+SIDESLIP: Final = (
+    "beta_rad", "r_rad_s", "phi_rad", "ay_m_s2", "p_rad_s", "airspeed_m_s", "alpha_rad", "theta_rad",
+)  # fmt: skip
+"""Channels of the test "beta", the likeliest culprit first."""
+SIDE_SLOPE: Final = (float(np.log(2.0)), 0.8)
+"""Logarithm of the usual slope of -ay on beta [g/rad], and its tolerance: -CYbeta/CL of 0.6 to 6 (judgement)."""
+SIDE_OF_LIFT: Final = (float(np.log(0.16)), 0.6)
+"""Logarithm of that slope over the slope of -az on alpha, -CYbeta/CLalpha, and its tolerance: 0.09 to 0.25."""
+SIDE_LOAD_STD: Final = 0.25
+"""Tolerance of the mean of ay, as a share of gravity [-]: a steady sideslip of 7 deg (judgement)."""
+SIDE_SHARE: Final = 0.5
+"""Squared multiple correlation of a specific force below which its slope is not tested: noise flattens it (judgement)."""
+
+
+def lateral(runs: Runs) -> list[Relation]:
+    """Every test that the lateral channels allow, in the runs that roll or yaw."""
+    names = set(runs.channels)
+    if not {"p_rad_s", "r_rad_s", "airspeed_m_s"} <= names:
+        return []
+    turning = runs.each(lambda c, dt_s: turns(c, dt_s).astype(np.float64)) > 0.0
+    if not turning.any():
+        return []
+    surfaces = tuple(n for n in RATES if n in names)
+    result = _attitudes(runs)
+    if "ay_m_s2" in names:
+        mean = runs.each(lambda c, dt_s: c["ay_m_s2"].mean(axis=1))
+        std = np.full_like(mean, SIDE_LOAD_STD * G0)
+        result.append(mean_test("ay_mean", ("ay_m_s2",), mean, np.zeros_like(mean), std, SIDE_LOAD_STD * G0))
+    if "beta_rad" in names and surfaces:
+        result += [_sideslip(runs), _side_slope(runs, surfaces)]
+    for name in surfaces:
+        moving = runs.each(lambda c, dt_s, n=name: moves(c[n], dt_s).astype(np.float64)) > 0.0  # type: ignore[misc]
+        result += [of_moving(test, moving) for test in _surface(runs, name, surfaces)]
+    for control in LATERAL.controls:
+        if {control.channel, control.command} <= names:
+            result.append(command_test(runs, control, RATES[control.channel]))
+    return [of_moving(test, turning) for test in result]
+
+
+def _zero(c: Channels, name: str) -> Array:
+    """A channel, or zero where the log has none."""
+    return c[name] if name in c else np.zeros_like(c["p_rad_s"])
+
+
+def _rates(c: Channels) -> tuple[Array, Array, Array, Array, Array]:
+    """p, q, r, phi, theta."""
+    p, q, r, phi, theta = (_zero(c, n) for n in ("p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", "theta_rad"))
+    return p, q, r, phi, theta
+
+
+def _bank(c: Channels, dt_s: float) -> Array:
+    p, q, r, phi, theta = _rates(c)
+    return integral(p + bank_coupling(q, r, phi, theta), dt_s)
+
+
+def _heading(c: Channels, dt_s: float) -> Array:
+    _, q, r, phi, theta = _rates(c)
+    return integral(heading_rate(q, r, phi, theta), dt_s)
+
+
+def _attitudes(runs: Runs) -> list[Relation]:
+    """Bank and heading against the integrals of their rates."""
+    result = []
+    for name, rate, of in (("phi", "p_rad_s", _bank), ("psi", "r_rad_s", _heading)):
+        if f"{name}_rad" not in runs.channels:
+            continue
+        measured = runs.spectra(lambda c, dt_s, n=name: np.unwrap(c[f"{n}_rad"], axis=1))  # type: ignore[misc]
+        factors = regress(measured, runs.spectra(of)[:, None], lines=runs.lines())
+        result.append(follows_test(name, (rate, f"{name}_rad"), factors, ATTITUDE_STD))
+    return result
+
+
+def _sideslip_parts() -> tuple[Signal, Signal, Signal]:
+    def turn(c: Channels, dt_s: float) -> Array:
+        return sideslip_turn(c["p_rad_s"], c["r_rad_s"], _zero(c, "alpha_rad"))
+
+    def gravity(c: Channels, dt_s: float) -> Array:
+        _, _, _, phi, theta = _rates(c)
+        bank = phi if "phi_rad" in c else _bank(c, dt_s)
+        return side_gravity(theta, bank) / c["airspeed_m_s"]
+
+    def force(c: Channels, dt_s: float) -> Array:
+        return _zero(c, "ay_m_s2") / c["airspeed_m_s"]
+
+    return turn, gravity, force
+
+
+def _sideslip(runs: Runs) -> Relation:
+    """Rate of beta against its causes, the motion by the surfaces as the instruments.
+
+    Causes that these do not tell apart are summed. A gust at the vane is nearly a random walk, so that its rate is white.
+    """
+    rate = runs.spectra(lambda c, dt_s: np.gradient(c["beta_rad"], dt_s, axis=1))
+    turn, gravity, force = (runs.spectra(of) for of in _sideslip_parts())
+    instruments = runs.padded(lambda c, dt_s: spectrum(driven(c, dt_s)[1], dt_s))
+    used = tuple(n for n in SIDESLIP if n in runs.channels)
+    for causes in ([turn, gravity, force], [turn, gravity + force], [turn + gravity + force]):
+        factors = regress(rate, np.stack(causes, axis=1), instruments, runs.lines())
+        if factors.strength[-1] > CLEAR or len(causes) == 1:
+            break
+    test = factor_test("beta", used, factors, BETA_STD[: len(causes)])
+    none = np.full((len(test.distance), 3 - len(causes)), np.nan)
+    value, std = test.figures[:, : len(causes)], test.figures[:, len(causes) : 2 * len(causes)]
+    return replace(test, figures=np.concatenate([value, none, std, none], axis=1))
+
+
+def _side_slope(runs: Runs, surfaces: tuple[str, ...]) -> Relation:
+    """Slope of ay on beta, the rates and the surfaces held: its sign, and its size against the usual one."""
+    channels = ("ay_m_s2", "beta_rad", "p_rad_s", "r_rad_s", *surfaces)
+    if "ay_m_s2" not in runs.channels:
+        return _nothing("side_slope", channels[1:], runs)
+    value, std, clear = _slope(runs, channels)
+    usual, tolerance = (np.full_like(value, x) for x in SIDE_SLOPE)
+    lift_channels = ("az_m_s2", "alpha_rad", "q_rad_s", "elevator_rad")
+    if set(lift_channels) <= set(runs.channels):
+        lift, lift_std, lifts = _slope(runs, lift_channels)
+        known = lifts & (lift > SIGNIFICANT * lift_std)
+        usual = np.where(known, np.log(np.where(known, lift, 1.0)) + SIDE_OF_LIFT[0], usual)
+        tolerance = np.where(known, SIDE_OF_LIFT[1], tolerance)
+    clear &= np.abs(value) > SIGNIFICANT * std
+    against = np.minimum(value, 0.0) / std
+    size = np.log(np.maximum(np.abs(value), 1e-9)) - usual
+    size = size / np.sqrt(tolerance**2 + (std / value) ** 2)
+    distance = finite((against**2 + size**2) * clear)
+    return Relation("side_slope", channels, distance, np.stack([value, std, np.exp(usual)], axis=1), clear)
+
+
+def _slope(runs: Runs, channels: tuple[str, ...]) -> tuple[Array, Array, Bools]:
+    """Slope of less the first channel on the second over gravity, the others held; its deviation; whether enough is explained."""
+    causes = [runs.spectra(_channel(n)) for n in channels[1:]]
+    factors = regress(runs.spectra(_channel(channels[0])), np.stack(causes, axis=1), lines=runs.lines())
+    std = np.sqrt(factors.covariance[:, 0, 0]) / G0
+    return -factors.value[:, 0] / G0, std, factors.share > SIDE_SHARE
+
+
+def _nothing(name: str, channels: tuple[str, ...], runs: Runs) -> Relation:
+    none = np.zeros(len(runs) + 1)
+    return Relation(name, channels, none, np.stack([none, none, none], axis=1), none > 0.0)
+
+
+def _surface(runs: Runs, name: str, surfaces: tuple[str, ...]) -> list[Relation]:
+    """What a surface does to its rate, the other causes held: its sign, and its size against the derivative that balances it."""
+    rate = RATES[name]
+    others = [n for n in surfaces if n != name]
+    sideslip = [n for n in ("beta_rad",) if n in runs.channels]
+    names = (name, *others, *sideslip, "p_rad_s", "r_rad_s")
+    causes = [runs.spectra(_integral(n)) for n in names]
+    factors = regress(runs.spectra(_channel(rate)), np.stack(causes, axis=1), lines=runs.lines())
+    result = [sign_test(name.removesuffix("_rad"), (name, rate, *sideslip), factors)]
+    balance, usual, tolerance = BALANCED[name]
+    if balance not in names:
+        return result
+    at = names.index(balance)
+    value, std = factors.value, np.sqrt(np.diagonal(factors.covariance, axis1=1, axis2=2))
+    clear = (np.abs(value[:, 0]) > SIGNIFICANT * std[:, 0]) & (
+        np.abs(value[:, at]) > SIGNIFICANT * std[:, at]
+    )
+    ratio = np.abs(value[:, 0] / value[:, at])
+    spread = np.sqrt(tolerance**2 + (std[:, 0] / value[:, 0]) ** 2 + (std[:, at] / value[:, at]) ** 2)
+    distance = finite(((np.log(np.maximum(ratio, 1e-9)) - usual) / spread) ** 2 * clear)
+    figures = np.stack([ratio, ratio * spread], axis=1)
+    result.append(Relation(f"{name.removesuffix('_rad')}_size", (name, balance), distance, figures, clear))
+    return result
+
+
+def _channel(name: str) -> Signal:
+    return lambda c, dt_s: c[name]
+
+
+def _integral(name: str) -> Signal:
+    return lambda c, dt_s: integral(c[name], dt_s)
+
+
+__all__ = ["lateral"]

@@ -1,0 +1,315 @@
+"""Are the channels of roll, yaw and sideslip of a log consistent with each other?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as fisher
+
+from airtruth.aircraft import Aircraft
+from airtruth.checks.kinematics_bias import rms
+from airtruth.checks.kinematics_energy import by_equation
+from airtruth.checks.kinematics_findings import bias_of, cause_of, drift, errors_of
+from airtruth.checks.kinematics_fit import Problem, limits_of, problem_of
+from airtruth.checks.kinematics_record import thinned
+from airtruth.checks.kinematics_search import DOUBT, Search, completed, search
+from airtruth.checks.kinematics_side import ERRORS, LATERAL, SideRecord
+from airtruth.checks.kinematics_words import NAMED, conclusions, verdict_of
+from airtruth.checks.result import CheckResult, Finding
+from airtruth.checks.samples import integral
+from airtruth.errors import LogError
+from airtruth.logs.flight_log import FlightLog
+from airtruth.numerics.prefilter import butterworth, edge_samples
+from airtruth.units import G0
+
+Array = NDArray[np.float64]
+
+MOST_RECORDS: Final = 20
+"""Records judged together [-]: judgement, as in the longitudinal motion."""
+LONGEST_ARM_SPANS: Final = 1.5
+"""Largest arm [spans]: judgement; the nose boom of a T-38 is 1.2 spans ahead of the CG."""
+LONGEST_ARM_M: Final = 40.0
+"""Largest arm where no span is known [m]: judgement, half the length of the largest aircraft."""
+USUAL_ARM_SPANS: Final = 0.4
+"""Arm that is not unusual [spans]: judgement; the nose of a transport is that far ahead."""
+USUAL_ARM_M: Final = 10.0
+"""Arm that is not unusual where no span is known [m]: judgement."""
+ROUNDS: Final = 3
+"""Largest number of searches with enlarged noise [-]: judgement; two usually suffice."""
+STEADY: Final = 0.1
+"""Relative change of an enlargement below which it is settled [-]: judgement."""
+OF_EQUATION: Final = {
+    "phi": ("phi_rad", "p_rad_s"),
+    "psi": ("psi_rad", "r_rad_s"),
+    "beta": ("beta_rad", "r_rad_s", "ay_m_s2"),
+}
+"""Equation -> channels whose errors it shows."""
+BY_GUSTS: Final = ("gyro_scale:r_rad_s", "accelerometer_scale:ay_m_s2")
+"""Errors that a gust at the vane hides."""
+ARMS: Final = ("vane_arm:beta_rad", "accelerometer_arm:ay_m_s2")
+"""Errors that enter as their difference."""
+
+
+def check_lateral(
+    logs: Sequence[FlightLog],
+    declared: Mapping[str, float] | None = None,
+    span_m: float | None = None,
+    biases: Mapping[str, float] | None = None,
+) -> CheckResult:
+    """Estimate the errors of the sensors of roll, yaw and sideslip from all runs together; the gate is not passed.
+
+    The errors are common to all runs. The noise is estimated for each run.
+
+    Parameters
+    ----------
+    logs : flight logs; of many runs the first `MOST_RECORDS` in which aileron or rudder moves are taken.
+    declared : instrument errors that are known, names of `airtruth.checks.kinematics_side.ERRORS` in SI.
+    span_m : wing span, which limits arms to `LONGEST_ARM_SPANS` [m]; None if it is not known.
+    biases : channel -> bias that is known [unit of the channel].
+
+    Raises
+    ------
+    LogError
+        If a channel is missing, or no run is long enough and has an aileron or rudder that moves.
+    """
+    records, remarks = side_records(logs)
+    known = {n: v for n, v in (declared or {}).items() if n in ERRORS}
+    equations = tuple(
+        e for e, c in LATERAL.channels.items() if records[0].channel(LATERAL.fields[c]) is not None
+    )
+    usual = _candidates(equations, known, span_m)
+    limits = limits_of(records, LONGEST_ARM_M if span_m is None else LONGEST_ARM_SPANS * span_m, LATERAL)
+    problem = problem_of(records, equations, known, limits, kinematics=LATERAL)
+    found, shown = _searched(problem, usual)
+    findings = (*errors_of(found, usual), *_biases(found, biases or {}))
+    verdict = verdict_of(shown, findings)
+    if verdict == "failed":
+        findings = tuple(replace(f, state="not assessed") if f.state in NAMED else f for f in findings)
+    causes = tuple(cause_of(found, i, findings) for i in range(len(found.tried)))
+    words = [*conclusions(verdict, shown, findings, causes), *_of_arms(findings, known), *_of_gusts(findings)]
+    return CheckResult(
+        verdict=verdict,
+        run_ids=tuple(r.run_id for r in records),
+        findings=findings,
+        causes=causes,
+        statistic=shown.statistic,
+        degrees=shown.degrees,
+        p_value=shown.p_value,
+        enlargement=shown.enlargement,
+        residual_rms=rms(found.problem, found.best.fit),
+        sentences=(*words, *remarks),
+    )
+
+
+def _searched(problem: Problem, usual: Mapping[str, float]) -> tuple[Search, Search]:
+    """Outcome of a search, and the same with the test of its best set against the noise alone.
+
+    The equations differ in what they leave: a good attitude shows every imperfection of a gyroscope, and a vane in the air does
+    not. What an equation leaves beyond noise enlarges its own noise, not that of the others.
+    """
+    first = found = search(problem, usual)
+    enlarged: dict[str, float] = {}
+    for _ in range(ROUNDS):
+        left = {}
+        for equation, (energy, count) in by_equation(found.problem, found.best.fit).items():
+            whole = energy * enlarged.get(equation, 1.0) ** 2 / max(count, 1)
+            if fisher.sf(whole, max(count, 1), found.problem.weight.degrees) < DOUBT:
+                left[equation] = float(np.sqrt(whole))
+        if left.keys() == enlarged.keys() and all(abs(left[e] / enlarged[e] - 1.0) < STEADY for e in left):
+            break
+        enlarged = left
+        again = problem_of(
+            problem.records,
+            problem.equations,
+            problem.known,
+            problem.limits,
+            None,
+            problem.lines,
+            LATERAL,
+            enlarged,
+        )
+        found = search(again, usual)
+    final = completed(found, usual)
+    if not enlarged:
+        return final, final
+    factor = max(max(enlarged.values()) ** 2, final.enlargement)
+    return final, replace(
+        final, statistic=first.statistic, degrees=first.degrees, p_value=first.p_value, enlargement=factor
+    )
+
+
+def declared_errors(aircraft: Aircraft) -> dict[str, float]:
+    """Errors of lateral sensors that aircraft.toml declares, as `check_lateral` takes them."""
+    result = {}
+    for error in ERRORS.values():
+        sensor = aircraft.file.sensors.get(error.channel)
+        value = error.neutral if sensor is None else sensor.errors().value(error.kind)
+        if value != error.neutral:
+            result[error.name] = value
+    return result
+
+
+def declared_biases(aircraft: Aircraft) -> dict[str, float]:
+    """Biases of lateral sensors that aircraft.toml declares, channel -> SI."""
+    sensors = aircraft.file.sensors
+    biases = {channel: sensors[channel].errors().bias for channel in LATERAL.fields if channel in sensors}
+    return {channel: bias for channel, bias in biases.items() if bias != 0.0}
+
+
+_NEEDED: Final = ("airspeed_m_s", "p_rad_s", "r_rad_s", "ay_m_s2")
+"""Channels of every lateral record."""
+_INPUTS: Final = ("alpha_rad", "theta_rad", "q_rad_s")
+"""Channels of the other motion that are known inputs."""
+
+
+def side_records(logs: Sequence[FlightLog]) -> tuple[list[SideRecord], list[str]]:
+    """Runs worth judging, with the channels that all of them have, and remarks on absent ones.
+
+    Raises
+    ------
+    LogError
+        As `check_lateral`.
+    """
+    shared = set.intersection(*(set(log.channels) for log in logs))
+    missing = [n for n in _NEEDED if n not in shared]
+    if missing or not {"aileron_rad", "rudder_rad"} & shared or not set(LATERAL.channels.values()) & shared:
+        wanted = missing or ["aileron_rad or rudder_rad, and beta_rad, phi_rad or psi_rad"]
+        raise LogError(
+            f"the lateral motion cannot be assessed: {', '.join(wanted)} is missing; map it on import"
+        )
+    records: list[SideRecord] = []
+    runs = sum(len(log.run_ids) for log in logs)
+    for log in logs:
+        for run, run_id in enumerate(log.run_ids):
+            rows = log.rows(run)
+            dt = float(np.mean(np.diff(log.t_s[rows])))
+            c = {n: log.channels[n][rows] for n in shared}
+            long_enough = rows.stop - rows.start >= 4 * edge_samples(butterworth(min(5.0, 0.2 / dt), 4, dt))
+            moved = max(np.ptp(c[n]) for n in ("aileron_rad", "rudder_rad") if n in c)
+            if long_enough and min(moved, np.ptp(c["p_rad_s"]), np.ptp(c["r_rad_s"])) > 0.0:
+                records.append(thinned(_record(run_id, dt, c)))
+    if not records:
+        raise LogError(
+            f"no run can be assessed: {runs} runs are shorter than about two seconds, or aileron and rudder, p or r "
+            "do not move in them; give a record with a manoeuvre of roll and yaw"
+        )
+    remarks = []
+    if min(len(records), MOST_RECORDS) < runs:
+        remarks.append(f"{min(len(records), MOST_RECORDS)} of {runs} runs were assessed.")
+    absent = [n for n in _INPUTS if n not in shared]
+    if absent:
+        remarks.append(f"{', '.join(absent)} is absent: zero is taken, a constant of alpha is free.")
+    for channel, loss in (
+        ("beta_rad", "the vane, r and ay are not assessed"),
+        ("phi_rad", "p is not assessed, and the bank is the integral of p"),
+        ("psi_rad", "r is assessed by sideslip alone"),
+    ):
+        if channel not in shared:
+            remarks.append(f"{channel} is absent: {loss}.")
+    return records[:MOST_RECORDS], remarks
+
+
+def _record(run_id: str, dt_s: float, c: Mapping[str, Array]) -> SideRecord:
+    def given(name: str) -> Array:
+        return c[name] if name in c else np.zeros_like(c["p_rad_s"])
+
+    alpha = given("alpha_rad")
+    path = given("ax_m_s2") * np.cos(alpha) + given("az_m_s2") * np.sin(alpha)
+    phi, psi = (np.unwrap(c[n]) if n in c else None for n in ("phi_rad", "psi_rad"))
+    return SideRecord(
+        run_id=run_id,
+        dt_s=dt_s,
+        airspeed=c["airspeed_m_s"],
+        p=c["p_rad_s"],
+        r=c["r_rad_s"],
+        ay=c["ay_m_s2"],
+        aileron=given("aileron_rad"),
+        rudder=given("rudder_rad"),
+        alpha=alpha,
+        theta=given("theta_rad") if "theta_rad" in c else alpha,
+        q=given("q_rad_s"),
+        bank=integral(c["p_rad_s"], dt_s) if phi is None else phi,
+        path=path if "ax_m_s2" in c and "az_m_s2" in c else np.zeros_like(path),
+        phi=phi,
+        psi=psi,
+        beta=c.get("beta_rad"),
+    )
+
+
+def _candidates(
+    equations: Sequence[str], known: Mapping[str, float], span_m: float | None
+) -> dict[str, float]:
+    """Errors that the equations can show, with their usual sizes [SI]; of two arms the one that is not declared."""
+    shown = {channel for equation in equations for channel in OF_EQUATION[equation]}
+    arm = USUAL_ARM_M if span_m is None else USUAL_ARM_SPANS * span_m
+    result = {}
+    for name, error in ERRORS.items():
+        if error.channel not in shown or (name == ARMS[1] and name in known):
+            continue
+        result[name] = error.usual if not error.is_arm else arm if error.kind == "arm" else 0.3 * arm
+    return result
+
+
+def _biases(found: Search, known: Mapping[str, float]) -> list[Finding]:
+    """Biases of p, r and ay from the ramps of the equations, beside the sums that known ones make there."""
+    problem = found.problem
+    meanings = {
+        "phi": ("gyro_bias:p_rad_s", "constant in p, by the drift of its integral from phi"),
+        "psi": ("gyro_bias:r_rad_s", "constant in r, by the drift of its integral from psi"),
+    }
+    drifts = {equation: drift(found, equation, known) for equation in problem.equations}
+    result = []
+    for equation, (name, meaning) in meanings.items():
+        if equation in drifts:
+            ramp, std = drifts[equation]
+            result.append(bias_of(found, name, "rad/s", meaning, -ramp, std))
+    if "beta" not in drifts:
+        return result
+    scale = dict(zip(found.best.fit.names, found.best.fit.value, strict=True)).get(
+        "vane_scale:beta_rad", problem.start("vane_scale:beta_rad")
+    )
+    speed = float(np.mean([r.channel("airspeed") for r in problem.records[:1]]))
+    ramp, std = (x / scale for x in drifts["beta"])
+    if "psi" not in drifts:
+        meaning = "constants in r, ay and phi, which psi would separate"
+        return [*result, bias_of(found, "gyro_bias:r_rad_s", "rad/s", meaning, ramp, std)]
+    alpha = float(np.mean([r.channel("alpha") for r in problem.records[:1]]))
+    yaw, yaw_std = drifts["psi"]
+    roll, roll_std = drifts.get("phi", (np.zeros(2), 0.0))
+    # beta's ramp is -(ay/V + p sin a - r cos a); those of phi and psi are -p and -r
+    side = speed * (-ramp + roll * np.sin(alpha) - yaw * np.cos(alpha))
+    spread = speed * float(np.sqrt(std**2 + (yaw_std * np.cos(alpha)) ** 2 + (roll_std * np.sin(alpha)) ** 2))
+    meaning = f"constant in ay, and {G0:.3g} m/s2 per rad of a constant in phi, by the drift of beta: one does not show the other"
+    return [*result, bias_of(found, "accelerometer_bias:ay_m_s2", "m/s2", meaning, side, spread)]
+
+
+def _of_arms(findings: Sequence[Finding], known: Mapping[str, float]) -> list[str]:
+    """What an arm is measured from."""
+    if not any(f.name in ARMS for f in findings):
+        return []
+    if ARMS[1] in known:
+        return [
+            f"The arm of the vane is measured from the CG, with the accelerometer {known[ARMS[1]]:.4g} m ahead as declared."
+        ]
+    return [
+        "The arms of the beta vane and of the accelerometer of ay enter as their difference: each stands for the distance of the "
+        "vane ahead of the accelerometer, and is that from the CG if the other instrument is there. Declare the place of one."
+    ]
+
+
+def _of_gusts(findings: Sequence[Finding]) -> list[str]:
+    """What moving air hides."""
+    hidden = [f.name for f in findings if f.name in BY_GUSTS and f.state == "not shown"]
+    if not hidden:
+        return []
+    return [
+        f"{' and '.join(hidden)} cannot be determined by the kinematics of these records: the vane of beta measures moving "
+        "air as well, or the manoeuvre is weak."
+    ]
+
+
+__all__ = ["check_lateral", "declared_biases", "declared_errors", "side_records"]

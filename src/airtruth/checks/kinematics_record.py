@@ -1,0 +1,171 @@
+"""Records of a kinematic check: channels of one run, several runs side by side, thinning; and what a check knows of an axis."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from typing import Any, Final, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.numerics.prefilter import butterworth, zero_phase
+from airtruth.physics.sensor_errors import KINDS, Kind, error_name
+from airtruth.units import UNITS, printed
+
+Array = NDArray[np.float64]
+
+RATE_HZ: Final = 25.0
+"""Smallest sample rate after thinning [Hz]: judgement; the motion of an aircraft lies below 5 Hz."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """One run, channels of one length; or several runs of one length and period, channels (runs, samples).
+
+    The fields of a kind of record behind these are its channels, None for one that the log lacks.
+
+    Attributes
+    ----------
+    run_id : name of the run.
+    dt_s : sample period [s].
+    """
+
+    run_id: str
+    dt_s: float
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Names of the channels."""
+        return tuple(f.name for f in fields(cls))[2:]
+
+    def channel(self, name: str) -> Array | None:
+        """(samples,) a channel by its field, None where the log has none."""
+        values: Array | None = getattr(self, name)
+        return values
+
+    @property
+    def length(self) -> int:
+        """Number of samples."""
+        return int(next(x.shape[-1] for n in self.names() if (x := self.channel(n)) is not None))
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the record [s]."""
+        return float(self.dt_s * self.length)
+
+    @cached_property
+    def t(self) -> Array:
+        """(samples,) time from the first sample [s]."""
+        return np.asarray(np.arange(self.length) * self.dt_s)
+
+
+R = TypeVar("R", bound=Samples)
+
+
+def stacked(records: Sequence[R]) -> list[tuple[tuple[int, ...], R]]:
+    """Records of one length, period and set of channels as one, each with the numbers of its runs."""
+    alike: dict[tuple[object, ...], list[int]] = {}
+    for i, r in enumerate(records):
+        absent = tuple(r.channel(n) is None for n in r.names())
+        alike.setdefault((r.dt_s, r.length, absent), []).append(i)
+    result = []
+    for numbers in alike.values():
+        own = [records[i] for i in numbers]
+        joined: dict[str, Any] = {
+            n: None if own[0].channel(n) is None else np.stack([getattr(r, n) for r in own])
+            for n in own[0].names()
+        }
+        result.append((tuple(numbers), replace(own[0], **joined)))
+    return result
+
+
+def thinned(record: R) -> R:
+    """Record with every k-th sample, at least `RATE_HZ`, all channels through one low-pass without lag."""
+    every = int(1.0 / (record.dt_s * RATE_HZ) + 1e-6)
+    if every < 2:
+        return record
+    period = every * record.dt_s
+    sos = butterworth(0.4 / period, 4, record.dt_s)
+
+    def thin(x: Array | None) -> Array | None:
+        return None if x is None else np.ascontiguousarray(zero_phase(x[None], sos)[0, ::every])
+
+    channels: dict[str, Any] = {n: thin(record.channel(n)) for n in record.names()}
+    return replace(record, dt_s=period, **channels)
+
+
+@dataclass(frozen=True)
+class InstrumentError:
+    """An error that the kinematics can show.
+
+    Attributes
+    ----------
+    channel, kind : of `airtruth.physics.sensor_errors`, which name it.
+    usual : size that is not unusual, the standard deviation of its prior [SI; of an arm in chords].
+    step : step of its derivative [SI].
+    meaning : definition, for people.
+    """
+
+    channel: str
+    kind: Kind
+    usual: float
+    step: float
+    meaning: str
+
+    @property
+    def name(self) -> str:
+        """Name that effects and results share."""
+        return error_name(self.channel, self.kind)
+
+    @property
+    def unit(self) -> str:
+        """Unit as it is printed, "-" for none."""
+        return printed(next(iter(UNITS[KINDS[self.kind].dimension]))) or "-"
+
+    @property
+    def neutral(self) -> float:
+        """Value without error."""
+        return KINDS[self.kind].neutral
+
+    @property
+    def is_arm(self) -> bool:
+        """Whether it is a distance."""
+        return KINDS[self.kind].dimension == "length"
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """What a kinematic check knows of a motion; everything else of the check is common to all.
+
+    Attributes
+    ----------
+    errors : errors that the channels can show, by name.
+    channels : equation -> channel that it predicts.
+    fields : channel whose bias the equations show -> field of the record.
+    compare : record, errors and equations -> difference of each equation, of the shape of the channels.
+    motions : record -> (k, samples) motions that the control surfaces cause.
+    controls : the control surfaces, in sentences.
+    same : groups of errors that move the channels in the same way; no set has two of a group.
+    telling : sizes that records have to show before the channels are called consistent [SI].
+    most : largest number of errors in a set; a real record, which no kinematic model of few terms explains exactly, takes up any
+        further error.
+    trends : degree of the polynomial that is free in each equation and record.
+    offsets : unknown constants, free in every set: name -> step of its derivative [SI].
+    """
+
+    errors: Mapping[str, InstrumentError]
+    channels: Mapping[str, str]
+    fields: Mapping[str, str]
+    compare: Callable[[Any, Mapping[str, float], Sequence[str]], dict[str, Array]]
+    motions: Callable[[Any], Array]
+    controls: str
+    same: tuple[frozenset[str], ...] = ()
+    telling: Mapping[str, float] = field(default_factory=dict)
+    most: int = 3
+    trends: int = 1
+    offsets: Mapping[str, float] = field(default_factory=dict)
+
+
+__all__ = ["RATE_HZ", "InstrumentError", "Kinematics", "R", "Samples", "stacked", "thinned"]

@@ -1,0 +1,205 @@
+"""Kinematics of roll, yaw and sideslip: phi, psi and beta that follow from rates and specific forces.
+
+No aerodynamic model enters. The equations are those of `airtruth.checks.rotation`, integrated, so that no measured channel is
+differentiated. The errors of the instruments: a vane x ahead of the centre of gravity reads beta + x r/V, an accelerometer
+at x, z reads ay + x r_dot - z p_dot. The integral of x r_dot/V is x r/V: the kinematics shows the place of the vane relative
+to the accelerometer. A constant error of alpha turns roll into sideslip; it is free in every set of errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.checks.kinematics_record import InstrumentError, Kinematics, Samples
+from airtruth.checks.lateral_model import fitted, simulated
+from airtruth.checks.pitch_motions import smoothed_surface
+from airtruth.checks.rotation import bank_coupling, heading_rate, side_gravity, sideslip_turn
+from airtruth.checks.samples import derivative, earlier, integral, lagged
+from airtruth.physics.sensor_errors import KINDS, Kind, error_name
+from airtruth.units import G0
+
+Array = NDArray[np.float64]
+
+EQUATIONS: Final = ("phi", "psi", "beta")
+"""Equations that are integrated, by the channel that they predict."""
+ALPHA_BIAS: Final = "vane_bias"
+"""Name of the constant of alpha, which is free."""
+_SLOW: Final = (1.0, 3.0)
+"""Time constants of the low-passes of the simulated motion, over the period of the motion per radian [-]."""
+
+
+@dataclass(frozen=True)
+class SideRecord(Samples):
+    """Record of the lateral-directional motion; a channel that a log lacks has a stand-in where one serves.
+
+    Attributes
+    ----------
+    airspeed, p, r, ay : (samples,) [m/s], [rad/s], [m/s2].
+    aileron, rudder : (samples,) [rad]; zero where the log has none.
+    alpha, theta, q : (samples,) [rad], [rad/s]; zero where the log has none.
+    bank : (samples,) bank, or the integral of p [rad].
+    path : (samples,) specific force along the path, ax cos a + az sin a [m/s2]; zero where the log has none.
+    phi, psi, beta : (samples,) [rad]; None where the log has none.
+    """
+
+    airspeed: Array
+    p: Array
+    r: Array
+    ay: Array
+    aileron: Array
+    rudder: Array
+    alpha: Array
+    theta: Array
+    q: Array
+    bank: Array
+    path: Array
+    phi: Array | None = None
+    psi: Array | None = None
+    beta: Array | None = None
+
+    @cached_property
+    def rolled(self) -> Array:
+        """(samples,) integral of the measured roll rate [rad]."""
+        return integral(self.p, self.dt_s)
+
+    @cached_property
+    def dots(self) -> tuple[Array, Array]:
+        """(samples,) derivatives of the measured roll and yaw rates [rad/s2]."""
+        return derivative(self.p, self.dt_s), derivative(self.r, self.dt_s)
+
+
+_ALL: Final = (
+    InstrumentError("p_rad_s", "scale", 0.05, 1e-3, "measured over true p"),
+    InstrumentError("p_rad_s", "lag", 0.1, 1e-3, "time constant of the gyro"),
+    InstrumentError("p_rad_s", "delay", 0.1, 1e-3, "delay of p against the other channels"),
+    InstrumentError("r_rad_s", "scale", 0.05, 1e-3, "measured over true r"),
+    InstrumentError("r_rad_s", "lag", 0.1, 1e-3, "time constant of the gyro"),
+    InstrumentError("r_rad_s", "delay", 0.1, 1e-3, "delay of r against the other channels"),
+    InstrumentError("phi_rad", "delay", 0.1, 1e-3, "delay of phi against p"),
+    InstrumentError("psi_rad", "delay", 0.1, 1e-3, "delay of psi against r"),
+    InstrumentError("beta_rad", "scale", 0.1, 1e-3, "measured over true beta, sidewash included"),
+    InstrumentError(
+        "beta_rad", "arm", 3.0, 1e-2, "position of the vane ahead of the CG: beta_vane = beta + x r/V"
+    ),
+    InstrumentError("beta_rad", "lag", 0.3, 1e-3, "time constant of the vane"),
+    InstrumentError("beta_rad", "delay", 0.2, 1e-3, "delay of beta against r and ay"),
+    InstrumentError("ay_m_s2", "scale", 0.05, 1e-3, "measured over true ay"),
+    InstrumentError(
+        "ay_m_s2", "arm", 3.0, 1e-2, "position of the accelerometer ahead of the CG: ay = ay_cg + x r_dot"
+    ),
+    InstrumentError(
+        "ay_m_s2", "arm_down", 1.0, 1e-2, "position of the accelerometer below the CG: ay = ay_cg - z p_dot"
+    ),
+    InstrumentError("ay_m_s2", "delay", 0.1, 1e-3, "delay of ay against the other channels"),
+)
+"""Each error with its usual size and the step of its derivative (judgement, as in the longitudinal motion)."""
+ERRORS: Final[dict[str, InstrumentError]] = {error.name: error for error in _ALL}
+"""Errors that the kinematics can show, by name."""
+
+
+def compare(
+    record: SideRecord, errors: Mapping[str, float], equations: Sequence[str] = EQUATIONS
+) -> dict[str, Array]:
+    """Measured channel less the one that the other channels predict, of the shape of the channels, for each equation.
+
+    The difference is a constant, a ramp (biases), moving air and noise.
+
+    Parameters
+    ----------
+    record : channels.
+    errors : instrument errors, names of `ERRORS`, and `ALPHA_BIAS` [rad]; an error without an entry is absent.
+    equations : equations to evaluate; those whose channels the record lacks are left out.
+    """
+    dt = record.dt_s
+
+    def error(channel: str, kind: Kind) -> float:
+        return float(errors.get(error_name(channel, kind), KINDS[kind].neutral))
+
+    def rate(channel: str, x: Array, dot: Array) -> Array:
+        late = earlier(x + error(channel, "lag") * dot, dt, error(channel, "delay"))
+        return late / error(channel, "scale")
+
+    p_dot, r_dot = record.dots
+    p, r = rate("p_rad_s", record.p, p_dot), rate("r_rad_s", record.r, r_dot)
+    bank = earlier(record.bank, dt, error("phi_rad", "delay"))
+    result = {}
+    if "phi" in equations and record.phi is not None:
+        moved = record.rolled + error("p_rad_s", "lag") * (record.p - record.p[..., :1])
+        rolled = earlier(moved, dt, error("p_rad_s", "delay")) / error("p_rad_s", "scale")
+        rolled = rolled + integral(bank_coupling(record.q, r, bank, record.theta), dt)
+        result["phi"] = record.phi - earlier(rolled, dt, -error("phi_rad", "delay"))
+    if "psi" in equations and record.psi is not None:
+        yawed = integral(heading_rate(record.q, r, bank, record.theta), dt)
+        result["psi"] = record.psi - earlier(yawed, dt, -error("psi_rad", "delay"))
+    if "beta" in equations and record.beta is not None:
+        alpha = record.alpha - float(errors.get(ALPHA_BIAS, 0.0))
+        ay = earlier(record.ay, dt, error("ay_m_s2", "delay")) / error("ay_m_s2", "scale")
+        x, z = error("ay_m_s2", "arm"), error("ay_m_s2", "arm_down")
+        ay = ay - record.q * (x * p + z * r)
+        sine = np.sin(record.beta)
+        forward = record.path + G0 * np.sin(alpha - record.theta)
+        force = (ay + side_gravity(record.theta, bank) - forward * sine) / np.sqrt(1.0 - sine**2)
+        # the integral of x r_dot/V is x r/V up to the change of V, which does not matter over a manoeuvre
+        turned = integral(sideslip_turn(p, r, alpha) + force / record.airspeed, dt)
+        turned = turned - (x * (r - r[..., :1]) - z * (p - p[..., :1])) / record.airspeed
+        vane = turned + error("beta_rad", "arm") * r / record.airspeed
+        vane = lagged(earlier(vane, dt, -error("beta_rad", "delay")), dt, error("beta_rad", "lag"))
+        result["beta"] = record.beta - error("beta_rad", "scale") * vane
+    return result
+
+
+def motions(record: SideRecord) -> Array:
+    """(k, samples) motions that aileron and rudder cause.
+
+    A linear model of the record, of beta (or its inertial part), p, r and phi, simulated from each surface: the states, the
+    integrals of both rates; from both together: rates of change and low-passes; the surfaces.
+    """
+    dt = record.dt_s
+    beta = record.beta if record.beta is not None else record.bank
+    channels = {"beta_rad": beta, "p_rad_s": record.p, "r_rad_s": record.r, "phi_rad": record.bank}
+    surfaces = {"aileron_rad": record.aileron, "rudder_rad": record.rudder}
+    every = {n: x[None] for n, x in (channels | surfaces).items()}
+    a, b = fitted(every, dt, tuple(channels), tuple(surfaces))
+    smooth = np.stack([smoothed_surface(x, dt) for x in surfaces.values()])
+    each = [simulated(a, b[:, [i]], smooth[None, [i]], dt)[0] for i in range(len(surfaces))]
+    whole = each[0] + each[1]
+    unit = 1.0 / max(float(np.abs(np.linalg.eigvals(a).imag).max()), 0.1)
+    rows = [row for one in each for row in (*one[:3], *integral(one[1:3], dt))]
+    rows += [*np.gradient(whole[1:3], dt, axis=1), *smooth]
+    rows += [lagged(whole[0], dt, share * unit) for share in _SLOW]
+    return np.array(rows)
+
+
+LATERAL: Final = Kinematics(
+    errors=ERRORS,
+    channels={"phi": "phi_rad", "psi": "psi_rad", "beta": "beta_rad"},
+    fields={
+        "airspeed_m_s": "airspeed",
+        "p_rad_s": "p",
+        "r_rad_s": "r",
+        "ay_m_s2": "ay",
+        "alpha_rad": "alpha",
+        "theta_rad": "theta",
+        "q_rad_s": "q",
+        "phi_rad": "phi",
+        "psi_rad": "psi",
+        "beta_rad": "beta",
+    },
+    compare=compare,
+    motions=motions,
+    controls="aileron and rudder",
+    same=(frozenset({"vane_arm:beta_rad", "accelerometer_arm:ay_m_s2"}),),
+    telling={"vane_scale:beta_rad": 0.15, "vane_lag:beta_rad": 0.1},
+    most=4,
+    trends=2,
+    offsets={ALPHA_BIAS: 1e-3},
+)
+"""The kinematics of the lateral-directional motion (`telling`: judgement, as in the longitudinal motion)."""
+
+__all__ = ["ERRORS", "LATERAL", "SideRecord", "compare", "motions"]

@@ -1,0 +1,162 @@
+"""Which motions a log supports, and the kinematic check of each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from airtruth.aircraft import Aircraft
+from airtruth.checks import kinematics_lateral
+from airtruth.checks.excitation import moves, turns
+from airtruth.checks.gate import admit
+from airtruth.checks.kinematics import check_kinematics, declared_biases, declared_errors
+from airtruth.checks.result import CheckResult
+from airtruth.errors import LogError, choices
+from airtruth.logs.flight_log import FlightLog
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, MOTIONS, Motion
+
+
+def unsupported(log: FlightLog, motion: Motion) -> str:
+    """Why a log does not support the analysis of a motion, "" if it does: channels that it lacks, or no excitation.
+
+    Parameters
+    ----------
+    log : flight log.
+    motion : one of `airtruth.physics.motion.MOTIONS`.
+    """
+    missing = missing_channels(log, motion)
+    if missing:
+        return f"the log lacks {', '.join(missing)}"
+    surfaces = [c.channel for c in motion.controls]
+    if not any(_moves(log, run, surfaces, motion) for run in range(len(log))):
+        return f"{' and '.join(surfaces)} do not move in any run, or the aircraft does not answer"
+    return ""
+
+
+def missing_channels(log: FlightLog, motion: Motion) -> tuple[str, ...]:
+    """Channels that the analysis of a motion needs and the log lacks; of alternatives, all of them as one."""
+    missing = [n for n in motion.required if n not in log.channels]
+    if not {"density_kg_m3", "altitude_m"} & set(log.channels):
+        missing.append("density_kg_m3 or altitude_m")
+    if motion is LATERAL and not {"beta_rad", "phi_rad", "psi_rad"} & set(log.channels):
+        missing.append("beta_rad, phi_rad or psi_rad")
+    return tuple(missing)
+
+
+def _moves(log: FlightLog, run: int, surfaces: Sequence[str], motion: Motion) -> bool:
+    """Whether a control surface of a motion moves in a run, and roll or yaw follow where they have to."""
+    rows = log.rows(run)
+    dt_s = float(np.mean(np.diff(log.t_s[rows])))
+    channels = {n: x[rows][None] for n, x in log.channels.items()}
+    excited = any(bool(moves(channels[n], dt_s)[0]) for n in surfaces)
+    return excited and (motion is LONGITUDINAL or bool(turns(channels, dt_s)[0]))
+
+
+def supported(logs: Sequence[FlightLog]) -> tuple[Motion, ...]:
+    """Motions that logs support, in the order of answers; one log that excites a motion is enough, the channels all have."""
+    return tuple(
+        motion
+        for motion in MOTIONS.values()
+        if not any(missing_channels(log, motion) for log in logs)
+        and any(not unsupported(log, motion) for log in logs)
+    )
+
+
+def chosen(logs: Sequence[FlightLog], wanted: str | None) -> tuple[Motion, ...]:
+    """Motions to answer: the wanted one, or each that the logs support; the longitudinal one if they support none.
+
+    Raises
+    ------
+    LogError
+        If the wanted motion is unknown, or a log lacks its channels.
+    """
+    if wanted is None:
+        return supported(logs) or (LONGITUDINAL,)
+    if wanted not in MOTIONS:
+        raise LogError(f"motion {wanted!r}: unknown; {choices(wanted, MOTIONS)}")
+    motion = MOTIONS[wanted]
+    for log in logs:
+        missing = missing_channels(log, motion)
+        if missing and motion is not LONGITUDINAL:  # whose own messages say more
+            raise LogError(
+                f"the {wanted} motion needs {', '.join(missing)}, which the log lacks; map it on import"
+            )
+    return (motion,)
+
+
+def check_motions(
+    logs: Sequence[tuple[str, FlightLog]],
+    aircraft: Aircraft | None = None,
+    *,
+    motion: str | None = None,
+    force: bool = False,
+) -> dict[str, CheckResult]:
+    """Pass logs through the gate, then estimate the errors of their instruments for each motion.
+
+    Parameters
+    ----------
+    logs : logs of one instrumentation, each with its name in messages, usually its file.
+    aircraft : aircraft whose declared sensor errors are known; None assumes ideal sensors.
+    motion : name of a motion; None for each that the logs support.
+    force : continue although a log contradicts physics; the results list the faults.
+
+    Returns
+    -------
+    Name of the motion -> result, in the order of answers.
+
+    Raises
+    ------
+    LogError
+        As `airtruth.checks.gate.admit` and the check of the motion.
+    """
+    admitted = [admit(log, aircraft, source=name, force=force) for name, log in logs]
+    parts = [one.log for one in admitted]
+    remarks = dict.fromkeys(sentence for one in admitted for sentence in one.remarks("aircraft"))
+    forced = tuple(sentence for one in admitted for sentence in one.forced)
+    return {
+        one.name: replace(result, sentences=(*result.sentences, *remarks), forced=forced)
+        for one in chosen(parts, motion)
+        for result in (_check(one, parts, aircraft),)
+    }
+
+
+def _check(motion: Motion, logs: Sequence[FlightLog], aircraft: Aircraft | None) -> CheckResult:
+    if motion is LONGITUDINAL:
+        if aircraft is None:
+            return check_kinematics(logs)
+        return check_kinematics(logs, declared_errors(aircraft), aircraft.chord_m, declared_biases(aircraft))
+    reasons = [unsupported(log, motion) for log in logs]
+    if all(reasons):
+        return _untold(logs, reasons[0])
+    if aircraft is None:
+        return kinematics_lateral.check_lateral(logs)
+    return kinematics_lateral.check_lateral(
+        logs,
+        kinematics_lateral.declared_errors(aircraft),
+        None if aircraft.file.geometry is None else aircraft.file.geometry.span.value,
+        kinematics_lateral.declared_biases(aircraft),
+    )
+
+
+def _untold(logs: Sequence[FlightLog], reason: str) -> CheckResult:
+    """The result of records without roll and yaw: nothing is compared."""
+    return CheckResult(
+        verdict="cannot_tell",
+        run_ids=tuple(run_id for log in logs for run_id in log.run_ids),
+        findings=(),
+        causes=(),
+        statistic=0.0,
+        degrees=0,
+        p_value=1.0,
+        enlargement=1.0,
+        residual_rms={},
+        sentences=(
+            f"These records cannot tell whether the channels of roll, yaw and sideslip agree: {reason}. Fly an aileron and a "
+            "rudder doublet.",
+        ),
+    )
+
+
+__all__ = ["check_motions", "chosen", "missing_channels", "supported", "unsupported"]

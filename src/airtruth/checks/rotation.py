@@ -1,0 +1,63 @@
+"""Rates of attitude and flow angles in general motion, of which the wings-level ones are the special case.
+
+Body axes, air at rest, specific forces ax, ay, az (B. L. Stevens and F. L. Lewis, *Aircraft Control and Simulation*, 2nd ed.,
+2003, table 2.5-1; with u, v, w in polar form):
+
+    phi'   = p + (q sin phi + r cos phi) tan theta
+    theta' = q cos phi - r sin phi
+    psi'   = (q sin phi + r cos phi)/cos theta
+    alpha' = q - (p cos a + r sin a) tan b
+             + (az cos a - ax sin a + g (cos a cos theta cos phi + sin a sin theta))/(V cos b)
+    beta'  = p sin a - r cos a + (ay + g cos theta sin phi - V' sin b)/(V cos b)
+
+All angles are in rad, rates in rad/s, specific forces in m/s2; arrays broadcast.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.units import G0
+
+Array = NDArray[np.float64]
+
+
+def bank_coupling(q: Array, r: Array, phi: Array, theta: Array) -> Array:
+    """Rate of bank less the roll rate, (q sin phi + r cos phi) tan theta [rad/s]."""
+    return np.asarray(heading_rate(q, r, phi, theta) * np.sin(theta))
+
+
+def heading_rate(q: Array, r: Array, phi: Array, theta: Array) -> Array:
+    """Rate of heading [rad/s]."""
+    return np.asarray((q * np.sin(phi) + r * np.cos(phi)) / np.cos(theta))
+
+
+def pitch_coupling(q: Array, r: Array, phi: Array) -> Array:
+    """Rate of pitch attitude less the pitch rate [rad/s]."""
+    return np.asarray(q * (np.cos(phi) - 1.0) - r * np.sin(phi))
+
+
+def alpha_coupling(p: Array, r: Array, alpha: Array, beta: Array) -> Array:
+    """Part of the rate of alpha that roll and yaw make, -(p cos a + r sin a) tan b [rad/s]."""
+    return np.asarray(-(p * np.cos(alpha) + r * np.sin(alpha)) * np.tan(beta))
+
+
+def sideslip_turn(p: Array, r: Array, alpha: Array) -> Array:
+    """Part of the rate of beta that rotation makes, p sin a - r cos a [rad/s]."""
+    return np.asarray(p * np.sin(alpha) - r * np.cos(alpha))
+
+
+def side_gravity(theta: Array, phi: Array) -> Array:
+    """Gravity along body y, g cos theta sin phi [m/s2]."""
+    return np.asarray(G0 * np.cos(theta) * np.sin(phi))
+
+
+__all__ = [
+    "alpha_coupling",
+    "bank_coupling",
+    "heading_rate",
+    "pitch_coupling",
+    "side_gravity",
+    "sideslip_turn",
+]

@@ -1,0 +1,1 @@
+"""The lateral-directional motion: its equations as regressions over (coefficient, signal), and its predictor."""

@@ -1,0 +1,189 @@
+"""The lateral-directional motion in moving air as a predictor: terms from the motion, records from a batch.
+
+States are beta, p, r, phi and two of the gust v, whose sideslip v/V acts through the aerodynamics and on the vane, and not on
+the inertial path. White noise drives p' and r': what the linear moments do not explain. Its intensity is estimated: set to
+zero, intervals are too narrow wherever the aerodynamics are not linear. With v = V(t)/V0 and p = q_bar(t)/q_bar0, forces and
+moments act p times on angles and p/v times on rates; the surplus over the reference is made of measured signals and enters as
+a known input, as do the products of rates and the changes of alpha, theta and gravity.
+
+Sources: V. Klein and E. A. Morelli, Aircraft System Identification, AIAA, 2006, 3.2; MIL-F-8785C, 3.7.1.2 (Dryden form).
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.identification.lateral.observation import CONTROLS, Known, condition_of, known_inputs
+from airtruth.identification.likelihood.fit import Records
+from airtruth.identification.likelihood.kalman_kernel import Signals
+from airtruth.identification.likelihood.predictor import W_SHARES, W_START, Predictor, Term, layout
+from airtruth.identification.options import Options
+from airtruth.logs.flight_log import Batch
+from airtruth.numerics.intersample import servo_bend
+from airtruth.numerics.prefilter import butterworth, zero_phase
+from airtruth.physics.atmosphere import air_density
+from airtruth.physics.lateral import LateralConstants, LateralScale, places, structure
+from airtruth.physics.motion import LATERAL
+from airtruth.units import G0
+
+Array = NDArray[np.float64]
+
+OUTPUTS: Final = tuple(output.name for output in LATERAL.outputs)
+"""Outputs of the predictor."""
+GUST: Final = "sigma_v"
+"""Standard deviation of the gust v [m/s]."""
+PROCESS: Final = ("noise_p_dot", "noise_r_dot")
+"""Intensities of the noise in p' and r' [rad/s per root second]."""
+KINEMATIC: Final = tuple(f"known_{state.name}" for state in LATERAL.states)
+"""Known inputs of the rates of the states: kinematics and inertia beyond the linear model."""
+SURPLUS: Final = tuple(f"surplus_{signal.name}" for signal in LATERAL.signals)
+"""Known inputs: each signal times the surplus of the dynamic pressure."""
+_FLOOR: Final = 1e-5
+"""Least noise of every output over its spread [-]; judgement: a record without noise has no likelihood."""
+
+
+def levels(outputs: tuple[str, ...], *, gusts: bool) -> tuple[str, ...]:
+    """Names of the levels: of output error the noise of the outputs alone."""
+    noise = tuple(f"noise_{name}" for name in outputs)
+    return (GUST, *noise, *PROCESS) if gusts else noise
+
+
+def predictor_of(
+    scale: LateralScale, outputs: tuple[str, ...], length_m: float, *, gusts: bool, measured: bool
+) -> Predictor:
+    """The predictor at a flight condition.
+
+    Parameters
+    ----------
+    scale : factors (runs,).
+    outputs : those of the log, of `OUTPUTS`.
+    length_m : scale length of the gust [m].
+    gusts : with the gust and the noise of the moments; without, it is output error.
+    measured : with the inputs `SURPLUS`.
+    """
+    own, state_names = structure(scale), [state.name for state in LATERAL.states]
+    controls = [control.name for control in LATERAL.controls]
+    coefficients = [c.name for c in LATERAL.coefficients]
+    terms = []
+    for i, row in enumerate(state_names):
+        for j, column in enumerate(state_names):
+            if own.kinematics[..., i, j].any():
+                terms.append(Term("A", row, column, own.kinematics[..., i, j]))
+        terms.append(Term("B", row, KINEMATIC[i], 1.0))
+    terms += [Term("C", name, name, 1.0) for name in state_names if name in outputs]
+    for derivative in LATERAL.derivatives:
+        is_state, number = places(LATERAL)[derivative.column]
+        signal = (state_names if is_state else controls)[number]
+        rate = own.rates[..., derivative.column]
+        for kinds, rows, factors in (("AB", state_names, own.forces), ("CD", OUTPUTS, own.accelerations)):
+            for i, row in enumerate(rows):
+                factor = factors[..., i, derivative.row] * rate
+                if not factor.any() or (kinds == "CD" and row not in outputs):
+                    continue
+                terms.append(Term(kinds[0 if is_state else 1], row, signal, factor, (derivative.name,)))
+                if measured:
+                    terms.append(Term(kinds[1], row, SURPLUS[derivative.column], factor, (derivative.name,)))
+                if gusts and signal == LATERAL.implicit[1]:
+                    terms += [
+                        Term(
+                            kinds[0], row, state, factor * share / scale.airspeed_m_s, (derivative.name, GUST)
+                        )
+                        for state, share in W_SHARES.items()
+                    ]
+    names = levels(outputs, gusts=gusts)
+    terms += [Term("R", name, "", 1.0, (f"noise_{name}",) * 2) for name in outputs]
+    if gusts:
+        a = scale.airspeed_m_s / length_m
+        first, second = W_SHARES
+        terms += [Term("A", first, first, -a), Term("A", second, second, -a), Term("A", second, first, a)]
+        terms.append(Term("Q", first, "", 2.0 * a))
+        terms += [Term("Q", name[6:7], "", 1.0, (name,) * 2) for name in PROCESS]
+        if LATERAL.implicit[1] in outputs:
+            terms += [
+                Term("C", LATERAL.implicit[1], state, share / scale.airspeed_m_s, (GUST,))
+                for state, share in W_SHARES.items()
+            ]
+    assert coefficients[0] == LATERAL.implicit[0]
+    return Predictor(
+        states=(*state_names, *(W_SHARES if gusts else ())),
+        inputs=(*controls, *KINEMATIC, *(SURPLUS if measured else ())),
+        outputs=outputs,
+        parameters=(*LATERAL.parameters, *names),
+        logarithmic=names,
+        terms=tuple(terms),
+        start=((tuple(W_SHARES), W_START),) if gusts else (),
+    )
+
+
+def kinematic_inputs(batch: Batch, constants: LateralConstants, scale: LateralScale, known: Known) -> Array:
+    """Rates of the states that the linear model leaves out, (runs, samples, states): `KINEMATIC`."""
+    c = constants
+    p, r, q, phi = batch.channels["p_rad_s"], batch.channels["r_rad_s"], known.q, known.phi
+    v, alpha0, theta0 = (x[:, None] for x in (scale.airspeed_m_s, scale.alpha_rad, scale.theta_rad))
+    beta = p * (np.sin(known.alpha) - np.sin(alpha0)) - r * (np.cos(known.alpha) - np.cos(alpha0))
+    beta = beta + G0 / v * (np.cos(known.theta) * np.sin(phi) - np.cos(theta0) * phi)
+    roll = c.inertia_xz_kg_m2 * p * q - (c.inertia_zz_kg_m2 - c.inertia_yy_kg_m2) * q * r
+    yaw = -c.inertia_xz_kg_m2 * q * r - (c.inertia_yy_kg_m2 - c.inertia_xx_kg_m2) * p * q
+    determinant = c.inertia_xx_kg_m2 * c.inertia_zz_kg_m2 - c.inertia_xz_kg_m2**2
+    p_dot = (c.inertia_zz_kg_m2 * roll + c.inertia_xz_kg_m2 * yaw) / determinant
+    r_dot = (c.inertia_xz_kg_m2 * roll + c.inertia_xx_kg_m2 * yaw) / determinant
+    phi_dot = (q * np.sin(phi) + r * np.cos(phi)) * np.tan(known.theta) - r * np.tan(theta0)
+    return np.stack([beta, p_dot, r_dot, phi_dot], axis=2)
+
+
+def surplus_inputs(batch: Batch, scale: LateralScale, known: Known, options: Options) -> Array:
+    """Signals about their means times the surplus of the dynamic pressure, (runs, samples, signals): `SURPLUS`."""
+    c = batch.channels
+    sos = butterworth(options.cutoff_of(batch.dt_s), options.order, batch.dt_s)
+    v = zero_phase(c["airspeed_m_s"], sos) / scale.airspeed_m_s[:, None]
+    density = air_density(c)
+    pressure = v**2 * density / density.mean(axis=1, keepdims=True)
+    columns = {**c, "beta_rad": known.beta}
+    made = []
+    for signal in LATERAL.signals:
+        x = columns[signal.channel]
+        factor = pressure - 1.0 if signal.length is None else pressure / v - 1.0
+        made.append(factor * (x - x.mean(axis=1, keepdims=True)))
+    return np.stack(made, axis=2)
+
+
+def records_of(
+    batch: Batch, constants: LateralConstants, options: Options, length_m: float, *, gusts: bool
+) -> Records[LateralScale]:
+    """Signals and predictor of a batch; nothing is checked. Outputs are the channels that the log has.
+
+    Surfaces between samples have the area of the cubic through the four nearest samples, and the corners of a first-order
+    servo behind a held command where the record shows one (`airtruth.numerics.intersample`).
+    """
+    known = known_inputs(batch)
+    scale = condition_of(batch, constants, options, known)
+    outputs = outputs_of(batch)
+    channels = {output.name: output.channel for output in LATERAL.outputs}
+    y = np.stack([batch.channels[channels[name]] for name in outputs], axis=2)
+    surfaces = np.stack([batch.channels[name] for name in CONTROLS], axis=2)
+    u = [surfaces - surfaces[:, :1], kinematic_inputs(batch, constants, scale, known)]
+    measured = options.pressure != "constant" and options.airspeed_m_s is None
+    if measured:
+        u.append(surplus_inputs(batch, scale, known, options))
+    inputs = np.concatenate(u, axis=2)
+    edge = np.concatenate([inputs[:, :1], inputs, inputs[:, -1:]], axis=1)
+    bend = np.zeros_like(inputs)
+    bend[:, 1:] = (edge[:, 1:-2] + edge[:, 2:-1] - edge[:, :-3] - edge[:, 3:]) / 24.0
+    for number, name in enumerate(CONTROLS):
+        bend[:, :, number] += servo_bend(batch.channels[name])
+    predictor = predictor_of(scale, outputs, length_m, gusts=gusts, measured=measured)
+    floor = _FLOOR * y.std(axis=1)
+    least = tuple(Term("R", name, "", floor[:, i] ** 2) for i, name in enumerate(outputs))
+    made = Predictor(**{**vars(predictor), "terms": (*predictor.terms, *least)})
+    return Records(batch.dt_s, Signals(y - y[:, :1], inputs, bend), layout(made, y.shape[0]), scale)
+
+
+def outputs_of(batch: Batch) -> tuple[str, ...]:
+    """Outputs that the log has: without a vane, beta is a state alone."""
+    return tuple(output.name for output in LATERAL.outputs if output.channel in batch.channels)
+
+
+__all__ = ["GUST", "OUTPUTS", "PROCESS", "levels", "outputs_of", "predictor_of", "records_of"]

@@ -1,0 +1,162 @@
+"""Equations of a motion, chosen by the type of its aircraft.
+
+A kernel calls `rates`, `outputs`, `air_at` and `move_plays`; numba compiles into it those of the motion whose tuples it is
+given, so that one source serves every motion and no branch is left in the loop. A motion registers its equations
+(`register`) with the types of its aircraft and of its inputs along a record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.numerics.compiled import by_types
+from airtruth.tracing.model.kernel_input import AirPoint, FilterModel, GridSignals
+
+Array = NDArray[np.float64]
+
+
+class Equations(NamedTuple):
+    """Equations of one motion; functions but the last are `airtruth.numerics.compiled.inner`.
+
+    Attributes
+    ----------
+    states, early : numbers of its states and of its early outputs; one more output is late.
+    rates, outputs, air_at, move_plays : as the functions of this module.
+    settle : (state, inputs, model) -> None: the effects' states into equilibrium with the states of the motion.
+    """
+
+    states: int
+    early: int
+    rates: Callable[..., float]
+    outputs: Callable[..., None]
+    air_at: Callable[..., AirPoint]
+    move_plays: Callable[..., None]
+    settle: Callable[[Array, AirPoint, FilterModel], None]
+
+
+_OF: Final[dict[type, Equations]] = {}
+"""Type of an aircraft, and type of its inputs along a record -> equations."""
+
+
+def register(aircraft: type, grid: type, equations: Equations) -> None:
+    """State the equations of a motion.
+
+    Parameters
+    ----------
+    aircraft : type of `FilterModel.aircraft`; grid : type of `KernelInput.grid`.
+    """
+    _OF[aircraft] = _OF[grid] = equations
+
+
+def equations_of(model: FilterModel) -> Equations:
+    """Equations of a model."""
+    return _OF[type(model.aircraft)]
+
+
+def _typed(model: Any) -> Equations:
+    """Equations by numba's type of a model."""
+    return _OF[model.types[model.fields.index("aircraft")].instance_class]
+
+
+def _states(model: Any) -> Callable[..., int]:
+    number = _typed(model).states
+    return lambda model: number
+
+
+def _early(model: Any) -> Callable[..., int]:
+    number = _typed(model).early
+    return lambda model: number
+
+
+def _all_outputs(model: Any) -> Callable[..., int]:
+    number = _typed(model).early + 1
+    return lambda model: number
+
+
+def _rates(x: Any, at: Any, model: Any, out: Any) -> Callable[..., float]:
+    own = _typed(model).rates
+    return lambda x, at, model, out: own(x, at, model, out)
+
+
+def _outputs(x: Any, rate: Any, force: Any, at: Any, model: Any, y: Any) -> Callable[..., None]:
+    own = _typed(model).outputs
+    return lambda x, rate, force, at, model, y: own(x, rate, force, at, model, y)
+
+
+def _air_at(grid: Any, point: Any) -> Callable[..., AirPoint]:
+    own = _OF[grid.instance_class].air_at
+    return lambda grid, point: own(grid, point)
+
+
+def _move_plays(x: Any, at: Any, model: Any) -> Callable[..., None]:
+    own = _typed(model).move_plays
+    return lambda x, at, model: own(x, at, model)
+
+
+@by_types(_states)
+def state_count(model: FilterModel) -> int:
+    """Number of states of the motion; those of the gusts follow."""
+    raise NotImplementedError
+
+
+@by_types(_early)
+def early_count(model: FilterModel) -> int:
+    """Number of outputs that the motion alone gives; the late one follows."""
+    raise NotImplementedError
+
+
+@by_types(_all_outputs)
+def output_count(model: FilterModel) -> int:
+    """Number of outputs."""
+    raise NotImplementedError
+
+
+@by_types(_rates)
+def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
+    """x' of the motion, the gusts and the effects' states into ``out``; returns the force of the late output at the CG [m/s2].
+
+    A play has no x': that of a lag in its place serves the linearisation, and `airtruth.tracing.model.equations.hold_plays`
+    and `move_plays` replace it.
+    """
+    raise NotImplementedError
+
+
+@by_types(_outputs)
+def outputs(x: Array, rate: Array, force: float, at: AirPoint, model: FilterModel, y: Array) -> None:
+    """What the sensors read without bias, lag, delay and noise, into ``y`` [units of the outputs].
+
+    Parameters
+    ----------
+    rate : (states,) x'; force : of the late output at the CG [m/s2]. Early outputs need neither.
+    """
+    raise NotImplementedError
+
+
+@by_types(_air_at)
+def air_at(grid: GridSignals, point: int) -> AirPoint:
+    """Inputs at a point of the filter's grid."""
+    raise NotImplementedError
+
+
+@by_types(_move_plays)
+def move_plays(x: Array, at: AirPoint, model: FilterModel) -> None:
+    """Move the states of plays to no more than their half width from their signals."""
+    raise NotImplementedError
+
+
+__all__ = [
+    "Equations",
+    "air_at",
+    "early_count",
+    "equations_of",
+    "move_plays",
+    "output_count",
+    "outputs",
+    "rates",
+    "register",
+    "state_count",
+]

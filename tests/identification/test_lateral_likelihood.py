@@ -1,0 +1,129 @@
+"""Lateral filter error, output error and equation error in the frequency domain: truth, intervals, innovations."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airtruth.identification import Options, identify, identify_batch, identify_joint
+from airtruth.identification.lateral.observation import condition_of, known_inputs
+from airtruth.identification.lateral.predictor import SURPLUS, levels, predictor_of, records_of
+from airtruth.identification.likelihood.fit import scored
+from airtruth.identification.likelihood.linearise import values_of
+from airtruth.identification.likelihood.predictor import layout
+from airtruth.numerics.discretise import assemble
+from airtruth.physics.lateral import lateral_system
+from airtruth.physics.motion import LATERAL
+from validation.affine_lateral import GTM, NAMES, THETA, fly, log_of, pitching
+
+DETERMINED = [NAMES.index(n) for n in ("CYbeta", "Clbeta", "Clp", "Clda", "Cnbeta", "Cndr")]
+QUIET = fly(runs=2, noise=1e-3)
+
+
+@pytest.mark.parametrize("method", ["filter-error", "output-error", "frequency"])
+def test_quiet_records_give_the_truth(method):
+    made = identify_batch(QUIET, GTM, method, motion=LATERAL)
+    assert made.converged.all()
+    np.testing.assert_allclose(made.theta[:, DETERMINED], np.tile(THETA[DETERMINED], (2, 1)), rtol=5e-4)
+    np.testing.assert_allclose(made.theta, np.tile(THETA, (2, 1)), atol=0.005)
+
+
+def test_predictor_has_the_matrices_of_the_linear_model():
+    known = known_inputs(QUIET)
+    scale = condition_of(QUIET, GTM, Options(), known)
+    outputs = tuple(output.name for output in LATERAL.outputs)
+    predictor = predictor_of(scale, outputs, 533.4, gusts=True, measured=True)
+    own = layout(predictor, 2)
+    names = levels(outputs, gusts=True)
+    z = np.concatenate([THETA, np.log(np.full(len(names), 0.7))])[None]
+    n, inputs, m, _ = own.sizes
+    system, process, variance = np.zeros((n + m, n + inputs)), np.zeros(n), np.zeros(m)
+    assemble(values_of(own, z)[0], own.location, own.coefficient[0], system, process, variance)
+    linear = lateral_system(THETA, scale)
+    np.testing.assert_allclose(system[:4, :4], linear.a[0], rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(system[:4, n : n + 2], linear.b[0], rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(system[n:, :4], linear.c[0], rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(system[n:, n : n + 2], linear.d[0], rtol=1e-12, atol=1e-12)
+    # the gust acts as a sideslip in forces, moments and on the vane: sigma sqrt(3/2)/V in its first state
+    share = 0.7 * np.sqrt(1.5) / scale.airspeed_m_s[0]
+    np.testing.assert_allclose(system[1:3, 4], linear.a[0, 1:3, 0] * share, rtol=1e-12)
+    np.testing.assert_allclose(system[n, 4], share, rtol=1e-12)
+    surplus = predictor.inputs.index(SURPLUS[0])
+    np.testing.assert_allclose(system[1:3, n + surplus], linear.a[0, 1:3, 0], rtol=1e-12)
+    np.testing.assert_allclose(process[1:3], 0.7**2)
+
+
+def test_gradient_is_that_of_differences():
+    batch = fly(runs=1, seconds=6.0, gust=0.6, seed=8)
+    data = records_of(batch, GTM, Options(), 533.4, gusts=True)
+    noise = np.log([0.6, 6e-4, 9e-3, 6e-3, 9e-4, 0.064, 0.01, 0.01])
+    z = np.concatenate([1.02 * THETA, noise])[None]
+    free = np.arange(z.shape[1])
+    run = np.arange(1)
+    _, gradient, information = scored(data, z, run, free)
+    step = 1e-5
+    for i in free[::3]:
+        up, down = z.copy(), z.copy()
+        up[0, i] += step
+        down[0, i] -= step
+        slope = (scored(data, up, run, free)[0] - scored(data, down, run, free)[0]) / (2.0 * step)
+        assert slope[0] == pytest.approx(gradient[0, i], rel=1e-5, abs=1e-5 * np.sqrt(information[0, i, i]))
+
+
+def test_records_without_a_vane_or_bank_are_fitted():
+    for lacking in ("beta_rad", "phi_rad"):
+        channels = {name: x for name, x in QUIET.channels.items() if name != lacking}
+        made = identify_batch(replace(QUIET, channels=channels), GTM, "filter-error", motion=LATERAL)
+        np.testing.assert_allclose(made.theta[:, DETERMINED], np.tile(THETA[DETERMINED], (2, 1)), rtol=5e-3)
+
+
+def test_constant_pressure_is_a_choice():
+    batch = fly(runs=2, gust=0.75, seed=1)
+    for method in ("filter-error", "frequency"):
+        one, other = (
+            identify_batch(batch, GTM, method, Options(pressure=p), LATERAL).theta
+            for p in ("constant", "measured")
+        )
+        assert np.abs(one - other).max() > 1e-3
+
+
+def test_output_error_in_turbulence_is_warned_about():
+    log = log_of(fly(q=pitching, runs=2, gust=0.75, seed=6))
+    noted = identify(log, GTM, ["output-error", "filter-error"], motion=LATERAL).notes
+    warned = [note for note in noted if "not white" in note]
+    assert len(warned) == 1
+    assert warned[0].startswith("Warning: output-error: the residuals are not white in 2 of 2 runs")
+    assert "Use filter-error" in warned[0]
+    calm = log_of(fly(q=pitching, runs=2, seed=6))
+    assert not any("not white" in n for n in identify(calm, GTM, ["output-error"], motion=LATERAL).notes)
+
+
+def test_joint_estimates_are_better_than_single_ones():
+    batch = fly(runs=4, gust=0.75, seed=11)
+    for method in ("filter-error", "frequency"):
+        joint = identify_joint([batch], GTM, method, motion=LATERAL)
+        single = identify_batch(batch, GTM, method, motion=LATERAL)
+        std = np.sqrt(np.diagonal(joint.covariance[0]))
+        ratio = std / np.sqrt(np.diagonal(single.covariance, axis1=1, axis2=2)).mean(axis=0)
+        np.testing.assert_allclose(ratio, 0.5, rtol=0.2)  # 1/sqrt(4)
+        assert (np.abs(joint.theta[0] - THETA) < 4.0 * std).all()
+
+
+def test_a_band_with_too_few_frequencies_is_refused():
+    from airtruth.errors import ConfigurationError
+
+    with pytest.raises(ConfigurationError, match=r"band_hz.*widen the band"):
+        identify_batch(QUIET, GTM, "frequency", Options(band_hz=(0.5, 0.7)), LATERAL)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gust", [0.0, 1.0])
+def test_filter_error_states_its_error(gust):
+    """150 runs of 15 derivatives: coverage within 2.5 standard errors of 95 %, errors as stated."""
+    batch = fly(runs=150, gust=gust, seed=1)
+    made = identify_batch(batch, GTM, "filter-error", motion=LATERAL)
+    assert made.converged.all()
+    error = made.theta - THETA
+    std = np.sqrt(np.diagonal(made.covariance, axis1=1, axis2=2))
+    assert (np.abs(error) < 1.96 * std).mean() == pytest.approx(0.95, abs=0.03)
+    assert np.sqrt((error**2).mean(axis=0) / (std**2).mean(axis=0)).mean() == pytest.approx(1.0, abs=0.1)

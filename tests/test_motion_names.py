@@ -1,0 +1,133 @@
+"""A ratchet: derivatives, channels and axes are named where a motion is described, and ever less elsewhere.
+
+No room may exceed its cap. Lower the cap of a room whose count has fallen; the test prints the total.
+"""
+
+import ast
+import re
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+from airtruth.physics.motion import MOTIONS
+
+SOURCE = Path(__file__).resolve().parents[1] / "src" / "airtruth"
+HOME = (
+    "physics/motion.py",
+    "physics/composition.py",
+    "effects/",
+    "identification/regression/",
+)
+"""Modules that describe an axis or hold its algebra: motions, parts of the aircraft, effects and estimators."""
+CAPS: dict[str, int] = {
+    "aircraft": 182,
+    "airtruth": 25,
+    "api": 2,
+    "charts": 1,
+    "checks": 298,
+    "cli": 27,
+    "design": 93,
+    "identification": 336,
+    "importers": 158,
+    "logs": 6,
+    "loop": 9,
+    "numerics": 17,
+    "physics": 249,
+    "reporting": 84,
+    "schemas": 2,
+    "simulation": 545,
+    "starting": 17,
+    "tracing": 159,
+    "tracing/inference": 10,
+    "tracing/model": 360,
+    "tracing/presentation": 45,
+    "tracing/selection": 91,
+}
+"""Room -> occurrences in its code."""
+
+
+def pattern() -> re.Pattern[str]:
+    """Names of derivatives, coefficients, channels and controls of every motion, and words of one axis."""
+    derivatives = {name for m in MOTIONS.values() for name in m.parameters}
+    numbers = {
+        f"{c.name}_{s.symbol}".upper() for m in MOTIONS.values() for c in m.coefficients for s in m.signals
+    }
+    channels = {name for m in MOTIONS.values() for name in (*m.channels, *(c.command for c in m.controls))}
+    controls = {c.name for m in MOTIONS.values() for c in m.controls}
+    axes = {"PARAMETERS", "lift", "moment", "chord", "span_m", "inertia_yy"}
+    exact = sorted(derivatives | numbers | channels, key=len, reverse=True)
+    return re.compile("|".join((*exact, *sorted(controls | axes))))
+
+
+NAMES = pattern()
+COEFFICIENTS = {c.name for m in MOTIONS.values() for c in m.coefficients} | {"CX"}
+"""Symbols that count as whole names and strings."""
+SIZED = {"eye", "zeros", "ones", "empty", "full", "range"}
+"""Functions whose argument 3 or 6 is the size of an axis."""
+
+
+def words(tree: ast.AST) -> Iterator[str]:
+    """Names and strings of the code, docstrings left out."""
+    docstrings = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Expr)}
+    for node in ast.walk(tree):
+        match node:
+            case ast.Name(id=text) | ast.Attribute(attr=text) | ast.arg(arg=text) | ast.alias(name=text):
+                yield text
+            case ast.keyword(arg=str(text)) | ast.FunctionDef(name=text) | ast.ClassDef(name=text):
+                yield text
+            case ast.Constant(value=str(text)) if id(node) not in docstrings:
+                yield text
+            case _:
+                pass
+
+
+def sizes(tree: ast.AST) -> int:
+    """Slices that end or begin at 3 or 6, and arrays and ranges of these sizes."""
+    count = 0
+    for node in ast.walk(tree):
+        match node:
+            case ast.Slice():
+                count += sum(is_size(bound) for bound in (node.lower, node.upper))
+            case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name)) if name in SIZED:
+                for argument in node.args[:1]:
+                    entries = argument.elts if isinstance(argument, ast.Tuple) else [argument]
+                    count += sum(map(is_size, entries))
+            case _:
+                pass
+    return count
+
+
+def is_size(node: ast.expr | None) -> bool:
+    return isinstance(node, ast.Constant) and node.value in (3, 6)
+
+
+def count(path: Path) -> int:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return sizes(tree) + sum(len(NAMES.findall(w)) + (w in COEFFICIENTS) for w in words(tree))
+
+
+def counts() -> Counter[str]:
+    """Room -> occurrences; the rooms of the tracer count each by itself."""
+    found: Counter[str] = Counter()
+    for path in sorted(SOURCE.rglob("*.py")):
+        name = path.relative_to(SOURCE).as_posix()
+        if not name.startswith(HOME):
+            *rooms, _ = name.split("/")
+            depth = 2 if rooms[:1] == ["tracing"] else 1
+            found["/".join(rooms[:depth]) or "airtruth"] += count(path)
+    return +found
+
+
+def test_the_names_of_a_motion_spread_to_no_room():
+    found = counts()
+    print(f"{sum(found.values())} names of derivatives, channels and axes; caps {sum(CAPS.values())}")
+    risen = {
+        room: (number, CAPS.get(room, 0)) for room, number in found.items() if number > CAPS.get(room, 0)
+    }
+    assert not risen, "room: (names, cap)"
+
+
+def test_code_counts_and_docstrings_do_not():
+    tree = ast.parse('def f(x):\n    """CLalpha."""\n    return x["CLalpha"] + y.elevator_rad[:3] + eye(6)\n')
+    assert [w for w in words(tree) if NAMES.search(w)] == ["CLalpha", "elevator_rad"]
+    assert sizes(tree) == 2

@@ -1,0 +1,206 @@
+"""A motion that the package does not know, through description, layouts, filter, fit and one effect."""
+
+import numpy as np
+import pytest
+from numba.core.caching import NullCache
+from scipy.linalg import expm, solve_discrete_are
+from scipy.optimize import least_squares
+from toy_motion import ARM_M, QBAR, TOY, ToyAircraft, ToyGrid, ToyPoint
+
+from airtruth.effects.effect import Effect, Parameter
+from airtruth.effects.sensors import sensor_effects
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.terms import AeroTerm, Change
+from airtruth.tracing.model import filter as record_filter
+from airtruth.tracing.model import linearise
+from airtruth.tracing.model.kernel_input import (
+    EffectArrays,
+    FilterModel,
+    GustModel,
+    KernelInput,
+    SensorArrays,
+)
+from airtruth.tracing.model.parameters import ParameterLayout, Parameters, core_of, state_layout
+from airtruth.tracing.model.schedule import UNSCHEDULED
+from airtruth.tracing.model.steady import steady_filter
+
+TRUTH = np.array([-0.12, -2.0, 0.05, -0.03, 0.004])
+HALF_CHORD_M, AIRSPEED_M_S, LENGTH_M, LEVEL = 0.5, 40.0, 200.0, 1.5
+DT_S, SUB, SAMPLES = 0.02, 4, 400
+FINE = 40
+"""Cells of a sample of the reference, in which the inputs are linear."""
+STD = np.array([1e-3, 2e-3, 5e-2])
+"""Noise of the outputs [rad, rad/s, m/s2]."""
+
+
+@pytest.fixture(autouse=True)
+def _uncached(monkeypatch):
+    """The package's cache of compiled kernels holds none of a motion that exists here alone."""
+    for kernel in (linearise._differences.__wrapped__, record_filter._innovations.__wrapped__):
+        monkeypatch.setattr(kernel, "_cache", NullCache())
+
+
+def model(derivatives, level=LEVEL):
+    none, ints = np.empty(0), np.empty((0, 6), dtype=np.int64)
+    three = np.zeros(3)
+    sensors = SensorArrays(three, np.ones(3), three, three, three, STD**2, three, 1.0)
+    return FilterModel(
+        ToyAircraft(np.asarray(derivatives, dtype=float), HALF_CHORD_M),
+        GustModel(level, LENGTH_M, 0.0, 0.0, 1.0),
+        EffectArrays(ints, none, none, none, ints[:, :2], none, none, none),
+        sensors,
+        state_layout(np.empty(0, dtype=np.int64), core_of(2), three, three, slow=False),
+    )
+
+
+def given(y, derivatives, grid, start):
+    mean = ToyPoint(*(float(x.mean()) for x in grid))
+    return KernelInput(
+        y, np.zeros_like(y), grid, np.empty(0), DT_S, SUB, start, 0.0, mean, model(derivatives)
+    )
+
+
+def inputs(sub=SUB):
+    t = np.arange(SAMPLES * sub + 1) * DT_S / sub
+    left, right = 0.05 * np.sin(3.0 * t), 0.04 * np.sin(1.3 * t + 1.0)
+    return ToyGrid(left, right, 0.2 * np.cos(0.7 * t), np.full(t.size, AIRSPEED_M_S))
+
+
+def linear(derivatives):
+    """A, B by the controls and the wind, C and D of the four states that matter, by hand."""
+    d, a = derivatives, AIRSPEED_M_S / LENGTH_M
+    gain = 2.0 * QBAR
+    row = gain * np.array([d[0], d[1] * HALF_CHORD_M / AIRSPEED_M_S, 0.0, d[4] * LEVEL])
+    system = np.array([[0.0, 1.0, 0.0, 0.0], row, [0.0, 0.0, -a, 0.0], [0.0, 0.0, a, -a]])
+    by = np.zeros((4, 3))
+    by[1] = gain * d[[2, 3, 4]]
+    out = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], ARM_M * row])
+    direct = np.zeros((3, 3))
+    direct[2] = ARM_M * by[1]
+    return system, by, out, direct
+
+
+def discrete(system, by, h):
+    """Exact step with inputs that are linear over it: transition, gains of the values at both ends, noise of the step."""
+    n, m = by.shape
+    whole = np.zeros((n + 2 * m, n + 2 * m))
+    whole[:n, :n], whole[:n, n : n + m], whole[n : n + m, n + m :] = system, by, np.eye(m) / h
+    step = expm(whole * h)
+    late = step[:n, n + m :]
+    noise = np.zeros((n, n))
+    noise[2, 2] = 2.0 * AIRSPEED_M_S / LENGTH_M
+    loan = expm(np.block([[-system, noise], [np.zeros((n, n)), system.T]]) * h)
+    phi = loan[n:, n:].T
+    return phi, step[:n, n : n + m] - late, late, phi @ loan[:n, n:]
+
+
+def kalman(y, derivatives, start):
+    """Innovations of a textbook filter with the steady gain: all three outputs in one update."""
+    system, by, out, direct = linear(derivatives)
+    u = np.column_stack(inputs(FINE)[:3])
+    phi, _, _, noise = discrete(system, by, DT_S)
+    p = solve_discrete_are(phi.T, out.T, noise, np.diag(STD**2))
+    s = out @ p @ out.T + np.diag(STD**2)
+    gain = p @ out.T @ np.linalg.inv(s)
+    cell, early, late, _ = discrete(system, by, DT_S / FINE)
+    x, found = start.copy(), []
+    for k in range(SAMPLES):
+        e = y[k] - out @ x - direct @ u[k * FINE]
+        found.append(e)
+        x = x + gain @ e
+        for i in range(k * FINE, (k + 1) * FINE):
+            x = cell @ x + early @ u[i] + late @ u[i + 1]
+    return np.array(found), s
+
+
+def flown(seed):
+    """Outputs of the toy in gusts, with noise."""
+    rng = np.random.default_rng(seed)
+    system, by, out, direct = linear(TRUTH)
+    u = np.column_stack(inputs()[:3])
+    cell, early, late, noise = discrete(system, by, DT_S / SUB)
+    root = np.linalg.cholesky(noise + 1e-18 * np.eye(4))
+    x, y = np.zeros(4), []
+    for k in range(SAMPLES):
+        y.append(out @ x + direct @ u[k * SUB] + STD * rng.standard_normal(3))
+        for i in range(k * SUB, (k + 1) * SUB):
+            x = cell @ x + early @ u[i] + late @ u[i + 1] + root @ rng.standard_normal(4)
+    return np.array(y)
+
+
+def innovations(y, derivatives):
+    one = given(y, derivatives, inputs(), np.zeros(4))
+    steady = steady_filter(one, UNSCHEDULED)
+    e = np.empty_like(y)
+    sound, _ = record_filter.innovations(one, steady, e)
+    assert sound
+    return e, steady
+
+
+@pytest.mark.slow
+def test_the_filter_is_that_of_a_textbook_and_finds_the_derivatives():
+    y = flown(1)
+    e, steady = innovations(y, TRUTH)
+    expected, covariance = kalman(y, TRUTH, np.zeros(4))
+    np.testing.assert_allclose(steady.covariance, covariance, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(e / STD, expected / STD, rtol=0.0, atol=1e-5)
+
+    def white(derivatives):
+        own, there = innovations(y, derivatives)
+        return (own @ steady.white.T).ravel() if there else None
+
+    found = least_squares(white, 0.8 * TRUTH, x_scale=np.abs(TRUTH))
+    std = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))
+    assert (np.abs(found.x - TRUTH) < 4.0 * std).all()
+    assert (std[:4] < 0.2 * np.abs(TRUTH[:4])).all()
+
+
+@pytest.mark.parametrize("early", [1, 2, 3])
+def test_the_first_update_is_that_of_the_early_outputs(early):
+    """Gain P C' S^-1 and regression of the late innovation, by numpy."""
+    rng = np.random.default_rng(early)
+    phi, c = 0.5 * np.eye(5), rng.standard_normal((early + 1, 5))
+    noise, variance = np.eye(5), np.ones(early + 1)
+    _, _, s, _, p, first = linearise.gain_of(phi, c, noise, variance)
+    pc = p @ c.T
+    inverse = np.linalg.inv(s[:early, :early])
+    np.testing.assert_allclose(first.gain, pc[:, :early] @ inverse, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(first.share, s[early, :early] @ inverse, rtol=1e-9, atol=1e-12)
+
+
+def test_parameters_follow_from_the_description():
+    layout = ParameterLayout(TOY)
+    assert layout.common.names[:8] == (
+        *("Cptheta", "Cpq", "Cpdl", "Cpdr", "Cpw"),
+        *("log_noise_theta", "log_noise_q", "log_noise_az"),
+    )
+    assert layout.per_record.names == (
+        *("theta0", "q0", "w1", "w2", "bias_theta", "bias_q", "bias_az", "Cp0", "log_sigma_w"),
+    )
+    assert layout.common.step[:5].tolist() == [1e-4, 1e-2, 1e-4, 1e-4, 1e-4]
+    point = Parameters(
+        np.zeros(layout.common.size), np.zeros((2, layout.per_record.size)), np.zeros(1), layout
+    )
+    assert point.layout.total == layout.common.size + 1 + layout.per_record.size
+    assert point.of_vector(point.vector).per_record.shape == (2, layout.per_record.size)
+
+
+def test_effects_follow_from_the_description():
+    stiffness = Effect(
+        "stiffness",
+        "dynamics",
+        (Parameter("dCp", "-", "more of Cp by theta", -1.0, 1.0, 0.1),),
+        lambda v: Change(aero=(AeroTerm("Cp", "theta", "quadratic", v["dCp"]),)),
+        "A spring.",
+        "None.",
+    )
+    assert stiffness.applies_to(TOY)
+    assert not stiffness.applies_to(LONGITUDINAL)
+    keys = [e.key for e in sensor_effects(TOY)]
+    assert {
+        "attitude_lag",
+        "gyro_scale",
+        "accelerometer_arm",
+        "sensor_delay:left_rad",
+        "sensor_delay:right_rad",
+    } <= {*keys}

@@ -1,0 +1,111 @@
+"""A toy motion that no module of the package knows: a pendulum in a wind, with two controls and five derivatives.
+
+    theta' = q,   q' = 2 qbar (Cp_theta theta + Cp_q q c/(2V) + Cp_left left + Cp_right right + Cp_wind (wind + gust))
+
+Outputs theta, q and, late, the acceleration 3 q' of an instrument three metres away.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from airtruth.numerics.compiled import inner
+from airtruth.physics.motion import Motion
+from airtruth.physics.motion_parts import Coefficient, Control, Declared, Mode, Output, Signal, State
+from airtruth.tracing.model.by_motion import Equations, register
+
+TOY = Motion(
+    name="toy",
+    heading="Toy motion",
+    states=(State("theta", "theta_rad"), State("q", "q_rad_s")),
+    controls=(
+        Control("left", "left_rad", "left_command_rad", "left_actuator", "dl"),
+        Control("right", "right_rad", "right_command_rad", "right_actuator", "dr"),
+    ),
+    known=("airspeed_m_s",),
+    outputs=(
+        Output("theta", "theta_rad", "attitude"),
+        Output("q", "q_rad_s", "gyro"),
+        Output("az", "az_m_s2", "accelerometer", late=True),
+    ),
+    coefficients=(Coefficient("Cp", "moment of the pendulum", "chord"),),
+    signals=(
+        Signal("theta", "theta", "theta_rad"),
+        Signal("qhat", "q", "q_rad_s", "chord"),
+        Signal("left", "dl", "left_rad"),
+        Signal("right", "dr", "right_rad"),
+        Signal("wind", "w", "wind"),
+    ),
+    implicit=("Cp", "theta"),
+    gusts=("w",),
+    declared=(Declared("inertia", 1.0, divides=("Cp",)),),
+    modes=(Mode("pendulum_rad_s", "rad/s", "natural frequency"),),
+    required=("theta_rad", "q_rad_s"),
+)
+
+
+class ToyAircraft(NamedTuple):
+    """Derivatives (5,) [-] and half the chord [m]."""
+
+    derivatives: np.ndarray
+    half_chord_m: float
+
+
+class ToyPoint(NamedTuple):
+    """Inputs at one time."""
+
+    left: float
+    right: float
+    wind: float
+    airspeed_m_s: float
+
+
+class ToyGrid(NamedTuple):
+    """The same along a record, (points,) each."""
+
+    left: np.ndarray
+    right: np.ndarray
+    wind: np.ndarray
+    airspeed_m_s: np.ndarray
+
+
+ARM_M = 3.0
+QBAR = 50.0
+
+
+@inner
+def rates(x, at, model, out):
+    d, v = model.aircraft.derivatives, at.airspeed_m_s
+    drive = d[0] * x[0] + d[1] * x[1] * model.aircraft.half_chord_m / v + d[2] * at.left + d[3] * at.right
+    out[0] = x[1]
+    out[1] = 2.0 * QBAR * (drive + d[4] * (at.wind + model.gusts.level_m_s * x[3]))
+    a = v / model.gusts.length_m
+    out[2] = -a * x[2]
+    out[3] = a * (x[2] - x[3])
+    for i in range(4, model.states.motion):
+        out[i] = 0.0
+    return ARM_M * out[1]
+
+
+@inner
+def outputs(x, rate, force, at, model, y):
+    y[0], y[1], y[2] = x[0], x[1], force
+    for i in range(3):
+        y[i] *= model.sensors.scale[i]
+
+
+@inner
+def air_at(grid, point):
+    return ToyPoint(grid.left[point], grid.right[point], grid.wind[point], grid.airspeed_m_s[point])
+
+
+@inner
+def move_plays(x, at, model):
+    pass
+
+
+def settle(x, at, model):
+    pass
+
+
+register(ToyAircraft, ToyGrid, Equations(2, 2, rates, outputs, air_at, move_plays, settle))
