@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from airtruth.arguments import names, require_whole
 from airtruth.effects.effect import Effect
@@ -79,13 +79,13 @@ class TraceOptions:
             )
 
 
-def _candidates(given: str | Effect | Iterable[str | Effect]) -> tuple[str | Effect, ...]:
+def _candidates(given: Any) -> tuple[str | Effect, ...]:
     """Keys of the library, and effects that are not in it."""
     if isinstance(given, Effect):
         return (_candidate(given),)
     several = () if isinstance(given, str) or not isinstance(given, Iterable) else tuple(given)
     if not any(isinstance(one, Effect) for one in several):
-        return names("effects", given, "elevator_delay")  # type: ignore[arg-type]  # it refuses other types
+        return names("effects", given, "elevator_delay")
     keys = iter(names("effects", [one for one in several if not isinstance(one, Effect)], "elevator_delay"))
     return tuple(_candidate(one) if isinstance(one, Effect) else next(keys) for one in several)
 
