@@ -153,7 +153,7 @@ def test_the_frequency_response_of_a_known_model_lies_on_the_measurement():
 
 def test_correlations_are_those_of_the_covariance_and_of_the_scatter():
     result = identify(log(runs=13), GTM, ["ls"])
-    stated = stated_correlations(result.estimates)["ls"]
+    stated = stated_correlations(result.to_frame())["ls"]
     mean = result.of("ls").covariance.mean(axis=0)
     assert stated[0, 1] == pytest.approx(mean[0, 1] / math.sqrt(mean[0, 0] * mean[1, 1]), rel=1e-12)
     scatter = scattered_correlations(result.to_frame())["ls"]
