@@ -75,7 +75,7 @@ def test_every_format_gives_the_same_log_and_estimates(kind, log, gtm, tmp_path)
     )
     methods = ("ls", "iv-f1")
     before, after = (identify(log, gtm, methods).to_frame() for log in (kept, back))
-    for name in before.columns[4:-1]:
+    for name in before.columns[4:].drop("status"):
         np.testing.assert_allclose(after[name], before[name], rtol=1e-9, err_msg=name)
 
 

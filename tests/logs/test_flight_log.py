@@ -124,7 +124,7 @@ def test_repr_is_one_short_line(log: FlightLog) -> None:
         "21 channels: airspeed_m_s, alpha_rad, theta_rad, q_rad_s, ...)"
     )
     assert repr(log.select("a", "q_rad_s")) == "FlightLog(1 run of 0.58 s at 50 Hz, 1 channel: q_rad_s)"
-    assert repr(log.select([])).startswith("FlightLog(0 runs, 11 channels: ")
+    assert repr(log.select([])).startswith("FlightLog(0 runs, 21 channels: ")
 
 
 def test_html_lists_channels_with_units(log: FlightLog) -> None:

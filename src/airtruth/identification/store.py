@@ -20,14 +20,14 @@ from airtruth.identification.stored import KEY, KEYS, Stored, open_stored
 from airtruth.logs import ledger
 from airtruth.logs.remote import location
 from airtruth.logs.tables import write_parts
-from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
 
 if TYPE_CHECKING:
     import pandas as pd
 
 FILE: Final = "estimates.parquet"
 """Name of the file of estimates in a campaign folder."""
-FILES: Final[Mapping[str, str]] = {LONGITUDINAL.name: FILE, LATERAL.name: "estimates-lateral.parquet"}
+FILES: Final[Mapping[str, str]] = {m.name: m.estimates_file for m in MOTIONS.values()}
 """The same by the name of the motion."""
 
 
@@ -36,7 +36,7 @@ def beside(path: Path, motion: Motion) -> Path:
 
     Examples
     --------
-    >>> beside(Path("out/light.parquet"), LATERAL).name
+    >>> beside(Path("out/light.parquet"), MOTIONS["lateral"]).name
     'light-lateral.parquet'
     """
     return path if motion is LONGITUDINAL else path.with_name(f"{path.stem}-{motion.name}{path.suffix}")

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from airtruth.documents import read_json
 from airtruth.errors import LogError, StoreError, choices
-from airtruth.identification import FILES
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.reporting.columns import Kind, flags, numbers, read_columns, texts
 from airtruth.reporting.paper.published import ESTIMATED
@@ -217,7 +216,7 @@ def writers(folder: Path) -> tuple[str, str]:
     """The commands that write the truth and the estimates of a folder, for messages."""
     shown = quote(str(folder))
     # a campaign of lateral records has estimates of the lateral motion alone, which tables and reports do not show
-    motion = f" --motion {LONGITUDINAL.name}" if (folder / FILES[LATERAL.name]).exists() else ""
+    motion = f" --motion {LONGITUDINAL.name}" if (folder / LATERAL.estimates_file).exists() else ""
     return (
         f"`airtruth fly CAMPAIGN.toml --out {shown}`",
         f"`airtruth identify {shown} --aircraft AIRCRAFT{motion}`",
