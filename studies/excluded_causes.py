@@ -3,7 +3,7 @@
 Flies the trial of `data/undeclared/b.parquet`, a vane 1.6 m ahead of its declared location in light turbulence, with fresh seeds:
 manoeuvres, noise, gusts and the errors of the declared derivatives differ. The check sees all six records, and the four that a
 trace would fit. It has excluded the cause if no possible set of errors contains it or an error that moves alpha alike; by its
-level `EQUAL` that happens by noise alone in 0.5 % of the flights for each set that is compared with it.
+level `EQUAL`, noise alone should do so in 0.5 % of the flights for each set that is compared with it.
 
     python -m studies.excluded_causes [--flights N] [--seed S]
 """

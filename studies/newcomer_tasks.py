@@ -195,7 +195,15 @@ TASKS: Final = (
             f"check {LOG} --aircraft gtm --json",
         ),
     ),
-    Task("export the state-space model", ("export --help",)),
+    Task(
+        "export the state-space model",
+        (
+            f"identify {LOG} --aircraft gtm --method ls --out estimates.parquet",
+            "export estimates.parquet --method ls --out short_period.mat",
+            "export gtm --airspeed-m-s 43 --altitude-m 2134 --out gtm.json",
+        ),
+        ("short_period.mat", "gtm.json"),
+    ),
     Task("read the estimates with pandas", (f"python:{PANDAS}",)),
 )
 """The tasks, in an order in which each finds the files of those before."""

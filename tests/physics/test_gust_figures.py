@@ -124,7 +124,7 @@ def test_the_ends_of_a_table_belong_to_it(figures: str, lowest_ft: float, highes
 
 
 def test_the_side_gust_is_that_of_its_source() -> None:
-    """GTM_DesignSim: v as w. MIL-F-8785C, 3.7.3.4 at 500 ft: sigma_v/sigma_w = (.177 + .000823 h)^-.4, Lv = h/(...)^1.2."""
+    """GTM: v as w; MIL-F-8785C, figures 10, 11 (500 ft): sigma_v/sigma_w = (.177 + .000823 h)^-.4, Lv = h/(...)^1.2."""
     gtm = gust_scales("gtm", "light", 7000 * FT)
     assert side_gust("gtm", gtm) == (gtm.sigma_w_m_s, gtm.length_w_m)
     low = gust_scales("mil-f-8785c", "moderate", 500 * FT)

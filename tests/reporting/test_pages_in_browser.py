@@ -202,6 +202,9 @@ def test_the_selector_shows_each_record(tabs, pages):
     below = "(() => {{ const b = document.getElementById('below'); b.value = '{}'; b.dispatchEvent(new Event('change')); }})()"
     tab.run(below.format("innovation"))
     assert "innovation" in tab.run("document.querySelectorAll('.plot h3')[2].textContent")
+    tab.run(below.format("pitch"))
+    assert "pitch change [deg]" in tab.run("document.querySelectorAll('.plot h3')[4].textContent")
+    tab.run(below.format("innovation"))
     button = "document.querySelector('#toggles button')"
     drawn = tab.run("document.querySelectorAll('.uplot canvas')[1].toDataURL()")
     tab.run(f"{button}.click()")

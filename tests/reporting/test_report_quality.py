@@ -1,5 +1,6 @@
 """Headline, agreement, frequency response and correlation of a page: by hand and against independent computation."""
 
+import base64
 import json
 import math
 from dataclasses import replace
@@ -131,6 +132,52 @@ def test_the_plots_state_tolerances_in_their_units():
     assert data["tolerances"] == pytest.approx([0.0, 2.0, 0.1 * 9.80665])
     assert [kind for _, kind in data["keys"]] == ["measured", "tolerance", "band"]
     assert set(OF_CHANNEL) == {"q_rad_s", "az_m_s2"}
+
+
+def test_the_pitch_of_the_plots_is_the_integral_of_q_with_its_tolerance():
+    """q = A cos(w t) has the pitch A/w sin(w t); the limits are 1.5 deg from the measured one (Part 60, 2.c.10)."""
+    given = histories()
+    t, w = given.first.t_s, 3.0
+
+    def turned(run, amplitude):
+        return {**run, "q_rad_s": amplitude * np.cos(w * t)}
+
+    records = tuple(
+        replace(
+            r,
+            measured=turned(r.measured, 0.2),
+            models={m: turned(own, 0.1) for m, own in r.models.items()},
+        )
+        for r in given.records
+    )
+    body = records_section(replace(given, records=records)).body
+    data = json.loads(body.split('id="records-data">')[1].split("</script>")[0])
+    assert '<option value="pitch">' in body
+    assert data["pitch"] == {"channel": "q [deg/s]", "tolerance": pytest.approx(1.5)}
+    for stated in data["records"]:
+        measured, *models = (np.frombuffer(base64.b64decode(x), dtype="<f4") for x in stated["pitch"])
+        assert len(models) == len(given.models)
+        # trapezoidal rule: relative error (w dt)^2/12 = 3e-4 at 50 Hz
+        for found, amplitude in ((measured, 0.2), *((m, 0.1) for m in models)):
+            exact = np.rad2deg(amplitude / w * np.sin(w * t))
+            np.testing.assert_allclose(found, exact, rtol=0, atol=4e-4 * np.rad2deg(amplitude / w))
+        low, high = (measured + side * data["pitch"]["tolerance"] for side in (-1.0, 1.0))
+        assert (high - low) == pytest.approx(np.full(len(t), 3.0))
+        # 0.1/3 rad = 1.91 deg apart at most: the simulation leaves the corridor
+        assert ((models[0] < low) | (models[0] > high)).any()
+
+
+def test_pitch_is_offered_only_where_q_was_recorded():
+    def without(run):
+        return {c: x for c, x in run.items() if c != "q_rad_s"}
+
+    given = histories()
+    records = tuple(
+        replace(r, measured=without(r.measured), models={m: without(own) for m, own in r.models.items()})
+        for r in given.records
+    )
+    body = records_section(replace(given, records=records)).body
+    assert '<option value="pitch">' not in body
 
 
 def test_the_frequency_response_of_a_known_model_lies_on_the_measurement():

@@ -1,7 +1,7 @@
 """Physical tests of a log: how far each relation between channels is from the one that physics requires.
 
-Body axes, air at rest, here wings level (R. V. Jategaonkar, *Flight Vehicle System Identification*, 2006, eqs 10.7
-and 10.8; `airtruth.checks.rotation` where bank, roll and yaw are recorded), with the specific forces ax, az and the flight-path
+Body axes, air at rest, here wings level (R. V. Jategaonkar, *Flight Vehicle System Identification*, 2006, chapter
+10; `airtruth.checks.rotation` where bank, roll and yaw are recorded), with the specific forces ax, az and the flight-path
 angle gamma = theta - alpha:
 
     theta' = q

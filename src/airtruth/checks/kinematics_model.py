@@ -1,7 +1,7 @@
 """Kinematics in the vertical plane: theta, alpha and airspeed that follow from rates and specific forces.
 
 No aerodynamic model enters. In the plane of symmetry, here wings level, in air at rest (R. V. Jategaonkar,
-*Flight Vehicle System Identification*, 2006, eqs 10.7 and 10.8 without lateral motion, in wind axes):
+*Flight Vehicle System Identification*, 2006, chapter 10, without lateral motion, in wind axes):
 
     theta' = q
     alpha' = q + (az cos(alpha) - ax sin(alpha) + g cos(theta - alpha))/V

@@ -27,7 +27,9 @@ FALSE: Final = 1e-3
 """Probability of a further error that is absent, for each candidate [-]: judgement; 14 candidates then give a false one
 in 1.4 % of the records."""
 EQUAL: Final = 5e-3
-"""Probability that noise alone makes the true set worse than another one by more than the margin [-]: judgement."""
+"""Probability that noise alone makes the true set worse than another one by more than the margin [-]: judgement.
+It is the level of one comparison if the noise is as modelled; over all comparisons of a flight, a check of six records excluded
+the true cause in 6 of 100 (`studies.excluded_causes`)."""
 BEAM: Final = 4
 """Sets that are continued with a further error [-]: judgement."""
 TRIED: Final = 7

@@ -1,7 +1,7 @@
 """Rates of attitude and flow angles in general motion, of which the wings-level ones are the special case.
 
 Body axes, air at rest, specific forces ax, ay, az (B. L. Stevens and F. L. Lewis, *Aircraft Control and Simulation*, 2nd ed.,
-2003, table 2.5-1; with u, v, w in polar form):
+2003; with u, v, w in polar form):
 
     phi'   = p + (q sin phi + r cos phi) tan theta
     theta' = q cos phi - r sin phi

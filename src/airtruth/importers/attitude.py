@@ -22,8 +22,8 @@ def euler_angles(
     """Roll phi, pitch theta and heading psi [rad] of unit quaternions.
 
     With the rotation matrix R from body axes (forward, right, down) to north, east, down, tan phi = R32/R33, sin theta =
-    -R31 and tan psi = R21/R11 (B. L. Stevens and F. L. Lewis, *Aircraft Control and Simulation*, 2nd ed., 2003, eqs
-    1.3-21 and 1.3-22). A quaternion and its negative have the same angles.
+    -R31 and tan psi = R21/R11 (B. L. Stevens and F. L. Lewis, *Aircraft Control and Simulation*, 2nd ed., 2003). A
+    quaternion and its negative have the same angles.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def euler_angles(
 def air_angles(u_m_s: Array, v_m_s: Array, w_m_s: Array) -> tuple[Array, Array, Array]:
     """Airspeed [m/s], angle of attack and angle of sideslip [rad] of a velocity relative to the air in body axes.
 
-    V = sqrt(u^2 + v^2 + w^2), tan alpha = w/u, sin beta = v/V (Stevens and Lewis, eqs 2.3-6).
+    V = sqrt(u^2 + v^2 + w^2), tan alpha = w/u, sin beta = v/V (Stevens and Lewis).
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Agreement of a simulation with a measurement: R2, and Theil's inequality coefficient with its proportions.
 
 Sources: H. Theil, Applied Economic Forecasting, North-Holland, 1966, chapter 2; R. V. Jategaonkar, Flight Vehicle System
-Identification, AIAA, 2nd ed., 2015, chapter 11.
+Identification, AIAA, 2nd ed., 2015, the chapter on model validation.
 """
 
 from __future__ import annotations

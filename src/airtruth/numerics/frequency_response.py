@@ -1,7 +1,7 @@
 """Frequency response of records of one input and one output, with its coherence and random error.
 
 The spectra are averaged over the records and over neighbouring lines. Sources: J. S. Bendat and A. G. Piersol, Random
-Data, 4th ed., Wiley, 2010, eqs (6.37), (6.39) and (9.90); M. B. Tischler and R. K. Remple, Aircraft and Rotorcraft System
+Data, 4th ed., Wiley, 2010; M. B. Tischler and R. K. Remple, Aircraft and Rotorcraft System
 Identification, AIAA, 2nd ed., 2012, chapter 7.
 """
 
@@ -22,7 +22,7 @@ LEAST_COHERENCE: Final = 0.6
 LEVEL: Final = 0.05
 """Level of the test that input and output are related at all [-]."""
 _TAPER: Final = 0.1
-"""Share of a record over which its ends are tapered [-] (Bendat and Piersol, section 11.5.2)."""
+"""Share of a record over which its ends are tapered [-] (Bendat and Piersol)."""
 _PER_OCTAVE: Final = 6
 """Bands in an octave [-]; judgement: a short period of damping .3 is half an octave wide."""
 

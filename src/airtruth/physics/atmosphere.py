@@ -145,8 +145,8 @@ def true_airspeed_of_calibrated_m_s(
     """True airspeed [m/s] of a calibrated airspeed [m/s] at a static pressure [Pa] and a density [kg/m3].
 
     The impact pressure is that of the calibrated airspeed at sea level, and that of the true airspeed at the static
-    pressure: q_c = p ((1 + (k - 1)/2 M^2)^(k/(k - 1)) - 1), isentropic and below Mach 1 (NACA Report 1135, 1953, eq.
-    44), with M^2 = V^2 rho/(k p). At small M it becomes rho0 CAS^2 = rho TAS^2. Shapes broadcast.
+    pressure: q_c = p ((1 + (k - 1)/2 M^2)^(k/(k - 1)) - 1), isentropic and below Mach 1 (NACA Report 1135, 1953),
+    with M^2 = V^2 rho/(k p). At small M it becomes rho0 CAS^2 = rho TAS^2. Shapes broadcast.
     """
     half, power = 0.5 * (HEAT_RATIO - 1.0), HEAT_RATIO / (HEAT_RATIO - 1.0)
     p = np.asarray(pressure_pa, dtype=np.float64)

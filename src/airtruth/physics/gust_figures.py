@@ -39,7 +39,7 @@ _GTM_GAINS: Final = {"light": (0.2, 0.17), "moderate": (0.4, 0.34), "severe": (1
 factors of "moderate"; here it is the table itself."""
 
 _MIL_W20_KT: Final = {"light": 15.0, "moderate": 30.0, "severe": 45.0}
-"""Wind speed at 20 ft (MIL-F-8785C, 3.7.3.4) [kt]."""
+"""Wind speed at 20 ft (MIL-F-8785C) [kt]."""
 _MIL_ALTITUDE_FT: Final = (1750.0, 3750.0, 7500.0, 15e3, 25e3, 35e3, 45e3, 55e3, 65e3, 75e3, 80e3)
 """Altitudes of `_MIL_SIGMA_FT_S` [ft]."""
 _MIL_SIGMA_FT_S: Final = {
@@ -60,7 +60,7 @@ def _gtm(level: str, altitude_ft: float) -> GustScales:
 
 
 def _mil_f_8785c(level: str, altitude_ft: float) -> GustScales:
-    """Low-altitude model (3.7.3.4) to 1000 ft, medium and high (3.7.2) from 2000 ft, linear between."""
+    """Low-altitude model (figures 10 and 11) to 1000 ft, medium and high (3.7.2) from 2000 ft, linear between."""
     low = min(altitude_ft, 1000.0)
     ratio = 0.177 + 0.000823 * low
     sigma_w = 0.1 * _MIL_W20_KT[level] * KT
@@ -93,7 +93,7 @@ FIGURES: Final[dict[str, Figures]] = {
     "mil-f-8785c": Figures(_mil_f_8785c, 10.0, 80000.0, side="u"),
 }
 """Sources of gust figures by name. The GTM simulator gives v the figures of w, the specification those of u (sigma_u = sigma_v,
-Lu = Lv: 3.7.2 and 3.7.3.4)."""
+Lu = Lv)."""
 
 
 def gust_scales(figures: str, level: str, altitude_m: float, factor: float = 1.0) -> GustScales:

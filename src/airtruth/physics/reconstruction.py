@@ -1,6 +1,6 @@
 """Angle of attack without a vane, from inertial measurements and airspeed, with the directions of its errors.
 
-Wings level, air at rest (R. V. Jategaonkar, *Flight Vehicle System Identification*, 2006, eqs 10.7 and 10.8), with
+Wings level, air at rest (R. V. Jategaonkar, *Flight Vehicle System Identification*, 2006, chapter 10), with
 the flight-path angle gamma = theta - alpha:
 
     theta' = q,   gamma' = -(az cos(alpha) - ax sin(alpha) + g cos(gamma))/V,   h' = V sin(gamma)

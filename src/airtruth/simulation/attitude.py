@@ -17,7 +17,7 @@ class Attitude(NamedTuple):
 def straight_attitude(alpha_rad: float, beta_rad: float, phi_rad: float, gamma_rad: float) -> Attitude:
     """Return the attitude in which the flight path has a given angle and leads north.
 
-    Stevens, Lewis and Johnson, Aircraft Control and Simulation, 3rd ed., 2016, eq. (3.6-3), the rate-of-climb constraint.
+    Stevens, Lewis and Johnson, Aircraft Control and Simulation, 3rd ed., 2016, the rate-of-climb constraint.
 
     Parameters
     ----------

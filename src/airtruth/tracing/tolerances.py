@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.physics.proof_of_match import NORMAL_M_S2, PITCH_RAD, RATE_RAD_S, SOURCE
+from airtruth.physics.proof_of_match import NORMAL_M_S2, PITCH_RAD, RATE_RAD_S, SOURCE, pitch_change
 from airtruth.tracing.inference.assess import Assessment
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.model.compile import CHANNELS
@@ -52,7 +52,7 @@ def excursion(residual: Array, dt_s: float) -> Excursion:
     dt_s : sample period [s].
     """
     q, az = residual[:, _Q], residual[:, _AZ]
-    pitch = np.concatenate([[0.0], np.cumsum(0.5 * dt_s * (q[1:] + q[:-1]))])
+    pitch = pitch_change(q, dt_s * np.arange(len(q), dtype=np.float64))
     motion = (np.abs(pitch) <= PITCH_RAD) | (np.abs(q) <= RATE_RAD_S)
     inside = motion & (np.abs(az) <= NORMAL_M_S2)
     return Excursion(

@@ -1,7 +1,7 @@
 """What physics says of the lateral-directional columns of an assignment.
 
 With the Euler angles phi, theta, psi and the rates p, q, r in body axes (B. L. Stevens and F. L. Lewis, *Aircraft Control and
-Simulation*, 2nd ed., 2003, 1.4):
+Simulation*, 2nd ed., 2003):
 
     phi' = p + tan(theta) (q sin(phi) + r cos(phi))
     psi' = (q sin(phi) + r cos(phi)) / cos(theta)

@@ -21,7 +21,7 @@ _HELD: Final = "held out"
 """Group of the records that a trace did not fit."""
 _NOTE: Final = (
     "R2: share of the measured variance that the simulation explains. U: Theil's inequality coefficient, 0 for a perfect "
-    "match; values below 0.25 to 0.3 are usually good (Jategaonkar, 2015). bias, variance, covariance: shares of the mean "
+    "match, 1 for the worst (Jategaonkar, 2015). bias, variance, covariance: shares of the mean "
     "square error that come from different means, different amplitudes, and a lack of correlation. Each record counts "
     "about its measured mean."
 )

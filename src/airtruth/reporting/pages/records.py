@@ -15,7 +15,14 @@ from airtruth.channels import shown
 from airtruth.charts import colours_of
 from airtruth.charts.model import MODELS
 from airtruth.logs.histories import Histories, History
-from airtruth.physics.proof_of_match import NORMAL_M_S2, OF_CHANNEL, PITCH_RAD, RATE_RAD_S, SOURCE
+from airtruth.physics.proof_of_match import (
+    NORMAL_M_S2,
+    OF_CHANNEL,
+    PITCH_RAD,
+    RATE_RAD_S,
+    SOURCE,
+    pitch_change,
+)
 from airtruth.reporting.pages.agreement import agreement_of_records, agreement_table
 from airtruth.reporting.pages.page import Section, as_json, data_table, notes_html
 from airtruth.table import MISSING, Number, Row, Table, flat
@@ -45,6 +52,8 @@ _QUANTITIES: Final = (
     ("sample_rate_hz", "sample rate [Hz]", 1.0, 1),
 )
 """Conditions of a record: key, heading with the display unit, that unit in SI, decimals."""
+_Q: Final = "q_rad_s"
+"""Channel whose integral is the pitch angle."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +78,10 @@ def extract(histories: Histories) -> Extract:
     kept = {round(k) for k in np.linspace(0, len(own) - 1, min(MOST, len(own)))}
     kept |= {own.index(histories.first)}
     records = tuple(own[k] for k in sorted(kept))
-    series = 2 + max(len(r.measured) * (1 + len(r.models) + len(r.innovations)) for r in records)
+    series = 2 + max(
+        len(r.measured) * (1 + len(r.models) + len(r.innovations)) + (_Q in r.measured) * (1 + len(r.models))
+        for r in records
+    )
     samples = max(len(r.t_s) for r in records)
     allowed = max(_LEAST, int(BUDGET / (_BYTES * series * len(records))))
     step = max(1, math.ceil(samples / allowed))
@@ -103,6 +115,8 @@ def records_section(histories: Histories | None, reason: str = "", note: str = "
     below = '<option value="residual">residual</option>'
     if all(r.innovations for r in chosen.records):
         below += '<option value="innovation">innovation</option>'
+    if all(_Q in r.measured for r in chosen.records):
+        below += '<option value="pitch">pitch</option>'
     controls = (
         f'<div class="controls"><label>Record <select id="record">{options}</select></label>'
         '<button type="button" id="record-previous" title="previous record">&lsaquo;</button>'
@@ -123,8 +137,8 @@ def records_section(histories: Histories | None, reason: str = "", note: str = "
             [
                 "Drag over a plot to zoom all of them; a double click shows the whole record.",
                 f"Tolerance of a training simulator ({SOURCE}), dashed in a residual: "
-                f"q within {RATE_RAD_S / DEG:g} deg/s, or pitch within {PITCH_RAD / DEG:g} deg (not "
-                f"drawn), and az within {NORMAL_M_S2 / G0:.2f} g of the measurement.",
+                f"q within {RATE_RAD_S / DEG:g} deg/s, or pitch within {PITCH_RAD / DEG:g} deg "
+                f"(select it below), and az within {NORMAL_M_S2 / G0:.2f} g of the measurement.",
                 *([note] if note else []),
                 *chosen.notes,
             ]
@@ -150,6 +164,7 @@ def _data(histories: Histories, chosen: Extract) -> dict[str, object]:
         "first": [r.run_id for r in chosen.records].index(histories.first.run_id),
         "channels": [shown(c)[0] for c in first.measured],
         "tolerances": [OF_CHANNEL.get(c, 0.0) * shown(c)[1] for c in first.measured],
+        "pitch": {"channel": shown(_Q)[0], "tolerance": PITCH_RAD / DEG},
         "keys": _keys(chosen),
         "models": [
             {"name": m, "colour": colours[m], "dash": list(_DASHES[min(ranks[m], 2)])}
@@ -168,6 +183,7 @@ def _record(record: History, models: tuple[str, ...], step: int) -> dict[str, ob
             single = np.ascontiguousarray(values[::step] * factor, dtype="<f4")
         return base64.b64encode(single.tobytes()).decode("ascii")
 
+    runs = [record.measured, *(record.models[m] for m in models)]
     floor = [record.floor.get(c, 0.0) * f for c, f in zip(channels, factors, strict=True)]
     return {
         "name": record.run_id,
@@ -181,6 +197,7 @@ def _record(record: History, models: tuple[str, ...], step: int) -> dict[str, ob
         "innovations": [[encoded(record.innovations[m][c]) for c in channels] for m in models]
         if record.innovations
         else [],
+        "pitch": [encoded(pitch_change(own[_Q], record.t_s), 1.0 / DEG) for own in runs if _Q in own],
         "floor": [x if math.isfinite(x) else 0.0 for x in floor],
     }
 

@@ -154,7 +154,7 @@ def correlation_section(
         )
         for method, matrix in correlations.items()
     )
-    note = f"{of} Beyond 0.9 in size, the records do not separate the two derivatives (Jategaonkar, 2015, ch. 11)."
+    note = f"{of} Beyond 0.9 in size, the records do not separate the two derivatives (Jategaonkar, 2015)."
     table = Table(heading, ("", *PARAMETERS), groups, (note,))
     return (chart,), Section(heading, anchor, chart_html(chart) + data_table(table, "correlation"))
 

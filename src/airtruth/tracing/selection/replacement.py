@@ -13,8 +13,9 @@ from airtruth.tracing.selection.significance import BEYOND_DOUBT, REMAINS
 STRONG_ODDS: Final = float(np.log(AS_PROBABLE))
 """Log-posterior, negative, by which a set of fewer effects may be behind."""
 KINEMATIC_ODDS: Final = -5.0
-"""Log-posterior by which a set that explains the kinematics may be behind one that does not [-] (judgement: odds of 150, as the
-kinematic check excludes the true set with a probability of 0.005)."""
+"""Log-posterior by which a set that explains the kinematics may be behind one that does not [-] (judgement: odds of 150, from
+the level of 0.005 of one comparison of the kinematic check; measured, the check of six records excluded the true cause in 6 of
+100 flights, odds of 16)."""
 CLEAN: Final = 0.05
 """Probability of the remaining anomaly from which a search explains the records, so that no tied effect is tried
 instead [-] (convention)."""

@@ -206,6 +206,12 @@
       plotOf(channel, 150, [points, ...data.models.map(lineOf)], [time, measured, ...models], 0, false,
         data.tolerances[i], measured);
       const isLast = i === data.channels.length - 1;
+      if (below.value === "pitch" && channel === data.pitch.channel) { // the integral of q from the first sample
+        const [angle, ...angles] = record.pitch.map(numbers);
+        plotOf("pitch change [deg]", isLast ? 126 : 104, [points, ...data.models.map(lineOf)], [time, angle, ...angles],
+          0, isLast, data.pitch.tolerance, angle);
+        return;
+      }
       if (below.value === "innovation") {
         plotOf(`${channel.split(" ")[0]} innovation [\u03c3]`, isLast ? 126 : 104, data.models.map(lineOf),
           [time, ...record.innovations.map((own) => numbers(own[i]))], 2, isLast);
