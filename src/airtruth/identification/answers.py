@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from airtruth.arguments import names
 from airtruth.errors import ConfigurationError, choices
 from airtruth.identification.condition import AircraftConstants
 from airtruth.identification.excited import excited_motions
@@ -76,6 +77,8 @@ def answers(
 def _of(methods: Given, motion: Motion) -> tuple[str | Method, ...]:
     if methods is None:
         return (DEFAULT[motion.name],)
+    if not isinstance(methods, str | Method | Iterable):
+        names("methods", methods, "ls")
     return (methods,) if isinstance(methods, str | Method) else tuple(methods)
 
 
