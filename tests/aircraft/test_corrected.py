@@ -12,7 +12,8 @@ from airtruth.physics.terms import AeroTerm, Change, DeclaredTerm, SensorTerm, S
 from airtruth.simulation.linearise import linearise
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import trim
-from airtruth.units import DEG, G0
+from airtruth.units import DEG, FT, G0, KT
+from tests.simulation.fly_campaigns import channel, fly
 from validation import small_aircraft as small
 
 ALPHA, ELEVATOR = 3.0 * DEG, -2.0 * DEG
@@ -91,3 +92,24 @@ def test_the_reference_of_an_elevator_that_is_less_effective(tmp_path):
     at = reference_point(plane, values, AT, Change(declared=(DeclaredTerm("elevator", 0.8),)))
     assert at.elevator_rad == pytest.approx(0.8 * ELEVATOR, rel=1e-12)
     assert at.az_m_s2 == pytest.approx(AT.az_m_s2, rel=1e-12)
+
+
+def test_a_campaign_flies_it(tmp_path):
+    """Trim, gust and log of a campaign; the surface repeats the command 60 ms later, at 50 Hz three samples."""
+    plane = small.declared(tmp_path)
+    delay = Change(surface=(SurfaceTerm("delay", 0.06),))
+    bare = plane.model_copy(update={"file": plane.file.model_copy(update={"elevator_actuator": None})})
+    new = write_corrected(bare, plane.file.derivatives, AT, delay, tmp_path / "new" / "small")
+    eas = float(equivalent_airspeed_m_s(AT.airspeed_m_s, AT.density_kg_m3)) / KT
+    altitude = float(altitude_of_density_m(AT.density_kg_m3)) / FT
+    flown = fly(
+        tmp_path / "flown",
+        aircraft=new.folder,
+        runs=1,
+        condition={"eas_kt": eas, "altitude_ft": altitude},
+        gust={"level": "light", "figures": "mil-f-8785c"},
+        sensors={"ideal": True},
+    )
+    command, surface = channel(flown, "elevator_command_rad"), channel(flown, "elevator_rad")
+    assert np.ptp(command) == pytest.approx(4.0 * DEG, rel=0.01)  # a doublet of 2 deg
+    np.testing.assert_allclose(surface[3:], command[:-3], rtol=0.0, atol=1e-9)

@@ -211,6 +211,14 @@ def test_a_part_that_is_shorter_than_a_run_is_left_out_and_named():
     assert any("part 1" in text and "shorter than a run" in text for text in log.metadata["reading"])
 
 
+@pytest.mark.parametrize("last_s", [1e30, 1.7e308])
+def test_a_damaged_time_before_a_restart_is_refused(last_s):
+    source = restarted(100.0, 0.0)
+    source.arrays["t"][299] = last_s
+    with pytest.raises(LogError, match=r"f\.csv"):
+        convert(source, MappingFile.model_validate(SPEED))
+
+
 @pytest.mark.parametrize("order", [[0, 2, 1, 3], [0, 1, 3, 2]])
 def test_rows_out_of_order_are_refused(order):
     source = restarted(100.0)

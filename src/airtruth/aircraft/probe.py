@@ -80,7 +80,8 @@ def probe(folder: Path, jsbsim_json: str) -> Constants:
     scratch = private_folder()
     try:
         output = scratch / "output"
-        arguments = {"folder": str(folder.absolute()), "jsbsim_json": jsbsim_json, "output": str(output)}
+        arguments = {key: table[key] for key in ("root", "model", "declare")}
+        arguments |= {"folder": str(folder.absolute()), "properties": _named(table), "output": str(output)}
         task = Task("airtruth.aircraft.probe_child:load", arguments, _LIMITS, _MODULES)
         try:
             answer: dict[str, Any] = dict(call(task).facts)
@@ -104,6 +105,16 @@ def _explain(error: IsolatedError, output: Path) -> str:
     printed = output.read_text(encoding="utf-8", errors="replace") if output.is_file() else ""
     lines = printed.strip().splitlines()[-_OUTPUT_LINES:]
     return f"JSBSim died while loading the model ({error.detail}); its output:\n  " + "\n  ".join(lines)
+
+
+def _named(table: dict[str, Any]) -> list[str]:
+    """Properties of the [jsbsim] table, which the model has to have."""
+    elevator, throttle = table["elevator"], table["throttle"]
+    names = [elevator["command"], elevator["surface"], *throttle["command"], *throttle["trim"], *table["set"]]
+    names += [*(table["augmentation"] or {}).values(), *(table["lateral"] or {}).values()]
+    for surface in filter(None, (table["aileron"], table["rudder"])):
+        names += [surface["command"], surface["surface"]]
+    return names + [table[key] for key in _WRITTEN if table[key]]
 
 
 def _refuse_control(folder: Path, table: dict[str, Any]) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +12,17 @@ from airtruth.errors import choices
 from airtruth.isolation.protocol import Reply
 
 
-def load(folder: str, jsbsim_json: str, output: str) -> Reply:
+def load(
+    folder: str, root: str, model: str, declare: Mapping[str, float], properties: Sequence[str], output: str
+) -> Reply:
     """Load a model and return "constants", or "error", why it cannot be used.
 
     Parameters
     ----------
-    folder : folder of aircraft.toml; jsbsim_json : its [jsbsim] table as JSON; output : file that receives what JSBSim prints.
+    folder : folder of aircraft.toml.
+    root, model, declare : entries of its [jsbsim] table.
+    properties : properties that the model has to have.
+    output : file that receives what JSBSim prints.
     """
     import jsbsim
 
@@ -25,28 +30,29 @@ def load(folder: str, jsbsim_json: str, output: str) -> Reply:
     for standard in (1, 2):
         os.dup2(descriptor, standard)
     jsbsim.set_logger(jsbsim.DefaultLogger())  # another task may have silenced it
-    return Reply(_load(Path(folder), json.loads(jsbsim_json)))
+    return Reply(_load(Path(folder), root, model, declare, properties))
 
 
-def _load(folder: Path, table: dict[str, Any]) -> dict[str, Any]:
+def _load(
+    folder: Path, root: str, model: str, declare: Mapping[str, float], properties: Sequence[str]
+) -> dict[str, Any]:
     import jsbsim
 
-    root, aircraft, *_ = model_root(folder, table["root"])
-    model = table["model"]
-    xml = model_file(folder, table["root"], model)
+    base, aircraft, *_ = model_root(folder, root)
+    xml = model_file(folder, root, model)
     if not xml.is_file():
         known = {p.name for p in aircraft.iterdir() if (p / f"{p.name}.xml").is_file()}
         return {"error": f"jsbsim.model: no {model}.xml below {aircraft}; {choices(model, known)}"}
     try:
-        fdm = jsbsim.FGFDMExec(str(root))
+        fdm = jsbsim.FGFDMExec(str(base))
         fdm.set_debug_level(0)
-        for name, value in table["declare"].items():
+        for name, value in declare.items():
             fdm[name] = value
-        if not load_model(fdm, folder, table["root"], model):
+        if not load_model(fdm, folder, root, model):
             return {"error": f"JSBSim refused {xml} for the reason above"}
         fdm.disable_output()
         manager = fdm.get_property_manager()
-        missing = [p for p in _named(table) if not manager.hasNode(p)]
+        missing = [p for p in properties if not manager.hasNode(p)]
         if missing:
             return {"error": _explain_missing(fdm, missing)}
         fdm["ic/h-sl-ft"] = 3000.0
@@ -55,15 +61,6 @@ def _load(folder: Path, table: dict[str, Any]) -> dict[str, Any]:
     except (jsbsim.BaseError, RuntimeError, KeyError) as error:
         return {"error": f"JSBSim refused {xml}: {error}"}
     return {"constants": constants_of(fdm).model_dump()}
-
-
-def _named(table: dict[str, Any]) -> list[str]:
-    elevator, throttle = table["elevator"], table["throttle"]
-    names = [elevator["command"], elevator["surface"], *throttle["command"], *throttle["trim"], *table["set"]]
-    names += [*(table["augmentation"] or {}).values(), *(table["lateral"] or {}).values()]
-    for surface in filter(None, (table["aileron"], table["rudder"])):
-        names += [surface["command"], surface["surface"]]
-    return names + [table[key] for key in ("six_axes", "rotary_gust", "roll_gust", "yaw_gust") if table[key]]
 
 
 def _explain_missing(fdm: Any, missing: list[str]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -176,7 +175,7 @@ def _continued(moving: Sequence[Clocked]) -> Parts:
         pieces = [np.split(one.t_s, one.starts)[number] for one in moving]
         low, high = min(float(t[0]) for t in pieces), max(float(t[-1]) for t in pieces)
         if number:
-            offsets.append(math.ceil(spans[-1][1] + PAUSE_S - low))
+            offsets.append(float(np.ceil(spans[-1][1] + PAUSE_S - low)))  # math.ceil has no infinity
         spans.append((low + offsets[-1], high + offsets[-1]))
         long.append(max(len(t) for t in pieces) >= MINIMUM_SAMPLES)
     return Parts(tuple(offsets), tuple(spans), tuple(long))
