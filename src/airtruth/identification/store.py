@@ -18,17 +18,18 @@ from airtruth.errors import LogError, StoreError
 from airtruth.identification.result import IdentificationResult, Settings, SpooledResult
 from airtruth.identification.stored import KEY, KEYS, Stored, open_stored
 from airtruth.logs import ledger
+from airtruth.logs.names import ESTIMATES
 from airtruth.logs.remote import location
 from airtruth.logs.tables import write_parts
-from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
+from airtruth.physics.motion import LONGITUDINAL, Motion
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FILE: Final = "estimates.parquet"
-"""Name of the file of estimates in a campaign folder."""
-FILES: Final[Mapping[str, str]] = {LONGITUDINAL.name: FILE, LATERAL.name: "estimates-lateral.parquet"}
-"""The same by the name of the motion."""
+FILES: Final[Mapping[str, str]] = ESTIMATES
+"""Name of a motion -> name of its file of estimates in a campaign folder."""
+FILE: Final = FILES[LONGITUDINAL.name]
+"""That of the longitudinal motion."""
 
 
 def beside(path: Path, motion: Motion) -> Path:
@@ -36,6 +37,7 @@ def beside(path: Path, motion: Motion) -> Path:
 
     Examples
     --------
+    >>> from airtruth.physics.motion import LATERAL
     >>> beside(Path("out/light.parquet"), LATERAL).name
     'light-lateral.parquet'
     """
