@@ -14,7 +14,7 @@ from airtruth.errors import ConfigurationError, StoreError
 from airtruth.exporting.model import SYSTEMS, LinearModel, OperatingPoint
 from airtruth.identification import identify
 from airtruth.identification.store import write_estimates
-from airtruth.physics.motion import LATERAL, LONGITUDINAL
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.short_period import modal, scale
 from airtruth.units import DEG
 from validation.linear_flight import GTM, as_log, fly
@@ -63,22 +63,6 @@ def test_the_covariance_is_that_of_drawn_derivatives():
     assert np.abs(scaled).max() < 0.06
     frame = MODEL.to_frame().set_index("entry")
     np.testing.assert_allclose(frame.loc["A(1,1)", "std"], sigma[0])
-
-
-def test_another_motion_is_an_entry_of_the_table(monkeypatch, tmp_path):
-    """Four states and two inputs, by a system that is affine in the fifteen derivatives."""
-
-    def system(theta, at):
-        a = np.arange(16.0).reshape(4, 4) + theta[0]
-        return a, theta[:8].reshape(4, 2), np.eye(5, 4), np.zeros((5, 2))
-
-    monkeypatch.setattr("airtruth.exporting.model.SYSTEMS", {**SYSTEMS, "lateral": system})
-    model = LinearModel(LATERAL, POINT, np.arange(15.0), np.eye(15), "a test")
-    assert model.states == ("beta_rad", "p_rad_s", "r_rad_s", "phi_rad")
-    assert model.inputs == ("aileron_rad", "rudder_rad")
-    assert model.outputs == ("beta_rad", "p_rad_s", "r_rad_s", "phi_rad", "ay_m_s2")
-    assert len(model.entries) == 16 + 8 + 20 + 10
-    np.testing.assert_allclose(np.diag(model.covariance)[:16], 1.0)
 
 
 @pytest.fixture(scope="module")

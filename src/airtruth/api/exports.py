@@ -20,7 +20,7 @@ def export(
     altitude_m: float | None = None,
     force: bool = False,
 ) -> LinearModel:
-    """Return the identified short period as a state-space model, and write it for MATLAB or python-control.
+    """Return the identified motion as a state-space model, and write it for MATLAB or python-control.
 
     Parameters
     ----------

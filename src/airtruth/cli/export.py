@@ -42,7 +42,7 @@ def export(
     force: Replace = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write A, B, C and D of the short period with names, units, operating point and covariance."""
+    """Write A, B, C and D of the identified motion with names, units, operating point and covariance."""
     import json
 
     from airtruth.exporting.write import require_suffix

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from airtruth.channels import SIGNALS
 from airtruth.errors import ConfigurationError
 from airtruth.physics import short_period
-from airtruth.physics.motion import LONGITUDINAL, Motion
+from airtruth.physics.lateral import lateral_scale, lateral_system
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 from airtruth.result import shortened
 
 if TYPE_CHECKING:
@@ -49,6 +50,22 @@ class OperatingPoint:
         return {**own, "dynamic_pressure_pa": pressure, **self.trim}
 
 
+@dataclass(frozen=True, kw_only=True)
+class LateralPoint(OperatingPoint):
+    """The same for the lateral-directional motion; its trim has alpha_rad and theta_rad.
+
+    Attributes
+    ----------
+    span_m : span [m].
+    inertia_xx_kg_m2, inertia_zz_kg_m2, inertia_xz_kg_m2 : roll and yaw inertia, integral of x z dm [kg m2].
+    """
+
+    span_m: float
+    inertia_xx_kg_m2: float
+    inertia_zz_kg_m2: float
+    inertia_xz_kg_m2: float
+
+
 Matrices = tuple[Array, Array, Array, Array]
 """A, B, C and D."""
 
@@ -63,8 +80,16 @@ def _short_period(theta: Array, at: OperatingPoint) -> Matrices:
     return a, b[:, None], np.vstack([np.eye(2), row[:2]]), np.array([[0.0], [0.0], [row[2]]])
 
 
+def _lateral(theta: Array, at: OperatingPoint) -> Matrices:
+    """V. Klein and E. A. Morelli, 3.2 and 3.3, see `airtruth.physics.lateral`; ay in m/s2."""
+    if not isinstance(at, LateralPoint):
+        raise TypeError("the lateral motion needs a LateralPoint")
+    s = lateral_scale(at, at.airspeed_m_s, at.density_kg_m3, at.trim["alpha_rad"], at.trim["theta_rad"])
+    return lateral_system(theta, s)
+
+
 SYSTEMS: Final[Mapping[str, Callable[[Array, OperatingPoint], Matrices]]] = MappingProxyType(
-    {LONGITUDINAL.name: _short_period}
+    {LONGITUDINAL.name: _short_period, LATERAL.name: _lateral}
 )
 """Name of a motion -> its matrices from derivatives and operating point: states, inputs and outputs in the order of the
 motion; affine in the derivatives."""
@@ -222,4 +247,4 @@ def _plain(values: Array) -> Any:
     return [float(x) if np.isfinite(x) else None for x in values]
 
 
-__all__ = ["SYSTEMS", "LinearModel", "OperatingPoint"]
+__all__ = ["SYSTEMS", "LateralPoint", "LinearModel", "OperatingPoint"]

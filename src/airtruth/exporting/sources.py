@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -9,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError, choices
-from airtruth.exporting.model import LinearModel, OperatingPoint
+from airtruth.exporting.model import LateralPoint, LinearModel, OperatingPoint
+from airtruth.identification.record_constants import Constants, LateralValues
+from airtruth.logs.names import ESTIMATES
 from airtruth.physics.atmosphere import density_kg_m3
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, motion_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,16 +25,25 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_CONDITION: Final = ("airspeed_m_s", "density_kg_m3")
-"""Columns of a file of estimates with the flight condition."""
+_AIR: Final = ("airspeed_m_s", "density_kg_m3")
+"""Columns of a file of estimates with airspeed and density."""
+_CONDITION: Final[Mapping[str, tuple[str, ...]]] = {
+    LONGITUDINAL.name: _AIR,
+    LATERAL.name: (*_AIR, "alpha_rad", "theta_rad"),
+}
+"""Motion -> columns of a file of estimates with the flight condition."""
+_CONSTANTS: Final[Mapping[str, tuple[str, ...]]] = {
+    LONGITUDINAL.name: tuple(f.name for f in fields(Constants)),
+    LATERAL.name: tuple(f.name for f in fields(LateralValues)),
+}
+"""Motion -> constants of the aircraft."""
 
 
 def estimates_file(source: Path) -> Path | None:
-    """The file of estimates that a path means: itself, or estimates.parquet in a folder; None for an aircraft."""
+    """The file of estimates that a path means: itself, or the first motion's in a folder; None for an aircraft."""
     if source.is_file() and source.suffix == ".parquet":
         return source
-    inside = source / "estimates.parquet"
-    return inside if inside.is_file() else None
+    return next((source / name for name in ESTIMATES.values() if (source / name).is_file()), None)
 
 
 def linear_model(
@@ -40,14 +53,15 @@ def linear_model(
     airspeed_m_s: float | None = None,
     altitude_m: float | None = None,
 ) -> LinearModel:
-    """Return the short period of an estimate, or of an aircraft, as a linear model.
+    """Return the motion of an estimate, or the short period of an aircraft, as a linear model.
 
     Several runs give their mean. Its covariance is that of one run over their number, widened for each derivative to the
     scatter of the runs where that is larger.
 
     Parameters
     ----------
-    source : file of estimates or a folder that holds one; or an aircraft: folder, aircraft.toml or shipped name.
+    source : file of estimates of a motion, or a folder, whose longitudinal ones come first; or an
+        aircraft: folder, aircraft.toml or shipped name.
     method : method of the estimates; None if they hold one.
     run_id : run of the estimates; None for the mean over the converged runs.
     airspeed_m_s, altitude_m : true airspeed [m/s] and altitude of an aircraft [m]; estimates state their own condition.
@@ -85,35 +99,33 @@ def _of_estimates(file: Path, method: str | None, run_id: str | None) -> LinearM
     from airtruth.identification.stored import read_stored
 
     frame, records = read_stored(file)
+    motion = motion_of(frame.columns)
+    condition = list(_CONDITION[motion.name])
     chosen = _method(file, frame, method)
     own = _rows(file, frame[frame["method"] == chosen], chosen, run_id)
     if (
         chosen not in records
-        or not set(_CONDITION) <= set(own.columns)
-        or own[list(_CONDITION)].isna().any(axis=None)
+        or not set(condition) <= set(own.columns)
+        or own[condition].isna().any(axis=None)
     ):
         raise ConfigurationError(
-            f"{file}: the rows of {chosen} lack the flight condition (airspeed_m_s, density_kg_m3), as files of earlier "
-            "versions do; identify the logs again"
+            f"{file}: the rows of {chosen} lack the flight condition ({', '.join(condition)}), as files of "
+            "earlier versions do; identify the logs again"
         )
-    names = list(LONGITUDINAL.parameters)
-    covariance = covariance_of(own)
+    names = list(motion.parameters)
+    covariance = covariance_of(own, names)
     notes: tuple[str, ...] = ("Outputs are at the centre of gravity, without errors of the instruments.",)
     if not np.isfinite(covariance).all():
         notes += (f"{chosen} states no covariance for these runs, so that the uncertainty is not known.",)
     theta = own[names].to_numpy(dtype=np.float64)
     constants, runs = records[chosen]["constants"], own["run_id"].tolist()
-    point = OperatingPoint(
-        airspeed_m_s=float(own["airspeed_m_s"].mean()),
-        density_kg_m3=float(own["density_kg_m3"].mean()),
-        wing_area_m2=constants["wing_area_m2"],
-        chord_m=constants["chord_m"],
-        mass_kg=constants["mass_kg"],
-        inertia_yy_kg_m2=constants["inertia_yy_kg_m2"],
-    )
+    at = {name: float(own[name].mean()) for name in condition}
+    trim = {name: at.pop(name) for name in condition if name not in _AIR}
+    known = at | {name: float(constants[name]) for name in _CONSTANTS[motion.name]}
+    point = LateralPoint(**known, trim=trim) if motion is LATERAL else OperatingPoint(**known, trim=trim)
     of = f"run {runs[0]}" if len(runs) == 1 else f"mean of {len(runs)} converged runs"
     return LinearModel(
-        motion=LONGITUDINAL,
+        motion=motion,
         point=point,
         derivatives=theta.mean(axis=0),
         derivative_covariance=_of_mean(theta, covariance),

@@ -155,7 +155,10 @@ def correlation_chart(correlations: Mapping[str, Array], of: str, motion: Motion
     of : what was correlated, a sentence.
     motion : whose derivatives they are.
     """
-    short = tuple(name.replace("alpha", "\u03b1").replace("de", "\u03b4") for name in motion.parameters)
+    short = tuple(
+        name.replace("alpha", "\u03b1").replace("beta", "\u03b2").replace("de", "\u03b4")
+        for name in motion.parameters
+    )
     panels = tuple(
         Panel(
             title=method,

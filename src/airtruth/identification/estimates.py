@@ -281,7 +281,8 @@ def estimates_table(estimates: Estimates, constants: Constants | None = None) ->
     """One row per run: run_id, method, converged, iterations, then NAME, NAME_std, ..._upper, then status.
 
     Behind them, correlations of the derivatives (`correlation_columns`) and, with the constants, the flight condition:
-    airspeed_m_s, density_kg_m3 (for the mass of the constants, also of a run that states another mass).
+    airspeed_m_s, density_kg_m3, of the lateral motion alpha_rad and theta_rad
+    (for the mass of the constants, also of a run that states another mass).
 
     Parameters
     ----------
@@ -310,4 +311,7 @@ def estimates_table(estimates: Estimates, constants: Constants | None = None) ->
         pressure = per_mass * constants.mass_kg / constants.wing_area_m2
         columns["airspeed_m_s"] = airspeed
         columns["density_kg_m3"] = 2.0 * pressure / airspeed**2
+        if isinstance(scale, LateralScale):
+            columns["alpha_rad"] = np.broadcast_to(scale.alpha_rad, len(estimates.run_ids))
+            columns["theta_rad"] = np.broadcast_to(scale.theta_rad, len(estimates.run_ids))
     return pd.DataFrame(columns)

@@ -162,9 +162,9 @@ class IdentificationResult:
         """One row per run and method, the columns of estimates.parquet (docs/methods.md).
 
         run_id, method, converged, iterations; NAME, NAME_std, NAME_lower, NAME_upper of each derivative [-] and modal
-        parameter; status; NAME_OTHER_corr, the correlations of the derivatives [-]; airspeed_m_s and density_kg_m3, the
-        flight condition of the estimate. Runs keep their order, and each run the order of
-        the methods.
+        parameter; status; NAME_OTHER_corr, the correlations of the derivatives [-]; airspeed_m_s and density_kg_m3, of
+        the lateral motion alpha_rad and theta_rad, the flight condition of the estimate. Runs keep their order,
+        and each run the order of the methods.
         """
         return _frame(self.estimates, self.settings.constants)
 

@@ -18,17 +18,18 @@ from airtruth.errors import LogError, StoreError
 from airtruth.identification.result import IdentificationResult, Settings, SpooledResult
 from airtruth.identification.stored import KEY, KEYS, Stored, open_stored
 from airtruth.logs import ledger
+from airtruth.logs.names import ESTIMATES
 from airtruth.logs.remote import location
 from airtruth.logs.tables import write_parts
-from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
+from airtruth.physics.motion import LONGITUDINAL, Motion
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FILE: Final = "estimates.parquet"
-"""Name of the file of estimates in a campaign folder."""
-FILES: Final[Mapping[str, str]] = {m.name: m.estimates_file for m in MOTIONS.values()}
-"""The same by the name of the motion."""
+FILES: Final[Mapping[str, str]] = ESTIMATES
+"""Name of a motion -> name of its file of estimates in a campaign folder."""
+FILE: Final = FILES[LONGITUDINAL.name]
+"""That of the longitudinal motion."""
 
 
 def beside(path: Path, motion: Motion) -> Path:
@@ -36,7 +37,8 @@ def beside(path: Path, motion: Motion) -> Path:
 
     Examples
     --------
-    >>> beside(Path("out/light.parquet"), MOTIONS["lateral"]).name
+    >>> from airtruth.physics.motion import LATERAL
+    >>> beside(Path("out/light.parquet"), LATERAL).name
     'light-lateral.parquet'
     """
     return path if motion is LONGITUDINAL else path.with_name(f"{path.stem}-{motion.name}{path.suffix}")

@@ -3,8 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from string import ascii_lowercase
+from typing import Final
+
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
+
+ESTIMATES: Final[Mapping[str, str]] = {
+    LONGITUDINAL.name: "estimates.parquet",
+    LATERAL.name: "estimates-lateral.parquet",
+}
+"""Name of a motion -> name of its file of estimates in a campaign folder."""
 
 
 def name_of(path: Path) -> str:
@@ -38,4 +48,4 @@ def chunk_file(chunk: int) -> str:
     return f"{ordered_number(chunk, 5)}.parquet"
 
 
-__all__ = ["chunk_file", "name_of", "ordered_number"]
+__all__ = ["ESTIMATES", "chunk_file", "name_of", "ordered_number"]

@@ -132,11 +132,6 @@ class Motion:
         """Numbers of coefficients and of signals."""
         return len(self.coefficients), len(self.signals)
 
-    @property
-    def estimates_file(self) -> str:
-        """Name of the file of its estimates in a folder of a campaign."""
-        return "estimates.parquet" if self.name == LONGITUDINAL.name else f"estimates-{self.name}.parquet"
-
     def index(self, name: str) -> int:
         """Position of a derivative in `parameters`.
 

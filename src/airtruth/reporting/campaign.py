@@ -6,7 +6,7 @@ The truth serves tables and scoring alone; identification and tracing never read
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from airtruth.documents import read_json
 from airtruth.errors import LogError, StoreError, choices
+from airtruth.logs.names import ESTIMATES as FILES
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.reporting.columns import Kind, flags, numbers, read_columns, texts
 from airtruth.reporting.paper.published import ESTIMATED
@@ -28,7 +29,7 @@ Array = NDArray[np.float64]
 TRUTH: Final = "truth.parquet"
 """File of the true parameters of each run."""
 
-ESTIMATES: Final = "estimates.parquet"
+ESTIMATES: Final = FILES[LONGITUDINAL.name]
 """File of the estimates (contract 2)."""
 
 DESCRIPTION: Final = "campaign.json"
@@ -40,9 +41,6 @@ FLOWN: Final = "ok"
 FAILED: Final = "failed"
 """Status of a run that could not be flown."""
 
-_BOUNDS: Final = tuple(name + end for name in ESTIMATED for end in ("_lower", "_upper"))
-"""Columns of the ends of the 95 % intervals (contract 2)."""
-
 TRUTH_KINDS: Final[Mapping[str, Kind]] = {
     "run_id": "text",
     "status": "text",
@@ -50,15 +48,22 @@ TRUTH_KINDS: Final[Mapping[str, Kind]] = {
 }
 """Columns of the truth that tables need."""
 
-ESTIMATE_KINDS: Final[Mapping[str, Kind]] = {
-    "run_id": "text",
-    "method": "text",
-    "status": "text",
-    "converged": "flag",
-    "iterations": "number",
-    **dict.fromkeys((*ESTIMATED, *_BOUNDS), "number"),
-}
-"""Columns of the estimates that reports need; the status may be absent."""
+
+def estimate_kinds(names: Sequence[str]) -> dict[str, Kind]:
+    """Columns of the estimates of parameters that reports need; the status may be absent."""
+    bounds = (name + end for name in names for end in ("_lower", "_upper"))
+    return {
+        "run_id": "text",
+        "method": "text",
+        "status": "text",
+        "converged": "flag",
+        "iterations": "number",
+        **dict.fromkeys((*names, *bounds), "number"),
+    }
+
+
+ESTIMATE_KINDS: Final[Mapping[str, Kind]] = estimate_kinds(ESTIMATED)
+"""Columns of the longitudinal estimates."""
 
 
 @dataclass(frozen=True)
@@ -216,27 +221,28 @@ def writers(folder: Path) -> tuple[str, str]:
     """The commands that write the truth and the estimates of a folder, for messages."""
     shown = quote(str(folder))
     # a campaign of lateral records has estimates of the lateral motion alone, which tables and reports do not show
-    motion = f" --motion {LONGITUDINAL.name}" if (folder / LATERAL.estimates_file).exists() else ""
+    motion = f" --motion {LONGITUDINAL.name}" if (folder / FILES[LATERAL.name]).exists() else ""
     return (
         f"`airtruth fly CAMPAIGN.toml --out {shown}`",
         f"`airtruth identify {shown} --aircraft AIRCRAFT{motion}`",
     )
 
 
-def read_estimates(path: Path, writer: str) -> pa.Table:
-    """Read the columns `ESTIMATE_KINDS` of a file of estimates.
+def read_estimates(path: Path, writer: str, names: Sequence[str] = ESTIMATED) -> pa.Table:
+    """Read the columns `estimate_kinds` of a file of estimates.
 
     Parameters
     ----------
     path : the file.
     writer : command that writes it, for messages.
+    names : its parameters.
 
     Raises
     ------
     StoreError, LogError
         See `read_columns`; or the file holds no estimate.
     """
-    table = read_columns(path, ESTIMATE_KINDS, writer, optional=("status",))
+    table = read_columns(path, estimate_kinds(names), writer, optional=("status",))
     if not table.num_rows:
         raise LogError(f"{path}: holds no estimate; {writer} writes it")
     return table

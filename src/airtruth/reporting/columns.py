@@ -58,6 +58,18 @@ def read_columns(
     return _cast_table(table, kinds, path, writer)
 
 
+def columns_of(path: Path, writer: str = "`airtruth identify`") -> list[str]:
+    """Return the names of the columns of a file.
+
+    Raises
+    ------
+    StoreError
+        If it is missing or cannot be read.
+    """
+    with _opened(path, writer) as file:
+        return list(file.schema_arrow.names)
+
+
 def column_parts(
     path: Path, kinds: Mapping[str, Kind], writer: str, optional: Sequence[str] = (), *, rows: int
 ) -> Iterator[pa.Table]:

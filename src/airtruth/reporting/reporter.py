@@ -8,9 +8,12 @@ from shlex import quote
 from typing import TYPE_CHECKING
 
 from airtruth.errors import ConfigurationError, StoreError
+from airtruth.logs.names import ESTIMATES as FILES
 from airtruth.logs.remote import location
 from airtruth.logs.sources import Logs
+from airtruth.physics.motion import LATERAL, motion_of
 from airtruth.reporting.campaign import ESTIMATES, TRUTH, Campaign, Parted
+from airtruth.reporting.columns import columns_of
 from airtruth.reporting.stored_campaign import open_campaign
 from airtruth.result import Result
 
@@ -109,7 +112,8 @@ def _of_path(path: Path, logs: Logs | None, aircraft: Aircraft | None) -> Report
 
         _refuse(logs, aircraft)
         return trace_report(*read_trace(path))
-    if (path / TRUTH).is_file():
+    lateral = path / FILES[LATERAL.name]
+    if (path / TRUTH).is_file() and ((path / ESTIMATES).is_file() or not lateral.is_file()):
         return _of_campaign(open_campaign(path), logs, aircraft)
     if path.is_file() and path.suffix != ".parquet" and not _begins_as_parquet(path):
         raise StoreError(
@@ -117,12 +121,15 @@ def _of_path(path: Path, logs: Logs | None, aircraft: Aircraft | None) -> Report
             "loop.json, or the Parquet file of estimates that `airtruth identify` writes"
         )
     estimates = path if path.is_file() else path / ESTIMATES
+    if not estimates.is_file():
+        estimates = lateral
     if estimates.is_file():
         from airtruth.reporting.campaign import read_estimates
         from airtruth.reporting.pages.estimates_page import estimates_report
         from airtruth.reporting.pages.identified import read_identified
 
-        read_estimates(estimates, "`airtruth identify`")
+        motion = motion_of(columns_of(estimates))
+        read_estimates(estimates, "`airtruth identify`", (*motion.parameters, *motion.modal))
         identified = read_identified(estimates, logs, aircraft)
         name = next((record["aircraft"] for record in identified.records.values()), "")
         title = f"Identification of {name}" if name else estimates.stem

@@ -12,6 +12,7 @@ from airtruth.aircraft import Aircraft
 from airtruth.errors import AirtruthError
 from airtruth.identification.charts import Frames, intervals_chart
 from airtruth.logs.sources import Logs
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.reporting.campaign import ESTIMATES, Campaign, Parted
 from airtruth.reporting.pages.estimates_page import shifts_of
 from airtruth.reporting.pages.frequency_page import frequency_charts, frequency_section
@@ -21,9 +22,9 @@ from airtruth.reporting.pages.origin import of_methods, origin_section
 from airtruth.reporting.pages.page import Report, Section, answer_html, data_table, page_of
 from airtruth.reporting.pages.records import records_section, records_tables
 from airtruth.reporting.pages.scatter_page import (
-    LEAST_RUNS,
     MOST_RUNS,
     correlation_section,
+    least_runs,
     runs_section,
 )
 from airtruth.reporting.paper import tables
@@ -64,7 +65,7 @@ def campaign_report(campaign: Parted, logs: Logs | None = None, aircraft: Aircra
     confidence = identified.confidence
     runs, runs_drawn = runs_section(_with_std(first, confidence), flown, {"truth": truth}, confidence)
     correlation, correlated = correlation_section(
-        {m: s.correlation for m, s in statistics.items() if s.counts.used >= LEAST_RUNS},
+        {m: s.correlation for m, s in statistics.items() if s.counts.used >= least_runs(LONGITUDINAL)},
         "Correlation over the converged runs.",
     )
     sections = [

@@ -14,8 +14,16 @@ from airtruth.identification.charts import intervals_chart
 from airtruth.identification.result import IdentificationResult
 from airtruth.identification.simulated import simulated_records
 from airtruth.identification.stored import Record
+from airtruth.physics.motion import LONGITUDINAL, motion_of
 from airtruth.reporting.pages.frequency_page import frequency_charts, frequency_section
-from airtruth.reporting.pages.identified import SIMULATED, Identified, answer_of, require_same_aircraft
+from airtruth.reporting.pages.identified import (
+    NOT_SIMULATED,
+    SIMULATED,
+    Identified,
+    answer_of,
+    refuse_records,
+    require_same_aircraft,
+)
 from airtruth.reporting.pages.origin import of_methods, origin_section
 from airtruth.reporting.pages.page import Report, Section, answer_html, data_table, page_of
 from airtruth.reporting.pages.records import records_section, records_tables
@@ -26,6 +34,7 @@ from airtruth.reporting.pages.scatter_page import (
     stated_correlations,
 )
 from airtruth.reporting.paper.published import SYMBOLS
+from airtruth.reporting.symbols import LATERAL_SYMBOLS
 from airtruth.table import as_csv, as_latex
 
 if TYPE_CHECKING:
@@ -35,7 +44,7 @@ if TYPE_CHECKING:
 
 _OVER_RUNS: Final = "Correlation over the converged runs."
 """What a correlation from the scatter of the runs is."""
-_SYMBOLS: Final = {**SYMBOLS, "wn_rad_s": r"$\omega_n$"}
+_SYMBOLS: Final = {**SYMBOLS, **LATERAL_SYMBOLS, "wn_rad_s": r"$\omega_n$"}
 """Symbols of a table that has a column of units."""
 
 
@@ -60,10 +69,11 @@ def estimates_report(title: str, identified: Identified) -> Report:
     ]
     runs, runs_drawn = runs_section(frame, None, references, identified.confidence)
     stated = stated_correlations(frame)
+    motion = motion_of(frame.columns)
     correlation, correlated = (
-        correlation_section(stated)
+        correlation_section(stated, motion=motion)
         if stated
-        else correlation_section(scattered_correlations(frame), _OVER_RUNS)
+        else correlation_section(scattered_correlations(frame), _OVER_RUNS, motion)
     )
     sections = [
         records_section(histories, identified.reason, SIMULATED),
@@ -73,7 +83,7 @@ def estimates_report(title: str, identified: Identified) -> Report:
         correlated,
         frequency_section(histories),
         Section("Error per record", "errors", records_tables(histories) if histories else ""),
-        origin_section(histories, of_methods(identified.records), dict.fromkeys(notes)),
+        origin_section(histories, of_methods(identified.records), dict.fromkeys(notes), motion),
     ]
     return Report(
         page=page_of(title, answer_html(*answer_of(frame)), chart, sections),
@@ -111,6 +121,7 @@ def identification_report(result: IdentificationResult, aircraft: Aircraft | Non
     sources = [(s.name, s.sha256, s.runs) for s in result.sources]
     made: Record = {**record, "sources": sources}  # type: ignore[typeddict-item]  # to_dict gives its keys
     records = dict.fromkeys(result.methods, made)
+    refuse_records(result.settings.motion, None, aircraft)
     histories, declared = result.histories(), None
     if aircraft is not None and histories is not None and result.logs is not None:
         from airtruth.reporting.pages.declared import declared_at
@@ -124,7 +135,9 @@ def identification_report(result: IdentificationResult, aircraft: Aircraft | Non
         frame=result.to_frame(),
         records=records,
         histories=histories,
-        reason="The result holds no logs, so the records are not shown.",
+        reason="The result holds no logs, so the records are not shown."
+        if result.settings.motion is LONGITUDINAL
+        else NOT_SIMULATED,
         declared=declared,
     )
     return estimates_report(f"Identification of {result.settings.aircraft}", identified)

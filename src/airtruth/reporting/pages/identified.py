@@ -13,6 +13,7 @@ import numpy as np
 from airtruth.aircraft import Aircraft
 from airtruth.errors import AirtruthError, ConfigurationError, StoreError
 from airtruth.identification.estimates import JOINT
+from airtruth.identification.methods import DEFAULT
 from airtruth.identification.record_constants import Constants, values_of
 from airtruth.identification.simulated import simulated_records, spaced
 from airtruth.identification.store import other_constants
@@ -20,7 +21,7 @@ from airtruth.identification.stored import Record, read_stored
 from airtruth.logs.digest import sha256_of
 from airtruth.logs.histories import Histories
 from airtruth.logs.sources import Logs
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion, motion_of
 from airtruth.table import significant
 
 if TYPE_CHECKING:
@@ -33,8 +34,8 @@ SIMULATED: Final = (
     "airspeed and density of the record; initial state, trim and offset of az are fitted to each record, alike for all methods."
 )
 """How the models of an identification are simulated."""
-_LEADING: Final = "iv-f1"
-"""Method whose estimates the answer states, if it is among those that were run: the default of the command."""
+NOT_SIMULATED: Final = "The records of the lateral motion are not simulated, so they are not shown."
+"""Why a page of lateral estimates has no records."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,8 @@ def read_identified(
     ------
     StoreError, LogError
         If the file cannot be read or is damaged, or a log that is given cannot be used.
+    ConfigurationError
+        If logs or an aircraft are given for estimates of the lateral motion, or the aircraft has other constants.
     AircraftError, TrimError
         If the aircraft cannot be trimmed at the condition of the records.
     """
@@ -91,6 +94,10 @@ def read_identified(
         None if runs is None else np.add.outer(np.array(spaced(runs)) * methods, np.arange(methods)).ravel()
     )
     frame, records = read_stored(path, rows)
+    motion = motion_of(frame.columns)
+    refuse_records(motion, logs, aircraft)
+    if motion is not LONGITUDINAL:
+        return Identified(frame, records, None, NOT_SIMULATED)
     if logs is None:
         logs, reason = _beside(path.parent, records)
         if reason:
@@ -109,6 +116,21 @@ def read_identified(
     declared = declared_at(aircraft, histories)
     histories = _simulated(logs, declared.before(frame), records, runs)
     return Identified(frame, records, histories, declared=declared)
+
+
+def refuse_records(motion: Motion, logs: Logs | None, aircraft: Aircraft | None) -> None:
+    """Refuse logs and an aircraft for estimates of a motion whose records are not simulated.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the option.
+    """
+    for option, value in (("--log", logs), ("--aircraft", aircraft)):
+        if value is not None and motion is not LONGITUDINAL:
+            raise ConfigurationError(
+                f"{option} simulates records, which the page of estimates of the {motion.name} motion does not show; leave it out"
+            )
 
 
 def require_same_aircraft(records: Mapping[str, Record], aircraft: Aircraft) -> None:
@@ -164,9 +186,10 @@ def _beside(folder: Path, records: Mapping[str, Record]) -> tuple[list[str], str
 
 
 def answer_of(frame: pd.DataFrame) -> list[str]:
-    """Sentences of the answer: the short period by the leading method, and where methods disagree."""
+    """Sentences of the answer: the modes by the default method if it was run, and where methods disagree."""
+    motion = motion_of(frame.columns)
     methods = list(dict.fromkeys(map(str, frame["method"])))
-    leading = _LEADING if _LEADING in methods else methods[0]
+    leading = DEFAULT[motion.name] if DEFAULT[motion.name] in methods else methods[0]
     own = frame[(frame["method"] == leading) & frame["converged"]]
     runs = int((frame["method"] == leading).sum())
     joint = list(dict.fromkeys(frame["run_id"])) == [JOINT]
@@ -174,7 +197,7 @@ def answer_of(frame: pd.DataFrame) -> list[str]:
         return [f"{leading} converged in none of {runs} runs."]
     words = ", ".join(
         f"{symbol} = {_with_error(own, name)} {unit}".rstrip()
-        for name, (symbol, unit) in _ANSWERED.items()
+        for name, (symbol, unit) in _ANSWERED[motion.name].items()
         if name in own
     )
     if joint:
@@ -185,7 +208,7 @@ def answer_of(frame: pd.DataFrame) -> list[str]:
         of = f"run {own['run_id'].iloc[0]}, with the standard deviation"
     sentences = [f"{leading} estimates {words} ({of})."]
     if len(methods) > 1:
-        apart = [name for name in PARAMETERS if _disagree(frame, methods, name)]
+        apart = [name for name in motion.parameters if _disagree(frame, methods, name)]
         sentences.append(
             f"The methods differ by more than their intervals in {', '.join(apart)}."
             if apart
@@ -194,8 +217,20 @@ def answer_of(frame: pd.DataFrame) -> list[str]:
     return sentences
 
 
-_ANSWERED: Final = {"wn_rad_s": ("wn", "rad/s"), "zeta": ("zeta", ""), "Cmalpha": ("Cmalpha", "1/rad")}
-"""Column -> symbol and unit in the answer."""
+_ANSWERED: Final[Mapping[str, Mapping[str, tuple[str, str]]]] = {
+    LONGITUDINAL.name: {
+        "wn_rad_s": ("wn", "rad/s"),
+        "zeta": ("zeta", ""),
+        "Cmalpha": ("Cmalpha", "1/rad"),
+    },
+    LATERAL.name: {
+        "dutch_roll_wn_rad_s": ("wn of the Dutch roll", "rad/s"),
+        "dutch_roll_zeta": ("zeta of the Dutch roll", ""),
+        "roll_1_s": ("root of the roll", "1/s"),
+        "Cnbeta": ("Cnbeta", "1/rad"),
+    },
+}
+"""Motion -> column -> symbol and unit in the answer."""
 
 
 def _with_error(rows: pd.DataFrame, name: str) -> str:
@@ -226,4 +261,4 @@ def _disagree(frame: pd.DataFrame, methods: Sequence[str], name: str) -> bool:
     return bool(ends) and max(low for low, _ in ends) > min(high for _, high in ends)
 
 
-__all__ = ["SIMULATED", "Identified", "answer_of", "read_identified"]
+__all__ = ["NOT_SIMULATED", "SIMULATED", "Identified", "answer_of", "read_identified", "refuse_records"]

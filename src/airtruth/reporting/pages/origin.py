@@ -8,6 +8,7 @@ from typing import Final
 from airtruth.identification.stored import Record
 from airtruth.logs.histories import Histories
 from airtruth.logs.provenance import Provenance
+from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.reporting.pages.page import Section, data_table, notes_html
 from airtruth.reporting.pages.records import conditions_table
 from airtruth.table import Group, Row, Table
@@ -17,18 +18,31 @@ UNITS: Final = (
     "wn in rad/s, zeta without unit. Signs: body axes x forward, z down; alpha, q and pitch nose-up positive; az about "
     "-9.8 m/s2 in level flight; elevator trailing edge down positive."
 )
-"""Units and signs of every page (contract 1)."""
+"""Units and signs of a page (contract 1)."""
+_LATERAL_UNITS: Final = (
+    "Units: SI; derivatives per radian, with rates as p b/(2V) and r b/(2V); wn in rad/s, zeta without unit, roots in 1/s. "
+    "Signs: body axes x forward, y right, z down; aileron (right less left)/2, each trailing edge down positive; "
+    "rudder trailing edge left positive."
+)
+"""The same for the lateral motion."""
 _CONSTANTS: Final = {
     "wing_area_m2": "wing area [m2]",
     "chord_m": "chord [m]",
     "mass_kg": "mass [kg]",
     "inertia_yy_kg_m2": "Iyy [kg m2]",
+    "span_m": "span [m]",
+    "inertia_xx_kg_m2": "Ixx [kg m2]",
+    "inertia_zz_kg_m2": "Izz [kg m2]",
+    "inertia_xz_kg_m2": "Ixz [kg m2]",
 }
 """Constant of an aircraft -> heading with its unit."""
 
 
 def origin_section(
-    histories: Histories | None, groups: Iterable[Group], notes: Iterable[str] = ()
+    histories: Histories | None,
+    groups: Iterable[Group],
+    notes: Iterable[str] = (),
+    motion: Motion = LONGITUDINAL,
 ) -> Section:
     """Return the section of conditions, units and provenance.
 
@@ -37,9 +51,10 @@ def origin_section(
     histories : records with their conditions; None where there are none.
     groups : rows of provenance, entry and value, from `of_trace` or `of_methods`.
     notes : sentences of the result.
+    motion : whose units and signs the page states.
     """
     parts = [] if histories is None else [data_table(conditions_table(histories), "conditions")]
-    parts.append(notes_html([UNITS]))
+    parts.append(notes_html([UNITS if motion is LONGITUDINAL else _LATERAL_UNITS]))
     rows = tuple(group for group in groups if group.rows)
     if rows:
         parts.append(data_table(Table("Provenance", ("entry", "value"), rows), "provenance"))

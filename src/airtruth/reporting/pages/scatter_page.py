@@ -13,7 +13,7 @@ from airtruth.charts import Chart
 from airtruth.charts import as_html as chart_html
 from airtruth.identification.charts import correlation_chart, runs_chart
 from airtruth.identification.covariance_columns import covariance_of
-from airtruth.physics.short_period import MODAL, PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL, Motion, motion_of
 from airtruth.reporting.pages.page import Section, data_table
 from airtruth.table import Group, Number, Row, Table, flat
 
@@ -26,8 +26,8 @@ MOST_RUNS: Final = 30
 """Most runs in a table of single runs [-] (judgement: a page stays small)."""
 MOST_MARKS: Final = 60
 """Most intervals in a panel of single runs [-] (judgement: they keep apart)."""
-LEAST_RUNS: Final = 12
-"""Fewest runs whose scatter gives a correlation matrix [-]; judgement: twice the number of derivatives."""
+LEAST_RUNS: Final = 2
+"""Fewest runs per derivative whose scatter gives a correlation matrix [-] (judgement)."""
 OF_METHOD: Final = "Correlation by the covariance that the method states, mean over the converged runs."
 """What a correlation from covariances is."""
 
@@ -63,7 +63,8 @@ def runs_section(
 
 
 def _runs_table(kept: pd.DataFrame, total: int) -> Table:
-    names = [name for name in (*PARAMETERS, *MODAL) if name in kept]
+    motion = motion_of(kept.columns)
+    names = [name for name in (*motion.parameters, *motion.modal) if name in kept]
     shown = [column for name in names for column in (name, f"{name}_std") if column in kept]
     values = kept[shown].to_numpy(dtype=np.float64)
     rows: list[Row] = [
@@ -84,7 +85,7 @@ def _runs_table(kept: pd.DataFrame, total: int) -> Table:
     notes: tuple[str, ...] = ("std: standard error that the method states for the run.",)
     if total > MOST_RUNS:
         notes += (
-            f"The first {MOST_RUNS} of {total} runs; estimates.parquet holds all, the table above counts all.",
+            f"The first {MOST_RUNS} of {total} runs; the file of estimates holds all, the table above counts all.",
         )
     return replace(flat("Estimates of each run", columns, rows, notes), keys=2)
 
@@ -93,7 +94,7 @@ def stated_correlations(frame: pd.DataFrame) -> dict[str, Array]:
     """Method -> correlation by its covariance, mean over the converged runs; methods without one are left out."""
     found = {}
     for method, own in frame[frame["converged"]].groupby("method", sort=False):
-        covariance = covariance_of(own)
+        covariance = covariance_of(own, motion_of(frame.columns).parameters)
         finite = np.isfinite(covariance).all(axis=(1, 2))
         if finite.any():
             matrix = _correlation(covariance[finite].mean(axis=0))
@@ -103,16 +104,22 @@ def stated_correlations(frame: pd.DataFrame) -> dict[str, Array]:
 
 
 def scattered_correlations(frame: pd.DataFrame) -> dict[str, Array]:
-    """Method -> correlation over the converged runs; methods with less than `LEAST_RUNS` are left out."""
+    """Method -> correlation over the converged runs; methods with less than `least_runs` are left out."""
     found = {}
+    motion = motion_of(frame.columns)
     for method, own in frame[frame["converged"]].groupby("method", sort=False):
-        values = own[list(PARAMETERS)].to_numpy(dtype=np.float64)
+        values = own[list(motion.parameters)].to_numpy(dtype=np.float64)
         values = values[np.isfinite(values).all(axis=1)]
-        if len(values) >= LEAST_RUNS:
+        if len(values) >= least_runs(motion):
             matrix = _correlation(np.cov(values, rowvar=False))
             if matrix is not None:
                 found[str(method)] = matrix
     return found
+
+
+def least_runs(motion: Motion) -> int:
+    """Fewest runs whose scatter gives a correlation matrix of the derivatives of a motion."""
+    return LEAST_RUNS * len(motion.parameters)
 
 
 def _correlation(covariance: Array) -> Array | None:
@@ -130,38 +137,40 @@ def _with_ones(matrix: Array) -> Array:
 
 
 def correlation_section(
-    correlations: Mapping[str, Array], of: str = OF_METHOD
+    correlations: Mapping[str, Array], of: str = OF_METHOD, motion: Motion = LONGITUDINAL
 ) -> tuple[tuple[Chart, ...], Section]:
     """Return chart and section of the correlation matrices; none and an empty section without one.
 
     Parameters
     ----------
-    correlations : method -> (6, 6) correlation [-].
+    correlations : method -> correlation in the order of ``motion.parameters`` [-].
     of : what was correlated, a sentence.
+    motion : whose derivatives they are.
     """
     heading, anchor = "Correlation of the estimates", "correlation"
     if not correlations:
         return (), Section(heading, anchor, "")
     correlations = {method: _with_ones(matrix) for method, matrix in correlations.items()}
-    chart = correlation_chart(correlations, of)
+    chart = correlation_chart(correlations, of, motion)
     groups = tuple(
         Group(
             method,
             tuple(
                 (name, *(Number(float(x), decimals=3) for x in row))
-                for name, row in zip(PARAMETERS, matrix, strict=True)
+                for name, row in zip(motion.parameters, matrix, strict=True)
             ),
         )
         for method, matrix in correlations.items()
     )
     note = f"{of} Beyond 0.9 in size, the records do not separate the two derivatives (Jategaonkar, 2015)."
-    table = Table(heading, ("", *PARAMETERS), groups, (note,))
+    table = Table(heading, ("", *motion.parameters), groups, (note,))
     return (chart,), Section(heading, anchor, chart_html(chart) + data_table(table, "correlation"))
 
 
 __all__ = [
     "MOST_RUNS",
     "correlation_section",
+    "least_runs",
     "runs_section",
     "scattered_correlations",
     "stated_correlations",

@@ -1,0 +1,32 @@
+"""Symbols of the lateral-directional parameters, for LaTeX."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from airtruth.physics.motion import LATERAL
+
+_SIGNALS: Final[Mapping[str, str]] = {
+    "beta": r"\beta",
+    "p": "p",
+    "r": "r",
+    "da": r"\delta_a",
+    "dr": r"\delta_r",
+}
+"""Symbol of a signal in the name of a derivative -> its symbol."""
+
+LATERAL_SYMBOLS: Final[Mapping[str, str]] = {
+    **{
+        c.name + s.symbol: f"$C_{{{c.name[1:]}{_SIGNALS[s.symbol]}}}$"
+        for c in LATERAL.coefficients
+        for s in LATERAL.signals
+    },
+    "dutch_roll_wn_rad_s": r"$\omega_n$, Dutch roll",
+    "dutch_roll_zeta": r"$\zeta$, Dutch roll",
+    "roll_1_s": r"$\lambda$, roll",
+    "spiral_1_s": r"$\lambda$, spiral",
+}
+"""Symbol of each parameter."""
+
+__all__ = ["LATERAL_SYMBOLS"]
