@@ -311,7 +311,7 @@ def estimates_table(estimates: Estimates, constants: Constants | None = None) ->
         pressure = per_mass * constants.mass_kg / constants.wing_area_m2
         columns["airspeed_m_s"] = airspeed
         columns["density_kg_m3"] = 2.0 * pressure / airspeed**2
-        if isinstance(scale, LateralScale):
-            columns["alpha_rad"] = np.broadcast_to(scale.alpha_rad, len(estimates.run_ids))
-            columns["theta_rad"] = np.broadcast_to(scale.theta_rad, len(estimates.run_ids))
+        for name in estimates.motion.known:
+            if name not in columns and hasattr(scale, name):
+                columns[name] = np.broadcast_to(getattr(scale, name), len(estimates.run_ids))
     return pd.DataFrame(columns)
