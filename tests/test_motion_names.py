@@ -28,7 +28,7 @@ CAPS: dict[str, int] = {
     "cli": 27,
     "design": 93,
     "exporting": 15,
-    "identification": 338,
+    "identification": 336,
     "importers": 158,
     "logs": 6,
     "loop": 9,
