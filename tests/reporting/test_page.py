@@ -238,7 +238,7 @@ def test_the_declared_aircraft_stands_beside_the_estimates(identified, tmp_path)
     assert float(row["iv-f1 shift [declared std]"]) == pytest.approx((mean + 1.4312) / 0.07, rel=1e-9)
     files = report(identified, tmp_path / "paper.svg", aircraft=aircraft)
     assert [p.name for p in files] == [
-        f"paper-{name}.svg" for name in ("intervals", "shifts", "runs", "frequency")
+        f"paper-{name}.svg" for name in ("intervals", "shifts", "runs", "correlation", "frequency")
     ]
 
 
