@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 def affine_copy(source: Path, target: Path, alpha_rad: float, elevator_rad: float) -> Path:
-    """Copy an aircraft with planes in place of its aerodynamic tables: value and upward slopes of the tables at the trim.
+    """Copy an aircraft with planes in place of its longitudinal tables: value and upward slopes of the tables at the trim.
 
     Parameters
     ----------
@@ -38,6 +38,8 @@ def affine_copy(source: Path, target: Path, alpha_rad: float, elevator_rad: floa
     }
     for table in tree.getroot().findall("./aerodynamics/axis/function//table"):
         names = [(variable.text or "").strip() for variable in table.findall("independentVar")]
+        if not set(names) <= set(at):
+            continue  # the lateral increments, which are zero in the pitch plane
         data = table.find("tableData")
         assert data is not None
         data.text = _plane(data.text or "", [at[name] for name in names])
