@@ -216,7 +216,7 @@ def test_the_updated_aircraft_flies_with_the_drag(dragged, tmp_path):
     assert answer["verdict"] == "learned"
     assert not answer["provisional"]
     assert not answer["declared_model"]["consistent"]
-    assert "RMS of ax beyond the declared model" in result.summary()
+    assert "RMS of ax beyond the declared model" in result.details()
     assert "95 % band of increment:CX over alpha_rad" in (tmp_path / "aircraft/gtm/gtm.xml").read_text()
     again = trace(dragged, answer["updated_aircraft"], TraceOptions()).to_dict()
     assert again["verdict"] == "none"
