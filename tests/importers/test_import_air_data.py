@@ -144,7 +144,8 @@ def test_calibrated_airspeed_inverts_the_isentropic_flow():
     np.testing.assert_allclose(true_airspeed_of_calibrated_m_s(200.0, P0_PA, RHO0_KG_M3), 200.0, rtol=1e-14)
 
 
-def test_calibrated_airspeed_agrees_with_jsbsim(tmp_path):
+def test_calibrated_airspeed_agrees_with_jsbsim(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # the model writes an output file where it is loaded
     jsbsim = pytest.importorskip("jsbsim")
     fdm = jsbsim.FGFDMExec(None)
     fdm.set_debug_level(0)
