@@ -20,7 +20,9 @@ from scipy.stats import beta
 
 from airtruth import aircraft as planes
 from airtruth.aircraft import Aircraft
-from airtruth.checks.kinematics import check_kinematics, declared_biases, declared_errors
+from airtruth.checks.kinematics import check_kinematics
+from airtruth.checks.kinematics_model import LONGITUDINAL
+from airtruth.checks.kinematics_record import declared_biases, declared_errors
 from airtruth.checks.kinematics_search import EQUAL, SAME
 from airtruth.checks.result import CheckResult
 from airtruth.logs.flight_log import FlightLog
@@ -51,7 +53,10 @@ def trial(seed: int) -> Trial:
 def checked(log: FlightLog, aircraft: Aircraft, runs: Sequence[str]) -> CheckResult:
     """Check some runs of a log."""
     return check_kinematics(
-        log.select(list(runs)), declared_errors(aircraft), aircraft.chord_m, declared_biases(aircraft)
+        log.select(list(runs)),
+        declared_errors(aircraft, LONGITUDINAL),
+        aircraft.chord_m,
+        declared_biases(aircraft, LONGITUDINAL),
     )
 
 

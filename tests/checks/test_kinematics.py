@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from airtruth.checks.kinematics import check_kinematics, declared_biases, declared_errors
+from airtruth.checks.kinematics import check_kinematics
 from airtruth.checks.kinematics_fit import Fit, fit, limits_of, problem_of
 from airtruth.checks.kinematics_lines import lines_of
-from airtruth.checks.kinematics_model import ERRORS, Record, compare, stacked
+from airtruth.checks.kinematics_model import ERRORS, LONGITUDINAL, Record, compare, stacked
+from airtruth.checks.kinematics_record import declared_biases, declared_errors
 from airtruth.checks.kinematics_search import Explanation
 from airtruth.checks.kinematics_words import _factors
 from airtruth.checks.result import Cause, CheckResult, Finding, tables, undetermined
@@ -474,8 +475,8 @@ def test_tables_and_json(true):
 
 
 def test_declared_sensors_of_the_gtm(gtm):
-    assert declared_errors(gtm) == {"sensor_delay:theta_rad": pytest.approx(0.04)}
-    biases = declared_biases(gtm)
+    assert declared_errors(gtm, LONGITUDINAL) == {"sensor_delay:theta_rad": pytest.approx(0.04)}
+    biases = declared_biases(gtm, LONGITUDINAL)
     assert set(biases) == {"airspeed_m_s", "theta_rad", "q_rad_s", "ax_m_s2", "az_m_s2"}
     assert (biases["q_rad_s"], biases["ax_m_s2"]) == pytest.approx((0.0027, 0.0162 * G0), abs=1e-6)
 

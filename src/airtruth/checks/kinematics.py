@@ -17,6 +17,7 @@ from airtruth.checks.kinematics_bias import rms
 from airtruth.checks.kinematics_findings import bias_of, cause_of, drift, errors_of
 from airtruth.checks.kinematics_fit import limits_of, problem_of
 from airtruth.checks.kinematics_model import ERRORS, LONGITUDINAL, Record, thinned
+from airtruth.checks.kinematics_record import declared_biases, declared_errors
 from airtruth.checks.kinematics_search import Search, completed, search
 from airtruth.checks.kinematics_vaneless import untestable, without_vane
 from airtruth.checks.kinematics_words import NAMED, conclusions, verdict_of
@@ -75,7 +76,12 @@ def check_logs(
     result = (
         check_kinematics(parts)
         if aircraft is None
-        else check_kinematics(parts, declared_errors(aircraft), aircraft.chord_m, declared_biases(aircraft))
+        else check_kinematics(
+            parts,
+            declared_errors(aircraft, LONGITUDINAL),
+            aircraft.chord_m,
+            declared_biases(aircraft, LONGITUDINAL),
+        )
     )
     remarks = dict.fromkeys(sentence for one in admitted for sentence in one.remarks("aircraft"))
     doubts = poor.words([one for log in parts for batch in batches(log) for one in poor.measured(batch)])
@@ -97,9 +103,9 @@ def check_kinematics(
     ----------
     log : flight log, or several; of many runs the first `MOST_RECORDS` with an elevator that moves are taken.
     declared : instrument errors that are known, names of
-        `airtruth.checks.kinematics_model.ERRORS` in SI; see `declared_errors`.
+        `airtruth.checks.kinematics_model.ERRORS` in SI; see `airtruth.checks.kinematics_record.declared_errors`.
     chord_m : mean aerodynamic chord, which limits arms to `LONGEST_ARM_CHORDS` [m]; None takes that of the log.
-    biases : channel -> bias that is known [unit of the channel]; see `declared_biases`.
+    biases : channel -> bias that is known [unit of the channel]; see `declared_biases` there.
 
     Raises
     ------
@@ -147,26 +153,6 @@ def check_kinematics(
         residual_rms=rms(found.problem, found.best.fit),
         sentences=(*words, *remarks),
     )
-
-
-def declared_errors(aircraft: Aircraft) -> dict[str, float]:
-    """Errors of sensors that aircraft.toml declares, as `check_kinematics` takes them."""
-    result = {}
-    for error in ERRORS.values():
-        sensor = aircraft.file.sensors.get(error.channel)
-        value = error.neutral if sensor is None else sensor.errors().value(error.kind)
-        if value != error.neutral:
-            result[error.name] = value
-    return result
-
-
-def declared_biases(aircraft: Aircraft) -> dict[str, float]:
-    """Biases that aircraft.toml declares, channel -> SI, as `check_kinematics` takes them."""
-    sensors = aircraft.file.sensors
-    biases = {
-        channel: sensors[channel].errors().bias for channel in LONGITUDINAL.fields if channel in sensors
-    }
-    return {channel: bias for channel, bias in biases.items() if bias != 0.0}
 
 
 def _records(logs: Sequence[FlightLog]) -> tuple[list[Record], list[str]]:
@@ -293,6 +279,4 @@ __all__ = [
     "check_kinematics",
     "check_log",
     "check_logs",
-    "declared_biases",
-    "declared_errors",
 ]

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as fisher
 
-from airtruth.aircraft import Aircraft
 from airtruth.checks.kinematics_bias import rms
 from airtruth.checks.kinematics_energy import by_equation
 from airtruth.checks.kinematics_findings import bias_of, cause_of, drift, errors_of
@@ -140,24 +139,6 @@ def _searched(problem: Problem, usual: Mapping[str, float]) -> tuple[Search, Sea
     return final, replace(
         final, statistic=first.statistic, degrees=first.degrees, p_value=first.p_value, enlargement=factor
     )
-
-
-def declared_errors(aircraft: Aircraft) -> dict[str, float]:
-    """Errors of lateral sensors that aircraft.toml declares, as `check_lateral` takes them."""
-    result = {}
-    for error in ERRORS.values():
-        sensor = aircraft.file.sensors.get(error.channel)
-        value = error.neutral if sensor is None else sensor.errors().value(error.kind)
-        if value != error.neutral:
-            result[error.name] = value
-    return result
-
-
-def declared_biases(aircraft: Aircraft) -> dict[str, float]:
-    """Biases of lateral sensors that aircraft.toml declares, channel -> SI."""
-    sensors = aircraft.file.sensors
-    biases = {channel: sensors[channel].errors().bias for channel in LATERAL.fields if channel in sensors}
-    return {channel: bias for channel, bias in biases.items() if bias != 0.0}
 
 
 _NEEDED: Final = ("airspeed_m_s", "p_rad_s", "r_rad_s", "ay_m_s2")
@@ -312,4 +293,4 @@ def _of_gusts(findings: Sequence[Finding]) -> list[str]:
     ]
 
 
-__all__ = ["check_lateral", "declared_biases", "declared_errors", "side_records"]
+__all__ = ["check_lateral", "side_records"]

@@ -10,6 +10,7 @@ from typing import Any, Final, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.aircraft import Aircraft
 from airtruth.numerics.prefilter import butterworth, zero_phase
 from airtruth.physics.sensor_errors import KINDS, Kind, error_name
 from airtruth.units import UNITS, printed
@@ -168,4 +169,32 @@ class Kinematics:
     offsets: Mapping[str, float] = field(default_factory=dict)
 
 
-__all__ = ["RATE_HZ", "InstrumentError", "Kinematics", "R", "Samples", "stacked", "thinned"]
+def declared_errors(aircraft: Aircraft, kinematics: Kinematics) -> dict[str, float]:
+    """Errors of sensors that aircraft.toml declares: name -> value [SI]."""
+    result = {}
+    for error in kinematics.errors.values():
+        sensor = aircraft.file.sensors.get(error.channel)
+        value = error.neutral if sensor is None else sensor.errors().value(error.kind)
+        if value != error.neutral:
+            result[error.name] = value
+    return result
+
+
+def declared_biases(aircraft: Aircraft, kinematics: Kinematics) -> dict[str, float]:
+    """Biases that aircraft.toml declares: channel -> value [SI]."""
+    sensors = aircraft.file.sensors
+    biases = {channel: sensors[channel].errors().bias for channel in kinematics.fields if channel in sensors}
+    return {channel: bias for channel, bias in biases.items() if bias != 0.0}
+
+
+__all__ = [
+    "RATE_HZ",
+    "InstrumentError",
+    "Kinematics",
+    "R",
+    "Samples",
+    "declared_biases",
+    "declared_errors",
+    "stacked",
+    "thinned",
+]

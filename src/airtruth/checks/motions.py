@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from airtruth.aircraft import Aircraft
-from airtruth.checks import kinematics_lateral
+from airtruth.checks import kinematics_lateral, kinematics_model, kinematics_side
 from airtruth.checks.excitation import moves, turns
 from airtruth.checks.gate import admit
-from airtruth.checks.kinematics import check_kinematics, declared_biases, declared_errors
+from airtruth.checks.kinematics import check_kinematics
+from airtruth.checks.kinematics_record import declared_biases, declared_errors
 from airtruth.checks.result import CheckResult
 from airtruth.errors import LogError, choices
 from airtruth.logs.flight_log import FlightLog
@@ -126,7 +127,9 @@ def _check(motion: Motion, logs: Sequence[FlightLog], aircraft: Aircraft | None)
     if motion is LONGITUDINAL:
         if aircraft is None:
             return check_kinematics(logs)
-        return check_kinematics(logs, declared_errors(aircraft), aircraft.chord_m, declared_biases(aircraft))
+        known = kinematics_model.LONGITUDINAL
+        errors, biases = declared_errors(aircraft, known), declared_biases(aircraft, known)
+        return check_kinematics(logs, errors, aircraft.chord_m, biases)
     reasons = [unsupported(log, motion) for log in logs]
     if all(reasons):
         return _untold(logs, reasons[0])
@@ -134,9 +137,9 @@ def _check(motion: Motion, logs: Sequence[FlightLog], aircraft: Aircraft | None)
         return kinematics_lateral.check_lateral(logs)
     return kinematics_lateral.check_lateral(
         logs,
-        kinematics_lateral.declared_errors(aircraft),
+        declared_errors(aircraft, kinematics_side.LATERAL),
         None if aircraft.file.geometry is None else aircraft.file.geometry.span.value,
-        kinematics_lateral.declared_biases(aircraft),
+        declared_biases(aircraft, kinematics_side.LATERAL),
     )
 
 

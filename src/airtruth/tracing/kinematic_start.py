@@ -14,8 +14,9 @@ from typing import Final
 import numpy as np
 
 from airtruth.aircraft import Aircraft
-from airtruth.checks.kinematics import AIRSPEED, check_kinematics, declared_errors
-from airtruth.checks.kinematics_model import ERRORS
+from airtruth.checks.kinematics import AIRSPEED, check_kinematics
+from airtruth.checks.kinematics_model import ERRORS, LONGITUDINAL
+from airtruth.checks.kinematics_record import declared_errors
 from airtruth.checks.kinematics_words import NAMED
 from airtruth.checks.result import Cause, CheckResult, Finding
 from airtruth.effects.effect import Effect
@@ -57,7 +58,7 @@ def kinematic_check(
         if fitted:
             parts.append(log.select(run_ids=fitted))
     try:
-        return check_kinematics(parts, declared_errors(aircraft), aircraft.chord_m)
+        return check_kinematics(parts, declared_errors(aircraft, LONGITUDINAL), aircraft.chord_m)
     except LogError:
         return None
 
