@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -199,6 +200,16 @@ def feedback_rad(bench: Bench) -> float:
     return max(angles) - min(angles)
 
 
+def switched_over(bench: Bench, names: ModelNames) -> Iterator[tuple[Bench, str]]:
+    """The bench with each switch of the model in its other position, and the setting as NAME = VALUE."""
+    start = bench.at()
+    manager = start.fdm.get_property_manager()
+    for name in names.switches:
+        if manager.hasNode(name):
+            value = 0.0 if start.fdm[name] else 1.0
+            yield bench.known(set={**bench.model.set, name: value}), f"{name} = {value:g}"
+
+
 def without_feedback(bench: Bench, names: ModelNames) -> tuple[Bench, list[str], list[str]]:
     """Switch feedback to the elevator off where a property does it, or carry it.
 
@@ -209,19 +220,9 @@ def without_feedback(bench: Bench, names: ModelNames) -> tuple[Bench, list[str],
     moves = feedback_rad(bench)
     if moves <= FEEDBACK_RAD:
         return bench, [], []
-    start = bench.at()
-    manager = start.fdm.get_property_manager()
-    for name in names.switches:
-        if not manager.hasNode(name):
-            continue
-        value = 0.0 if start.fdm[name] else 1.0
-        switched = bench.known(set={**bench.model.set, name: value})
+    for switched, setting in switched_over(bench, names):
         if feedback_rad(switched) <= FEEDBACK_RAD and turns(switched, bench.model.elevator.command, ELEVATOR):
-            return (
-                switched,
-                [f"augmentation: {name} = {value:g} switches the feedback to the elevator off"],
-                [],
-            )
+            return switched, [f"augmentation: {setting} switches the feedback to the elevator off"], []
     carried = bench.model.elevator.model_copy(update={"feedback": True})
     return (
         bench.known(elevator=carried),
@@ -271,6 +272,7 @@ __all__ = [
     "feedback_rad",
     "integrated",
     "lateral_of",
+    "switched_over",
     "turns",
     "without_feedback",
 ]

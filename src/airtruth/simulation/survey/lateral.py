@@ -8,7 +8,7 @@ from typing import Final
 from airtruth.aircraft.model import SurfaceProperties
 from airtruth.errors import AircraftError
 from airtruth.simulation.survey.bench import Bench
-from airtruth.simulation.survey.controls import FEEDBACK_RAD, Control, control_of, turns
+from airtruth.simulation.survey.controls import FEEDBACK_RAD, Control, control_of, switched_over, turns
 from airtruth.simulation.survey.names import ModelNames
 from airtruth.units import DEG
 
@@ -80,17 +80,11 @@ def _without_feedback(bench: Bench, names: ModelNames) -> tuple[Bench, list[str]
     moves = feedback_rad(bench)
     if max(moves.values()) <= FEEDBACK_RAD:
         return bench, [], []
-    start = bench.at()
-    manager = start.fdm.get_property_manager()
-    for name in names.switches:
-        if not manager.hasNode(name):
-            continue
-        value = 0.0 if start.fdm[name] else 1.0
-        switched = bench.known(set={**bench.model.set, name: value})
+    for switched, setting in switched_over(bench, names):
         if max(feedback_rad(switched).values()) <= FEEDBACK_RAD and all(
             turns(switched, surface.command, control) for control, surface in _controls(bench)
         ):
-            return switched, [f"augmentation: {name} = {value:g} switches the lateral feedback off"], []
+            return switched, [f"augmentation: {setting} switches the lateral feedback off"], []
     notes, carried = [], {}
     for control, surface in _controls(bench):
         if moves[control.name] > FEEDBACK_RAD:
