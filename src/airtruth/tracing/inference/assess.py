@@ -256,7 +256,7 @@ def _free_run_slopes(
     own: Array,
     weight: Array,
 ) -> tuple[Array, Array]:
-    """Residual of a free run (samples, outputs) and its weighted derivatives (own parameters but the gusts, samples * outputs)."""
+    """Residual of a free run (samples, outputs) and its weighted derivatives (own parameters but gusts, samples * outputs)."""
     given = filter_inputs(record, compiled)
     residual = respond_to(given, settings, common, own, free_run=True).e
     columns, entries = [], settings.layout.per_record

@@ -29,7 +29,8 @@ class Whitener:
     Attributes
     ----------
     coefficients : (order, outputs, outputs); root : (outputs, outputs).
-    start : (outputs, outputs) inverse root of the covariance of the innovations themselves, for the first samples, which have no past.
+    start : (outputs, outputs) inverse root of the covariance of the innovations themselves, for the first samples, which have
+        no past.
     """
 
     coefficients: Array

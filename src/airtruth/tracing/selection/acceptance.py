@@ -254,7 +254,7 @@ def is_plausible(problem: TraceProblem, own: PosteriorFit) -> bool:
 
 
 def declared_part(problem: TraceProblem, effect: Effect) -> float:
-    """Size that the declared aircraft has of an effect of the flow angle's rate, in its JSBSim model and in [dynamics]; 0 for others."""
+    """Size that the declared aircraft has of an effect of the flow angle's rate, in its model and in [dynamics]; 0 for others."""
     plant, motion = problem.records[0].plant, problem.layout.motion
     stated = declared_dynamics(plant.aircraft.file.dynamics).aero
     for term in effect.change({p.name: 1.0 for p in effect.parameters}).aero:
@@ -304,7 +304,7 @@ def shape_reasons(effect: Effect, sizes: Array) -> Iterator[str]:
 def _free_run_gain(
     problem: TraceProblem, unaided: list[Assessment], after: list[Assessment], weights: tuple[Array, ...]
 ) -> tuple[Array, Array]:
-    """(records, outputs) gains in squared residual over the weight by channel, and (outputs, outputs) covariance of their sums."""
+    """(records, outputs) gains in squared residual over the weight, and (outputs, outputs) covariance of their sums."""
     outputs = len(problem.settings.noise)
     free, covariance = np.zeros((len(after), outputs)), np.zeros((outputs, outputs))
     for i, (old, new, weight) in enumerate(zip(unaided, after, weights, strict=True)):

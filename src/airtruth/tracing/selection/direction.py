@@ -100,7 +100,8 @@ def inserted(base: Sensitivities, at: int, t: Array, w: Array, more: Array | Non
 
     Parameters
     ----------
-    t, w, more : (directions, samples, outputs), (directions, outputs, outputs) and (directions,), as of `Sensitivities`; None is zero.
+    t, w, more : (directions, samples, outputs), (directions, outputs, outputs) and (directions,), as of `Sensitivities`;
+        None is zero.
     """
     added = np.zeros(len(t)) if more is None else more
     return Sensitivities(
