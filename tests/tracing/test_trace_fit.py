@@ -7,6 +7,7 @@ import pytest
 import trace_records as tr
 
 from airtruth.effects.registry import EFFECTS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import AeroTerm, Change
 from airtruth.tracing.inference import posterior
 from airtruth.tracing.inference.hypothesis import Hypothesis, unconstrained_by
@@ -286,11 +287,11 @@ def test_order_of_records_does_not_matter(three):
 
 def test_a_curvature_sets_its_slope_free_where_it_is_one():
     """About zero it is a slope at a trim of 0.1 rad; at a trim of zero, as in the linear model, it is none."""
-    assert {key: free for key, e in EFFECTS.items() if (free := unconstrained_by(e, 0.1))} == {
+    assert {key: free for key, e in EFFECTS.items() if (free := unconstrained_by(e, 0.1, LONGITUDINAL))} == {
         "cl_alpha_nonlinear:quadratic": (0,),
         "cm_alpha_nonlinear:quadratic": (3,),
     }
-    assert not any(unconstrained_by(e, 0.0) for e in EFFECTS.values())
+    assert not any(unconstrained_by(e, 0.0, LONGITUDINAL) for e in EFFECTS.values())
 
 
 def test_precision_without_a_declared_slope():
