@@ -47,6 +47,7 @@ class Motion:
     declared : quantities of aircraft.toml that scale or shift the coefficients.
     modes : modal parameters of the linear model.
     required : columns without which no analysis is possible; air density or altitude is needed beside them.
+    known_signals : known inputs over which an increment of a coefficient may depend beside the signals.
     """
 
     name: str
@@ -62,6 +63,7 @@ class Motion:
     declared: tuple[Declared, ...]
     modes: tuple[Mode, ...]
     required: tuple[str, ...]
+    known_signals: tuple[Signal, ...] = ()
 
     def __reduce__(self) -> tuple[Callable[[str], Motion], tuple[str]]:
         """Pickle the name: a motion is the same object in every process."""
@@ -116,7 +118,7 @@ class Motion:
         return frozenset(
             (
                 *(c.name for c in self.coefficients),
-                *(s.name for s in self.signals),
+                *(s.name for s in (*self.signals, *self.known_signals)),
                 *self.parameters,
                 *self.neutral,
                 *self.channels,
@@ -277,6 +279,7 @@ LATERAL: Final = Motion(
         Declared("inertia_xz"),
         Declared("cg"),
         Declared("cg_y"),
+        Declared("yaw_moment"),
     ),
     modes=(
         Mode("dutch_roll_wn_rad_s", "rad/s", "natural frequency of the Dutch roll"),
@@ -285,6 +288,7 @@ LATERAL: Final = Motion(
         Mode("spiral_1_s", "1/s", "root of the spiral"),
     ),
     required=("airspeed_m_s", "p_rad_s", "r_rad_s", "ay_m_s2", "aileron_rad", "rudder_rad"),
+    known_signals=(Signal("alpha", "alpha", "alpha_rad"),),
 )
 """The lateral-directional motion; a log holds beta_rad, or phi_rad or psi_rad from which it is reconstructed."""
 
