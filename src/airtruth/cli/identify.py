@@ -199,7 +199,7 @@ def tables(
     force: Replace = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write the paper's tables from identified campaigns, beside the published figures."""
+    """Write the paper's tables from identified campaigns, beside the published figures, and a table of lateral estimates."""
     for folder in folders:
         require_file(
             folder, "campaign folder", f"`airtruth fly CAMPAIGN.toml --out {quote(str(folder))}` creates it"
