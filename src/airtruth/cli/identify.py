@@ -47,7 +47,7 @@ def identify(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Parquet file of the estimates. Default: DIR/estimates.parquet for one DIR, none for logs. Of two motions the "
+            help="File of the estimates, FILE.parquet. Default: DIR/estimates.parquet for one DIR, none for logs. Of two motions the "
             "lateral one is written beside it, with -lateral in the name."
         ),
     ] = None,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from airtruth.errors import ConfigurationError, StoreError
 from airtruth.logs.names import ESTIMATES as FILES
+from airtruth.logs.parquet import SUFFIX, is_parquet
 from airtruth.logs.remote import location
 from airtruth.logs.sources import Logs
 from airtruth.physics.motion import LONGITUDINAL, motion_of
@@ -114,7 +115,7 @@ def _of_path(path: Path, logs: Logs | None, aircraft: Aircraft | None) -> Report
         return trace_report(*read_trace(path))
     if (path / TRUTH).is_file():
         return _of_campaign(open_campaigns(path), logs, aircraft)
-    if path.is_file() and path.suffix != ".parquet" and not _begins_as_parquet(path):
+    if path.is_file() and path.suffix != SUFFIX and not is_parquet(path):
         raise StoreError(
             f"{path}: holds no result; allowed: the folder of a trace, a loop or an identified campaign, its trace.json or "
             "loop.json, or the Parquet file of estimates that `airtruth identify` writes"
@@ -143,11 +144,6 @@ def _of_estimates(files: Sequence[Path], logs: Logs | None, aircraft: Aircraft |
         made.append(read_identified(file, *asked))
     name = next((record["aircraft"] for record in made[0].records.values()), "")
     return estimates_report(f"Identification of {name}" if name else files[0].stem, made)
-
-
-def _begins_as_parquet(path: Path) -> bool:
-    with path.open("rb") as file:
-        return file.read(4) == b"PAR1"
 
 
 def _of_campaign(campaigns: Sequence[Parted], logs: Logs | None, aircraft: Aircraft | None) -> Report:
