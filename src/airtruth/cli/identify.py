@@ -47,8 +47,8 @@ def identify(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="File of the estimates, FILE.parquet. Default: DIR/estimates.parquet for one DIR, none for logs. Of two motions the "
-            "lateral one is written beside it, with -lateral in the name."
+            help="File of the estimates, FILE.parquet. Default: DIR/estimates.parquet for one DIR, none for logs. Of two "
+            "motions the lateral one is written beside it, with -lateral in the name."
         ),
     ] = None,
     trim: Annotated[
