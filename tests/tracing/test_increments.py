@@ -42,7 +42,8 @@ from airtruth.tracing.selection.increment_fit import (
     is_apart_from_zero,
     redundant_increment,
 )
-from airtruth.tracing.selection.increments import flown, log_evidences, screen, shapes, sharpened
+from airtruth.tracing.selection.flown import flown
+from airtruth.tracing.selection.increments import log_evidences, screen, shapes, sharpened
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.release import Release
 from airtruth.tracing.selection.rounds import RoundStart, search_round

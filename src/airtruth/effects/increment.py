@@ -30,47 +30,51 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from airtruth.effects.effect import Effect, Parameter
-from airtruth.physics.terms import OUTPUTS, AeroTerm, Change, ReadingTerm, StateTerm, shape_of
+from airtruth.physics.motion import MOTIONS
+from airtruth.physics.motion_parts import Signal
+from airtruth.physics.terms import OUTPUTS, QBAR, AeroTerm, Change, ReadingTerm, StateTerm, shape_of
 
 Array = NDArray[np.float64]
 
 NAME: Final = "increment"
 """Name of every learned increment."""
-SIGNAL_NAMES: Final[Mapping[str, str]] = {
-    "alpha": "alpha_rad",
-    "elevator": "elevator_rad",
-    "qhat": "q_hat",
-    "alpha_dot_hat": "alpha_dot_hat",
-    "qbar": "qbar_pa",
+_SIGNALS: Final[Mapping[str, Signal]] = {
+    s.name: s for m in MOTIONS.values() for s in (*m.known_signals, *m.signals)
 }
-"""Signal of a term -> its name in an answer; a rate is multiplied by c/(2V)."""
-Acted = Literal["CL", "Cm", "CX", "alpha_rad", "q_rad_s", "az_m_s2"]
-"""Coefficient, or channel whose reading changes."""
+"""Signal of a motion, or known input that is one -> its description."""
+_COEFFICIENTS: Final = {c.name: c for m in MOTIONS.values() for c in m.coefficients}
+"""Name -> coefficient of a motion."""
+SIGNAL_NAMES: Final[Mapping[str, str]] = {
+    **{s.name: s.channel if s.length is None else f"{s.symbol}_hat" for s in _SIGNALS.values()},
+    **{m.flow_rate: m.flow_rate for m in MOTIONS.values()},
+    QBAR: f"{QBAR}_pa",
+}
+"""Signal of a term -> its name in an answer; a rate is multiplied by its reference length over 2 V."""
+_AXIAL: Final = "CX"
+"""Coefficient of the axial force, which is none of a motion."""
 _DIFFERENCE: Final[Mapping[str, float]] = {
-    "CL": 1e-3,
-    "Cm": 1e-4,
-    "CX": 1e-4,
-    "alpha_rad": 1e-4,
-    "q_rad_s": 1e-3,
-    "az_m_s2": 1e-2,
+    "force": 1e-3,
+    "moment": 1e-4,
+    "axial": 1e-4,
+    "rad": 1e-4,
+    "rad_s": 1e-3,
+    "m_s2": 1e-2,
 }
 """Step of the differences in a bend [-, unit of the channel] (judgement: small against noise, large against rounding)."""
 _REACH: Final[Mapping[str, float]] = {
-    "CL": 1.0,
-    "Cm": 0.3,
-    "CX": 0.1,
-    "alpha_rad": 0.1,
-    "q_rad_s": 1.0,
-    "az_m_s2": 30.0,
+    "force": 1.0,
+    "moment": 0.3,
+    "axial": 0.1,
+    "rad": 0.1,
+    "rad_s": 1.0,
+    "m_s2": 30.0,
 }
 """Largest bend over one cell [-, unit of the channel] (judgement: the lift and the moment of a stall; 6 deg of a vane)."""
-_QHAT: Final = 30.0
-"""Pitch rate over q c/(2V) by which the share of a reading over q c/(2V) exceeds one over an angle [-] (judgement)."""
-_DERIVATIVE: Final[Mapping[str, float]] = {"": 1.0, "alpha": 7.0, "elevator": 7.0, "qhat": 200.0}
-"""Increment of a derivative by each factor over one of a coefficient [1/rad, -] (judgement: Cm of 0.3 over a Cmde of 2 and a
-Cmq of 60)."""
-_ACTS: Final = {"CL": "lift", "Cm": "pitching moment", "CX": "axial force"}
-"""Coefficient in words."""
+_RATE: Final = 30.0
+"""Rate over its nondimensional value by which the share of a reading over it exceeds one over an angle [-] (judgement)."""
+_DERIVATIVE: Final[Mapping[str | None, float]] = {None: 7.0, "chord": 200.0, "span": 20.0}
+"""Increment of a derivative over one of a coefficient [1/rad, -], by the reference length of the factor (judgement: Cm of 0.3
+over a Cmde of 2 and a Cmq of 60; rates over the span are smaller by its ratio to the chord)."""
 _SLOPE: Final = "slope"
 """Name of the rise c over the cell of the trim."""
 STEP: Final = "step"
@@ -124,7 +128,7 @@ class Shape:
 
     Attributes
     ----------
-    acts_on : "CL", "Cm", "CX", or the channel whose reading changes.
+    acts_on : coefficient, or the channel whose reading changes.
     signal : one of `airtruth.physics.terms.signals_of` a motion.
     low, high : range of the signal in which the increment is learned [unit of the signal].
     cells : number of equal cells of the range; 0 for a linear increment, which needs ``memory``.
@@ -138,7 +142,7 @@ class Shape:
         half width of its play is not estimated: the cost has a kink there.
     """
 
-    acts_on: Acted
+    acts_on: str
     signal: str
     low: float
     high: float
@@ -165,7 +169,7 @@ class Shape:
         if self.step_cell is not None:
             return (STEP,)
         bends = tuple(_bend(k) for k in range(len(self.knots)))
-        slope = self.acts_on != "CX" and not (self.memory and self.factor)
+        slope = self.acts_on != _AXIAL and not (self.memory and self.factor)
         return (*bends, _SLOPE) if bends and slope else bends
 
     @property
@@ -228,14 +232,13 @@ class Shape:
 
     def _change(self, pieces: tuple[Piece, ...], *states: StateTerm) -> Change:
         """The pieces as terms of what the increment acts on."""
-        if self.acts_on == "CL" or self.acts_on == "Cm" or self.acts_on == "CX":
-            coefficient = self.acts_on
+        if not self.of_reading:
             by = (self.factor, self.factor_trim) if self.factor else ()
-            return Change(states=states, aero=tuple(AeroTerm(coefficient, *piece, *by) for piece in pieces))
-        channel = self.acts_on
+            return Change(states=states, aero=tuple(AeroTerm(self.acts_on, *piece, *by) for piece in pieces))
         behind = self.state if self.factor else ""
         return Change(
-            states=states, readings=tuple(ReadingTerm(channel, *piece, behind=behind) for piece in pieces)
+            states=states,
+            readings=tuple(ReadingTerm(self.acts_on, *piece, behind=behind) for piece in pieces),
         )
 
     def _bends(self, values: Mapping[str, float], signal: str) -> tuple[Piece, ...]:
@@ -282,7 +285,7 @@ class Shape:
         at = np.asarray(signal, dtype=np.float64)
         lines, amplitudes = _pieces_of(self)
         values = np.stack(
-            [shape_of(AeroTerm("CL", "alpha", form, 1.0, at=x), at) for form, x in lines], axis=-1
+            [shape_of(AeroTerm(self.acts_on, self.signal, form, 1.0, at=x), at) for form, x in lines], axis=-1
         )
         return np.asarray(values @ amplitudes)
 
@@ -340,10 +343,10 @@ def increment(shape: Shape, prior_std: float = math.inf) -> Increment:
     """
     size = "share" if not shape.cells else ""
     names = [size] if size else list(shape.coefficients)
-    scale = _DERIVATIVE[shape.factor]
-    reach, step = scale * _REACH[shape.acts_on], scale * _DIFFERENCE[shape.acts_on]
+    kind, scale = _kind(shape.acts_on), _scale(shape)
+    reach, step = scale * _REACH[kind], scale * _DIFFERENCE[kind]
     if size:
-        rate = _QHAT if shape.of_reading and shape.signal == "qhat" else 1.0
+        rate = _RATE if shape.of_reading and _SIGNALS[shape.signal].length is not None else 1.0
         reach, step = 20.0 * rate * reach, 100.0 * rate * step
     meanings = {
         "share": "part that acts through the state [1/unit of the signal]",
@@ -367,7 +370,7 @@ def increment(shape: Shape, prior_std: float = math.inf) -> Increment:
         parameters += [
             _of_memory(name, value, shape.memory) for name, value in shape.estimated_memory.items()
         ]
-    acts = _ACTS.get(shape.acts_on, f"reading of {shape.acts_on}")
+    acts = _words(shape.acts_on)
     return Increment(
         name=NAME,
         variant=shape.variant,
@@ -379,6 +382,26 @@ def increment(shape: Shape, prior_std: float = math.inf) -> Increment:
         distinguished_by="Records that cover its range slowly and fast separate a function from memory.",
         shape=shape,
     )
+
+
+def _kind(acts_on: str) -> str:
+    """Key of `_REACH` and `_DIFFERENCE`: kind of a coefficient, or unit of a channel."""
+    if acts_on in _COEFFICIENTS:
+        return "force" if _COEFFICIENTS[acts_on].length is None else "moment"
+    units = (unit for unit in sorted(_REACH, key=len, reverse=True) if acts_on.endswith(f"_{unit}"))
+    return next(units, "axial")
+
+
+def _scale(shape: Shape) -> float:
+    """Increment of what a shape acts on over one of a coefficient: larger for a derivative."""
+    return _DERIVATIVE[_SIGNALS[shape.factor].length] if shape.factor else 1.0
+
+
+def _words(acts_on: str) -> str:
+    """What an increment acts on, in words."""
+    if acts_on in _COEFFICIENTS:
+        return _COEFFICIENTS[acts_on].description.partition(",")[0]
+    return "axial force" if acts_on == _AXIAL else f"reading of {acts_on}"
 
 
 def _of_memory(name: str, value: float, memory: Memory) -> Parameter:
