@@ -327,6 +327,10 @@ MOTIONS: Final[Mapping[str, Motion]] = MappingProxyType({m.name: m for m in (LON
 """Name -> motion, in the order of answers."""
 
 
+VANES: Final = frozenset(y.channel for m in MOTIONS.values() for y in m.outputs if y.instrument == "vane")
+"""Columns of the vanes of every motion."""
+
+
 def motion_of(columns: Iterable[str]) -> Motion:
     """The motion whose derivatives are among the columns of a table of estimates; the longitudinal one if none is."""
     names = set(columns)
@@ -337,4 +341,4 @@ def _named(name: str) -> Motion:
     return MOTIONS[name]
 
 
-__all__ = ["LATERAL", "LONGITUDINAL", "MOTIONS", "Motion", "motion_of"]
+__all__ = ["LATERAL", "LONGITUDINAL", "MOTIONS", "VANES", "Motion", "motion_of"]
