@@ -33,7 +33,7 @@ CAPS: dict[str, int] = {
     "logs": 6,
     "loop": 9,
     "numerics": 17,
-    "physics": 249,
+    "physics": 247,
     "reporting": 83,
     "schemas": 2,
     "simulation": 547,

@@ -163,7 +163,9 @@ def _data(histories: Histories, chosen: Extract) -> dict[str, object]:
     return {
         "first": [r.run_id for r in chosen.records].index(histories.first.run_id),
         "channels": [shown(c)[0] for c in first.measured],
-        "tolerances": [OF_CHANNEL.get(c, 0.0) * shown(c)[1] for c in first.measured],
+        "tolerances": [
+            (OF_CHANNEL[c].absolute if c in OF_CHANNEL else 0.0) * shown(c)[1] for c in first.measured
+        ],
         "pitch": {"channel": shown(_Q)[0], "tolerance": PITCH_RAD / DEG},
         "keys": _keys(chosen),
         "models": [
