@@ -201,7 +201,9 @@ LONGITUDINAL: Final = Motion(
     name="longitudinal",
     heading="Longitudinal motion",
     states=(State("alpha", "alpha_rad"), State("q", "q_rad_s")),
-    controls=(Control("elevator", "elevator_rad", "elevator_command_rad", "elevator_actuator", "de"),),
+    controls=(
+        Control("elevator", "elevator_rad", "elevator_command_rad", "elevator_actuator", "de", "q_rad_s"),
+    ),
     known=("airspeed_m_s", "density_kg_m3", "theta_rad"),
     outputs=(
         Output("alpha", "alpha_rad", "vane"),
@@ -243,8 +245,8 @@ LATERAL: Final = Motion(
         State("phi", "phi_rad"),
     ),
     controls=(
-        Control("aileron", "aileron_rad", "aileron_command_rad", "aileron_actuator", "da"),
-        Control("rudder", "rudder_rad", "rudder_command_rad", "rudder_actuator", "dr"),
+        Control("aileron", "aileron_rad", "aileron_command_rad", "aileron_actuator", "da", "p_rad_s"),
+        Control("rudder", "rudder_rad", "rudder_command_rad", "rudder_actuator", "dr", "r_rad_s"),
     ),
     known=("airspeed_m_s", "density_kg_m3", "alpha_rad", "theta_rad", "q_rad_s"),
     outputs=(

@@ -166,7 +166,7 @@ def _corrections(case: Case, fit: PosteriorFit, covariance: Array) -> Correction
     values = fit.point.common[SHORT_PERIOD.common.derivatives].tolist()
     deviations = np.sqrt(np.diag(covariance)[SHORT_PERIOD.common.derivatives]).tolist()
     std = dict(zip(PARAMETERS, deviations, strict=True))
-    plants = [record.plant for record in case.fitted.records]
+    plants = [record.pitch_plant for record in case.fitted.records]
     alpha = float(np.mean([p.trim_alpha_rad for p in plants])) + case.fitted.alpha_shift_rad
     return Corrections(
         {name: rounded(value, std[name]) for name, value in zip(PARAMETERS, values, strict=True)},

@@ -86,7 +86,7 @@ def _surface(record: TraceRecord, change: Change) -> Panel:
 def _curve(shown_: ShownRecord, terms: tuple[AeroTerm, ...]) -> Panel:
     """Coefficient over its signal: the declared one, refitted, and with the effect."""
     first, record = terms[0], shown_.record
-    plant = record.plant
+    plant = record.pitch_plant
     over = plant.alpha_rad if first.signal == "alpha" else plant.elevator_rad
     at = plant.trim_alpha_rad if first.signal == "alpha" else plant.trim_elevator_rad
     shift = plant.alpha_shift_rad if first.signal == "alpha" else 0.0

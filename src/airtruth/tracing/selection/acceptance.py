@@ -259,7 +259,7 @@ def is_plausible(problem: TraceProblem, own: PosteriorFit) -> bool:
 
 def declared_part(problem: TraceProblem, effect: Effect) -> float:
     """Size that the declared aircraft has of an effect of alpha_dot, in its JSBSim model and in [dynamics]; 0 for others."""
-    plant = problem.records[0].plant
+    plant = problem.records[0].pitch_plant
     stated = declared_dynamics(plant.aircraft.file.dynamics).aero
     for term in effect.change({p.name: 1.0 for p in effect.parameters}).aero:
         if term.signal == _ALPHA_DOT:
