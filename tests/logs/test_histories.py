@@ -18,7 +18,14 @@ def history(run_id, floor=0.1):
     y = {c: np.sin(T + k) for k, c in enumerate(("alpha_rad", "az_m_s2"))}
     models = {m: {c: x * values for c, values in y.items()} for m, x in (("declared", 0.5), ("after", 0.9))}
     return History(
-        run_id, "fitted", T, -T, y, models, floor={"alpha_rad": floor}, conditions={"mass_kg": 26.2}
+        run_id,
+        "fitted",
+        T,
+        {"elevator_rad": -T},
+        y,
+        models,
+        floor={"alpha_rad": floor},
+        conditions={"mass_kg": 26.2},
     )
 
 
