@@ -47,7 +47,7 @@ def test_a_file_gives_back_the_records(tmp_path):
     assert read.first.run_id == "a"
     for mine, stored in zip(two().records, read.records, strict=True):
         np.testing.assert_array_equal(stored.t_s, mine.t_s)
-        np.testing.assert_array_equal(stored.elevator_rad, mine.elevator_rad)
+        np.testing.assert_array_equal(stored.controls_rad["elevator_rad"], mine.controls_rad["elevator_rad"])
         for c in mine.measured:
             np.testing.assert_array_equal(stored.measured[c], mine.measured[c])
             for m in mine.models:
