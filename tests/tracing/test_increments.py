@@ -445,7 +445,7 @@ IDLE = increment(Shape("Cm", "alpha", -0.03, 0.03, 4, trim=0.0), 0.01)
 def beyond_one_degree(one):
     e = one.signals.elevator_rad
     measured = e + 0.5 * np.sign(e) * np.maximum(np.abs(e) - DEG, 0.0)
-    return replace(one, signals=replace(one.signals, elevator_rad=measured))
+    return replace(one, signals=replace(one.signals, controls_rad=measured[None]))
 
 
 @pytest.mark.slow

@@ -157,7 +157,7 @@ def _shapes(case: Case, fitted: Sequence[AxialSeries]) -> list[Shape]:
     """Functions of each signal that the records excite, over the range that they cover, with more and more cells."""
     trims = {
         "alpha": float(np.mean([r.plant.trim_alpha_rad for r in case.fitted.records])),
-        "elevator": float(np.mean([r.plant.trim_elevator_rad for r in case.fitted.records])),
+        "elevator": float(np.mean([r.pitch_plant.trim_elevator_rad for r in case.fitted.records])),
     }
     found = []
     for name in SIGNALS:
@@ -306,7 +306,7 @@ def _relative_swing(own: _Learned, case: Case, fitted: Sequence[AxialSeries]) ->
     shape = own.effect.shape
     swing = float(np.ptp(shape.basis(np.linspace(shape.low, shape.high, 101)) @ own.bends))
     low, high = covered(np.concatenate([s.signals["alpha"] for s in fitted]))
-    plant = case.fitted.records[0].plant
+    plant = case.fitted.records[0].pitch_plant
     at = np.linspace(low, high, 101)
     declared = np.interp(at, plant.alpha_rad, plant.over_alpha[:, 0]) / plant.aircraft.constants.wing_area_m2
     return swing / max(float(np.ptp(declared)), 1e-9)

@@ -29,6 +29,8 @@ class LateralPlant:
     neutral_rad : (controls,) deflections that an effectiveness leaves alone [rad]: zero, for the linear model its trim.
     derivatives, derivative_cov : (15,) declared values and (15, 15) covariance, mass, inertias and CG included.
     trim : of the JSBSim aircraft, None for a linear one.
+    alpha_shift_rad : 0, because the tables are over the measured angle of attack; of `airtruth.tracing.model.plant.Plant`, the
+        angle from which the linear model counts.
     """
 
     aircraft: Aircraft
@@ -42,6 +44,7 @@ class LateralPlant:
     derivatives: Array
     derivative_cov: Array
     trim: Trim | None
+    alpha_shift_rad: float = 0.0
 
 
 __all__ = ["LateralPlant"]

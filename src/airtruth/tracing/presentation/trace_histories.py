@@ -96,7 +96,7 @@ def _by_channel(values: np.ndarray[Any, np.dtype[np.float64]]) -> dict[str, Any]
 
 
 def _conditions(record: TraceRecord) -> dict[str, float]:
-    s, plant = record.signals, record.plant
+    s, plant = record.signals, record.pitch_plant
     constants = plant.aircraft.constants
     return {
         "airspeed_m_s": float(s.airspeed_m_s.mean()),

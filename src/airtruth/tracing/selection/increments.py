@@ -100,7 +100,7 @@ def shapes(problem: TraceProblem) -> list[Shape]:
     ranges = {name: _range(records, name) for name in ("alpha", "elevator", "qhat", "alpha_dot_hat")}
     trims = {
         "alpha": float(np.mean([r.plant.trim_alpha_rad for r in records])),
-        "elevator": float(np.mean([r.plant.trim_elevator_rad for r in records])),
+        "elevator": float(np.mean([r.pitch_plant.trim_elevator_rad for r in records])),
     }
     highest_hz = _NYQUIST_SHARE * 0.5 / max(r.signals.dt_s for r in records)
     found: list[Shape] = []
