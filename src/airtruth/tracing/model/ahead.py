@@ -35,8 +35,8 @@ def _model() -> FilterModel:
             [*[1.0] * 12, np.zeros((2, 3)), increments, axis, axis, axis, np.zeros((2, 2, 2, 3))]
         ),
         GustModel(*[1.0] * len(GustModel._fields)),
-        EffectArrays(whole.reshape(0, 5), none, none, none, whole.reshape(0, 2), none, none, none),
-        SensorArrays._make([*[ones] * 7, 1.0]),
+        EffectArrays(whole.reshape(0, 6), none, none, none, whole.reshape(0, 2), none, none, none),
+        SensorArrays._make([*[ones] * 7, 1.0, ones]),
         state_layout(whole, CORE, 0.0 * ones, 0.0 * ones, slow=False),
     )
 

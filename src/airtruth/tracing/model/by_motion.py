@@ -20,13 +20,14 @@ Array = NDArray[np.float64]
 
 
 class Equations(NamedTuple):
-    """Equations of one motion; functions but the last are `airtruth.numerics.compiled.inner`.
+    """Equations of one motion; functions but ``settle`` are `airtruth.numerics.compiled.inner`.
 
     Attributes
     ----------
     states, early : numbers of its states and of its early outputs; one more output is late.
     rates, outputs, air_at, move_plays : as the functions of this module.
     settle : (state, inputs, model) -> None: the effects' states into equilibrium with the states of the motion.
+    has_roll_gust : whether a state of a roll gust, of unit variance, follows the other states of the gusts.
     """
 
     states: int
@@ -35,7 +36,8 @@ class Equations(NamedTuple):
     outputs: Callable[..., None]
     air_at: Callable[..., AirPoint]
     move_plays: Callable[..., None]
-    settle: Callable[[Array, AirPoint, FilterModel], None]
+    settle: Callable[[Array, Any, FilterModel], None]
+    has_roll_gust: bool = False
 
 
 _OF: Final[dict[type, Equations]] = {}

@@ -50,7 +50,7 @@ class CompiledChange:
     effects : terms and states, for the filter's kernel.
     effect_states, motion : first state of each effect with states; states up to the last of them.
     declared : quantity of `airtruth.physics.terms.DECLARED` -> all its terms together.
-    bias, scale, lag_s, delay_s, arm_m : (3,) of the outputs [units of the outputs, -, s, s, m].
+    bias, scale, lag_s, delay_s, arm_m, down_m : (outputs,) [units of the outputs, -, s, s, m, m].
     inputs : channel of an input -> scale, bias and position error of its sensor.
     """
 
@@ -64,6 +64,7 @@ class CompiledChange:
     lag_s: Array
     delay_s: Array
     arm_m: Array
+    down_m: Array
     inputs: Mapping[str, SensorErrors]
 
     def states(self, slow: bool) -> StateLayout:
@@ -106,6 +107,7 @@ def compile_change(change: Change) -> CompiledChange:
         lag_s=np.maximum(outputs["lag"], 0.0),
         delay_s=outputs["delay"],
         arm_m=outputs["arm"],
+        down_m=outputs["arm_down"],
         inputs=inputs,
     )
 

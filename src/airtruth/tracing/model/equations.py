@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import inner, shared
 from airtruth.physics.longitudinal import lower_point
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.sensors import vane_equation
 from airtruth.physics.terms import numbered_shape
 from airtruth.tracing.model.by_motion import Equations, register
@@ -37,7 +38,7 @@ from airtruth.tracing.model.kernel_input import (
     GridSignals,
     GustModel,
 )
-from airtruth.tracing.model.parameters import LEAD, LEAD_COUNT, OUTPUTS
+from airtruth.tracing.model.parameters import GUST_1, LEAD, LEAD_COUNT, OUTPUTS
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
@@ -52,8 +53,10 @@ of 840 m at 43 m/s, within 6 % (rms 2 %) from 0.5 to 600 rad/s, the level left f
 powers of the frequency, so that the corners serve any speed and length; a record of seconds shows little below it."""
 _LEAD_GAIN: Final = (0.58, 0.84, 1.39)
 """Gains at these corners [-]; fitted with them."""
-_READING: Final = 2
+_READING: Final = len(LONGITUDINAL.coefficients)
 """First number of a reading among what a term acts on, see `EffectArrays`."""
+_LEADS: Final = LEAD - GUST_1
+"""Position of the first low-passed copy among the states of the gusts [-]."""
 _PLAY: Final = 2
 """Number of the play in `airtruth.physics.terms.STATE_KINDS`."""
 _PLAY_S: Final = 0.05
@@ -62,7 +65,7 @@ large against its width at once)."""
 _ALPHA_DOT: Final = 3
 """Number of the signal alpha_dot_hat in `airtruth.physics.terms.SIGNALS`."""
 
-_shape = cast("Callable[[int, float], float]", inner(numbered_shape))
+shape = cast("Callable[[int, float], float]", inner(numbered_shape))
 _vane = cast("Callable[[float, float, float, float], float]", inner(vane_equation))
 
 
@@ -83,12 +86,18 @@ class Signals(NamedTuple):
 
 
 @shared
-def gust(x: Array, rolloff: float) -> float:
-    """Upward gust over the level of Dryden's part [-]."""
+def gust_of(x: Array, first: int, rolloff: float) -> float:
+    """Gust of two states of Dryden's filter, the first of them at ``first``, over the level of Dryden's part [-]."""
     lead = 0.0
     for i in range(LEAD_COUNT):
-        lead += _LEAD_GAIN[i] * (x[2] - x[LEAD + i])
-    return float(_W1 * x[2] + _W2 * x[3] + rolloff * lead)
+        lead += _LEAD_GAIN[i] * (x[first] - x[first + _LEADS + i])
+    return float(_W1 * x[first] + _W2 * x[first + 1] + rolloff * lead)
+
+
+@shared
+def gust(x: Array, rolloff: float) -> float:
+    """Upward gust over the level of Dryden's part [-]."""
+    return gust_of(x, GUST_1, rolloff)
 
 
 @inner
@@ -106,7 +115,7 @@ def effective_elevator(elevator_rad: float, aircraft: AircraftArrays) -> float:
 
 
 @inner
-def _cell(axis: Array, x: float) -> tuple[int, float]:
+def cell(axis: Array, x: float) -> tuple[int, float]:
     """Lower point of the cell that holds x and the share of the cell below x; the end cells go on outside."""
     low = lower_point(axis, x)
     return low, (x - axis[low]) / (axis[low + 1] - axis[low])
@@ -118,9 +127,9 @@ def _look_up(
 ) -> tuple[float, float, float]:
     """X, Z [N] and M [N m], trilinear in the tables."""
     values = aircraft.values
-    i, si = _cell(aircraft.alpha_rad, alpha)
-    j, sj = _cell(aircraft.elevator_rad, surface)
-    n, sn = _cell(aircraft.qhat, qhat)
+    i, si = cell(aircraft.alpha_rad, alpha)
+    j, sj = cell(aircraft.elevator_rad, surface)
+    n, sn = cell(aircraft.qhat, qhat)
     fx = fz = fm = 0.0
     for a in range(2):
         wa = si if a else 1.0 - si
@@ -139,14 +148,9 @@ def _look_up(
 
 
 @inner
-def _signal(signals: Signals, number: int) -> float:
-    if number == 0:
-        return signals.alpha
-    if number == 1:
-        return signals.elevator
-    if number == _ALPHA_DOT:
-        return signals.alpha_dot_hat
-    return signals.qhat if number == 2 else signals.qbar
+def signal_of(signals: tuple[float, ...], number: int) -> float:
+    """A signal of any motion by its number."""
+    return signals[number]
 
 
 @inner
@@ -166,13 +170,13 @@ def _terms(
         if (number == _ALPHA_DOT) != in_alpha_dot or effects.term_index[t, 0] >= _READING:
             continue
         state, amplitude = effects.term_index[t, 3], effects.amplitude[t]
-        s = x[state] if state >= 0 else _signal(signals, number)
+        s = x[state] if state >= 0 else signal_of(signals, number)
         if in_alpha_dot and effects.term_index[t, 0] == 0:
             s /= 1.0 + amplitude * feedback
-        increment = amplitude * _shape(effects.term_index[t, 2], s - effects.origin[t])
+        increment = amplitude * shape(effects.term_index[t, 2], s - effects.origin[t])
         factor = effects.term_index[t, 4]
         if factor >= 0:
-            increment *= _signal(signals, factor) - effects.factor_origin[t]
+            increment *= signal_of(signals, factor) - effects.factor_origin[t]
         if effects.term_index[t, 0] == 0:
             lift += increment
         else:
@@ -216,27 +220,29 @@ def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
     )
     out[0] = q + (fz * cosine - fx * sine) / (mass * ground) + weight
     out[1] = fm / aircraft.inertia_kg_m2
-    _gust_rates(x, v, late, gusts, out)
-    _effect_rates(x, Signals(alpha, surface, qhat, out[0] * half, qbar), model, out)
+    gust_rates(x, GUST_1, v, late, gusts, out)
+    effect_rates(x, Signals(alpha, surface, qhat, out[0] * half, qbar), model, out)
     return float(fz / mass)
 
 
 @inner
-def _gust_rates(x: Array, v: float, late: float, gusts: GustModel, out: Array) -> None:
+def gust_rates(x: Array, first: int, v: float, late: float, gusts: GustModel, out: Array) -> None:
+    """x' of the states of a gust, the first of them at ``first``."""
     a = v / gusts.length_m
-    out[2] = -a * x[2]
-    out[3] = a * (x[2] - x[3])
-    out[4] = late
+    out[first] = -a * x[first]
+    out[first + 1] = a * (x[first] - x[first + 1])
+    out[first + 2] = late
     for i in range(LEAD_COUNT):
-        out[LEAD + i] = _LEAD_RAD_S[i] * (x[2] - x[LEAD + i])
+        out[first + _LEADS + i] = _LEAD_RAD_S[i] * (x[first] - x[first + _LEADS + i])
 
 
 @inner
-def _effect_rates(x: Array, signals: Signals, model: FilterModel, out: Array) -> None:
+def effect_rates(x: Array, signals: tuple[float, ...], model: FilterModel, out: Array) -> None:
+    """x' of the effects' states."""
     effects = model.effects
     for k in range(effects.time_s.size):
         at = model.states.effect[k]
-        s = _signal(signals, effects.state_index[k, 1])
+        s = signal_of(signals, effects.state_index[k, 1])
         if effects.state_index[k, 0] == _PLAY:
             out[at] = (s - x[at]) / _PLAY_S
         elif effects.state_index[k, 0] == 0:
@@ -257,17 +263,39 @@ def hold_plays(x: Array, tried: Array, model: FilterModel) -> None:
 
 
 @inner
-def move_plays(x: Array, at: AirPoint, model: FilterModel) -> None:
+def has_plays(effects: EffectArrays) -> bool:
+    """Whether an effect has a play."""
+    for k in range(effects.time_s.size):
+        if effects.state_index[k, 0] == _PLAY:
+            return True
+    return False
+
+
+@inner
+def follow(x: Array, signals: tuple[float, ...], model: FilterModel) -> None:
     """Move the states of plays to no more than their half width from their signals."""
     effects = model.effects
     for k in range(effects.time_s.size):
         if effects.state_index[k, 0] == _PLAY:
-            alpha = air_alpha(x, gust(x, model.gusts.rolloff), model.gusts.level_m_s, at)
-            surface = effective_elevator(at.elevator_rad, model.aircraft)
-            qhat = x[1] * 0.5 * model.aircraft.chord_m / at.airspeed_m_s
-            s = _signal(Signals(alpha, surface, qhat, 0.0, at.qbar_pa), effects.state_index[k, 1])
+            s = signal_of(signals, effects.state_index[k, 1])
             i, half = model.states.effect[k], effects.half_width[k]
             x[i] = min(max(x[i], s - half), s + half)
+
+
+@inner
+def _measured(x: Array, alpha: float, at: AirPoint, model: FilterModel) -> Signals:
+    """The signals that need no acceleration."""
+    surface = effective_elevator(at.elevator_rad, model.aircraft)
+    qhat = x[1] * 0.5 * model.aircraft.chord_m / at.airspeed_m_s
+    return Signals(alpha, surface, qhat, 0.0, at.qbar_pa)
+
+
+@inner
+def move_plays(x: Array, at: AirPoint, model: FilterModel) -> None:
+    """See `airtruth.tracing.model.by_motion.move_plays`."""
+    if has_plays(model.effects):
+        alpha = air_alpha(x, gust(x, model.gusts.rolloff), model.gusts.level_m_s, at)
+        follow(x, _measured(x, alpha, at, model), model)
 
 
 def settle_effects(x: Array, at: AirPoint, model: FilterModel) -> None:
@@ -296,21 +324,18 @@ def air_at(grid: GridSignals, point: int) -> AirPoint:
 
 
 @inner
-def _add_readings(x: Array, alpha: float, at: AirPoint, model: FilterModel, y: Array) -> None:
-    """Add the increments of the readings."""
+def add_readings(x: Array, signals: tuple[float, ...], first: int, model: FilterModel, y: Array) -> None:
+    """Add the increments of the readings; ``first``: first number of a reading among what a term acts on."""
     effects = model.effects
     for t in range(effects.amplitude.size):
-        output = effects.term_index[t, 0] - _READING
+        output = effects.term_index[t, 0] - first
         if output >= 0:
-            surface = effective_elevator(at.elevator_rad, model.aircraft)
-            qhat = x[1] * 0.5 * model.aircraft.chord_m / at.airspeed_m_s
             state = effects.term_index[t, 3]
-            signals = Signals(alpha, surface, qhat, 0.0, at.qbar_pa)
-            s = x[state] if state >= 0 else _signal(signals, effects.term_index[t, 1])
-            more = effects.amplitude[t] * _shape(effects.term_index[t, 2], s - effects.origin[t])
+            s = x[state] if state >= 0 else signal_of(signals, effects.term_index[t, 1])
+            more = effects.amplitude[t] * shape(effects.term_index[t, 2], s - effects.origin[t])
             behind = effects.term_index[t, 5]
             if behind >= 0:
-                driver = _signal(signals, effects.state_index[behind, 1])
+                driver = signal_of(signals, effects.state_index[behind, 1])
                 more *= x[model.states.effect[behind]] - driver
             y[output] += more
 
@@ -323,7 +348,8 @@ def outputs(x: Array, rate: Array, az: float, at: AirPoint, model: FilterModel, 
     y[0] = _vane(alpha, x[1], arm[0], at.airspeed_m_s)
     y[1] = x[1]
     y[2] = az - arm[2] * rate[1]
-    _add_readings(x, alpha, at, model, y)
+    if model.effects.amplitude.size > 0:
+        add_readings(x, _measured(x, alpha, at, model), _READING, model, y)
     for i in range(OUTPUTS):
         y[i] *= scale[i]
 
@@ -338,12 +364,21 @@ def lead_decay(dt_s: float, i: int) -> tuple[float, float]:
 register(AircraftArrays, GridSignals, Equations(2, 2, rates, outputs, air_at, move_plays, settle_effects))
 
 __all__ = [
+    "add_readings",
     "air_alpha",
     "air_at",
+    "cell",
+    "effect_rates",
     "effective_elevator",
+    "follow",
     "gust",
+    "gust_of",
+    "gust_rates",
+    "has_plays",
     "hold_plays",
     "lead_decay",
     "rates",
     "settle_effects",
+    "shape",
+    "signal_of",
 ]

@@ -23,7 +23,7 @@ from airtruth.tracing.model.corners import (
     predicted,
     settled,
 )
-from airtruth.tracing.model.equations import gust
+from airtruth.tracing.model.equations import gust_of
 from airtruth.tracing.model.gains import Gains, interpolate, scaled
 from airtruth.tracing.model.kernel_input import AirPoint, FilterModel, KernelInput
 from airtruth.tracing.model.linearise import FirstUpdate
@@ -78,7 +78,7 @@ def _initial_state(given: KernelInput) -> Array:
     states = equations_of(model).states
     x[: given.start.size] = given.start
     x[lead_of(states) : core_of(states)] = given.start[states]
-    x[given.start.size] = gust(x, model.gusts.rolloff)
+    x[given.start.size] = gust_of(x, states, model.gusts.rolloff)
     at = type(given.reference)(*(column[0] for column in given.grid))
     equations_of(model).settle(x, at, model)
     return x

@@ -52,15 +52,16 @@ class AircraftArrays(NamedTuple):
 
 
 class GustModel(NamedTuple):
-    """Vertical gusts.
+    """The gusts that the filter estimates, vertical in the pitch plane and from the side in the lateral-directional motion.
 
     Attributes
     ----------
     level_m_s : standard deviation of Dryden's part [m/s].
     length_m : scale length [m].
     rolloff : 0 for Dryden's spectrum, 1 for von Karman's [-].
-    rotary : share of the rotary gust [-].
-    rotary_time_s : time the gust takes to the tail, 4 b/(pi V) [s].
+    rotary : share of the rotary gusts [-].
+    rotary_time_s : time the gust takes to the tail, 4 b/(pi V), of the side gust 3 b/(pi V) [s].
+    roll_1_m : standard deviation of the roll gust over the level [1/m]; roll_time_s : its correlation time [s].
     """
 
     level_m_s: float
@@ -68,6 +69,8 @@ class GustModel(NamedTuple):
     rolloff: float
     rotary: float
     rotary_time_s: float
+    roll_1_m: float = 0.0
+    roll_time_s: float = 1.0
 
 
 class EffectArrays(NamedTuple):
@@ -94,15 +97,14 @@ class EffectArrays(NamedTuple):
 
 
 class SensorArrays(NamedTuple):
-    """Errors of the outputs alpha, q, az.
+    """Errors of the outputs of the motion, (outputs,) each.
 
     Attributes
     ----------
-    bias : (3,) [units of the outputs]; scale : (3,) [-]; arm_m : (3,) position ahead of the CG [m].
-    lag_s, delay_s : (3,) [s]; 0 for none.
-    variance : (3,) of the white noise [units of the outputs squared].
-    slow_std : (3,) of the correlated noise, a Gauss-Markov process [units of the outputs]; slow_time_s : its correlation
-        time [s].
+    bias : [units of the outputs]; scale : [-]; arm_m, down_m : position ahead of the CG and below it [m].
+    lag_s, delay_s : [s]; 0 for none.
+    variance : of the white noise [units of the outputs squared].
+    slow_std : of the correlated noise, a Gauss-Markov process [units of the outputs]; slow_time_s : its correlation time [s].
     """
 
     bias: Array
@@ -113,6 +115,7 @@ class SensorArrays(NamedTuple):
     variance: Array
     slow_std: Array
     slow_time_s: float
+    down_m: Array
 
 
 class FilterModel(NamedTuple):

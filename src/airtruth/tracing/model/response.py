@@ -334,6 +334,7 @@ def pack_sensors(
         variance=noise * (1.0 - share) + settings.resolution**2,
         slow_std=np.sqrt(noise * share),
         slow_time_s=COLOUR_TIME_S * float(np.exp(common[entries.log_colour_time])),
+        down_m=compiled.down_m,
     )
 
 
