@@ -34,7 +34,7 @@ CAPS: dict[str, int] = {
     "loop": 9,
     "numerics": 17,
     "physics": 249,
-    "reporting": 83,
+    "reporting": 76,
     "schemas": 2,
     "simulation": 547,
     "starting": 17,
