@@ -19,8 +19,8 @@ TOY = Motion(
     heading="Toy motion",
     states=(State("theta", "theta_rad"), State("q", "q_rad_s")),
     controls=(
-        Control("left", "left_rad", "left_command_rad", "left_actuator", "dl"),
-        Control("right", "right_rad", "right_command_rad", "right_actuator", "dr"),
+        Control("left", "left_rad", "left_command_rad", "left_actuator", "dl", "q_rad_s"),
+        Control("right", "right_rad", "right_command_rad", "right_actuator", "dr", "q_rad_s"),
     ),
     known=("airspeed_m_s",),
     outputs=(
@@ -108,4 +108,9 @@ def settle(x, at, model):
     pass
 
 
-register(ToyAircraft, ToyGrid, Equations(2, 2, rates, outputs, air_at, move_plays, settle))
+@inner
+def shifted(at, field, by):
+    return ToyPoint(at.left + by * (field == 0), at.right + by * (field == 1), at.wind, at.airspeed_m_s)
+
+
+register(ToyAircraft, ToyGrid, Equations(2, 2, rates, outputs, air_at, move_plays, settle, shifted, ToyPoint, 1))

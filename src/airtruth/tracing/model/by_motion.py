@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import by_types
-from airtruth.tracing.model.kernel_input import AirPoint, FilterModel, GridSignals
+from airtruth.tracing.model.kernel_input import AirPoint, AnyPoint, FilterModel, GridSignals
 
 Array = NDArray[np.float64]
 
@@ -27,6 +27,9 @@ class Equations(NamedTuple):
     states, early : numbers of its states and of its early outputs; one more output is late.
     rates, outputs, air_at, move_plays : as the functions of this module.
     settle : (state, inputs, model) -> None: the effects' states into equilibrium with the states of the motion.
+    shifted : (inputs at one time, number of a field, amount) -> the inputs with the amount added to the field.
+    point : type of its inputs at one time, with the fields of those along a record: controls first, coefficients last.
+    coefficients : number of its coefficients.
     has_roll_gust : whether a state of a roll gust, of unit variance, follows the other states of the gusts.
     """
 
@@ -37,6 +40,9 @@ class Equations(NamedTuple):
     air_at: Callable[..., AirPoint]
     move_plays: Callable[..., None]
     settle: Callable[[Array, Any, FilterModel], None]
+    shifted: Callable[..., AirPoint]
+    point: Any
+    coefficients: int
     has_roll_gust: bool = False
 
 
@@ -51,12 +57,23 @@ def register(aircraft: type, grid: type, equations: Equations) -> None:
     ----------
     aircraft : type of `FilterModel.aircraft`; grid : type of `KernelInput.grid`.
     """
-    _OF[aircraft] = _OF[grid] = equations
+    _OF[aircraft] = _OF[grid] = _OF[equations.point] = equations
 
 
 def equations_of(model: FilterModel) -> Equations:
     """Equations of a model."""
     return _OF[type(model.aircraft)]
+
+
+def equations_of_grid(grid: tuple[Array, ...]) -> Equations:
+    """Equations of inputs along a record."""
+    return _OF[type(grid)]
+
+
+def coefficients_of(grid: tuple[Array, ...]) -> tuple[str, ...]:
+    """Names of the increments of coefficients among inputs along a record."""
+    own = _OF[type(grid)]
+    return tuple(own.point._fields[-own.coefficients :])
 
 
 def _typed(model: Any) -> Equations:
@@ -92,6 +109,17 @@ def _outputs(x: Any, rate: Any, force: Any, at: Any, model: Any, y: Any) -> Call
 def _air_at(grid: Any, point: Any) -> Callable[..., AirPoint]:
     own = _OF[grid.instance_class].air_at
     return lambda grid, point: own(grid, point)
+
+
+def _shifted(at: Any, field: Any, by: Any) -> Callable[..., AirPoint]:
+    own = _OF[at.instance_class].shifted
+    return lambda at, field, by: own(at, field, by)
+
+
+def _coefficient_field(grid: Any) -> Callable[..., int]:
+    own = _OF[grid.instance_class]
+    first = len(own.point._fields) - own.coefficients
+    return lambda grid: first
 
 
 def _move_plays(x: Any, at: Any, model: Any) -> Callable[..., None]:
@@ -144,6 +172,18 @@ def air_at(grid: GridSignals, point: int) -> AirPoint:
     raise NotImplementedError
 
 
+@by_types(_coefficient_field)
+def coefficient_field(grid: GridSignals) -> int:
+    """Number of the field of the first increment of a coefficient among the inputs."""
+    raise NotImplementedError
+
+
+@by_types(_shifted)
+def shifted(at: AnyPoint, field: int, by: float) -> AnyPoint:
+    """Inputs with an amount added to one of them [its unit]; controls are the first fields, coefficients the last."""
+    raise NotImplementedError
+
+
 @by_types(_move_plays)
 def move_plays(x: Array, at: AirPoint, model: FilterModel) -> None:
     """Move the states of plays to no more than their half width from their signals."""
@@ -153,12 +193,16 @@ def move_plays(x: Array, at: AirPoint, model: FilterModel) -> None:
 __all__ = [
     "Equations",
     "air_at",
+    "coefficient_field",
+    "coefficients_of",
     "early_count",
     "equations_of",
+    "equations_of_grid",
     "move_plays",
     "output_count",
     "outputs",
     "rates",
     "register",
+    "shifted",
     "state_count",
 ]

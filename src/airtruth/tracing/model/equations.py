@@ -361,7 +361,25 @@ def lead_decay(dt_s: float, i: int) -> tuple[float, float]:
     return decay, (1.0 - decay) / r
 
 
-register(AircraftArrays, GridSignals, Equations(2, 2, rates, outputs, air_at, move_plays, settle_effects))
+@inner
+def shifted(at: AirPoint, field: int, by: float) -> AirPoint:
+    """See `airtruth.tracing.model.by_motion.shifted`; no effect moves the fields between the control and the coefficients."""
+    return AirPoint(
+        at.elevator_rad + (by if field == 0 else 0.0),
+        at.airspeed_m_s,
+        at.ground_m_s,
+        at.qbar_pa,
+        at.theta_rad,
+        at.lift + (by if field == 5 else 0.0),
+        at.moment + (by if field == 6 else 0.0),
+    )
+
+
+register(
+    AircraftArrays,
+    GridSignals,
+    Equations(2, 2, rates, outputs, air_at, move_plays, settle_effects, shifted, AirPoint, 2),
+)
 
 __all__ = [
     "add_readings",

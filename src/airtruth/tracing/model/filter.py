@@ -20,6 +20,7 @@ from airtruth.tracing.model.by_motion import air_at, early_count, equations_of, 
 from airtruth.tracing.model.corners import (
     corrected,
     gain_at,
+    is_uncertain,
     predicted,
     settled,
 )
@@ -268,10 +269,10 @@ def _innovations(
         if keeps:
             for i in range(n):
                 path.corrected[k, i] = x[i]
-        if given.corner_rad2.size > 0 and (uncertain or given.corner_rad2[k + 1] > 0.0):
+        if given.corner_rad2.size > 0 and (uncertain or is_uncertain(given.corner_rad2, k + 1)):
             if is_steady:
                 p = corners.steady[node].copy()
-            p = predicted(corrected(p, now, corners.c[node]), corners, node, given.corner_rad2[k + 1])
+            p = predicted(corrected(p, now, corners.c[node]), corners, node, given.corner_rad2, k + 1)
             uncertain = True
         if states.noise >= 0:
             for i in range(states.noise, n):
@@ -307,7 +308,7 @@ def free_run(given: KernelInput, e: Array) -> bool:
 
     The surface is taken as known between the samples.
     """
-    certain = given._replace(corner_rad2=np.zeros(0))
+    certain = given._replace(corner_rad2=np.zeros((0, 0)))
     return innovations(certain, without_update(given.model), e)[0]
 
 

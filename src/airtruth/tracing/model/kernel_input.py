@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.tracing.model.lateral_input import LateralAircraft, LateralGrid, LateralPoint
 from airtruth.tracing.model.parameters import StateLayout
 
 Array = NDArray[np.float64]
@@ -78,7 +79,7 @@ class EffectArrays(NamedTuple):
 
     Attributes
     ----------
-    term_index : (terms, 6) what it acts on (0 CL, 1 Cm, 2 + i the reading of output i), signal (-1 for a state), shape,
+    term_index : (terms, 6) what it acts on (number of the coefficient, then of the output whose reading), signal (-1 for a state), shape,
         state (-1 for a signal), signal of its factor (-1 for none), row of ``state_index`` of the lag whose lag error x - s
         multiplies the term (-1 for none).
     amplitude, origin, factor_origin : (terms,) of each term.
@@ -121,7 +122,7 @@ class SensorArrays(NamedTuple):
 class FilterModel(NamedTuple):
     """Everything that does not change along a record."""
 
-    aircraft: AircraftArrays
+    aircraft: AircraftArrays | LateralAircraft
     gusts: GustModel
     effects: EffectArrays
     sensors: SensorArrays
@@ -161,36 +162,42 @@ class GridSignals(NamedTuple):
     moment: Array
 
 
+AnyPoint = AirPoint | LateralPoint
+"""Inputs at one time of either motion."""
+
+
 class KernelInput(NamedTuple):
     """One record, one model.
 
     Attributes
     ----------
-    y : (samples, 3) measured alpha [rad], q [rad/s], az [m/s2]; more : (samples, 3) added to the predicted outputs.
+    y : (samples, outputs) measured outputs [their units]; more : (samples, outputs) added to the predicted ones.
     grid : known inputs, ``sub`` (even) cells to a sample.
-    corner_rad2 : (samples,) variance of the surface's mean over the cell that ends at each sample, about that of the
-        grid [rad2]; empty if the surface is known between the samples.
+    corner_rad2 : (controls, samples) variance of a surface's mean over the cell that ends at each sample, about that of the
+        grid [rad2]; empty if the surfaces are known between the samples.
     dt_s : sample period [s].
-    start : (4,) initial alpha [rad], q [rad/s] and gust states [-].
-    reference_alpha_rad, reference : means of the record, about which it is linearised.
+    start : initial states of the motion [their units] and of the gust's filter [-].
+    reference_flow_rad, reference : means of the record, about which it is linearised: of the first output, the flow angle, and of
+        the inputs.
     model : see there.
     """
 
     y: Array
     more: Array
-    grid: GridSignals
+    grid: GridSignals | LateralGrid
     corner_rad2: Array
     dt_s: float
     sub: int
     start: Array
-    reference_alpha_rad: float
-    reference: AirPoint
+    reference_flow_rad: float
+    reference: AnyPoint
     model: FilterModel
 
 
 __all__ = [
     "AirPoint",
     "AircraftArrays",
+    "AnyPoint",
     "EffectArrays",
     "FilterModel",
     "GridSignals",

@@ -294,6 +294,26 @@ def air_at(grid: LateralGrid, point: int) -> LateralPoint:
 
 
 @inner
+def shifted(at: LateralPoint, field: int, by: float) -> LateralPoint:
+    """See `airtruth.tracing.model.by_motion.shifted`; the fields between the controls and the coefficients stay."""
+    return LateralPoint(
+        at.aileron_rad + (by if field == 0 else 0.0),
+        at.rudder_rad + (by if field == 1 else 0.0),
+        at.airspeed_m_s,
+        at.ground_m_s,
+        at.qbar_pa,
+        at.alpha_rad,
+        at.ground_alpha_rad,
+        at.theta_rad,
+        at.q_rad_s,
+        at.speed_rate_1_s,
+        at.side + (by if field == 10 else 0.0),
+        at.roll + (by if field == 11 else 0.0),
+        at.yaw + (by if field == 12 else 0.0),
+    )
+
+
+@inner
 def move_plays(x: Array, at: LateralPoint, model: FilterModel) -> None:
     """See `airtruth.tracing.model.by_motion.move_plays`."""
     if has_plays(model.effects):
@@ -325,6 +345,9 @@ register(
         air_at=air_at,
         move_plays=move_plays,
         settle=settle_effects,
+        shifted=shifted,
+        point=LateralPoint,
+        coefficients=_COEFFICIENTS,
         has_roll_gust=True,
     ),
 )

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from airtruth.numerics.ahead import awaited
 from airtruth.numerics.compiled import inner
 from airtruth.tracing.model.advance import Steps, Work, advance_motion, advance_sensors, steps_of, work_of
-from airtruth.tracing.model.by_motion import air_at, rates
+from airtruth.tracing.model.by_motion import air_at, coefficient_field, coefficients_of, rates, shifted
 from airtruth.tracing.model.equations import air_alpha, effective_elevator, gust
 from airtruth.tracing.model.filter import Path, innovation, innovations, path_of
 from airtruth.tracing.model.kernel_input import AirPoint, GridSignals, KernelInput, SensorArrays
@@ -81,19 +81,6 @@ class Tangent(NamedTuple):
     lead: int
     sensors: SensorArrays
     start: Array
-
-
-@inner
-def _with_force(at: AirPoint, lift: float, moment: float) -> AirPoint:
-    return AirPoint(
-        at.elevator_rad,
-        at.airspeed_m_s,
-        at.ground_m_s,
-        at.qbar_pa,
-        at.theta_rad,
-        at.lift + lift,
-        at.moment + moment,
-    )
 
 
 @inner
