@@ -41,6 +41,8 @@ TOY = Motion(
     declared=(Declared("inertia", 1.0, divides=("Cp",)),),
     modes=(Mode("pendulum_rad_s", "rad/s", "natural frequency"),),
     required=("theta_rad", "q_rad_s"),
+    forces="moment",
+    incidence="angle of the pendulum",
 )
 
 
@@ -113,4 +115,13 @@ def shifted(at, field, by):
     return ToyPoint(at.left + by * (field == 0), at.right + by * (field == 1), at.wind, at.airspeed_m_s)
 
 
-register(ToyAircraft, ToyGrid, Equations(2, 2, rates, outputs, air_at, move_plays, settle, shifted, ToyPoint, 1))
+@inner
+def signals_at(x, at, rate, model, out):
+    pass
+
+
+register(
+    ToyAircraft,
+    ToyGrid,
+    Equations(2, 2, rates, outputs, air_at, move_plays, settle, shifted, signals_at, ToyPoint, 1),
+)

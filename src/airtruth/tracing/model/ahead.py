@@ -21,7 +21,7 @@ from airtruth.tracing.model.kernel_input import (
 from airtruth.tracing.model.linearise import linearise
 from airtruth.tracing.model.parameters import CORE, OUTPUTS, SHORT_PERIOD, state_layout
 from airtruth.tracing.model.steady import without_update
-from airtruth.tracing.model.tangent import matrices_along
+from airtruth.tracing.model.tangent import FLOWN, matrices_along
 
 _AT: Final = AirPoint(*[1.0] * len(AirPoint._fields))
 """Inputs at a point."""
@@ -58,7 +58,7 @@ def _filter() -> None:
 
 def _tangent() -> None:
     given = _given()
-    matrices_along(given, path_of(2, CORE, OUTPUTS), 1.0)
+    matrices_along(given, path_of(2, CORE, OUTPUTS), 1.0, np.array([1, 4]), len(FLOWN))
 
 
 KERNELS: Final[tuple[tuple[str, Callable[[], None]], ...]] = (

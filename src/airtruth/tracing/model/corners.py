@@ -165,10 +165,10 @@ def corrected(p: Array, k_gain: Array, c: Array) -> Array:
 @inner
 def is_uncertain(corner_rad2: Array, sample: int) -> bool:
     """Whether a surface is uncertain in the cell that ends at a sample."""
+    found = False
     for c in range(corner_rad2.shape[0]):
-        if corner_rad2[c, sample] > 0.0:
-            return True
-    return False
+        found = found or corner_rad2[c, sample] > 0.0
+    return found
 
 
 @allocating

@@ -30,33 +30,21 @@ from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.sensors import vane_equation
 from airtruth.physics.terms import numbered_shape
 from airtruth.tracing.model.by_motion import Equations, register
+from airtruth.tracing.model.gust_states import gust_of, gust_rates
 from airtruth.tracing.model.kernel_input import (
     AircraftArrays,
     AirPoint,
     EffectArrays,
     FilterModel,
     GridSignals,
-    GustModel,
 )
-from airtruth.tracing.model.parameters import GUST_1, LEAD, LEAD_COUNT, OUTPUTS
+from airtruth.tracing.model.parameters import GUST_1, OUTPUTS
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
-_W1: Final = math.sqrt(1.5)
-"""Gain of the first state of MIL-F-8785C's vertical Dryden filter, states of unit drive [-]."""
-_W2: Final = math.sqrt(1.5) * (1.0 / math.sqrt(3.0) - 1.0)
-"""Gain of its second state [-]."""
-_LEAD_RAD_S: Final = (2.1, 21.0, 217.0)
-"""Corners of the rolloff [rad/s]. Fitted here: with `_LEAD_GAIN` they turn Dryden's spectrum into von Karman's, both
-of 840 m at 43 m/s, within 6 % (rms 2 %) from 0.5 to 600 rad/s, the level left free. In this band both spectra are
-powers of the frequency, so that the corners serve any speed and length; a record of seconds shows little below it."""
-_LEAD_GAIN: Final = (0.58, 0.84, 1.39)
-"""Gains at these corners [-]; fitted with them."""
 _READING: Final = len(LONGITUDINAL.coefficients)
 """First number of a reading among what a term acts on, see `EffectArrays`."""
-_LEADS: Final = LEAD - GUST_1
-"""Position of the first low-passed copy among the states of the gusts [-]."""
 _PLAY: Final = 2
 """Number of the play in `airtruth.physics.terms.STATE_KINDS`."""
 _PLAY_S: Final = 0.05
@@ -83,15 +71,6 @@ class Signals(NamedTuple):
     qhat: float
     alpha_dot_hat: float
     qbar: float
-
-
-@shared
-def gust_of(x: Array, first: int, rolloff: float) -> float:
-    """Gust of two states of Dryden's filter, the first of them at ``first``, over the level of Dryden's part [-]."""
-    lead = 0.0
-    for i in range(LEAD_COUNT):
-        lead += _LEAD_GAIN[i] * (x[first] - x[first + _LEADS + i])
-    return float(_W1 * x[first] + _W2 * x[first + 1] + rolloff * lead)
 
 
 @shared
@@ -226,17 +205,6 @@ def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
 
 
 @inner
-def gust_rates(x: Array, first: int, v: float, late: float, gusts: GustModel, out: Array) -> None:
-    """x' of the states of a gust, the first of them at ``first``."""
-    a = v / gusts.length_m
-    out[first] = -a * x[first]
-    out[first + 1] = a * (x[first] - x[first + 1])
-    out[first + 2] = late
-    for i in range(LEAD_COUNT):
-        out[first + _LEADS + i] = _LEAD_RAD_S[i] * (x[first] - x[first + _LEADS + i])
-
-
-@inner
 def effect_rates(x: Array, signals: tuple[float, ...], model: FilterModel, out: Array) -> None:
     """x' of the effects' states."""
     effects = model.effects
@@ -265,10 +233,10 @@ def hold_plays(x: Array, tried: Array, model: FilterModel) -> None:
 @inner
 def has_plays(effects: EffectArrays) -> bool:
     """Whether an effect has a play."""
+    found = False
     for k in range(effects.time_s.size):
-        if effects.state_index[k, 0] == _PLAY:
-            return True
-    return False
+        found = found or effects.state_index[k, 0] == _PLAY
+    return found
 
 
 @inner
@@ -354,11 +322,18 @@ def outputs(x: Array, rate: Array, az: float, at: AirPoint, model: FilterModel, 
         y[i] *= scale[i]
 
 
-def lead_decay(dt_s: float, i: int) -> tuple[float, float]:
-    """Decay of a low-passed copy over a time [s], and its mean over that time [-]."""
-    r = _LEAD_RAD_S[i] * dt_s
-    decay = math.exp(-r)
-    return decay, (1.0 - decay) / r
+@inner
+def signals_at(x: Array, at: AirPoint, rate: float, model: FilterModel, out: Array) -> None:
+    """See `airtruth.tracing.model.by_motion.signals_at`."""
+    gusts, half = model.gusts, 0.5 * model.aircraft.chord_m / at.airspeed_m_s
+    upward = gust(x, gusts.rolloff)
+    late = (upward - x[GUST_1 + 2]) / gusts.rotary_time_s
+    out[0] = air_alpha(x, upward, gusts.level_m_s, at)
+    out[1] = effective_elevator(at.elevator_rad, model.aircraft)
+    out[2] = (x[1] - gusts.rotary * gusts.level_m_s * late / at.airspeed_m_s) * half
+    out[3] = rate * half
+    out[4] = at.qbar_pa
+    out[5] = x[1] * half
 
 
 @inner
@@ -378,7 +353,7 @@ def shifted(at: AirPoint, field: int, by: float) -> AirPoint:
 register(
     AircraftArrays,
     GridSignals,
-    Equations(2, 2, rates, outputs, air_at, move_plays, settle_effects, shifted, AirPoint, 2),
+    Equations(2, 2, rates, outputs, air_at, move_plays, settle_effects, shifted, signals_at, AirPoint, 2),
 )
 
 __all__ = [
@@ -390,11 +365,8 @@ __all__ = [
     "effective_elevator",
     "follow",
     "gust",
-    "gust_of",
-    "gust_rates",
     "has_plays",
     "hold_plays",
-    "lead_decay",
     "rates",
     "settle_effects",
     "shape",

@@ -24,9 +24,9 @@ from airtruth.tracing.model.corners import (
     predicted,
     settled,
 )
-from airtruth.tracing.model.equations import gust_of
 from airtruth.tracing.model.gains import Gains, interpolate, scaled
-from airtruth.tracing.model.kernel_input import AirPoint, FilterModel, KernelInput
+from airtruth.tracing.model.gust_states import gust_of
+from airtruth.tracing.model.kernel_input import AnyPoint, FilterModel, KernelInput
 from airtruth.tracing.model.linearise import FirstUpdate
 from airtruth.tracing.model.parameters import DELAY_ORDER, core_of, lead_of
 from airtruth.tracing.model.steady import SteadyFilter, without_update
@@ -124,7 +124,7 @@ def _update(x: Array, k_gain: Array, e: Array, model: FilterModel) -> bool:
 
 
 @inner
-def _read(x: Array, at: AirPoint, model: FilterModel, work: Work) -> None:
+def _read(x: Array, at: AnyPoint, model: FilterModel, work: Work) -> None:
     """What the sensors read before lags, delays and correlated noise, into ``work.out``."""
     az = rates(x, at, model, work.rate[0])
     outputs(x, work.rate[0], az, at, model, work.out)
@@ -141,7 +141,7 @@ def _residual(x: Array, i: int, k: int, given: KernelInput, work: Work) -> float
 def innovation(
     x: Array,
     k: int,
-    at: AirPoint,
+    at: AnyPoint,
     given: KernelInput,
     first: FirstUpdate,
     direct: Array,

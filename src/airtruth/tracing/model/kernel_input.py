@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.tracing.model.lateral_input import LateralAircraft, LateralGrid, LateralPoint
 from airtruth.tracing.model.parameters import StateLayout
 
 Array = NDArray[np.float64]
@@ -79,7 +78,7 @@ class EffectArrays(NamedTuple):
 
     Attributes
     ----------
-    term_index : (terms, 6) what it acts on (number of the coefficient, then of the output whose reading), signal (-1 for a state), shape,
+    term_index : (terms, 6) what it acts on (coefficients, then readings of the outputs), signal (-1 for a state), shape,
         state (-1 for a signal), signal of its factor (-1 for none), row of ``state_index`` of the lag whose lag error x - s
         multiplies the term (-1 for none).
     amplitude, origin, factor_origin : (terms,) of each term.
@@ -119,10 +118,18 @@ class SensorArrays(NamedTuple):
     down_m: Array
 
 
+AnyAircraft: TypeAlias = Any
+"""The aircraft of a motion: `AircraftArrays` or `LateralAircraft`."""
+AnyPoint: TypeAlias = Any
+"""Inputs of a motion at one time: `AirPoint` or `LateralPoint`."""
+AnyGrid: TypeAlias = Any
+"""Inputs of a motion on the filter's grid: `GridSignals` or `LateralGrid`."""
+
+
 class FilterModel(NamedTuple):
     """Everything that does not change along a record."""
 
-    aircraft: AircraftArrays | LateralAircraft
+    aircraft: AnyAircraft
     gusts: GustModel
     effects: EffectArrays
     sensors: SensorArrays
@@ -162,10 +169,6 @@ class GridSignals(NamedTuple):
     moment: Array
 
 
-AnyPoint = AirPoint | LateralPoint
-"""Inputs at one time of either motion."""
-
-
 class KernelInput(NamedTuple):
     """One record, one model.
 
@@ -184,7 +187,7 @@ class KernelInput(NamedTuple):
 
     y: Array
     more: Array
-    grid: GridSignals | LateralGrid
+    grid: AnyGrid
     corner_rad2: Array
     dt_s: float
     sub: int
@@ -197,6 +200,8 @@ class KernelInput(NamedTuple):
 __all__ = [
     "AirPoint",
     "AircraftArrays",
+    "AnyAircraft",
+    "AnyGrid",
     "AnyPoint",
     "EffectArrays",
     "FilterModel",

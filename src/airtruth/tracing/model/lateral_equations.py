@@ -8,10 +8,10 @@ speed without the gust along the path, angle of attack, pitch attitude and pitch
     Ixx p' - Ixz r' = L + Ixz p q - (Izz - Iyy) q r,   Izz r' - Ixz p' = N - Ixz q r - (Iyy - Ixx) p q
     phi' = p + (q sin(phi) + r cos(phi)) tan(theta),   ay = Y/m + x (r' + p q) - z (p' - q r)
 
-with V, alpha and beta over ground. The gust v to the right has the filter of the vertical one (`airtruth.tracing.model.equations`).
-The beta of the air is asin((V_ground sin(beta) - v)/V), its yaw rate r - (v - v_late)/(tau V) with tau = 3 b/(pi V), its roll
-rate p - p_gust; p_gust is MIL-F-8785C's, its level that of v (`airtruth.physics.lateral_gusts`). Both rotary gusts have the
-share ``rotary``.
+with V, alpha and beta over ground. The gust v to the right has the filter of the vertical one
+(`airtruth.tracing.model.gust_states`). The beta of the air is asin((V_ground sin(beta) - v)/V), its yaw rate
+r - (v - v_late)/(tau V) with tau = 3 b/(pi V), its roll rate p - p_gust; p_gust is that of MIL-F-8785C, its level that of v
+(`airtruth.physics.lateral_gusts`). Both rotary gusts have the share ``rotary``.
 
 Forces: for each signal a table of Y, L, N over alpha and the signal, times q_bar; constants over alpha; increments of the
 derivatives; terms of `airtruth.physics.terms`. A CG that moves aft takes Y along; one that moves to the right leaves the lift at
@@ -33,18 +33,17 @@ from numpy.typing import NDArray
 from airtruth.numerics.compiled import inner, shared
 from airtruth.physics.motion import LATERAL
 from airtruth.physics.sensors import side_vane_equation
-from airtruth.tracing.model.by_motion import Equations, register
+from airtruth.tracing.model.by_motion import Equations
 from airtruth.tracing.model.equations import (
     add_readings,
     cell,
     effect_rates,
     follow,
-    gust_of,
-    gust_rates,
     has_plays,
     shape,
     signal_of,
 )
+from airtruth.tracing.model.gust_states import gust_of, gust_rates
 from airtruth.tracing.model.kernel_input import EffectArrays, FilterModel
 from airtruth.tracing.model.lateral_input import LateralAircraft, LateralGrid, LateralPoint
 from airtruth.tracing.model.parameters import core_of
@@ -294,6 +293,15 @@ def air_at(grid: LateralGrid, point: int) -> LateralPoint:
 
 
 @inner
+def signals_at(x: Array, at: LateralPoint, rate: float, model: FilterModel, out: Array) -> None:
+    """See `airtruth.tracing.model.by_motion.signals_at`."""
+    half, own = 0.5 * model.aircraft.span_m / at.airspeed_m_s, _signals(x, at, model)
+    out[0], out[1], out[2], out[3], out[4] = own.beta, own.aileron, own.rudder, own.phat, own.rhat
+    out[5], out[6], out[7] = rate * half, own.qbar, own.alpha
+    out[8], out[9] = x[1] * half, x[2] * half
+
+
+@inner
 def shifted(at: LateralPoint, field: int, by: float) -> LateralPoint:
     """See `airtruth.tracing.model.by_motion.shifted`; the fields between the controls and the coefficients stay."""
     return LateralPoint(
@@ -334,22 +342,20 @@ def settle_effects(x: Array, at: LateralPoint, model: FilterModel) -> None:
         x[model.states.effect[k]] = still[model.effects.state_index[k, 1]]
 
 
-register(
-    LateralAircraft,
-    LateralGrid,
-    Equations(
-        states=_STATES,
-        early=len(LATERAL.outputs) - 1,
-        rates=rates,
-        outputs=outputs,
-        air_at=air_at,
-        move_plays=move_plays,
-        settle=settle_effects,
-        shifted=shifted,
-        point=LateralPoint,
-        coefficients=_COEFFICIENTS,
-        has_roll_gust=True,
-    ),
+EQUATIONS: Final = Equations(
+    states=_STATES,
+    early=len(LATERAL.outputs) - 1,
+    rates=rates,
+    outputs=outputs,
+    air_at=air_at,
+    move_plays=move_plays,
+    settle=settle_effects,
+    shifted=shifted,
+    signals_at=signals_at,
+    point=LateralPoint,
+    coefficients=_COEFFICIENTS,
+    has_roll_gust=True,
 )
+"""The equations of the lateral-directional motion."""
 
-__all__ = ["LateralSignals", "air_beta", "effective_deflection"]
+__all__ = ["EQUATIONS", "LateralSignals", "air_beta", "effective_deflection"]

@@ -9,13 +9,17 @@ from numpy.typing import NDArray
 
 from airtruth.physics.lateral_gusts import roll_deviation_rad_s
 from airtruth.physics.motion import LATERAL
+from airtruth.tracing.model.by_motion import register
 from airtruth.tracing.model.compile import CompiledChange
 from airtruth.tracing.model.kernel_input import GustModel
-from airtruth.tracing.model.lateral_input import LateralAircraft
+from airtruth.tracing.model.lateral_equations import EQUATIONS
+from airtruth.tracing.model.lateral_input import LateralAircraft, LateralGrid
 from airtruth.tracing.model.lateral_plant import LateralPlant
 from airtruth.tracing.model.parameters import CommonEntries
 
 Array = NDArray[np.float64]
+
+register(LateralAircraft, LateralGrid, EQUATIONS)
 
 
 def pack_lateral(

@@ -17,8 +17,8 @@ from airtruth.numerics.ahead import awaited
 from airtruth.numerics.compiled import allocating, inner
 from airtruth.numerics.discretise import multiply, riccati, step, whitener
 from airtruth.tracing.model.by_motion import equations_of, output_count, outputs, rates, state_count
-from airtruth.tracing.model.equations import gust_of
-from airtruth.tracing.model.kernel_input import AirPoint, FilterModel
+from airtruth.tracing.model.gust_states import gust_of
+from airtruth.tracing.model.kernel_input import AnyPoint, FilterModel
 from airtruth.tracing.model.parameters import CORE, DELAY_ORDER, GUST_1, core_of
 
 Array = NDArray[np.float64]
@@ -69,7 +69,7 @@ def delay_system(delay_s: float) -> Array:
 
 
 @allocating
-def _half_width(state: int, at: AirPoint, model: FilterModel) -> float:
+def _half_width(state: int, at: AnyPoint, model: FilterModel) -> float:
     """Half width of the central difference in a state of the motion."""
     states = state_count(model)
     core = states + _GUSTS
@@ -84,7 +84,7 @@ def _half_width(state: int, at: AirPoint, model: FilterModel) -> float:
     return ANGLE_RAD / moves if moves > 1e-9 else _GUST
 
 
-def linearise(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array) -> Array:
+def linearise(x: Array, at: AnyPoint, model: FilterModel, a: Array, c: Array) -> Array:
     """A and C of the motion, effects' states, late sensors and correlated noise about a state, by central differences.
 
     Parameters
@@ -106,7 +106,7 @@ def linearise(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array) ->
 
 @awaited
 @njit(cache=True, nogil=True, error_model="numpy")
-def _differences(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array) -> None:
+def _differences(x: Array, at: AnyPoint, model: FilterModel, a: Array, c: Array) -> None:
     """Columns of A and C of the motion and the effects' states; ``x`` is moved and returns."""
     count = output_count(model)
     rate, y = np.empty((2, x.size)), np.empty((2, count))

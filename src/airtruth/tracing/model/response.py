@@ -17,14 +17,16 @@ from airtruth.tracing.model.by_motion import coefficients_of, equations_of_grid
 from airtruth.tracing.model.compile import CompiledChange, compile_change
 from airtruth.tracing.model.kernel_input import (
     AircraftArrays,
-    AirPoint,
+    AnyAircraft,
+    AnyGrid,
+    AnyPoint,
     FilterModel,
     GridSignals,
     GustModel,
     KernelInput,
     SensorArrays,
 )
-from airtruth.tracing.model.lateral_input import LateralAircraft, LateralGrid, LateralPoint
+from airtruth.tracing.model.lateral_input import LateralGrid
 from airtruth.tracing.model.lateral_packing import pack_lateral, side_gusts
 from airtruth.tracing.model.lateral_plant import LateralPlant
 from airtruth.tracing.model.parameters import COLOUR_TIME_S, SHORT_PERIOD, CommonEntries
@@ -99,18 +101,16 @@ class FilterInputs:
     compiled: CompiledChange
     y: Array
     lead: int
-    grid: GridSignals | LateralGrid
+    grid: AnyGrid
     corner_rad2: Array
     reference_flow_rad: float
-    reference: AirPoint | LateralPoint
+    reference: AnyPoint
     along: Schedule
 
 
 def filter_inputs(record: TraceRecord, change: Change | CompiledChange) -> FilterInputs:
     """Undo what a change says of the inputs' sensors, and put what it says of the surface behind the elevator."""
-    compiled = (
-        change if isinstance(change, CompiledChange) else compile_change(change, record.signals.motion)
-    )
+    compiled = change if isinstance(change, CompiledChange) else compile_change(change, record.signals.motion)
     if any(compiled.surface) or compiled.inputs:
         return _inputs(record, compiled)
     as_measured: FilterInputs | None = record.kept.get(_AS_MEASURED)
@@ -128,15 +128,13 @@ def _inputs(record: TraceRecord, compiled: CompiledChange) -> FilterInputs:
     controls = [nodes(fine) for fine in _surfaces(s, compiled)]
     v, ground = _airspeed(compiled, s), _undo(compiled, "airspeed_m_s", s.ground_m_s)
     qbar, force = 0.5 * s.density_kg_m3 * v * v, _remainder(record, compiled, v.size)
-    grid: GridSignals | LateralGrid
+    grid: AnyGrid
     if s.motion is LONGITUDINAL:
-        grid = GridSignals(*controls, v, ground, qbar, theta, *force)
+        grid = GridSignals._make([*controls, v, ground, qbar, theta, *force])
     else:
-        alpha = _angle_of_attack(compiled, s)
-        q = _undo(compiled, "q_rad_s", s.q_rad_s)
-        grid = LateralGrid(
-            *controls, v, ground, qbar, alpha, alpha, theta, q, _relative_rate(ground, s), *force
-        )
+        alpha, q = _angle_of_attack(compiled, s), _undo(compiled, "q_rad_s", s.q_rad_s)
+        known = (v, ground, qbar, alpha, alpha, theta, q, _relative_rate(ground, s))
+        grid = LateralGrid._make([*controls, *known, *force])
     speed = float(v.mean())
     means = {name: float(x.mean()) for name, x in grid._asdict().items()}
     means |= {"airspeed_m_s": speed, "ground_m_s": speed} | dict.fromkeys(coefficients_of(grid), 0.0)
@@ -305,7 +303,7 @@ def filter_model(given: FilterInputs, settings: Settings, common: Array, per_rec
     record, compiled = given.record, given.compiled
     constants, entries = record.plant.aircraft.constants, settings.layout.common
     sensors = pack_sensors(compiled, settings, common, per_record, constants.chord_m)
-    aircraft: AircraftArrays | LateralAircraft
+    aircraft: AnyAircraft
     gusts = GustModel(
         level_m_s=float(np.exp(per_record[settings.layout.per_record.log_gust])),
         length_m=record.gust_length_m,

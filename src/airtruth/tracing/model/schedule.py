@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.tracing.model.by_motion import coefficients_of, equations_of_grid
-from airtruth.tracing.model.kernel_input import AirPoint, GridSignals
-from airtruth.tracing.model.lateral_input import LateralGrid, LateralPoint
+from airtruth.tracing.model.kernel_input import AnyGrid, AnyPoint
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -42,7 +41,7 @@ class Schedule(NamedTuple):
     """
 
     flow_rad: tuple[float, ...]
-    air: tuple[AirPoint | LateralPoint, ...]
+    air: tuple[AnyPoint, ...]
     lower: Ints
     share: Array
 
@@ -51,7 +50,7 @@ UNSCHEDULED: Final = Schedule((), (), np.zeros(0, dtype=np.int64), np.zeros(0))
 """The mean of the record serves."""
 
 
-def schedule(flow_rad: Array, grid: GridSignals | LateralGrid, sub: int) -> Schedule:
+def schedule(flow_rad: Array, grid: AnyGrid, sub: int) -> Schedule:
     """The flight conditions of a record, by its airspeed.
 
     Parameters
