@@ -177,7 +177,6 @@ class ParameterLayout:
 
     Attributes
     ----------
-    motion : the motion.
     common, per_record : entries of the vectors.
     """
 
@@ -333,13 +332,7 @@ def core_of(states: int) -> int:
 
 
 def core_states(motion: Motion) -> int:
-    """Number of states of a motion and its gusts, the roll gust included.
-
-    Examples
-    --------
-    >>> core_states(LONGITUDINAL)
-    8
-    """
+    """Number of states of a motion and its gusts, the roll gust included."""
     return core_of(len(motion.states)) + ("p" in motion.gusts)
 
 
