@@ -222,9 +222,9 @@ LONGITUDINAL: Final = Motion(
     implicit=("CL", "alpha"),
     gusts=("w", "u"),
     declared=(
-        Declared("mass", 1.0, divides=("CL",)),
-        Declared("inertia", 1.0, divides=("Cm",)),
-        Declared("cg"),
+        Declared("mass", 1.0, divides=("CL",), entry="mass"),
+        Declared("inertia", 1.0, divides=("Cm",), entry="inertia_yy"),
+        Declared("cg", entry="cg"),
         Declared("thrust_arm"),
     ),
     modes=(
@@ -271,11 +271,11 @@ LATERAL: Final = Motion(
     implicit=("CY", "beta"),
     gusts=("v", "p", "r"),
     declared=(
-        Declared("mass", 1.0, divides=("CY",)),
-        Declared("inertia_xx", 1.0, divides=("Cl",)),
-        Declared("inertia_zz", 1.0, divides=("Cn",)),
-        Declared("inertia_xz"),
-        Declared("cg"),
+        Declared("mass", 1.0, divides=("CY",), entry="mass"),
+        Declared("inertia_xx", 1.0, divides=("Cl",), entry="inertia_xx"),
+        Declared("inertia_zz", 1.0, divides=("Cn",), entry="inertia_zz"),
+        Declared("inertia_xz", entry="inertia_xz"),
+        Declared("cg", entry="cg"),
         Declared("cg_y"),
     ),
     modes=(

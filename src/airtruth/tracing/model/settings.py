@@ -15,8 +15,8 @@ from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.sensor_errors import KINDS, Kind
 from airtruth.physics.terms import Change, SensorTerm
 from airtruth.tracing.model.compile import CHANNELS
+from airtruth.tracing.model.declared import inertia_std
 from airtruth.tracing.model.parameters import SHORT_PERIOD, ParameterLayout
-from airtruth.tracing.model.plant import inertia_std
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.units import DEG
 
@@ -247,7 +247,7 @@ def common_prior(
     precision = np.zeros((entries.size, entries.size))
     derivatives, inertia = entries.derivatives, entries.inertia
     # an inertia larger by i makes the derivatives of the moment look smaller by i
-    std = inertia_std(records[0].plant.aircraft)
+    std = inertia_std(records[0].plant.aircraft, motion)
     turn = np.zeros(derivatives.stop)
     for row in (motion.row(c.name) for c in motion.coefficients if c.length is not None):
         turn[row] = -declared_derivatives_of(records)[row]
