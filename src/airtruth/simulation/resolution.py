@@ -55,7 +55,8 @@ def linear_point(aircraft: Aircraft, condition: Condition, dt_s: float = 1.0 / 2
 
 def point_of(aircraft: Aircraft, at: Trim, linear: Linearisation) -> LinearPoint:
     """Derivatives, trim and tail of an aircraft that was trimmed and linearised."""
-    return LinearPoint(linear.central, at.alpha_rad, at.elevator_rad, tail_geometry(aircraft))
+    trim = {"alpha": at.alpha_rad, "elevator": at.elevator_rad}
+    return LinearPoint(linear.central, trim, tail_geometry(aircraft))
 
 
 def at_condition(
