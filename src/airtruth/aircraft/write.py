@@ -58,9 +58,7 @@ class Corrections:
         ConfigurationError
             If a name is not a derivative.
         """
-        terms = linear_terms(
-            self.increments, {"alpha": self.alpha_rad, "elevator": self.elevator_rad}
-        )
+        terms = linear_terms(self.increments, {"alpha": self.alpha_rad, "elevator": self.elevator_rad})
         return dict(zip(self.increments, terms, strict=True))
 
 

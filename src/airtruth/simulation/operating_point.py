@@ -80,8 +80,6 @@ def lateral_operating_point(aircraft: Aircraft, trim: Trim, grid: LateralGrid) -
 
     Raises
     ------
-    AircraftError
-        If a surface does not reach an angle of the grid.
     TrimError
         If aileron and rudder do not follow their commands at the trim.
     """

@@ -334,9 +334,7 @@ class HeldStates:
         else:
             settling_s = _POWER_S if self.loses_power else _FILTERS_S
             q, p, r = rates
-            self.executive.initialise(
-                condition, alpha_rad, controls, q, settling_s, p_rad_s=p, r_rad_s=r
-            )
+            self.executive.initialise(condition, alpha_rad, controls, q, settling_s, p_rad_s=p, r_rad_s=r)
         self.motion = motion
         return self.executive.respond()
 

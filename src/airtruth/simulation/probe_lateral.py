@@ -18,11 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.errors import AircraftError
 from airtruth.simulation.probe import HeldStates, with_breaks_of
 from airtruth.simulation.simulator import Executive
 from airtruth.simulation.trim import Trim
-from airtruth.units import DEG, FT, LBF
+from airtruth.units import FT, LBF
 
 Array = NDArray[np.float64]
 
@@ -87,16 +86,11 @@ class LateralStates:
         )
 
     def at(self, alpha_rad: float, signals: Array, ratio: float = 1.0) -> Array:
-        """(3,) Y [N], L and N [N m] at the surfaces that are wanted.
+        """(3,) Y [N], L and N [N m] with the surfaces where they are wanted, or at the end of their range.
 
         Parameters
         ----------
         signals : (5,) as `origin`; ratio : airspeed over that of the trim [-].
-
-        Raises
-        ------
-        AircraftError
-            If a surface does not reach its angle.
         """
         beta, p, r = map(float, signals[:3])
         wanted = signals[3:]
@@ -114,17 +108,9 @@ class LateralStates:
             answer = self._states.respond(condition, alpha_rad, controls, 0.0, p_rad_s=p, r_rad_s=r)
             error = wanted - np.array([answer.aileron_rad, answer.rudder_rad])
             if np.abs(error).max() < _SAME_SURFACE_RAD:
-                return np.array([node.get_double_value() for node in self._forces]) * _UNITS
+                break
             command = command + error
-        raise AircraftError(
-            f"{self.trim_words}: aileron and rudder stop {np.abs(error).max() / DEG:.3g} deg from the angles of the records; "
-            "check command, surface and command_per_rad of jsbsim.aileron and jsbsim.rudder in aircraft.toml"
-        )
-
-    @property
-    def trim_words(self) -> str:
-        """The trim in a message."""
-        return f"at {self.trim.airspeed_m_s:.3g} m/s and {self.trim.condition.altitude_m:.0f} m"
+        return np.asarray(np.array([node.get_double_value() for node in self._forces]) * _UNITS)
 
 
 def probe_lateral(aircraft: Aircraft, trim: Trim, grid: LateralGrid) -> LateralTables:
@@ -135,18 +121,15 @@ def probe_lateral(aircraft: Aircraft, trim: Trim, grid: LateralGrid) -> LateralT
     aircraft, trim : the aircraft and its equilibrium in six axes.
     grid : states to evaluate; breaks of the forces over each signal are added, and those over the angle of attack at the
         ends of the signals' ranges.
-
-    Raises
-    ------
-    AircraftError
-        If a surface does not reach an angle.
     """
     states = LateralStates(aircraft, trim)
     signals = tuple(
         with_breaks_of(_along(states, number), _with(axis, float(origin)))
         for number, (axis, origin) in enumerate(zip(grid.signals, states.origin, strict=True))
     )
-    ends = [_moved(states, number, float(x)) for number, axis in enumerate(signals) for x in (axis[0], axis[-1])]
+    ends = [
+        _moved(states, number, float(x)) for number, axis in enumerate(signals) for x in (axis[0], axis[-1])
+    ]
     alphas = with_breaks_of(
         lambda alpha: np.concatenate([states.at(alpha, end) for end in ends]),
         _with(grid.alpha_rad, trim.alpha_rad),
@@ -185,7 +168,6 @@ def _with(axis: Array, value: float) -> Array:
     """The axis and one value more, unless a point is there already."""
     kept = axis[np.abs(axis - value) > 1e-9 * (1.0 + abs(value))]
     return np.sort(np.append(kept, value))
-
 
 
 __all__ = ["FORCES", "LateralGrid", "LateralStates", "LateralTables", "lateral_forces", "probe_lateral"]

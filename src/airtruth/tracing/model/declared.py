@@ -38,11 +38,7 @@ UNCERTAINTY: Final[Mapping[str, Uncertainty]] = {
     ),
     LATERAL.name: Uncertainty(
         relative=(0.10, 0.50, 0.30, 0.50, 0.15, 0.10, 0.10, 0.20, 0.10, 0.20, 0.10, 0.30, 0.15, 0.30, 0.08),
-        least=(
-            (0.01, 0.05, 0.05, 0.005, 0.005)
-            + (0.002, 0.005, 0.005, 0.001, 0.001)
-            + (0.002, 0.005, 0.005, 0.001, 0.001)
-        ),
+        least=(0.01, 0.05, 0.05, 0.005, 0.005, *2 * (0.002, 0.005, 0.005, 0.001, 0.001)),
     ),
 }
 """Motion -> uncertainty (judgement): smaller ones let a declared error pass for an effect, larger ones let the derivatives absorb
