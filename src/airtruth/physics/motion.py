@@ -47,6 +47,7 @@ class Motion:
     declared : quantities of aircraft.toml that scale or shift the coefficients.
     modes : modal parameters of the linear model.
     required : columns without which no analysis is possible; air density or altitude is needed beside them.
+    forces, incidence : its coefficients together, and its flow angle, in words.
     """
 
     name: str
@@ -62,6 +63,8 @@ class Motion:
     declared: tuple[Declared, ...]
     modes: tuple[Mode, ...]
     required: tuple[str, ...]
+    forces: str
+    incidence: str
 
     def __reduce__(self) -> tuple[Callable[[str], Motion], tuple[str]]:
         """Pickle the name: a motion is the same object in every process."""
@@ -122,10 +125,20 @@ class Motion:
                 *self.channels,
                 *self.known,
                 *(f"sigma_{component}" for component in self.gusts),
-                f"{self.implicit[1]}_dot_hat",
+                self.flow_rate,
                 "qbar",
             )
         )
+
+    @property
+    def flow(self) -> str:
+        """Signal of the flow angle, whose rate makes the equations implicit."""
+        return self.implicit[1]
+
+    @property
+    def flow_rate(self) -> str:
+        """Signal of the nondimensional rate of the flow angle."""
+        return f"{self.flow}_dot_hat"
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -232,6 +245,8 @@ LONGITUDINAL: Final = Motion(
         Mode("zeta", "-", "damping ratio of the short period"),
     ),
     required=("airspeed_m_s", "alpha_rad", "q_rad_s", "az_m_s2", "elevator_rad"),
+    forces="lift or moment",
+    incidence="angle of attack",
 )
 """The short-period motion in the pitch plane."""
 
@@ -285,6 +300,8 @@ LATERAL: Final = Motion(
         Mode("spiral_1_s", "1/s", "root of the spiral"),
     ),
     required=("airspeed_m_s", "p_rad_s", "r_rad_s", "ay_m_s2", "aileron_rad", "rudder_rad"),
+    forces="side force or moment",
+    incidence="angle of sideslip",
 )
 """The lateral-directional motion; a log holds beta_rad, or phi_rad or psi_rad from which it is reconstructed."""
 

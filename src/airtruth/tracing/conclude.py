@@ -13,7 +13,7 @@ from scipy.stats import chi2
 
 from airtruth.effects.increment import Increment
 from airtruth.physics.atmosphere import RHO0_KG_M3
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import Motion
 from airtruth.tracing.answer import (
     ANOMALY_LEVEL,
     AcceptedEffect,
@@ -135,7 +135,9 @@ def conclude(
         derivatives=_derivatives(case, rounds, covariance),
         updated_aircraft=updated_aircraft,
         detectability=_detectability(case, rounds, likelihood, sizes),
-        next_flight=_next_flight(effects, verdict, remaining, list(least_certain(shown))),
+        next_flight=_next_flight(
+            effects, verdict, remaining, list(least_certain(shown)), case.fitted.layout.motion
+        ),
         model=case.model,
         records=RecordNames(
             tuple(dict.fromkeys(r.signals.record for r in case.fitted.records)),
@@ -240,7 +242,9 @@ def _effect(
             sorted(c.score.effect.variant for c in others if c.score.effect.name == effect.name)
         ),
         channel=effect.variant_channel,
-        about_alpha_rad=final.hypothesis.trim_alpha_rad + shift if is_curvature(effect) else None,
+        about_alpha_rad=final.hypothesis.trim_flow_rad + shift
+        if is_curvature(effect, final.hypothesis.motion)
+        else None,
     )
     if isinstance(effect, Increment):
         return in_physical_terms(problem, final, covariance, effect, accepted)
@@ -322,9 +326,10 @@ def _candidates(
 def _derivatives(case: Case, rounds: Sequence[SearchRound], covariance: Array) -> Derivatives:
     """Declared and refitted derivatives at the trim, the mean over the records' flight conditions."""
     declared = np.mean([r.plant.derivatives for r in case.fitted.records], axis=0)
+    motion = case.fitted.layout.motion
 
     def named(values: Array) -> dict[str, float]:
-        return dict(zip(PARAMETERS, values.tolist(), strict=True))
+        return dict(zip(motion.parameters, values.tolist(), strict=True))
 
     rows = rounds[-1].null.layout.of.common.derivatives
     return Derivatives(
@@ -371,6 +376,7 @@ def _next_flight(
     verdict: VerdictName,
     remaining: Anomaly,
     learned: Sequence[str],
+    motion: Motion,
 ) -> str:
     if verdict == "none":
         return (
@@ -393,8 +399,11 @@ def _next_flight(
             )
     lines += learned
     if remaining.p_value <= ANOMALY_LEVEL:
-        lines.append(f"The remaining residual shows in {remaining.where}: {advice(remaining.where)}")
-    return " ".join(lines) or "Repeat the manoeuvre with the largest residual, with opposite elevator sign."
+        lines.append(f"The remaining residual shows in {remaining.where}: {advice(remaining.where, motion)}")
+    return " ".join(lines) or (
+        "Repeat the manoeuvre with the largest residual, with opposite "
+        f"{' and '.join(c.name for c in motion.controls)} sign."
+    )
 
 
 __all__ = ["conclude", "detectability", "estimates"]

@@ -232,7 +232,7 @@ def _with_later_colour(
     At the declared aircraft a strong effect drives correlated noise to its limits, and it does not enter. Correlated noise can
     imitate a share of an effect too, so that the effects of the first search are tried beside it.
     """
-    level = later_level(sum(r.samples for r in case.fitted.records))
+    level = later_level(sum(r.samples for r in case.fitted.records), len(case.fitted.settings.noise))
     coloured, point = beside(case, rounds[-1].null, level)
     phrase = "search with correlated noise"
     if not coloured.fitted.settings.coloured or not may_begin(advance, phrase):
