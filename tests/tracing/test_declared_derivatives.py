@@ -13,7 +13,7 @@ from airtruth.tracing.inference.derivative_likelihood import contradiction, deri
 from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
 from airtruth.tracing.model.declared import declared_covariance
 from airtruth.tracing.selection.anomaly import DERIVATIVES_MOVED, Anomaly
-from airtruth.tracing.selection.omnibus import advice
+from airtruth.tracing.selection.families import advice
 
 DECLARED = np.diag([0.24, 9.5, 0.05, 0.09, 6.2, 0.09]) ** 2
 """Covariance of the declared derivatives of aircraft/gtm, independent."""

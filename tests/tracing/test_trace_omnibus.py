@@ -17,7 +17,8 @@ from airtruth.tracing.model.records import nodes
 from airtruth.tracing.model.response import External, respond
 from airtruth.tracing.model.surface import play
 from airtruth.tracing.selection.anomaly import Anomaly
-from airtruth.tracing.selection.omnibus import advice, anomalies, chi_square, families, views
+from airtruth.tracing.selection.families import advice, families
+from airtruth.tracing.selection.omnibus import anomalies, chi_square, views
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.selection.spectrum import lines
 from airtruth.units import DEG

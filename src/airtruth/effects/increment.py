@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from airtruth.effects.effect import Effect, Parameter
-from airtruth.physics.terms import READINGS, AeroTerm, Change, ReadingTerm, StateTerm, shape_of
+from airtruth.physics.terms import OUTPUTS, AeroTerm, Change, ReadingTerm, StateTerm, shape_of
 
 Array = NDArray[np.float64]
 
@@ -125,13 +125,13 @@ class Shape:
     Attributes
     ----------
     acts_on : "CL", "Cm", "CX", or the channel whose reading changes.
-    signal : one of `airtruth.physics.terms.SIGNALS`.
+    signal : one of `airtruth.physics.terms.signals_of` a motion.
     low, high : range of the signal in which the increment is learned [unit of the signal].
     cells : number of equal cells of the range; 0 for a linear increment, which needs ``memory``.
     trim : value of the signal at the trim.
     memory : state between the signal and the increment; None for an increment of the signal itself. With a factor, the lag
         whose time constant changes.
-    factor : one of `airtruth.physics.terms.FACTORS`, whose derivative changes, or whose lag in a reading does; empty where
+    factor : one of `airtruth.physics.terms.factors_of` it, whose derivative changes, or whose lag in a reading does; empty where
         the coefficient or the reading itself does.
     factor_trim : value of the factor at the trim.
     step_cell : number of the cell over which a step behind a play rises; None for a function that may bend at every knot. The
@@ -177,7 +177,7 @@ class Shape:
     @property
     def of_reading(self) -> bool:
         """Whether it changes a reading instead of a coefficient."""
-        return self.acts_on in READINGS
+        return self.acts_on in OUTPUTS
 
     @property
     def of_derivative(self) -> bool:

@@ -14,7 +14,7 @@ from airtruth.channels import SIGNALS, shown
 from airtruth.charts import Band, Line, Mark, Panel, Rule
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.motion import LONGITUDINAL
-from airtruth.physics.terms import READINGS, AeroTerm, Change, shape_of
+from airtruth.physics.terms import OUTPUTS, AeroTerm, Change, shape_of
 from airtruth.table import significant
 from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
 from airtruth.tracing.answer import TraceAnswer
@@ -151,9 +151,9 @@ def learned_panel(effect: AcceptedEffect, table: IncrementTable | None) -> Panel
 def _subject(effect: AcceptedEffect) -> tuple[str, float]:
     """What a learned increment changes, with its display unit, and the factor to this unit from SI."""
     acts_on, by = effect.acts_on or "", effect.by or ""
-    if acts_on in READINGS and not by:
+    if acts_on in OUTPUTS and not by:
         return shown(acts_on)
-    own = SIGNALS[acts_on].unit if acts_on in READINGS else ""
+    own = SIGNALS[acts_on].unit if acts_on in OUTPUTS else ""
     unit = (f"{own or 1}/rad" if by.endswith("_rad") else own) or "-"
     return f"{effect.subject} [{unit}]", 1.0
 
