@@ -128,6 +128,22 @@ class Motion:
         )
 
     @cached_property
+    def derivative_units(self) -> str:
+        """Units of its derivatives in headings: ``1/rad, rates as q c/(2V)``."""
+        letters = {"chord": "c", "span": "b"}
+        rates = (f"{s.symbol} {letters[s.length]}/(2V)" for s in self.signals if s.length is not None)
+        return f"1/rad, rates as {', '.join(rates)}"
+
+    @cached_property
+    def inertias(self) -> tuple[str, ...]:
+        """Moments and products of inertia that it needs, as aircraft.toml names them."""
+        return tuple(
+            "inertia_yy" if d.name == "inertia" else d.name
+            for d in self.declared
+            if d.name.startswith("inertia")
+        )
+
+    @cached_property
     def names(self) -> frozenset[str]:
         """Names that a term of an effect may have if it concerns the motion."""
         return frozenset(
@@ -233,9 +249,9 @@ LONGITUDINAL: Final = Motion(
     ),
     known=("airspeed_m_s", "density_kg_m3", "theta_rad"),
     outputs=(
-        Output("alpha", "alpha_rad", "vane"),
-        Output("q", "q_rad_s", "gyro"),
-        Output("az", "az_m_s2", "accelerometer", late=True),
+        Output("alpha", "alpha_rad", "vane", quantity="angle of attack"),
+        Output("q", "q_rad_s", "gyro", quantity="pitch rate"),
+        Output("az", "az_m_s2", "accelerometer", late=True, quantity="normal acceleration"),
     ),
     coefficients=(
         Coefficient("CL", "lift, along -z", None, -1),
@@ -279,11 +295,11 @@ LATERAL: Final = Motion(
     ),
     known=("airspeed_m_s", "density_kg_m3", "alpha_rad", "theta_rad", "q_rad_s"),
     outputs=(
-        Output("beta", "beta_rad", "vane"),
-        Output("p", "p_rad_s", "gyro"),
-        Output("r", "r_rad_s", "gyro"),
-        Output("phi", "phi_rad", "attitude"),
-        Output("ay", "ay_m_s2", "accelerometer", late=True),
+        Output("beta", "beta_rad", "vane", quantity="sideslip"),
+        Output("p", "p_rad_s", "gyro", quantity="roll rate"),
+        Output("r", "r_rad_s", "gyro", quantity="yaw rate"),
+        Output("phi", "phi_rad", "attitude", quantity="bank"),
+        Output("ay", "ay_m_s2", "accelerometer", late=True, quantity="side acceleration"),
     ),
     coefficients=(
         Coefficient("CY", "side force, to the right", None),
@@ -327,6 +343,18 @@ MOTIONS: Final[Mapping[str, Motion]] = MappingProxyType({m.name: m for m in (LON
 """Name -> motion, in the order of answers."""
 
 
+def motion_with(outputs: Iterable[str]) -> Motion:
+    """The motion with most of some outputs; the longitudinal one of none.
+
+    Examples
+    --------
+    >>> motion_with(["p_rad_s", "r_rad_s"]).name
+    'lateral'
+    """
+    names = set(outputs)
+    return max(MOTIONS.values(), key=lambda motion: len(names & set(motion.output_channels)))
+
+
 def motion_of(columns: Iterable[str]) -> Motion:
     """The motion whose derivatives are among the columns of a table of estimates; the longitudinal one if none is."""
     names = set(columns)
@@ -337,4 +365,4 @@ def _named(name: str) -> Motion:
     return MOTIONS[name]
 
 
-__all__ = ["LATERAL", "LONGITUDINAL", "MOTIONS", "Motion", "motion_of"]
+__all__ = ["LATERAL", "LONGITUDINAL", "MOTIONS", "Motion", "motion_of", "motion_with"]
