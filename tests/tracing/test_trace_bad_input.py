@@ -19,7 +19,7 @@ from airtruth.logs.store import write_log
 from airtruth.physics.terms import Change, SensorTerm
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing import run as tracing
-from airtruth.tracing.model import records
+from airtruth.tracing.model import reading
 from airtruth.tracing.prepare import prepare
 from airtruth.units import DEG
 
