@@ -98,6 +98,13 @@ class Observation:
         return np.concatenate([np.broadcast_to(powers, (runs, *powers.shape)), self.terms], axis=1)
 
 
+def nonlinear_columns(names: Collection[str]) -> tuple[tuple[str, int], ...]:
+    """Terms of `nonlinear` in their order: name, and position of the signal."""
+    signals = len(REGRESSORS)
+    made = [("alpha", j) for j in range(signals)] if "alpha" in names else []
+    return (*made, *([("beta", REGRESSORS.index("beta_rad"))] if "beta" in names else []))
+
+
 def nonlinear(regressors: Array, alpha: Array, names: Collection[str]) -> Array:
     """Terms (runs, terms, samples) that a linear model lacks.
 
@@ -255,5 +262,6 @@ __all__ = [
     "integrated",
     "known_inputs",
     "nonlinear",
+    "nonlinear_columns",
     "observe",
 ]

@@ -4,19 +4,29 @@ States are beta, p, r, phi and two of the gust v, whose sideslip v/V acts throug
 the inertial path. White noise drives p' and r': what the linear moments do not explain. Its intensity is estimated: set to
 zero, intervals are too narrow wherever the aerodynamics are not linear. With v = V(t)/V0 and p = q_bar(t)/q_bar0, forces and
 moments act p times on angles and p/v times on rates; the surplus over the reference is made of measured signals and enters as
-a known input, as do the products of rates and the changes of alpha, theta and gravity.
+a known input, as do the products of rates and the changes of alpha, theta and gravity. So do the terms of
+`airtruth.identification.lateral.observation.nonlinear`, with a factor of their own in each coefficient.
 
 Sources: V. Klein and E. A. Morelli, Aircraft System Identification, AIAA, 2006, 3.2; MIL-F-8785C, 3.7.1.2 (Dryden form).
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.identification.lateral.observation import CONTROLS, Known, condition_of, known_inputs
+from airtruth.identification.lateral.observation import (
+    CONTROLS,
+    REGRESSORS,
+    Known,
+    condition_of,
+    known_inputs,
+    nonlinear,
+    nonlinear_columns,
+)
 from airtruth.identification.likelihood.fit import Records
 from airtruth.identification.likelihood.kalman_kernel import Signals
 from airtruth.identification.likelihood.predictor import W_SHARES, W_START, Predictor, Term, layout
@@ -41,6 +51,8 @@ KINEMATIC: Final = tuple(f"known_{state.name}" for state in LATERAL.states)
 """Known inputs of the rates of the states: kinematics and inertia beyond the linear model."""
 SURPLUS: Final = tuple(f"surplus_{signal.name}" for signal in LATERAL.signals)
 """Known inputs: each signal times the surplus of the dynamic pressure."""
+TERM: Final = "term_{}_{}"
+"""Known input: a nonlinear term by its name and the name of its signal."""
 _FLOOR: Final = 1e-5
 """Least noise of every output over its spread [-]; judgement: a record without noise has no likelihood."""
 
@@ -51,8 +63,23 @@ def levels(outputs: tuple[str, ...], *, gusts: bool) -> tuple[str, ...]:
     return (GUST, *noise, *PROCESS) if gusts else noise
 
 
+def factor_names(terms: Collection[str]) -> tuple[str, ...]:
+    """Names of the factors of nonlinear terms, which follow the derivatives among the parameters."""
+    return tuple(
+        f"{LATERAL.derivatives[LATERAL.at(c.name, LATERAL.signals[j].name)].name}_{name}"
+        for c in LATERAL.coefficients
+        for name, j in nonlinear_columns(terms)
+    )
+
+
 def predictor_of(
-    scale: LateralScale, outputs: tuple[str, ...], length_m: float, *, gusts: bool, measured: bool
+    scale: LateralScale,
+    outputs: tuple[str, ...],
+    length_m: float,
+    *,
+    gusts: bool,
+    measured: bool,
+    terms: Collection[str] = (),
 ) -> Predictor:
     """The predictor at a flight condition.
 
@@ -63,17 +90,19 @@ def predictor_of(
     length_m : scale length of the gust [m].
     gusts : with the gust and the noise of the moments; without, it is output error.
     measured : with the inputs `SURPLUS`.
+    terms : nonlinear terms, of `airtruth.identification.options.TERMS`.
     """
     own, state_names = structure(scale), [state.name for state in LATERAL.states]
     controls = [control.name for control in LATERAL.controls]
     coefficients = [c.name for c in LATERAL.coefficients]
-    terms = []
+    made = []
+    columns = nonlinear_columns(terms)
     for i, row in enumerate(state_names):
         for j, column in enumerate(state_names):
             if own.kinematics[..., i, j].any():
-                terms.append(Term("A", row, column, own.kinematics[..., i, j]))
-        terms.append(Term("B", row, KINEMATIC[i], 1.0))
-    terms += [Term("C", name, name, 1.0) for name in state_names if name in outputs]
+                made.append(Term("A", row, column, own.kinematics[..., i, j]))
+        made.append(Term("B", row, KINEMATIC[i], 1.0))
+    made += [Term("C", name, name, 1.0) for name in state_names if name in outputs]
     for derivative in LATERAL.derivatives:
         is_state, number = places(LATERAL)[derivative.column]
         signal = (state_names if is_state else controls)[number]
@@ -83,37 +112,53 @@ def predictor_of(
                 factor = factors[..., i, derivative.row] * rate
                 if not factor.any() or (kinds == "CD" and row not in outputs):
                     continue
-                terms.append(Term(kinds[0 if is_state else 1], row, signal, factor, (derivative.name,)))
+                made.append(Term(kinds[0 if is_state else 1], row, signal, factor, (derivative.name,)))
                 if measured:
-                    terms.append(Term(kinds[1], row, SURPLUS[derivative.column], factor, (derivative.name,)))
+                    made.append(Term(kinds[1], row, SURPLUS[derivative.column], factor, (derivative.name,)))
+                made += [
+                    Term(
+                        kinds[1],
+                        row,
+                        TERM.format(name, LATERAL.signals[j].name),
+                        factor,
+                        (f"{derivative.name}_{name}",),
+                    )
+                    for name, j in columns
+                    if j == derivative.column
+                ]
                 if gusts and signal == LATERAL.implicit[1]:
-                    terms += [
+                    made += [
                         Term(
                             kinds[0], row, state, factor * share / scale.airspeed_m_s, (derivative.name, GUST)
                         )
                         for state, share in W_SHARES.items()
                     ]
     names = levels(outputs, gusts=gusts)
-    terms += [Term("R", name, "", 1.0, (f"noise_{name}",) * 2) for name in outputs]
+    made += [Term("R", name, "", 1.0, (f"noise_{name}",) * 2) for name in outputs]
     if gusts:
         a = scale.airspeed_m_s / length_m
         first, second = W_SHARES
-        terms += [Term("A", first, first, -a), Term("A", second, second, -a), Term("A", second, first, a)]
-        terms.append(Term("Q", first, "", 2.0 * a))
-        terms += [Term("Q", name[6:7], "", 1.0, (name,) * 2) for name in PROCESS]
+        made += [Term("A", first, first, -a), Term("A", second, second, -a), Term("A", second, first, a)]
+        made.append(Term("Q", first, "", 2.0 * a))
+        made += [Term("Q", name[6:7], "", 1.0, (name,) * 2) for name in PROCESS]
         if LATERAL.implicit[1] in outputs:
-            terms += [
+            made += [
                 Term("C", LATERAL.implicit[1], state, share / scale.airspeed_m_s, (GUST,))
                 for state, share in W_SHARES.items()
             ]
     assert coefficients[0] == LATERAL.implicit[0]
     return Predictor(
         states=(*state_names, *(W_SHARES if gusts else ())),
-        inputs=(*controls, *KINEMATIC, *(SURPLUS if measured else ())),
+        inputs=(
+            *controls,
+            *KINEMATIC,
+            *(SURPLUS if measured else ()),
+            *(TERM.format(name, LATERAL.signals[j].name) for name, j in columns),
+        ),
         outputs=outputs,
-        parameters=(*LATERAL.parameters, *names),
+        parameters=(*LATERAL.parameters, *factor_names(terms), *names),
         logarithmic=names,
-        terms=tuple(terms),
+        terms=tuple(made),
         start=((tuple(W_SHARES), W_START),) if gusts else (),
     )
 
@@ -150,6 +195,13 @@ def surplus_inputs(batch: Batch, scale: LateralScale, known: Known, options: Opt
     return np.stack(made, axis=2)
 
 
+def term_inputs(batch: Batch, known: Known, options: Options) -> Array:
+    """Nonlinear terms of the signals about their first samples, (runs, samples, terms), by ``options.terms``."""
+    columns = {**batch.channels, "beta_rad": known.beta}
+    signals = np.stack([columns[name] for name in REGRESSORS], axis=1)
+    return np.swapaxes(nonlinear(signals - signals[..., :1], known.alpha, options.terms), 1, 2)
+
+
 def records_of(
     batch: Batch, constants: LateralConstants, options: Options, length_m: float, *, gusts: bool
 ) -> Records[LateralScale]:
@@ -168,13 +220,14 @@ def records_of(
     measured = options.pressure != "constant" and options.airspeed_m_s is None
     if measured:
         u.append(surplus_inputs(batch, scale, known, options))
+    u.append(term_inputs(batch, known, options))
     inputs = np.concatenate(u, axis=2)
     edge = np.concatenate([inputs[:, :1], inputs, inputs[:, -1:]], axis=1)
     bend = np.zeros_like(inputs)
     bend[:, 1:] = (edge[:, 1:-2] + edge[:, 2:-1] - edge[:, :-3] - edge[:, 3:]) / 24.0
     for number, name in enumerate(CONTROLS):
         bend[:, :, number] += servo_bend(batch.channels[name])
-    predictor = predictor_of(scale, outputs, length_m, gusts=gusts, measured=measured)
+    predictor = predictor_of(scale, outputs, length_m, gusts=gusts, measured=measured, terms=options.terms)
     floor = _FLOOR * y.std(axis=1)
     least = tuple(Term("R", name, "", floor[:, i] ** 2) for i, name in enumerate(outputs))
     made = Predictor(**{**vars(predictor), "terms": (*predictor.terms, *least)})
@@ -186,4 +239,4 @@ def outputs_of(batch: Batch) -> tuple[str, ...]:
     return tuple(output.name for output in LATERAL.outputs if output.channel in batch.channels)
 
 
-__all__ = ["GUST", "OUTPUTS", "PROCESS", "levels", "outputs_of", "predictor_of", "records_of"]
+__all__ = ["GUST", "OUTPUTS", "PROCESS", "factor_names", "levels", "outputs_of", "predictor_of", "records_of"]
