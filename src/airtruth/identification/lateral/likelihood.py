@@ -62,6 +62,7 @@ def search_of(noise: Array, options: Options, *, gusts: bool) -> Search:
         level=slice(count, count + prior.size),
         tolerance=FilterOptions.tolerance,
         maximum_iterations=STEPS * options.maximum_iterations,
+        to_prior=True,
     )
 
 

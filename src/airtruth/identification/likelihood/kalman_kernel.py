@@ -139,11 +139,19 @@ def innovate_slopes(
     n, inputs, count = phi.shape[1], u.shape[2], slope.phi.shape[3]
     columns = rows.shape[1] - count
     state, ahead, now = np.empty(n), np.empty(n), np.empty(m)
+    # rows of the matrices that no parameter moves, such as those of a gust, are left out
+    by_state, by_input = np.empty(n, dtype=np.bool_), np.empty(n, dtype=np.bool_)
+    out_state, out_input = np.empty(m, dtype=np.bool_), np.empty(m, dtype=np.bool_)
     dx, dx_ahead, de = np.empty((n, count)), np.empty((n, count)), np.empty((m, count))
     for run in range(runs):
         for i in range(n):
             state[i] = nuisance[run, i]
         dx[:] = 0.0
+        for i in range(n):
+            by_state[i] = slope.phi[run, i].any()
+            by_input[i] = slope.early[run, i].any() or slope.late[run, i].any()
+        for a in range(m):
+            out_state[a], out_input[a] = slope.c[run, a].any(), slope.d[run, a].any()
         for k in range(samples):
             for a in range(m):
                 total = y[run, k, a] - nuisance[run, n + a]
@@ -151,12 +159,17 @@ def innovate_slopes(
                     de[a, f] = 0.0
                 for i in range(n):
                     total -= c[run, a, i] * state[i]
-                    for f in range(count):
-                        de[a, f] -= c[run, a, i] * dx[i, f] + slope.c[run, a, i, f] * state[i]
+                    if out_state[a]:
+                        for f in range(count):
+                            de[a, f] -= c[run, a, i] * dx[i, f] + slope.c[run, a, i, f] * state[i]
+                    elif c[run, a, i] != 0.0:
+                        for f in range(count):
+                            de[a, f] -= c[run, a, i] * dx[i, f]
                 for i in range(inputs):
                     total -= d[run, a, i] * u[run, k, i]
-                    for f in range(count):
-                        de[a, f] -= slope.d[run, a, i, f] * u[run, k, i]
+                    if out_input[a]:
+                        for f in range(count):
+                            de[a, f] -= slope.d[run, a, i, f] * u[run, k, i]
                 now[a] = total
             for a in range(m):
                 for f in range(count):
@@ -172,8 +185,12 @@ def innovate_slopes(
                     dx_ahead[i, f] = 0.0
                 for h in range(n):
                     total += phi[run, i, h] * state[h]
-                    for f in range(count):
-                        dx_ahead[i, f] += phi[run, i, h] * dx[h, f] + slope.phi[run, i, h, f] * state[h]
+                    if by_state[i]:
+                        for f in range(count):
+                            dx_ahead[i, f] += phi[run, i, h] * dx[h, f] + slope.phi[run, i, h, f] * state[h]
+                    elif phi[run, i, h] != 0.0:
+                        for f in range(count):
+                            dx_ahead[i, f] += phi[run, i, h] * dx[h, f]
                 for a in range(m):
                     total += gain_p[run, i, a] * now[a]
                     for f in range(count):
@@ -182,10 +199,11 @@ def innovate_slopes(
                     first = u[run, k, h] + bend[run, k + 1, h]
                     second = u[run, k + 1, h] + bend[run, k + 1, h]
                     total += early[run, i, h] * first + late[run, i, h] * second
-                    for f in range(count):
-                        dx_ahead[i, f] += (
-                            slope.early[run, i, h, f] * first + slope.late[run, i, h, f] * second
-                        )
+                    if by_input[i]:
+                        for f in range(count):
+                            dx_ahead[i, f] += (
+                                slope.early[run, i, h, f] * first + slope.late[run, i, h, f] * second
+                            )
                 ahead[i] = total
             state, ahead = ahead, state
             dx, dx_ahead = dx_ahead, dx
