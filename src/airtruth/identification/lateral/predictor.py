@@ -37,6 +37,7 @@ from airtruth.numerics.prefilter import butterworth, zero_phase
 from airtruth.physics.atmosphere import air_density
 from airtruth.physics.lateral import LateralConstants, LateralScale, places, structure
 from airtruth.physics.motion import LATERAL
+from airtruth.physics.motion_parts import Derivative
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
@@ -94,9 +95,7 @@ def predictor_of(
     """
     own, state_names = structure(scale), [state.name for state in LATERAL.states]
     controls = [control.name for control in LATERAL.controls]
-    coefficients = [c.name for c in LATERAL.coefficients]
     made = []
-    columns = nonlinear_columns(terms)
     for i, row in enumerate(state_names):
         for j, column in enumerate(state_names):
             if own.kinematics[..., i, j].any():
@@ -107,25 +106,14 @@ def predictor_of(
         is_state, number = places(LATERAL)[derivative.column]
         signal = (state_names if is_state else controls)[number]
         rate = own.rates[..., derivative.column]
+        known = _known_inputs(derivative, terms, measured=measured)
         for kinds, rows, factors in (("AB", state_names, own.forces), ("CD", OUTPUTS, own.accelerations)):
             for i, row in enumerate(rows):
                 factor = factors[..., i, derivative.row] * rate
                 if not factor.any() or (kinds == "CD" and row not in outputs):
                     continue
                 made.append(Term(kinds[0 if is_state else 1], row, signal, factor, (derivative.name,)))
-                if measured:
-                    made.append(Term(kinds[1], row, SURPLUS[derivative.column], factor, (derivative.name,)))
-                made += [
-                    Term(
-                        kinds[1],
-                        row,
-                        TERM.format(name, LATERAL.signals[j].name),
-                        factor,
-                        (f"{derivative.name}_{name}",),
-                    )
-                    for name, j in columns
-                    if j == derivative.column
-                ]
+                made += [Term(kinds[1], row, name, factor, (parameter,)) for name, parameter in known]
                 if gusts and signal == LATERAL.implicit[1]:
                     made += [
                         Term(
@@ -136,24 +124,14 @@ def predictor_of(
     names = levels(outputs, gusts=gusts)
     made += [Term("R", name, "", 1.0, (f"noise_{name}",) * 2) for name in outputs]
     if gusts:
-        a = scale.airspeed_m_s / length_m
-        first, second = W_SHARES
-        made += [Term("A", first, first, -a), Term("A", second, second, -a), Term("A", second, first, a)]
-        made.append(Term("Q", first, "", 2.0 * a))
-        made += [Term("Q", name[6:7], "", 1.0, (name,) * 2) for name in PROCESS]
-        if LATERAL.implicit[1] in outputs:
-            made += [
-                Term("C", LATERAL.implicit[1], state, share / scale.airspeed_m_s, (GUST,))
-                for state, share in W_SHARES.items()
-            ]
-    assert coefficients[0] == LATERAL.implicit[0]
+        made += _air_terms(scale, outputs, length_m)
     return Predictor(
         states=(*state_names, *(W_SHARES if gusts else ())),
         inputs=(
             *controls,
             *KINEMATIC,
             *(SURPLUS if measured else ()),
-            *(TERM.format(name, LATERAL.signals[j].name) for name, j in columns),
+            *(TERM.format(name, LATERAL.signals[j].name) for name, j in nonlinear_columns(terms)),
         ),
         outputs=outputs,
         parameters=(*LATERAL.parameters, *factor_names(terms), *names),
@@ -161,6 +139,32 @@ def predictor_of(
         terms=tuple(made),
         start=((tuple(W_SHARES), W_START),) if gusts else (),
     )
+
+
+def _known_inputs(derivative: Derivative, terms: Collection[str], *, measured: bool) -> list[tuple[str, str]]:
+    """Known inputs that act as the signal of a derivative does, each with its parameter."""
+    made = [(SURPLUS[derivative.column], derivative.name)] if measured else []
+    signal = LATERAL.signals[derivative.column].name
+    return made + [
+        (TERM.format(name, signal), f"{derivative.name}_{name}")
+        for name, j in nonlinear_columns(terms)
+        if j == derivative.column
+    ]
+
+
+def _air_terms(scale: LateralScale, outputs: tuple[str, ...], length_m: float) -> list[Term]:
+    """The gust's own motion, its effect on the vane, and the noise of the moments."""
+    a = scale.airspeed_m_s / length_m
+    first, second = W_SHARES
+    made = [Term("A", first, first, -a), Term("A", second, second, -a), Term("A", second, first, a)]
+    made.append(Term("Q", first, "", 2.0 * a))
+    made += [Term("Q", name[6:7], "", 1.0, (name,) * 2) for name in PROCESS]
+    if LATERAL.implicit[1] in outputs:
+        made += [
+            Term("C", LATERAL.implicit[1], state, share / scale.airspeed_m_s, (GUST,))
+            for state, share in W_SHARES.items()
+        ]
+    return made
 
 
 def kinematic_inputs(batch: Batch, constants: LateralConstants, scale: LateralScale, known: Known) -> Array:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from airtruth.identification.likelihood.linearise import Matrices
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 
 class Signals(NamedTuple):
@@ -115,6 +116,20 @@ def innovate(step: Matrices, white: Array, gain_p: Array, signals: Signals, rows
 
 
 @njit(cache=True)
+def _moved_rows(slope: FilterSlopes, run: int) -> tuple[Bools, Bools, Bools, Bools]:
+    """Rows of phi, of early and late, of c and of d that a parameter moves; those of a gust, for example, none does."""
+    n, m = slope.phi.shape[1], slope.c.shape[1]
+    by_state, by_input = np.empty(n, dtype=np.bool_), np.empty(n, dtype=np.bool_)
+    out_state, out_input = np.empty(m, dtype=np.bool_), np.empty(m, dtype=np.bool_)
+    for i in range(n):
+        by_state[i] = slope.phi[run, i].any()
+        by_input[i] = slope.early[run, i].any() or slope.late[run, i].any()
+    for a in range(m):
+        out_state[a], out_input[a] = slope.c[run, a].any(), slope.d[run, a].any()
+    return by_state, by_input, out_state, out_input
+
+
+@njit(cache=True)
 def innovate_slopes(
     steady: Filter, slope: FilterSlopes, nuisance: Array, signals: Signals, rows: Array
 ) -> None:
@@ -126,32 +141,21 @@ def innovate_slopes(
     nuisance : (runs, states + outputs) initial means and biases.
     rows : (runs, 1 + states + outputs + free, samples outputs), its last ``free`` written.
     """
-    phi, early, late, c, d = (
-        steady.step.phi,
-        steady.step.early,
-        steady.step.late,
-        steady.step.c,
-        steady.step.d,
-    )
+    step = steady.step
+    phi, early, late, c, d = step.phi, step.early, step.late, step.c, step.d
+    d_early, d_late = slope.early, slope.late
     white, gain_p = steady.white, steady.gain_p
     y, u, bend = signals.y, signals.u, signals.bend
     runs, samples, m = y.shape
     n, inputs, count = phi.shape[1], u.shape[2], slope.phi.shape[3]
     columns = rows.shape[1] - count
     state, ahead, now = np.empty(n), np.empty(n), np.empty(m)
-    # rows of the matrices that no parameter moves, such as those of a gust, are left out
-    by_state, by_input = np.empty(n, dtype=np.bool_), np.empty(n, dtype=np.bool_)
-    out_state, out_input = np.empty(m, dtype=np.bool_), np.empty(m, dtype=np.bool_)
     dx, dx_ahead, de = np.empty((n, count)), np.empty((n, count)), np.empty((m, count))
     for run in range(runs):
         for i in range(n):
             state[i] = nuisance[run, i]
         dx[:] = 0.0
-        for i in range(n):
-            by_state[i] = slope.phi[run, i].any()
-            by_input[i] = slope.early[run, i].any() or slope.late[run, i].any()
-        for a in range(m):
-            out_state[a], out_input[a] = slope.c[run, a].any(), slope.d[run, a].any()
+        by_state, by_input, out_state, out_input = _moved_rows(slope, run)
         for k in range(samples):
             for a in range(m):
                 total = y[run, k, a] - nuisance[run, n + a]
@@ -201,9 +205,7 @@ def innovate_slopes(
                     total += early[run, i, h] * first + late[run, i, h] * second
                     if by_input[i]:
                         for f in range(count):
-                            dx_ahead[i, f] += (
-                                slope.early[run, i, h, f] * first + slope.late[run, i, h, f] * second
-                            )
+                            dx_ahead[i, f] += d_early[run, i, h, f] * first + d_late[run, i, h, f] * second
                 ahead[i] = total
             state, ahead = ahead, state
             dx, dx_ahead = dx_ahead, dx
