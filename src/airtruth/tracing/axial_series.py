@@ -173,7 +173,7 @@ def _series(
     factor = declared_total(change.declared, "elevator")
     neutral = plant.neutral_elevator_rad
     cells = s.sub * FINE
-    surface = through(change.surface_path, s.elevator_rad, s.dt_s / cells)[::cells]
+    surface = through(change.surface_path(), s.elevator_rad, s.dt_s / cells)[::cells]
     elevator = neutral + factor * (surface - neutral)
     alpha, q = channels["alpha_rad"], channels["q_rad_s"]
     speed, density = s.airspeed_m_s[:: s.sub] * ratio, s.density_kg_m3[:: s.sub]
