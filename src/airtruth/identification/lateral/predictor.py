@@ -183,6 +183,12 @@ def kinematic_inputs(batch: Batch, constants: LateralConstants, scale: LateralSc
     return np.stack([beta, p_dot, r_dot, phi_dot], axis=2)
 
 
+def _signals(batch: Batch, known: Known) -> Array:
+    """Channels of the signals, (runs, signals, samples); the sideslip measured or reconstructed."""
+    columns = {**batch.channels, "beta_rad": known.beta}
+    return np.stack([columns[name] for name in REGRESSORS], axis=1)
+
+
 def surplus_inputs(batch: Batch, scale: LateralScale, known: Known, options: Options) -> Array:
     """Signals about their means times the surplus of the dynamic pressure, (runs, samples, signals): `SURPLUS`."""
     c = batch.channels
@@ -190,10 +196,8 @@ def surplus_inputs(batch: Batch, scale: LateralScale, known: Known, options: Opt
     v = zero_phase(c["airspeed_m_s"], sos) / scale.airspeed_m_s[:, None]
     density = air_density(c)
     pressure = v**2 * density / density.mean(axis=1, keepdims=True)
-    columns = {**c, "beta_rad": known.beta}
     made = []
-    for signal in LATERAL.signals:
-        x = columns[signal.channel]
+    for signal, x in zip(LATERAL.signals, np.swapaxes(_signals(batch, known), 0, 1), strict=True):
         factor = pressure - 1.0 if signal.length is None else pressure / v - 1.0
         made.append(factor * (x - x.mean(axis=1, keepdims=True)))
     return np.stack(made, axis=2)
@@ -201,8 +205,7 @@ def surplus_inputs(batch: Batch, scale: LateralScale, known: Known, options: Opt
 
 def term_inputs(batch: Batch, known: Known, options: Options) -> Array:
     """Nonlinear terms of the signals about their first samples, (runs, samples, terms), by ``options.terms``."""
-    columns = {**batch.channels, "beta_rad": known.beta}
-    signals = np.stack([columns[name] for name in REGRESSORS], axis=1)
+    signals = _signals(batch, known)
     return np.swapaxes(nonlinear(signals - signals[..., :1], known.alpha, options.terms), 1, 2)
 
 
