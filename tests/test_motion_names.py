@@ -26,7 +26,7 @@ CAPS: dict[str, int] = {
     "charts": 1,
     "checks": 577,
     "cli": 27,
-    "design": 93,
+    "design": 91,
     "exporting": 15,
     "identification": 336,
     "importers": 158,
