@@ -168,7 +168,7 @@ def _angle_of_attack(compiled: CompiledChange, s: Signals) -> Array:
 def _relative_rate(ground_m_s: Array, s: Signals) -> Array:
     """V'/V of the speed without the gust, from its samples [1/s]."""
     sampled = ground_m_s[:: s.sub]
-    return on_grid(np.gradient(sampled, s.dt_s) / sampled, s.sub)
+    return on_grid(np.gradient(sampled, s.dt_s, edge_order=min(2, sampled.size - 1)) / sampled, s.sub)
 
 
 def _corners(s: Signals, compiled: CompiledChange) -> Array:
