@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.physics.motion import LONGITUDINAL, Motion
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -188,6 +188,14 @@ class ParameterLayout:
 
 SHORT_PERIOD: Final = ParameterLayout(LONGITUDINAL)
 """Parameters of the short period."""
+_LATERAL: Final = ParameterLayout(LATERAL)
+
+
+def layout_of(motion: Motion) -> ParameterLayout:
+    """Parameters of a motion."""
+    return SHORT_PERIOD if motion is LONGITUDINAL else _LATERAL
+
+
 COLOUR_TIME_S: Final = 0.1
 """Unit of the correlation time of correlated noise [s]."""
 
@@ -401,6 +409,7 @@ __all__ = [
     "core_of",
     "core_states",
     "effect_states",
+    "layout_of",
     "lead_of",
     "state_layout",
 ]
