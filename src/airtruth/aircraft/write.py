@@ -36,19 +36,21 @@ HIGHEST_HZ: Final = 400.0
 
 @dataclass(frozen=True)
 class Corrections:
-    """Increments of the six derivatives, linear about a trim.
+    """Increments of derivatives, linear about a trim.
 
     Attributes
     ----------
-    increments : name of `airtruth.physics.short_period.PARAMETERS` -> increment [1/rad]; may leave some out.
-    alpha_rad, elevator_rad : the trim, where lift and moment stay as they are [rad].
+    increments : derivative of any motion -> increment [1/rad]; may leave some out.
+    alpha_rad, elevator_rad : the trim, where forces and moments stay as they are [rad].
     std : standard deviations of the increments, of those that have one [1/rad].
+    beside : other signals at the trim, those of aileron, rudder and sideslip [rad].
     """
 
     increments: Mapping[str, float]
     alpha_rad: float
     elevator_rad: float
     std: Mapping[str, float] = field(default_factory=dict)
+    beside: Mapping[str, float] = field(default_factory=dict)
 
     def terms(self) -> dict[str, AeroTerm]:
         """The increments as terms, by the names of the derivatives.
@@ -58,7 +60,8 @@ class Corrections:
         ConfigurationError
             If a name is not a derivative.
         """
-        terms = linear_terms(self.increments, self.alpha_rad, self.elevator_rad)
+        at = {"alpha": self.alpha_rad, "elevator": self.elevator_rad, **self.beside}
+        terms = linear_terms(self.increments, at)
         return dict(zip(self.increments, terms, strict=True))
 
 

@@ -1,4 +1,4 @@
-"""Contributions of tail, wing and flow to the six derivatives, from the declared derivatives and the geometry.
+"""Contributions of parts and flow to the derivatives, from the declared derivatives and the geometry.
 
 A cause that acts on a whole part of the aircraft moves several derivatives in one direction. The directions are first
 order: a fraction s of the cause adds s times its direction to the derivatives.
@@ -12,12 +12,20 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.composition_lateral import (
+    SideGeometry,
+    cg_part,
+    fin_part,
+    inertia_parts,
+    tip_at_rest,
+    tip_part,
+)
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, MOTIONS, Motion
 from airtruth.physics.short_period import CL_ALPHA, CL_DE, CL_Q, CM_ALPHA, CM_DE, CM_Q
 
 Array = NDArray[np.float64]
@@ -111,13 +119,21 @@ class Part:
     Attributes
     ----------
     neutral : value that changes nothing: 1 of a factor, 0 of a shift or of a severity.
-    direction : derivatives (6,) and geometry -> change of the derivatives per unit, at the neutral value.
+    direction : derivatives and geometry (`TailGeometry` of the pitch plane, `SideGeometry` of the lateral motion) -> change of
+        the derivatives per unit, at the neutral value.
     motion : name of the motion whose derivatives they are.
+    at_rest : geometry -> what it adds per unit beside the derivatives: a coefficient per lift coefficient of the aircraft
+        [-], or a declared quantity [its unit]; None for nothing.
     """
 
     neutral: float
-    direction: Callable[[Array, TailGeometry], Array]
+    direction: Callable[[Array, Any], Array]
     motion: str = LONGITUDINAL.name
+    at_rest: Callable[[Any], Mapping[str, float]] | None = None
+
+
+def _at_rest_mirrored(geometry: SideGeometry) -> Mapping[str, float]:
+    return {name: -value for name, value in tip_at_rest(geometry).items()}
 
 
 PARTS: Final[Mapping[str, Part]] = MappingProxyType(
@@ -127,45 +143,82 @@ PARTS: Final[Mapping[str, Part]] = MappingProxyType(
         "dynamic_pressure": Part(1.0, lambda derivatives, _: derivatives.copy()),
         "aerodynamic_center": Part(0.0, _centre),
         "icing": Part(0.0, lambda derivatives, _: np.array(ICED) * derivatives),
+        "fin": Part(1.0, fin_part, LATERAL.name),
+        "left_wing_tip": Part(0.0, tip_part, LATERAL.name, _at_rest_mirrored),
+        "right_wing_tip": Part(0.0, tip_part, LATERAL.name, tip_at_rest),
     }
 )
-"""Causes by name: tail, wing and dynamic pressure are factors, the aerodynamic centre counts aft in chords, and icing is a
-severity, 1 for the reference ice."""
+"""Causes by name: tail, wing, dynamic pressure and fin are factors, the aerodynamic centre counts aft in chords, icing is a
+severity, 1 for the reference ice, and a wing tip is the part of its semispan that is lost."""
 CAUSES: Final[Mapping[str, float]] = MappingProxyType(
-    {name: part.neutral for name, part in PARTS.items()} | dict.fromkeys(LONGITUDINAL.parameters, 0.0)
+    {name: part.neutral for name, part in PARTS.items()}
+    | {name: 0.0 for motion in MOTIONS.values() for name in motion.parameters}
 )
 """Causes of a change of the derivatives (`airtruth.physics.terms.DerivativeTerm`) -> neutral value; a derivative is its own
 cause."""
 
 
-def directions(derivatives: Array, geometry: TailGeometry) -> Mapping[str, Array]:
-    """Change of the six apparent derivatives per unit of each declared quantity and each part, at its neutral value.
+def cause_motion(cause: str) -> Motion:
+    """The motion whose derivatives a cause changes.
 
     Parameters
     ----------
-    derivatives, geometry : as in `tail_part`.
+    cause : one of `CAUSES`.
+    """
+    if cause in PARTS:
+        return MOTIONS[PARTS[cause].motion]
+    return next(motion for motion in MOTIONS.values() if cause in motion.parameters)
+
+
+def directions(derivatives: Array, geometry: Any, motion: Motion = LONGITUDINAL) -> Mapping[str, Array]:
+    """Change of the apparent derivatives of a motion per unit of each declared quantity and each part, at its neutral value.
+
+    Parameters
+    ----------
+    derivatives : of the aircraft, in the order of the motion [-].
+    geometry : `TailGeometry` of the pitch plane, `SideGeometry` of the lateral motion.
+    motion : the motion.
 
     Returns
     -------
-    quantity or part -> (6,). A factor on the mass or an inertia divides its coefficients, the effectiveness of a control
-    multiplies its derivatives, and "cg" counts aft in chords.
+    quantity, part or derivative -> change. A factor on the mass or an inertia divides its coefficients, the effectiveness of a
+    control multiplies its derivatives, and "cg" counts aft in chords.
     """
     found = {}
-    for quantity in LONGITUDINAL.declared:
+    for quantity in motion.declared:
         if quantity.divides:
             divided = np.zeros_like(derivatives)
-            for row in map(LONGITUDINAL.row, quantity.divides):
+            for row in map(motion.row, quantity.divides):
                 divided[row] = derivatives[row]
             found[quantity.name] = -divided
-    for control in LONGITUDINAL.controls:
+    for control in motion.controls:
         found[control.name] = np.zeros_like(derivatives)
-        column = LONGITUDINAL.column(control.name)
+        column = motion.column(control.name)
         found[control.name][column] = derivatives[column]
-    found["cg"] = np.zeros_like(derivatives)
-    found["cg"][LONGITUDINAL.row("Cm")] = derivatives[LONGITUDINAL.row("CL")]
-    return MappingProxyType(
-        found | {name: part.direction(derivatives, geometry) for name, part in PARTS.items()}
-    )
+    found |= _LOADING[motion.name](derivatives, geometry)
+    found |= {
+        p: part.direction(derivatives, geometry) for p, part in PARTS.items() if part.motion == motion.name
+    }
+    return MappingProxyType(found | dict(zip(motion.parameters, np.eye(len(derivatives)), strict=True)))
+
+
+def _pitch_loading(derivatives: Array, _geometry: TailGeometry) -> dict[str, Array]:
+    """A CG farther aft."""
+    aft = np.zeros_like(derivatives)
+    aft[LONGITUDINAL.row("Cm")] = derivatives[LONGITUDINAL.row("CL")]
+    return {"cg": aft}
+
+
+def _side_loading(derivatives: Array, geometry: SideGeometry) -> dict[str, Array]:
+    """Inertias, which a product of inertia couples, and a CG farther aft."""
+    return {**inertia_parts(derivatives, geometry), "cg": cg_part(derivatives, geometry)}
+
+
+_LOADING: Final[Mapping[str, Callable[[Array, Any], dict[str, Array]]]] = {
+    LONGITUDINAL.name: _pitch_loading,
+    LATERAL.name: _side_loading,
+}
+"""Motion -> directions of the loading that do not divide a coefficient alone."""
 
 
 def cg_transfer(shift: float) -> Array:
@@ -193,7 +246,9 @@ __all__ = [
     "ICED",
     "PARTS",
     "Part",
+    "SideGeometry",
     "TailGeometry",
+    "cause_motion",
     "cg_transfer",
     "directions",
     "tail_part",
