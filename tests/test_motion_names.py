@@ -36,7 +36,7 @@ CAPS: dict[str, int] = {
     "physics": 249,
     "reporting": 76,
     "schemas": 2,
-    "simulation": 547,
+    "simulation": 551,
     "starting": 17,
     "tracing": 160,
     "tracing/inference": 10,

@@ -84,8 +84,7 @@ def test_increments_change_the_innovations_as_in_flights(name):
                 *arguments,
                 steady=base.steady,
                 external=External(
-                    sign * h * lift * (kind == "lift"),
-                    sign * h * moment * (kind == "moment"),
+                    sign * h * np.array([lift * (kind == "lift"), moment * (kind == "moment")]),
                     sign * h * output * tangent.sensors.scale * (kind == "output"),
                 ),
             ).e

@@ -10,9 +10,9 @@ M. B. Bragg et al., Effect of Ice Accretion on Aircraft Flight Dynamics, AIAA 20
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,18 +42,20 @@ ICED: Final = (-0.100, -0.0135, -0.095, -0.099, -0.035, -0.100)
 
 @dataclass(frozen=True)
 class TailGeometry:
-    """What is declared of the tail; None where it has to be inferred.
+    """What is declared of wing, tail and fin; None where it has to be inferred.
 
     Attributes
     ----------
     aspect_ratio : of the wing [-].
     arm : distance from the CG to the tail's aerodynamic centre over the chord [-].
     lift : lift slope of the tail by the wing area and the free dynamic pressure, a_t S_t/S efficiency [1/rad].
+    side : what the lateral motion needs.
     """
 
     aspect_ratio: float | None = None
     arm: float | None = None
     lift: float | None = None
+    side: SideGeometry = field(default_factory=SideGeometry)
 
 
 def tail_part(derivatives: Array, geometry: TailGeometry) -> Array:
@@ -119,21 +121,32 @@ class Part:
     Attributes
     ----------
     neutral : value that changes nothing: 1 of a factor, 0 of a shift or of a severity.
-    direction : derivatives and geometry (`TailGeometry` of the pitch plane, `SideGeometry` of the lateral motion) -> change of
-        the derivatives per unit, at the neutral value.
+    direction : derivatives of the motion and geometry -> change of the derivatives per unit, at the neutral value.
     motion : name of the motion whose derivatives they are.
     at_rest : geometry -> what it adds per unit beside the derivatives: a coefficient per lift coefficient of the aircraft
         [-], or a declared quantity [its unit]; None for nothing.
     """
 
     neutral: float
-    direction: Callable[[Array, Any], Array]
+    direction: Callable[[Array, TailGeometry], Array]
     motion: str = LONGITUDINAL.name
-    at_rest: Callable[[Any], Mapping[str, float]] | None = None
+    at_rest: Callable[[TailGeometry], Mapping[str, float]] | None = None
 
 
-def _at_rest_mirrored(geometry: SideGeometry) -> Mapping[str, float]:
-    return {name: -value for name, value in tip_at_rest(geometry).items()}
+def _fin(derivatives: Array, geometry: TailGeometry) -> Array:
+    return fin_part(derivatives, geometry.side)
+
+
+def _tip(derivatives: Array, geometry: TailGeometry) -> Array:
+    return tip_part(derivatives, geometry.side)
+
+
+def _without_left_tip(geometry: TailGeometry) -> Mapping[str, float]:
+    return {name: -value for name, value in tip_at_rest(geometry.side).items()}
+
+
+def _without_right_tip(geometry: TailGeometry) -> Mapping[str, float]:
+    return tip_at_rest(geometry.side)
 
 
 PARTS: Final[Mapping[str, Part]] = MappingProxyType(
@@ -143,16 +156,16 @@ PARTS: Final[Mapping[str, Part]] = MappingProxyType(
         "dynamic_pressure": Part(1.0, lambda derivatives, _: derivatives.copy()),
         "aerodynamic_center": Part(0.0, _centre),
         "icing": Part(0.0, lambda derivatives, _: np.array(ICED) * derivatives),
-        "fin": Part(1.0, fin_part, LATERAL.name),
-        "left_wing_tip": Part(0.0, tip_part, LATERAL.name, _at_rest_mirrored),
-        "right_wing_tip": Part(0.0, tip_part, LATERAL.name, tip_at_rest),
+        "fin": Part(1.0, _fin, LATERAL.name),
+        "left_wing_tip": Part(0.0, _tip, LATERAL.name, _without_left_tip),
+        "right_wing_tip": Part(0.0, _tip, LATERAL.name, _without_right_tip),
     }
 )
 """Causes by name: tail, wing, dynamic pressure and fin are factors, the aerodynamic centre counts aft in chords, icing is a
 severity, 1 for the reference ice, and a wing tip is the part of its semispan that is lost."""
 CAUSES: Final[Mapping[str, float]] = MappingProxyType(
     {name: part.neutral for name, part in PARTS.items()}
-    | {name: 0.0 for motion in MOTIONS.values() for name in motion.parameters}
+    | dict.fromkeys((name for m in MOTIONS.values() for name in m.parameters), 0.0)
 )
 """Causes of a change of the derivatives (`airtruth.physics.terms.DerivativeTerm`) -> neutral value; a derivative is its own
 cause."""
@@ -170,19 +183,21 @@ def cause_motion(cause: str) -> Motion:
     return next(motion for motion in MOTIONS.values() if cause in motion.parameters)
 
 
-def directions(derivatives: Array, geometry: Any, motion: Motion = LONGITUDINAL) -> Mapping[str, Array]:
-    """Change of the apparent derivatives of a motion per unit of each declared quantity and each part, at its neutral value.
+def directions(
+    derivatives: Array, geometry: TailGeometry, motion: Motion = LONGITUDINAL
+) -> Mapping[str, Array]:
+    """Change of the apparent derivatives per unit of each declared quantity and each part, at its neutral value.
 
     Parameters
     ----------
-    derivatives : of the aircraft, in the order of the motion [-].
-    geometry : `TailGeometry` of the pitch plane, `SideGeometry` of the lateral motion.
-    motion : the motion.
+    derivatives : of the motion, in its order [-]; geometry : as in `tail_part`.
+    motion : whose derivatives, quantities, controls and parts count.
 
     Returns
     -------
-    quantity, part or derivative -> change. A factor on the mass or an inertia divides its coefficients, the effectiveness of a
-    control multiplies its derivatives, and "cg" counts aft in chords.
+    quantity, part or derivative -> change of the derivatives. A factor on the mass or an inertia divides its coefficients, the
+    effectiveness of a control multiplies its derivatives, and "cg" counts aft in chords: lift pitches the nose up about a
+    centre of gravity that lies farther aft, and a side force yaws it to the right.
     """
     found = {}
     for quantity in motion.declared:
@@ -196,9 +211,8 @@ def directions(derivatives: Array, geometry: Any, motion: Motion = LONGITUDINAL)
         column = motion.column(control.name)
         found[control.name][column] = derivatives[column]
     found |= _LOADING[motion.name](derivatives, geometry)
-    found |= {
-        p: part.direction(derivatives, geometry) for p, part in PARTS.items() if part.motion == motion.name
-    }
+    parts = {name: part for name, part in PARTS.items() if part.motion == motion.name}
+    found |= {name: part.direction(derivatives, geometry) for name, part in parts.items()}
     return MappingProxyType(found | dict(zip(motion.parameters, np.eye(len(derivatives)), strict=True)))
 
 
@@ -209,15 +223,15 @@ def _pitch_loading(derivatives: Array, _geometry: TailGeometry) -> dict[str, Arr
     return {"cg": aft}
 
 
-def _side_loading(derivatives: Array, geometry: SideGeometry) -> dict[str, Array]:
+def _side_loading(derivatives: Array, geometry: TailGeometry) -> dict[str, Array]:
     """Inertias, which a product of inertia couples, and a CG farther aft."""
-    return {**inertia_parts(derivatives, geometry), "cg": cg_part(derivatives, geometry)}
+    side = geometry.side
+    return {**inertia_parts(derivatives, side), "cg": cg_part(derivatives, side)}
 
 
-_LOADING: Final[Mapping[str, Callable[[Array, Any], dict[str, Array]]]] = {
-    LONGITUDINAL.name: _pitch_loading,
-    LATERAL.name: _side_loading,
-}
+_LOADING: Final[Mapping[str, Callable[[Array, TailGeometry], dict[str, Array]]]] = MappingProxyType(
+    {LONGITUDINAL.name: _pitch_loading, LATERAL.name: _side_loading}
+)
 """Motion -> directions of the loading that do not divide a coefficient alone."""
 
 

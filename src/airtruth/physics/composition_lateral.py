@@ -30,12 +30,12 @@ _REFERENCE_LOSS: Final = 0.2
 
 @dataclass(frozen=True)
 class SideGeometry:
-    """What is declared of fin and wing; None where it has to be inferred. The defaults are judgement.
+    """What is declared of fin and wing; None where it has to be inferred. The other defaults are judgement.
 
     Attributes
     ----------
-    span_m, chord_m : of the wing [m].
-    aspect_ratio : of the wing [-].
+    span_m : of the wing [m]; 0 where it is not declared.
+    aspect_ratio : of the wing [-]: transports and light aircraft have 7 to 10.
     taper : chord at the tip over that at the root [-].
     aileron : inboard and outboard end of the ailerons in semispans [-].
     wing_mass : mass of the wing over that of the aircraft [-]: transports have 0.10 to 0.13.
@@ -45,9 +45,8 @@ class SideGeometry:
     inertia_kg_m2 : Ixx, Izz, Ixz [kg m2].
     """
 
-    span_m: float
-    chord_m: float
-    aspect_ratio: float
+    span_m: float = 0.0
+    aspect_ratio: float = 8.0
     taper: float = 0.4
     aileron: tuple[float, float] = (0.6, 0.95)
     wing_mass: float = 0.12
@@ -139,7 +138,7 @@ def lift_slope(geometry: SideGeometry) -> float:
 
     Examples
     --------
-    >>> round(lift_slope(SideGeometry(span_m=8.0, chord_m=1.0, aspect_ratio=8.0)), 3)
+    >>> round(lift_slope(SideGeometry(aspect_ratio=8.0)), 3)
     4.907
     """
     ratio = geometry.aspect_ratio
@@ -188,7 +187,7 @@ def cg_part(derivatives: Array, geometry: SideGeometry) -> Array:
     beta, rate = LATERAL.column("beta"), LATERAL.column("rhat")
     part[rate] = 2.0 * derivatives[beta]
     part[LATERAL.row("Cn")] += derivatives[LATERAL.row("CY")]
-    return part * (geometry.chord_m / geometry.span_m)
+    return np.asarray(part / geometry.aspect_ratio)
 
 
 def _named(derivatives: Array) -> dict[str, float]:

@@ -54,12 +54,14 @@ class Output:
     channel : column of the flight log.
     instrument : name of its sensor in the names of errors.
     late : whether it needs the accelerations of the motion; the filter updates with the other outputs first.
+    quantity : in words.
     """
 
     name: str
     channel: str
     instrument: str
     late: bool = False
+    quantity: str = ""
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ def imitated_lag_s(problem: TraceProblem, fitted: PosteriorFit) -> float:
     gust_rad = np.exp(fitted.point.per_record[:, problem.layout.per_record.log_gust]) / airspeed_m_s
     if gust_rad.min() <= PLAUSIBLE_RAD:
         return 0.0
-    rate_rad_s = np.concatenate([np.diff(v.alpha_rad) / v.dt_s for v in views(fitted, problem)])
+    rate_rad_s = np.concatenate([np.diff(v.flow_rad) / v.dt_s for v in views(fitted, problem)])
     return float(PLAUSIBLE_RAD * np.abs(rate_rad_s).mean() / np.square(rate_rad_s).mean())
 
 

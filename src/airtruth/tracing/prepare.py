@@ -138,7 +138,7 @@ def prepare(
     return Case(
         fitted=TraceProblem(fitted, settings, options.threads),
         held=TraceProblem(held, settings, options.threads) if held else None,
-        hypothesis=Hypothesis(declared_change(aircraft, has_vane=has_vane), trim_alpha_rad=trim_alpha_rad),
+        hypothesis=Hypothesis(declared_change(aircraft, has_vane=has_vane), trim_flow_rad=trim_alpha_rad),
         effects=tuple(e for e in effects if not reasons[e.key]),
         untestable=tuple((e, reasons[e.key]) for e in effects if reasons[e.key]),
         model=model,

@@ -13,7 +13,6 @@ from airtruth.tracing.inference.feedback import responds_to_motion
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.compile import CHANNELS
-from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.acceptance import Candidate
 from airtruth.tracing.selection.rounds import SearchRound
@@ -69,10 +68,10 @@ class Stages:
 
 
 def in_closed_loop(stages: Stages) -> bool:
-    """Whether the elevator of the records that a report shows responds to the motion."""
+    """Whether a control of the records that a report shows responds to the motion."""
     problem, assessed = stages.reported
     return responds_to_motion(
-        [r.signals.sampled_elevator_rad for r in problem.records], [a.whitened for a in assessed["before"]]
+        [r.signals.sampled_controls_rad for r in problem.records], [a.whitened for a in assessed["before"]]
     )
 
 
@@ -86,7 +85,8 @@ def assess_stages(case: Case, rounds: Sequence[SearchRound]) -> Stages:
     null, last = before_fit(rounds), rounds[-1].null
     # noise levels are those of the stage before: with the declared ones only the declared model would be assessed
     declared = null.point.common.copy()
-    declared[[*range(SHORT_PERIOD.common.derivatives.stop), SHORT_PERIOD.common.inertia]] = 0.0
+    own = case.fitted.layout.common
+    declared[[*range(own.derivatives.stop), own.inertia]] = 0.0
     models = {
         "declared": StageModel(case.hypothesis, declared, np.zeros(0), null.point.per_record, False),
         "before": _model(null),

@@ -19,7 +19,6 @@ from airtruth.aircraft.write import Corrections, write_aircraft
 from airtruth.effects.increment import Increment
 from airtruth.errors import StoreError
 from airtruth.logs import atomic
-from airtruth.physics.short_period import PARAMETERS
 from airtruth.physics.terms import DECLARED, AeroTerm, Change, ReadingTerm, SensorTerm, declared_total
 from airtruth.quantity import Quantity
 from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
@@ -27,7 +26,6 @@ from airtruth.tracing.axial_force import AxialForce
 from airtruth.tracing.increment_table import increment_table
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import robust_covariance
-from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.response import moved_past_sensors_m
 from airtruth.tracing.model.settings import VANE
 from airtruth.tracing.prepare import Case
@@ -163,16 +161,19 @@ def write_update(
 
 def _corrections(case: Case, fit: PosteriorFit, covariance: Array) -> Corrections:
     """The refitted derivatives, about the mean trim of the fitted records."""
-    values = fit.point.common[SHORT_PERIOD.common.derivatives].tolist()
-    deviations = np.sqrt(np.diag(covariance)[SHORT_PERIOD.common.derivatives]).tolist()
-    std = dict(zip(PARAMETERS, deviations, strict=True))
-    plants = [record.pitch_plant for record in case.fitted.records]
-    alpha = float(np.mean([p.trim_alpha_rad for p in plants])) + case.fitted.alpha_shift_rad
+    layout = case.fitted.layout
+    motion, own = layout.motion, layout.common.derivatives
+    values = fit.point.common[own].tolist()
+    deviations = np.sqrt(np.diag(covariance)[own]).tolist()
+    std = dict(zip(motion.parameters, deviations, strict=True))
+    origins = np.array([record.plant.trim_signals for record in case.fitted.records]).T
+    trim = {s.name: float(np.mean(at)) for s, at in zip(motion.signals, origins, strict=True)}
+    trim[motion.flow] += case.fitted.alpha_shift_rad
     return Corrections(
-        {name: rounded(value, std[name]) for name, value in zip(PARAMETERS, values, strict=True)},
-        round(alpha, _DECIMALS),
-        round(float(np.mean([p.trim_elevator_rad for p in plants])), _DECIMALS),
+        {name: rounded(value, std[name]) for name, value in zip(motion.parameters, values, strict=True)},
+        {name: round(at, _DECIMALS) for name, at in trim.items()},
         std,
+        motion,
     )
 
 
@@ -187,12 +188,13 @@ def _write_flying(
 ) -> None:
     """An aircraft without a JSBSim model, as one that flies in level flight at the trim of the fitted records."""
     signals = [record.signals for record in case.fitted.records]
+    alpha_rad, (control,) = trim.trim[trim.motion.flow], trim.motion.controls
     at = TrimPoint(
         airspeed_m_s=float(np.mean([s.airspeed_m_s[0] for s in signals])),
         density_kg_m3=float(np.mean([s.density_kg_m3[0] for s in signals])),
-        alpha_rad=trim.alpha_rad,
-        elevator_rad=trim.elevator_rad,
-        az_m_s2=-G0 * math.cos(trim.alpha_rad),
+        alpha_rad=alpha_rad,
+        elevator_rad=trim.trim[control.name],
+        az_m_s2=-G0 * math.cos(alpha_rad),
     )
     with atomic.new_folder(folder) as new:
         write_corrected(aircraft, aircraft.file.derivatives, at, change, new, note, origin)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from airtruth.physics.terms import DECLARED
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.whitening import Whitener
-from airtruth.tracing.model.parameters import OUTPUTS, Layout, ParameterLayout, Parameters
+from airtruth.tracing.model.parameters import Layout, ParameterLayout, Parameters
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.response import Response, filter_inputs, respond, respond_to
 from airtruth.tracing.model.settings import (
@@ -80,12 +80,12 @@ class TraceProblem:
 
     @property
     def declared_derivatives(self) -> Array:
-        """(6,) declared derivatives, averaged over the records' flight conditions [-]."""
+        """(derivatives,) declared, averaged over the records' flight conditions [-]."""
         return declared_derivatives_of(self.records)
 
     @property
     def declared_covariance(self) -> Array:
-        """(6, 6) covariance of the increments of the derivatives, averaged likewise [-]."""
+        """(derivatives, derivatives) covariance of the increments of the derivatives, averaged likewise [-]."""
         return declared_covariance_of(self.records)
 
     @property
@@ -107,11 +107,11 @@ class Sensitivities:
 
     Attributes
     ----------
-    r : (samples, 3) whitened innovations.
+    r : (samples, outputs) whitened innovations.
     logdet : mean of log|S| over the samples.
-    t : (parameters, samples, 3) derivatives of the whitened innovations at fixed whitener; parameters as in `Layout`.
-    w : (parameters, 3, 3) whitened derivatives of S.
-    white : (3, 3) whitener.
+    t : (parameters, samples, outputs) derivatives of the whitened innovations at fixed whitener; parameters as in `Layout`.
+    w : (parameters, outputs, outputs) whitened derivatives of S.
+    white : (outputs, outputs) whitener.
     more : (parameters,) derivatives of the sum of log|S| beyond the steady one, by an uncertain surface; or a zero.
     """
 
@@ -165,7 +165,7 @@ class PosteriorFit:
 
     @property
     def innovations(self) -> list[Array]:
-        """(samples, 3) whitened innovations of each record."""
+        """(samples, outputs) whitened innovations of each record."""
         return [s.r for s in self.sensitivities]
 
     @property
@@ -253,7 +253,7 @@ class _Differences:
     def __init__(self, base: Response, parameters: int) -> None:
         self.base = base
         self.t = np.zeros((parameters, *base.e.shape))
-        self.w = np.zeros((parameters, OUTPUTS, OUTPUTS))
+        self.w = np.zeros((parameters, *base.covariance.shape))
         self.more = np.zeros(parameters)
 
     def put(self, index: int, moved: Response, h: float) -> None:

@@ -43,10 +43,15 @@ _MOST_SLOW: Final = 0.99
 
 @dataclass(frozen=True)
 class External:
-    """Signals added to CL, Cm (points,) [-] and to the outputs (samples, 3), for tests that name no effect."""
+    """Signals added to the coefficients, for tests that name no effect.
 
-    lift: Array
-    moment: Array
+    Attributes
+    ----------
+    force : (coefficients, points) in the order of the motion [-].
+    output : (samples, outputs) added to the outputs [their units].
+    """
+
+    force: Array
     output: Array
 
 
@@ -244,10 +249,10 @@ def kernel_input(
     more = np.zeros_like(given.y)
     grid = given.grid._replace(lift=given.grid.lift + lift, moment=given.grid.moment + moment)
     if external is not None:
-        own = external.lift.size
+        own = external.force.shape[1]
         more[given.lead :] = external.output
-        grid.lift[-own:] += external.lift
-        grid.moment[-own:] += external.moment
+        grid.lift[-own:] += external.force[0]
+        grid.moment[-own:] += external.force[1]
     signals = given.record.signals
     return KernelInput(
         y=given.y,
