@@ -35,6 +35,7 @@ from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
 from airtruth.tracing.presentation.text import increment_words
 from airtruth.tracing.selection.acceptance import SUPERSEDED, Candidate
 from airtruth.tracing.selection.explanation import CauseSet
+from airtruth.tracing.selection.flown import flown
 from airtruth.tracing.selection.increment_fit import (
     FittedIncrement,
     effective_bends,
@@ -42,7 +43,7 @@ from airtruth.tracing.selection.increment_fit import (
     is_apart_from_zero,
     redundant_increment,
 )
-from airtruth.tracing.selection.increments import flown, log_evidences, screen, shapes, sharpened
+from airtruth.tracing.selection.increments import log_evidences, screen, shapes, sharpened
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.release import Release
 from airtruth.tracing.selection.rounds import RoundStart, search_round

@@ -343,6 +343,10 @@ MOTIONS: Final[Mapping[str, Motion]] = MappingProxyType({m.name: m for m in (LON
 """Name -> motion, in the order of answers."""
 
 
+VANES: Final = frozenset(y.channel for m in MOTIONS.values() for y in m.outputs if y.instrument == "vane")
+"""Columns of the vanes of every motion."""
+
+
 def motion_with(outputs: Iterable[str]) -> Motion:
     """The motion with most of some outputs; the longitudinal one of none.
 
@@ -365,4 +369,4 @@ def _named(name: str) -> Motion:
     return MOTIONS[name]
 
 
-__all__ = ["LATERAL", "LONGITUDINAL", "MOTIONS", "Motion", "motion_of", "motion_with"]
+__all__ = ["LATERAL", "LONGITUDINAL", "MOTIONS", "VANES", "Motion", "motion_of", "motion_with"]

@@ -105,10 +105,11 @@ def _traced(
         atomic.make_folder(out)
     advance("probe the declared aircraft")
     case = prepare(checked, declared, effects, options)
+    motion = case.fitted.layout.motion
     advance("check the kinematics")
     held = set() if case.held is None else {r.signals.run_id for r in case.held.records}
-    # a reconstructed alpha agrees with q and az by construction
-    kinematics = None if not case.has_vane else kinematic_check(checked, declared, held)
+    # a reconstructed angle agrees with rates and accelerations by construction
+    kinematics = None if not case.has_vane else kinematic_check(checked, declared, held, motion)
     case = replace(case, effects=within_kinematics(case.effects, kinematics))
     case, rounds = _search(case, options, advance, kinematics)
     advance("assess every stage on fitted and held-out records")
@@ -129,7 +130,7 @@ def _traced(
     answer = conclude(stages, rounds, publish, forced, axial)
     whole = kinematics
     if held and kinematics is not None and names_a_sensor(answer):
-        whole = kinematic_check(checked, declared, ())
+        whole = kinematic_check(checked, declared, (), motion)
     answer = with_contradictions(answer, kinematics, _longest_period_s(case), whole)
     answer = replace(answer, notes=(*notes, *remarks, *answer.notes))
     result = TraceResult(answer, rounds, stages, origin)

@@ -19,6 +19,7 @@ from airtruth.aircraft.write import Corrections, write_aircraft
 from airtruth.effects.increment import Increment
 from airtruth.errors import StoreError
 from airtruth.logs import atomic
+from airtruth.physics.motion import VANES
 from airtruth.physics.terms import DECLARED, AeroTerm, Change, ReadingTerm, SensorTerm, declared_total
 from airtruth.quantity import Quantity
 from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
@@ -27,7 +28,6 @@ from airtruth.tracing.increment_table import increment_table
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import robust_covariance
 from airtruth.tracing.model.response import moved_past_sensors_m
-from airtruth.tracing.model.settings import VANE
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.update_origin import source_text, with_spread
@@ -37,8 +37,8 @@ Array = NDArray[np.float64]
 
 WITHOUT_EFFECTS: Final = "without_effects"
 """Folder beside that of the updated aircraft: one without a JSBSim model, as it flies without the accepted effects."""
-_WITH_ARM: Final = (VANE, "az_m_s2")
-"""Channels whose reading depends on where their sensor is."""
+_WITH_ARM: Final = ("vane", "accelerometer")
+"""Instruments whose reading depends on where they are."""
 _DECIMALS: Final = 6
 """Decimals of the trim about which the derivatives are refitted [rad] (judgement: finer than any sensor of angles)."""
 _Term = TypeVar("_Term", AeroTerm, ReadingTerm)
@@ -56,7 +56,9 @@ def accepted_change(case: Case, fit: PosteriorFit, sizes: Array, chord_m: float)
     if shift == DECLARED["cg"]:
         return change
     moved_m = moved_past_sensors_m(fit.point.common, shift, chord_m)
-    arms = (SensorTerm(c, "arm", moved_m) for c in _WITH_ARM if c != VANE or case.has_vane)
+    outputs = case.fitted.layout.motion.outputs
+    moved = [y for y in outputs if y.instrument in _WITH_ARM and (y.channel not in VANES or case.has_vane)]
+    arms = (SensorTerm(y.channel, "arm", moved_m) for y in moved)
     return replace(change, sensors=(*change.sensors, *arms))
 
 
