@@ -21,6 +21,7 @@ from airtruth.logs import atomic
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.provenance import Provenance, digests_of
 from airtruth.logs.sources import Logs, named_logs
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS
 from airtruth.tracing.answer import ANSWER, DECLARED_LEVEL
 from airtruth.tracing.axial_force import axial_force
 from airtruth.tracing.conclude import conclude
