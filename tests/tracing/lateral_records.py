@@ -98,10 +98,10 @@ def record(y, aileron, rudder, plant_=None, sub=2, dt=DT, name="a", **known):
 
 
 def common(**values):
-    """Common parameters, zero but for those that are named; rotary gusts and rolloff without a share unless stated."""
+    """Common parameters, zero but for those that are named; rotary gusts, rolloff and a CG past the sensors without a share."""
     entries = LAYOUT.common
     made = np.zeros(entries.size)
-    for name, value in ({"rotary": -0.5, "rolloff": -0.5} | values).items():
+    for name, value in ({"rotary": -0.5, "rolloff": -0.5, "mounting": -0.5} | values).items():
         made[entries.index(name)] = value
     return made
 

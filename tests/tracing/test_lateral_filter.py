@@ -2,33 +2,24 @@
 
 from __future__ import annotations
 
+import lateral_records as lr
 import numpy as np
 import pytest
-import lateral_records as lr
 from scipy.integrate import solve_ivp
-from scipy.linalg import expm, solve_discrete_are
 
-from airtruth.physics.lateral_gusts import roll_deviation_rad_s
 from airtruth.physics.motion import LATERAL
 from airtruth.physics.terms import (
-    AeroTerm,
     Change,
     DeclaredTerm,
-    ReadingTerm,
-    SensorTerm,
-    StateTerm,
-    SurfaceTerm,
     signals_of,
 )
 from airtruth.tracing.model.lateral_equations import LateralSignals
-from airtruth.tracing.model.linearise import process_intensity
-from airtruth.tracing.model.steady import linearise_at_reference, steady_filter
 from airtruth.units import DEG, G0
 
 SAMPLES = 250
 START = (0.02, 0.1, -0.05, 0.1)
 SMOOTH = {
-    "v": lambda t: lr.V + 1.5 * np.sin(0.9 * t),
+    "v": lambda t: lr.V + 1.5 * np.sin(0.4 * t),
     "alpha": lambda t: lr.ALPHA + 0.02 * np.sin(1.1 * t),
     "theta": lambda t: lr.ALPHA + 0.05 * np.sin(0.7 * t),
     "q": lambda t: 0.1 * np.cos(1.3 * t),
@@ -60,7 +51,7 @@ def flown(
     states=(),
     cy_beta_dot=0.0,
 ):
-    """y (samples, 5) and the effects' states by scipy's DOP853: the equations of Stevens and Lewis, table 2.5-1, in side velocity.
+    """y (samples, 5) and the effects' states by scipy's DOP853: the equations of Stevens and Lewis, table 2.5-1.
 
     ``more``: signals -> increments of CY, Cl, Cn; ``states``: (start, rate by signals and states) of the effects' states;
     ``moved``: CG aft and to the right [m].
@@ -77,7 +68,9 @@ def flown(
         v_dot = (SMOOTH["v"](t + h) - SMOOTH["v"](t - h)) / (2.0 * h)
         force, half = 0.5 * lr.DENSITY * v**2 * c.wing_area_m2, 0.5 * c.span_m / v
         own = np.array([beta, p * half, r * half, surfaces[0](t), surfaces[1](t)])
-        kinematic = np.cos(beta) * v * (p * np.sin(alpha) - r * np.cos(alpha)) + G0 * np.cos(theta) * np.sin(phi)
+        kinematic = np.cos(beta) * v * (p * np.sin(alpha) - r * np.cos(alpha)) + G0 * np.cos(theta) * np.sin(
+            phi
+        )
         signals = dict(zip(("beta", "phat", "rhat", "aileron", "rudder"), own, strict=True))
         signals |= {"x": x[4:], "alpha": alpha, "qbar": 0.5 * lr.DENSITY * v**2}
         cy, cl, cn = (1.0 + slope * (alpha - lr.ALPHA)) * table @ own + more(signals)
@@ -110,7 +103,7 @@ def flown(
 
 
 def made(**own):
-    return lr.record(np.zeros((SAMPLES, 5)), aileron, rudder, sub=4, **(SMOOTH | own))
+    return lr.record(np.zeros((SAMPLES, 5)), aileron, rudder, sub=8, **(SMOOTH | own))
 
 
 def close(found, expected, tolerance=1e-6):

@@ -43,7 +43,9 @@ def own_of(one):
 def test_without_a_vane_alpha_is_no_output():
     assert SETTINGS.measured.tolist() == [True, True, True]
     assert WITHOUT.measured.tolist() == [False, True, True]
-    assert not any(term.channel == "alpha_rad" for term in declared_change(GTM, absent=("alpha_rad",)).sensors)
+    assert not any(
+        term.channel == "alpha_rad" for term in declared_change(GTM, absent=("alpha_rad",)).sensors
+    )
 
 
 @pytest.mark.slow

@@ -172,9 +172,9 @@ def _with_error(errors: SensorErrors, term: SensorTerm) -> SensorErrors:
         return replace(errors, bias=errors.bias + term.value)
     if term.kind == "alpha_slope" and term.channel == "airspeed_m_s":
         return replace(errors, alpha_slope_per_rad=errors.alpha_slope_per_rad + term.value)
-    if term.kind == "arm_right" and term.channel == "alpha_rad":
+    if term.kind == "arm_right":
         return replace(errors, y_m=errors.y_m + term.value)
-    known = ("bias", "scale", "alpha_slope of airspeed_m_s", "arm_right of alpha_rad")
+    known = ("bias", "scale", "arm_right", "alpha_slope of airspeed_m_s")
     raise ConfigurationError(f"effect on {term.channel}: {term.kind!r}; {choices(term.kind, known)}")
 
 

@@ -353,7 +353,19 @@ def shifted(at: AirPoint, field: int, by: float) -> AirPoint:
 register(
     AircraftArrays,
     GridSignals,
-    Equations(2, 2, rates, outputs, air_at, move_plays, settle_effects, shifted, signals_at, AirPoint, 2),
+    Equations(
+        states=len(LONGITUDINAL.states),
+        early=len(LONGITUDINAL.outputs) - 1,
+        rates=rates,
+        outputs=outputs,
+        air_at=air_at,
+        move_plays=move_plays,
+        settle=settle_effects,
+        shifted=shifted,
+        signals_at=signals_at,
+        point=AirPoint,
+        coefficients=len(LONGITUDINAL.coefficients),
+    ),
 )
 
 __all__ = [

@@ -276,19 +276,19 @@ def outputs(x: Array, rate: Array, ay: float, at: LateralPoint, model: FilterMod
 def air_at(grid: LateralGrid, point: int) -> LateralPoint:
     """Inputs at a point of the filter's grid."""
     return LateralPoint(
-        grid.aileron_rad[point],
-        grid.rudder_rad[point],
-        grid.airspeed_m_s[point],
-        grid.ground_m_s[point],
-        grid.qbar_pa[point],
-        grid.alpha_rad[point],
-        grid.ground_alpha_rad[point],
-        grid.theta_rad[point],
-        grid.q_rad_s[point],
-        grid.speed_rate_1_s[point],
-        grid.side[point],
-        grid.roll[point],
-        grid.yaw[point],
+        aileron_rad=grid.aileron_rad[point],
+        rudder_rad=grid.rudder_rad[point],
+        airspeed_m_s=grid.airspeed_m_s[point],
+        ground_m_s=grid.ground_m_s[point],
+        qbar_pa=grid.qbar_pa[point],
+        alpha_rad=grid.alpha_rad[point],
+        ground_alpha_rad=grid.ground_alpha_rad[point],
+        theta_rad=grid.theta_rad[point],
+        q_rad_s=grid.q_rad_s[point],
+        speed_rate_1_s=grid.speed_rate_1_s[point],
+        side=grid.side[point],
+        roll=grid.roll[point],
+        yaw=grid.yaw[point],
     )
 
 
@@ -305,19 +305,19 @@ def signals_at(x: Array, at: LateralPoint, rate: float, model: FilterModel, out:
 def shifted(at: LateralPoint, field: int, by: float) -> LateralPoint:
     """See `airtruth.tracing.model.by_motion.shifted`; the fields between the controls and the coefficients stay."""
     return LateralPoint(
-        at.aileron_rad + (by if field == 0 else 0.0),
-        at.rudder_rad + (by if field == 1 else 0.0),
-        at.airspeed_m_s,
-        at.ground_m_s,
-        at.qbar_pa,
-        at.alpha_rad,
-        at.ground_alpha_rad,
-        at.theta_rad,
-        at.q_rad_s,
-        at.speed_rate_1_s,
-        at.side + (by if field == 10 else 0.0),
-        at.roll + (by if field == 11 else 0.0),
-        at.yaw + (by if field == 12 else 0.0),
+        aileron_rad=at.aileron_rad + (by if field == 0 else 0.0),
+        rudder_rad=at.rudder_rad + (by if field == 1 else 0.0),
+        airspeed_m_s=at.airspeed_m_s,
+        ground_m_s=at.ground_m_s,
+        qbar_pa=at.qbar_pa,
+        alpha_rad=at.alpha_rad,
+        ground_alpha_rad=at.ground_alpha_rad,
+        theta_rad=at.theta_rad,
+        q_rad_s=at.q_rad_s,
+        speed_rate_1_s=at.speed_rate_1_s,
+        side=at.side + (by if field == 10 else 0.0),
+        roll=at.roll + (by if field == 11 else 0.0),
+        yaw=at.yaw + (by if field == 12 else 0.0),
     )
 
 

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
+from airtruth.physics.motion import LONGITUDINAL, Motion
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -177,7 +177,6 @@ class ParameterLayout:
 
     Attributes
     ----------
-    motion : the motion.
     common, per_record : entries of the vectors.
     """
 
@@ -188,14 +187,6 @@ class ParameterLayout:
 
 SHORT_PERIOD: Final = ParameterLayout(LONGITUDINAL)
 """Parameters of the short period."""
-_LATERAL: Final = ParameterLayout(LATERAL)
-
-
-def layout_of(motion: Motion) -> ParameterLayout:
-    """Parameters of a motion."""
-    return SHORT_PERIOD if motion is LONGITUDINAL else _LATERAL
-
-
 COLOUR_TIME_S: Final = 0.1
 """Unit of the correlation time of correlated noise [s]."""
 
@@ -341,13 +332,7 @@ def core_of(states: int) -> int:
 
 
 def core_states(motion: Motion) -> int:
-    """Number of states of a motion and its gusts, the roll gust included.
-
-    Examples
-    --------
-    >>> core_states(LONGITUDINAL)
-    8
-    """
+    """Number of states of a motion and its gusts, the roll gust included."""
     return core_of(len(motion.states)) + ("p" in motion.gusts)
 
 
@@ -409,7 +394,6 @@ __all__ = [
     "core_of",
     "core_states",
     "effect_states",
-    "layout_of",
     "lead_of",
     "state_layout",
 ]

@@ -158,17 +158,17 @@ def _surfaces(s: Signals, compiled: CompiledChange) -> Iterator[Array]:
 
 def _angle_of_attack(compiled: CompiledChange, s: Signals) -> Array:
     """Angle of attack at the CG, without the errors of a vane that may be off the plane of symmetry [rad]."""
-    errors = compiled.inputs.get("alpha_rad")
+    errors = compiled.inputs.get(s.motion.known_signals[0].channel)
     if errors is None:
         return s.alpha_rad
-    p = on_grid(s.y[:, s.motion.output_channels.index("p_rad_s")], s.sub)
-    return errors.unscaled(s.alpha_rad) - p * errors.y_m / s.airspeed_m_s
+    roll = on_grid(s.y[:, s.motion.output_channels.index(s.motion.controls[0].damped)], s.sub)
+    return errors.unscaled(s.alpha_rad) - roll * errors.y_m / s.airspeed_m_s
 
 
 def _relative_rate(ground_m_s: Array, s: Signals) -> Array:
     """V'/V of the speed without the gust, from its samples [1/s]."""
     sampled = ground_m_s[:: s.sub]
-    return on_grid(np.gradient(sampled, s.dt_s, edge_order=min(2, sampled.size - 1)) / sampled, s.sub)
+    return on_grid(np.gradient(sampled, s.dt_s, edge_order=2 if sampled.size > 2 else 1) / sampled, s.sub)
 
 
 def _corners(s: Signals, compiled: CompiledChange) -> Array:

@@ -16,12 +16,17 @@ from airtruth.physics.sensor_errors import KINDS, Kind
 from airtruth.physics.terms import Change, SensorTerm
 from airtruth.tracing.model.compile import CHANNELS
 from airtruth.tracing.model.declared import inertia_std
-from airtruth.tracing.model.parameters import SHORT_PERIOD, ParameterLayout, layout_of
+from airtruth.tracing.model.parameters import SHORT_PERIOD, ParameterLayout
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.units import DEG
 
 Array = NDArray[np.float64]
 
+LAYOUTS: Final[Mapping[str, ParameterLayout]] = {
+    LONGITUDINAL.name: SHORT_PERIOD,
+    LATERAL.name: ParameterLayout(LATERAL),
+}
+"""Motion -> its free parameters."""
 VANE: Final = CHANNELS[0]
 """Output that a log without a vane does not have."""
 _CARRIED: Final[Mapping[str, tuple[Kind, ...]]] = {
@@ -141,7 +146,7 @@ def settings_of(
         thrust_std=thrust_std,
         trim_std=np.array([_TRIM_STD[c.length] for c in motion.coefficients]),
         resolution=np.zeros(len(motion.outputs)),
-        layout=layout_of(motion),
+        layout=LAYOUTS[motion.name],
     )
     for channel in absent:
         settings = without(settings, motion.output_channels.index(channel))
@@ -287,6 +292,7 @@ def common_prior(
 
 __all__ = [
     "GUST_COVARIANCE",
+    "LAYOUTS",
     "VANE",
     "Settings",
     "common_prior",
