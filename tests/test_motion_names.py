@@ -38,11 +38,11 @@ CAPS: dict[str, int] = {
     "physics": 249,
     "reporting": 76,
     "schemas": 2,
-    "simulation": 551,
+    "simulation": 577,
     "starting": 17,
     "tracing": 160,
     "tracing/inference": 10,
-    "tracing/model": 375,
+    "tracing/model": 386,
     "tracing/presentation": 45,
     "tracing/selection": 91,
 }
