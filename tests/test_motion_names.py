@@ -13,8 +13,10 @@ from airtruth.physics.motion import MOTIONS
 
 SOURCE = Path(__file__).resolve().parents[1] / "src" / "airtruth"
 HOME = (
+    "aircraft/parts.py",
     "physics/motion.py",
     "physics/composition.py",
+    "physics/composition_lateral.py",
     "effects/",
     "identification/regression/",
 )

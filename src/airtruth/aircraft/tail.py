@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from airtruth.aircraft.file import Aircraft, Fin, Tail
+from airtruth.aircraft.file import Aircraft
+from airtruth.aircraft.parts import Fin, Tail
 from airtruth.physics.composition import SideGeometry, TailGeometry
 
 

@@ -31,20 +31,20 @@ class LinearPoint:
     trim : signal of the motion, or alpha -> value at the trim [rad]; those left out are zero there.
     geometry : what is declared of wing, tail and fin.
     motion : the motion of the model.
-    lift : lift coefficient at the trim [-].
+    weight : weight over the dynamic pressure and the wing area at the trim, its lift coefficient [-].
     """
 
     derivatives: Array
     trim: Mapping[str, float]
     geometry: TailGeometry
     motion: Motion = LONGITUDINAL
-    lift: float = 0.0
+    weight: float = 0.0
 
     def at_rest(self, coefficient: str, amount: float) -> AeroTerm:
         """An increment of ``amount`` per lift coefficient, with the lift linear in the angle of attack."""
         slope = lift_slope(self.geometry.side)
         return AeroTerm(
-            coefficient, "alpha", "linear", amount * slope, self.trim.get("alpha", 0.0) - self.lift / slope
+            coefficient, "alpha", "linear", amount * slope, self.trim.get("alpha", 0.0) - self.weight / slope
         )
 
 

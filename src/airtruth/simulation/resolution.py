@@ -71,7 +71,7 @@ def linear_point(
     }
     force = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2 * aircraft.wing_area_m2
     return LinearPoint(
-        linear.central, trimmed, tail_geometry(aircraft), LATERAL, lift=at.mass_kg * G0 / force
+        linear.central, trimmed, tail_geometry(aircraft), LATERAL, weight=at.mass_kg * G0 / force
     )
 
 

@@ -266,7 +266,7 @@ def _effects(options: TraceOptions) -> list[Effect]:
         matching = {k: e for k, e in library.items() if key in (k, e.name)}
         if not matching:
             known = {*library, *(e.name for e in library.values())}
-            raise ConfigurationError(f"effect {key!r} of the {motion.name} motion: {choices(key, known)}")
+            raise ConfigurationError(f"effect {key!r}: {choices(key, known)}")
         found |= {k: e for k, e in matching.items() if not e.in_derivatives}
     return list(found.values())
 

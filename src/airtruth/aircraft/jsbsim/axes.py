@@ -24,7 +24,7 @@ _PARTNERS: Final[Mapping[str, frozenset[str]]] = {
     "SIDE": frozenset({"AXIAL", "NORMAL"}),
 }
 """Axis -> those beside which JSBSim accepts it."""
-_MOMENTS: Final = {
+_TURNING: Final = {
     "Cm": ("PITCH", "metrics/cbarw-ft", "moment"),
     "Cl": ("ROLL", "metrics/bw-ft", "roll"),
     "Cn": ("YAW", "metrics/bw-ft", "yaw"),
@@ -43,7 +43,7 @@ class _Force:
     body : body axis that carries it -> its sign; JSBSim counts AXIAL aft.
     wind : axis of lift, drag and side force -> sign, and function of the angle.
     angle : property of the angle between body and wind [rad].
-    moments : axis of a moment, coordinate whose distance from the CG causes it, sign, and part of the name of its function.
+    turns : axis of a moment, coordinate whose distance from the CG causes it, sign, and part of the name of its function.
     missing : what the model lacks where neither carries it.
     """
 
@@ -52,7 +52,7 @@ class _Force:
     body: Mapping[str, float]
     wind: Mapping[str, tuple[float, str]]
     angle: str
-    moments: tuple[tuple[str, str, float, str], ...]
+    turns: tuple[tuple[str, str, float, str], ...]
     missing: str
 
 
@@ -86,7 +86,7 @@ _FORCES: Final[Mapping[str, _Force]] = {
     ),
 }
 """Coefficient of a force -> how it reaches the axes."""
-CARRIED: Final = (*_MOMENTS, *_FORCES)
+CARRIED: Final = (*_TURNING, *_FORCES)
 """Coefficients that reach an axis."""
 
 
@@ -106,7 +106,7 @@ def to_axes(aerodynamics: Element, by_coefficient: Mapping[str, list[str]], root
         If no axis of the model can carry a force.
     """
     pressure = "aero/qbar-psf", "metrics/Sw-sqft"
-    for coefficient, (to, length, name) in _MOMENTS.items():
+    for coefficient, (to, length, name) in _TURNING.items():
         if by_coefficient[coefficient]:
             formula = op("product", *pressure, length, _sum(by_coefficient[coefficient]))
             words = f"Increments of {coefficient} about the CG [lbf ft]"
@@ -123,7 +123,7 @@ def to_axes(aerodynamics: Element, by_coefficient: Mapping[str, list[str]], root
             words = f"Increments of {coefficient} [lbf]"
             axis(aerodynamics, name).append(function(f"{root}{force.total}-{name}-lbs", words, share))
         # JSBSim applies forces at its reference point; this takes them back to the CG
-        for to, across, sign, name in force.moments:
+        for to, across, sign, name in force.turns:
             shift = op("product", sign, _arm(aerodynamics, across), total)
             words = f"Increments of {coefficient} taken to the CG [lbf ft]"
             axis(aerodynamics, to).append(function(f"{root}{force.total}-{name}-lbsft", words, shift))

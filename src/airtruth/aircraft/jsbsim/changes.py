@@ -18,6 +18,8 @@ from airtruth.units import FT, LBF
 
 _CONTROLS: Final = tuple(c.name for m in MOTIONS.values() for c in m.controls)
 """Controls of every motion."""
+_TURNING: Final = "yaw_moment"
+"""Declared quantity of a constant yawing moment [N m]."""
 
 
 def write(
@@ -43,8 +45,8 @@ def write(
     """
     factors = {name: declared_total(change.declared, name) for name in _CONTROLS}
     moved = {n for n in _CONTROLS if change.of_surface(n) or factors[n] != 1.0}
-    yaw_moment = declared_total(change.declared, "yaw_moment")
-    if not moved and not change.aero and not yaw_moment:
+    turning = declared_total(change.declared, _TURNING)
+    if not moved and not change.aero and not turning:
         return
     aerodynamics = root.find("aerodynamics")
     if aerodynamics is None:
@@ -71,11 +73,11 @@ def write(
         components += aerodynamics_xml.write(
             aerodynamics, change.aero, change.states, surfaces, gusts, origin, where
         )
-    if yaw_moment:
+    if turning:
         label = surfaces[_CONTROLS[0]].names.label
-        words = f"Constant yawing moment, nose right [lbf ft]: {yaw_moment!r} N m{origin.of_declared('yaw_moment')}"
-        moment = function(f"aero/{label}/yaw-moment-lbsft", words, value(yaw_moment / (LBF * FT)))
-        axis(aerodynamics, "YAW").append(moment)
+        words = f"Constant yawing moment, nose right [lbf ft]: {turning!r} N m{origin.of_declared(_TURNING)}"
+        added = function(f"aero/{label}/yaw-moment-lbsft", words, value(turning / (LBF * FT)))
+        axis(aerodynamics, "YAW").append(added)
     if not components.parts:
         return
     control = root.find("flight_control")
