@@ -27,12 +27,12 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.errors import AirtruthError
 from airtruth.logs.sources import named_logs
 from airtruth.logs.store import read_log
+from airtruth.tracing.calibration.corner_share import with_corner_share
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import converged_fit, initial_parameters
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.prepare import Case, prepare
-from airtruth.tracing.selection.corner_share import with_corner_share
 from airtruth.tracing.selection.rounds import RoundStart, search_round
 from airtruth.tracing.selection.set_table import SetTable
 from validation.blind.figures import DECLARED

@@ -23,6 +23,8 @@ from airtruth.logs.provenance import Provenance, digests_of
 from airtruth.logs.sources import Logs, named_logs
 from airtruth.tracing.answer import ANSWER, DECLARED_LEVEL
 from airtruth.tracing.axial_force import axial_force
+from airtruth.tracing.calibration.calibrated import calibrated
+from airtruth.tracing.calibration.noise_colour import beside, later_level
 from airtruth.tracing.conclude import conclude
 from airtruth.tracing.declared_model import declared_p_value
 from airtruth.tracing.kinematic_start import (
@@ -38,12 +40,9 @@ from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.prepare import Case, prepare
 from airtruth.tracing.replay import flown_again
 from airtruth.tracing.result import TraceResult
-from airtruth.tracing.selection.airspeed_error import with_corrected_airspeed
 from airtruth.tracing.selection.budget import Advance, Budget, may_begin
-from airtruth.tracing.selection.corner_share import with_corner_share
 from airtruth.tracing.selection.learn import with_increments
 from airtruth.tracing.selection.look_alikes import with_look_alikes
-from airtruth.tracing.selection.noise_colour import beside, later_level, with_coloured_noise
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.selection.search import search
@@ -179,8 +178,7 @@ def _search(
     advance("refit the declared aircraft")
     limited = None if options.time_budget_s is None else Budget(options.time_budget_s, advance)
     steps = advance if limited is None else limited
-    case, start = with_coloured_noise(case)
-    case = with_corrected_airspeed(with_corner_share(case, start), start)
+    case, start = calibrated(case)
     sets = SetTable(case.fitted)
     rounds = _pruned_search(case, sets, start, options, steps, kinematics)
     if rounds and rounds[-1].null.hypothesis.effects and not case.fitted.settings.coloured:

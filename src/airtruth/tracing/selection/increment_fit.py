@@ -14,6 +14,7 @@ from airtruth.effects.increment import Increment
 from airtruth.physics.motion import Motion
 from airtruth.physics.readings import increments_over
 from airtruth.physics.terms import QBAR
+from airtruth.tracing.inference.direction import Direction
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import inflation, robust_covariance
@@ -26,7 +27,6 @@ from airtruth.tracing.selection.acceptance import (
     has_converged,
     tested_on_left_out,
 )
-from airtruth.tracing.selection.direction import Direction
 from airtruth.tracing.selection.flown import flown
 from airtruth.tracing.selection.increments import Screened
 from airtruth.tracing.selection.refit import refit_without
