@@ -40,7 +40,7 @@ CAPS: dict[str, int] = {
     "starting": 17,
     "tracing": 160,
     "tracing/inference": 10,
-    "tracing/model": 386,
+    "tracing/model": 390,
     "tracing/presentation": 45,
     "tracing/selection": 91,
 }
