@@ -129,7 +129,7 @@ def test_command_lists_all_or_some():
     lag = next(e for e in listed if e["name"] == "actuator_lag")
     assert lag["parameters"][0]["neutral"] is None  # infinite
     text = campaigns.command("effects", "cm_alpha_nonlinear").out
-    assert text.startswith("cm_alpha_nonlinear:break  (dynamics)\n")
+    assert text.startswith("cm_alpha_nonlinear:break  (dynamics, longitudinal)\n")
     assert "cm_alpha_nonlinear:quadratic" in text
     assert "at_alpha_rad" in text
     wrong = campaigns.command("effects", "backlsh")

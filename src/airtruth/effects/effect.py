@@ -248,6 +248,11 @@ class Effect:
         parts = names & PARTS.keys()
         return names - parts <= motion.names and all(PARTS[name].motion == motion.name for name in parts)
 
+    @property
+    def motions(self) -> tuple[str, ...]:
+        """Names of the motions to which it applies."""
+        return tuple(name for name, motion in MOTIONS.items() if self.applies_to(motion))
+
     def change(self, values: Mapping[str, float]) -> Change:
         """Return the terms that the effect changes at these values.
 

@@ -43,7 +43,7 @@ def as_markdown(effects: Iterable[Effect]) -> str:
 
 
 def _paragraph(effect: Effect) -> str:
-    lines = [f"{effect.key}  ({effect.where})"]
+    lines = [f"{effect.key}  ({', '.join((effect.where, *effect.motions))})"]
     lines += [f"  {_parameter(p)}" for p in effect.parameters]
     paragraphs = (
         ("", effect.explanation),
@@ -96,6 +96,7 @@ def _entry(effect: Effect) -> dict[str, Any]:
             for p in effect.parameters
         ],
         "channels": list(effect.channels),
+        "motions": list(effect.motions),
         "explanation": effect.explanation,
         "source": effect.source,
         "distinguished_by": effect.distinguished_by,
