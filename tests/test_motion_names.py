@@ -31,7 +31,7 @@ CAPS: dict[str, int] = {
     "identification": 336,
     "importers": 158,
     "logs": 2,
-    "loop": 9,
+    "loop": 1,
     "numerics": 17,
     "physics": 277,
     "reporting": 65,

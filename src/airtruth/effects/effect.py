@@ -265,6 +265,11 @@ class Effect:
         of_motion = all(PARTS[name].motion == motion.name for name in parts)
         return shown and names - parts <= known and of_motion
 
+    @property
+    def motions(self) -> tuple[str, ...]:
+        """Names of the motions to which it applies."""
+        return tuple(name for name, motion in MOTIONS.items() if self.applies_to(motion))
+
     def change(self, values: Mapping[str, float]) -> Change:
         """Return the terms that the effect changes at these values.
 
