@@ -9,13 +9,13 @@ from scipy.signal import lsim, lti
 
 from airtruth.effects.increment import Memory, Shape, increment
 from airtruth.physics.terms import Change, SensorTerm
+from airtruth.tracing.inference.direction import Direction, extended_by
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.records import FINE
 from airtruth.tracing.model.response import External, filter_inputs, respond_to
 from airtruth.tracing.model.tangent import FLOWN, POINTS, propagated, tangent_of
-from airtruth.tracing.selection.direction import Direction, extended_by
 from airtruth.tracing.selection.increment_inputs import Motion, sensitivities_to
 
 LATE = Change(sensors=(SensorTerm("q_rad_s", "lag", 0.03), SensorTerm("az_m_s2", "delay", 0.015)))

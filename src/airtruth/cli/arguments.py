@@ -42,7 +42,7 @@ Terms = Annotated[
     typer.Option(
         "--term",
         metavar="NAME",
-        help="Nonlinear term to free in the lateral regressions, may be repeated: alpha, products with the angle of attack; "
+        help="Nonlinear term to free in the lateral coefficients, may be repeated: alpha, products with the angle of attack; "
         "beta, beta |beta|.",
     ),
 ]
@@ -103,7 +103,9 @@ Replace = Annotated[
 ]
 Model = Annotated[
     TraceModel,
-    typer.Option("--model", help="aircraft: forces probed in JSBSim; linear: the linear short-period model."),
+    typer.Option(
+        "--model", help="aircraft: forces probed in JSBSim; linear: the linear model of the motion."
+    ),
 ]
 HeldOut = Annotated[
     list[str] | None,

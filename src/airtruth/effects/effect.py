@@ -246,17 +246,17 @@ class Effect:
         """The variant where it is a column of a log."""
         return self.variant if self.variant in SIGNALS else None
 
-    @property
-    def motions(self) -> tuple[str, ...]:
-        """Names of the motions that it concerns."""
-        return tuple(name for name, motion in MOTIONS.items() if self.applies_to(motion))
-
     def applies_to(self, motion: Motion) -> bool:
         """Whether every name in its terms is one of a motion."""
         names = self._example.names()
         parts = names & PARTS.keys()
         known = motion.names | set(coefficients_of(motion))
         return names - parts <= known and all(PARTS[name].motion == motion.name for name in parts)
+
+    @property
+    def motions(self) -> tuple[str, ...]:
+        """Names of the motions to which it applies."""
+        return tuple(name for name, motion in MOTIONS.items() if self.applies_to(motion))
 
     def change(self, values: Mapping[str, float]) -> Change:
         """Return the terms that the effect changes at these values.

@@ -19,12 +19,12 @@ from scipy.signal import lfilter
 
 from airtruth.effects.increment import Memory, Shape
 from airtruth.physics.terms import READINGS
+from airtruth.tracing.inference.direction import inserted
 from airtruth.tracing.inference.posterior import PosteriorFit, Sensitivities, TraceProblem
 from airtruth.tracing.model.linearise import ANGLE_RAD, RATE_RAD_S
 from airtruth.tracing.model.parameters import OUTPUTS
 from airtruth.tracing.model.response import filter_inputs
 from airtruth.tracing.model.tangent import FLOWN, POINTS, Tangent, propagated, tangent_of
-from airtruth.tracing.selection.direction import inserted
 
 Array = NDArray[np.float64]
 
