@@ -18,10 +18,11 @@ from airtruth.errors import choices
 from airtruth.physics import terms
 from airtruth.physics.motion import MOTIONS, Motion
 from airtruth.physics.sensor_errors import KINDS, SensorErrors
-from airtruth.physics.short_period import PARAMETERS
 from airtruth.physics.terms import AeroTerm, ReadingTerm, StateTerm, SurfaceTerm
 from airtruth.quantity import Quantity, Strict
 
+DERIVATIVES: Final = tuple(name for motion in MOTIONS.values() for name in motion.parameters)
+"""Names in the table [derivatives]."""
 FILE: Final = "aircraft.toml"
 """Name of the file that makes a folder an aircraft."""
 
@@ -190,9 +191,8 @@ def _of_any(of: Callable[[Motion], tuple[str, ...]]) -> tuple[str, ...]:
 class AircraftFile(Strict):
     """aircraft.toml.
 
-    derivatives: the six short-period derivatives about the CG, by the names of
-    `airtruth.physics.short_period.PARAMETERS`, with their uncertainty. Where there is a JSBSim model its
-    own values count, and only the ratio std/value is taken from here.
+    derivatives: those of any motion about the CG, by their names (`airtruth.physics.motion`), with their
+    uncertainty. Where there is a JSBSim model its own values count, and only the ratio std/value is taken from here.
     """
 
     schema_: Literal[1] = Field(default=1, alias="schema")
@@ -215,8 +215,8 @@ class AircraftFile(Strict):
     @classmethod
     def _known_derivatives(cls, value: dict[str, Quantity]) -> dict[str, Quantity]:
         for name in value:
-            if name not in PARAMETERS:
-                raise ValueError(f"{name!r} is not a derivative; {choices(name, PARAMETERS)}")
+            if name not in DERIVATIVES:
+                raise ValueError(f"{name!r} is not a derivative; {choices(name, DERIVATIVES)}")
         control = value.get("Cmde")
         if control is not None and control.value > 0.0:
             raise ValueError(

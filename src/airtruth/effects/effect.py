@@ -247,11 +247,18 @@ class Effect:
         return self.variant if self.variant in SIGNALS else None
 
     def applies_to(self, motion: Motion) -> bool:
-        """Whether every name in its terms is one of a motion."""
-        names = self._example.names()
+        """Whether every name in its terms is one of a motion, and every error of a sensor one that the motion shows.
+
+        Of a known input, that is an error of what every motion knows, or one that an output of the motion brings about.
+        """
+        example = self._example
+        names = example.names()
+        seen = {*motion.channels, *set.intersection(*(set(m.known) for m in MOTIONS.values()))}
+        shown = all(t.channel in seen or t.rate in motion.output_channels for t in example.sensors)
         parts = names & PARTS.keys()
         known = motion.names | set(coefficients_of(motion))
-        return names - parts <= known and all(PARTS[name].motion == motion.name for name in parts)
+        of_motion = all(PARTS[name].motion == motion.name for name in parts)
+        return shown and names - parts <= known and of_motion
 
     @property
     def motions(self) -> tuple[str, ...]:
