@@ -102,7 +102,7 @@ def _derivatives(answer: TraceAnswer) -> Block:
 
 
 def _farthest(answer: TraceAnswer) -> list[str]:
-    """The derivatives that are farthest from their declaration, in declared standard deviations; the first ones without a test."""
+    """The derivatives farthest from their declaration, in declared standard deviations; the first ones without a test."""
     names = list(answer.motion.parameters)
     if answer.declared_model is not None:
         shifts = answer.declared_model.shifts
