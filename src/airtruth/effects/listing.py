@@ -28,11 +28,12 @@ def as_json(effects: Iterable[Effect]) -> str:
 
 def as_markdown(effects: Iterable[Effect]) -> str:
     """A table with one row per parameter: meaning, range, and the smallest material value."""
-    rows = ["| effect | parameter | meaning | range | material from |", "|---|---|---|---|---|"]
+    rows = ["| effect | motion | parameter | meaning | range | material from |", "|---|---|---|---|---|---|"]
     for effect in effects:
         for number, p in enumerate(effect.parameters):
             cells = (
                 "" if number else f"`{effect.key}`",
+                "" if number else ", ".join(effect.motions),
                 f"`{p.name}`",
                 p.meaning,
                 f"{p.low:g} to {p.high:g}{_unit(p)}",
@@ -90,6 +91,7 @@ def _entry(effect: Effect) -> dict[str, Any]:
         "name": effect.name,
         "variant": effect.variant,
         "where": effect.where,
+        "motions": list(effect.motions),
         "in_derivatives": effect.in_derivatives,
         "parameters": [
             {k: None if isinstance(v, float) and math.isinf(v) else v for k, v in asdict(p).items()}
