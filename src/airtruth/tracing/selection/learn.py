@@ -32,12 +32,12 @@ from airtruth.tracing.selection.increment_fit import (
     refitted,
 )
 from airtruth.tracing.selection.increments import Screened, screen, shapes, sharpened
+from airtruth.tracing.selection.outcome import settled, total_cost
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.ranking import TIE
 from airtruth.tracing.selection.release import CONTRADICTED, DeclaredCauses, explained
 from airtruth.tracing.selection.rounds import NOTHING_DECLARED, Rival, SearchRound, scored_round
 from airtruth.tracing.selection.set_table import SetTable
-from airtruth.tracing.selection.settled import settled, total_cost
 from airtruth.tracing.selection.significance import REMAINS
 
 Array = NDArray[np.float64]

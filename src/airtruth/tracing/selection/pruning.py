@@ -19,12 +19,11 @@ from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.selection.acceptance import SUPERSEDED
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.explanation import REFERENCE, CauseSet
+from airtruth.tracing.selection.outcome import STRONG_ODDS, total_cost
 from airtruth.tracing.selection.refit import losses_without
 from airtruth.tracing.selection.release import CONTRADICTED
-from airtruth.tracing.selection.replacement import STRONG_ODDS
 from airtruth.tracing.selection.rounds import SearchRound, scored_round
 from airtruth.tracing.selection.set_table import SetTable
-from airtruth.tracing.selection.settled import as_declared, total_cost
 from airtruth.tracing.selection.significance import FAMILY_LEVEL, MISFIT_FAMILY_LEVEL, significant_gain
 from airtruth.tracing.selection.weights import with_rival
 
@@ -87,7 +86,7 @@ def _as_declared(sets: SetTable, last: SearchRound, learned: bool) -> PosteriorF
     """
     if last.null.hypothesis.spread is None:
         return None
-    own = as_declared(sets, last.null)
+    own = sets.declared(last.null)
     if own is None or contradiction(sets.problem, own).p_value <= CONTRADICTED:
         return None
     behind = own.cost + len(own.point.sizes) - REFERENCE - total_cost(last)

@@ -33,8 +33,8 @@ TIE: Final = 6.0
 _NEAR: Final = 30.0
 """Difference in log L up to which candidates are compared under one autoregression [-] (judgement: wide enough for
 the change of a gain by the autoregression)."""
-_ITERATIONS: Final = 6
-"""Iterations of a refit under the common autoregression [-] (judgement: it begins next to its optimum)."""
+WHITENED_ITERATIONS: Final = 6
+"""Iterations of a refit under an autoregression [-] (judgement: it begins next to its optimum)."""
 
 
 def rank(
@@ -117,8 +117,10 @@ def _whitened_cost(
 ) -> float:
     """Cost under an autoregression, at the noise and gust levels of another fit, so that only the motion counts."""
     start = own.point.with_levels(levels.point)
-    again = fit(problem, own.hypothesis, start, whitener, iterations=_ITERATIONS, free_levels=False, near=own)
+    again = fit(
+        problem, own.hypothesis, start, whitener, iterations=WHITENED_ITERATIONS, free_levels=False, near=own
+    )
     return np.inf if again is None else again.cost
 
 
-__all__ = ["TIE", "gains_of", "rank"]
+__all__ = ["TIE", "WHITENED_ITERATIONS", "gains_of", "rank"]

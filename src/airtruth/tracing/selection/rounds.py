@@ -25,7 +25,7 @@ from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.budget import Advance
 from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.omnibus import anomalies
-from airtruth.tracing.selection.ranking import TIE, rank
+from airtruth.tracing.selection.ranking import TIE, WHITENED_ITERATIONS, rank
 from airtruth.tracing.selection.refit import (
     LEADING,
     LED,
@@ -55,8 +55,6 @@ MOST_EFFECTS: Final = 3
 not been separable)."""
 _RESTARTS: Final = 2
 """Number of times that a round begins again at a better optimum of its null [-] (judgement: one has been enough)."""
-_GLS_ITERATIONS: Final = 6
-"""Iterations of the refit under the autoregression [-] (judgement: it begins next to its optimum)."""
 NOTHING_KNOWN: Final[Mapping[str, float]] = MappingProxyType({})
 """No effect has a size that is known beforehand."""
 NOTHING_DECLARED: Final = DeclaredCauses(wrong_allowed=False)
@@ -310,7 +308,7 @@ def _refit_whitened(problem: TraceProblem, null: PosteriorFit, whitener: Whitene
         null.hypothesis,
         null.point,
         whitener,
-        iterations=_GLS_ITERATIONS,
+        iterations=WHITENED_ITERATIONS,
         free_levels=False,
         near=null,
     )

@@ -12,9 +12,9 @@ from airtruth.effects.increment import Increment
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.selection.acceptance import OUTDONE, has_converged
 from airtruth.tracing.selection.explanation import REFERENCE
+from airtruth.tracing.selection.outcome import total_cost
 from airtruth.tracing.selection.ranking import TIE
 from airtruth.tracing.selection.rounds import Rival, SearchRound
-from airtruth.tracing.selection.settled import total_cost
 
 _POINTS: Final = 2.0
 """Score in standard deviations from which the residual points to one more effect [-] (convention)."""
