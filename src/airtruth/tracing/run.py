@@ -21,6 +21,7 @@ from airtruth.logs import atomic
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.provenance import Provenance, digests_of
 from airtruth.logs.sources import Logs, named_logs
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS
 from airtruth.tracing.answer import ANSWER, DECLARED_LEVEL
 from airtruth.tracing.axial_force import axial_force
 from airtruth.tracing.calibration.calibrated import calibrated
@@ -255,19 +256,20 @@ def _with_later_colour(
 
 
 def _effects(options: TraceOptions) -> list[Effect]:
-    """The requested candidates, each once; a name without a variant selects all of its variants."""
+    """The requested candidates of the motion, each once; a name without a variant selects all of its variants."""
+    motion = MOTIONS[options.motion or LONGITUDINAL.name]
+    library = {key: effect for key, effect in EFFECTS.items() if effect.applies_to(motion)}
     if options.effects is None:
-        return [effect for effect in EFFECTS.values() if not effect.in_derivatives]
+        return [effect for effect in library.values() if not effect.in_derivatives]
     found: dict[str, Effect] = {}
     for key in options.effects:
         if isinstance(key, Effect):
             found[key.key] = key
             continue
-        matching = {k: e for k, e in EFFECTS.items() if key in (k, e.name)}
+        matching = {k: e for k, e in library.items() if key in (k, e.name)}
         if not matching:
-            raise ConfigurationError(
-                f"effect {key!r}: {choices(key, {*EFFECTS, *(e.name for e in EFFECTS.values())})}"
-            )
+            known = {*library, *(e.name for e in library.values())}
+            raise ConfigurationError(f"effect {key!r}: {choices(key, known)}")
         found |= {k: e for k, e in matching.items() if not e.in_derivatives}
     return list(found.values())
 
