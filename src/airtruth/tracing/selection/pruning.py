@@ -16,11 +16,11 @@ from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment
 from airtruth.tracing.inference.derivative_likelihood import contradiction
 from airtruth.tracing.inference.posterior import PosteriorFit
-from airtruth.tracing.selection.acceptance import SUPERSEDED
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.explanation import REFERENCE, CauseSet
 from airtruth.tracing.selection.outcome import STRONG_ODDS, total_cost
 from airtruth.tracing.selection.refit import losses_without
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import CONTRADICTED
 from airtruth.tracing.selection.rounds import SearchRound, scored_round
 from airtruth.tracing.selection.set_table import SetTable
@@ -130,7 +130,7 @@ def _kept(own: SearchRound, gone: set[str], is_declared: bool) -> SearchRound:
     """A round without the effects that are gone, and without its release where nothing of its explanation is left."""
     if own.tied and own.tied[0].score.effect.key in gone:
         first = own.tied[0]
-        others = (replace(c, reasons=(SUPERSEDED,)) if c is first else c for c in own.candidates)
+        others = (replace(c, reasons=(Refusal.SUPERSEDED,)) if c is first else c for c in own.candidates)
         own = replace(own, tied=(), profile=None, candidates=tuple(others))
     if is_declared:
         return replace(own, release=None, sets=(), rival=None)

@@ -12,13 +12,6 @@ from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import Whitener, autoregression
 from airtruth.tracing.selection.acceptance import (
-    IMMATERIAL,
-    OUTDONE,
-    SUPERSEDED,
-    SURPASSED,
-    UNCONVERGED,
-    WORSE_FREE_RUN,
-    WORSE_LIKELIHOOD,
     Candidate,
     assess_candidate,
     implausibility,
@@ -26,6 +19,7 @@ from airtruth.tracing.selection.acceptance import (
     untested,
 )
 from airtruth.tracing.selection.refit import Refit
+from airtruth.tracing.selection.refusal import Refusal
 
 TIE: Final = 6.0
 """Difference in 2 log L up to which two effects explain the records equally well [-] (judgement: a likelihood ratio of
@@ -66,24 +60,28 @@ def rank(
     led = gains.get(leader, np.inf)
     for gain, r in ranked:
         if leader in gains and gain > led:
-            candidates.append(untested(r.score, r.fit, gain, SURPASSED))
+            candidates.append(untested(r.score, r.fit, gain, Refusal.SURPASSED))
             continue
         if replacement is not None and r.score.effect.key == replacement[0]:
-            candidates.append(untested(r.score, r.fit, gain, SUPERSEDED, f"that is {replacement[1]}"))
+            candidates.append(untested(r.score, r.fit, gain, Refusal.SUPERSEDED, f"that is {replacement[1]}"))
             continue
         if gain < accepted - TIE and r.score.effect.name != leading:
             implausible = implausibility(problem, r.score.effect, r.fit)
-            candidates.append(untested(r.score, r.fit, gain, OUTDONE, *implausible))
+            candidates.append(untested(r.score, r.fit, gain, Refusal.OUTDONE, *implausible))
             continue
         candidate = assess_candidate(problem, r.score, r.fit, gain, reference, least)
         if r.score.effect.key == leader:
-            alone = set(candidate.reasons) - {UNCONVERGED} if in_set else {WORSE_LIKELIHOOD, WORSE_FREE_RUN}
+            alone = (
+                set(candidate.reasons) - {Refusal.UNCONVERGED}
+                if in_set
+                else {Refusal.WORSE_LIKELIHOOD, Refusal.WORSE_FREE_RUN}
+            )
             still = (why for why in candidate.reasons if why not in alone)
             candidate = replace(candidate, reasons=tuple(still))
         if gain < accepted - TIE:
-            candidate = replace(candidate, reasons=(*candidate.reasons, OUTDONE))
+            candidate = replace(candidate, reasons=(*candidate.reasons, Refusal.OUTDONE))
         candidates.append(candidate)
-        if not np.isfinite(accepted) and set(candidate.reasons) <= {IMMATERIAL, UNCONVERGED}:
+        if not np.isfinite(accepted) and set(candidate.reasons) <= {Refusal.IMMATERIAL, Refusal.UNCONVERGED}:
             accepted = gain  # an effect that explains less than an immaterial one is not the cause either
             leading = r.score.effect.name
     return tuple(candidates)

@@ -20,7 +20,7 @@ from airtruth.tracing.inference.whitening import Whitener, autoregression
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection import score_test
 from airtruth.tracing.selection.absorbed import refit_absorbed
-from airtruth.tracing.selection.acceptance import SUPERSEDED, SURPASSED, UNSUPPORTED, Candidate, has_converged
+from airtruth.tracing.selection.acceptance import Candidate, has_converged
 from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.budget import Advance
 from airtruth.tracing.selection.explanation import CauseSet
@@ -34,6 +34,7 @@ from airtruth.tracing.selection.refit import (
     refit_known,
     refit_leaders,
 )
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import DeclaredCauses, Release, explained, release
 from airtruth.tracing.selection.score_test import Table
 from airtruth.tracing.selection.set_table import SetTable
@@ -336,7 +337,7 @@ def _with_evidence(own: SearchRound, begin: RoundStart) -> SearchRound:
         begin.tested, MISFIT_FAMILY_LEVEL
     ):
         return own
-    weak = (replace(c, reasons=(*c.reasons, UNSUPPORTED)) for c in own.candidates)
+    weak = (replace(c, reasons=(*c.reasons, Refusal.UNSUPPORTED)) for c in own.candidates)
     return replace(own, tied=(), candidates=tuple(weak))
 
 
@@ -346,7 +347,11 @@ def _tied(candidates: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
     if not accepted:
         return ()
     best = accepted[0]
-    others = (c for c in candidates if c is not best and c.reasons[:1] not in ((SUPERSEDED,), (SURPASSED,)))
+    others = (
+        c
+        for c in candidates
+        if c is not best and c.reasons[:1] not in ((Refusal.SUPERSEDED,), (Refusal.SURPASSED,))
+    )
     near = (c for c in others if abs(best.gain - c.gain) <= TIE and has_converged(c.fit, c.gain))
     return (best, *near)
 

@@ -13,12 +13,13 @@ from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.profile import relocated
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.absorbed import refit_absorbed
-from airtruth.tracing.selection.acceptance import OUTDONE, Candidate, is_plausible, predicts_records_left_out
+from airtruth.tracing.selection.acceptance import Candidate, is_plausible, predicts_records_left_out
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import AHEAD, BETTER, better_set
 from airtruth.tracing.selection.explanation import events
 from airtruth.tracing.selection.outcome import CLEAN, STRONG_ODDS, Outcome, required_lead, settled, total_cost
 from airtruth.tracing.selection.refit import redundant_effect
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import DeclaredCauses, Release
 from airtruth.tracing.selection.rounds import (
     NOTHING_DECLARED,
@@ -345,7 +346,7 @@ def _variants(own: SearchRound) -> tuple[Candidate, ...]:
         replace(c, reasons=())
         for c in own.candidates
         if c.score.effect.name == best.score.effect.name
-        and c.reasons == (OUTDONE,)
+        and c.reasons == (Refusal.OUTDONE,)
         and np.isfinite(c.likelihood_gain).all()
     )
 
