@@ -8,6 +8,7 @@ import trace_records as tr
 from scaled_records import ACCELEROMETER, GYRO, VANE, fitted, scaled_problem
 
 from airtruth.effects.registry import EFFECTS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.selection import ranking
 from airtruth.tracing.selection.acceptance import predicts_records_left_out, untested
 from airtruth.tracing.selection.exchange import better_set, other_kinds
@@ -17,7 +18,7 @@ from airtruth.tracing.selection.rounds import scored_round
 from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.selection.significance import MISFIT_FAMILY_LEVEL, significant_gain
 
-LIBRARY = tuple(e for e in EFFECTS.values() if not e.in_derivatives)
+LIBRARY = tuple(e for e in EFFECTS.values() if not e.in_derivatives and e.applies_to(LONGITUDINAL))
 LEAST = significant_gain(33, MISFIT_FAMILY_LEVEL)
 
 
