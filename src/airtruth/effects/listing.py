@@ -91,14 +91,12 @@ def _entry(effect: Effect) -> dict[str, Any]:
         "name": effect.name,
         "variant": effect.variant,
         "where": effect.where,
-        "motions": list(effect.motions),
         "in_derivatives": effect.in_derivatives,
         "parameters": [
             {k: None if isinstance(v, float) and math.isinf(v) else v for k, v in asdict(p).items()}
             for p in effect.parameters
         ],
         "channels": list(effect.channels),
-        "motions": list(effect.motions),
         "explanation": effect.explanation,
         "source": effect.source,
         "distinguished_by": effect.distinguished_by,
