@@ -52,17 +52,17 @@ of 840 m at 43 m/s, within 6 % (rms 2 %) from 0.5 to 600 rad/s, the level left f
 powers of the frequency, so that the corners serve any speed and length; a record of seconds shows little below it."""
 _LEAD_GAIN: Final = (0.58, 0.84, 1.39)
 """Gains at these corners [-]; fitted with them."""
-_READING: Final = 2
+READING: Final = 2
 """First number of a reading among what a term acts on, see `EffectArrays`."""
-_PLAY: Final = 2
+PLAY: Final = 2
 """Number of the play in `airtruth.physics.terms.STATE_KINDS`."""
-_PLAY_S: Final = 0.05
+PLAY_S: Final = 0.05
 """Time constant of the lag that takes the place of a play in the linearisation [s] (judgement: a play follows a motion that is
 large against its width at once)."""
-_ALPHA_DOT: Final = 3
+ALPHA_DOT: Final = 3
 """Number of the signal alpha_dot_hat in `airtruth.physics.terms.SIGNALS`."""
 
-_shape = cast("Callable[[int, float], float]", inner(numbered_shape))
+shape = cast("Callable[[int, float], float]", inner(numbered_shape))
 _vane = cast("Callable[[float, float, float, float], float]", inner(vane_equation))
 
 
@@ -106,7 +106,7 @@ def effective_elevator(elevator_rad: float, aircraft: AircraftArrays) -> float:
 
 
 @inner
-def _cell(axis: Array, x: float) -> tuple[int, float]:
+def cell(axis: Array, x: float) -> tuple[int, float]:
     """Lower point of the cell that holds x and the share of the cell below x; the end cells go on outside."""
     low = lower_point(axis, x)
     return low, (x - axis[low]) / (axis[low + 1] - axis[low])
@@ -118,9 +118,9 @@ def _look_up(
 ) -> tuple[float, float, float]:
     """X, Z [N] and M [N m], trilinear in the tables."""
     values = aircraft.values
-    i, si = _cell(aircraft.alpha_rad, alpha)
-    j, sj = _cell(aircraft.elevator_rad, surface)
-    n, sn = _cell(aircraft.qhat, qhat)
+    i, si = cell(aircraft.alpha_rad, alpha)
+    j, sj = cell(aircraft.elevator_rad, surface)
+    n, sn = cell(aircraft.qhat, qhat)
     fx = fz = fm = 0.0
     for a in range(2):
         wa = si if a else 1.0 - si
@@ -139,18 +139,18 @@ def _look_up(
 
 
 @inner
-def _signal(signals: Signals, number: int) -> float:
+def signal_of(signals: Signals, number: int) -> float:
     if number == 0:
         return signals.alpha
     if number == 1:
         return signals.elevator
-    if number == _ALPHA_DOT:
+    if number == ALPHA_DOT:
         return signals.alpha_dot_hat
     return signals.qhat if number == 2 else signals.qbar
 
 
 @inner
-def _terms(
+def terms(
     x: Array, signals: Signals, effects: EffectArrays, in_alpha_dot: bool, feedback: float
 ) -> tuple[float, float]:
     """Increments of CL and Cm by the effects' terms in alpha', or by all others.
@@ -163,16 +163,16 @@ def _terms(
     lift = moment = 0.0
     for t in range(effects.amplitude.size):
         number = effects.term_index[t, 1]
-        if (number == _ALPHA_DOT) != in_alpha_dot or effects.term_index[t, 0] >= _READING:
+        if (number == ALPHA_DOT) != in_alpha_dot or effects.term_index[t, 0] >= READING:
             continue
         state, amplitude = effects.term_index[t, 3], effects.amplitude[t]
-        s = x[state] if state >= 0 else _signal(signals, number)
+        s = x[state] if state >= 0 else signal_of(signals, number)
         if in_alpha_dot and effects.term_index[t, 0] == 0:
             s /= 1.0 + amplitude * feedback
-        increment = amplitude * _shape(effects.term_index[t, 2], s - effects.origin[t])
+        increment = amplitude * shape(effects.term_index[t, 2], s - effects.origin[t])
         factor = effects.term_index[t, 4]
         if factor >= 0:
-            increment *= _signal(signals, factor) - effects.factor_origin[t]
+            increment *= signal_of(signals, factor) - effects.factor_origin[t]
         if effects.term_index[t, 0] == 0:
             lift += increment
         else:
@@ -207,7 +207,7 @@ def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
         for turn in range(2):  # terms in alpha' last: they take alpha' with everything else in it
             first = q + ((fz - force * lift) * cosine - fx * sine) / (mass * ground) + weight
             signals = Signals(alpha, surface, qhat, first * half, qbar)
-            added = _terms(x, signals, model.effects, turn == 1, half * force * cosine / (mass * v))
+            added = terms(x, signals, model.effects, turn == 1, half * force * cosine / (mass * v))
             lift, moment = lift + added[0], moment + added[1]
     fz -= force * lift
     fm += (
@@ -236,9 +236,9 @@ def _effect_rates(x: Array, signals: Signals, model: FilterModel, out: Array) ->
     effects = model.effects
     for k in range(effects.time_s.size):
         at = model.states.effect[k]
-        s = _signal(signals, effects.state_index[k, 1])
-        if effects.state_index[k, 0] == _PLAY:
-            out[at] = (s - x[at]) / _PLAY_S
+        s = signal_of(signals, effects.state_index[k, 1])
+        if effects.state_index[k, 0] == PLAY:
+            out[at] = (s - x[at]) / PLAY_S
         elif effects.state_index[k, 0] == 0:
             out[at] = (s - x[at]) / effects.time_s[k]
         else:
@@ -252,7 +252,7 @@ def hold_plays(x: Array, tried: Array, model: FilterModel) -> None:
     """Put the states of plays in ``tried`` back to those of ``x``: they do not move within a step."""
     effects = model.effects
     for k in range(effects.time_s.size):
-        if effects.state_index[k, 0] == _PLAY:
+        if effects.state_index[k, 0] == PLAY:
             tried[model.states.effect[k]] = x[model.states.effect[k]]
 
 
@@ -261,11 +261,11 @@ def move_plays(x: Array, at: AirPoint, model: FilterModel) -> None:
     """Move the states of plays to no more than their half width from their signals."""
     effects = model.effects
     for k in range(effects.time_s.size):
-        if effects.state_index[k, 0] == _PLAY:
+        if effects.state_index[k, 0] == PLAY:
             alpha = air_alpha(x, gust(x, model.gusts.rolloff), model.gusts.level_m_s, at)
             surface = effective_elevator(at.elevator_rad, model.aircraft)
             qhat = x[1] * 0.5 * model.aircraft.chord_m / at.airspeed_m_s
-            s = _signal(Signals(alpha, surface, qhat, 0.0, at.qbar_pa), effects.state_index[k, 1])
+            s = signal_of(Signals(alpha, surface, qhat, 0.0, at.qbar_pa), effects.state_index[k, 1])
             i, half = model.states.effect[k], effects.half_width[k]
             x[i] = min(max(x[i], s - half), s + half)
 
@@ -300,17 +300,17 @@ def _add_readings(x: Array, alpha: float, at: AirPoint, model: FilterModel, y: A
     """Add the increments of the readings."""
     effects = model.effects
     for t in range(effects.amplitude.size):
-        output = effects.term_index[t, 0] - _READING
+        output = effects.term_index[t, 0] - READING
         if output >= 0:
             surface = effective_elevator(at.elevator_rad, model.aircraft)
             qhat = x[1] * 0.5 * model.aircraft.chord_m / at.airspeed_m_s
             state = effects.term_index[t, 3]
             signals = Signals(alpha, surface, qhat, 0.0, at.qbar_pa)
-            s = x[state] if state >= 0 else _signal(signals, effects.term_index[t, 1])
-            more = effects.amplitude[t] * _shape(effects.term_index[t, 2], s - effects.origin[t])
+            s = x[state] if state >= 0 else signal_of(signals, effects.term_index[t, 1])
+            more = effects.amplitude[t] * shape(effects.term_index[t, 2], s - effects.origin[t])
             behind = effects.term_index[t, 5]
             if behind >= 0:
-                driver = _signal(signals, effects.state_index[behind, 1])
+                driver = signal_of(signals, effects.state_index[behind, 1])
                 more *= x[model.states.effect[behind]] - driver
             y[output] += more
 
@@ -338,12 +338,21 @@ def lead_decay(dt_s: float, i: int) -> tuple[float, float]:
 register(AircraftArrays, GridSignals, Equations(2, 2, rates, outputs, air_at, move_plays, settle_effects))
 
 __all__ = [
+    "ALPHA_DOT",
+    "PLAY",
+    "PLAY_S",
+    "READING",
+    "Signals",
     "air_alpha",
     "air_at",
+    "cell",
     "effective_elevator",
     "gust",
     "hold_plays",
     "lead_decay",
     "rates",
     "settle_effects",
+    "shape",
+    "signal_of",
+    "terms",
 ]

@@ -1,0 +1,355 @@
+"""Derivatives of the filter's gains in the parameters.
+
+The slopes of the equations give those of the linearisation. One step of Newton's method from the steady covariance leads to that
+of the moved linearisation: the residual of the Riccati equation, propagated by the closed loop, whose powers all parameters
+share. The gains of a small step less those of none are then divided by the step.
+
+Source: P. Lancaster and L. Rodman, *Algebraic Riccati Equations* (1995), section 13.5 (Newton's method; its step solves a Stein
+equation, summed here by doubling as by R. A. Smith, SIAM J. Appl. Math. 16 (1968) 198-201).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from airtruth.numerics.compiled import allocating, inner
+from airtruth.numerics.discretise import DOUBLINGS, congruence, multiply, riccati, step, whitener
+from airtruth.tracing.model.by_motion import output_count, outputs, state_count
+from airtruth.tracing.model.corners import CornerNodes, corrected, gain_at, predicted, settled, STEP_RAD, drive_sensors, moved_surface, spread_of
+from airtruth.tracing.model.equations import gust
+from airtruth.tracing.model.flight_slopes import GainSlopes
+from airtruth.tracing.model.kernel_input import AirPoint, FilterModel
+from airtruth.tracing.model.linearise import (
+    FirstUpdate,
+    add_sensors,
+    covariance_of,
+    LEAST_MOVE,
+    first_update,
+    half_width,
+    update_gain,
+)
+from airtruth.tracing.model.parameters import CORE, GUST_1, LEAD
+from airtruth.tracing.model.slopes import LOG_GUST, ROLLOFF, SlopeWork, output_slopes, rate_slopes, slope_work
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_SMALL: Final = 1e-9
+"""Largest entry of a power of the closed loop whose square adds nothing [-]; judgement: far below the step of a difference."""
+
+
+class Moves(NamedTuple):
+    """Small steps of the parameters, and where they lead; row 0 is none.
+
+    Attributes
+    ----------
+    h : (rows,) [units of the parameters]; zero for a parameter that moves no gain.
+    column : (rows,) column of the motion's slopes behind those of the states; -1 for none.
+    variance, slow_std : (rows, outputs) of the sensors' noise after a step; slow_time_s : (rows,).
+    """
+
+    h: Array
+    column: Ints
+    variance: Array
+    slow_std: Array
+    slow_time_s: Array
+
+
+class Conditions(NamedTuple):
+    """The filter at one flight condition after each step of the parameters; see `SteadyFilter` and `Corners`."""
+
+    k_gain: Array
+    first: FirstUpdate
+    direct: Array
+    white: Array
+    covariance: Array
+    logdet: Array
+    steady: Array
+    phi: Array
+    noise: Array
+    spread: Array
+    c: Array
+
+
+class _Linear(NamedTuple):
+    """Linearisation of the motion, and its slopes in the columns behind those of the states.
+
+    Attributes
+    ----------
+    a, c : (motion, motion), (outputs, motion); input, direct : (motion,), (outputs,) slopes in the surface.
+    d_a, d_c, d_input, d_direct : the same with a last axis of columns.
+    """
+
+    a: Array
+    c: Array
+    input: Array
+    direct: Array
+    d_a: Array
+    d_c: Array
+    d_input: Array
+    d_direct: Array
+
+
+class _Ends(NamedTuple):
+    """Rates (2, states), outputs, and their slopes at both ends of a difference."""
+
+    rate: Array
+    y: Array
+    slope: Array
+    out: Array
+
+
+@inner
+def _at_end(side: int, x: Array, at: AirPoint, model: FilterModel, aircraft: Any, ends: _Ends, work: SlopeWork) -> None:
+    az = rate_slopes(x, at, model, aircraft, ends.rate[side], ends.slope[side], work)
+    output_slopes(x, ends.rate[side], at, model, aircraft, ends.slope[side], ends.out[side], work)
+    outputs(x, ends.rate[side], az, at, model, ends.y[side])
+
+
+@allocating
+def _linear(x: Array, at: AirPoint, model: FilterModel, aircraft: Any, columns: int, with_input: bool) -> _Linear:
+    """Linearisation about a state by the differences of `airtruth.tracing.model.linearise.linearise`, and its slopes.
+
+    The half width in a gust depends on the level and the rolloff, and the difference with it where the tables bend.
+    """
+    motion, count, wide = model.states.motion, output_count(model), model.states.motion + columns
+    ends = _Ends(
+        np.zeros((2, x.size)), np.zeros((2, count)), np.zeros((2, motion + 1, wide)), np.zeros((2, count, wide))
+    )
+    work = slope_work(wide)
+    made = _Linear(
+        np.zeros((motion, motion)),
+        np.zeros((count, motion)),
+        np.zeros(motion),
+        np.zeros(count),
+        np.zeros((motion, motion, columns)),
+        np.zeros((count, motion, columns)),
+        np.zeros((motion, columns)),
+        np.zeros((count, columns)),
+    )
+    for j in range(motion + (1 if with_input else 0)):
+        h, middle = STEP_RAD, 0.0
+        if j < motion:
+            h, middle = half_width(j, at, model), x[j]
+        for side in range(2):
+            sign = h if side == 0 else -h
+            if j < motion:
+                x[j] = middle + sign
+            moved = moved_surface(at, sign if j == motion else 0.0)
+            _at_end(side, x, moved, model, aircraft, ends, work)
+        if j == motion:
+            for i in range(motion):
+                made.input[i] = (ends.rate[0, i] - ends.rate[1, i]) / (2.0 * h)
+                for q in range(columns):
+                    made.d_input[i, q] = (ends.slope[0, i, motion + q] - ends.slope[1, i, motion + q]) / (2.0 * h)
+            for i in range(count):
+                made.direct[i] = (ends.y[0, i] - ends.y[1, i]) / (2.0 * h)
+                for q in range(columns):
+                    made.d_direct[i, q] = (ends.out[0, i, motion + q] - ends.out[1, i, motion + q]) / (2.0 * h)
+            continue
+        x[j] = middle
+        _difference(j, h, ends.rate, ends.slope, motion, made.a, made.d_a)
+        _difference(j, h, ends.y, ends.out, motion, made.c, made.d_c)
+        _widths(j, at, model, ends, made)
+    return made
+
+
+@inner
+def _difference(j: int, h: float, values: Array, slope: Array, motion: int, out: Array, d_out: Array) -> None:
+    """A column of a matrix, and its slopes."""
+    for i in range(out.shape[0]):
+        out[i, j] = (values[0, i] - values[1, i]) / (2.0 * h)
+        for q in range(d_out.shape[2]):
+            d_out[i, j, q] = (slope[0, i, motion + q] - slope[1, i, motion + q]) / (2.0 * h)
+
+
+@allocating
+def _widths(j: int, at: AirPoint, model: FilterModel, ends: _Ends, made: _Linear) -> None:
+    """Add the slopes by those of the half width in a gust, whose logarithm falls by one with that of the level."""
+    first = state_count(model)
+    core = first + CORE - GUST_1
+    if j < first or j >= core:
+        return
+    unit = np.zeros(core)
+    unit[j] = 1.0
+    by_gust = gust(unit, model.gusts.rolloff)
+    if not abs(model.gusts.level_m_s * by_gust) / at.airspeed_m_s > LEAST_MOVE:
+        return
+    by_rolloff = (gust(unit, 1.0) - gust(unit, 0.0)) / by_gust
+    for i in range(made.a.shape[0]):
+        if first + LEAD - GUST_1 <= i < core:
+            continue  # the low-passed copies are linear
+        more = 0.5 * (ends.slope[0, i, j] + ends.slope[1, i, j]) - made.a[i, j]
+        made.d_a[i, j, LOG_GUST] -= more
+        made.d_a[i, j, ROLLOFF] -= by_rolloff * more
+    for i in range(made.c.shape[0]):
+        more = 0.5 * (ends.out[0, i, j] + ends.out[1, i, j]) - made.c[i, j]
+        made.d_c[i, j, LOG_GUST] -= more
+        made.d_c[i, j, ROLLOFF] -= by_rolloff * more
+
+
+@allocating
+def _moved_system(
+    row: int, linear: _Linear, moves: Moves, model: FilterModel, a: Array, c: Array, direct: Array, column: Array
+) -> None:
+    """Linearisation after a step of a parameter, late sensors and correlated noise included."""
+    motion, h, q = model.states.motion, moves.h[row], moves.column[row]
+    for i in range(a.shape[0]):
+        column[i] = direct[i] = 0.0
+        for j in range(a.shape[0]):
+            a[i, j] = 0.0
+    driven = linear.direct.copy()
+    for i in range(motion):
+        column[i] = linear.input[i] + (h * linear.d_input[i, q] if q >= 0 else 0.0)
+        for j in range(motion):
+            a[i, j] = linear.a[i, j] + (h * linear.d_a[i, j, q] if q >= 0 else 0.0)
+    for i in range(c.shape[0]):
+        driven[i] += h * linear.d_direct[i, q] if q >= 0 else 0.0
+        for j in range(a.shape[0]):
+            c[i, j] = 0.0
+        for j in range(motion):
+            c[i, j] = linear.c[i, j] + (h * linear.d_c[i, j, q] if q >= 0 else 0.0)
+    for j in range(a.shape[0]):
+        direct[j] = c[c.shape[0] - 1, j]
+    add_sensors(model, moves.slow_std[row], moves.slow_time_s[row], a, c)
+    drive_sensors(driven, model, column)
+
+
+@allocating
+def _powers(phi: Array, k_gain: Array, c: Array) -> tuple[int, Array]:
+    """Number of powers 1, 2, 4, ... of the closed loop phi (I - K C), and these (powers, states, states)."""
+    n = phi.shape[0]
+    powers, work, keep = np.zeros((DOUBLINGS, n, n)), np.zeros((n, n)), np.zeros((n, n))
+    multiply(k_gain, c, work)
+    for i in range(n):
+        for j in range(n):
+            keep[i, j] = (1.0 if i == j else 0.0) - work[i, j]
+    multiply(phi, keep, powers[0])
+    for number in range(1, DOUBLINGS):
+        multiply(powers[number - 1], powers[number - 1], powers[number])
+        largest = 0.0
+        for i in range(n):
+            for j in range(n):
+                largest = max(largest, abs(powers[number, i, j]))
+        if largest < _SMALL:
+            return number + 1, powers
+    return DOUBLINGS, powers
+
+
+@allocating
+def _newton(p: Array, after: Array, count: int, powers: Array, out: Array) -> None:
+    """One step of Newton's method from a covariance, where the equation leads to another one."""
+    n = p.shape[0]
+    change, work, more = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    for i in range(n):
+        for j in range(n):
+            change[i, j] = after[i, j] - p[i, j]
+    for number in range(count):
+        congruence(powers[number], change, work, more)
+        for i in range(n):
+            for j in range(n):
+                change[i, j] += more[i, j]
+    for i in range(n):
+        for j in range(n):
+            out[i, j] = p[i, j] + change[i, j]
+
+
+@allocating
+def _gains(row: int, c: Array, variance: Array, out: Conditions) -> None:
+    """Gains of a steady covariance of the prediction."""
+    pc = np.empty(out.k_gain[row].shape)
+    covariance_of(out.steady[row], c, variance, pc, out.covariance[row])
+    out.logdet[row] = whitener(out.covariance[row], out.white[row])
+    update_gain(pc, out.white[row], out.k_gain[row])
+    first_update(pc, out.covariance[row], FirstUpdate(out.first.gain[row], out.first.share[row]))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _conditions(
+    x: Array, at: AirPoint, model: FilterModel, aircraft: Any, columns: int, moves: Moves, dt_s: float, out: Conditions
+) -> None:
+    """`conditions` into ``out``."""
+    n, rows, with_input = x.size, moves.h.size, out.spread.shape[0] > 0
+    linear = _linear(x, at, model, aircraft, columns, with_input)
+    system, process, column = np.zeros((n, n + 1)), np.zeros(n), np.zeros(n)
+    a, early, late = np.zeros((n, n)), np.empty((n, 1)), np.empty((n, 1))
+    count, powers = 0, np.zeros((0, n, n))
+    for row in range(rows):
+        if row > 0 and moves.h[row] == 0.0:
+            continue
+        _moved_system(row, linear, moves, model, a, out.c[row], out.direct[row], column)
+        moves_motion = row == 0 or moves.slow_time_s[row] != moves.slow_time_s[0]
+        for i in range(n):
+            for j in range(n):
+                moves_motion = moves_motion or a[i, j] != system[i, j]
+        if moves_motion:
+            process[state_count(model)] = 2.0 * at.airspeed_m_s / model.gusts.length_m
+            if model.states.noise >= 0:
+                for i in range(model.states.noise, n):
+                    process[i] = 2.0 / moves.slow_time_s[row]
+            own = np.zeros((n, n + 1))
+            for i in range(n):
+                for j in range(n):
+                    own[i, j] = a[i, j]
+            step(own, process, n, dt_s, out.phi[row], early, late, out.noise[row])
+            if row == 0:
+                system = own
+        else:
+            for i in range(n):
+                for j in range(n):
+                    out.phi[row, i, j], out.noise[row, i, j] = out.phi[0, i, j], out.noise[0, i, j]
+        if with_input:
+            out.spread[row] = spread_of(a, column, dt_s)
+        if row == 0:
+            out.steady[0] = riccati(out.phi[0], out.c[0], out.noise[0], moves.variance[0])
+            _gains(0, out.c[0], moves.variance[0], out)
+            count, powers = _powers(out.phi[0], out.k_gain[0], out.c[0])
+            continue
+        # the gains of the steady covariance with the moved sensors, and the prediction that follows
+        for i in range(n):
+            for j in range(n):
+                out.steady[row, i, j] = out.steady[0, i, j]
+        _gains(row, out.c[row], moves.variance[row], out)
+        after = corrected(out.steady[0], out.k_gain[row], out.c[row])
+        work, following = np.empty((n, n)), np.empty((n, n))
+        congruence(out.phi[row], after, work, following)
+        for i in range(n):
+            for j in range(n):
+                following[i, j] += out.noise[row, i, j]
+        _newton(out.steady[0], following, count, powers, out.steady[row])
+        _gains(row, out.c[row], moves.variance[row], out)
+
+
+def conditions(
+    x: Array, at: AirPoint, model: FilterModel, aircraft: Any, columns: int, moves: Moves, dt_s: float, uncertain: bool
+) -> Conditions:
+    """The filter at one flight condition after small steps of the parameters.
+
+    Parameters
+    ----------
+    x, at : (states,) where it is linearised, and the inputs there.
+    aircraft : what the parameters move of it; columns : number of the slopes' columns behind those of the states.
+    uncertain : whether the surface is uncertain between samples.
+    """
+    n, count, rows = x.size, model.sensors.scale.size, moves.h.size
+    square = (rows, n, n)
+    out = Conditions(
+        k_gain=np.zeros((rows, n, count)),
+        first=FirstUpdate(np.zeros((rows, n, count - 1)), np.zeros((rows, count - 1))),
+        direct=np.zeros((rows, n)),
+        white=np.zeros((rows, count, count)),
+        covariance=np.zeros((rows, count, count)),
+        logdet=np.zeros(rows),
+        steady=np.zeros(square),
+        phi=np.zeros(square),
+        noise=np.zeros(square),
+        spread=np.zeros(square if uncertain else (0, 0, 0)),
+        c=np.zeros((rows, count, n)),
+    )
+    _conditions(x.copy(), at, model, aircraft, columns, moves, dt_s, out)
+    return out

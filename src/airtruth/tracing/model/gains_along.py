@@ -1,0 +1,170 @@
+"""Derivatives of the gains along a record: between flight conditions, and where the surface is uncertain.
+
+Every step of a parameter has a recursion of its own; that of none decides where the gains are steady again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from airtruth.numerics.discretise import multiply
+from airtruth.tracing.model.corners import CornerNodes, corrected, gain_at, predicted, settled
+from airtruth.tracing.model.flight_slopes import GainSlopes
+from airtruth.tracing.model.gain_slopes import Conditions, Moves
+from airtruth.tracing.model.linearise import FirstUpdate
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class _Gains(NamedTuple):
+    """Gains after one step of a parameter at each sample; see `airtruth.tracing.model.filter.Path`."""
+
+    k_gain: Array
+    first: FirstUpdate
+    direct: Array
+    scale: Array
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _recursion(
+    gains: _Gains,
+    corners: CornerNodes,
+    scale: Array,
+    node: Ints,
+    corner_rad2: Array,
+    uncertain: NDArray[np.bool_],
+    decides: bool,
+) -> float:
+    """Replace the settled gains where the surface is uncertain; the sum of log|S| beyond the common one.
+
+    Parameters
+    ----------
+    scale : (nodes, outputs, outputs) of the settled filter at each condition; node : (samples,) the nearest condition.
+    uncertain : (samples,) where the gains are not the settled ones, written if the row ``decides``.
+    """
+    samples, count, total, p = node.size, scale.shape[1], 0.0, corners.steady[0].copy()
+    own = np.empty((count, count))
+    for k in range(samples):
+        at, lasts = node[k], False
+        if uncertain[k]:
+            first = FirstUpdate(gains.first.gain[k], gains.first.share[k])
+            more, away = gain_at(p, corners, at, gains.k_gain[k], first, own)
+            multiply(scale[at], own, gains.scale[k])
+            total += more
+            lasts = not settled(away)
+            for i in range(count):
+                total -= 2.0 * math.log(scale[at, i, i])
+        else:
+            for i in range(count):
+                total -= 2.0 * math.log(gains.scale[k, i, i])
+        if k + 1 == samples or corner_rad2.size == 0:
+            continue
+        if decides:
+            uncertain[k + 1] = lasts or corner_rad2[k + 1] > 0.0
+        if uncertain[k + 1]:
+            if not uncertain[k]:
+                p = corners.steady[at].copy()
+            p = predicted(corrected(p, gains.k_gain[k], corners.c[at]), corners, at, corner_rad2[k + 1])
+    return total
+
+
+def slopes_along(
+    nodes: Sequence[Conditions], common: int, moves: Moves, lower: Ints, share: Array, corner_rad2: Array
+) -> tuple[GainSlopes, Array]:
+    """Derivatives of the gains at each sample, or of all samples at once, and (parameters,) of the log|S| beyond the common one.
+
+    Parameters
+    ----------
+    nodes : the filter at each flight condition after each step of the parameters; common : number of the common one.
+    lower, share : see `airtruth.tracing.model.schedule.Schedule`; empty with a single node.
+    corner_rad2 : (samples,) see `airtruth.tracing.model.kernel_input.KernelInput`.
+    """
+    rows, count = moves.h.size, nodes[0].white.shape[1]
+    if lower.size == 0 and corner_rad2.size == 0:
+        own = nodes[0]
+        steady = _Gains(own.k_gain, own.first, own.direct, np.zeros((rows, count, count)))
+        return _divided([_row(steady, row) for row in range(rows)], moves), np.zeros(rows - 1)
+    samples = lower.size or corner_rad2.size
+    node = lower + (share > 0.5) if lower.size else np.zeros(samples, dtype=np.int64)
+    uncertain = np.zeros(samples, dtype=np.bool_)
+    made, more = [], np.zeros(rows)
+    for row in range(rows):
+        if row > 0 and moves.h[row] == 0.0:
+            made.append(made[0])
+            more[row] = more[0]
+            continue
+        root = np.linalg.inv(nodes[common].white[row])
+        scale = np.stack(
+            [np.eye(count) if i == common else np.tril(root @ own.white[row]) for i, own in enumerate(nodes)]
+        )
+
+        def along(x: Sequence[Array]) -> Array:
+            every = np.stack(x)
+            if not lower.size:
+                return np.repeat(every[:1], samples, axis=0)
+            low, by = every[lower], share.reshape(-1, *[1] * (every.ndim - 1))
+            return np.ascontiguousarray(low + by * (every[lower + 1] - low))
+
+        gains = _Gains(
+            along([own.k_gain[row] for own in nodes]),
+            FirstUpdate(
+                along([own.first.gain[row] for own in nodes]), along([own.first.share[row] for own in nodes])
+            ),
+            along([own.direct[row] for own in nodes]),
+            along(list(scale)),
+        )
+        more[row] = _recursion(
+            gains, _corners(nodes, row, moves), scale, node, corner_rad2, uncertain, row == 0
+        )
+        made.append(gains)
+    h = np.where(moves.h[1:] == 0.0, 1.0, moves.h[1:])
+    return _divided(made, moves), (more[1:] - more[0]) / h
+
+
+def _row(own: _Gains, row: int) -> _Gains:
+    """The gains after one step as those of a single sample."""
+    first = FirstUpdate(own.first.gain[row : row + 1], own.first.share[row : row + 1])
+    at = slice(row, row + 1)
+    return _Gains(own.k_gain[at], first, own.direct[at], own.scale[at])
+
+
+def _corners(nodes: Sequence[Conditions], row: int, moves: Moves) -> CornerNodes:
+    """The recursion after one step."""
+    spread = [own.spread[row] if own.spread.size else np.zeros((0, 0)) for own in nodes]
+    return CornerNodes(
+        phi=np.stack([own.phi[row] for own in nodes]),
+        noise=np.stack([own.noise[row] for own in nodes]),
+        spread=np.stack(spread),
+        steady=np.stack([own.steady[row] for own in nodes]),
+        c=np.stack([own.c[row] for own in nodes]),
+        variance=moves.variance[row],
+        covariance=np.stack([own.covariance[row] for own in nodes]),
+        root=np.stack([np.linalg.inv(own.white[row]) for own in nodes]),
+        logdet=np.array([own.logdet[row] for own in nodes]),
+    )
+
+
+def _divided(rows: Sequence[_Gains], moves: Moves) -> GainSlopes:
+    """Differences from the first row over the steps, with the parameters as the last axis."""
+
+    def slope(x: Sequence[Array]) -> Array:
+        out = np.zeros((*x[0].shape, len(x) - 1))
+        for row in range(1, len(x)):
+            if moves.h[row] != 0.0:
+                out[..., row - 1] = (x[row] - x[0]) / moves.h[row]
+        return out
+
+    first = FirstUpdate(slope([r.first.gain for r in rows]), slope([r.first.share for r in rows]))
+    return GainSlopes(
+        slope([r.k_gain for r in rows]), first, slope([r.direct for r in rows]), slope([r.scale for r in rows])
+    )
+
+
+__all__ = ["slopes_along"]
