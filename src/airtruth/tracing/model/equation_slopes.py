@@ -1,4 +1,4 @@
-"""Slopes of the equations of `airtruth.tracing.model.equations` in the states and the parameters."""
+"""Derivatives of the equations of `airtruth.tracing.model.equations` along those of the states, and in the parameters."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import inner
 from airtruth.physics.motion import LONGITUDINAL
+from airtruth.tracing.model.compile import CompiledChange
 from airtruth.tracing.model.equations import (
     ALPHA_DOT,
     PLAY,
@@ -25,8 +26,9 @@ from airtruth.tracing.model.equations import (
     signal_of,
     terms,
 )
-from airtruth.tracing.model.kernel_input import AircraftArrays, AirPoint, FilterModel
-from airtruth.tracing.model.parameters import CORE, GUST_1, LEAD, OUTPUTS
+from airtruth.tracing.model.kernel_input import AircraftArrays, AirPoint, EffectArrays, FilterModel
+from airtruth.tracing.model.parameters import CORE, GUST_1, LEAD, OUTPUTS, SHORT_PERIOD
+from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.slopes import (
     INERTIA,
     LOG_GUST,
@@ -42,11 +44,12 @@ from airtruth.tracing.model.slopes import (
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 _DERIVATIVES: Final = len(MOVERS)
-"""First column of the derivatives, behind those of the states."""
+"""Number of the first derivative among the columns."""
 _TRIM: Final = _DERIVATIVES + len(LONGITUDINAL.derivatives)
-"""First column of the trim."""
+"""Number of the first increment at the trim."""
 _ROW: Final = len(LONGITUDINAL.signals)
 """Derivatives of a coefficient [-]."""
 _LATE: Final = LEAD - 1
@@ -106,7 +109,11 @@ def _look_up(
             wb = sj if b else 1.0 - sj
             for c in range(2):
                 wc, dc = sn if c else 1.0 - sn, 1.0 if c else -1.0
-                x, z, m = values[i + a, j + b, n + c, 0], values[i + a, j + b, n + c, 1], values[i + a, j + b, n + c, 2]
+                x, z, m = (
+                    values[i + a, j + b, n + c, 0],
+                    values[i + a, j + b, n + c, 1],
+                    values[i + a, j + b, n + c, 2],
+                )
                 w, wda, wdc = wa * wb * wc, da * wb * wc, wa * wb * dc
                 fx, fz, fm = fx + w * x, fz + w * z, fm + w * m
                 ax, az, am = ax + wda * x, az + wda * z, am + wda * m
@@ -142,28 +149,39 @@ def _shape_slope(number: int, s: float) -> float:
 
 
 @inner
-def _add_signal(number: int, by: float, work: SlopeWork, row: Array) -> None:
-    """Add a multiple of the slopes of a signal; the surface and the dynamic pressure are known inputs."""
-    if number == 0:
-        for c in range(row.size):
-            row[c] += by * work.alpha[c]
-    elif number == 2:
-        for c in range(row.size):
-            row[c] += by * work.qhat[c]
-    elif number == ALPHA_DOT:
-        for c in range(row.size):
-            row[c] += by * work.alpha_dot_hat[c]
+def _add(by: float, d: Array, row: Array) -> None:
+    for p in range(row.size):
+        row[p] += by * d[p]
 
 
 @inner
-def _add_term(t: int, x: Array, signals: Signals, model: FilterModel, feedback: float, by_alpha: float, work: SlopeWork) -> None:
-    """Add the slopes of a term of CL or Cm.
+def _add_signal(number: int, by: float, work: SlopeWork, row: Array) -> None:
+    """Add a multiple of the derivatives of a signal; the surface and the dynamic pressure are known inputs."""
+    if number == 0:
+        _add(by, work.alpha, row)
+    elif number == 2:
+        _add(by, work.qhat, row)
+    elif number == ALPHA_DOT:
+        _add(by, work.alpha_dot_hat, row)
+
+
+@inner
+def _add_term(
+    t: int,
+    x: Array,
+    d_x: Array,
+    signals: Signals,
+    effects: EffectArrays,
+    feedback: float,
+    by_alpha: float,
+    work: SlopeWork,
+) -> None:
+    """Add the derivatives of a term of CL or Cm.
 
     Parameters
     ----------
     feedback : loss of alpha_dot_hat by a unit of CL [-]; by_alpha : its slope in alpha.
     """
-    effects = model.effects
     number, state, factor = effects.term_index[t, 1], effects.term_index[t, 3], effects.term_index[t, 4]
     amplitude, of_lift = effects.amplitude[t], effects.term_index[t, 0] == 0
     raw = x[state] if state >= 0 else signal_of(signals, number)
@@ -175,148 +193,186 @@ def _add_term(t: int, x: Array, signals: Signals, model: FilterModel, feedback: 
     bent = amplitude * _shape_slope(effects.term_index[t, 2], s) * weight
     row = work.lift if of_lift else work.moment
     if state >= 0:
-        row[state] += bent
+        _add(bent, d_x[state], row)
     else:
         _add_signal(number, bent * loop, work, row)
         if loop != 1.0:
-            _add_signal(0, -bent * raw * loop * loop * amplitude * by_alpha, work, row)
+            _add(-bent * raw * loop * loop * amplitude * by_alpha, work.alpha, row)
     if factor >= 0:
         _add_signal(factor, amplitude * shape(effects.term_index[t, 2], s), work, row)
 
 
 @inner
-def _add_terms(x: Array, signals: Signals, model: FilterModel, in_alpha_dot: bool, feedback: float, by_alpha: float, work: SlopeWork) -> None:
-    """Add the slopes of the terms in alpha', or of all others."""
-    for t in range(model.effects.amplitude.size):
-        if model.effects.term_index[t, 0] < READING and (model.effects.term_index[t, 1] == ALPHA_DOT) == in_alpha_dot:
-            _add_term(t, x, signals, model, feedback, by_alpha, work)
+def _all_terms(
+    x: Array,
+    d_x: Array,
+    f: _Force,
+    lift: float,
+    signals: Signals,
+    at: AirPoint,
+    model: FilterModel,
+    column: Ints,
+    work: SlopeWork,
+) -> None:
+    """Add the derivatives of the effects' terms of CL and Cm; ``lift``: CL of the increments without them."""
+    aircraft, effects, half = model.aircraft, model.effects, 0.5 * model.aircraft.chord_m / at.airspeed_m_s
+    force, alpha, mass = at.qbar_pa * aircraft.area_m2, signals.alpha, aircraft.mass_kg
+    loss, weight = half * force / (mass * at.airspeed_m_s), G0 * math.cos(at.theta_rad - x[0]) / at.ground_m_s
+    fz = f.z - force * (lift + terms(x, signals, effects, False, 0.0)[0])
+    first = x[1] + (fz * math.cos(alpha) - f.x * math.sin(alpha)) / (mass * at.ground_m_s) + weight
+    turned = Signals(alpha, signals.elevator, signals.qhat, first * half, signals.qbar)
+    for turn in range(2):  # terms in alpha' take that of all other forces
+        if turn == 1:
+            _turning(x, d_x, fz, alpha, f, at, model, column, work.alpha_dot_hat, work)
+            for p in range(work.lift.size):
+                work.alpha_dot_hat[p] *= half
+        for t in range(effects.amplitude.size):
+            if effects.term_index[t, 0] < READING and (effects.term_index[t, 1] == ALPHA_DOT) == (turn == 1):
+                _add_term(t, x, d_x, turned, effects, loss * math.cos(alpha), -loss * math.sin(alpha), work)
 
 
 @inner
 def _air_slopes(
-    x: Array, upward: float, at: AirPoint, model: FilterModel, moved: AircraftMoves, late: Array, work: SlopeWork
+    x: Array,
+    d_x: Array,
+    upward: float,
+    at: AirPoint,
+    model: FilterModel,
+    moved: AircraftMoves,
+    column: Ints,
+    late: Array,
+    work: SlopeWork,
 ) -> None:
-    """Slopes of the gust, of the late gust into ``late``, of alpha and of qhat."""
-    gusts, motion, v = model.gusts, model.states.motion, at.airspeed_m_s
-    for c in range(late.size):
-        work.upward[c] = moved.upward[c] if c < CORE else 0.0
-    for j in range(CORE):
-        work.upward[motion + ROLLOFF] += moved.lead[j] * x[j]
-    for c in range(late.size):
-        late[c] = work.upward[c] / gusts.rotary_time_s
-    late[_LATE] -= 1.0 / gusts.rotary_time_s
+    """Derivatives of the gust, of the late gust's rate into ``late``, of alpha and of qhat."""
+    gusts, v, up = model.gusts, at.airspeed_m_s, moved.upward
     sine = (math.sin(at.theta_rad - x[0]) * at.ground_m_s - gusts.level_m_s * upward) / v
     turn = 1.0 / math.sqrt(1.0 - sine * sine) if abs(sine) < 1.0 else 0.0
-    half, share = 0.5 * model.aircraft.chord_m / v, turn * gusts.level_m_s / v
-    tail = half * gusts.level_m_s / v
-    for c in range(late.size):
-        work.alpha[c] = share * work.upward[c]
-        work.qhat[c] = -tail * gusts.rotary * late[c]
-    work.alpha[0] += turn * math.cos(at.theta_rad - x[0]) * at.ground_m_s / v
-    work.alpha[motion + LOG_GUST] += share * upward
-    tail *= (upward - x[_LATE]) / gusts.rotary_time_s
-    work.qhat[1] += half
-    work.qhat[motion + ROTARY] -= tail
-    work.qhat[motion + LOG_GUST] -= gusts.rotary * tail
+    half, share, rate = (
+        0.5 * model.aircraft.chord_m / v,
+        turn * gusts.level_m_s / v,
+        1.0 / gusts.rotary_time_s,
+    )
+    tail, steep = half * gusts.level_m_s / v, turn * math.cos(at.theta_rad - x[0]) * at.ground_m_s / v
+    size, by_rolloff = late.size, 0.0
+    first, second, low, middle, high = up[GUST_1], up[GUST_1 + 1], up[LEAD], up[LEAD + 1], up[LEAD + 2]
+    for p in range(size):
+        copies = low * d_x[LEAD, p] + middle * d_x[LEAD + 1, p] + high * d_x[LEAD + 2, p]
+        work.upward[p] = first * d_x[GUST_1, p] + second * d_x[GUST_1 + 1, p] + copies
+    for j in range(CORE):
+        by_rolloff += moved.lead[j] * x[j]
+    work.upward[column[ROLLOFF]] += by_rolloff
+    for p in range(size):
+        late[p] = rate * (work.upward[p] - d_x[_LATE, p])
+    for p in range(size):
+        work.alpha[p] = steep * d_x[0, p] + share * work.upward[p]
+    turning = tail * gusts.rotary
+    for p in range(size):
+        work.qhat[p] = half * d_x[1, p] - turning * late[p]
+    behind = tail * rate * (upward - x[_LATE])
+    work.alpha[column[LOG_GUST]] += share * upward
+    work.qhat[column[ROTARY]] -= behind
+    work.qhat[column[LOG_GUST]] -= gusts.rotary * behind
 
 
 @inner
-def _coefficient_slopes(signals: Signals, model: FilterModel, moved: AircraftMoves, work: SlopeWork) -> None:
-    """Slopes of CL and Cm beside the tables, without the effects' terms."""
-    aircraft, motion = model.aircraft, model.states.motion
-    more, d_alpha, d_de = (
-        aircraft.increments,
-        signals.alpha - aircraft.trim_alpha_rad,
-        signals.elevator - aircraft.trim_elevator_rad,
-    )
-    for c in range(work.lift.size):
-        work.lift[c] = more[0] * work.alpha[c] + more[1] * work.qhat[c]
-        work.moment[c] = more[_ROW] * work.alpha[c] + more[_ROW + 1] * work.qhat[c]
+def _coefficient_slopes(
+    signals: Signals, model: FilterModel, moved: AircraftMoves, column: Ints, work: SlopeWork
+) -> None:
+    """Derivatives of CL and Cm beside the tables, without the effects' terms."""
+    aircraft, more = model.aircraft, model.aircraft.increments
+    lift_alpha, lift_qhat, moment_alpha, moment_qhat = more[0], more[1], more[_ROW], more[_ROW + 1]
+    for p in range(work.lift.size):
+        work.lift[p] = lift_alpha * work.alpha[p] + lift_qhat * work.qhat[p]
+    for p in range(work.lift.size):
+        work.moment[p] = moment_alpha * work.alpha[p] + moment_qhat * work.qhat[p]
     for i in range(_ROW):
-        value = d_alpha if i == 0 else (signals.qhat if i == 1 else d_de)
-        work.lift[motion + _DERIVATIVES + i] += value
-        work.moment[motion + _DERIVATIVES + _ROW + i] += moved.inertia * value
-        work.moment[motion + INERTIA] += moved.turned[i] * value
-    work.lift[motion + _TRIM] += 1.0
-    work.moment[motion + _TRIM + 1] += 1.0
+        value = signals.qhat
+        if i == 0:
+            value = signals.alpha - aircraft.trim_alpha_rad
+        elif i == 2:
+            value = signals.elevator - aircraft.trim_elevator_rad
+        work.lift[column[_DERIVATIVES + i]] += value
+        work.moment[column[_DERIVATIVES + _ROW + i]] += moved.inertia * value
+        work.moment[column[INERTIA]] += moved.turned[i] * value
+    work.lift[column[_TRIM]] += 1.0
+    work.moment[column[_TRIM + 1]] += 1.0
 
 
 @inner
 def _turning(
-    x: Array, fz: float, alpha: float, f: _Force, at: AirPoint, model: FilterModel, row: Array, work: SlopeWork
+    x: Array,
+    d_x: Array,
+    fz: float,
+    alpha: float,
+    f: _Force,
+    at: AirPoint,
+    model: FilterModel,
+    column: Ints,
+    row: Array,
+    work: SlopeWork,
 ) -> None:
-    """Slopes of alpha' into ``row``, where the force is ``fz`` in all."""
+    """Derivatives of alpha' into ``row``, where the force is ``fz`` in all."""
     cosine, sine = math.cos(alpha), math.sin(alpha)
     by = 1.0 / (model.aircraft.mass_kg * at.ground_m_s)
     by_alpha = by * (f.z_alpha * cosine - f.x_alpha * sine - fz * sine - f.x * cosine)
     by_qhat = by * (f.z_qhat * cosine - f.x_qhat * sine)
     by_lift = by * at.qbar_pa * model.aircraft.area_m2 * cosine
-    for c in range(row.size):
-        row[c] = by_alpha * work.alpha[c] + by_qhat * work.qhat[c] - by_lift * work.lift[c]
-    row[0] += G0 * math.sin(at.theta_rad - x[0]) / at.ground_m_s
-    row[1] += 1.0
-    row[model.states.motion + THRUST] += by * (f.z_thrust * cosine - f.x_thrust * sine)
+    falls = G0 * math.sin(at.theta_rad - x[0]) / at.ground_m_s
+    for p in range(row.size):
+        more = by_alpha * work.alpha[p] + by_qhat * work.qhat[p] - by_lift * work.lift[p]
+        row[p] = falls * d_x[0, p] + d_x[1, p] + more
+    row[column[THRUST]] += by * (f.z_thrust * cosine - f.x_thrust * sine)
 
 
 @inner
-def _effect_slopes(half: float, model: FilterModel, slope: Array, work: SlopeWork) -> None:
-    """Slopes of the rates of the effects' states."""
+def _effect_slopes(half: float, d_x: Array, model: FilterModel, slope: Array, work: SlopeWork) -> None:
+    """Derivatives of the rates of the effects' states."""
     effects = model.effects
-    for c in range(work.lift.size):
-        work.alpha_dot_hat[c] = half * slope[0, c]
+    if effects.time_s.size > 0:
+        for p in range(work.lift.size):
+            work.alpha_dot_hat[p] = half * slope[0, p]
     for k in range(effects.time_s.size):
         at, signal, wn = model.states.effect[k], effects.state_index[k, 1], 1.0 / effects.time_s[k]
         row = slope[at]
-        for c in range(row.size):
-            row[c] = 0.0
+        for p in range(row.size):
+            row[p] = 0.0
         if effects.state_index[k, 0] == PLAY:
             _add_signal(signal, 1.0 / PLAY_S, work, row)
-            row[at] -= 1.0 / PLAY_S
+            _add(-1.0 / PLAY_S, d_x[at], row)
         elif effects.state_index[k, 0] == 0:
             _add_signal(signal, wn, work, row)
-            row[at] -= wn
+            _add(-wn, d_x[at], row)
         else:
-            row[at + 1] = 1.0
+            _add(1.0, d_x[at + 1], row)
             row = slope[at + 1]
-            for c in range(row.size):
-                row[c] = 0.0
+            for p in range(row.size):
+                row[p] = 0.0
             _add_signal(signal, wn * wn, work, row)
-            row[at] -= wn * wn
-            row[at + 1] -= 2.0 * effects.damping[k] * wn
+            _add(-wn * wn, d_x[at], row)
+            _add(-2.0 * effects.damping[k] * wn, d_x[at + 1], row)
 
 
 @inner
-def _all_terms(
-    x: Array, f: _Force, lift: float, signals: Signals, at: AirPoint, model: FilterModel, work: SlopeWork
-) -> None:
-    """Add the slopes of the effects' terms of CL and Cm; ``lift``: CL of the increments without them."""
-    aircraft, half = model.aircraft, 0.5 * model.aircraft.chord_m / at.airspeed_m_s
-    force, alpha, mass = at.qbar_pa * aircraft.area_m2, signals.alpha, aircraft.mass_kg
-    _add_terms(x, signals, model, False, 0.0, 0.0, work)
-    # terms in alpha' take that of all other forces
-    fz = f.z - force * (lift + terms(x, signals, model.effects, False, 0.0)[0])
-    weight = G0 * math.cos(at.theta_rad - x[0]) / at.ground_m_s
-    first = x[1] + (fz * math.cos(alpha) - f.x * math.sin(alpha)) / (mass * at.ground_m_s) + weight
-    _turning(x, fz, alpha, f, at, model, work.alpha_dot_hat, work)
-    for c in range(work.lift.size):
-        work.alpha_dot_hat[c] *= half
-    loss = half * force / (mass * at.airspeed_m_s)
-    turned = Signals(alpha, signals.elevator, signals.qhat, first * half, signals.qbar)
-    _add_terms(x, turned, model, True, loss * math.cos(alpha), -loss * math.sin(alpha), work)
-
-
-@inner
-def _gust_slopes(v: float, model: FilterModel, slope: Array) -> None:
-    """Slopes of the rates of the gusts, but for the low-passed copies."""
+def _gust_slopes(v: float, d_x: Array, model: FilterModel, slope: Array) -> None:
+    """Derivatives of the rates of the gusts, but for the late gust and the low-passed copies."""
     a = v / model.gusts.length_m
-    for c in range(slope.shape[1]):
-        slope[GUST_1, c] = slope[GUST_1 + 1, c] = 0.0
-    slope[GUST_1, GUST_1], slope[GUST_1 + 1, GUST_1], slope[GUST_1 + 1, GUST_1 + 1] = -a, a, -a
+    for p in range(slope.shape[1]):
+        slope[GUST_1, p] = -a * d_x[GUST_1, p]
+    for p in range(slope.shape[1]):
+        slope[GUST_1 + 1, p] = a * (d_x[GUST_1, p] - d_x[GUST_1 + 1, p])
 
 
 @inner
 def longitudinal_rate_slopes(
-    x: Array, at: AirPoint, model: FilterModel, moved: AircraftMoves, out: Array, slope: Array, work: SlopeWork
+    x: Array,
+    d_x: Array,
+    at: AirPoint,
+    model: FilterModel,
+    moved: AircraftMoves,
+    column: Ints,
+    out: Array,
+    slope: Array,
+    work: SlopeWork,
 ) -> float:
     """See `airtruth.tracing.model.slopes.rate_slopes`."""
     az = rates(x, at, model, out)
@@ -326,31 +382,37 @@ def longitudinal_rate_slopes(
     surface = effective_elevator(at.elevator_rad, aircraft)
     tail = gusts.rotary * gusts.level_m_s * (upward - x[_LATE]) / (gusts.rotary_time_s * v)
     signals = Signals(alpha, surface, (x[1] - tail) * half, 0.0, at.qbar_pa)
-    _air_slopes(x, upward, at, model, moved, slope[_LATE], work)
+    _air_slopes(x, d_x, upward, at, model, moved, column, slope[_LATE], work)
     f = _look_up(aircraft, moved.engine, alpha, surface, signals.qhat, at.qbar_pa)
-    _coefficient_slopes(signals, model, moved, work)
+    _coefficient_slopes(signals, model, moved, column, work)
     if model.effects.amplitude.size > 0:
         d_alpha, d_de = alpha - aircraft.trim_alpha_rad, surface - aircraft.trim_elevator_rad
         lift = at.lift + more[0] * d_alpha + more[1] * signals.qhat + more[2] * d_de
-        _all_terms(x, f, lift, signals, at, model, work)
-    mass, force, chord = aircraft.mass_kg, at.qbar_pa * aircraft.area_m2, aircraft.chord_m
-    _turning(x, az * mass, alpha, f, at, model, slope[0], work)
-    for c in range(slope.shape[1]):
-        fz = f.z_alpha * work.alpha[c] + f.z_qhat * work.qhat[c] - force * work.lift[c]
-        fm = f.m_alpha * work.alpha[c] + f.m_qhat * work.qhat[c] + force * chord * work.moment[c]
-        slope[1, c] = (fm - chord * aircraft.cg_shift * fz) / aircraft.inertia_kg_m2
-        slope[motion, c] = fz / mass
-    slope[1, motion + THRUST] += (f.m_thrust - chord * aircraft.cg_shift * f.z_thrust) / aircraft.inertia_kg_m2
-    slope[1, motion + INERTIA] -= out[1] / moved.inertia
-    slope[motion, motion + THRUST] += f.z_thrust / mass
-    _gust_slopes(v, model, slope)
-    _effect_slopes(half, model, slope, work)
+        _all_terms(x, d_x, f, lift, signals, at, model, column, work)
+    mass, force = aircraft.mass_kg, at.qbar_pa * aircraft.area_m2
+    arm, by = aircraft.chord_m * aircraft.cg_shift, 1.0 / aircraft.inertia_kg_m2
+    _turning(x, d_x, az * mass, alpha, f, at, model, column, slope[0], work)
+    z_alpha, z_qhat, z_lift = f.z_alpha / mass, f.z_qhat / mass, force / mass
+    for p in range(slope.shape[1]):
+        slope[motion, p] = z_alpha * work.alpha[p] + z_qhat * work.qhat[p] - z_lift * work.lift[p]
+    m_alpha, m_qhat = by * (f.m_alpha - arm * f.z_alpha), by * (f.m_qhat - arm * f.z_qhat)
+    m_lift, m_moment = by * arm * force, by * force * aircraft.chord_m
+    for p in range(slope.shape[1]):
+        tables = m_alpha * work.alpha[p] + m_qhat * work.qhat[p]
+        slope[1, p] = tables + m_lift * work.lift[p] + m_moment * work.moment[p]
+    slope[1, column[THRUST]] += by * (f.m_thrust - arm * f.z_thrust)
+    slope[1, column[INERTIA]] -= out[1] / moved.inertia
+    slope[motion, column[THRUST]] += f.z_thrust / mass
+    _gust_slopes(v, d_x, model, slope)
+    _effect_slopes(half, d_x, model, slope, work)
     return az
 
 
 @inner
-def _add_reading(t: int, x: Array, signals: Signals, model: FilterModel, work: SlopeWork, row: Array) -> None:
-    """Add the slopes of an increment of a reading."""
+def _add_reading(
+    t: int, x: Array, d_x: Array, signals: Signals, model: FilterModel, work: SlopeWork, row: Array
+) -> None:
+    """Add the derivatives of an increment of a reading."""
     effects = model.effects
     number, state, behind = effects.term_index[t, 1], effects.term_index[t, 3], effects.term_index[t, 5]
     s = (x[state] if state >= 0 else signal_of(signals, number)) - effects.origin[t]
@@ -359,50 +421,79 @@ def _add_reading(t: int, x: Array, signals: Signals, model: FilterModel, work: S
         driver, own = effects.state_index[behind, 1], model.states.effect[behind]
         weight = x[own] - signal_of(signals, driver)
         value = effects.amplitude[t] * shape(effects.term_index[t, 2], s)
-        row[own] += value
+        _add(value, d_x[own], row)
         _add_signal(driver, -value, work, row)
     by = effects.amplitude[t] * _shape_slope(effects.term_index[t, 2], s) * weight
     if state >= 0:
-        row[state] += by
+        _add(by, d_x[state], row)
     else:
         _add_signal(number, by, work, row)
 
 
 @inner
-def longitudinal_output_slopes(
-    x: Array,
-    rate: Array,
-    at: AirPoint,
-    model: FilterModel,
-    moved: AircraftMoves,
-    slope: Array,
-    out: Array,
-    work: SlopeWork,
+def _reading_slopes(
+    x: Array, d_x: Array, at: AirPoint, model: FilterModel, out: Array, work: SlopeWork
 ) -> None:
-    """See `airtruth.tracing.model.slopes.output_slopes`."""
-    scale, arm, motion, v = model.sensors.scale, model.sensors.arm_m, model.states.motion, at.airspeed_m_s
-    half, effects = 0.5 * model.aircraft.chord_m / v, model.effects
-    for c in range(out.shape[1]):
-        out[0, c], out[1, c] = work.alpha[c], 0.0
-        out[2, c] = slope[motion, c] - arm[2] * slope[1, c]
-    out[0, 1] -= arm[0] / v
-    out[1, 1] = 1.0
-    out[0, motion + MOUNTING] -= x[1] / v * moved.mounting_m
-    out[2, motion + MOUNTING] -= rate[1] * moved.mounting_m
-    for c in range(out.shape[1]):  # readings take q c/(2V) of the body and no alpha'
-        work.qhat[c] = work.alpha_dot_hat[c] = 0.0
-    work.qhat[1] = half
+    """Add the derivatives of the increments of the readings, which take q c/(2V) of the body and no alpha'."""
+    half, effects = 0.5 * model.aircraft.chord_m / at.airspeed_m_s, model.effects
+    if effects.amplitude.size == 0:
+        return
+    for p in range(out.shape[1]):
+        work.qhat[p], work.alpha_dot_hat[p] = half * d_x[1, p], 0.0
     alpha = air_alpha(x, gust(x, model.gusts.rolloff), model.gusts.level_m_s, at)
     surface = effective_elevator(at.elevator_rad, model.aircraft)
     signals = Signals(alpha, surface, x[1] * half, 0.0, at.qbar_pa)
     for t in range(effects.amplitude.size):
         if effects.term_index[t, 0] >= READING:
-            _add_reading(t, x, signals, model, work, out[effects.term_index[t, 0] - READING])
+            _add_reading(t, x, d_x, signals, model, work, out[effects.term_index[t, 0] - READING])
+
+
+@inner
+def longitudinal_output_slopes(
+    x: Array,
+    d_x: Array,
+    rate: Array,
+    slope: Array,
+    at: AirPoint,
+    model: FilterModel,
+    moved: AircraftMoves,
+    column: Ints,
+    out: Array,
+    work: SlopeWork,
+) -> None:
+    """See `airtruth.tracing.model.slopes.output_slopes`."""
+    scale, arm, motion, v = model.sensors.scale, model.sensors.arm_m, model.states.motion, at.airspeed_m_s
+    vane, ahead = arm[0] / v, arm[2]
+    for p in range(out.shape[1]):
+        out[0, p] = work.alpha[p] - vane * d_x[1, p]
+    for p in range(out.shape[1]):
+        out[1, p] = d_x[1, p]
+    for p in range(out.shape[1]):
+        out[2, p] = slope[motion, p] - ahead * slope[1, p]
+    out[0, column[MOUNTING]] -= x[1] / v * moved.mounting_m
+    out[2, column[MOUNTING]] -= rate[1] * moved.mounting_m
+    _reading_slopes(x, d_x, at, model, out, work)
     for i in range(OUTPUTS):
-        for c in range(out.shape[1]):
-            out[i, c] *= scale[i]
+        if scale[i] != 1.0:
+            for p in range(out.shape[1]):
+                out[i, p] *= scale[i]
 
 
-register_slopes(AircraftArrays, MotionSlopes(longitudinal_rate_slopes, longitudinal_output_slopes))
+def pack_moves(plant: Plant, compiled: CompiledChange, common: Array, rolloff: float) -> AircraftMoves:
+    """What the parameters move of `airtruth.tracing.model.response.pack_aircraft`."""
+    entries, moment, unit = SHORT_PERIOD.common, LONGITUDINAL.row("Cm"), np.eye(CORE)
+    return AircraftMoves(
+        inertia=1.0 + float(common[entries.inertia]),
+        turned=plant.derivatives[moment] + common[moment],
+        engine=np.zeros_like(plant.constant) + plant.engine,
+        mounting_m=compiled.declared["cg"] * plant.aircraft.constants.chord_m,
+        upward=np.array([gust(row, rolloff) for row in unit]),
+        lead=np.array([gust(row, 1.0) - gust(row, 0.0) for row in unit]),
+    )
 
-__all__ = ["AircraftMoves", "longitudinal_output_slopes", "longitudinal_rate_slopes"]
+
+register_slopes(
+    AircraftArrays, MotionSlopes(longitudinal_rate_slopes, longitudinal_output_slopes, pack_moves)
+)
+
+__all__ = ["AircraftMoves", "longitudinal_output_slopes", "longitudinal_rate_slopes", "pack_moves"]

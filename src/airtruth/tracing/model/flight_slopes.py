@@ -9,7 +9,7 @@ Source: O. Talagrand and P. Courtier, Q. J. R. Meteorol. Soc. 113 (1987) 1311-13
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import inner
 from airtruth.tracing.model.advance import PARTS, Steps, steps_of
-from airtruth.tracing.model.by_motion import air_at, early_count, equations_of, output_count, state_count
+from airtruth.tracing.model.by_motion import air_at, early_count, output_count, state_count
 from airtruth.tracing.model.filter import Path
 from airtruth.tracing.model.kernel_input import FilterModel, GridSignals, KernelInput
 from airtruth.tracing.model.linearise import FirstUpdate
@@ -26,6 +26,15 @@ from airtruth.tracing.model.slopes import SlopeWork, output_slopes, rate_slopes,
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+
+_BLOCK: Final = 8
+"""Parameters that a processor moves at once at the most [-]."""
+
+
+def width_of(parameters: int) -> int:
+    """Length of the last axis of arrays of derivatives: whole blocks, with a spare row for what is no parameter."""
+    return _BLOCK * (parameters // _BLOCK + 1)
 
 
 class GainSlopes(NamedTuple):
@@ -50,8 +59,7 @@ class Moved(NamedTuple):
     Attributes
     ----------
     aircraft : of the aircraft, of the motion's own type.
-    column : (columns behind those of the states,) number of the parameter of a column; -1 for none.
-    bias : (outputs,) likewise of the biases.
+    column : (movers,) see `airtruth.tracing.model.slopes.rate_slopes`; bias : (outputs,) likewise of the biases.
     slow_std : (outputs, parameters) derivatives of the correlated noise; forget : (parameters,) of its decay over a sample.
     start : (states, parameters) of the initial state.
     """
@@ -72,7 +80,7 @@ class _Lanes(NamedTuple):
     x, d_x : (states,) state, and derivatives.
     tried, d_tried : at a stage or after the update by the early outputs.
     rate, d_rate : (5, states + 1,) of the stages and of the end of a step.
-    slope : (states of the motion + 1, columns); out_slope : (outputs, columns); work : see `SlopeWork`.
+    work : see `SlopeWork`.
     d_out, d_last : (outputs,) before lags and delays, now and at the start of a step; d_before : before the early update.
     d_raw : (outputs,) of the innovation before its scale.
     d_ends : (parts + 1,) a signal at the ends of the parts of a step; d_held : (order,) of a delay.
@@ -84,8 +92,6 @@ class _Lanes(NamedTuple):
     d_tried: Array
     rate: Array
     d_rate: Array
-    slope: Array
-    out_slope: Array
     work: SlopeWork
     d_out: Array
     d_last: Array
@@ -95,9 +101,8 @@ class _Lanes(NamedTuple):
     d_held: Array
 
 
-def _lanes_of(model: FilterModel, columns: int, parameters: int) -> _Lanes:
+def _lanes_of(model: FilterModel, parameters: int) -> _Lanes:
     n, motion, count = model.states.size, model.states.motion, model.sensors.scale.size
-    wide = motion + columns
     return _Lanes(
         x=np.zeros(n),
         d_x=np.zeros((n, parameters)),
@@ -105,9 +110,7 @@ def _lanes_of(model: FilterModel, columns: int, parameters: int) -> _Lanes:
         d_tried=np.zeros((n, parameters)),
         rate=np.zeros((5, n)),
         d_rate=np.zeros((5, motion + 1, parameters)),
-        slope=np.zeros((motion + 1, wide)),
-        out_slope=np.zeros((count, wide)),
-        work=slope_work(wide),
+        work=slope_work(parameters),
         d_out=np.zeros((count, parameters)),
         d_last=np.zeros((count, parameters)),
         d_before=np.zeros((count, parameters)),
@@ -118,23 +121,9 @@ def _lanes_of(model: FilterModel, columns: int, parameters: int) -> _Lanes:
 
 
 @inner
-def _carry(slope: Array, motion: int, d_x: Array, column: Ints, out: Array) -> None:
-    """Derivatives of rows by those of the states, and by the parameters themselves."""
-    for i in range(out.shape[0]):
-        for p in range(out.shape[1]):
-            out[i, p] = 0.0
-        for j in range(motion):
-            by = slope[i, j]
-            if by != 0.0:
-                for p in range(out.shape[1]):
-                    out[i, p] += by * d_x[j, p]
-        for c in range(column.size):
-            if column[c] >= 0:
-                out[i, column[c]] += slope[i, motion + c]
-
-
-@inner
-def _read(i: int, k: int, x: Array, d_x: Array, moved: Moved, model: FilterModel, d_out: Array, d_raw: Array) -> None:
+def _read(
+    i: int, k: int, x: Array, d_x: Array, moved: Moved, model: FilterModel, d_out: Array, d_raw: Array
+) -> None:
     """Derivatives of measured less predicted value of an output into ``d_raw``, of those before lag and delay."""
     lag, delay, noise = model.states.lag[i], model.states.delay[i], model.states.noise
     for p in range(d_raw.shape[1]):
@@ -146,8 +135,7 @@ def _read(i: int, k: int, x: Array, d_x: Array, moved: Moved, model: FilterModel
     if noise >= 0:
         for p in range(d_raw.shape[1]):
             d_raw[i, p] -= model.sensors.slow_std[i] * d_x[noise + i, p] + moved.slow_std[i, p] * x[noise + i]
-    if moved.bias[i] >= 0:
-        d_raw[i, moved.bias[i]] -= 1.0
+    d_raw[i, moved.bias[i]] -= 1.0
 
 
 @inner
@@ -162,7 +150,9 @@ def _settle(d_x: Array, d_out: Array, model: FilterModel) -> None:
 
 
 @inner
-def _early(k: int, row: int, given: KernelInput, moved: Moved, path: Path, gains: GainSlopes, own: _Lanes) -> None:
+def _early(
+    k: int, row: int, given: KernelInput, moved: Moved, path: Path, gains: GainSlopes, own: _Lanes
+) -> None:
     """Innovations of the early outputs, and the state after the update by them."""
     model, early = given.model, early_count(given.model)
     if k == 0:
@@ -185,7 +175,14 @@ def _early(k: int, row: int, given: KernelInput, moved: Moved, path: Path, gains
 
 @inner
 def _late(
-    k: int, row: int, given: KernelInput, moved: Moved, path: Path, gains: GainSlopes, shown: float, own: _Lanes
+    k: int,
+    row: int,
+    given: KernelInput,
+    moved: Moved,
+    path: Path,
+    gains: GainSlopes,
+    shown: float,
+    own: _Lanes,
 ) -> None:
     """Innovation of the late output, see `airtruth.tracing.model.filter.innovation`."""
     model, early = given.model, early_count(given.model)
@@ -201,11 +198,22 @@ def _late(
         for i in range(own.x.size):
             by, step = weight * path.direct[k, i], weight * (own.tried[i] - own.x[i])
             for p in range(own.d_raw.shape[1]):
-                own.d_raw[early, p] -= by * (own.d_tried[i, p] - own.d_x[i, p]) + step * gains.direct[row, i, p]
+                own.d_raw[early, p] -= (
+                    by * (own.d_tried[i, p] - own.d_x[i, p]) + step * gains.direct[row, i, p]
+                )
 
 
 @inner
-def _update(k: int, row: int, given: KernelInput, moved: Moved, steps: Steps, path: Path, gains: GainSlopes, own: _Lanes) -> None:
+def _update(
+    k: int,
+    row: int,
+    given: KernelInput,
+    moved: Moved,
+    steps: Steps,
+    path: Path,
+    gains: GainSlopes,
+    own: _Lanes,
+) -> None:
     """The update, and the decay of the correlated noise."""
     noise = given.model.states.noise
     for i in range(own.x.size):
@@ -320,20 +328,34 @@ def _advance_delay(delay: int, i: int, steps: Steps, own: _Lanes) -> None:
 
 
 @inner
-def _advance(point: int, grid: GridSignals, model: FilterModel, moved: Moved, steps: Steps, own: _Lanes) -> None:
+def _advance(
+    point: int, grid: GridSignals, model: FilterModel, moved: Moved, steps: Steps, own: _Lanes
+) -> None:
     """One step of the motion, and of the sensors behind it."""
-    motion = model.states.motion
     for stage in range(5 if steps.has_late_sensors else 4):
         if stage < 4:
             _stage(stage, model, steps, own)
         else:
             _end(model, steps, own)
         at = air_at(grid, point + (0 if stage == 0 else (2 if stage >= 3 else 1)))
-        rate_slopes(own.tried, at, model, moved.aircraft, own.rate[stage], own.slope, own.work)
-        _carry(own.slope, motion, own.d_tried, moved.column, own.d_rate[stage])
+        d_rate, column = own.d_rate[stage], moved.column
+        rate_slopes(
+            own.tried, own.d_tried, at, model, moved.aircraft, column, own.rate[stage], d_rate, own.work
+        )
         if steps.has_late_sensors and (stage == 0 or stage == 4):
-            output_slopes(own.tried, own.rate[stage], at, model, moved.aircraft, own.slope, own.out_slope, own.work)
-            _carry(own.out_slope, motion, own.d_tried, moved.column, own.d_last if stage == 0 else own.d_out)
+            d_out = own.d_last if stage == 0 else own.d_out
+            output_slopes(
+                own.tried,
+                own.d_tried,
+                own.rate[stage],
+                d_rate,
+                at,
+                model,
+                moved.aircraft,
+                column,
+                d_out,
+                own.work,
+            )
     if steps.has_late_sensors:
         _advance_sensors(model, steps, own)
     else:
@@ -342,7 +364,14 @@ def _advance(point: int, grid: GridSignals, model: FilterModel, moved: Moved, st
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _along(
-    given: KernelInput, moved: Moved, steps: Steps, path: Path, gains: GainSlopes, shown: float, own: _Lanes, out: Array
+    given: KernelInput,
+    moved: Moved,
+    steps: Steps,
+    path: Path,
+    gains: GainSlopes,
+    shown: float,
+    own: _Lanes,
+    out: Array,
 ) -> None:
     """`innovation_slopes` from the derivatives of the initial state."""
     model, samples, n = given.model, given.y.shape[0], given.model.states.size
@@ -354,9 +383,11 @@ def _along(
             for p in range(out.shape[2]):
                 own.d_tried[i, p] = own.d_x[i, p]
         for turn in range(2):
-            rate_slopes(own.tried, at, model, moved.aircraft, own.rate[0], own.slope, own.work)
-            output_slopes(own.tried, own.rate[0], at, model, moved.aircraft, own.slope, own.out_slope, own.work)
-            _carry(own.out_slope, model.states.motion, own.d_tried, moved.column, own.d_out)
+            rate, d_rate, column = own.rate[0], own.d_rate[0], moved.column
+            rate_slopes(own.tried, own.d_tried, at, model, moved.aircraft, column, rate, d_rate, own.work)
+            output_slopes(
+                own.tried, own.d_tried, rate, d_rate, at, model, moved.aircraft, column, own.d_out, own.work
+            )
             if turn == 0:
                 _early(k, row, given, moved, path, gains, own)
             else:
@@ -379,11 +410,11 @@ def innovation_slopes(given: KernelInput, moved: Moved, path: Path, gains: GainS
     """
     samples, count = given.y.shape
     parameters = moved.forget.size
-    own = _lanes_of(given.model, moved.column.size, parameters)
+    own = _lanes_of(given.model, parameters)
     own.d_x[:] = moved.start
     out = np.empty((samples, count, parameters))
     _along(given, moved, steps_of(given.model, given.dt_s, given.sub), path, gains, shown, own, out)
     return out
 
 
-__all__ = ["GainSlopes", "Moved", "innovation_slopes"]
+__all__ = ["GainSlopes", "Moved", "innovation_slopes", "width_of"]

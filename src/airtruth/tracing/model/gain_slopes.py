@@ -10,7 +10,6 @@ equation, summed here by doubling as by R. A. Smith, SIAM J. Appl. Math. 16 (196
 
 from __future__ import annotations
 
-import math
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -20,15 +19,20 @@ from numpy.typing import NDArray
 from airtruth.numerics.compiled import allocating, inner
 from airtruth.numerics.discretise import DOUBLINGS, congruence, multiply, riccati, step, whitener
 from airtruth.tracing.model.by_motion import output_count, outputs, state_count
-from airtruth.tracing.model.corners import CornerNodes, corrected, gain_at, predicted, settled, STEP_RAD, drive_sensors, moved_surface, spread_of
+from airtruth.tracing.model.corners import (
+    STEP_RAD,
+    corrected,
+    drive_sensors,
+    moved_surface,
+    spread_of,
+)
 from airtruth.tracing.model.equations import gust
-from airtruth.tracing.model.flight_slopes import GainSlopes
 from airtruth.tracing.model.kernel_input import AirPoint, FilterModel
 from airtruth.tracing.model.linearise import (
+    LEAST_MOVE,
     FirstUpdate,
     add_sensors,
     covariance_of,
-    LEAST_MOVE,
     first_update,
     half_width,
     update_gain,
@@ -96,8 +100,15 @@ class _Linear(NamedTuple):
 
 
 class _Ends(NamedTuple):
-    """Rates (2, states), outputs, and their slopes at both ends of a difference."""
+    """Rates (2, states), outputs, and their slopes at both ends of a difference, in the states and then the movers.
 
+    Attributes
+    ----------
+    unit, column : derivatives of the states, and numbers of the movers, along the last axis.
+    """
+
+    unit: Array
+    column: Ints
     rate: Array
     y: Array
     slope: Array
@@ -105,22 +116,34 @@ class _Ends(NamedTuple):
 
 
 @inner
-def _at_end(side: int, x: Array, at: AirPoint, model: FilterModel, aircraft: Any, ends: _Ends, work: SlopeWork) -> None:
-    az = rate_slopes(x, at, model, aircraft, ends.rate[side], ends.slope[side], work)
-    output_slopes(x, ends.rate[side], at, model, aircraft, ends.slope[side], ends.out[side], work)
+def _at_end(
+    side: int, x: Array, at: AirPoint, model: FilterModel, aircraft: Any, ends: _Ends, work: SlopeWork
+) -> None:
+    rate, slope = ends.rate[side], ends.slope[side]
+    az = rate_slopes(x, ends.unit, at, model, aircraft, ends.column, rate, slope, work)
+    output_slopes(x, ends.unit, rate, slope, at, model, aircraft, ends.column, ends.out[side], work)
     outputs(x, ends.rate[side], az, at, model, ends.y[side])
 
 
 @allocating
-def _linear(x: Array, at: AirPoint, model: FilterModel, aircraft: Any, columns: int, with_input: bool) -> _Linear:
+def _linear(
+    x: Array, at: AirPoint, model: FilterModel, aircraft: Any, columns: int, with_input: bool
+) -> _Linear:
     """Linearisation about a state by the differences of `airtruth.tracing.model.linearise.linearise`, and its slopes.
 
     The half width in a gust depends on the level and the rolloff, and the difference with it where the tables bend.
     """
     motion, count, wide = model.states.motion, output_count(model), model.states.motion + columns
     ends = _Ends(
-        np.zeros((2, x.size)), np.zeros((2, count)), np.zeros((2, motion + 1, wide)), np.zeros((2, count, wide))
+        np.zeros((x.size, wide)),
+        motion + np.arange(columns),
+        np.zeros((2, x.size)),
+        np.zeros((2, count)),
+        np.zeros((2, motion + 1, wide)),
+        np.zeros((2, count, wide)),
     )
+    for i in range(motion):
+        ends.unit[i, i] = 1.0
     work = slope_work(wide)
     made = _Linear(
         np.zeros((motion, motion)),
@@ -146,11 +169,15 @@ def _linear(x: Array, at: AirPoint, model: FilterModel, aircraft: Any, columns: 
             for i in range(motion):
                 made.input[i] = (ends.rate[0, i] - ends.rate[1, i]) / (2.0 * h)
                 for q in range(columns):
-                    made.d_input[i, q] = (ends.slope[0, i, motion + q] - ends.slope[1, i, motion + q]) / (2.0 * h)
+                    made.d_input[i, q] = (ends.slope[0, i, motion + q] - ends.slope[1, i, motion + q]) / (
+                        2.0 * h
+                    )
             for i in range(count):
                 made.direct[i] = (ends.y[0, i] - ends.y[1, i]) / (2.0 * h)
                 for q in range(columns):
-                    made.d_direct[i, q] = (ends.out[0, i, motion + q] - ends.out[1, i, motion + q]) / (2.0 * h)
+                    made.d_direct[i, q] = (ends.out[0, i, motion + q] - ends.out[1, i, motion + q]) / (
+                        2.0 * h
+                    )
             continue
         x[j] = middle
         _difference(j, h, ends.rate, ends.slope, motion, made.a, made.d_a)
@@ -195,7 +222,14 @@ def _widths(j: int, at: AirPoint, model: FilterModel, ends: _Ends, made: _Linear
 
 @allocating
 def _moved_system(
-    row: int, linear: _Linear, moves: Moves, model: FilterModel, a: Array, c: Array, direct: Array, column: Array
+    row: int,
+    linear: _Linear,
+    moves: Moves,
+    model: FilterModel,
+    a: Array,
+    c: Array,
+    direct: Array,
+    column: Array,
 ) -> None:
     """Linearisation after a step of a parameter, late sensors and correlated noise included."""
     motion, h, q = model.states.motion, moves.h[row], moves.column[row]
@@ -271,7 +305,14 @@ def _gains(row: int, c: Array, variance: Array, out: Conditions) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _conditions(
-    x: Array, at: AirPoint, model: FilterModel, aircraft: Any, columns: int, moves: Moves, dt_s: float, out: Conditions
+    x: Array,
+    at: AirPoint,
+    model: FilterModel,
+    aircraft: Any,
+    columns: int,
+    moves: Moves,
+    dt_s: float,
+    out: Conditions,
 ) -> None:
     """`conditions` into ``out``."""
     n, rows, with_input = x.size, moves.h.size, out.spread.shape[0] > 0
@@ -326,7 +367,14 @@ def _conditions(
 
 
 def conditions(
-    x: Array, at: AirPoint, model: FilterModel, aircraft: Any, columns: int, moves: Moves, dt_s: float, uncertain: bool
+    x: Array,
+    at: AirPoint,
+    model: FilterModel,
+    aircraft: Any,
+    columns: int,
+    moves: Moves,
+    dt_s: float,
+    uncertain: bool,
 ) -> Conditions:
     """The filter at one flight condition after small steps of the parameters.
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -15,12 +15,16 @@ from numpy.typing import NDArray
 
 from airtruth.numerics.discretise import multiply
 from airtruth.tracing.model.corners import CornerNodes, corrected, gain_at, predicted, settled
-from airtruth.tracing.model.flight_slopes import GainSlopes
+from airtruth.tracing.model.flight_slopes import GainSlopes, width_of
 from airtruth.tracing.model.gain_slopes import Conditions, Moves
 from airtruth.tracing.model.linearise import FirstUpdate
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+
+_ONE: Final = 2
+"""Dimensions of `_Gains.direct` where all samples have the same gains [-]."""
 
 
 class _Gains(NamedTuple):
@@ -90,7 +94,7 @@ def slopes_along(
     if lower.size == 0 and corner_rad2.size == 0:
         own = nodes[0]
         steady = _Gains(own.k_gain, own.first, own.direct, np.zeros((rows, count, count)))
-        return _divided([_row(steady, row) for row in range(rows)], moves), np.zeros(rows - 1)
+        return _divided(steady, moves), np.zeros(rows - 1)
     samples = lower.size or corner_rad2.size
     node = lower + (share > 0.5) if lower.size else np.zeros(samples, dtype=np.int64)
     uncertain = np.zeros(samples, dtype=np.bool_)
@@ -125,14 +129,13 @@ def slopes_along(
         )
         made.append(gains)
     h = np.where(moves.h[1:] == 0.0, 1.0, moves.h[1:])
-    return _divided(made, moves), (more[1:] - more[0]) / h
-
-
-def _row(own: _Gains, row: int) -> _Gains:
-    """The gains after one step as those of a single sample."""
-    first = FirstUpdate(own.first.gain[row : row + 1], own.first.share[row : row + 1])
-    at = slice(row, row + 1)
-    return _Gains(own.k_gain[at], first, own.direct[at], own.scale[at])
+    stacked = _Gains(
+        np.stack([own.k_gain for own in made]),
+        FirstUpdate(np.stack([own.first.gain for own in made]), np.stack([own.first.share for own in made])),
+        np.stack([own.direct for own in made]),
+        np.stack([own.scale for own in made]),
+    )
+    return _divided(stacked, moves), (more[1:] - more[0]) / h
 
 
 def _corners(nodes: Sequence[Conditions], row: int, moves: Moves) -> CornerNodes:
@@ -151,20 +154,24 @@ def _corners(nodes: Sequence[Conditions], row: int, moves: Moves) -> CornerNodes
     )
 
 
-def _divided(rows: Sequence[_Gains], moves: Moves) -> GainSlopes:
-    """Differences from the first row over the steps, with the parameters as the last axis."""
+def _divided(rows: _Gains, moves: Moves) -> GainSlopes:
+    """Differences from the first row over the steps, with the parameters as the last axis.
 
-    def slope(x: Sequence[Array]) -> Array:
-        out = np.zeros((*x[0].shape, len(x) - 1))
-        for row in range(1, len(x)):
-            if moves.h[row] != 0.0:
-                out[..., row - 1] = (x[row] - x[0]) / moves.h[row]
-        return out
+    Parameters
+    ----------
+    rows : (rows, samples, ...), or (rows, ...) where all samples have the same gains.
+    """
+    moved = np.flatnonzero(moves.h)
+    by, width = 1.0 / moves.h[moved], width_of(moves.h.size - 1)
+    each = rows.direct.ndim > _ONE
 
-    first = FirstUpdate(slope([r.first.gain for r in rows]), slope([r.first.share for r in rows]))
-    return GainSlopes(
-        slope([r.k_gain for r in rows]), first, slope([r.direct for r in rows]), slope([r.scale for r in rows])
-    )
+    def slope(x: Array) -> Array:
+        out = np.zeros((*x.shape[1:], width))
+        out[..., moved - 1] = np.moveaxis(x[moved] - x[0], 0, -1) * by
+        return out if each else out[None]
+
+    first = FirstUpdate(slope(rows.first.gain), slope(rows.first.share))
+    return GainSlopes(slope(rows.k_gain), first, slope(rows.direct), slope(rows.scale))
 
 
 __all__ = ["slopes_along"]

@@ -7,22 +7,18 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.physics.motion import LONGITUDINAL
-from airtruth.tracing.model.compile import CompiledChange
 from airtruth.tracing.model.corners import Corners
 from airtruth.tracing.model.equation_slopes import AircraftMoves
-from airtruth.tracing.model.equations import PLAY, gust
+from airtruth.tracing.model.equations import PLAY
 from airtruth.tracing.model.filter import initial_state, innovations, path_of
-from airtruth.tracing.model.flight_slopes import Moved, innovation_slopes
+from airtruth.tracing.model.flight_slopes import Moved, innovation_slopes, width_of
 from airtruth.tracing.model.gain_slopes import Conditions, Moves, conditions
 from airtruth.tracing.model.gains_along import slopes_along
 from airtruth.tracing.model.kernel_input import KernelInput
 from airtruth.tracing.model.linearise import FirstUpdate
-from airtruth.tracing.model.parameters import CORE, SHORT_PERIOD
-from airtruth.tracing.model.plant import Plant
-from airtruth.tracing.model.response import LOST, FilterInputs, Response, kernel_input
+from airtruth.tracing.model.response import LOST, FilterInputs, Response, kernel_input, respond_to
 from airtruth.tracing.model.settings import Settings
-from airtruth.tracing.model.slopes import has_slopes, moving
+from airtruth.tracing.model.slopes import has_slopes, moves_of, moving
 from airtruth.tracing.model.steady import Condition, common_of, conditions_of, equilibrium, joined
 
 Array = NDArray[np.float64]
@@ -38,13 +34,19 @@ class ResponseSlopes(NamedTuple):
 
     Attributes
     ----------
+    parameters : indices in a vector of the common parameters and those of the record.
     e : (parameters, samples, outputs) of the innovations.
     covariance : (parameters, outputs, outputs); more_logdet : (parameters,).
     """
 
+    parameters: Ints
     e: Array
     covariance: Array
     more_logdet: Array
+
+
+NO_SLOPES: Final = ResponseSlopes(np.zeros(0, dtype=np.int64), *(np.zeros((0, 0, 0)) for _ in range(3)))
+"""No derivatives."""
 
 
 class _Noise(NamedTuple):
@@ -63,43 +65,51 @@ class _Noise(NamedTuple):
     d_forget: Array
 
 
-def sloped(given: FilterInputs, settings: Settings, common: Array, parameters: Ints) -> NDArray[np.bool_]:
-    """(parameters,) which of the parameters have derivatives along the nominal flight; the others need flights of their own.
+def _sloped(kernel: KernelInput, settings: Settings, common: Array, wanted: Ints) -> Ints:
+    """The parameters that have derivatives along the nominal flight.
 
     Correlated noise that is absent adds states once it is there, and a play has no slope where it reverses.
-
-    Parameters
-    ----------
-    parameters : indices in a vector of the common parameters and those of the record.
     """
-    if (given.compiled.effects.state_index[:, 0] == PLAY).any():
-        return np.zeros(parameters.size, dtype=np.bool_)
+    model = kernel.model
+    if not has_slopes(model) or (model.effects.state_index[:, 0] == PLAY).any():
+        return wanted[:0]
     shares = settings.layout.common.colour_shares
     absent = np.arange(shares.start, shares.stop)[common[shares] <= 0.0]
-    return ~np.isin(parameters, absent)
+    return wanted[~np.isin(wanted, absent)]
 
 
 def respond_with_slopes(
-    given: FilterInputs, settings: Settings, common: Array, per_record: Array, parameters: Ints
+    given: FilterInputs, settings: Settings, common: Array, per_record: Array, wanted: Ints
 ) -> tuple[Response, ResponseSlopes | None]:
     """`airtruth.tracing.model.response.respond_to`, and its derivatives; None where the motion is lost.
 
     Parameters
     ----------
     common, per_record : see `CommonEntries` and `RecordEntries`.
-    parameters : those in which it is differentiated, see `sloped`.
+    wanted : parameters in which it is differentiated where the motion states its derivatives, as indices in a vector of the
+        common parameters and those of the record.
     """
     kernel = kernel_input(given, settings, common, per_record)
+    parameters = _sloped(kernel, settings, common, wanted)
+    if parameters.size == 0:
+        return respond_to(given, settings, common, per_record), NO_SLOPES
     samples, count = kernel.y.shape
     e, none = np.full_like(kernel.y, LOST), np.eye(count)
     lost = Response(e[given.lead :], none, none, np.nan)
-    aircraft = pack_moves(given.record.plant, given.compiled, common, kernel.model.gusts.rolloff)
+    aircraft = moves_of(kernel.model)(given.record.plant, given.compiled, common, kernel.model.gusts.rolloff)
     noise = _noise(kernel, settings, common, parameters)
     moves, column = _moves(settings, noise, parameters)
     uncertain = kernel.corner_rad2.size > 0
     nodes = [
         conditions(
-            equilibrium(alpha, air, kernel.model), air, kernel.model, aircraft, column.size, moves, kernel.dt_s, uncertain
+            equilibrium(alpha, air, kernel.model),
+            air,
+            kernel.model,
+            aircraft,
+            column.size,
+            moves,
+            kernel.dt_s,
+            uncertain,
         )
         for alpha, air in conditions_of(kernel, given.along)
     ]
@@ -120,25 +130,12 @@ def respond_with_slopes(
     by_covariance = np.where(moved[1:, None, None], (covariance[1:] - covariance[0]) / h, 0.0)
     e = e[given.lead :]
     response = Response(e, steady.white, steady.covariance, steady.logdet + more / len(e), more, steady)
-    by_e = np.ascontiguousarray(np.moveaxis(slopes[given.lead :], 2, 0))
-    return response, ResponseSlopes(by_e, by_covariance, more_slopes)
-
-
-def pack_moves(plant: Plant, compiled: CompiledChange, common: Array, rolloff: float) -> AircraftMoves:
-    """What the parameters move of `airtruth.tracing.model.response.pack_aircraft`."""
-    entries, moment, unit = SHORT_PERIOD.common, LONGITUDINAL.row("Cm"), np.eye(CORE)
-    return AircraftMoves(
-        inertia=1.0 + float(common[entries.inertia]),
-        turned=plant.derivatives[moment] + common[moment],
-        engine=np.zeros_like(plant.constant) + plant.engine,
-        mounting_m=compiled.declared["cg"] * plant.aircraft.constants.chord_m,
-        upward=np.array([gust(row, rolloff) for row in unit]),
-        lead=np.array([gust(row, 1.0) - gust(row, 0.0) for row in unit]),
-    )
+    by_e = np.ascontiguousarray(np.moveaxis(slopes[given.lead :, :, : parameters.size], 2, 0))
+    return response, ResponseSlopes(parameters, by_e, by_covariance, more_slopes)
 
 
 def _moves(settings: Settings, noise: _Noise, parameters: Ints) -> tuple[Moves, Ints]:
-    """Small steps of the parameters that move gains, and the number of the parameter of each column of the slopes."""
+    """Small steps of the parameters that move gains, and the number of each mover among the parameters; -1 for none."""
     entries, own = settings.layout.common, settings.layout.per_record
     number = np.full(entries.size + own.size, -1, dtype=np.int64)
     number[parameters] = np.arange(parameters.size)
@@ -214,9 +211,12 @@ def _moved(
     kernel: KernelInput, settings: Settings, parameters: Ints, aircraft: AircraftMoves, noise: _Noise, column: Ints
 ) -> Moved:
     """What the parameters move beside the gains."""
-    entries, own = settings.layout.common, settings.layout.per_record
-    start, at_rest = np.zeros((kernel.model.states.size, parameters.size)), initial_state(kernel)
-    bias = np.full(kernel.model.sensors.scale.size, -1, dtype=np.int64)
+    entries, own, spare = settings.layout.common, settings.layout.per_record, parameters.size
+    n, count = kernel.model.states.size, kernel.model.sensors.scale.size
+    start, bias = np.zeros((n, width_of(spare))), np.full(count, spare, dtype=np.int64)
+    slow_std, forget = np.zeros((count, start.shape[1])), np.zeros(start.shape[1])
+    slow_std[:, :spare], forget[:spare] = noise.d_slow_std, noise.d_forget
+    at_rest = initial_state(kernel)
     for p, index in enumerate(parameters - entries.size):
         if 0 <= index < own.start.stop:
             # the initial state is linear in it
@@ -224,7 +224,7 @@ def _moved(
             start[:, p] = initial_state(shifted) - at_rest
         elif own.bias.start <= index < own.bias.stop:
             bias[index - own.bias.start] = p
-    return Moved(aircraft, column, bias, noise.d_slow_std, noise.d_forget, start)
+    return Moved(aircraft, np.where(column < 0, spare, column), bias, slow_std, forget, start)
 
 
-__all__ = ["ResponseSlopes", "pack_moves", "respond_with_slopes", "sloped"]
+__all__ = ["ResponseSlopes", "respond_with_slopes"]

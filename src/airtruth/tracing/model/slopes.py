@@ -1,10 +1,9 @@
-"""Slopes of the equations of a motion, chosen by the type of its aircraft.
+"""Derivatives of the equations of a motion in many parameters at once, chosen by the type of its aircraft.
 
-A slope is a row over columns: the states of the motion, the gusts and the effects first, then the parameters that move the
-motion, in the order of `MOVERS`, the derivatives and the trim. A motion registers its slopes (`register_slopes`); derivatives
-of a motion without them are differences of flights.
+The last axis of every array of derivatives is that of the parameters. A motion states its derivatives by `register_slopes`;
+those of a motion without them are differences of flights.
 
-Source: A. Griewank and A. Walther, *Evaluating Derivatives*, 2nd ed. (2008), section 3.1, for the forward mode.
+Source: A. Griewank and A. Walther, *Evaluating Derivatives*, 2nd ed. (2008), section 3.1 (forward mode, several directions).
 """
 
 from __future__ import annotations
@@ -23,13 +22,13 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 MOVERS: Final = ("rotary", "thrust", "rolloff", "inertia", "mounting", "log_gust")
-"""Parameters that move any motion, in the order of their columns behind those of the states."""
+"""Parameters that move any motion; the derivatives and the increments at the trim follow them in `moving`."""
 ROTARY, THRUST, ROLLOFF, INERTIA, MOUNTING, LOG_GUST = range(len(MOVERS))
 """Their numbers."""
 
 
 class SlopeWork(NamedTuple):
-    """Slopes of what forces and readings depend on, (columns,) each.
+    """Derivatives of what forces and readings depend on, (parameters,) each.
 
     Attributes
     ----------
@@ -46,15 +45,17 @@ class SlopeWork(NamedTuple):
 
 
 class MotionSlopes(NamedTuple):
-    """Slopes of one motion's equations; both are `airtruth.numerics.compiled.inner`.
+    """Derivatives of one motion's equations.
 
     Attributes
     ----------
-    rates, outputs : as `rate_slopes` and `output_slopes`.
+    rates, outputs : as `rate_slopes` and `output_slopes`, `airtruth.numerics.compiled.inner`.
+    moves : (plant, compiled change, common parameters, rolloff) -> what the parameters move of the aircraft.
     """
 
     rates: Callable[..., float]
     outputs: Callable[..., None]
+    moves: Callable[..., Any]
 
 
 _OF: Final[dict[type, MotionSlopes]] = {}
@@ -66,26 +67,31 @@ def register_slopes(aircraft: type, slopes: MotionSlopes) -> None:
     _OF[aircraft] = slopes
 
 
+def moves_of(model: FilterModel) -> Callable[..., Any]:
+    """See `MotionSlopes.moves`."""
+    return _OF[type(model.aircraft)].moves
+
+
 def has_slopes(model: FilterModel) -> bool:
     """Whether the motion of a model has slopes."""
     return type(model.aircraft) in _OF
 
 
 @shared
-def slope_work(columns: int) -> SlopeWork:
-    """Arrays for a number of columns."""
+def slope_work(parameters: int) -> SlopeWork:
+    """Arrays for a number of parameters."""
     return SlopeWork(
-        np.zeros(columns),
-        np.zeros(columns),
-        np.zeros(columns),
-        np.zeros(columns),
-        np.zeros(columns),
-        np.zeros(columns),
+        np.zeros(parameters),
+        np.zeros(parameters),
+        np.zeros(parameters),
+        np.zeros(parameters),
+        np.zeros(parameters),
+        np.zeros(parameters),
     )
 
 
 def moving(layout: ParameterLayout, sizes: int) -> Ints:
-    """(columns behind those of the states,) index of each parameter that moves the motion, as in `Layout`."""
+    """(movers,) index of each parameter that moves the motion, as in `Layout`."""
     common, own = layout.common, layout.per_record
     first = common.size + sizes
     named = [first + own.log_gust if name == "log_gust" else common.index(name) for name in MOVERS]
@@ -99,29 +105,54 @@ def _typed(model: Any) -> MotionSlopes:
     return _OF[model.types[model.fields.index("aircraft")].instance_class]
 
 
-def _rate_slopes(x: Any, at: Any, model: Any, moved: Any, out: Any, slope: Any, work: Any) -> Callable[..., float]:
+def _rate_slopes(
+    x: Any, d_x: Any, at: Any, model: Any, moved: Any, column: Any, out: Any, d_out: Any, work: Any
+) -> Callable[..., float]:
     own = _typed(model).rates
-    return lambda x, at, model, moved, out, slope, work: own(x, at, model, moved, out, slope, work)
+    return lambda x, d_x, at, model, moved, column, out, d_out, work: own(
+        x, d_x, at, model, moved, column, out, d_out, work
+    )
 
 
 def _output_slopes(
-    x: Any, rate: Any, at: Any, model: Any, moved: Any, slope: Any, out: Any, work: Any
+    x: Any,
+    d_x: Any,
+    rate: Any,
+    d_rate: Any,
+    at: Any,
+    model: Any,
+    moved: Any,
+    column: Any,
+    d_out: Any,
+    work: Any,
 ) -> Callable[..., None]:
     own = _typed(model).outputs
-    return lambda x, rate, at, model, moved, slope, out, work: own(x, rate, at, model, moved, slope, out, work)
+    return lambda x, d_x, rate, d_rate, at, model, moved, column, d_out, work: own(
+        x, d_x, rate, d_rate, at, model, moved, column, d_out, work
+    )
 
 
 @by_types(_rate_slopes)
 def rate_slopes(
-    x: Array, at: AirPoint, model: FilterModel, moved: Any, out: Array, slope: Array, work: SlopeWork
+    x: Array,
+    d_x: Array,
+    at: AirPoint,
+    model: FilterModel,
+    moved: Any,
+    column: Ints,
+    out: Array,
+    d_out: Array,
+    work: SlopeWork,
 ) -> float:
-    """`airtruth.tracing.model.by_motion.rates`, and their slopes.
+    """`airtruth.tracing.model.by_motion.rates`, and their derivatives.
 
     Parameters
     ----------
+    d_x : (states, parameters) derivatives of the state.
     moved : what the parameters move of the aircraft, of the motion's own type.
-    slope : (states of the motion, gusts and effects + 1, columns), written but for the low-passed copies of the gust, whose steps
-        are exact; the last row is that of the force of the late output.
+    column : (movers,) number of each parameter of `moving` along the last axis.
+    d_out : (states of the motion, gusts and effects + 1, parameters), written but for the low-passed copies of the gust, whose
+        steps are exact; the last row is that of the force of the late output.
     work : written for `output_slopes` at the same state.
     """
     raise NotImplementedError
@@ -129,13 +160,22 @@ def rate_slopes(
 
 @by_types(_output_slopes)
 def output_slopes(
-    x: Array, rate: Array, at: AirPoint, model: FilterModel, moved: Any, slope: Array, out: Array, work: SlopeWork
+    x: Array,
+    d_x: Array,
+    rate: Array,
+    d_rate: Array,
+    at: AirPoint,
+    model: FilterModel,
+    moved: Any,
+    column: Ints,
+    d_out: Array,
+    work: SlopeWork,
 ) -> None:
-    """Slopes of what the sensors read without bias, lag, delay and noise, into ``out`` (outputs, columns).
+    """Derivatives of what the sensors read without bias, lag, delay and noise, into ``d_out`` (outputs, parameters).
 
     Parameters
     ----------
-    rate, slope, work : of `rate_slopes` at the same state.
+    rate, d_rate, work : of `rate_slopes` at the same state.
     """
     raise NotImplementedError
 
@@ -151,6 +191,7 @@ __all__ = [
     "MotionSlopes",
     "SlopeWork",
     "has_slopes",
+    "moves_of",
     "moving",
     "output_slopes",
     "rate_slopes",

@@ -191,4 +191,14 @@ def linearise_at_reference(given: KernelInput, a: Array, c: Array) -> Array:
     return linearise(x, given.reference, given.model, a, c)
 
 
-__all__ = ["Condition", "SteadyFilter", "common_of", "conditions_of", "equilibrium", "joined", "linearise_at_reference", "steady_filter", "without_update"]
+__all__ = [
+    "Condition",
+    "SteadyFilter",
+    "common_of",
+    "conditions_of",
+    "equilibrium",
+    "joined",
+    "linearise_at_reference",
+    "steady_filter",
+    "without_update",
+]
