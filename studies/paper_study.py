@@ -24,9 +24,10 @@ from airtruth.aircraft import Aircraft
 from airtruth.identification import estimates_table, identify_batch
 from airtruth.logs.flight_log import Batch
 from airtruth.logs.store import read_table, write_table
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.reporting.campaign import read_campaign
-from airtruth.reporting.paper.comparison import RUNS, SIX
+from airtruth.reporting.paper.comparison import RUNS, together
 from airtruth.reporting.paper.tables import TABLES, Entry, PaperTable, evaluate
 from airtruth.table import Row, Table, as_markdown, flat
 from airtruth.units import DEG, G0
@@ -57,6 +58,9 @@ PRINTED_COLUMNS: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
     "moderate": {"table3": ("ls", "iv-lowpass", "iv-f1", "iv-f2")},
 }
 """Level -> table -> methods whose columns the paper prints, each once."""
+
+SIX: Final = together(LONGITUDINAL)
+"""Name in place of a parameter for statistics of all six derivatives together."""
 
 METHODS: Final = {
     "light": (*PRINTED_COLUMNS["light"]["table1"], "iv-reference", "iv-actuator", "iv-f1", "iv-f2"),

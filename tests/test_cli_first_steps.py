@@ -146,8 +146,7 @@ def test_a_new_mapping_of_a_file_is_the_guess(airtruth, tmp_path):
     assert code == 0
     assert (tmp_path / "map.toml").read_text() == guess_mapping(tmp_path / "data/foreign/flight7.csv")
     code, _, err = airtruth(*out.splitlines()[-1].split()[1:])
-    assert code == 2
-    assert "state sign = -1" in err
+    assert (code, err) == (0, "")  # the guess turns Nz and the elevator around, as flight7.toml does
 
 
 @pytest.mark.slow

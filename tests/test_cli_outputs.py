@@ -47,6 +47,23 @@ def test_identify_does_not_replace_its_input(command, log):
     assert log.read_bytes() == before
 
 
+@pytest.mark.parametrize(
+    ("name", "offered"), [("e", "e.parquet"), ("e.csv", "e.parquet"), ("e.v2", "e.parquet")]
+)
+def test_a_file_of_estimates_is_named_parquet(command, log, name, offered):
+    code, out, err = command("identify", log, "--aircraft", "gtm", "--method", "ls", "--out", name)
+    assert (code, out) == (2, "")
+    assert err == f"airtruth: {name}: estimates are a Parquet file; name it {offered}\n"
+    assert not Path(name).exists()
+
+
+def test_estimates_are_known_by_their_content(command, log):
+    assert command("identify", log, "--aircraft", "gtm", "--method", "ls", "--out", "e.parquet")[0] == 0
+    Path("e.parquet").rename("renamed")
+    assert command("export", "renamed", "--out", "m.json")[0] == 0
+    assert command("report", "renamed", "--out", "r.html")[0] == 0
+
+
 def test_identify_can_be_repeated_and_keeps_other_files(command, log, tmp_path):
     arguments = ("identify", log, "--aircraft", "gtm", "--method", "ls", "--out", "e.parquet")
     assert command(*arguments)[0] == 0

@@ -101,7 +101,7 @@ def test_simulated_records_have_measured_inputs_and_simulated_outputs():
 
     def record(name, y):
         flown = {"declared": {"alpha_rad": np.asarray(y, dtype=float)}}
-        return History(name, "fitted", t, t, {"alpha_rad": t}, flown)
+        return History(name, "fitted", t, {"elevator_rad": t}, {"alpha_rad": t}, flown)
 
     records = (record("c", (5, 6, 7, 8)), record("a", (1, 2)), record("b", (1, 2, 3, np.nan)))
     (only,) = simulated_logs([log], Histories(records, ("declared",), "c", 3), "declared")

@@ -117,7 +117,10 @@ AERO = {"coefficient": "Cm", "signal": "alpha_dot_hat", "shape": "linear", "ampl
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"states": [LATE | {"signal": "qbar"}]}, "state late: signal 'qbar': allowed: alpha, alpha_dot_hat"),
+        (
+            {"states": [LATE | {"signal": "qbar"}]},
+            "state late: signal 'qbar': allowed: aileron, alpha, alpha_dot_hat, beta",
+        ),
         (
             {"aero": [AERO | {"signal": "alpha_dot"}]},
             "aero Cm: signal 'alpha_dot': did you mean 'alpha_dot_hat'",

@@ -42,7 +42,7 @@ def updated(tmp_path_factory):
     }
     plane = gtm.model_copy(update={"file": gtm.file.model_copy(update={"derivatives": refitted})})
     folder = tmp_path_factory.mktemp("patch") / "gtm"
-    corrections = Corrections(SIX, 0.097366, -0.000816, STD)
+    corrections = Corrections(SIX, {"alpha": 0.097366, "elevator": -0.000816}, STD)
     origin = Origin(SOURCE, {ARM: 0.152})
     write_aircraft(plane, Change(sensors=(ARM,)), folder, "Effects: vane_arm.", corrections, origin=origin)
     return gtm, folder

@@ -142,7 +142,7 @@ def test_a_band_is_that_of_the_tracers_fit(bench, campaign, flown):
         band.model.declared,
         (own.effect,),
         also_unconstrained=tuple(range(6)),
-        trim_alpha_rad=flown.record.plant.trim_alpha_rad,
+        trim_flow_rad=flown.record.plant.trim_alpha_rad,
     )
     record = flown_by(band.model, flown.record, hypothesis, own.sizes, still)
     problem = TraceProblem((record, record), band.model.settings)

@@ -31,7 +31,9 @@ def traced(folder, plane, rate_hz=50.0):
         "altitude_m": 2133.6,
         "sample_rate_hz": rate_hz,
     }
-    record = History("r1", "fitted", t, np.zeros(len(t)), series, {"before": series}, conditions=conditions)
+    record = History(
+        "r1", "fitted", t, {"elevator_rad": t}, series, {"before": series}, conditions=conditions
+    )
     origin = Provenance("1", plane.name, {}, aircraft_digests(plane.folder), str(plane.folder.resolve()))
     folder.mkdir()
     write_histories(folder / FILE, Histories((record,), ("before",), "r1", 1, {PROVENANCE: origin.to_dict()}))

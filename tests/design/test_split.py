@@ -68,7 +68,7 @@ def test_separation_is_that_of_two_fits_of_the_tracer(bench, model):
     problem = TraceProblem((replace(record, signals=replace(record.signals, y=y)),), model.settings)
     costs = []
     for effect, size in ((truth.effect, 0.007), (rival, float(expected.sizes[0]))):
-        hypothesis = Hypothesis(model.declared, (effect,), trim_alpha_rad=record.plant.trim_alpha_rad)
+        hypothesis = Hypothesis(model.declared, (effect,), trim_flow_rad=record.plant.trim_alpha_rad)
         start = Parameters(still, model.own(record)[None], np.array([size]))
         ended = fit(problem, hypothesis, start, free_levels=False)
         costs.append(ended.cost - 0.5 * sum(len(s.r) * s.logdet for s in ended.sensitivities))

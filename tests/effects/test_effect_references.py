@@ -194,7 +194,7 @@ def test_pair_of_signals_against_an_independent_integration(gtm, paper_condition
 def test_corrected_derivatives_against_an_independent_integration(gtm, paper_condition, plain, tmp_path):
     start, _ = flights.fly(gtm, paper_condition)
     amounts = {"CLalpha": 0.5, "CLq": 10.0, "CLde": 0.2, "Cmalpha": -0.4, "Cmq": 8.0, "Cmde": 0.3}
-    corrections = Corrections(amounts, start.alpha_rad, start.elevator_rad)
+    corrections = Corrections(amounts, {"alpha": start.alpha_rad, "elevator": start.elevator_rad})
     plane = flights.changed(gtm, Change(), tmp_path, derivatives=corrections)
     after, flown = flights.fly(plane, paper_condition)
     assert after.alpha_rad == pytest.approx(start.alpha_rad, abs=1e-10)  # the trim stays
@@ -249,7 +249,9 @@ def test_declared_value_against_an_independent_integration(
 
 def test_derivatives_of_the_elevator_share_its_effectiveness(gtm, paper_condition, tmp_path):
     start = trim(gtm, paper_condition)
-    corrections = Corrections({"CLde": 0.2, "Cmde": 0.3}, start.alpha_rad, start.elevator_rad)
+    corrections = Corrections(
+        {"CLde": 0.2, "Cmde": 0.3}, {"alpha": start.alpha_rad, "elevator": start.elevator_rad}
+    )
     weak = EFFECTS["elevator_effectiveness"].change({"factor": 0.8})
     plane = flights.changed(gtm, weak, tmp_path, derivatives=corrections)
     after = trim(plane, paper_condition)

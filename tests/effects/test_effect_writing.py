@@ -70,7 +70,7 @@ def test_derivatives_of_a_foreign_aircraft_move_by_what_is_written(foreign, tmp_
     # Lift alone is written first: with it c172x and T38 move in Cm too, by their own term in alpha_dot.
     # That of c172x in CL, 1.7 per alpha_dot c/(2V), takes 1 % off any lift.
     for amounts, rows, share in ((lift, slice(0, 3), np.cos(start.alpha_rad)), (moment, slice(3, 6), 1.0)):
-        corrections = writing.Corrections(amounts, start.alpha_rad, start.elevator_rad)
+        corrections = writing.Corrections(amounts, {"alpha": start.alpha_rad, "elevator": start.elevator_rad})
         name = next(iter(amounts))
         changed = flights.changed(plane, Change(), tmp_path / name, derivatives=corrections)
         moved = linearise(changed, trim(changed, at)).central[rows] - before[rows]
@@ -201,7 +201,7 @@ def test_what_cannot_be_written_says_why(gtm, tmp_path):
         writing.write_aircraft(gtm, Change(), gtm.folder)
     with pytest.raises(StoreError, match="name is the model's"):
         writing.write_aircraft(gtm, Change(), tmp_path / "my aircraft")
-    corrections = writing.Corrections({"Cmalfa": 0.1}, 0.1, 0.0)
+    corrections = writing.Corrections({"Cmalfa": 0.1}, {"alpha": 0.1})
     with pytest.raises(ConfigurationError, match=r"did you mean 'Cmalpha'"):
         writing.write_aircraft(gtm, Change(), tmp_path / "a", derivatives=corrections)
     nonsense = Change(aero=(AeroTerm("Cm", "beta", "linear", 1.0),))

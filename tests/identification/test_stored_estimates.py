@@ -65,6 +65,11 @@ def test_estimates_of_all_runs_jointly_are_not_mixed_with_those_of_each(tmp_path
     assert set(read_stored(path)[1]) == {"iv-f1"}
 
 
+def test_estimates_need_a_parquet_name(tmp_path):
+    with pytest.raises(StoreError, match=r"estimates are a Parquet file; name it e\.parquet"):
+        write_estimates(tmp_path / "e", identify(as_log(fly(runs=1, noise=0.1)), GTM, ["ls"]))
+
+
 def test_logs_of_one_name_are_both_sources(tmp_path):
     path = tmp_path / "estimates.parquet"
     for number, folder in enumerate(("a", "b")):

@@ -18,7 +18,14 @@ def history(run_id, floor=0.1):
     y = {c: np.sin(T + k) for k, c in enumerate(("alpha_rad", "az_m_s2"))}
     models = {m: {c: x * values for c, values in y.items()} for m, x in (("declared", 0.5), ("after", 0.9))}
     return History(
-        run_id, "fitted", T, -T, y, models, floor={"alpha_rad": floor}, conditions={"mass_kg": 26.2}
+        run_id,
+        "fitted",
+        T,
+        {"elevator_rad": -T},
+        y,
+        models,
+        floor={"alpha_rad": floor},
+        conditions={"mass_kg": 26.2},
     )
 
 
@@ -40,7 +47,7 @@ def test_a_file_gives_back_the_records(tmp_path):
     assert read.first.run_id == "a"
     for mine, stored in zip(two().records, read.records, strict=True):
         np.testing.assert_array_equal(stored.t_s, mine.t_s)
-        np.testing.assert_array_equal(stored.elevator_rad, mine.elevator_rad)
+        np.testing.assert_array_equal(stored.controls_rad["elevator_rad"], mine.controls_rad["elevator_rad"])
         for c in mine.measured:
             np.testing.assert_array_equal(stored.measured[c], mine.measured[c])
             for m in mine.models:

@@ -7,12 +7,13 @@ import pytest
 
 from airtruth.errors import ConfigurationError
 from airtruth.physics.composition import TailGeometry, directions
+from airtruth.physics.motion import LATERAL
 from airtruth.physics.resolution import LinearPoint, derivative_increments, linear_terms, resolved
 from airtruth.physics.terms import AeroTerm, Change, DeclaredTerm, DerivativeTerm
 
 DERIVATIVES = np.array([5.0, 8.0, 0.4, -1.2, -20.0, -1.4])
 GEOMETRY = TailGeometry(8.0, 3.5, 0.8)
-POINT = LinearPoint(DERIVATIVES, 0.1, -0.02, GEOMETRY)
+POINT = LinearPoint(DERIVATIVES, {"alpha": 0.1, "elevator": -0.02}, GEOMETRY)
 MASS = DeclaredTerm("mass", 1.1)
 
 
@@ -58,4 +59,32 @@ def test_unknown_names_are_errors():
     with pytest.raises(ConfigurationError, match=r"cause 'tial'.*did you mean 'tail'"):
         derivative_increments([DerivativeTerm("tial", 0.5)], DERIVATIVES, GEOMETRY)
     with pytest.raises(ConfigurationError, match=r"derivative 'CMQ'"):
-        linear_terms({"CMQ": 1.0}, 0.0, 0.0)
+        linear_terms({"CMQ": 1.0}, {})
+
+
+def test_lateral_causes_have_the_derivatives_of_the_lateral_motion():
+    derivatives = np.arange(1.0, 16.0)
+    point = LinearPoint(derivatives, {"rudder": 0.03}, TailGeometry(aspect_ratio=8.0), LATERAL)
+    terms = (DerivativeTerm("Cnr", -0.2), DerivativeTerm("CYdr", 0.1))
+    found = resolved(Change(derivatives=terms), point)
+    assert [(t.coefficient, t.signal, t.amplitude, t.at) for t in found.aero] == [
+        ("CY", "rudder", 0.1, 0.03),
+        ("Cn", "rhat", -0.2, 0.0),
+    ]
+    with pytest.raises(ConfigurationError, match=r"cause 'tail'"):
+        resolved(Change(derivatives=(DerivativeTerm("tail", 0.5),)), point)
+
+
+def test_lateral_directions_of_declared_quantities():
+    derivatives = np.arange(1.0, 16.0)
+    found = directions(derivatives, TailGeometry(aspect_ratio=8.0), LATERAL)
+    row = dict(zip(("CY", "Cl", "Cn"), derivatives.reshape(3, 5), strict=True))
+    zero = np.zeros(5)
+    # a side force acts a chord, an eighth of the span, ahead of a CG that lies a chord farther aft
+    np.testing.assert_allclose(found["cg"], [*zero, *zero, *(row["CY"] / 8.0)])
+    np.testing.assert_allclose(found["mass"], [*-row["CY"], *zero, *zero])
+    np.testing.assert_allclose(found["inertia_zz"], [*zero, *zero, *-row["Cn"]])
+    rudder = np.zeros((3, 5))
+    rudder[:, 4] = derivatives.reshape(3, 5)[:, 4]
+    np.testing.assert_allclose(found["rudder"], rudder.ravel())
+    assert "tail" not in found

@@ -32,7 +32,7 @@ def record(run_id="r1", group="fitted", samples=301, dt_s=0.02, models=STAGES):
         run_id=run_id,
         group=group,
         t_s=t,
-        elevator_rad=elevator,
+        controls_rad={"elevator_rad": elevator},
         measured=measured,
         models={
             m: {c: x * scale * motion for c, scale in scales.items()}

@@ -101,7 +101,9 @@ def test_plots_hold_the_records_in_the_units_of_their_labels():
     assert data["first"] == len(shown.records) - 1
     for stated, mine in zip(data["records"], shown.records, strict=True):
         np.testing.assert_allclose(numbers(stated["t"]), mine.t_s, rtol=1e-6)
-        np.testing.assert_allclose(numbers(stated["elevator"]), np.rad2deg(mine.elevator_rad), rtol=1e-6)
+        np.testing.assert_allclose(
+            numbers(stated["controls"][0]), np.rad2deg(mine.controls_rad["elevator_rad"]), rtol=1e-6
+        )
         for i, (channel, unit) in enumerate(
             (("alpha_rad", np.pi / 180), ("q_rad_s", np.pi / 180), ("az_m_s2", 1.0))
         ):

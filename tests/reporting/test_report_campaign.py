@@ -8,7 +8,7 @@ import report_synthetic as synthetic
 
 from airtruth.errors import LogError, StoreError
 from airtruth.reporting import Campaign, read_campaign, stored_campaign
-from airtruth.reporting.campaign import describe
+from airtruth.reporting.description import describe
 
 
 @pytest.fixture

@@ -131,7 +131,7 @@ def test_the_plots_state_tolerances_in_their_units():
     data = json.loads(page.split('id="records-data">')[1].split("</script>")[0])
     assert data["tolerances"] == pytest.approx([0.0, 2.0, 0.1 * 9.80665])
     assert [kind for _, kind in data["keys"]] == ["measured", "tolerance", "band"]
-    assert set(OF_CHANNEL) == {"q_rad_s", "az_m_s2"}
+    assert set(OF_CHANNEL) == {"q_rad_s", "az_m_s2", "p_rad_s", "r_rad_s"}
 
 
 def test_the_pitch_of_the_plots_is_the_integral_of_q_with_its_tolerance():

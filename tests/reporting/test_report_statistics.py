@@ -227,9 +227,15 @@ def test_statistics_do_not_depend_on_the_order_of_runs_or_on_the_scale(seed, n, 
     assert other.products[""] == pytest.approx(one.products[""], rel=1e-6, abs=1e-30)
 
 
+ARRAYS = [name for name in Sample.__dataclass_fields__ if name != "motion"]
+
+
 def parts_of(sample, rows):
     return [
-        Sample(*(getattr(sample, name)[first : first + rows] for name in Sample.__dataclass_fields__))
+        Sample(
+            *(getattr(sample, name)[first : first + rows] for name in ARRAYS),
+            motion=sample.motion,
+        )
         for first in range(0, len(sample.truth), rows)
     ]
 

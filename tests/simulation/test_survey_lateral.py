@@ -56,6 +56,15 @@ def test_surface_sign_and_feedback(name, aileron, rudder, carried):
     assert (model.aileron.feedback, model.rudder.feedback) == carried
 
 
+def test_the_survey_of_the_gtm_recovers_its_lateral_controls(tmp_path):
+    """Its commands are angles [rad]; the survey reads gtm.xml without aircraft.toml, and the trim needs both surfaces."""
+    new_from_jsbsim(AIRCRAFT / "gtm", tmp_path / "surveyed")
+    model = aircraft.load(tmp_path / "surveyed").file.jsbsim
+    declared = aircraft.load("gtm").file.jsbsim
+    assert model.aileron.command == declared.aileron.command == model.lateral.aileron
+    assert model.rudder.command == declared.rudder.command == model.lateral.rudder
+
+
 def test_a_yaw_damper_with_a_switch_is_switched_off():
     bench, notes, decisions = found_in("global5000")
     assert bench.model.set == {"fcs/yaw-damper-enable": 0.0}

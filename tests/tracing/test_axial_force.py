@@ -23,7 +23,7 @@ from airtruth.tracing.axial_force import axial_force
 from airtruth.tracing.axial_series import axial_series
 from airtruth.tracing.declared_model import with_axial_force
 from airtruth.tracing.model.parameters import SHORT_PERIOD
-from airtruth.tracing.model.records import read
+from airtruth.tracing.model.reading import read
 from airtruth.tracing.prepare import prepare
 from airtruth.tracing.presentation.error_table import axial_words
 from airtruth.tracing.stage_errors import AxialErrors, AxialRms

@@ -15,7 +15,7 @@ from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.model.elevator_path import corner_variance, read_between
 from airtruth.tracing.model.parameters import SHORT_PERIOD
-from airtruth.tracing.model.records import read
+from airtruth.tracing.model.reading import read
 from airtruth.tracing.model.response import filter_inputs, respond
 from airtruth.tracing.selection.corner_share import corner_share
 from airtruth.units import DEG, G0
@@ -39,12 +39,14 @@ def test_what_the_samples_show_has_no_variance():
 
 def test_a_delay_of_the_surface_carries_the_corner_to_later_cells():
     made = tr.record(np.zeros((6, 3)), 0.0)
-    made = replace(made, signals=replace(made.signals, corner_rad2=np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])))
+    made = replace(
+        made, signals=replace(made.signals, corner_rad2=np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]]))
+    )
     late = filter_inputs(made, Change(surface=(SurfaceTerm("delay", 1.5 * tr.DT),)))
     assert late.corner_rad2 == pytest.approx([0.0, 0.0, 0.0, 0.5, 0.5, 0.0], abs=0.05)
     assert late.corner_rad2.sum() == pytest.approx(1.0, rel=0.02)
     plain = filter_inputs(made, Change())
-    assert plain.corner_rad2 is made.signals.corner_rad2
+    assert (plain.corner_rad2 == made.signals.corner_rad2[0]).all()
     assert late.grid is not plain.grid
     assert (
         filter_inputs(made, EFFECTS["elevator_asymmetry"].change({"dCmde": 0.1})).grid is plain.grid
@@ -213,7 +215,7 @@ def sharply_stepped(rng, anywhere, noise, name):
             )
     t = np.arange(samples) * tr.DT
     made = tr.record(np.array(y), lambda at: np.interp(at, t, u), name=name)
-    return replace(made, signals=replace(made.signals, corner_rad2=corner_variance(u, 0.0)))
+    return replace(made, signals=replace(made.signals, corner_rad2=corner_variance(u, 0.0)[None]))
 
 
 def whitened(made, sigma_w=0.3):
@@ -226,7 +228,7 @@ def whitened(made, sigma_w=0.3):
 def test_innovations_are_those_of_the_kalman_filter_with_the_corner_in_its_noise():
     made, u = stepped(np.random.default_rng(2))
     corner = corner_variance(u, 0.0)
-    known = replace(made, signals=replace(made.signals, corner_rad2=corner))
+    known = replace(made, signals=replace(made.signals, corner_rad2=corner[None]))
     r, found = whitened(known)
     expected = kalman(made, u, corner, 0.3)
     assert np.abs(r - expected).max() < 0.05  # curvature of the sines at a degree
@@ -245,7 +247,7 @@ def test_a_step_between_samples_leaves_no_spike():
         per_record[SHORT_PERIOD.per_record.log_gust] = np.log(0.02)
         for aware in worst:
             corner = corner_variance(u, 0.0) if aware else np.zeros(0)
-            known = replace(made, signals=replace(made.signals, corner_rad2=corner))
+            known = replace(made, signals=replace(made.signals, corner_rad2=corner[None]))
             found = respond(known, quiet, Change(), common, per_record)
             r = found.e @ found.white.T
             worst[aware] = max(worst[aware], float(np.abs(r[15:30]).max()))
@@ -268,7 +270,7 @@ def test_a_smooth_residual_below_the_resolution_is_no_information():
 def test_a_sensor_late_by_little_does_not_read_the_corner():
     """The surface is known at the samples: as a lag goes to zero, its covariance goes to that of no lag."""
     made, u = stepped(np.random.default_rng(2))
-    known = replace(made, signals=replace(made.signals, corner_rad2=corner_variance(u, 0.0)))
+    known = replace(made, signals=replace(made.signals, corner_rad2=corner_variance(u, 0.0)[None]))
     common, own = tr.still()
     own[SHORT_PERIOD.per_record.log_gust] = np.log(0.3)
     more = [

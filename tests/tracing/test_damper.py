@@ -6,10 +6,11 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import cont2discrete, dlsim, lfilter
 
 from airtruth.logs.flight_log import FlightLog
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import SurfaceTerm
 from airtruth.tracing.model.damper import Damper, damper_surface, find_damper
 from airtruth.tracing.model.elevator_path import read_between
-from airtruth.tracing.model.records import read
+from airtruth.tracing.model.reading import MeasuredControl, read
 from airtruth.tracing.model.surface import through
 from airtruth.units import DEG
 
@@ -113,7 +114,7 @@ def surface_of(samples, q):
     }
     channels |= {"elevator_rad": samples, "q_rad_s": q, "airspeed_m_s": np.full(SAMPLES, 38.0)}
     log = FlightLog({}, ("a",), np.array([0, SAMPLES]), np.arange(SAMPLES) * DT, channels)
-    return read(log, NOISE, TAU)[0]
+    return read(log, LONGITUDINAL, [MeasuredControl(NOISE, TAU)])[0]
 
 
 def noisy(exact, seed):
@@ -128,7 +129,7 @@ def test_the_path_between_samples_is_as_good_as_the_samples(pilot):
         q = pitch_rate(seed)
         exact = flown(pilot(seed), Damper(0.5, 0.75), q)
         signals = surface_of(noisy(exact, 500 + seed), q)
-        assert signals.elevator_std_rad == 0.0
+        assert signals.control_std_rad == 0.0
         errors.append(((means(signals.elevator_rad) - means(exact)) ** 2).mean())
     assert np.sqrt(np.mean(errors)) < NOISE
 

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.declared_model import remaining_evidence
 from airtruth.tracing.inference import derivative_likelihood as module
 from airtruth.tracing.inference.derivative_likelihood import contradiction, derivative_likelihood
 from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
 from airtruth.tracing.model.plant import declared_covariance
 from airtruth.tracing.selection.anomaly import DERIVATIVES_MOVED, Anomaly
-from airtruth.tracing.selection.omnibus import advice
+from airtruth.tracing.selection.families import advice
 
 DECLARED = np.diag([0.24, 9.5, 0.05, 0.09, 6.2, 0.09]) ** 2
 """Covariance of the declared derivatives of aircraft/gtm, independent."""
@@ -124,6 +125,6 @@ def test_what_an_answer_leaves_is_in_the_remaining_evidence(white):
     left = remaining_evidence(problem, SimpleNamespace(null=fitted, anomaly=anomaly))
     test = contradiction(problem, fitted)
     assert left == Anomaly(DERIVATIVES_MOVED, test.statistic, test.degrees, 2.0 * test.p_value)
-    assert advice(left.where).startswith("trace again with `derivatives` among the candidates")
+    assert advice(left.where, LONGITUDINAL).startswith("trace again with `derivatives` among the candidates")
     problem, fitted = fit_of(cause, np.outer(cause, cause))
     assert remaining_evidence(problem, SimpleNamespace(null=fitted, anomaly=anomaly)) is anomaly

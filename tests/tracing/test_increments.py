@@ -35,6 +35,7 @@ from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
 from airtruth.tracing.presentation.text import increment_words
 from airtruth.tracing.selection.acceptance import SUPERSEDED, Candidate
 from airtruth.tracing.selection.explanation import CauseSet
+from airtruth.tracing.selection.flown import flown
 from airtruth.tracing.selection.increment_fit import (
     FittedIncrement,
     effective_bends,
@@ -42,7 +43,7 @@ from airtruth.tracing.selection.increment_fit import (
     is_apart_from_zero,
     redundant_increment,
 )
-from airtruth.tracing.selection.increments import flown, log_evidences, screen, shapes, sharpened
+from airtruth.tracing.selection.increments import log_evidences, screen, shapes, sharpened
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.release import Release
 from airtruth.tracing.selection.rounds import RoundStart, search_round
@@ -445,7 +446,7 @@ IDLE = increment(Shape("Cm", "alpha", -0.03, 0.03, 4, trim=0.0), 0.01)
 def beyond_one_degree(one):
     e = one.signals.elevator_rad
     measured = e + 0.5 * np.sign(e) * np.maximum(np.abs(e) - DEG, 0.0)
-    return replace(one, signals=replace(one.signals, elevator_rad=measured))
+    return replace(one, signals=replace(one.signals, controls_rad=measured[None]))
 
 
 @pytest.mark.slow

@@ -17,7 +17,8 @@ from airtruth.simulation.manoeuvres import Manoeuvre, sample
 from airtruth.simulation.trim import trim
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.plant import probed
-from airtruth.tracing.model.records import TraceRecord, read
+from airtruth.tracing.model.reading import read
+from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.remainder import looked_up, remainders
 from airtruth.tracing.model.response import filter_inputs, respond
 from airtruth.tracing.model.settings import initial_per_record, settings_of

@@ -40,12 +40,12 @@ def flown(change, sub, share, uncertain):
         times = np.arange((120 - 1) * signals.sub + 1) * tr.DT / signals.sub
         finer = {n: np.interp(grid, times, getattr(signals, n)) for n in names}
         fine = np.linspace(0.0, grid[-1], (120 - 1) * sub * FINE + 1)
-        finer["elevator_rad"] = np.asarray(tr.doublet(fine))
+        finer["controls_rad"] = np.asarray(tr.doublet(fine))[None]
         signals = replace(signals, sub=sub, **finer)
     if uncertain:
         corner = np.zeros(120)
         corner[uncertain["corner_rad2"]] = (0.3 * np.pi / 180.0) ** 2
-        signals = replace(signals, corner_rad2=corner)
+        signals = replace(signals, corner_rad2=corner[None])
     record = replace(record, signals=signals)
     given = filter_inputs(record, change)
     point = tr.point([record])
@@ -84,8 +84,7 @@ def test_increments_change_the_innovations_as_in_flights(name):
                 *arguments,
                 steady=base.steady,
                 external=External(
-                    sign * h * lift * (kind == "lift"),
-                    sign * h * moment * (kind == "moment"),
+                    sign * h * np.array([lift * (kind == "lift"), moment * (kind == "moment")]),
                     sign * h * output * tangent.sensors.scale * (kind == "output"),
                 ),
             ).e

@@ -115,7 +115,7 @@ def test_declared_errors_of_the_inputs_are_undone():
     coarse = t[::FINE]
     seen = replace(
         one,
-        elevator_rad=1.2 * (0.3 * (t - 0.04)) + 0.01,
+        controls_rad=(1.2 * (0.3 * (t - 0.04)) + 0.01)[None],
         airspeed_m_s=1.2 * (40.0 + coarse - 0.04) + 0.01,
         ground_m_s=1.2 * (41.0 + coarse - 0.04) + 0.01,
     )

@@ -11,12 +11,12 @@ import trace_records as tr
 from scipy.stats import norm
 
 from airtruth.tracing.inference.optimise import fit, initial_parameters
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection import noise_colour
 from airtruth.tracing.selection.noise_colour import (
     LATER_LEVEL,
     LEVEL,
-    SHARES,
     TYPICAL,
     later_level,
     scores,
@@ -25,6 +25,8 @@ from airtruth.tracing.selection.noise_colour import (
 )
 from airtruth.tracing.selection.release import DeclaredCauses
 from airtruth.units import DEG
+
+SHARES = SHORT_PERIOD.common.colour_shares
 
 pytestmark = pytest.mark.slow
 
@@ -79,7 +81,7 @@ def test_slope_of_a_share_is_that_of_the_refitted_likelihood():
         again = fit(problem, tr.NOTHING, replace(null.point, common=common))
         return (again.cost - 0.5 * share**2 / 0.5**2 - null.cost) / share
 
-    for i, place in enumerate(SHARES):
+    for i, place in enumerate(range(*SHARES.indices(SHARES.stop))):
         expected = 2.0 * rise(place, 0.005) - rise(place, 0.01)
         assert slope[i] == pytest.approx(expected, abs=0.04 * abs(expected) + 1.5)
         assert abs(slope[i]) > 3.0 * np.sqrt(information[i, i])
@@ -89,7 +91,7 @@ def test_white_records_stay_as_they_are():
     white = case(5, 0.0)
     found, start = with_coloured_noise(white)
     assert found is white
-    np.testing.assert_array_equal(start.common[list(SHARES)], 0.0)
+    np.testing.assert_array_equal(start.common[SHARES], 0.0)
 
 
 def test_slow_noise_enters_fitted_and_held_out_records():
@@ -98,7 +100,7 @@ def test_slow_noise_enters_fitted_and_held_out_records():
     assert found.fitted.settings.coloured
     assert found.held is not None
     assert found.held.settings.coloured
-    assert (start.common[list(SHARES)] > 0.0).any()
+    assert (start.common[SHARES] > 0.0).any()
     assert found.fitted.records == slow.fitted.records
 
 
@@ -116,9 +118,9 @@ def test_typical_score_is_that_of_simulated_records():
 
 def test_less_is_enough_beside_effects_in_a_short_record():
     """Two thirds of the typical score: 0.2 sqrt(400) = 4 in 400 samples; 0.2 sqrt(960) > 6.17, the limit of the first test."""
-    assert later_level(400) == pytest.approx(3.0 * norm.sf(4.0))
-    assert later_level(100) == LATER_LEVEL
-    assert later_level(960) == later_level(100_000) == LEVEL
+    assert later_level(400, 3) == pytest.approx(3.0 * norm.sf(4.0))
+    assert later_level(100, 3) == LATER_LEVEL
+    assert later_level(960, 3) == later_level(100_000, 3) == LEVEL
 
 
 def test_a_search_does_not_begin_where_the_motion_diverges(monkeypatch):
@@ -139,7 +141,7 @@ def test_noise_that_nobody_declares_is_no_slow_noise():
     slow = replace(slow, fitted=replace(slow.fitted, settings=settings))
     found, start = with_coloured_noise(slow)
     assert found is slow
-    np.testing.assert_array_equal(start.common[list(SHARES)], 0.0)
+    np.testing.assert_array_equal(start.common[SHARES], 0.0)
 
 
 def test_what_is_as_slow_as_a_motion_is_no_noise():
@@ -150,4 +152,4 @@ def test_what_is_as_slow_as_a_motion_is_no_noise():
     assert scores(problem, white).max() > 5.0
     found, start = with_coloured_noise(slow)
     assert found is slow
-    np.testing.assert_array_equal(start.common[list(SHARES)], 0.0)
+    np.testing.assert_array_equal(start.common[SHARES], 0.0)

@@ -10,7 +10,7 @@ from airtruth.checks.airspeed import gust_cutoff_hz, low_passed, without_noise
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.store import read_log
 from airtruth.tracing import TraceOptions, trace
-from airtruth.tracing.model.records import read
+from airtruth.tracing.model.reading import read
 from airtruth.units import G0
 from validation.blind import draw, trials
 from validation.blind.truths import Added

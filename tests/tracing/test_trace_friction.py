@@ -22,7 +22,7 @@ def flown(sigma_w):
 def test_in_gusts_it_is_the_lag_nearest_to_the_friction():
     """Least squares of w sgn(alpha') on alpha'; about w sqrt(2/pi) over the standard deviation of a Gaussian rate."""
     problem, null = flown(1.0)
-    rate_rad_s = np.concatenate([np.diff(v.alpha_rad) / v.dt_s for v in views(null, problem)])
+    rate_rad_s = np.concatenate([np.diff(v.flow_rad) / v.dt_s for v in views(null, problem)])
     (nearest,), *_ = np.linalg.lstsq(rate_rad_s[:, None], PLAUSIBLE_RAD * np.sign(rate_rad_s), rcond=None)
     lag_s = imitated_lag_s(problem, null)
     assert lag_s == pytest.approx(nearest, rel=1e-9)

@@ -9,6 +9,7 @@ import trace_records as tr
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import AeroTerm, Change
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.whitening import NO_WHITENER
@@ -16,14 +17,17 @@ from airtruth.tracing.model.records import nodes
 from airtruth.tracing.model.response import External, respond
 from airtruth.tracing.model.surface import play
 from airtruth.tracing.selection.anomaly import Anomaly
-from airtruth.tracing.selection.omnibus import FAMILIES, advice, anomalies, chi_square, views
+from airtruth.tracing.selection.families import advice, families
+from airtruth.tracing.selection.omnibus import anomalies, chi_square, views
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.selection.spectrum import lines
 from airtruth.units import DEG
 
 pytestmark = pytest.mark.slow
 
+FAMILIES = families(LONGITUDINAL)
 ELEVATOR, STATIC, SURFACE, HISTORY, DRIFT, VANE = FAMILIES
+CHANNELS = LONGITUDINAL.output_channels
 DRAWS = 20
 
 
@@ -46,7 +50,7 @@ def test_a_direction_that_stands_twice_counts_once():
 
 def test_directions_that_records_do_not_excite_say_nothing():
     assert chi_square(np.zeros(3), np.zeros((3, 3))) == (0.0, 0, 1.0)
-    assert lines([np.zeros((100, 3))], [0.02]).p_value == 1.0
+    assert lines([np.zeros((100, 3))], [0.02], CHANNELS).p_value == 1.0
 
 
 def test_directions_of_any_unit_count_alike():
@@ -77,7 +81,7 @@ def test_lines_of_innovations_without_a_line(pole):
     found = []
     for _ in range(500):
         records = [lfilter([1.0], [1.0, -pole], rng.standard_normal((n, 3)), axis=0) for n in (250, 300)]
-        found.append(lines(records, [0.02, 0.02]).p_value)
+        found.append(lines(records, [0.02, 0.02], CHANNELS).p_value)
     share = np.mean(np.array(found) <= 0.05)
     assert share == pytest.approx(0.05, abs=4.0 * np.sqrt(0.05 * 0.95 / 500))
 
@@ -87,7 +91,7 @@ def test_a_ringing_channel_is_found_where_it_rings():
     rng = np.random.default_rng(4)
     r = rng.standard_normal((500, 3))
     r[:, 1] += 0.8 * np.sin(2.0 * np.pi * 6.8 * 0.02 * np.arange(500))
-    found = lines([r], [0.02])
+    found = lines([r], [0.02], CHANNELS)
     assert found.where == "q_rad_s at 6.5 to 7.0 Hz"
     assert found.p_value < 1e-12
     # 500 samples of 20 ms: a line every 0.1 Hz, five to a band
@@ -111,16 +115,16 @@ def test_a_strong_mode_is_not_taken_for_colour(size):
         ringing = lfilter([1.0], [1.0, -2.0 * pole.real, abs(pole) ** 2], rng.standard_normal(300))
         r[:, 1] += size * ringing / ringing.std()
         records.append(r)
-    found = lines(records, [0.02] * 4)
+    found = lines(records, [0.02] * 4, CHANNELS)
     assert found.where == "q_rad_s at 6.5 to 7.0 Hz"
     assert found.p_value < 1e-9
 
 
 def test_records_of_several_rates_share_their_bands():
     rng = np.random.default_rng(5)
-    found = lines([rng.standard_normal((100, 3)), rng.standard_normal((40, 3))], [0.02, 0.05])
+    found = lines([rng.standard_normal((100, 3)), rng.standard_normal((40, 3))], [0.02, 0.05], CHANNELS)
     assert float(found.where.split(" to ")[1].split()[0]) <= 10.0
-    assert lines([rng.standard_normal((20, 3))], [0.5]).p_value == 1.0
+    assert lines([rng.standard_normal((20, 3))], [0.5], CHANNELS).p_value == 1.0
 
 
 def seen(records):
@@ -173,7 +177,9 @@ def test_an_elevator_that_loses_effect_is_seen_over_the_deflection():
     records = []
     for made in pair(np.random.default_rng(10)):
         de = nodes(made.signals.elevator_rad)
-        moment = External(np.zeros(de.size), 15.0 * de * np.abs(de), np.zeros_like(made.signals.y))
+        moment = External(
+            np.array([np.zeros(de.size), 15.0 * de * np.abs(de)]), np.zeros_like(made.signals.y)
+        )
         records.append(changed(made, difference(made, external=moment)))
     found = seen(records)
     assert found[SURFACE].p_value < 1e-6
@@ -189,7 +195,7 @@ def test_hysteresis_is_seen_in_the_history():
             np.arange(len(smooth)),
             smooth - play(smooth, 0.5 * DEG),
         )
-        moment = External(np.zeros(lag.size), -0.8 * lag, np.zeros_like(made.signals.y))
+        moment = External(np.array([np.zeros(lag.size), -0.8 * lag]), np.zeros_like(made.signals.y))
         records.append(changed(made, difference(made, external=moment)))
     found = seen(records)
     assert found[HISTORY].p_value < 1e-6
@@ -241,7 +247,7 @@ def test_a_drift_is_seen_in_time(drifts):
     records = []
     for made in pair(np.random.default_rng(11)):
         time = np.linspace(0.0, 1.0, nodes(made.signals.elevator_rad).size)
-        moment = External(np.zeros(time.size), 0.006 * time, np.zeros_like(made.signals.y))
+        moment = External(np.array([np.zeros(time.size), 0.006 * time]), np.zeros_like(made.signals.y))
         more = np.zeros_like(made.signals.y)
         more[:, 1] = 0.5 * DEG * np.linspace(0.0, 1.0, len(more))
         records.append(changed(made, difference(made, external=moment) if drifts == "moment" else more))
@@ -251,7 +257,7 @@ def test_a_drift_is_seen_in_time(drifts):
 
 
 def test_advice_for_each_place():
-    said = [advice(where) for where in (*FAMILIES, "az_m_s2 at 2.0 to 2.5 Hz", "vane_lag")]
+    said = [advice(where, LONGITUDINAL) for where in (*FAMILIES, "az_m_s2 at 2.0 to 2.5 Hz", "vane_lag")]
     assert len(set(said)) == len(said)
     assert all(s.endswith(".") for s in said)
 

@@ -5,7 +5,8 @@ import pytest
 import trace_records as tr
 
 from airtruth.logs.flight_log import FlightLog
-from airtruth.tracing.model.records import read
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.tracing.model.reading import MeasuredControl, read
 from airtruth.units import DEG
 
 STD = 0.02 * DEG
@@ -18,7 +19,9 @@ def restored(elevator, std=STD):
         name: np.zeros(500) for name in ("alpha_rad", "q_rad_s", "az_m_s2", "theta_rad", "altitude_m")
     }
     channels |= {"airspeed_m_s": np.full(500, tr.V), "elevator_rad": elevator}
-    (signals,) = read(FlightLog({}, ("a",), np.array([0, 500]), T, channels), std)
+    (signals,) = read(
+        FlightLog({}, ("a",), np.array([0, 500]), T, channels), LONGITUDINAL, [MeasuredControl(std)]
+    )
     return signals.elevator_rad[:: (signals.elevator_rad.size - 1) // 499]
 
 

@@ -259,7 +259,7 @@ def test_the_score_of_a_curvature_is_that_of_a_refit_beside_a_free_slope():
     y += tr.SETTINGS.noise * rng.standard_normal(y.shape)
     problem = tr.problem([replace(made, signals=replace(made.signals, y=y))])
     curvature = EFFECTS["cl_alpha_nonlinear:quadratic"]
-    declared = replace(tr.NOTHING, trim_alpha_rad=0.1)
+    declared = replace(tr.NOTHING, trim_flow_rad=0.1)
     null = fit(problem, declared, initial_parameters(problem, declared))
     (score,) = table(null, problem, [curvature], NO_WHITENER, 0).scores
     also_unconstrained = fit(problem, replace(declared, also_unconstrained=(0,)), null.point)

@@ -7,9 +7,10 @@ import pytest
 
 from airtruth import aircraft
 from airtruth.logs.store import read_log
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing import TraceOptions
 from airtruth.tracing.inference.optimise import fit, initial_parameters
-from airtruth.tracing.model.records import read
+from airtruth.tracing.model.reading import MeasuredControl, read
 from airtruth.tracing.prepare import prepare
 from airtruth.units import DEG
 from validation import small_aircraft as small
@@ -30,15 +31,19 @@ def test_the_noise_remains_where_the_surface_moves_and_in_short_rests():
     step = np.where((t >= 2.0) & (t < 2.3), 4.0 * DEG, 0.0)
     noise = STD_RAD * np.random.default_rng(0).standard_normal(log.t_s.size)
     surface = np.tile(step, small.RECORDS) + noise
-    (first, *_) = read(replace(log, channels={**log.channels, "elevator_rad": surface}), STD_RAD)
-    noisy = first.surface_noise_rad2 == STD_RAD**2
+    (first, *_) = read(
+        replace(log, channels={**log.channels, "elevator_rad": surface}),
+        LONGITUDINAL,
+        [MeasuredControl(STD_RAD)],
+    )
+    noisy = first.surface_noise_rad2[0] == STD_RAD**2
     assert noisy[(t > 2.0) & (t < 2.3)].all()
     assert not noisy[(t < 1.5) | (t > 3.0)].any()
     assert set(np.unique(first.surface_noise_rad2)) == {0.0, STD_RAD**2}
 
 
 def test_a_surface_without_noise_has_none():
-    (first, *_) = read(small.flight_log(5), 0.0)
+    (first, *_) = read(small.flight_log(5))
     assert first.surface_noise_rad2.size == 0
 
 
@@ -61,13 +66,13 @@ def test_innovations_of_the_gyro_are_as_large_in_motion_as_at_rest(plane):
     for seed in range(61, 67):
         case = prepare([small.flight_log(seed)], plane, [], TraceOptions())
         exact = tuple(
-            replace(r, signals=replace(r.signals, surface_noise_rad2=np.zeros(0)))
+            replace(r, signals=replace(r.signals, surface_noise_rad2=np.zeros((1, 0))))
             for r in case.fitted.records
         )
         for expects, problem in ((True, case.fitted), (False, replace(case.fitted, records=exact))):
             fitted = fit(problem, case.hypothesis, initial_parameters(problem, case.hypothesis))
             for record, at in zip(case.fitted.records, fitted.sensitivities, strict=True):
-                moving = record.signals.surface_noise_rad2 > 0.0
+                moving = record.signals.surface_noise_rad2[0] > 0.0
                 ratios[expects].append([np.mean(at.r[rows, 1] ** 2) for rows in (moving, ~moving)])
     expected, ignored = (np.divide(*np.mean(ratios[expects], axis=0)) for expects in (True, False))
     assert expected == pytest.approx(1.0, abs=0.07)

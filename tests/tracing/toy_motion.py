@@ -19,8 +19,8 @@ TOY = Motion(
     heading="Toy motion",
     states=(State("theta", "theta_rad"), State("q", "q_rad_s")),
     controls=(
-        Control("left", "left_rad", "left_command_rad", "left_actuator", "dl"),
-        Control("right", "right_rad", "right_command_rad", "right_actuator", "dr"),
+        Control("left", "left_rad", "left_command_rad", "left_actuator", "dl", "q_rad_s"),
+        Control("right", "right_rad", "right_command_rad", "right_actuator", "dr", "q_rad_s"),
     ),
     known=("airspeed_m_s",),
     outputs=(
@@ -41,6 +41,8 @@ TOY = Motion(
     declared=(Declared("inertia", 1.0, divides=("Cp",)),),
     modes=(Mode("pendulum_rad_s", "rad/s", "natural frequency"),),
     required=("theta_rad", "q_rad_s"),
+    forces="moment",
+    incidence="angle of the pendulum",
 )
 
 

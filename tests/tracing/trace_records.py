@@ -58,7 +58,7 @@ def record(y, elevator, theta=None, sub=2, dt=DT, v=V, density=DENSITY, ground=N
         dt_s=dt,
         sub=sub,
         y=np.ascontiguousarray(y),
-        elevator_rad=on(elevator, fine),
+        controls_rad=on(elevator, fine)[None],
         airspeed_m_s=speed,
         ground_m_s=speed if ground is None else on(ground, grid),
         density_kg_m3=on(density, grid),

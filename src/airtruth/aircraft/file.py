@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -14,6 +15,7 @@ from airtruth.aircraft.probe import Constants
 from airtruth.channels import SIGNALS
 from airtruth.errors import choices
 from airtruth.physics import terms
+from airtruth.physics.motion import MOTIONS, Motion
 from airtruth.physics.sensor_errors import KINDS, SensorErrors
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.physics.terms import AeroTerm, ReadingTerm, StateTerm, SurfaceTerm
@@ -140,8 +142,8 @@ class Dynamics(Strict):
     """Dynamics of the JSBSim model that its forces in a steady state do not show; a trace adds them to its filter.
 
     `airtruth trace` writes them into an updated aircraft. surface: terms between the measured surface and the air, in
-    sequence; states: lags, modes and plays; aero: increments of CL and Cm whose signal is alpha_dot c/(2V) or a state; readings:
-    increments of what the sensors read, which campaigns fly as well.
+    sequence; states: lags, modes and plays; aero: increments of coefficients whose signal is alpha_dot c/(2V),
+    beta_dot b/(2V) or a state; readings: increments of what the sensors read, which campaigns fly as well.
     """
 
     surface: tuple[SurfaceTerm, ...] = ()
@@ -165,21 +167,27 @@ class Dynamics(Strict):
 
     @model_validator(mode="after")
     def _named(self) -> Dynamics:
-        states = tuple(s.name for s in self.states)
-        measured = tuple(s.name for s in self.states if s.signal in terms.MEASURED)
+        controls = tuple(c.name for m in MOTIONS.values() for c in m.controls)
         named: list[tuple[str, str, tuple[str, ...]]]
-        named = [
-            (f"state {s.name}: signal", s.signal, terms.FACTORS if s.kind == "play" else terms.DRIVERS)
-            for s in self.states
-        ]
+        named = [(f"surface {t.kind}: control", t.control, controls) for t in self.surface]
+        for s in self.states:
+            of = terms.factors_of if s.kind == "play" else terms.drivers_of
+            named.append((f"state {s.name}: signal", s.signal, _of_any(of)))
         for t in self.aero:
-            named.append(("aero: coefficient", t.coefficient, terms.COEFFICIENTS))
-            named.append((f"aero {t.coefficient}: signal", t.signal, (*terms.SIGNALS, *states)))
-            named.append((f"aero {t.coefficient}: factor", t.factor, ("", *terms.FACTORS)))
+            named.append(("aero: coefficient", t.coefficient, _of_any(terms.coefficients_of)))
+            motion = next((m for m in MOTIONS.values() if t.coefficient in terms.coefficients_of(m)), None)
+            if motion is not None:
+                signals = (*terms.signals_of(motion), *self._states_of(terms.drivers_of(motion)))
+                named.append((f"aero {t.coefficient}: signal", t.signal, signals))
+                named.append((f"aero {t.coefficient}: factor", t.factor, ("", *terms.factors_of(motion))))
         for r in self.readings:
-            named.append(("readings: channel", r.channel, terms.READINGS))
-            named.append((f"readings {r.channel}: signal", r.signal, (*terms.MEASURED, *measured)))
-            named.append((f"readings {r.channel}: behind", r.behind, ("", *measured)))
+            named.append(("readings: channel", r.channel, tuple(sorted(terms.OUTPUTS))))
+            motion = next((m for m in MOTIONS.values() if r.channel in m.output_channels), None)
+            if motion is not None:
+                signals = terms.measured_of(motion)
+                measured = self._states_of(signals)
+                named.append((f"readings {r.channel}: signal", r.signal, (*signals, *measured)))
+                named.append((f"readings {r.channel}: behind", r.behind, ("", *measured)))
         for name, value, allowed in named:
             if value not in allowed:
                 known = [n for n in allowed if n]
@@ -187,6 +195,15 @@ class Dynamics(Strict):
                     f"{name} {value!r}: {choices(value, known) if known else 'declare it in states'}"
                 )
         return self
+
+    def _states_of(self, signals: tuple[str, ...]) -> tuple[str, ...]:
+        """Names of the states that one of some signals drives."""
+        return tuple(s.name for s in self.states if s.signal in signals)
+
+
+def _of_any(of: Callable[[Motion], tuple[str, ...]]) -> tuple[str, ...]:
+    """Names of all motions, each once."""
+    return tuple(dict.fromkeys(name for motion in MOTIONS.values() for name in of(motion)))
 
 
 class AircraftFile(Strict):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import Any, Final
 
 from airtruth.aircraft import AircraftFile, Dynamics
 from airtruth.channels import SIGNALS
 from airtruth.physics.sensor_errors import KINDS
+from airtruth.physics.terms import entries
 from airtruth.quantity import Quantity
 from airtruth.toml_values import toml_value
 from airtruth.units import UNITS
@@ -64,7 +64,7 @@ def write(file: AircraftFile, heading: str) -> str:
                 for row in rows:
                     lines += [
                         f"\n[[{name}.{key}]]",
-                        *(f"{k} = {toml_value(v)}" for k, v in asdict(row).items()),
+                        *(f"{k} = {toml_value(v)}" for k, v in entries(row).items()),
                     ]
         else:
             lines += _table((name,), _stated(table))

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
 from typing import Any, Final
 
 from airtruth.aircraft import AircraftFile, toml
 from airtruth.aircraft.origin import SHARE, rounded
+from airtruth.physics.terms import entries
 from airtruth.quantity import Quantity, Strict
 from airtruth.toml_places import Path, Places, places, spliced
 from airtruth.toml_values import toml_value
@@ -124,7 +124,7 @@ def _items(text: str, found: Places, path: Path, items: tuple[Any, ...]) -> tupl
     """New items of an array of tables, behind those that are there."""
     blocks = [
         "\n".join(
-            [f"[[{'.'.join(map(str, path))}]]", *(f"{k} = {toml_value(v)}" for k, v in asdict(i).items())]
+            [f"[[{'.'.join(map(str, path))}]]", *(f"{k} = {toml_value(v)}" for k, v in entries(i).items())]
         )
         for i in items
     ]

@@ -25,6 +25,7 @@ from airtruth.aircraft.toml_patch import patched
 from airtruth.errors import AircraftError, ConfigurationError, StoreError
 from airtruth.logs import ledger
 from airtruth.logs.atomic import new_folder
+from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.resolution import linear_terms
 from airtruth.physics.terms import AeroTerm, Change, declared_total
 
@@ -36,19 +37,20 @@ HIGHEST_HZ: Final = 400.0
 
 @dataclass(frozen=True)
 class Corrections:
-    """Increments of the six derivatives, linear about a trim.
+    """Increments of the derivatives of a motion, linear about a trim.
 
     Attributes
     ----------
-    increments : name of `airtruth.physics.short_period.PARAMETERS` -> increment [1/rad]; may leave some out.
-    alpha_rad, elevator_rad : the trim, where lift and moment stay as they are [rad].
-    std : standard deviations of the increments, of those that have one [1/rad].
+    increments : derivative -> increment [1/rad, -]; may leave some out.
+    trim : signal -> value where the coefficients stay as they are [rad]; those left out are zero there.
+    std : standard deviations of the increments, of those that have one [1/rad, -].
+    motion : of the derivatives.
     """
 
     increments: Mapping[str, float]
-    alpha_rad: float
-    elevator_rad: float
+    trim: Mapping[str, float]
     std: Mapping[str, float] = field(default_factory=dict)
+    motion: Motion = LONGITUDINAL
 
     def terms(self) -> dict[str, AeroTerm]:
         """The increments as terms, by the names of the derivatives.
@@ -58,7 +60,7 @@ class Corrections:
         ConfigurationError
             If a name is not a derivative.
         """
-        terms = linear_terms(self.increments, self.alpha_rad, self.elevator_rad)
+        terms = linear_terms(self.increments, self.trim, self.motion)
         return dict(zip(self.increments, terms, strict=True))
 
 

@@ -18,7 +18,9 @@ from airtruth.logs.provenance import PROVENANCE, Provenance
 from airtruth.result import shortened
 from airtruth.table import Table, as_html, as_text, flat, to_frame, write_table
 from airtruth.tracing.answer import ANSWER, TraceAnswer
+from airtruth.tracing.motions import Part, parts_of
 from airtruth.tracing.presentation.files import ERRORS
+from airtruth.tracing.presentation.several import by_motion
 from airtruth.tracing.presentation.text import effect_line
 from airtruth.tracing.run import provenance_of
 
@@ -46,11 +48,18 @@ class TracedSet:
     name : of its folder below the output folder.
     answer : what trace.json states; None if the set has no answer.
     error : why it has none.
+    others : answers of the other motions that the same records excite.
     """
 
     name: str
     answer: TraceAnswer | None
     error: str = ""
+    others: tuple[TraceAnswer, ...] = ()
+
+    @property
+    def answers(self) -> tuple[TraceAnswer, ...]:
+        """Answer of each motion; none if the set has none."""
+        return () if self.answer is None else (self.answer, *self.others)
 
 
 @dataclass(frozen=True)
@@ -71,13 +80,23 @@ class TracedSets:
 
     @property
     def verdicts(self) -> Mapping[str, int]:
-        """Number of sets with each verdict."""
-        return Counter(FAILED if s.answer is None else s.answer.verdict for s in self.sets)
+        """Number of answers with each verdict, and of sets without one."""
+        failed = [FAILED for s in self.sets if s.answer is None]
+        return Counter([*(a.verdict for s in self.sets for a in s.answers), *failed])
 
     def table(self) -> Table:
-        """One row for each set: verdict, effects with sizes, and the p-value of the declared model."""
-        columns = ("set", "verdict", "provisional", "p declared", "effects")
-        return flat(f"{len(self.sets)} sets of records", columns, [_row(s) for s in self.sets])
+        """One row for each answer: verdict, effects with sizes, and the p-value of the declared model."""
+        several = any(s.others for s in self.sets)
+        columns = (
+            "set",
+            *(("motion",) if several else ()),
+            "verdict",
+            "provisional",
+            "p declared",
+            "effects",
+        )
+        rows = [row for s in self.sets for row in _rows(s, several)]
+        return flat(f"{len(self.sets)} sets of records", columns, rows)
 
     def summary(self) -> str:
         """The number of sets with each verdict, then the table."""
@@ -90,7 +109,7 @@ class TracedSets:
 
     def to_dict(self) -> dict[str, Any]:
         """Name of a set -> its trace.json, or the reason why it has none under the key "error"."""
-        return {s.name: {"error": s.error} if s.answer is None else s.answer.to_dict() for s in self.sets}
+        return {s.name: by_motion(s.answers) if s.answers else {"error": s.error} for s in self.sets}
 
     def plot(self) -> Figure:
         """Number of sets with each verdict."""
@@ -181,32 +200,50 @@ def _named(sets: Sequence[Path]) -> dict[str, Path]:
 
 
 def _earlier(task: TraceTask) -> TracedSet | None:
-    """The set if its folder holds an answer of the same version, options and inputs."""
-    if task.force or not all((task.out / name).is_file() for name in (ANSWER, FILE, ERRORS)):
+    """The set if its folder holds answers of the same version, options and inputs."""
+    if task.force:
         return None
     try:
-        stated = Provenance.read(read_histories(task.out / FILE, "airtruth trace").facts.get(PROVENANCE))
-        now = provenance_of(task.logs, task.aircraft, task.options)
-        if replace(stated, folder=now.folder) != now:  # the same bytes in another folder
-            return None
-        return TracedSet(task.out.name, TraceAnswer.read(task.answer))
-    except (StoreError, LogError):
-        return None
+        parts = parts_of(task.logs, task.aircraft, task.options)
+        if all(_is_answered(task, part) for part in parts):
+            return _read(task)
+    except (StoreError, LogError, ConfigurationError):
+        pass
+    return None
+
+
+def _is_answered(task: TraceTask, part: Part) -> bool:
+    """Whether the folder of a motion holds its answer of the same version, options and inputs."""
+    folder = part.into(task.out) or task.out
+    if not all((folder / name).is_file() for name in (ANSWER, FILE, ERRORS)):
+        return False
+    stated = Provenance.read(read_histories(folder / FILE, "airtruth trace").facts.get(PROVENANCE))
+    now = provenance_of(task.logs, task.aircraft, part.options)
+    return replace(stated, folder=now.folder) == now  # the same bytes in another folder
 
 
 def _traced(task: TraceTask, ended: Ended) -> TracedSet:
     if ended.error is not None:
         return TracedSet(task.out.name, None, str(ended.error))
-    return TracedSet(task.out.name, TraceAnswer.read(task.answer))
+    return _read(task)
 
 
-def _row(one: TracedSet) -> tuple[str, ...]:
-    if one.answer is None:
-        return (one.name, FAILED, "", "", one.error.replace("\n", " "))
-    effects = "; ".join(effect_line(e) for e in one.answer.effects)
-    declared = one.answer.declared_model
-    p_value = "" if declared is None else f"{declared.p_value:.2g}"
-    return (one.name, one.answer.verdict, "yes" if one.answer.provisional else "no", p_value, effects)
+def _read(task: TraceTask) -> TracedSet:
+    first, *others = map(TraceAnswer.read, task.answers)
+    return TracedSet(task.out.name, first, others=tuple(others))
+
+
+def _rows(one: TracedSet, several: bool) -> Iterator[tuple[str, ...]]:
+    """The rows of a set; ``several``: with the motion of each."""
+    if not one.answers:
+        yield (one.name, *([""] if several else []), FAILED, "", "", one.error.replace("\n", " "))
+    for number, answer in enumerate(one.answers):
+        effects = "; ".join(effect_line(e) for e in answer.effects)
+        declared = answer.declared_model
+        p_value = "" if declared is None else f"{declared.p_value:.2g}"
+        motion = [answer.motion.name] if several else []
+        name = "" if number else one.name
+        yield (name, *motion, answer.verdict, "yes" if answer.provisional else "no", p_value, effects)
 
 
 __all__ = ["FAILED", "NAME", "TracedSet", "TracedSets", "trace_sets"]

@@ -50,6 +50,21 @@ class TraceTask:
         """File of the result: trace.json or loop.json."""
         return self.out / f"{self.command}.json"
 
+    @property
+    def folders(self) -> tuple[str, ...]:
+        """Folder of the answer of each motion within that of the task; empty for the task's own."""
+        from airtruth.tracing.motions import parts_of
+
+        return tuple(part.folder for part in parts_of(self.logs, self.aircraft, self.options))
+
+    @property
+    def answers(self) -> tuple[Path, ...]:
+        """Files of the result that are there, that of a second motion in the folder of its name."""
+        from airtruth.tracing.motions import FOLDERS
+
+        each = (self.answer, *(self.out / name / self.answer.name for name in FOLDERS[1:]))
+        return tuple(path for path in each if path.is_file())
+
 
 def perform(task: TraceTask, advance: Callable[[str], None] = lambda step: None) -> str:
     """Trace, or close the loop, into the folder of the task, and return the summary; the result depends on the task alone.

@@ -53,14 +53,18 @@ def trace_outputs(
     if out is None:
         yield declared
         return
-    with writing(command, [*log_files(logs), *aircraft_files(declared)], force=force) as outputs:
-        folder = out / "trace" if command == "loop" else out
-        outputs.require(*(folder / name for name in _trace_names()))
-        if command == "loop":
-            from airtruth.loop import OUTPUTS
+    from airtruth.tracing.motions import FOLDERS
 
-            outputs.require(*(out / name for name in OUTPUTS))
-        outputs.require_folder(folder / "aircraft" / declared.name)
+    with writing(command, [*log_files(logs), *aircraft_files(declared)], force=force) as outputs:
+        for name in FOLDERS:
+            own = out / name if name else out
+            folder = own / "trace" if command == "loop" else own
+            outputs.require(*(folder / file for file in _trace_names()))
+            if command == "loop":
+                from airtruth.loop import OUTPUTS
+
+                outputs.require(*(own / file for file in OUTPUTS))
+            outputs.require_folder(folder / "aircraft" / declared.name)
         yield declared
 
 

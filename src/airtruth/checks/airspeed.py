@@ -127,7 +127,7 @@ def without_noise(
     return QuietAirspeed(np.asarray(ground_m_s + smoothed(gust, ratio)), WalkInNoise(noise, ratio))
 
 
-def ground_speed(channels: Mapping[str, Array], theta: Array, dt_s: float) -> Array:
+def ground_speed(channels: Mapping[str, Array], theta: Array, dt_s: float, *, banked: bool = False) -> Array:
     """Speed without gusts (samples,) [m/s]: the integral of the acceleration along the path, and a line.
 
     The line, which fits the airspeed, takes up the accelerometer's bias and the steady wind; without ax, thrust less drag too.
@@ -135,7 +135,7 @@ def ground_speed(channels: Mapping[str, Array], theta: Array, dt_s: float) -> Ar
     aircraft.
     """
     v = np.asarray(channels["airspeed_m_s"], dtype=np.float64)
-    along = _path_acceleration(channels, theta)
+    along = (_banked_acceleration if banked else _path_acceleration)(channels, theta)
     speed = np.concatenate([[0.0], np.cumsum(0.5 * dt_s * (along[1:] + along[:-1]))])
     time = dt_s * (np.arange(len(v)) - 0.5 * (len(v) - 1))
     slope = float(time @ (v - speed) / (time @ time))
@@ -163,22 +163,23 @@ class Speeds(NamedTuple):
     quiet: QuietAirspeed
 
 
-def speeds(channels: Mapping[str, Array], dt_s: float) -> Speeds:
+def speeds(channels: Mapping[str, Array], dt_s: float, *, banked: bool = False) -> Speeds:
     """Airspeed of a run without the noise of its sensor, and what it follows from.
 
     Parameters
     ----------
     channels : (samples,) each; dt_s : sample period [s].
+    banked : whether sideslip and bank count; otherwise the flight is in the pitch plane.
     """
     theta = attitude(channels, dt_s)
-    ground = ground_speed(channels, theta, dt_s)
-    walk = ground_walk(channels, theta, dt_s)
+    ground = ground_speed(channels, theta, dt_s, banked=banked)
+    walk = ground_walk(channels, theta, dt_s, banked=banked)
     return Speeds(theta, ground, without_noise(channels["airspeed_m_s"], ground, dt_s, walk))
 
 
-def ground_walk(channels: Mapping[str, Array], theta: Array, dt_s: float) -> float:
+def ground_walk(channels: Mapping[str, Array], theta: Array, dt_s: float, *, banked: bool = False) -> float:
     """Variance that the error of `ground_speed` gains from one sample to the next, from the noise of its sensors [m2/s2]."""
-    noise, _ = _variances(_path_acceleration(channels, theta))
+    noise, _ = _variances((_banked_acceleration if banked else _path_acceleration)(channels, theta))
     return float(noise) * dt_s**2
 
 
@@ -189,6 +190,21 @@ def _path_acceleration(channels: Mapping[str, Array], theta: Array) -> Array:
     if "ax_m_s2" in channels:
         along = along + channels["ax_m_s2"] * np.cos(alpha) + channels["az_m_s2"] * np.sin(alpha)
     return np.asarray(along)
+
+
+def _banked_acceleration(channels: Mapping[str, Array], theta: Array) -> Array:
+    """As `_path_acceleration` with sideslip and bank; the specific force of axes that are not recorded is left out.
+
+    Source: B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, 2nd ed., 2003, table 2.5-1 (V').
+    """
+    alpha, beta, phi = channels["alpha_rad"], channels["beta_rad"], channels["phi_rad"]
+    along = np.stack([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
+    gravity = np.stack([-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)])
+    total = G0 * (along * gravity).sum(axis=0)
+    if "ax_m_s2" in channels:
+        for part, name in zip(along, ("ax_m_s2", "ay_m_s2", "az_m_s2"), strict=True):
+            total = total + part * channels.get(name, 0.0)
+    return np.asarray(total)
 
 
 __all__ = [

@@ -53,6 +53,13 @@ OfMotion = Annotated[
         help="Motion to identify. Default: each that the records excite and have the channels for.",
     ),
 ]
+TracedMotion = Annotated[
+    MotionName | None,
+    typer.Option(
+        "--motion",
+        help="Motion to trace. Default: each that the records excite and have the channels for.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 CampaignFile = Annotated[
     Path, typer.Argument(metavar="CAMPAIGN.toml", help="Campaign file, see docs/campaigns.md.")

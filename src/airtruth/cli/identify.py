@@ -47,8 +47,8 @@ def identify(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Parquet file of the estimates. Default: DIR/estimates.parquet for one DIR, none for logs. Of two motions the "
-            "lateral one is written beside it, with -lateral in the name."
+            help="File of the estimates, FILE.parquet. Default: DIR/estimates.parquet for one DIR, none for logs. Of two "
+            "motions the lateral one is written beside it, with -lateral in the name."
         ),
     ] = None,
     trim: Annotated[
@@ -199,7 +199,7 @@ def tables(
     force: Replace = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write the paper's tables from identified campaigns, beside the published figures."""
+    """Write the paper's tables from identified campaigns, beside the published figures, and a table of lateral estimates."""
     for folder in folders:
         require_file(
             folder, "campaign folder", f"`airtruth fly CAMPAIGN.toml --out {quote(str(folder))}` creates it"

@@ -39,6 +39,15 @@ LOOP_STEPS: Final = (
     ("identify simulated", 1.0),
 )
 """The same of a loop."""
+
+
+def steps_of(steps: Sequence[tuple[str, float]], folders: Sequence[str]) -> tuple[tuple[str, float], ...]:
+    """The steps of a command that answers several motions: those of a motion with a folder begin with its name."""
+    return tuple(
+        (f"{folder}: {first}" if folder else first, seconds) for folder in folders for first, seconds in steps
+    )
+
+
 AT_ONCE_S: Final = 0.5
 """Time within which work that is reported was done by an earlier command [s] (judgement)."""
 LEAST_DONE: Final = 0.04
@@ -318,5 +327,6 @@ __all__ = [
     "loading",
     "progress_bar",
     "status",
+    "steps_of",
     "working",
 ]

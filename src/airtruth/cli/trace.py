@@ -19,10 +19,12 @@ from airtruth.cli.arguments import (
     LogFiles,
     Methods,
     Model,
+    MotionName,
     OnCluster,
     Quiet,
     Threads,
     TimeBudget,
+    TracedMotion,
     TraceSeed,
 )
 from airtruth.cli.compilation import compile_filter
@@ -36,6 +38,7 @@ from airtruth.cli.progress import (
     loading,
     progress_bar,
     status,
+    steps_of,
 )
 from airtruth.errors import FAILED_RUNS
 
@@ -50,6 +53,7 @@ def trace(
     logs: LogFiles,
     aircraft: Declared,
     out: Annotated[Path, typer.Option(help="Folder of trace.json, figures and the updated aircraft.")],
+    motion: TracedMotion = None,
     model: Model = "aircraft",
     hold_out: HeldOut = None,
     jobs: Threads = PROCESSORS,
@@ -75,7 +79,7 @@ def trace(
         from airtruth.api.campaigns import load_aircraft
         from airtruth.api.trace_tasks import TraceTask
 
-        options = _options(model, hold_out, jobs, seed, effect, time_budget, increments)
+        options = _options(motion, model, hold_out, jobs, seed, effect, time_budget, increments)
     if each:
         _trace_each(logs, aircraft, options, out, cluster, force=force, as_json=json_, quiet=quiet)
         return
@@ -92,6 +96,7 @@ def loop(
     aircraft: Declared,
     out: Annotated[Path, typer.Option(help="Folder of the trace, the estimates, loop.json and the table.")],
     method: Methods = None,
+    motion: TracedMotion = None,
     model: Model = "aircraft",
     hold_out: HeldOut = None,
     jobs: Threads = PROCESSORS,
@@ -112,7 +117,7 @@ def loop(
         from airtruth.api.trace_tasks import TraceTask
         from airtruth.loop import METHODS
 
-        options = _options(model, hold_out, jobs, seed, effect, time_budget, increments)
+        options = _options(motion, model, hold_out, jobs, seed, effect, time_budget, increments)
     task = TraceTask(tuple(logs), load_aircraft(aircraft), options, out, force, tuple(method or METHODS))
     _perform(task, cluster, as_json=json_, quiet=quiet)
 
@@ -122,10 +127,11 @@ def _perform(task: TraceTask, cluster: str | None, *, as_json: bool, quiet: bool
     from airtruth.api.trace_tasks import attempted_on, perform
     from airtruth.cluster import workers
 
+    steps = TRACE_STEPS if task.methods is None else LOOP_STEPS
     with (
         workers(cluster) as on,
         announced_compilation(task.command, quiet),
-        status(task.command, quiet, TRACE_STEPS if task.methods is None else LOOP_STEPS) as advance,
+        status(task.command, quiet, steps_of(steps, task.folders)) as advance,
     ):
         if on is None:
             summary = perform(task, advance)
@@ -136,20 +142,34 @@ def _perform(task: TraceTask, cluster: str | None, *, as_json: bool, quiet: bool
                 raise ended.error
             summary = ended.summary
     if as_json:
-        summary = task.answer.read_text(encoding="utf-8")
+        summary = _json(task.answers)
     elif is_verbose() and task.methods is None:
-        summary = _details(task.answer)
+        summary = _details(task.answers)
     print_result(summary.rstrip())
 
 
-def _details(answer: Path) -> str:
+def _json(answers: Sequence[Path]) -> str:
+    """The file of an answer; of several, an object with that of each motion under its name."""
+    import json
+
+    from airtruth.physics.motion import MOTIONS
+
+    texts = [path.read_text(encoding="utf-8") for path in answers]
+    if len(texts) == 1:
+        return texts[0]
+    named = zip(MOTIONS, map(json.loads, texts), strict=True)
+    return json.dumps(dict(named), indent=1)
+
+
+def _details(answers: Sequence[Path]) -> str:
     from airtruth.documents import read_json
     from airtruth.errors import StoreError
     from airtruth.tracing.answer import TraceAnswer
+    from airtruth.tracing.presentation.several import under_headings
     from airtruth.tracing.presentation.text import as_trace_text
 
-    document = read_json(answer, StoreError, "run the same command again")
-    return as_trace_text(TraceAnswer.from_dict(document, str(answer)))
+    documents = [(read_json(path, StoreError, "run the same command again"), path) for path in answers]
+    return under_headings(as_trace_text, [TraceAnswer.from_dict(own, str(path)) for own, path in documents])
 
 
 def _trace_each(
@@ -185,6 +205,7 @@ def _trace_each(
 
 
 def _options(
+    motion: MotionName | None,
     model: str,
     hold_out: Sequence[str] | None,
     jobs: int,
@@ -203,4 +224,5 @@ def _options(
         effects=None if effect is None else tuple(effect),
         time_budget_s=time_budget,
         increments=increments,
+        motion=motion,
     )

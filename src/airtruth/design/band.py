@@ -240,7 +240,7 @@ class Band:
             model.declared,
             tuple(own.effect for own in self.learned),
             also_unconstrained=_FREE,
-            trim_alpha_rad=record.plant.trim_alpha_rad,
+            trim_flow_rad=record.plant.trim_alpha_rad,
         )
         scale = [np.where(np.arange(len(own.sizes)) < own.effect.bends, factor, 1.0) for own in self.learned]
         sizes = np.concatenate([own.sizes for own in self.learned]) * np.concatenate(scale)

@@ -26,7 +26,8 @@ from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import trim
 from airtruth.tracing.conditions import gust_length_m
 from airtruth.tracing.model.plant import Plant, probed
-from airtruth.tracing.model.records import TraceRecord, read
+from airtruth.tracing.model.reading import read
+from airtruth.tracing.model.records import TraceRecord
 
 Array = NDArray[np.float64]
 

@@ -89,7 +89,7 @@ class Model:
 
     def hypothesis(self, effects: Sequence[Effect], record: TraceRecord) -> Hypothesis:
         """The declared aircraft with some effects."""
-        return Hypothesis(self.declared, tuple(effects), trim_alpha_rad=record.plant.trim_alpha_rad)
+        return Hypothesis(self.declared, tuple(effects), trim_flow_rad=record.plant.trim_alpha_rad)
 
     def own(self, record: TraceRecord) -> Array:
         """(per-record,) parameters of a flight in these gusts."""

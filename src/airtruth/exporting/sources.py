@@ -14,6 +14,7 @@ from airtruth.errors import ConfigurationError, choices
 from airtruth.exporting.model import LateralPoint, LinearModel, OperatingPoint
 from airtruth.identification.record_constants import Constants, LateralValues
 from airtruth.logs.names import ESTIMATES
+from airtruth.logs.parquet import SUFFIX, is_parquet
 from airtruth.physics.atmosphere import density_kg_m3
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, motion_of
 
@@ -41,7 +42,7 @@ _CONSTANTS: Final[Mapping[str, tuple[str, ...]]] = {
 
 def estimates_file(source: Path) -> Path | None:
     """The file of estimates that a path means: itself, or the first motion's in a folder; None for an aircraft."""
-    if source.is_file() and source.suffix == ".parquet":
+    if source.is_file() and (source.suffix == SUFFIX or is_parquet(source)):
         return source
     return next((source / name for name in ESTIMATES.values() if (source / name).is_file()), None)
 

@@ -177,7 +177,7 @@ def _record(
         run_id=run_id,
         group="",
         t_s=t_s,
-        elevator_rad=channels["elevator_rad"],
+        controls_rad={"elevator_rad": channels["elevator_rad"]},
         measured={c: channels[c] for c in OUTPUTS},
         models=models,
         conditions={

@@ -19,6 +19,7 @@ from airtruth.identification.result import IdentificationResult, Settings, Spool
 from airtruth.identification.stored import KEY, KEYS, Stored, open_stored
 from airtruth.logs import ledger
 from airtruth.logs.names import ESTIMATES
+from airtruth.logs.parquet import require_suffix
 from airtruth.logs.remote import location
 from airtruth.logs.tables import write_parts
 from airtruth.physics.motion import LONGITUDINAL, Motion
@@ -58,9 +59,11 @@ def require_mergeable(
     Raises
     ------
     StoreError
-        Naming the difference and the cure.
+        Naming the difference and the cure; or the file is not named .parquet.
     """
-    _kept(location(path), methods, settings.to_dict(), force)
+    file = location(path)
+    require_suffix(file, "estimates")
+    _kept(file, methods, settings.to_dict(), force)
 
 
 def write_estimates(
@@ -86,9 +89,10 @@ def write_estimates(
     Raises
     ------
     StoreError
-        If the merge is refused, or the file cannot be read or written.
+        If the file is not named .parquet, the merge is refused, or it cannot be read or written.
     """
     path = location(path)
+    require_suffix(path, "estimates")
     settings = result.settings.to_dict()
     record = {
         "version": result.version,

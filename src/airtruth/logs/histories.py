@@ -17,13 +17,14 @@ from typing_extensions import TypedDict
 from airtruth.channels import RUN_ID, TIME
 from airtruth.errors import StoreError
 from airtruth.logs.tables import read_metadata, read_table, require_kinds, write_table
+from airtruth.physics.motion import LONGITUDINAL
 
 Array = NDArray[np.float64]
 
 FILE: Final = "records.parquet"
 """Name of the file in the folder of a trace."""
-INPUT: Final = "elevator_rad"
-"""Channel that drives the simulations."""
+CONTROLS: Final = tuple(control.channel for control in LONGITUDINAL.controls)
+"""Channels that drive the simulations where a file states no others."""
 KEY: Final = "histories"
 """Key of the file-level JSON that describes the records."""
 
@@ -41,9 +42,9 @@ class History:
     run_id : name of the record.
     group : "fitted", "held out", or "" where records are not divided.
     t_s : (samples,) time from the start of the record [s].
-    elevator_rad : (samples,) measured elevator [rad].
+    controls_rad : channel -> (samples,) measured control surface [rad].
     measured : channel -> (samples,) measured values in SI.
-    models : model -> channel -> (samples,) simulation from the elevator, without correction by measurements.
+    models : model -> channel -> (samples,) simulation from the controls, without correction by measurements.
     innovations : model -> channel -> (samples,) whitened errors of the prediction one sample ahead [-].
     effect : channel -> (samples,) part of the simulation that the accepted effects make.
     floor : channel -> root mean square of a simulation's error that gusts and sensor noise alone explain.
@@ -53,7 +54,7 @@ class History:
     run_id: str
     group: str
     t_s: Array
-    elevator_rad: Array
+    controls_rad: Mapping[str, Array]
     measured: Mapping[str, Array]
     models: Mapping[str, Mapping[str, Array]]
     innovations: Mapping[str, Mapping[str, Array]] = field(default_factory=dict)
@@ -114,6 +115,7 @@ class _Document(TypedDict):
     innovations: bool
     effect: bool
     records: dict[str, _Record]
+    controls: NotRequired[list[str]]
     facts: NotRequired[dict[str, Any]]
 
 
@@ -126,11 +128,11 @@ def write_histories(path: Path, histories: Histories) -> None:
         If the file cannot be written.
     """
     first = histories.records[0]
-    channels = list(first.measured)
+    channels, controls = list(first.measured), list(first.controls_rad)
     columns: dict[str, Any] = {
         RUN_ID: pa.array([r.run_id for r in histories.records for _ in r.t_s], pa.string())
     }
-    for name in _columns(channels, histories.models, bool(first.innovations), bool(first.effect)):
+    for name in _columns(controls, channels, histories.models, bool(first.innovations), bool(first.effect)):
         columns[name] = np.concatenate([_series(record, name) for record in histories.records])
     document = {
         "channels": channels,
@@ -145,6 +147,8 @@ def write_histories(path: Path, histories: Histories) -> None:
         },
         "facts": dict(histories.facts),
     }
+    if tuple(controls) != CONTROLS:
+        document["controls"] = controls
     write_table(path, pa.table(columns), {KEY: document})
 
 
@@ -169,7 +173,8 @@ def read_histories(path: Path, cure: str) -> Histories:
         where = ".".join(map(str, first["loc"])) or KEY
         raise StoreError(f"{path}: is not complete ({where}: {first['msg'].lower()}); {cure}") from None
     channels, models = document["channels"], document["models"]
-    names = _columns(channels, models, document["innovations"], document["effect"])
+    controls = document.get("controls", list(CONTROLS))
+    names = _columns(controls, channels, models, document["innovations"], document["effect"])
     frame = read_table(path)
     require_kinds(path, frame, {RUN_ID: "text", **dict.fromkeys(names, "number")}, cure)
     values = {name: _of_motion(frame[name].to_numpy(dtype=np.float64)) for name in names}
@@ -187,10 +192,14 @@ def read_histories(path: Path, cure: str) -> Histories:
 
 
 def _columns(
-    channels: list[str], models: list[str] | tuple[str, ...], innovations: bool, effect: bool
+    controls: list[str],
+    channels: list[str],
+    models: list[str] | tuple[str, ...],
+    innovations: bool,
+    effect: bool,
 ) -> list[str]:
     kinds = ["free_run", "innovation"] if innovations else ["free_run"]
-    names = [TIME, INPUT]
+    names = [TIME, *controls]
     for channel in channels:
         names += [f"{channel}_measured", *(f"{channel}_{kind}_{m}" for m in models for kind in kinds)]
         names += [f"{channel}_effect"] if effect else []
@@ -213,7 +222,7 @@ def _series(record: History, name: str) -> Array:
 
 def _named(record: History) -> Iterator[tuple[str, Array]]:
     yield TIME, record.t_s
-    yield INPUT, record.elevator_rad
+    yield from record.controls_rad.items()
     for channel, measured in record.measured.items():
         yield f"{channel}_measured", measured
         for model, simulated in record.models.items():
@@ -234,7 +243,7 @@ def _history(run_id: str, described: _Record, document: _Document, own: Mapping[
         run_id=run_id,
         group=described["group"],
         t_s=own[TIME],
-        elevator_rad=own[INPUT],
+        controls_rad={c: own[c] for c in document.get("controls", CONTROLS)},
         measured={c: own[f"{c}_measured"] for c in channels},
         models=by_model("free_run"),
         innovations=by_model("innovation") if document["innovations"] else {},
@@ -244,4 +253,4 @@ def _history(run_id: str, described: _Record, document: _Document, own: Mapping[
     )
 
 
-__all__ = ["FILE", "INPUT", "Histories", "History", "read_histories", "write_histories"]
+__all__ = ["CONTROLS", "FILE", "Histories", "History", "read_histories", "write_histories"]

@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
 from airtruth.physics.short_period import CL_ALPHA, CL_DE, CL_Q, CM_ALPHA, CM_DE, CM_Q
 
 Array = NDArray[np.float64]
@@ -132,39 +132,55 @@ PARTS: Final[Mapping[str, Part]] = MappingProxyType(
 """Causes by name: tail, wing and dynamic pressure are factors, the aerodynamic centre counts aft in chords, and icing is a
 severity, 1 for the reference ice."""
 CAUSES: Final[Mapping[str, float]] = MappingProxyType(
-    {name: part.neutral for name, part in PARTS.items()} | dict.fromkeys(LONGITUDINAL.parameters, 0.0)
+    {name: part.neutral for name, part in PARTS.items()}
+    | dict.fromkeys((name for m in MOTIONS.values() for name in m.parameters), 0.0)
 )
 """Causes of a change of the derivatives (`airtruth.physics.terms.DerivativeTerm`) -> neutral value; a derivative is its own
 cause."""
 
 
-def directions(derivatives: Array, geometry: TailGeometry) -> Mapping[str, Array]:
-    """Change of the six apparent derivatives per unit of each declared quantity and each part, at its neutral value.
+_LEVERS: Final[Mapping[str, tuple[str, str, Callable[[TailGeometry], float]]]] = MappingProxyType(
+    {
+        "longitudinal": ("CL", "Cm", lambda _: 1.0),
+        "lateral": ("CY", "Cn", lambda geometry: 1.0 / (geometry.aspect_ratio or _ASPECT_RATIO)),
+    }
+)
+"""Motion -> force whose moment changes with the CG, that moment, and the chord over the reference length of the moment [-]."""
+
+
+def directions(
+    derivatives: Array, geometry: TailGeometry, motion: Motion = LONGITUDINAL
+) -> Mapping[str, Array]:
+    """Change of the apparent derivatives per unit of each declared quantity and each part, at its neutral value.
 
     Parameters
     ----------
-    derivatives, geometry : as in `tail_part`.
+    derivatives : of the motion, in its order [-]; geometry : as in `tail_part`.
+    motion : whose derivatives, quantities, controls and parts count.
 
     Returns
     -------
-    quantity or part -> (6,). A factor on the mass or an inertia divides its coefficients, the effectiveness of a control
-    multiplies its derivatives, and "cg" counts aft in chords.
+    quantity or part -> change of the derivatives. A factor on the mass or an inertia divides its coefficients, the
+    effectiveness of a control multiplies its derivatives, and "cg" counts aft in chords: lift pitches the nose up about a
+    centre of gravity that lies farther aft, and a side force yaws it to the right.
     """
     found = {}
-    for quantity in LONGITUDINAL.declared:
+    for quantity in motion.declared:
         if quantity.divides:
             divided = np.zeros_like(derivatives)
-            for row in map(LONGITUDINAL.row, quantity.divides):
+            for row in map(motion.row, quantity.divides):
                 divided[row] = derivatives[row]
             found[quantity.name] = -divided
-    for control in LONGITUDINAL.controls:
+    for control in motion.controls:
         found[control.name] = np.zeros_like(derivatives)
-        column = LONGITUDINAL.column(control.name)
+        column = motion.column(control.name)
         found[control.name][column] = derivatives[column]
+    force, moment, chords = _LEVERS[motion.name]
     found["cg"] = np.zeros_like(derivatives)
-    found["cg"][LONGITUDINAL.row("Cm")] = derivatives[LONGITUDINAL.row("CL")]
+    found["cg"][motion.row(moment)] = chords(geometry) * derivatives[motion.row(force)]
+    parts = {name: part for name, part in PARTS.items() if part.motion == motion.name}
     return MappingProxyType(
-        found | {name: part.direction(derivatives, geometry) for name, part in PARTS.items()}
+        found | {name: part.direction(derivatives, geometry) for name, part in parts.items()}
     )
 
 

@@ -33,6 +33,7 @@ class Control:
     channel, command : columns of the measured surface and of its command [rad].
     actuator : table of aircraft.toml with its servo.
     symbol : its part in the names of derivatives.
+    damped : column of the angular rate that a damper feeds back to it.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Control:
     command: str
     actuator: str
     symbol: str
+    damped: str
 
 
 @dataclass(frozen=True)
@@ -52,12 +54,14 @@ class Output:
     channel : column of the flight log.
     instrument : name of its sensor in the names of errors.
     late : whether it needs the accelerations of the motion; the filter updates with the other outputs first.
+    quantity : in words.
     """
 
     name: str
     channel: str
     instrument: str
     late: bool = False
+    quantity: str = ""
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,23 @@ def reading_increments(
     named = {name for term in terms for name in (term.signal, term.behind)}
     if "qbar" in named:
         signals["qbar"] = 0.5 * np.asarray(air_density(truth)) * truth["airspeed_m_s"] ** 2
+    return increments_over(terms, states, signals, dt_s)
+
+
+def increments_over(
+    terms: Sequence[ReadingTerm], states: Sequence[StateTerm], signals: Mapping[str, Array], dt_s: float
+) -> dict[str, Array]:
+    """Increments of readings by channel, in signals of any motion.
+
+    Parameters
+    ----------
+    terms, states : as of `reading_increments`.
+    signals : name -> values (runs, samples) of each signal that a term or a state of a term names.
+    dt_s : sample period [s].
+    """
+    named = {name for term in terms for name in (term.signal, term.behind)}
     drivers = {s.name: s.signal for s in states}
+    signals = dict(signals)
     signals |= {s.name: state_of(s, signals[s.signal], dt_s) for s in states if s.name in named}
     total: dict[str, Array] = {}
     for term in terms:
@@ -85,4 +101,4 @@ def reading_increments(
     return total
 
 
-__all__ = ["reading_increments", "state_of"]
+__all__ = ["increments_over", "reading_increments", "state_of"]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError, choices
 from airtruth.physics.composition import CAUSES, TailGeometry, directions
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.terms import AeroTerm, Change, DerivativeTerm
 
 Array = NDArray[np.float64]
@@ -26,44 +26,47 @@ class LinearPoint:
 
     Attributes
     ----------
-    derivatives : (6,) in the order of `airtruth.physics.motion.LONGITUDINAL` [-].
-    alpha_rad, elevator_rad : the trim [rad].
+    derivatives : of the motion, in its order [-].
+    trim : signal of the motion -> value at the trim [rad]; those left out are zero there.
     geometry : what is declared of the tail.
+    motion : the motion of the model.
     """
 
     derivatives: Array
-    alpha_rad: float
-    elevator_rad: float
+    trim: Mapping[str, float]
     geometry: TailGeometry
+    motion: Motion = LONGITUDINAL
 
 
 def derivative_increments(
-    terms: Iterable[DerivativeTerm], derivatives: Array, geometry: TailGeometry
+    terms: Iterable[DerivativeTerm], derivatives: Array, geometry: TailGeometry, motion: Motion = LONGITUDINAL
 ) -> Array:
-    """Change of the six derivatives by some causes.
+    """Change of the derivatives by some causes.
 
     Parameters
     ----------
     terms : the causes.
-    derivatives : (6,) of the declared aircraft [-].
+    derivatives : of the declared aircraft, in the order of the motion [-].
     geometry : what is declared of its tail.
+    motion : whose derivatives change.
 
     Returns
     -------
-    (6,) sum over the causes of size times direction (`airtruth.physics.composition.directions`); the size is the
+    Sum over the causes of size times direction (`airtruth.physics.composition.directions`); the size is the
     difference from neutral.
 
     Raises
     ------
     ConfigurationError
-        If a cause is not known.
+        If a cause is none of the motion.
     """
-    names = LONGITUDINAL.parameters
-    unit = dict(directions(derivatives, geometry)) | dict(zip(names, np.eye(len(names)), strict=True))
+    names = motion.parameters
+    unit = dict(directions(derivatives, geometry, motion)) | dict(zip(names, np.eye(len(names)), strict=True))
     total = np.zeros(len(names))
     for term in terms:
-        if term.cause not in CAUSES:
-            raise ConfigurationError(f"cause {term.cause!r}: {choices(term.cause, CAUSES)}")
+        if term.cause not in CAUSES or term.cause not in unit:
+            known = [cause for cause in CAUSES if cause in unit]
+            raise ConfigurationError(f"cause {term.cause!r}: {choices(term.cause, known)}")
         total += (term.value - CAUSES[term.cause]) * unit[term.cause]
     return total
 
@@ -83,38 +86,40 @@ def resolved(change: Change, at: LinearPoint) -> Change:
     """
     if not change.derivatives:
         return change
-    amounts = derivative_increments(change.derivatives, at.derivatives, at.geometry)
-    # a derivative of lift counts across the flight path, a term of CL along -z of the body
-    amounts[LONGITUDINAL.row("CL")] /= np.cos(at.alpha_rad)
-    named = {name: float(x) for name, x in zip(LONGITUDINAL.parameters, amounts, strict=True) if x != 0.0}
-    terms = linear_terms(named, at.alpha_rad, at.elevator_rad)
+    motion = at.motion
+    amounts = derivative_increments(change.derivatives, at.derivatives, at.geometry, motion)
+    # a derivative of lift counts across the flight path, a term of it along -z of the body
+    for coefficient in (c.name for c in motion.coefficients if c.sign < 0):
+        amounts[motion.row(coefficient)] /= np.cos(at.trim[motion.implicit[1]])
+    named = {name: float(x) for name, x in zip(motion.parameters, amounts, strict=True) if x != 0.0}
+    terms = linear_terms(named, at.trim, motion)
     return replace(change, aero=change.aero + terms, derivatives=())
 
 
 def linear_terms(
-    increments: Mapping[str, float], alpha_rad: float, elevator_rad: float
+    increments: Mapping[str, float], trim: Mapping[str, float], motion: Motion = LONGITUDINAL
 ) -> tuple[AeroTerm, ...]:
     """Increments of derivatives as terms that vanish at a trim.
 
     Parameters
     ----------
-    increments : derivative of `airtruth.physics.motion.LONGITUDINAL` -> increment [1/rad]; may leave some out.
-    alpha_rad, elevator_rad : the trim [rad].
+    increments : derivative of the motion -> increment [1/rad, -]; may leave some out.
+    trim : signal -> value at the trim [rad]; those left out are zero there.
+    motion : of the derivatives.
 
     Raises
     ------
     ConfigurationError
-        If a name is not a derivative.
+        If a name is not a derivative of the motion.
     """
-    at = {"alpha": alpha_rad, "elevator": elevator_rad, "qhat": 0.0}
     terms = []
     for name, amount in increments.items():
-        if name not in LONGITUDINAL.parameters:
-            raise ConfigurationError(f"derivative {name!r}: {choices(name, LONGITUDINAL.parameters)}")
-        derivative = LONGITUDINAL.derivatives[LONGITUDINAL.index(name)]
-        signal = LONGITUDINAL.signals[derivative.column].name
-        coefficient = LONGITUDINAL.coefficients[derivative.row].name
-        terms.append(AeroTerm(coefficient, signal, "linear", amount, at[signal]))
+        if name not in motion.parameters:
+            raise ConfigurationError(f"derivative {name!r}: {choices(name, motion.parameters)}")
+        derivative = motion.derivatives[motion.index(name)]
+        signal = motion.signals[derivative.column].name
+        coefficient = motion.coefficients[derivative.row].name
+        terms.append(AeroTerm(coefficient, signal, "linear", amount, trim.get(signal, 0.0)))
     return tuple(terms)
 
 

@@ -20,7 +20,7 @@ from airtruth.physics.motion import MOTIONS
 
 Array = NDArray[np.float64]
 
-Kind = Literal["bias", "scale", "lag", "delay", "arm", "arm_down", "alpha_slope"]
+Kind = Literal["bias", "scale", "lag", "delay", "arm", "arm_down", "arm_right", "alpha_slope"]
 """Errors that an effect may add to those declared."""
 
 
@@ -186,9 +186,13 @@ def error_name(channel: str, kind: Kind) -> str:
     --------
     >>> error_name("alpha_rad", "scale"), error_name("q_rad_s", "delay"), error_name("beta_rad", "arm")
     ('vane_scale', 'sensor_delay:q_rad_s', 'vane_arm:beta_rad')
+    >>> error_name("alpha_rad", "arm_right")
+    'alpha_vane_roll_arm'
     """
     if kind == "delay":
         return f"sensor_delay:{channel}"
+    if kind == "arm_right":
+        return f"{channel.removesuffix('_rad')}_{INSTRUMENTS[channel]}_roll_arm"
     name = f"{INSTRUMENTS[channel]}_{kind.replace('arm_down', 'arm_z')}"
     return f"{name}:{channel}" if channel in LATERAL else name
 

@@ -1,37 +1,76 @@
 """Terms that an effect adds to a model, in plain values; simulation, tracing and the aircraft writer read them.
 
-Every term has no influence at its neutral value. Signs and axes are those of the flight log: body axes, x forward, z
-down, nose-up positive, elevator trailing edge down positive.
+Every term has no influence at its neutral value. Signs and axes are those of the flight log: body axes, x forward, y right,
+z down, nose-up positive, elevator trailing edge down positive (`airtruth.physics.motion`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields, replace
-from typing import Final, Literal
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from airtruth.physics.motion import LONGITUDINAL, MOTIONS
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
 from airtruth.physics.sensor_errors import Kind
 
 Array = NDArray[np.float64]
 
-SIGNALS: Final = ("alpha", "elevator", "qhat", "alpha_dot_hat", "qbar")
-"""Signals of an `AeroTerm`, which may name a state as well; their order numbers them for compiled code."""
-DRIVERS: Final = SIGNALS[:4]
-"""Signals that may drive a `StateTerm`."""
-FACTORS: Final = ("alpha", "elevator", "qhat")
-"""Signals by which an `AeroTerm` may be multiplied: those of the six derivatives."""
-MEASURED: Final = ("alpha", "elevator", "qhat", "qbar")
-"""Signals that a log measures; a `ReadingTerm` names one of these or a state."""
-COEFFICIENTS: Final = (*(c.name for c in LONGITUDINAL.coefficients), "CX")
-"""Coefficients of an `AeroTerm`; the axial force changes the airspeed and ax alone."""
+QBAR: Final = "qbar"
+"""Signal of every motion: dynamic pressure [Pa]."""
+
+
+def factors_of(motion: Motion) -> tuple[str, ...]:
+    """Signals by which an `AeroTerm` may be multiplied: those of the derivatives, angles before rates."""
+    return tuple(s.name for s in sorted(motion.signals, key=lambda s: s.length is not None))
+
+
+def drivers_of(motion: Motion) -> tuple[str, ...]:
+    """Signals that may drive a `StateTerm`: `factors_of`, and the rate of the implicit state over l/(2V)."""
+    return (*factors_of(motion), f"{motion.implicit[1]}_dot_hat")
+
+
+def signals_of(motion: Motion) -> tuple[str, ...]:
+    """Signals of an `AeroTerm`, which may name a state as well; their order numbers them for compiled code.
+
+    Examples
+    --------
+    >>> signals_of(LONGITUDINAL)
+    ('alpha', 'elevator', 'qhat', 'alpha_dot_hat', 'qbar')
+    >>> signals_of(MOTIONS["lateral"])
+    ('beta', 'aileron', 'rudder', 'phat', 'rhat', 'beta_dot_hat', 'qbar', 'alpha')
+    """
+    return (*drivers_of(motion), QBAR, *(s.name for s in motion.known_signals))
+
+
+def measured_of(motion: Motion) -> tuple[str, ...]:
+    """Signals that a log measures; a `ReadingTerm` names one of these or a state."""
+    return (*factors_of(motion), QBAR, *(s.name for s in motion.known_signals))
+
+
+def coefficients_of(motion: Motion) -> tuple[str, ...]:
+    """Coefficients of an `AeroTerm`; the axial force of the pitch plane changes the airspeed and ax alone."""
+    return (*(c.name for c in motion.coefficients), *(("CX",) if motion is LONGITUDINAL else ()))
+
+
+SIGNALS: Final = signals_of(LONGITUDINAL)
+"""`signals_of` the pitch plane."""
+DRIVERS: Final = drivers_of(LONGITUDINAL)
+"""`drivers_of` the pitch plane."""
+FACTORS: Final = factors_of(LONGITUDINAL)
+"""`factors_of` the pitch plane."""
 READINGS: Final = LONGITUDINAL.output_channels
-"""Channels of a `ReadingTerm`, the outputs of the filter."""
-ELEVATOR: Final = "elevator_rad"
-"""Channel of the measured surface."""
+"""Outputs of the filter of the pitch plane."""
+OUTPUTS: Final = frozenset(channel for m in MOTIONS.values() for channel in m.output_channels)
+"""Channels of a `ReadingTerm`: the outputs of every motion."""
+ELEVATOR: Final = LONGITUDINAL.controls[0].name
+"""Control of a `SurfaceTerm` that names none."""
+_CHANNELS: Final = {c.name: c.channel for m in MOTIONS.values() for c in m.controls}
+"""Control -> column of its measured deflection."""
+_ACROSS: Final = {"arm_right": "p_rad_s"}
+"""Kind of error of a position -> rate of rotation that it needs, where the channel itself does not imply it."""
 SHAPES: Final = ("linear", "quadratic", "above", "below")
 """Functions f of an `AeroTerm` or a `ReadingTerm`, see `shape_of`; their order numbers them for compiled code."""
 FORMULAS: Final[Mapping[str, str]] = {
@@ -60,10 +99,12 @@ class SurfaceTerm:
     kind : "delay" [s]; "lag", time constant of a first-order lag [s]; "rate_limit" [rad/s];
         "backlash", full width of the play [rad], the surface starts in its middle.
     value : neutral 0; for "rate_limit" infinite.
+    control : name of the control (`airtruth.physics.motion_parts.Control`).
     """
 
     kind: Literal["delay", "lag", "rate_limit", "backlash"]
     value: float
+    control: str = ELEVATOR
 
 
 @dataclass(frozen=True)
@@ -75,7 +116,7 @@ class StateTerm:
     name : of the state.
     kind : "lag": tau x' = s - x; "mode": x'' + 2 zeta wn x' + wn^2 x = wn^2 s; "play": x rests until |s - x| reaches a half
         width and then follows s at that distance: hysteresis, or friction. All start in equilibrium, x = s.
-    signal : one of `DRIVERS`; of a play one of `FACTORS`.
+    signal : one of `drivers_of` a motion; of a play one of `factors_of` it.
     time_s : tau of a lag [s]; 1/wn of a mode [s]; 0 of a play.
     damping : zeta of a mode [-].
     half_width : of a play [unit of the signal].
@@ -96,14 +137,16 @@ class AeroTerm:
     Attributes
     ----------
     coefficient : "CL" (force along -z of the body over q_bar S), "Cm" (about the CG, over q_bar S c) or "CX" (force along x of
-        the body through the CG over q_bar S, which changes the airspeed and ax alone).
-    signal : one of `SIGNALS` or the name of a `StateTerm`: alpha [rad] of the air at the CG; elevator [rad] that causes
-        the forces (surface terms and effectiveness included); qhat = q c/(2V); alpha_dot_hat = alpha_dot c/(2V) of the
-        motion over ground, the influence of this term on it included; zero at a trim; qbar [Pa], the dynamic pressure.
+        the body through the CG over q_bar S, which changes the airspeed and ax alone); "CY" (force along y of the body),
+        "Cl", "Cn" (about the CG, over q_bar S b).
+    signal : one of `signals_of` the motion, or the name of a `StateTerm`: alpha, beta [rad] of the air at the CG; elevator,
+        aileron, rudder [rad] that cause the forces (surface terms and effectiveness included); qhat = q c/(2V),
+        phat = p b/(2V), rhat = r b/(2V); alpha_dot_hat = alpha_dot c/(2V), beta_dot_hat = beta_dot b/(2V) of the motion over
+        ground, the influence of this term on it included; zero at a trim; qbar [Pa], the dynamic pressure.
     shape : name of f, see `FORMULAS`.
     amplitude : per unit of f [and of the factor]; neutral 0.
     at : origin of f [unit of the signal].
-    factor : one of `FACTORS`, whose derivative then depends on the signal; empty for none.
+    factor : one of `factors_of` the motion, whose derivative then depends on the signal; empty for none.
     factor_at : origin of the factor [unit of the factor].
     """
 
@@ -130,9 +173,8 @@ class ReadingTerm:
 
     Attributes
     ----------
-    channel : one of `READINGS`.
-    signal : "alpha" [rad] of the air at the CG, "elevator" [rad], "qhat" = q c/(2V), "qbar" [Pa], or the name of a
-        `StateTerm`.
+    channel : one of `OUTPUTS`.
+    signal : one of `measured_of` a motion, as in an `AeroTerm`, or the name of a `StateTerm`.
     shape : name of f, see `FORMULAS`.
     amplitude : per unit of f [unit of the channel]; neutral 0.
     at : origin of f [unit of the signal].
@@ -204,10 +246,11 @@ class DeclaredTerm:
 
     Attributes
     ----------
-    quantity : key of `DECLARED`. "mass", "inertia" (Iyy), the name of a control (all forces and moments of the surface's
-        deflection from trim): a factor, neutral 1. "cg": shift of the CG aft [chords]; "thrust_arm": shift of the thrust
-        line down, nose-up positive [m]: neutral 0. Sensors keep their position relative to the CG; a `SensorTerm` moves
-        them.
+    quantity : key of `DECLARED`. "mass", "inertia" (Iyy), "inertia_xx", "inertia_zz", the name of a control (all forces and
+        moments of the surface's deflection from trim): a factor, neutral 1. "inertia_xz": increment of Ixz over the square
+        root of Ixx Izz; "cg": shift of the CG aft [chords]; "cg_y": to the right [m]; "thrust_arm": shift of the thrust
+        line down, nose-up positive [m]; "yaw_moment": constant yawing moment, nose right [N m]: neutral 0. Sensors keep
+        their position relative to the CG; a `SensorTerm` moves them.
     """
 
     quantity: str
@@ -257,8 +300,9 @@ class SensorTerm:
     Attributes
     ----------
     channel : column of the log.
-    kind : "bias" [unit of the channel]; "scale", a factor; "lag", time constant [s]; "delay" [s]; "arm",
-        position ahead of the CG [m] (alpha_rad: alpha - q x/V; az_m_s2: az - x q_dot).
+    kind : "bias" [unit of the channel]; "scale", a factor; "lag", time constant [s]; "delay" [s]; "arm", "arm_right",
+        "arm_down", position ahead of, right of and below the CG [m] (alpha_rad: alpha - q x/V + p y/V; az_m_s2: az - x q_dot;
+        beta_rad: beta + r x/V - p z/V; ay_m_s2: ay + x r_dot - z p_dot).
     value : neutral 0, for "scale" 1.
     """
 
@@ -273,12 +317,23 @@ class AirTerm:
 
     Attributes
     ----------
-    level : "sigma_u" or "sigma_w", standard deviation of a gust component.
+    level : standard deviation of a gust component.
     factor : on the declared level [-]; neutral 1. A declared level of zero counts as that of the other component.
     """
 
-    level: Literal["sigma_u", "sigma_w"]
+    level: Literal["sigma_u", "sigma_v", "sigma_w"]
     factor: float
+
+
+def entries(term: SurfaceTerm | StateTerm | AeroTerm | ReadingTerm) -> dict[str, Any]:
+    """Entries of a term in a file; a surface term of the elevator names no control.
+
+    Examples
+    --------
+    >>> entries(SurfaceTerm("delay", 0.06)), entries(SurfaceTerm("lag", 0.1, "rudder"))
+    ({'kind': 'delay', 'value': 0.06}, {'kind': 'lag', 'value': 0.1, 'control': 'rudder'})
+    """
+    return {k: v for k, v in asdict(term).items() if (k, v) != ("control", ELEVATOR)}
 
 
 @dataclass(frozen=True)
@@ -303,22 +358,29 @@ class Change:
         """Whether it changes the JSBSim model itself, and not its sensors or the air alone."""
         return bool(self.surface or self.aero or self.declared or self.derivatives)
 
-    @property
-    def surface_path(self) -> tuple[SurfaceTerm, ...]:
-        """Elements between the reading of the elevator and the air: a late reading is a negative delay before `surface`.
+    def of_surface(self, control: str) -> tuple[SurfaceTerm, ...]:
+        """The surface terms of one control."""
+        return tuple(term for term in self.surface if term.control == control)
+
+    def surface_path(self, control: str = ELEVATOR) -> tuple[SurfaceTerm, ...]:
+        """Elements between the reading of a control and the air: a late reading is a negative delay before `surface`.
 
         Examples
         --------
-        >>> Change(sensors=(SensorTerm(ELEVATOR, "delay", 0.02),)).surface_path
-        (SurfaceTerm(kind='delay', value=-0.02),)
+        >>> late = Change(sensors=(SensorTerm("rudder_rad", "delay", 0.02),))
+        >>> late.surface_path("rudder"), late.surface_path()
+        ((SurfaceTerm(kind='delay', value=-0.02, control='rudder'),), ())
         """
-        late = sum(t.value for t in self.sensors if (t.channel, t.kind) == (ELEVATOR, "delay"))
-        return (SurfaceTerm("delay", -late), *self.surface) if late != 0.0 else self.surface
+        own = self.of_surface(control)
+        late = sum(t.value for t in self.sensors if (t.channel, t.kind) == (_CHANNELS[control], "delay"))
+        return (SurfaceTerm("delay", -late, control), *own) if late != 0.0 else own
 
     def names(self) -> frozenset[str]:
         """Every name of its terms that a motion has to have; states of its own are none."""
         found = {t.quantity for t in self.declared} | {t.cause for t in self.derivatives}
         found |= {t.channel for t in self.sensors} | {t.level for t in self.air}
+        found |= {t.control for t in self.surface}
+        found |= {_ACROSS[t.kind] for t in self.sensors if t.kind in _ACROSS}
         found |= {name for r in self.readings for name in (r.channel, r.signal)} | {
             x.signal for x in self.states
         }

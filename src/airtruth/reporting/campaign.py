@@ -6,7 +6,7 @@ The truth serves tables and scoring alone; identification and tracing never read
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
@@ -16,12 +16,11 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from airtruth.documents import read_json
 from airtruth.errors import LogError, StoreError, choices
 from airtruth.logs.names import ESTIMATES as FILES
-from airtruth.physics.motion import LATERAL, LONGITUDINAL
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
 from airtruth.reporting.columns import Kind, flags, numbers, read_columns, texts
-from airtruth.reporting.paper.published import ESTIMATED
+from airtruth.reporting.description import DESCRIPTION, describe
 from airtruth.reporting.partial import Sample
 
 Array = NDArray[np.float64]
@@ -29,28 +28,21 @@ Array = NDArray[np.float64]
 TRUTH: Final = "truth.parquet"
 """File of the true parameters of each run."""
 
-ESTIMATES: Final = FILES[LONGITUDINAL.name]
-"""File of the estimates (contract 2)."""
-
-DESCRIPTION: Final = "campaign.json"
-"""File of the campaign's name, title, number of runs and gust settings."""
-
 FLOWN: Final = "ok"
 """Status of a run that has a log."""
 
 FAILED: Final = "failed"
 """Status of a run that could not be flown."""
 
-TRUTH_KINDS: Final[Mapping[str, Kind]] = {
-    "run_id": "text",
-    "status": "text",
-    **dict.fromkeys(ESTIMATED, "number"),
-}
-"""Columns of the truth that tables need."""
+
+def truth_kinds(motion: Motion) -> dict[str, Kind]:
+    """Columns of the truth of a motion that tables need."""
+    return {"run_id": "text", "status": "text", **dict.fromkeys(motion.estimated, "number")}
 
 
-def estimate_kinds(names: Sequence[str]) -> dict[str, Kind]:
-    """Columns of the estimates of parameters that reports need; the status may be absent."""
+def estimate_kinds(motion: Motion) -> dict[str, Kind]:
+    """Columns of the estimates of a motion that reports need; the status may be absent."""
+    names = motion.estimated
     bounds = (name + end for name in names for end in ("_lower", "_upper"))
     return {
         "run_id": "text",
@@ -62,17 +54,13 @@ def estimate_kinds(names: Sequence[str]) -> dict[str, Kind]:
     }
 
 
-ESTIMATE_KINDS: Final[Mapping[str, Kind]] = estimate_kinds(ESTIMATED)
-"""Columns of the longitudinal estimates."""
-
-
 @dataclass(frozen=True)
 class MethodEstimates:
     """Estimates of one method; rows follow `Campaign.run_ids`, NaN where a run did not fly.
 
     Attributes
     ----------
-    values, lower, upper : (runs, 8) six derivatives [-], wn [rad/s], zeta [-], and the bounds of their intervals.
+    values, lower, upper : (runs, estimated) as `Motion.estimated`, and the bounds of their intervals.
     converged : (runs,) whether the method converged.
     iterations : (runs,) number of iterations.
     status : (runs,) how the estimation of each run ended.
@@ -88,7 +76,7 @@ class MethodEstimates:
 
 @dataclass(frozen=True)
 class Campaign:
-    """A flown and identified campaign.
+    """A flown and identified campaign, of one motion.
 
     Attributes
     ----------
@@ -97,8 +85,9 @@ class Campaign:
     gust : gust settings in words, empty if campaign.json does not state them.
     run_ids : planned runs.
     flown : (runs,) whether the run has a log.
-    truth : (runs, 8) truth of each run, NaN where it did not fly.
+    truth : (runs, estimated) truth of each run, NaN where it did not fly.
     estimates : method -> estimates.
+    motion : whose parameters they are.
     """
 
     folder: Path
@@ -109,6 +98,7 @@ class Campaign:
     flown: NDArray[np.bool_]
     truth: Array
     estimates: Mapping[str, MethodEstimates]
+    motion: Motion = LONGITUDINAL
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -127,7 +117,17 @@ class Campaign:
     def sample(self, method: str) -> Sample:
         """Truth and estimates of one method."""
         e = self.estimates[method]
-        return Sample(self.truth, self.flown, e.values, e.lower, e.upper, e.converged, e.iterations, e.status)
+        return Sample(
+            self.truth,
+            self.flown,
+            e.values,
+            e.lower,
+            e.upper,
+            e.converged,
+            e.iterations,
+            e.status,
+            self.motion,
+        )
 
 
 class Parted(Protocol):
@@ -138,6 +138,7 @@ class Parted(Protocol):
     folder, name, title, gust : as in `Campaign`.
     methods : methods with estimates.
     runs : number of planned runs.
+    motion : whose parameters are estimated.
     """
 
     @property
@@ -152,14 +153,17 @@ class Parted(Protocol):
     def methods(self) -> tuple[str, ...]: ...
     @property
     def runs(self) -> int: ...
+    @property
+    def motion(self) -> Motion: ...
     def parts(self) -> Iterable[Campaign]:
         """Return the same parts at each call, each run in one of them, in the order of the truth."""
         ...
 
 
 def average_truth(campaign: Parted) -> Array:
-    """Return the mean truth of the runs that flew, (8,); exact if all of them share one truth."""
-    first, total, count = None, np.zeros(len(ESTIMATED)), 0
+    """Return the mean truth of the runs that flew, (estimated,); exact if all of them share one truth."""
+    names = campaign.motion.estimated
+    first, total, count = None, np.zeros(len(names)), 0
     with np.errstate(over="ignore", invalid="ignore"):
         for part in campaign.parts():
             truth = part.truth[part.flown]
@@ -167,21 +171,17 @@ def average_truth(campaign: Parted) -> Array:
                 first = truth[0] if first is None else first
                 total += (truth - first).sum(axis=0)
                 count += len(truth)
-        return np.full(len(ESTIMATED), np.nan) if first is None else np.asarray(first + total / count)
+        return np.full(len(names), np.nan) if first is None else np.asarray(first + total / count)
 
 
-@dataclass(frozen=True)
-class Description:
-    """The entries of campaign.json that tables show; ``runs`` is None where the file does not state it."""
-
-    name: str
-    title: str
-    runs: int | None
-    gust: str
+def motions_of(folder: Path) -> tuple[Motion, ...]:
+    """Motions of which a folder holds estimates; the longitudinal one if it holds none."""
+    found = tuple(motion for motion in MOTIONS.values() if (folder / FILES[motion.name]).is_file())
+    return found or (LONGITUDINAL,)
 
 
-def read_campaign(folder: Path) -> Campaign:
-    """Read the truth and the estimates of a campaign folder.
+def read_campaign(folder: Path, motion: Motion = LONGITUDINAL) -> Campaign:
+    """Read the truth and the estimates of a motion from a campaign folder.
 
     Raises
     ------
@@ -190,12 +190,12 @@ def read_campaign(folder: Path) -> Campaign:
     LogError
         A column is missing or has the wrong type, or truth and estimates do not hold the same runs.
     """
-    fly, identify = writers(folder)
+    fly, identify = writers(folder, motion)
     if not folder.is_dir():
         raise StoreError(f"{folder}: no such campaign folder; {fly} creates it")
-    truth_path, estimates_path = folder / TRUTH, folder / ESTIMATES
-    run_ids, flown, truth = _truth(read_columns(truth_path, TRUTH_KINDS, fly), truth_path)
-    estimates = read_estimates(estimates_path, identify)
+    truth_path, estimates_path = folder / TRUTH, folder / FILES[motion.name]
+    run_ids, flown, truth = _truth(read_columns(truth_path, truth_kinds(motion), fly), truth_path, motion)
+    estimates = read_estimates(estimates_path, identify, motion)
     rows_of = _match(run_ids, flown, estimates, estimates_path, identify)
     described = describe(folder)
     if described.runs is not None and described.runs != len(run_ids):
@@ -212,43 +212,46 @@ def read_campaign(folder: Path) -> Campaign:
         flown=flown,
         truth=truth,
         estimates={
-            m: estimates_of(estimates, rows, runs, len(run_ids)) for m, (rows, runs) in rows_of.items()
+            m: estimates_of(estimates, rows, runs, len(run_ids), motion)
+            for m, (rows, runs) in rows_of.items()
         },
+        motion=motion,
     )
 
 
-def writers(folder: Path) -> tuple[str, str]:
-    """The commands that write the truth and the estimates of a folder, for messages."""
+def writers(folder: Path, motion: Motion) -> tuple[str, str]:
+    """The commands that write the truth and the estimates of a motion in a folder, for messages."""
     shown = quote(str(folder))
-    # a campaign of lateral records has estimates of the lateral motion alone, which tables and reports do not show
-    motion = f" --motion {LONGITUDINAL.name}" if (folder / FILES[LATERAL.name]).exists() else ""
+    # without the option a command answers each motion that the records excite
+    others = any((folder / FILES[m.name]).exists() for m in MOTIONS.values() if m is not LONGITUDINAL)
+    named = f" --motion {motion.name}" if others else ""
     return (
         f"`airtruth fly CAMPAIGN.toml --out {shown}`",
-        f"`airtruth identify {shown} --aircraft AIRCRAFT{motion}`",
+        f"`airtruth identify {shown} --aircraft AIRCRAFT{named}`",
     )
 
 
-def read_estimates(path: Path, writer: str, names: Sequence[str] = ESTIMATED) -> pa.Table:
+def read_estimates(path: Path, writer: str, motion: Motion) -> pa.Table:
     """Read the columns `estimate_kinds` of a file of estimates.
 
     Parameters
     ----------
     path : the file.
     writer : command that writes it, for messages.
-    names : its parameters.
+    motion : whose parameters it holds.
 
     Raises
     ------
     StoreError, LogError
         See `read_columns`; or the file holds no estimate.
     """
-    table = read_columns(path, estimate_kinds(names), writer, optional=("status",))
+    table = read_columns(path, estimate_kinds(motion), writer, optional=("status",))
     if not table.num_rows:
         raise LogError(f"{path}: holds no estimate; {writer} writes it")
     return table
 
 
-def _truth(table: pa.Table, path: Path) -> tuple[tuple[str, ...], NDArray[np.bool_], Array]:
+def _truth(table: pa.Table, path: Path, motion: Motion) -> tuple[tuple[str, ...], NDArray[np.bool_], Array]:
     run_ids = tuple(texts(table, "run_id"))
     if not run_ids:
         raise LogError(f"{path}: holds no run")
@@ -260,7 +263,7 @@ def _truth(table: pa.Table, path: Path) -> tuple[tuple[str, ...], NDArray[np.boo
         if word not in (FLOWN, FAILED):
             raise LogError(f"{path}: status {word!r} of run {run!r}; {choices(word, (FLOWN, FAILED))}")
     flown = np.array([word == FLOWN for word in status])
-    truth = np.where(flown[:, None], numbers(table, ESTIMATED), np.nan)
+    truth = np.where(flown[:, None], numbers(table, motion.estimated), np.nan)
     bad = flown & ~np.isfinite(truth).all(axis=1)
     if bad.any():
         raise LogError(f"{path}: {_some(np.array(run_ids)[bad])} flew, but the truth is not a finite number")
@@ -302,16 +305,17 @@ def _match(
 
 
 def estimates_of(
-    table: pa.Table, rows: NDArray[np.int64], runs: NDArray[np.int64], total: int
+    table: pa.Table, rows: NDArray[np.int64], runs: NDArray[np.int64], total: int, motion: Motion
 ) -> MethodEstimates:
     """Estimates of one method.
 
     Parameters
     ----------
-    table : columns `ESTIMATE_KINDS`.
+    table : columns `estimate_kinds`.
     rows : its rows of the method.
     runs : index of the run of each of these rows.
     total : number of runs.
+    motion : whose parameters are read.
     """
     own = table.take(rows)
 
@@ -325,53 +329,13 @@ def estimates_of(
     status = np.full(total, "", dtype=object)
     status[runs] = texts(own, "status") if "status" in own.column_names else "not converged"
     return MethodEstimates(
-        values=per_run(numbers(own, ESTIMATED)),
-        lower=per_run(numbers(own, [f"{name}_lower" for name in ESTIMATED])),
-        upper=per_run(numbers(own, [f"{name}_upper" for name in ESTIMATED])),
+        values=per_run(numbers(own, motion.estimated)),
+        lower=per_run(numbers(own, [f"{name}_lower" for name in motion.estimated])),
+        upper=per_run(numbers(own, [f"{name}_upper" for name in motion.estimated])),
         converged=converged,
         iterations=per_run(numbers(own, ["iterations"])[:, 0]),
         status=tuple(status),
     )
-
-
-def describe(folder: Path) -> Description:
-    """Read campaign.json of a folder; without it the folder's name serves.
-
-    Raises
-    ------
-    StoreError
-        If the file is malformed.
-    """
-    path = folder / DESCRIPTION
-    fallback = folder.resolve().name
-    if not path.is_file():
-        return Description(fallback, fallback, None, "")
-    cure = "correct it, or remove it to use the folder's name"
-    entries = read_json(path, StoreError, cure)
-    if not isinstance(entries, dict):
-        raise StoreError(f'{path}: holds no JSON object; expected {{"name": ..., "title": ..., ...}}')
-    gust = entries.get("gust")
-    words = (
-        ", ".join(f"{key} {_words(value)}" for key, value in gust.items()) if isinstance(gust, dict) else ""
-    )
-    name = entries.get("name", fallback)
-    title, runs = entries.get("title", name), entries.get("runs")
-    if not (isinstance(name, str) and isinstance(title, str)):
-        raise StoreError(f"{path}: name and title must be text; {cure}")
-    if Path(name).name != name or not name.isprintable():
-        raise StoreError(f"{path}: name {name!r} cannot be part of a file's name; leave out '/'")
-    if not (runs is None or isinstance(runs, int)):
-        raise StoreError(f"{path}: runs {runs!r} must be a whole number; {cure}")
-    return Description(name, title or name, runs, words)
-
-
-def _words(setting: object) -> str:
-    """A gust setting in words: a plain value, or a distribution with its parameters."""
-    if not isinstance(setting, dict):
-        return str(setting)
-    if set(setting) == {"value"}:
-        return str(setting["value"])
-    return " ".join(f"{key} {_words(value)}" for key, value in setting.items() if value is not None)
 
 
 def _some(runs: Iterable[object]) -> str:

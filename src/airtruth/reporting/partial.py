@@ -8,25 +8,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Final
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.numerics.order_statistics import medians
-from airtruth.physics import short_period
+from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.reporting import statistics
 from airtruth.reporting.statistics import MAD_TO_STD, Counts, MethodStatistics, Statistic
 
 Array = NDArray[np.float64]
-
-_SIX: Final = slice(0, len(short_period.PARAMETERS))
-"""Columns of the six derivatives."""
-_MODAL: Final = slice(len(short_period.PARAMETERS), None)
-"""Columns of wn and zeta."""
-_COLUMNS: Final = len(short_period.PARAMETERS) + len(short_period.MODAL)
-"""Number of estimated parameters [-]."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +27,11 @@ class Sample:
 
     Attributes
     ----------
-    truth : (runs, 8) six derivatives [-], wn [rad/s], zeta [-].
+    truth : (runs, estimated) derivatives and modal parameters, as `Motion.estimated`.
     flown : (runs,) whether the run has a log.
-    values, lower, upper : (runs, 8) estimates and the bounds of their intervals.
+    values, lower, upper : (runs, estimated) estimates and the bounds of their intervals.
     converged, iterations, status : (runs,) how the estimation of each run ended.
+    motion : whose parameters they are.
     """
 
     truth: Array
@@ -49,11 +42,12 @@ class Sample:
     converged: NDArray[np.bool_]
     iterations: Array
     status: tuple[str, ...]
+    motion: Motion = LONGITUDINAL
 
     @property
     def finite(self) -> NDArray[np.bool_]:
         """(runs,) whether the run has finite derivatives, converged or not."""
-        return np.asarray(self.flown & np.isfinite(self.values[:, _SIX]).all(axis=1))
+        return np.asarray(self.flown & np.isfinite(self.values[:, _derivatives(self.motion)]).all(axis=1))
 
     @property
     def used(self) -> NDArray[np.bool_]:
@@ -62,10 +56,25 @@ class Sample:
 
     @property
     def entering(self) -> NDArray[np.bool_]:
-        """(runs, 8) whether an estimate enters its mean: wn and zeta of oscillatory estimates alone."""
-        oscillates = self.used & np.isfinite(self.values[:, _MODAL]).all(axis=1)
-        columns = [self.used] * len(short_period.PARAMETERS) + [oscillates] * len(short_period.MODAL)
+        """(runs, estimated) whether an estimate enters its mean: modal parameters of estimates that have all of them alone."""
+        oscillates = self.used & np.isfinite(self.values[:, _modal(self.motion)]).all(axis=1)
+        columns = [self.used] * len(self.motion.parameters) + [oscillates] * len(self.motion.modal)
         return np.stack(columns, axis=1)
+
+
+def _derivatives(motion: Motion) -> slice:
+    """Columns of the derivatives."""
+    return slice(len(motion.parameters))
+
+
+def _modal(motion: Motion) -> slice:
+    """Columns of the modal parameters."""
+    return slice(len(motion.parameters), None)
+
+
+def _scored(motion: Motion) -> NDArray[np.intp]:
+    """Columns of the derivatives that RelErr counts."""
+    return np.array([motion.index(name) for name in motion.scored])
 
 
 Parts = Callable[[], Iterable[Mapping[str, Sample]]]
@@ -83,13 +92,13 @@ def method_statistics(parts: Parts) -> dict[str, MethodStatistics]:
     sums: dict[str, _Sums] = {}
     for part in parts():
         for method, sample in part.items():
-            sums.setdefault(method, _Sums()).add(sample)
+            sums.setdefault(method, _Sums(sample.motion)).add(sample)
     powers = {method: _Powers(own) for method, own in sums.items()}
     products = np.zeros((len(sums), len(sums)))
     for part in parts():
         influences = np.stack([powers[method].add(sample) for method, sample in part.items()])
         products += influences @ influences.T
-    median, mad = _robust(parts, list(sums))
+    median, mad = _robust(parts, sums)
     return {
         method: _statistics(
             sums[method],
@@ -102,28 +111,18 @@ def method_statistics(parts: Parts) -> dict[str, MethodStatistics]:
     }
 
 
-def _zeros() -> Array:
-    return np.zeros(_COLUMNS)
-
-
-@dataclass
 class _Sums:
     """First pass: numbers of runs and sums."""
 
-    total: int = 0
-    failed_to_fly: int = 0
-    finite: int = 0
-    flown: int = 0
-    used: int = 0
-    reasons: Counter[str] = field(default_factory=Counter)
-    stated: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(_COLUMNS, dtype=np.bool_))
-    n: Array = field(default_factory=_zeros)
-    values: Array = field(default_factory=_zeros)
-    truth: Array = field(default_factory=_zeros)
-    errors: Array = field(default_factory=_zeros)
-    squares: Array = field(default_factory=_zeros)
-    hits: Array = field(default_factory=_zeros)
-    iterations: float = 0.0
+    def __init__(self, motion: Motion) -> None:
+        self.motion = motion
+        self.total, self.failed_to_fly, self.finite, self.flown, self.used = 0, 0, 0, 0, 0
+        self.reasons: Counter[str] = Counter()
+        columns = len(motion.estimated)
+        self.stated = np.zeros(columns, dtype=np.bool_)
+        self.n, self.values, self.truth = (np.zeros(columns) for _ in range(3))
+        self.errors, self.squares, self.hits = (np.zeros(columns) for _ in range(3))
+        self.iterations = 0.0
 
     def add(self, s: Sample) -> None:
         """Add a part."""
@@ -166,8 +165,8 @@ class _Powers:
         self._values, self._errors = sums.values / sums.n, sums.errors / sums.n
         self._truth, self._squares = sums.truth / sums.n, sums.squares / sums.n
         self._iterations = sums.iterations / max(sums.used, 1)
-        self.second, self.fourth, self.errors, self.squares = _zeros(), _zeros(), _zeros(), _zeros()
-        self.products = np.zeros((len(short_period.PARAMETERS),) * 2)
+        self.second, self.fourth, self.errors, self.squares = np.zeros((4, len(sums.n)))
+        self.products = np.zeros((len(sums.motion.parameters),) * 2)
         self.iterations = 0.0
 
     def add(self, s: Sample) -> Array:
@@ -178,11 +177,13 @@ class _Powers:
         self.fourth += _sum(deviations**4, entering)
         self.errors += _sum((errors - self._errors) ** 2, entering)
         self.squares += _sum((errors**2 - self._squares) ** 2, entering)
-        self.products += deviations[used, _SIX].T @ deviations[used, _SIX]
+        own = deviations[used, _derivatives(s.motion)]
+        self.products += own.T @ own
         self.iterations += float(np.sum((s.iterations[used] - self._iterations) ** 2))
         influences = np.zeros(len(s.truth))
+        scored = _scored(s.motion)
         influences[used] = statistics.influence(
-            errors[used, _SIX], self._errors[_SIX], self._truth[_SIX], self._used
+            errors[used][:, scored], self._errors[scored], self._truth[scored], self._used
         )
         return influences
 
@@ -196,8 +197,9 @@ def _statistics(
 ) -> MethodStatistics:
     coverage = statistics.hit_rate_of(sums.n, sums.hits)
     bias, truth = sums.errors / sums.n, sums.truth / sums.n
-    modal_bias = statistics.mean_of(sums.n[_MODAL], sums.errors[_MODAL], powers.errors[_MODAL])
-    modal_truth = np.abs(truth[_MODAL])
+    scored, modal = _scored(sums.motion), _modal(sums.motion)
+    modal_bias = statistics.mean_of(sums.n[modal], sums.errors[modal], powers.errors[modal])
+    modal_truth = np.abs(truth[modal])
     return MethodStatistics(
         counts=sums.counts,
         mean=statistics.mean_of(sums.n, sums.values, powers.second),
@@ -209,7 +211,7 @@ def _statistics(
         median=robust[0],
         mad=robust[1],
         relerr=statistics.relative_error_of(
-            sums.used, bias[_SIX], truth[_SIX], own, float(np.sum(powers.errors[_SIX]))
+            sums.used, bias[scored], truth[scored], own, float(np.sum(powers.errors[scored]))
         ),
         relerr_modal=Statistic(np.abs(modal_bias.value) / modal_truth, modal_bias.se / modal_truth),
         iterations=statistics.mean_of(sums.used, np.asarray(sums.iterations), np.asarray(powers.iterations)),
@@ -218,8 +220,9 @@ def _statistics(
     )
 
 
-def _robust(parts: Parts, methods: list[str]) -> tuple[Array, Array]:
-    """Median and scaled median absolute deviation of each column over its finite rows, (methods, 8) each."""
+def _robust(parts: Parts, sums: Mapping[str, _Sums]) -> tuple[Array, Array]:
+    """Median and scaled median absolute deviation of each column over its finite rows, (methods, estimated) each."""
+    methods = list(sums)
 
     def blocks() -> Iterator[Array]:
         for part in parts():
@@ -229,7 +232,7 @@ def _robust(parts: Parts, methods: list[str]) -> tuple[Array, Array]:
 
     centre = medians(blocks)
     spread = medians(lambda: (np.abs(block - centre) for block in blocks()))
-    shape = len(methods), _COLUMNS
+    shape = len(methods), -1
     return centre.reshape(shape), (MAD_TO_STD * spread).reshape(shape)
 
 

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
 
 from airtruth.errors import ConfigurationError, StoreError
 from airtruth.logs.names import ESTIMATES as FILES
+from airtruth.logs.parquet import SUFFIX, is_parquet
 from airtruth.logs.remote import location
 from airtruth.logs.sources import Logs
-from airtruth.physics.motion import LATERAL, motion_of
-from airtruth.reporting.campaign import ESTIMATES, TRUTH, Campaign, Parted
+from airtruth.physics.motion import LONGITUDINAL, motion_of
+from airtruth.reporting.campaign import TRUTH, Campaign, Parted
 from airtruth.reporting.columns import columns_of
-from airtruth.reporting.stored_campaign import open_campaign
+from airtruth.reporting.stored_campaign import open_campaigns
 from airtruth.result import Result
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def report(
 
 def _report(source: Source, logs: Logs | None, aircraft: Aircraft | None) -> Report:
     if isinstance(source, Campaign):
-        return _of_campaign(source, logs, aircraft)
+        return _of_campaign((source,), logs, aircraft)
     if isinstance(source, Path | str):
         return _of_path(location(source), logs, aircraft)
     return _of_result(source, logs, aircraft)
@@ -112,44 +113,43 @@ def _of_path(path: Path, logs: Logs | None, aircraft: Aircraft | None) -> Report
 
         _refuse(logs, aircraft)
         return trace_report(*read_trace(path))
-    lateral = path / FILES[LATERAL.name]
-    if (path / TRUTH).is_file() and ((path / ESTIMATES).is_file() or not lateral.is_file()):
-        return _of_campaign(open_campaign(path), logs, aircraft)
-    if path.is_file() and path.suffix != ".parquet" and not _begins_as_parquet(path):
+    if (path / TRUTH).is_file():
+        return _of_campaign(open_campaigns(path), logs, aircraft)
+    if path.is_file() and path.suffix != SUFFIX and not is_parquet(path):
         raise StoreError(
             f"{path}: holds no result; allowed: the folder of a trace, a loop or an identified campaign, its trace.json or "
             "loop.json, or the Parquet file of estimates that `airtruth identify` writes"
         )
-    estimates = path if path.is_file() else path / ESTIMATES
-    if not estimates.is_file():
-        estimates = lateral
-    if estimates.is_file():
-        from airtruth.reporting.campaign import read_estimates
-        from airtruth.reporting.pages.estimates_page import estimates_report
-        from airtruth.reporting.pages.identified import read_identified
-
-        motion = motion_of(columns_of(estimates))
-        read_estimates(estimates, "`airtruth identify`", (*motion.parameters, *motion.modal))
-        identified = read_identified(estimates, logs, aircraft)
-        name = next((record["aircraft"] for record in identified.records.values()), "")
-        title = f"Identification of {name}" if name else estimates.stem
-        return estimates_report(title, identified)
-    shown = quote(str(path))
+    files = [path] if path.is_file() else [path / name for name in FILES.values() if (path / name).is_file()]
+    if files:
+        return _of_estimates(files, logs, aircraft)
+    shown, own = quote(str(path)), FILES[LONGITUDINAL.name]
     raise StoreError(
-        f"{path}: nothing to report; expected trace.json (`airtruth trace ... --out {shown}`) or {ESTIMATES} "
-        f"(`airtruth identify {shown} --aircraft A --out {quote(str(path / ESTIMATES))}`)"
+        f"{path}: nothing to report; expected trace.json (`airtruth trace ... --out {shown}`) or {own} "
+        f"(`airtruth identify {shown} --aircraft A --out {quote(str(path / own))}`)"
     )
 
 
-def _begins_as_parquet(path: Path) -> bool:
-    with path.open("rb") as file:
-        return file.read(4) == b"PAR1"
+def _of_estimates(files: Sequence[Path], logs: Logs | None, aircraft: Aircraft | None) -> Report:
+    """The report of files of estimates, each of one motion; logs and aircraft serve that whose records are simulated."""
+    from airtruth.reporting.campaign import read_estimates
+    from airtruth.reporting.pages.estimates_page import estimates_report
+    from airtruth.reporting.pages.identified import read_identified, simulates
+
+    made = []
+    for file in files:
+        motion = motion_of(columns_of(file))
+        read_estimates(file, "`airtruth identify`", motion)
+        asked = (logs, aircraft) if len(files) == 1 or simulates(motion) else (None, None)
+        made.append(read_identified(file, *asked))
+    name = next((record["aircraft"] for record in made[0].records.values()), "")
+    return estimates_report(f"Identification of {name}" if name else files[0].stem, made)
 
 
-def _of_campaign(campaign: Parted, logs: Logs | None, aircraft: Aircraft | None) -> Report:
+def _of_campaign(campaigns: Sequence[Parted], logs: Logs | None, aircraft: Aircraft | None) -> Report:
     from airtruth.reporting.pages.campaign_page import campaign_report
 
-    return campaign_report(campaign, logs, aircraft)
+    return campaign_report(campaigns, logs, aircraft)
 
 
 def _refuse(logs: Logs | None, aircraft: Aircraft | None) -> None:

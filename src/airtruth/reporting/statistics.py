@@ -56,7 +56,7 @@ class Counts:
     used : runs with a converged, finite estimate; only these enter means, standard deviations, RMSE and RelErr.
     not_converged : runs with a finite estimate that did not converge.
     diverged : runs without a finite estimate.
-    aperiodic : used runs with a non-oscillatory estimate, which has no modal parameters.
+    aperiodic : used runs whose estimate lacks a modal parameter, such as a non-oscillatory one.
     reasons : status of the runs that flew but are not used -> number of runs.
     """
 
@@ -71,20 +71,20 @@ class Counts:
 
 @dataclass(frozen=True)
 class MethodStatistics:
-    """All statistics of one method over one campaign; arrays follow the eight estimated parameters.
+    """All statistics of one method over one campaign; arrays follow `Motion.estimated`.
 
     Attributes
     ----------
     counts : number of runs by outcome.
-    mean, std : (8,) over the used runs; wn and zeta over the oscillatory ones.
-    rmse : (8,) root mean square error against the truth of each run.
-    coverage : (8,) fraction of the used runs with the truth inside the interval [-].
-    median, mad : (8,) over every finite estimate, converged or not; the median absolute deviation
+    mean, std : (estimated,) over the used runs; modal parameters over those that have all of them.
+    rmse : (estimated,) root mean square error against the truth of each run.
+    coverage : (estimated,) fraction of the used runs with the truth inside the interval [-].
+    median, mad : (estimated,) over every finite estimate, converged or not; the median absolute deviation
         is scaled to the standard deviation of a normal sample.
-    relerr : relative error of the six derivatives.
-    relerr_modal : (2,) relative error of wn and of zeta.
+    relerr : relative error of the derivatives that are scored.
+    relerr_modal : (modal,) relative error of each modal parameter.
     iterations : () mean number of iterations of the used runs.
-    correlation : (6, 6) correlation of the six estimates over the used runs.
+    correlation : (derivatives, derivatives) correlation of the estimates over the used runs.
     products : method -> sum over the planned runs of the influence of the run on its RelErr times that on the RelErr of
         this method, see `influence`; this method among them.
     """

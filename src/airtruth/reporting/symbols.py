@@ -1,4 +1,4 @@
-"""Symbols of the lateral-directional parameters, for LaTeX."""
+"""Symbols of the parameters of every motion, for LaTeX."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from airtruth.physics.motion import LATERAL
+from airtruth.reporting.paper.published import SYMBOLS as PRINTED
 
 _SIGNALS: Final[Mapping[str, str]] = {
     "beta": r"\beta",
@@ -27,6 +28,15 @@ LATERAL_SYMBOLS: Final[Mapping[str, str]] = {
     "roll_1_s": r"$\lambda$, roll",
     "spiral_1_s": r"$\lambda$, spiral",
 }
-"""Symbol of each parameter."""
+"""Symbol of each parameter of the lateral-directional motion."""
 
-__all__ = ["LATERAL_SYMBOLS"]
+SYMBOLS: Final[Mapping[str, str]] = {
+    **PRINTED,
+    **{
+        name: symbol + ("" if LATERAL.units[name] in ("-", "1/rad") else f" [{LATERAL.units[name]}]")
+        for name, symbol in LATERAL_SYMBOLS.items()
+    },
+}
+"""Symbol of each parameter of every motion, those of modes with their units."""
+
+__all__ = ["LATERAL_SYMBOLS", "SYMBOLS"]

@@ -9,9 +9,9 @@ from pathlib import Path
 from airtruth.errors import ConfigurationError
 from airtruth.reporting.campaign import Parted
 from airtruth.reporting.paper import layout, tables
-from airtruth.reporting.paper.published import SYMBOLS
 from airtruth.reporting.paper.tables import PaperTable, TableSpec
-from airtruth.reporting.stored_campaign import open_campaign
+from airtruth.reporting.stored_campaign import open_campaigns
+from airtruth.reporting.symbols import SYMBOLS
 from airtruth.table import as_text, write_table
 
 
@@ -35,12 +35,12 @@ def write_tables(
     """Write each table whose campaign is among ``folders`` as NAME.md, NAME.csv and NAME.tex.
 
     A campaign "NAME-..." is a variant of NAME and gives the same tables under its own name. A campaign with
-    methods that no table shows gives a table of all its methods as well. A table without a campaign is
-    skipped, and the text states the reason.
+    methods that no table shows gives a table of all its methods as well, and so does each motion of which a
+    folder holds estimates. A table without a campaign is skipped, and the text states the reason.
 
     Parameters
     ----------
-    folders : campaign folders with truth.parquet and estimates.parquet.
+    folders : campaign folders with truth.parquet, and estimates.parquet or estimates-lateral.parquet.
     out : folder of the tables; created if it does not exist.
     specs : descriptions of the tables, `tables.TABLES` by default.
 
@@ -53,9 +53,9 @@ def write_tables(
     """
     wanted = tuple(tables.TABLES.values() if specs is None else specs)
     campaigns = _campaigns(folders)
-    known = {campaign.name: tables.statistics_of(campaign) for campaign in campaigns}
+    known = {(c.name, c.motion.name): tables.statistics_of(c) for c in campaigns}
     evaluated = [
-        tables.evaluate(spec, campaign, known[campaign.name]) for spec, campaign in _pairs(wanted, campaigns)
+        tables.evaluate(spec, c, known[c.name, c.motion.name]) for spec, c in _pairs(wanted, campaigns)
     ]
     paths: list[Path] = []
     texts = []
@@ -70,17 +70,19 @@ def write_tables(
 def _campaigns(folders: Sequence[Path]) -> list[Parted]:
     if not folders:
         raise ConfigurationError("no campaign folder is given; name folders that `airtruth fly` wrote")
-    by_name: dict[str, Parted] = {}
+    by_name: dict[str, Path] = {}
+    campaigns: list[Parted] = []
     for folder in folders:
-        campaign = open_campaign(folder)
-        if campaign.name in by_name:
-            other = by_name[campaign.name].folder
+        own = open_campaigns(folder)
+        name = own[0].name
+        if name in by_name:
             raise ConfigurationError(
-                f"{folder} and {other} are both campaign {campaign.name!r}; give one of them, or change "
+                f"{folder} and {by_name[name]} are both campaign {name!r}; give one of them, or change "
                 "the name in one campaign.json"
             )
-        by_name[campaign.name] = campaign
-    return list(by_name.values())
+        by_name[name] = folder
+        campaigns += own
+    return campaigns
 
 
 def _pairs(specs: Sequence[TableSpec], campaigns: Sequence[Parted]) -> Iterator[tuple[TableSpec, Parted]]:
@@ -101,12 +103,13 @@ def _skipped(
     specs: Sequence[TableSpec], campaigns: Sequence[Parted], written: Sequence[PaperTable]
 ) -> Iterator[str]:
     for spec in specs:
-        if any(table.spec is spec for table in written):
+        own = [c for c in campaigns if c.motion is spec.motion]
+        if not own or any(table.spec is spec for table in written):
             continue
-        fitting = [c for c in campaigns if tables.shows(spec, c)]
+        fitting = [c for c in own if tables.shows(spec, c)]
         if fitting:
             why = f"no estimate by {', '.join(spec.columns)} in {', '.join(str(c.folder) for c in fitting)}"
         else:
-            given = ", ".join(f"{c.name!r} ({c.folder})" for c in campaigns)
+            given = ", ".join(f"{c.name!r} ({c.folder})" for c in own)
             why = f"no campaign {spec.campaign!r} or '{spec.campaign}-...' among {given}"
         yield f"Skipped {spec.name}: {why}.\n"

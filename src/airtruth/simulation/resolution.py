@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from airtruth.aircraft import Aircraft
 from airtruth.aircraft.tail import tail_geometry
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.resolution import LinearPoint, resolved
 from airtruth.physics.terms import Change
 from airtruth.simulation.disposable import isolated
@@ -55,7 +56,9 @@ def linear_point(aircraft: Aircraft, condition: Condition, dt_s: float = 1.0 / 2
 
 def point_of(aircraft: Aircraft, at: Trim, linear: Linearisation) -> LinearPoint:
     """Derivatives, trim and tail of an aircraft that was trimmed and linearised."""
-    return LinearPoint(linear.central, at.alpha_rad, at.elevator_rad, tail_geometry(aircraft))
+    flow, (control,) = LONGITUDINAL.flow, LONGITUDINAL.controls
+    trimmed = {flow: at.alpha_rad, control.name: at.elevator_rad}
+    return LinearPoint(linear.central, trimmed, tail_geometry(aircraft))
 
 
 def at_condition(

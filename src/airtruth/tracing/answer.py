@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any, Final, Literal, TypeGuard
 
 from airtruth.errors import StoreError
+from airtruth.physics.motion import Motion, motion_of
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate, effect_key
-from airtruth.tracing.stage_errors import AxialErrors, Errors, Replay, Tolerances
+from airtruth.tracing.stage_errors import COUNTS, AxialErrors, Errors, Replay, Tolerances
 
 ANSWER: Final = "trace.json"
 """Name of the file in the folder of a trace."""
@@ -249,6 +250,11 @@ class TraceAnswer:
     axial_force: AxialErrors | None = None
     refined: dict[str, RefinedDerivative] = field(default_factory=dict)
 
+    @property
+    def motion(self) -> Motion:
+        """The motion whose derivatives it states."""
+        return motion_of(self.derivatives.declared)
+
     def __repr__(self) -> str:
         """Return verdict, effects and model in a line."""
         doubt = ", provisional" if self.provisional else ""
@@ -323,12 +329,27 @@ class TraceAnswer:
 def _nested(document: Mapping[str, Any]) -> dict[str, Any]:
     """The document with its stages in a mapping of their own, as `Errors` and `Tolerances` hold them."""
     nested = dict(document)
-    for name, rest in (("error", {"channels"}), ("tolerances", {"source", "limits"})):
+    for name, rest in (("error", {"channels"}), ("tolerances", {"source", "limits", "modes"})):
         block = document.get(name)
         if isinstance(block, Mapping):
             stages = {stage: value for stage, value in block.items() if stage not in rest}
+            if name == "tolerances":
+                stages = {stage: _with_distances(value) for stage, value in stages.items()}
             nested[name] = {key: value for key, value in block.items() if key in rest} | {"stages": stages}
     return nested
+
+
+def _with_distances(sets: Any) -> Any:
+    """The sets of a stage with their distances in a mapping of their own, as `Excursions` holds them."""
+    if not isinstance(sets, Mapping):
+        return sets
+    return {
+        records: {key: own[key] for key in COUNTS if key in own}
+        | {"distances": {key: value for key, value in own.items() if key not in COUNTS}}
+        if isinstance(own, Mapping)
+        else own
+        for records, own in sets.items()
+    }
 
 
 def _plain(value: Any) -> Any:

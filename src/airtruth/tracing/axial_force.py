@@ -26,7 +26,8 @@ from scipy.linalg import block_diag
 from airtruth.aircraft import Aircraft
 from airtruth.effects.increment import SIGNAL_NAMES, Increment, Shape, increment
 from airtruth.logs.flight_log import FlightLog
-from airtruth.physics.terms import Change
+from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.terms import Change, coefficients_of, factors_of
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.answer import Z95
 from airtruth.tracing.axial_series import CHANNEL, AxialSeries, axial_series
@@ -43,7 +44,9 @@ from airtruth.tracing.stages import Stages
 
 Array = NDArray[np.float64]
 
-SIGNALS: Final = ("alpha", "elevator", "qhat")
+_COEFFICIENT: Final = "CX"
+"""Coefficient of the axial force."""
+SIGNALS: Final = factors_of(LONGITUDINAL)
 """Signals over which an increment is learned."""
 _FINER: Final = (12, 16, 24)
 """Further numbers of cells [-]; those of the other increments but for the finest."""
@@ -115,11 +118,14 @@ def axial_force(
 
     Returns
     -------
-    None where a vane or a JSBSim model is missing, a fitted record has no ax or a throttle that moves, or there are fewer
-    than three of them. A held-out record of this kind has no part in the errors.
+    None where the motion has no axial force, a vane or a JSBSim model is missing, a fitted record has no ax or a throttle that
+    moves, or there are fewer than three of them. A held-out record of this kind has no part in the errors.
     """
     case = stages.case
-    usable = case.model == "aircraft" and case.has_vane and len(case.fitted.records) >= LEAST_RECORDS
+    has_axial = _COEFFICIENT in coefficients_of(case.fitted.layout.motion)
+    usable = (
+        has_axial and case.model == "aircraft" and case.has_vane and len(case.fitted.records) >= LEAST_RECORDS
+    )
     steady = _steady_runs(logs)
     if not usable or not all(r.signals.run_id in steady for r in case.fitted.records):
         return None
@@ -157,14 +163,16 @@ def _shapes(case: Case, fitted: Sequence[AxialSeries]) -> list[Shape]:
     """Functions of each signal that the records excite, over the range that they cover, with more and more cells."""
     trims = {
         "alpha": float(np.mean([r.plant.trim_alpha_rad for r in case.fitted.records])),
-        "elevator": float(np.mean([r.plant.trim_elevator_rad for r in case.fitted.records])),
+        LONGITUDINAL.controls[0].name: float(
+            np.mean([r.pitch_plant.trim_elevator_rad for r in case.fitted.records])
+        ),
     }
     found = []
     for name in SIGNALS:
         low, high = covered(np.concatenate([s.signals[name] for s in fitted]))
         if high > low:
             trim = float(np.clip(trims.get(name, 0.0), low, high))
-            found += [Shape("CX", name, low, high, cells, trim) for cells in (CELLS, *_FINER)]
+            found += [Shape(_COEFFICIENT, name, low, high, cells, trim) for cells in (CELLS, *_FINER)]
     return found
 
 
@@ -306,7 +314,7 @@ def _relative_swing(own: _Learned, case: Case, fitted: Sequence[AxialSeries]) ->
     shape = own.effect.shape
     swing = float(np.ptp(shape.basis(np.linspace(shape.low, shape.high, 101)) @ own.bends))
     low, high = covered(np.concatenate([s.signals["alpha"] for s in fitted]))
-    plant = case.fitted.records[0].plant
+    plant = case.fitted.records[0].pitch_plant
     at = np.linspace(low, high, 101)
     declared = np.interp(at, plant.alpha_rad, plant.over_alpha[:, 0]) / plant.aircraft.constants.wing_area_m2
     return swing / max(float(np.ptp(declared)), 1e-9)

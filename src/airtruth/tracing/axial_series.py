@@ -131,7 +131,7 @@ def axial_series(
         readings=change.readings,
     )
     by_run = {r.signals.run_id: (r, p) for r, p in zip(records, own, strict=True)}
-    plants = {id(r.plant): r.plant for r in records}
+    plants = {id(r.pitch_plant): r.pitch_plant for r in records}
     between = {key: _between_points(plant) for key, plant in plants.items()}
     found: dict[str, AxialSeries] = {}
     for batch in (b for log in logs for b in batches(log)):
@@ -146,7 +146,7 @@ def axial_series(
                 ratio = channels[_SPEED] / batch.channels[_SPEED][row]
                 bias_rad = float(parameters[SHORT_PERIOD.per_record.bias][0])
                 found[run_id] = _series(
-                    channels, record, ratio, bias_rad, between[id(record.plant)], change, aircraft
+                    channels, record, ratio, bias_rad, between[id(record.pitch_plant)], change, aircraft
                 )
     return [found[r.signals.run_id] for r in records]
 
@@ -168,12 +168,12 @@ def _series(
     bias_rad : estimated bias of the vane, which is undone [rad].
     between : X between the points of the tables, see `_between_points`.
     """
-    s, plant, c = record.signals, record.plant, aircraft.constants
+    s, plant, c = record.signals, record.pitch_plant, aircraft.constants
     own = _accelerometer(aircraft)
     factor = declared_total(change.declared, "elevator")
     neutral = plant.neutral_elevator_rad
     cells = s.sub * FINE
-    surface = through(change.surface_path, s.elevator_rad, s.dt_s / cells)[::cells]
+    surface = through(change.surface_path(), s.elevator_rad, s.dt_s / cells)[::cells]
     elevator = neutral + factor * (surface - neutral)
     alpha, q = channels["alpha_rad"], channels["q_rad_s"]
     speed, density = s.airspeed_m_s[:: s.sub] * ratio, s.density_kg_m3[:: s.sub]

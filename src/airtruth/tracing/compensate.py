@@ -31,7 +31,6 @@ from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.readings import reading_increments, state_of
 from airtruth.physics.sensor_errors import SensorErrors
 from airtruth.physics.terms import (
-    MEASURED,
     AeroTerm,
     Change,
     ReadingTerm,
@@ -39,6 +38,7 @@ from airtruth.physics.terms import (
     StateTerm,
     SurfaceTerm,
     declared_total,
+    measured_of,
 )
 from airtruth.tracing.increment_response import increments, response
 from airtruth.tracing.model.records import head_samples
@@ -147,8 +147,9 @@ def compensation_of(result: TraceResult) -> Compensation:
 
 def _measurable(change: Change) -> tuple[tuple[AeroTerm, ...], tuple[StateTerm, ...]]:
     """Increments in measured signals, and the states that measured signals drive."""
-    states = tuple(s for s in change.states if s.signal in MEASURED)
-    known = {*MEASURED, *(s.name for s in states)}
+    measured = measured_of(LONGITUDINAL)
+    states = tuple(s for s in change.states if s.signal in measured)
+    known = {*measured, *(s.name for s in states)}
     return tuple(t for t in change.aero if t.signal in known and t.factor in ("", *known)), states
 
 

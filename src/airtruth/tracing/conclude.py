@@ -13,7 +13,6 @@ from scipy.stats import chi2
 
 from airtruth.effects.increment import Increment
 from airtruth.physics.atmosphere import RHO0_KG_M3
-from airtruth.physics.short_period import PARAMETERS
 from airtruth.tracing.answer import (
     ANOMALY_LEVEL,
     AcceptedEffect,
@@ -50,6 +49,7 @@ from airtruth.tracing.inference.hypothesis import is_curvature
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.inference.robust import robust_covariance
 from airtruth.tracing.intervals import at_measured_alpha, estimates, widened_by_profile, widened_by_rejected
+from airtruth.tracing.next_flight import next_flight
 from airtruth.tracing.notes import notes
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.record_differences import CERTAIN, DIFFERENCES, differences
@@ -57,7 +57,7 @@ from airtruth.tracing.replay import worsened
 from airtruth.tracing.reservations import reservations
 from airtruth.tracing.selection.acceptance import SURPASSED, Candidate
 from airtruth.tracing.selection.anomaly import Anomaly
-from airtruth.tracing.selection.omnibus import FRICTION, advice
+from airtruth.tracing.selection.families import FRICTION
 from airtruth.tracing.selection.release import CONTRADICTED
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.selection.score_test import Table
@@ -94,6 +94,7 @@ def conclude(
     axial : what ax shows; None where it was not compared.
     """
     case, first, last = stages.case, rounds[0], rounds[-1]
+    motion = case.fitted.layout.motion
     effects = accepted(rounds)
     anomaly, remaining = first.anomaly, remaining_evidence(case.fitted, last)
     covariance = robust_covariance(case.fitted, last.reported)
@@ -109,8 +110,7 @@ def conclude(
     sets = alternatives(rounds)
     likelihood = derivative_likelihood(case.fitted, first.null)
     sizes = cause_sizes(likelihood, case.declared)
-    confirmed = confirmation(stages)
-    shown = (*stated, *along)
+    confirmed, shown = confirmation(stages), (*stated, *along)
     agreement = homogeneity(case.fitted, last.reported)
     reserved = _reserved(case.fitted, last, shown, sets, declared, agreement)
     verdict = _verdict(shown, declared, agreement)
@@ -118,7 +118,7 @@ def conclude(
         anomaly = remaining = Anomaly(DIFFERENCES, agreement.statistic, agreement.degrees, agreement.p_value)
     errors = stage_errors(stages)
     refined = _refined(stages, declared) if verdict == "none" else {}
-    updated_aircraft, replay = (None, None) if publish is None else publish(bool(refined))
+    updated, replay = (None, None) if publish is None else publish(bool(refined))
     return TraceAnswer(
         verdict=verdict,
         provisional=case.held is None
@@ -133,9 +133,9 @@ def conclude(
         candidates=_candidates(case, rounds, stated, sizes),
         error=errors,
         derivatives=_derivatives(case, rounds, covariance),
-        updated_aircraft=updated_aircraft,
+        updated_aircraft=updated,
         detectability=_detectability(case, rounds, likelihood, sizes),
-        next_flight=_next_flight(effects, verdict, remaining, list(least_certain(shown))),
+        next_flight=next_flight(effects, verdict, remaining, list(least_certain(shown)), motion),
         model=case.model,
         records=RecordNames(
             tuple(dict.fromkeys(r.signals.record for r in case.fitted.records)),
@@ -144,7 +144,7 @@ def conclude(
         notes=(
             *reserved,
             *notes(stages, last, declared, errors, replay, forced),
-            *_generated(case, updated_aircraft),
+            *_generated(case, updated),
         ),
         tolerances=tolerances(stages),
         replay=replay,
@@ -240,7 +240,9 @@ def _effect(
             sorted(c.score.effect.variant for c in others if c.score.effect.name == effect.name)
         ),
         channel=effect.variant_channel,
-        about_alpha_rad=final.hypothesis.trim_alpha_rad + shift if is_curvature(effect) else None,
+        about_alpha_rad=final.hypothesis.trim_flow_rad + shift
+        if is_curvature(effect, final.hypothesis.motion)
+        else None,
     )
     if isinstance(effect, Increment):
         return in_physical_terms(problem, final, covariance, effect, accepted)
@@ -322,9 +324,10 @@ def _candidates(
 def _derivatives(case: Case, rounds: Sequence[SearchRound], covariance: Array) -> Derivatives:
     """Declared and refitted derivatives at the trim, the mean over the records' flight conditions."""
     declared = np.mean([r.plant.derivatives for r in case.fitted.records], axis=0)
+    motion = case.fitted.layout.motion
 
     def named(values: Array) -> dict[str, float]:
-        return dict(zip(PARAMETERS, values.tolist(), strict=True))
+        return dict(zip(motion.parameters, values.tolist(), strict=True))
 
     rows = rounds[-1].null.layout.of.common.derivatives
     return Derivatives(
@@ -364,37 +367,6 @@ def detectability(table: Table) -> dict[str, float]:
         kept = found.get(s.effect.name)
         found[s.effect.name] = value if kept is None else (max if p.reciprocal else min)(kept, value)
     return found
-
-
-def _next_flight(
-    effects: Sequence[tuple[Candidate, tuple[Candidate, ...]]],
-    verdict: VerdictName,
-    remaining: Anomaly,
-    learned: Sequence[str],
-) -> str:
-    if verdict == "none":
-        return (
-            "These records show no missing effect down to the sizes listed under detectability; larger or longer "
-            "manoeuvres lower these sizes."
-        )
-    lines = []
-    if verdict == "unexplained":
-        lines.append("The declared aircraft lacks something that no candidate explains.")
-    for best, others in effects:
-        names = {c.score.effect.key: c.score.effect for c in (best, *others)}
-        if len({e.name for e in names.values()}) > 1:
-            ways: dict[str, list[str]] = {}
-            for key, effect in names.items():
-                ways.setdefault(effect.distinguished_by, []).append(key)
-            split = " ".join(f"{', '.join(keys)}: {way}" for way, keys in ways.items() if way)
-            lines.append(
-                f"Separate {', '.join(names)} as follows. {split} `airtruth plan --from` computes the input that "
-                "separates them most."
-            )
-    lines += learned
-    if remaining.p_value <= ANOMALY_LEVEL:
-        lines.append(f"The remaining residual shows in {remaining.where}: {advice(remaining.where)}")
-    return " ".join(lines) or "Repeat the manoeuvre with the largest residual, with opposite elevator sign."
 
 
 __all__ = ["conclude", "detectability", "estimates"]

@@ -8,10 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from airtruth.effects.registry import EFFECTS
-from airtruth.physics.short_period import PARAMETERS
 from airtruth.tracing.answer import AcceptedEffect
 from airtruth.tracing.inference.assess import own_likelihood
-from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.explanation import DERIVATIVES
 from airtruth.tracing.selection.release import size_in_derivatives
@@ -53,15 +51,15 @@ def _without(model: StageModel, effect: AcceptedEffect, case: Case) -> StageMode
             hypothesis=replace(model.hypothesis, effects=rest),
             sizes=np.delete(model.sizes, model.hypothesis.span(effect.key)),
         )
-    common = model.common.copy()
+    common, layout = model.common.copy(), case.fitted.layout
     if effect.name == DERIVATIVES:
-        common[[PARAMETERS.index(name[1:]) for name in effect.parameters]] = 0.0
+        common[[layout.motion.index(name[1:]) for name in effect.parameters]] = 0.0
         return replace(model, common=common)
     cause = next(c for c in case.declared.causes if c.key == effect.name)
     (estimate,) = effect.parameters.values()
     own = EFFECTS[cause.key]
     size = own.parameters[0].size(estimate.value)
-    common[SHORT_PERIOD.common.derivatives] -= size_in_derivatives(own, size) * cause.direction
+    common[layout.common.derivatives] -= size_in_derivatives(own, size) * cause.direction
     return replace(model, common=common)
 
 

@@ -13,7 +13,6 @@ from scipy.optimize import brentq
 from scipy.stats import chi2, ncx2
 
 from airtruth.effects.registry import EFFECTS
-from airtruth.physics.short_period import PARAMETERS
 from airtruth.tracing.answer import (
     DECLARED_LEVEL,
     Z95,
@@ -86,7 +85,7 @@ def declared_model(
                 ),
                 sigma=float(shift[i] / declared_std[i]),
             )
-            for i, name in enumerate(PARAMETERS)
+            for i, name in enumerate(problem.layout.motion.parameters)
         },
         where=DERIVATIVES_MOVED if by_derivatives else anomaly.where,
     )
@@ -147,11 +146,11 @@ def remaining_evidence(problem: TraceProblem, last: SearchRound) -> Anomaly:
 
 
 def _apparent_shift(last: SearchRound, covariance: Array, causes: DeclaredCauses) -> tuple[Array, Array]:
-    """(6,) Shift of the derivatives with what carried causes bring, to first order, and its standard deviation."""
+    """(derivatives,) shift of the derivatives with what carried causes bring, to first order, and its standard deviation."""
     point, hypothesis = last.null.point, last.null.hypothesis
     shift = point.common[point.of.common.derivatives].copy()
-    slopes = np.zeros((len(PARAMETERS), len(covariance)))
-    slopes[:, point.of.common.derivatives] = np.eye(len(PARAMETERS))
+    slopes = np.zeros((len(shift), len(covariance)))
+    slopes[:, point.of.common.derivatives] = np.eye(len(shift))
     directions = {c.key: c.direction for c in causes.causes}
     for effect in (e for e in hypothesis.effects if e.key in directions):
         number = hypothesis.span(effect.key).start
@@ -311,7 +310,7 @@ def _estimates(
         shift, std = last.null.point.common, np.sqrt(np.diag(covariance))
         return {
             f"d{name}": _normal(float(shift[i]), float(std[i]))
-            for i, name in enumerate(PARAMETERS)
+            for i, name in enumerate(last.null.point.of.motion.parameters)
             if name in best.wrong
         }
     effect = EFFECTS[key]

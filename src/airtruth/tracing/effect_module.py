@@ -13,7 +13,7 @@ from airtruth.effects.closed_form import ClosedForm, closed_forms
 from airtruth.effects.increment import SIGNAL_NAMES, STEP
 from airtruth.errors import StoreError
 from airtruth.logs import atomic
-from airtruth.physics.terms import READINGS
+from airtruth.physics.terms import OUTPUTS
 from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
 from airtruth.tracing.answer import Z95, TraceAnswer
 
@@ -132,7 +132,7 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
     trim = e.table.origin if e.table is not None else 0.0
     by = f', behind="{state}"' if e.states else f', "{factor}", {e.by_at!r}'
     by = by if factor else ""
-    field, term = ("readings", "ReadingTerm") if e.acts_on in READINGS else ("aero", "AeroTerm")
+    field, term = ("readings", "ReadingTerm") if e.acts_on in OUTPUTS else ("aero", "AeroTerm")
     values = {name: p.value for name, p in e.parameters.items()} if form is None else form.values
     sizes = {k: v for k, v in values.items() if k not in ("at", "width", "time_s", "damping", "half_width")}
     if form is not None:
@@ -167,7 +167,7 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
         f"EFFECT_{number} = Effect(\n"
         f'    name="learned_{(e.acts_on or "").lower()}_{f"{factor}_" if factor else ""}{over}",\n'
         f'    variant="{"-".join(s.kind for s in e.states)}",\n'
-        f'    where="{"sensor" if e.acts_on in READINGS else "dynamics"}",\n    parameters=(\n{lines}    ),\n'
+        f'    where="{"sensor" if e.acts_on in OUTPUTS else "dynamics"}",\n    parameters=(\n{lines}    ),\n'
         f"    describe=_terms_{number},\n"
         f'    explanation="Learned from flight logs: {e.variant}.",\n'
         f'    source="{sentence}",\n)\n'
@@ -235,7 +235,7 @@ def _unit(size: str, acts_on: str, factor: str, over: str) -> str:
     """Unit of a size: of a step, of a slope or share over a signal, of a curvature, or of a factor."""
     if size == "factor":
         return "-"
-    of_derivative = factor and acts_on not in READINGS
+    of_derivative = factor and acts_on not in OUTPUTS
     above = "" if factor and not of_derivative else _UNITS.get(acts_on, "")
     signals = [factor] if of_derivative else []
     signals += [over] * {"step": 0, "slope": 1, "share": 1, "curvature": 2}[size]

@@ -12,8 +12,8 @@ from airtruth.effects.increment import SIGNAL_NAMES, Increment, Shape
 from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable
 from airtruth.tracing.answer import Z95, CandidateScore
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.selection.flown import flown
 from airtruth.tracing.selection.increment_fit import fitted_bends, relative_swing
-from airtruth.tracing.selection.increments import flown
 from airtruth.tracing.selection.rounds import SearchRound
 
 Array = NDArray[np.float64]
@@ -40,7 +40,8 @@ def in_physical_terms(
         acts_on=shape.acts_on,
         over=SIGNAL_NAMES[shape.signal],
         by=SIGNAL_NAMES[shape.factor] if shape.factor else None,
-        by_at=shape.factor_trim + (problem.alpha_shift_rad if shape.factor == "alpha" else 0.0),
+        by_at=shape.factor_trim
+        + (problem.alpha_shift_rad if shape.factor == problem.layout.motion.flow else 0.0),
         relative_size=relative_swing(problem, fitted, effect),
         table=increment_table(problem, fitted, covariance, effect) if shape.cells else None,
         states=states,
@@ -57,7 +58,7 @@ def increment_table(
     shape = effect.shape
     signal = np.concatenate([flown(r, shape.signal) for r in problem.records])
     table = table_of(shape, *fitted_bends(fitted, effect, covariance), signal)
-    shift_rad = problem.alpha_shift_rad if shape.signal == "alpha" else 0.0
+    shift_rad = problem.alpha_shift_rad if shape.signal == problem.layout.motion.flow else 0.0
     at, trim = tuple(x + shift_rad for x in table.at), shape.trim + shift_rad
     return replace(table, at=at, trim=trim) if shift_rad else table
 

@@ -7,15 +7,16 @@ error of a sensor at all, it limits the errors that a trace may name.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from airtruth.aircraft import Aircraft
+from airtruth.checks import kinematics_model, kinematics_side
 from airtruth.checks.kinematics import AIRSPEED, check_kinematics
-from airtruth.checks.kinematics_model import ERRORS, LONGITUDINAL
+from airtruth.checks.kinematics_lateral import check_lateral
 from airtruth.checks.kinematics_record import declared_errors
 from airtruth.checks.kinematics_words import NAMED
 from airtruth.checks.result import Cause, CheckResult, Finding
@@ -23,9 +24,12 @@ from airtruth.effects.effect import Effect
 from airtruth.effects.registry import EFFECTS
 from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
+from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.sensor_errors import KINDS
 from airtruth.tracing.answer import Evidence, TraceAnswer
 
+ERRORS: Final = kinematics_model.ERRORS | kinematics_side.ERRORS
+"""Errors that the kinematics of a motion can show, by name."""
 _ERRORS: Final = 5.0
 """Standard errors of the kinematic check beyond which it excludes an error of a sensor [-] (judgement: its noise is not
 quite white)."""
@@ -44,13 +48,14 @@ sample)."""
 
 
 def kinematic_check(
-    logs: Sequence[FlightLog], aircraft: Aircraft, held: Collection[str]
+    logs: Sequence[FlightLog], aircraft: Aircraft, held: Collection[str], motion: Motion = LONGITUDINAL
 ) -> CheckResult | None:
     """Kinematic check of the records that are not held out; None where they do not allow one.
 
     Parameters
     ----------
     logs : logs that passed the gate; held : names of the held-out records.
+    motion : whose channels are compared.
     """
     parts = []
     for log in logs:
@@ -58,9 +63,25 @@ def kinematic_check(
         if fitted:
             parts.append(log.select(run_ids=fitted))
     try:
-        return check_kinematics(parts, declared_errors(aircraft, LONGITUDINAL), aircraft.chord_m)
+        return _CHECKS[motion.name](parts, aircraft)
     except LogError:
         return None
+
+
+def _of_pitch(logs: Sequence[FlightLog], aircraft: Aircraft) -> CheckResult:
+    return check_kinematics(logs, declared_errors(aircraft, kinematics_model.LONGITUDINAL), aircraft.chord_m)
+
+
+def _of_side(logs: Sequence[FlightLog], aircraft: Aircraft) -> CheckResult:
+    known = declared_errors(aircraft, kinematics_side.LATERAL)
+    return check_lateral(logs, known, aircraft.constants.span_m or None)
+
+
+_CHECKS: Final[Mapping[str, Callable[[Sequence[FlightLog], Aircraft], CheckResult]]] = {
+    "longitudinal": _of_pitch,
+    "lateral": _of_side,
+}
+"""Name of a motion -> kinematic check of logs with an aircraft's declared errors."""
 
 
 def starts_of(check: CheckResult | None) -> dict[str, float]:

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from airtruth.quantity import Quantity
 from airtruth.table import significant
 from airtruth.tracing.answer import DeclaredModel
-from airtruth.tracing.model.compile import CHANNELS
-from airtruth.tracing.model.parameters import COLOUR_TIME_S, SHORT_PERIOD
+from airtruth.tracing.model.parameters import COLOUR_TIME_S, Parameters
 from airtruth.tracing.replay import disagreement, worsened
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.stage_errors import Errors, PerChannel, Replay
@@ -32,7 +31,7 @@ _WORSE: Final = 1.02
 _TIMES: Final = 2.0
 """Ratio of two errors from which the ratio is stated and not the difference [-] (convention)."""
 _IN_LOOP: Final = (
-    "the elevator responds to the motion (a damper, an autopilot or a pilot): gusts move it too, so that the free run of a "
+    "{controls} to the motion (a damper, an autopilot or a pilot): gusts move {them} too, so that the free run of a "
     "false model may come closer than that of the true one; the innovations remain a valid test"
 )
 """Note of a trace in closed loop."""
@@ -57,14 +56,18 @@ def notes(
     forced : faults of the logs that the caller overruled.
     """
     yield from stages.case.notes
-    yield from _correlated_noise(last.null.point.common)
+    yield from _correlated_noise(last.null.point)
     if declared.consistent:
         yield from within_assumed_uncertainty(
             declared, stages.case.fitted.records[0].plant.aircraft.file.derivatives
         )
     yield from worse_held_out(errors)
     if in_closed_loop(stages):
-        yield _IN_LOOP
+        names = [c.name for c in stages.case.fitted.layout.motion.controls]
+        several = len(names) > 1
+        yield _IN_LOOP.format(
+            controls=f"the {' or the '.join(names)} responds", them="them" if several else "it"
+        )
     if stages.case.left_out:
         yield (
             "the time budget ended the search, so the answer is provisional; left out: "
@@ -120,16 +123,17 @@ def within_assumed_uncertainty(declared: DeclaredModel, stated: Mapping[str, Qua
         )
 
 
-def _correlated_noise(common: Array) -> Iterator[str]:
+def _correlated_noise(point: Parameters) -> Iterator[str]:
+    common, entries = point.common, point.of.common
+    channels = point.of.motion.output_channels
     shares = {
-        channel: float(share)
-        for channel, share in zip(CHANNELS, common[SHORT_PERIOD.common.colour_shares], strict=True)
+        channel: float(share) for channel, share in zip(channels, common[entries.colour_shares], strict=True)
     }
     named = [
         f"{100.0 * share:.0f} % of {channel}" for channel, share in shares.items() if share > _WORTH_A_NOTE
     ]
     if named:
-        time_s = COLOUR_TIME_S * math.exp(common[SHORT_PERIOD.common.log_colour_time])
+        time_s = COLOUR_TIME_S * math.exp(common[entries.log_colour_time])
         yield (
             f"the sensor noise is correlated in time: {', '.join(named)} of the noise variance, over {time_s:.2g} s"
         )

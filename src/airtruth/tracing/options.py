@@ -11,6 +11,7 @@ from airtruth.arguments import names, require_whole
 from airtruth.effects.effect import Effect
 from airtruth.effects.registry import EFFECTS
 from airtruth.errors import ConfigurationError, choices
+from airtruth.physics.motion import MOTIONS
 
 MODELS: Final = ("aircraft", "linear")
 """Models of the declared aircraft: forces probed in JSBSim, or the linear short-period model."""
@@ -34,6 +35,7 @@ class TraceOptions:
         machine, is provisional, and lists the omitted steps.
     increments : whether increments are learned from the residual of the named effects; None where the whole library is
         searched.
+    motion : "longitudinal" or "lateral"; None for each that the records excite and have the channels for.
     """
 
     model: str = "aircraft"
@@ -43,6 +45,7 @@ class TraceOptions:
     effects: tuple[str | Effect, ...] | None = None
     time_budget_s: float | None = None
     increments: bool | None = None
+    motion: str | None = None
 
     @property
     def keys(self) -> tuple[str, ...] | None:
@@ -66,6 +69,8 @@ class TraceOptions:
         """
         if self.model not in MODELS:
             raise ConfigurationError(f"--model {self.model!r}: {choices(self.model, MODELS)}")
+        if self.motion is not None and self.motion not in MOTIONS:
+            raise ConfigurationError(f"--motion {self.motion!r}: {choices(str(self.motion), MOTIONS)}")
         if self.threads < 1:
             raise ConfigurationError(f"--jobs {self.threads}: must be at least 1")
         require_whole("seed", self.seed, 0)

@@ -18,12 +18,14 @@ from airtruth.effects.effect import Effect
 from airtruth.errors import ConfigurationError, LogError, choices
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.composition import directions
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.reconstruction import is_reconstructed
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.tracing.conditions import condition_notes, records_of
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.model.records import FINE, Signals, TraceRecord, fine, read
+from airtruth.tracing.model.reading import measured_controls, read
+from airtruth.tracing.model.records import FINE, Signals, TraceRecord, fine
 from airtruth.tracing.model.settings import VANE, declared_change, resolved, settings_of
 from airtruth.tracing.model.surface_noise import with_surface_noise
 from airtruth.tracing.options import TraceOptions
@@ -99,13 +101,8 @@ def prepare(
         Naming what is wrong, where, and what to do.
     """
     _one_aircraft(logs, aircraft)
-    pots = aircraft.file.sensors.get("elevator_rad")
-    noise = pots.noise_std.value if pots else 0.0
-    servo = aircraft.file.elevator_actuator
-    rate = math.inf if servo is None else servo.rate_limit.value
-    signals = [
-        undo_input_sensors(s, aircraft) for log in logs for s in read(log, noise, aircraft.servo_time_s, rate)
-    ]
+    controls = measured_controls(aircraft, LONGITUDINAL)
+    signals = [undo_input_sensors(s, aircraft) for log in logs for s in read(log, LONGITUDINAL, controls)]
     signals.sort(key=lambda s: s.run_id)  # the answer does not depend on the order of the logs
     chosen = _hold_out([s.run_id for s in signals], options)
     _check(signals, chosen, logs)
@@ -141,7 +138,7 @@ def prepare(
     return Case(
         fitted=TraceProblem(fitted, settings, options.threads),
         held=TraceProblem(held, settings, options.threads) if held else None,
-        hypothesis=Hypothesis(declared_change(aircraft, has_vane=has_vane), trim_alpha_rad=trim_alpha_rad),
+        hypothesis=Hypothesis(declared_change(aircraft, has_vane=has_vane), trim_flow_rad=trim_alpha_rad),
         effects=tuple(e for e in effects if not reasons[e.key]),
         untestable=tuple((e, reasons[e.key]) for e in effects if reasons[e.key]),
         model=model,
@@ -199,7 +196,12 @@ def undo_input_sensors(s: Signals, aircraft: Aircraft) -> Signals:
         airspeed = airspeed / declared.slope(fine(s.y[:, 0], s.sub))
     return replace(
         s,
-        elevator_rad=true("elevator_rad", s.elevator_rad, s.sub * FINE),
+        controls_rad=np.stack(
+            [
+                true(control.channel, x, s.sub * FINE)
+                for control, x in zip(s.motion.controls, s.controls_rad, strict=True)
+            ]
+        ),
         airspeed_m_s=airspeed,
         ground_m_s=true("airspeed_m_s", s.ground_m_s, s.sub),
     )

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from airtruth import aircraft as planes
 from airtruth.aircraft import Aircraft, Sensor
 from airtruth.errors import FlightError, TrimError
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.simulation.disposable import isolated, isolated_flight
 from airtruth.simulation.replay import Track, replay, substeps
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim, trim
 from airtruth.tracing.inference.assess import noise_floor
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.model.compile import CHANNELS
 from airtruth.tracing.model.records import FINE, TraceRecord
 from airtruth.tracing.stage_errors import MOST_RECORDS, PerChannel, Replay
 from airtruth.tracing.stages import Stages
@@ -44,15 +44,16 @@ def flown_again(stages: Stages, aircraft: Aircraft, updated: str | Path | None) 
 
     Returns
     -------
-    Errors of both aircraft; an empty `Replay` for an aircraft without a JSBSim model, for a trace with the linear model, and
-    where the motion leaves the range of the simulation.
+    Errors of both aircraft; an empty `Replay` for a motion outside of the pitch plane, for an aircraft without JSBSim, for
+    a trace with the linear model, and where the motion leaves the range of the simulation.
 
     Raises
     ------
     AircraftError
         If the updated aircraft cannot be read.
     """
-    if aircraft.file.jsbsim is None or stages.case.model != "aircraft":
+    is_pitch = stages.case.fitted.layout.motion is LONGITUDINAL
+    if not is_pitch or aircraft.file.jsbsim is None or stages.case.model != "aircraft":
         return Replay()
     new = None if updated is None else planes.load(updated)
     weights = _weights(stages)
@@ -77,8 +78,9 @@ def disagreement(replay: Replay, stages: Stages) -> list[str]:
     """
     if replay.declared is None:
         return []
+    channels = stages.case.fitted.layout.motion.output_channels
     same = np.stack([a.free_run for a in stages.reported[1]["declared"][:MOST_RECORDS]])
-    filtered = dict(zip(CHANNELS, np.sqrt(np.mean(same**2, axis=0)).tolist(), strict=True))
+    filtered = dict(zip(channels, np.sqrt(np.mean(same**2, axis=0)).tolist(), strict=True))
     ratios = {c: rms / max(filtered[c], 1e-12) for c, rms in replay.declared.items()}
     apart = [f"{channel} {ratio:.2f}" for channel, ratio in ratios.items() if abs(np.log(ratio)) > _APART]
     if not apart:
@@ -121,6 +123,7 @@ def _weights(stages: Stages) -> list[Array]:
 
 def _errors(problem: TraceProblem, aircraft: Aircraft, weights: list[Array]) -> PerChannel:
     """Root mean squares of the measured channels."""
+    channels = problem.layout.motion.output_channels
     trims: dict[Condition, Trim] = {}
     squares = []
     for record, weight in zip(problem.records, weights, strict=False):
@@ -136,11 +139,11 @@ def _errors(problem: TraceProblem, aircraft: Aircraft, weights: list[Array]) -> 
         flown = isolated_flight(
             steps, f"the replay of {aircraft.name}", replay, aircraft, trims[at], measured
         )
-        residual = record.signals.y - np.stack([flown[c] for c in CHANNELS], axis=1)
+        residual = record.signals.y - np.stack([flown[c] for c in channels], axis=1)
         squares.append((residual**2).mean(axis=0))
     roots = np.sqrt(np.mean(squares, axis=0)).tolist()
     return {
-        c: root for c, root, known in zip(CHANNELS, roots, problem.settings.measured, strict=True) if known
+        c: root for c, root, known in zip(channels, roots, problem.settings.measured, strict=True) if known
     }
 
 
@@ -162,7 +165,7 @@ def track(record: TraceRecord, aircraft: Aircraft, weight: Array) -> Track:
     Parameters
     ----------
     record : its inputs are corrected for the sensors of its plant's aircraft.
-    weight : (3,) standard deviations that weight the residuals of `CHANNELS`.
+    weight : (outputs,) standard deviations that weight the residuals of the outputs.
     """
     s = record.signals
     steps = substeps(s.dt_s)
@@ -181,12 +184,12 @@ def track(record: TraceRecord, aircraft: Aircraft, weight: Array) -> Track:
         alpha = np.interp(grid, np.arange(samples), s.y[:, 0])
         return values * old.slope(alpha) / new.slope(alpha)
 
-    outputs: Mapping[str, Array] = {c: s.y[:, i] for i, c in enumerate(CHANNELS)}
+    outputs: Mapping[str, Array] = {c: s.y[:, i] for i, c in enumerate(s.motion.output_channels)}
     return Track(
         dt_s=s.dt_s,
         substeps=steps,
         outputs=outputs,
-        weight=dict(zip(CHANNELS, weight.tolist(), strict=True)),
+        weight=dict(zip(s.motion.output_channels, weight.tolist(), strict=True)),
         elevator_rad=true("elevator_rad", s.elevator_rad, s.sub * FINE),
         airspeed_m_s=true("airspeed_m_s", s.airspeed_m_s, s.sub),
     )

@@ -12,10 +12,10 @@ from typing import Final
 from airtruth.effects.effect import Parameter
 from airtruth.effects.increment import NAME
 from airtruth.effects.registry import EFFECTS
+from airtruth.physics.motion import VANES
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.answer import DECLARED_LEVEL, Alternative
 from airtruth.tracing.friction import PLAUSIBLE_RAD, is_late_vane
-from airtruth.tracing.model.settings import VANE
 from airtruth.tracing.selection.explanation import DERIVATIVES, events
 from airtruth.units import DEG
 
@@ -104,7 +104,11 @@ def reservations(
             f"learned increments explain the records without {listed}, with a posterior weight of {100.0 * unnamed:.0f} %: the "
             "names are provisional"
         )
-    of_vane = [e.key for e in named if e.key in EFFECTS and EFFECTS[e.key].channels == (VANE,)]
+    of_vane = [
+        e.key
+        for e in named
+        if e.key in EFFECTS and set(EFFECTS[e.key].channels) <= VANES and EFFECTS[e.key].channels
+    ]
     late = [e.key for e in named if is_late_vane(e.key) and 0.0 < _value(e) <= friction_lag_s]
     if of_vane and friction_p_value <= DOUBT:
         found.append(

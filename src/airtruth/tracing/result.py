@@ -16,6 +16,7 @@ from airtruth.tracing.answer import ANSWER, TraceAnswer
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.presentation.brief import as_brief_text
 from airtruth.tracing.presentation.html import as_trace_html
+from airtruth.tracing.presentation.several import by_motion, html_under_headings, under_headings
 from airtruth.tracing.presentation.text import as_trace_text
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.stages import Stages
@@ -35,12 +36,24 @@ class TraceResult:
     rounds : rounds of the search, the last without an accepted effect.
     stages : models of the report, assessed on every record.
     provenance : version, options and digests of the inputs.
+    others : results of the other motions that the same logs answer; text and JSON have each under its name.
     """
 
     answer: TraceAnswer
     rounds: tuple[SearchRound, ...]
     stages: Stages
     provenance: Provenance = field(default_factory=Provenance)
+    others: tuple[TraceResult, ...] = ()
+
+    @property
+    def motion(self) -> str:
+        """Name of the motion."""
+        return self.answer.motion.name
+
+    @property
+    def motions(self) -> dict[str, TraceResult]:
+        """Name of each motion that is answered -> its result."""
+        return {one.motion: one for one in (self, *self.others)}
 
     @cached_property
     def histories(self) -> Histories:
@@ -66,11 +79,11 @@ class TraceResult:
 
     def summary(self) -> str:
         """The text that `airtruth trace` prints: one screen, the verdict first."""
-        return as_brief_text(self.answer)
+        return under_headings(as_brief_text, self.answers)
 
     def details(self) -> str:
         """The text of `airtruth trace --verbose`: every table, candidate and note."""
-        return as_trace_text(self.answer)
+        return under_headings(as_trace_text, self.answers)
 
     def to_frame(self) -> pd.DataFrame:
         """The candidates, one row each, most significant first."""
@@ -78,9 +91,14 @@ class TraceResult:
 
         return pd.DataFrame([c.to_dict() for c in self.answer.candidates])
 
+    @property
+    def answers(self) -> list[TraceAnswer]:
+        """Answer of each motion."""
+        return [one.answer for one in self.motions.values()]
+
     def to_dict(self) -> dict[str, Any]:
-        """What trace.json holds (docs/trace.md)."""
-        return self.answer.to_dict()
+        """What trace.json holds (docs/trace.md); of several motions, that of each under its name."""
+        return by_motion(self.answers)
 
     def plot(self) -> Figure:
         """Residuals of one record's free run: as declared, the effect, before and after."""
@@ -108,4 +126,4 @@ class TraceResult:
         return shortened(self.summary())
 
     def _repr_html_(self) -> str:
-        return as_trace_html(self.answer)
+        return html_under_headings(as_trace_html, self.answers)

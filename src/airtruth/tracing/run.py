@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -62,8 +62,10 @@ def trace(
     out: Path | None = None,
     force: bool = False,
     advance: Advance = lambda step: None,
+    runs: Collection[str] | None = None,
+    notes: Sequence[str] = (),
 ) -> TraceResult:
-    """Trace the residual of flight logs to the effects that the declared aircraft lacks.
+    """Trace the residual of flight logs to the effects that the declared aircraft lacks, in one motion.
 
     Parameters
     ----------
@@ -73,20 +75,16 @@ def trace(
     out : folder of trace.json, the figures and the updated aircraft; None to write nothing.
     force : trace logs that contradict physics all the same; the answer lists the faults.
     advance : receives the step that begins.
+    runs : runs to trace; None for all.
+    notes : remarks for the answer, sentences without a final period.
 
     Raises
     ------
     LogError, ConfigurationError, AircraftError, StoreError
         Naming what is wrong, where, and what to do.
-
-    Examples
-    --------
-    >>> result = trace("data/undeclared/d.parquet", "gtm")  # doctest: +SKIP
-    >>> result.answer.verdict  # doctest: +SKIP
-    'one_of'
     """
     with threadpool_limits(limits=1, user_api="blas"):  # threads for small matrices wait for each other
-        return _traced(logs, aircraft, options or TraceOptions(), out, force, advance)
+        return _traced(logs, aircraft, options or TraceOptions(), out, force, advance, runs, notes)
 
 
 def _traced(
@@ -96,19 +94,22 @@ def _traced(
     out: Path | None,
     force: bool,
     advance: Advance,
+    runs: Collection[str] | None,
+    notes: Sequence[str],
 ) -> TraceResult:
     declared = aircraft if isinstance(aircraft, Aircraft) else planes.load(aircraft)
     effects = _effects(options)
-    checked, forced, remarks = _checked(logs, declared, force)
+    checked, forced, remarks = _checked(logs, declared, force, runs)
     if out is not None:  # both before the search, which takes minutes
         updated_folder(declared, out)
         atomic.make_folder(out)
     advance("probe the declared aircraft")
     case = prepare(checked, declared, effects, options)
+    motion = case.fitted.layout.motion
     advance("check the kinematics")
     held = set() if case.held is None else {r.signals.run_id for r in case.held.records}
-    # a reconstructed alpha agrees with q and az by construction
-    kinematics = None if not case.has_vane else kinematic_check(checked, declared, held)
+    # a reconstructed angle agrees with rates and accelerations by construction
+    kinematics = None if not case.has_vane else kinematic_check(checked, declared, held, motion)
     case = replace(case, effects=within_kinematics(case.effects, kinematics))
     case, rounds = _search(case, options, advance, kinematics)
     advance("assess every stage on fitted and held-out records")
@@ -129,9 +130,9 @@ def _traced(
     answer = conclude(stages, rounds, publish, forced, axial)
     whole = kinematics
     if held and kinematics is not None and names_a_sensor(answer):
-        whole = kinematic_check(checked, declared, ())
+        whole = kinematic_check(checked, declared, (), motion)
     answer = with_contradictions(answer, kinematics, _longest_period_s(case), whole)
-    answer = replace(answer, notes=(*remarks, *answer.notes))
+    answer = replace(answer, notes=(*notes, *remarks, *answer.notes))
     result = TraceResult(answer, rounds, stages, origin)
     if out is not None:
         result.write(out)
@@ -148,6 +149,8 @@ def provenance_of(logs: Logs, aircraft: Aircraft, options: TraceOptions) -> Prov
     """
     stated = {f.name: getattr(options, f.name) for f in fields(options) if f.name != "threads"}
     stated["effects"] = options.keys  # the number of threads changes nothing
+    if options.motion is None:
+        del stated["motion"]
     words = {name: "default" if value is None else _words(value) for name, value in stated.items()}
     digests = digests_of(logs, aircraft.folder)
     return Provenance(__version__, aircraft.name, words, digests, str(aircraft.folder.resolve()))
@@ -158,10 +161,11 @@ def _words(value: object) -> str:
 
 
 def _checked(
-    logs: Logs, aircraft: Aircraft, force: bool
+    logs: Logs, aircraft: Aircraft, force: bool, runs: Collection[str] | None
 ) -> tuple[list[FlightLog], list[str], tuple[str, ...]]:
     """The logs behind the gate, the faults that ``force`` overruled, and remarks for the answer."""
-    admitted = [gate.admit(log, aircraft, source=name, force=force) for name, log in named_logs(logs)]
+    read = named_logs(logs, run_ids=runs)
+    admitted = [gate.admit(log, aircraft, source=name, force=force) for name, log in read]
     forced = [sentence for one in admitted for sentence in one.forced]
     remarks = dict.fromkeys(sentence for one in admitted for sentence in one.remarks("aircraft"))
     return [one.log for one in admitted], forced, tuple(remarks)
@@ -232,7 +236,7 @@ def _with_later_colour(
     At the declared aircraft a strong effect drives correlated noise to its limits, and it does not enter. Correlated noise can
     imitate a share of an effect too, so that the effects of the first search are tried beside it.
     """
-    level = later_level(sum(r.samples for r in case.fitted.records))
+    level = later_level(sum(r.samples for r in case.fitted.records), len(case.fitted.settings.noise))
     coloured, point = beside(case, rounds[-1].null, level)
     phrase = "search with correlated noise"
     if not coloured.fitted.settings.coloured or not may_begin(advance, phrase):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field
 from typing import Any, Final, Generic, Protocol, TypeVar
 
 STAGES: Final = ("declared", "before", "after", "control", "floor")
@@ -105,21 +105,24 @@ class Excursions:
 
     Attributes
     ----------
-    pitch_rad, q_rad_s, az_m_s2 : largest distances over the records [rad, rad/s, m/s2].
+    distances : quantity -> largest distance over the records, in SI; in JSON side by side with the others.
     share_inside : mean share of the samples inside the tolerances [-].
     records_within, records : number of records inside throughout, and in all.
     """
 
-    pitch_rad: float
-    q_rad_s: float
-    az_m_s2: float
+    distances: PerChannel
     share_inside: float
     records_within: int
     records: int
 
     def to_dict(self) -> dict[str, Any]:
-        """Every field."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+        """The distances side by side with the counts."""
+        counts = {name: getattr(self, name) for name in COUNTS}
+        return {**self.distances, **counts}
+
+
+COUNTS: Final = ("share_inside", "records_within", "records")
+"""Fields of `Excursions` beside the distances."""
 
 
 @dataclass(frozen=True)
@@ -129,18 +132,22 @@ class Tolerances:
     Attributes
     ----------
     source : regulation.
-    limits : quantity -> largest allowed distance, in SI.
+    limits : quantity -> largest allowed distance, in SI; a tolerance may also state a share of the measured value.
     stages : stage -> distances.
+    modes : stage -> quantity of `airtruth.physics.proof_of_lateral.LateralProof` -> value, null where the motion has none;
+        of the lateral-directional motion.
     """
 
     source: str
     limits: dict[str, float]
     stages: dict[str, BySet[Excursions]]
+    modes: dict[str, dict[str, float | None]] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Source, limits and stages side by side."""
         rows = {name: e.to_dict() for name, e in self.stages.items()}
-        return {"source": self.source, "limits": dict(self.limits), **rows}
+        modes = {"modes": {name: dict(own) for name, own in self.modes.items()}} if self.modes else {}
+        return {"source": self.source, "limits": dict(self.limits), **modes, **rows}
 
 
 MOST_RECORDS: Final = 6

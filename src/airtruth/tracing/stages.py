@@ -12,8 +12,7 @@ from airtruth.tracing.inference.assess import Assessment, assess, fitted_noise_f
 from airtruth.tracing.inference.feedback import responds_to_motion
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.model.compile import CHANNELS
-from airtruth.tracing.model.parameters import SHORT_PERIOD
+from airtruth.tracing.model.settings import Settings
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.acceptance import Candidate
 from airtruth.tracing.selection.rounds import SearchRound
@@ -69,10 +68,10 @@ class Stages:
 
 
 def in_closed_loop(stages: Stages) -> bool:
-    """Whether the elevator of the records that a report shows responds to the motion."""
+    """Whether a control of the records that a report shows responds to the motion."""
     problem, assessed = stages.reported
     return responds_to_motion(
-        [r.signals.sampled_elevator_rad for r in problem.records], [a.whitened for a in assessed["before"]]
+        [r.signals.sampled_controls_rad for r in problem.records], [a.whitened for a in assessed["before"]]
     )
 
 
@@ -86,7 +85,8 @@ def assess_stages(case: Case, rounds: Sequence[SearchRound]) -> Stages:
     null, last = before_fit(rounds), rounds[-1].null
     # noise levels are those of the stage before: with the declared ones only the declared model would be assessed
     declared = null.point.common.copy()
-    declared[[*range(SHORT_PERIOD.common.derivatives.stop), SHORT_PERIOD.common.inertia]] = 0.0
+    own = case.fitted.layout.common
+    declared[[*range(own.derivatives.stop), own.inertia]] = 0.0
     models = {
         "declared": StageModel(case.hypothesis, declared, np.zeros(0), null.point.per_record, False),
         "before": _model(null),
@@ -127,27 +127,27 @@ def stage_errors(stages: Stages) -> Errors:
     """Root mean squares of every stage on the fitted and on the held-out records."""
     found: dict[str, BySet[Rms]] = {}
     case = stages.case
-    measured = case.fitted.settings.measured
+    settings = case.fitted.settings
     for name in STAGES:
         if name == "floor":
             held = None if case.held is None else _floor(case.held, stages, stages.held)
             found[name] = BySet(_floor(case.fitted, stages, stages.fitted), held)
         elif name in stages.fitted:
-            held = _pooled(stages.held[name], measured) if name in stages.held else None
-            found[name] = BySet(_pooled(stages.fitted[name], measured), held)
+            held = _pooled(stages.held[name], settings) if name in stages.held else None
+            found[name] = BySet(_pooled(stages.fitted[name], settings), held)
     return Errors(_signals(case), found)
 
 
 def _signals(case: Case) -> PerChannel:
     """Standard deviation of each measured channel, the scale of the errors."""
     y = [r.signals.y - r.signals.y.mean(axis=0) for r in case.fitted.records]
-    return _per_channel(np.concatenate(y) ** 2, case.fitted.settings.measured)
+    return _per_channel(np.concatenate(y) ** 2, case.fitted.settings)
 
 
-def _pooled(assessed: Sequence[Assessment], measured: NDArray[np.bool_]) -> Rms:
+def _pooled(assessed: Sequence[Assessment], settings: Settings) -> Rms:
     return Rms(
-        free_run=_per_channel(np.array([a.free_run**2 for a in assessed]), measured),
-        innovation=_per_channel(np.array([a.innovation**2 for a in assessed]), measured),
+        free_run=_per_channel(np.array([a.free_run**2 for a in assessed]), settings),
+        innovation=_per_channel(np.array([a.innovation**2 for a in assessed]), settings),
     )
 
 
@@ -157,15 +157,15 @@ def _floor(problem: TraceProblem, stages: Stages, assessed: dict[str, list[Asses
     A model that does not fit a record takes its misfit for gusts, and its floor is too high.
     """
     stage = min(("before", stages.best), key=lambda name: sum(a.likelihood for a in assessed[name]))
-    own, measured = assessed[stage], problem.settings.measured
+    own, settings = assessed[stage], problem.settings
     return Rms(
-        free_run=_per_channel(free_run_floor(problem, stages.models[stage], own) ** 2, measured),
-        innovation=_per_channel(np.array([a.expected**2 for a in own]), measured),
+        free_run=_per_channel(free_run_floor(problem, stages.models[stage], own) ** 2, settings),
+        innovation=_per_channel(np.array([a.expected**2 for a in own]), settings),
     )
 
 
 def free_run_floor(problem: TraceProblem, model: StageModel, assessed: Sequence[Assessment]) -> Array:
-    """(records, 3) root mean squares of free runs that gusts and sensor noise alone explain."""
+    """(records, outputs) root mean squares of free runs that gusts and sensor noise alone explain."""
     compiled = model.hypothesis.compiled(model.sizes)
     return np.array(
         [
@@ -183,10 +183,11 @@ def free_run_floor(problem: TraceProblem, model: StageModel, assessed: Sequence[
     )
 
 
-def _per_channel(squares: Array, measured: NDArray[np.bool_]) -> PerChannel:
+def _per_channel(squares: Array, settings: Settings) -> PerChannel:
     """Root of the mean over the first axis, by measured channel."""
     roots = np.sqrt(np.mean(squares, axis=0)).tolist()
-    return {channel: root for channel, root, known in zip(CHANNELS, roots, measured, strict=True) if known}
+    rows = zip(settings.layout.motion.output_channels, roots, settings.measured, strict=True)
+    return {channel: root for channel, root, known in rows if known}
 
 
 __all__ = [

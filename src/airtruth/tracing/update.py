@@ -19,7 +19,7 @@ from airtruth.aircraft.write import Corrections, write_aircraft
 from airtruth.effects.increment import Increment
 from airtruth.errors import StoreError
 from airtruth.logs import atomic
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import VANES
 from airtruth.physics.terms import DECLARED, AeroTerm, Change, ReadingTerm, SensorTerm, declared_total
 from airtruth.quantity import Quantity
 from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
@@ -27,9 +27,7 @@ from airtruth.tracing.axial_force import AxialForce
 from airtruth.tracing.increment_table import increment_table
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import robust_covariance
-from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.response import moved_past_sensors_m
-from airtruth.tracing.model.settings import VANE
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.update_origin import source_text, with_spread
@@ -39,8 +37,8 @@ Array = NDArray[np.float64]
 
 WITHOUT_EFFECTS: Final = "without_effects"
 """Folder beside that of the updated aircraft: one without a JSBSim model, as it flies without the accepted effects."""
-_WITH_ARM: Final = (VANE, "az_m_s2")
-"""Channels whose reading depends on where their sensor is."""
+_WITH_ARM: Final = ("vane", "accelerometer")
+"""Instruments whose reading depends on where they are."""
 _DECIMALS: Final = 6
 """Decimals of the trim about which the derivatives are refitted [rad] (judgement: finer than any sensor of angles)."""
 _Term = TypeVar("_Term", AeroTerm, ReadingTerm)
@@ -58,7 +56,9 @@ def accepted_change(case: Case, fit: PosteriorFit, sizes: Array, chord_m: float)
     if shift == DECLARED["cg"]:
         return change
     moved_m = moved_past_sensors_m(fit.point.common, shift, chord_m)
-    arms = (SensorTerm(c, "arm", moved_m) for c in _WITH_ARM if c != VANE or case.has_vane)
+    outputs = case.fitted.layout.motion.outputs
+    moved = [y for y in outputs if y.instrument in _WITH_ARM and (y.channel not in VANES or case.has_vane)]
+    arms = (SensorTerm(y.channel, "arm", moved_m) for y in moved)
     return replace(change, sensors=(*change.sensors, *arms))
 
 
@@ -163,16 +163,19 @@ def write_update(
 
 def _corrections(case: Case, fit: PosteriorFit, covariance: Array) -> Corrections:
     """The refitted derivatives, about the mean trim of the fitted records."""
-    values = fit.point.common[SHORT_PERIOD.common.derivatives].tolist()
-    deviations = np.sqrt(np.diag(covariance)[SHORT_PERIOD.common.derivatives]).tolist()
-    std = dict(zip(PARAMETERS, deviations, strict=True))
-    plants = [record.plant for record in case.fitted.records]
-    alpha = float(np.mean([p.trim_alpha_rad for p in plants])) + case.fitted.alpha_shift_rad
+    layout = case.fitted.layout
+    motion, own = layout.motion, layout.common.derivatives
+    values = fit.point.common[own].tolist()
+    deviations = np.sqrt(np.diag(covariance)[own]).tolist()
+    std = dict(zip(motion.parameters, deviations, strict=True))
+    origins = np.array([record.plant.trim_signals for record in case.fitted.records]).T
+    trim = {s.name: float(np.mean(at)) for s, at in zip(motion.signals, origins, strict=True)}
+    trim[motion.flow] += case.fitted.alpha_shift_rad
     return Corrections(
-        {name: rounded(value, std[name]) for name, value in zip(PARAMETERS, values, strict=True)},
-        round(alpha, _DECIMALS),
-        round(float(np.mean([p.trim_elevator_rad for p in plants])), _DECIMALS),
+        {name: rounded(value, std[name]) for name, value in zip(motion.parameters, values, strict=True)},
+        {name: round(at, _DECIMALS) for name, at in trim.items()},
         std,
+        motion,
     )
 
 
@@ -187,12 +190,13 @@ def _write_flying(
 ) -> None:
     """An aircraft without a JSBSim model, as one that flies in level flight at the trim of the fitted records."""
     signals = [record.signals for record in case.fitted.records]
+    alpha_rad, (control,) = trim.trim[trim.motion.flow], trim.motion.controls
     at = TrimPoint(
         airspeed_m_s=float(np.mean([s.airspeed_m_s[0] for s in signals])),
         density_kg_m3=float(np.mean([s.density_kg_m3[0] for s in signals])),
-        alpha_rad=trim.alpha_rad,
-        elevator_rad=trim.elevator_rad,
-        az_m_s2=-G0 * math.cos(trim.alpha_rad),
+        alpha_rad=alpha_rad,
+        elevator_rad=trim.trim[control.name],
+        az_m_s2=-G0 * math.cos(alpha_rad),
     )
     with atomic.new_folder(folder) as new:
         write_corrected(aircraft, aircraft.file.derivatives, at, change, new, note, origin)

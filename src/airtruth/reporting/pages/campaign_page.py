@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,15 +11,17 @@ from scipy.stats import norm
 from airtruth.aircraft import Aircraft
 from airtruth.errors import AirtruthError
 from airtruth.identification.charts import Frames, intervals_chart
+from airtruth.logs.names import ESTIMATES as FILES
 from airtruth.logs.sources import Logs
-from airtruth.physics.motion import LONGITUDINAL
-from airtruth.reporting.campaign import ESTIMATES, Campaign, Parted
+from airtruth.physics.motion import Motion
+from airtruth.reporting.campaign import Campaign, Parted
 from airtruth.reporting.pages.estimates_page import shifts_of
 from airtruth.reporting.pages.frequency_page import frequency_charts, frequency_section
 from airtruth.reporting.pages.headline import headline
-from airtruth.reporting.pages.identified import SIMULATED, Identified, read_identified
+from airtruth.reporting.pages.identified import SIMULATED, Identified, read_identified, simulates
+from airtruth.reporting.pages.motions import Part, report_of
 from airtruth.reporting.pages.origin import of_methods, origin_section
-from airtruth.reporting.pages.page import Report, Section, answer_html, data_table, page_of
+from airtruth.reporting.pages.page import Report, Section, answer_html, data_table
 from airtruth.reporting.pages.records import records_section, records_tables
 from airtruth.reporting.pages.scatter_page import (
     MOST_RUNS,
@@ -29,23 +31,35 @@ from airtruth.reporting.pages.scatter_page import (
 )
 from airtruth.reporting.paper import tables
 from airtruth.reporting.paper.layout import lay_out
-from airtruth.reporting.paper.published import ESTIMATED, SYMBOLS
 from airtruth.reporting.paper.tables import PaperTable
 from airtruth.reporting.stored_campaign import StoredCampaign
-from airtruth.table import as_csv, as_latex, flat
+from airtruth.reporting.symbols import SYMBOLS
+from airtruth.table import as_latex, flat
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-def campaign_report(campaign: Parted, logs: Logs | None = None, aircraft: Aircraft | None = None) -> Report:
+def campaign_report(
+    campaigns: Sequence[Parted], logs: Logs | None = None, aircraft: Aircraft | None = None
+) -> Report:
     """Return the report of a campaign, each method in the first of the paper's tables that has it.
 
     Parameters
     ----------
+    campaigns : the campaign with the estimates of each motion.
     logs : logs of the campaign; None for those in its folder.
-    aircraft : the declared aircraft; None for none.
+    aircraft : the declared aircraft; None for none. It and ``logs`` serve the motion whose records are simulated.
     """
+    parts = {}
+    for one in campaigns:
+        asked = (logs, aircraft) if len(campaigns) == 1 or simulates(one.motion) else (None, None)
+        parts[one.motion.name] = _part(one, *asked)
+    return report_of(campaigns[0].title or campaigns[0].name, parts)
+
+
+def _part(campaign: Parted, logs: Logs | None, aircraft: Aircraft | None) -> Part:
+    motion = campaign.motion
     shown = _tables(campaign)
     laid_out = [lay_out(table) for table in shown]
     rows = [row for table in shown for row in tables.long_form(table).rows]
@@ -63,12 +77,13 @@ def campaign_report(campaign: Parted, logs: Logs | None = None, aircraft: Aircra
     statistics = {m: s for table in shown for m, s in table.statistics.items()}
     facts = [f"Gust: {campaign.gust}."] if campaign.gust else []
     confidence = identified.confidence
-    runs, runs_drawn = runs_section(_with_std(first, confidence), flown, {"truth": truth}, confidence)
+    runs, runs_drawn = runs_section(_with_std(first, confidence, motion), flown, {"truth": truth}, confidence)
     correlation, correlated = correlation_section(
-        {m: s.correlation for m, s in statistics.items() if s.counts.used >= least_runs(LONGITUDINAL)},
+        {m: s.correlation for m, s in statistics.items() if s.counts.used >= least_runs(motion)},
         "Correlation over the converged runs.",
+        motion,
     )
-    sections = [
+    sections = (
         records_section(histories, identified.reason, SIMULATED),
         Section(
             "Estimates against the truth",
@@ -80,37 +95,35 @@ def campaign_report(campaign: Parted, logs: Logs | None = None, aircraft: Aircra
         correlated,
         frequency_section(histories),
         Section("Error per record", "errors", records_tables(histories) if histories else ""),
-        origin_section(histories, of_methods(identified.records), facts),
-    ]
-    return Report(
-        page=page_of(
-            campaign.title or campaign.name,
-            answer_html(*headline(statistics, flown, campaign.runs, confidence)),
-            chart,
-            sections,
-        ),
-        csv=as_csv(flat(campaign.title, tables.LONG_COLUMNS, rows)),
+        origin_section(histories, of_methods(identified.records), facts, motion),
+    )
+    return Part(
+        answer=answer_html(*headline(statistics, flown, campaign.runs, confidence, motion)),
+        picture=chart,
+        sections=sections,
+        figures=flat(campaign.title, tables.LONG_COLUMNS, rows),
         latex="\n".join(latex),
         charts=(chart, *shifts, *runs, *correlation, *frequency_charts(histories)),
     )
 
 
-def _with_std(rows: pd.DataFrame, confidence: float) -> pd.DataFrame:
+def _with_std(rows: pd.DataFrame, confidence: float, motion: Motion) -> pd.DataFrame:
     """The rows with the standard errors of their intervals, which are symmetric and normal."""
     half = float(norm.isf(0.5 * (1.0 - confidence)))
     with np.errstate(over="ignore", invalid="ignore"):
-        std = {f"{n}_std": 0.5 * (rows[f"{n}_upper"] - rows[f"{n}_lower"]) / half for n in ESTIMATED}
+        std = {f"{n}_std": 0.5 * (rows[f"{n}_upper"] - rows[f"{n}_lower"]) / half for n in motion.estimated}
     return rows.assign(**std)
 
 
 def _flown(campaign: Parted) -> tuple[int, dict[str, float]]:
     """Number of the runs that flew, and their mean truth."""
-    count, total = 0, np.zeros(len(ESTIMATED))
+    names = campaign.motion.estimated
+    count, total = 0, np.zeros(len(names))
     with np.errstate(over="ignore"):
         for part in campaign.parts():
             count += int(part.flown.sum())
             total += part.truth[part.flown].sum(axis=0)
-        return count, dict(zip(ESTIMATED, (total / count).tolist(), strict=True))
+        return count, dict(zip(names, (total / count).tolist(), strict=True))
 
 
 def _frame(campaign: Campaign) -> pd.DataFrame:
@@ -120,7 +133,7 @@ def _frame(campaign: Campaign) -> pd.DataFrame:
     parts = []
     for method, e in campaign.estimates.items():
         columns: dict[str, object] = {"run_id": campaign.run_ids, "method": method, "converged": e.converged}
-        for j, name in enumerate(ESTIMATED):
+        for j, name in enumerate(campaign.motion.estimated):
             columns[name] = e.values[:, j]
             columns[f"{name}_lower"] = e.lower[:, j]
             columns[f"{name}_upper"] = e.upper[:, j]
@@ -167,7 +180,7 @@ def _identified(
 ) -> Identified:
     layout = (flown, len(campaign.methods)) if isinstance(campaign, StoredCampaign) else None
     try:
-        return read_identified(campaign.folder / ESTIMATES, logs, aircraft, layout)
+        return read_identified(campaign.folder / FILES[campaign.motion.name], logs, aircraft, layout)
     except AirtruthError as error:
         if logs is not None or aircraft is not None:
             raise

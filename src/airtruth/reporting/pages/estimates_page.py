@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -14,7 +15,7 @@ from airtruth.identification.charts import intervals_chart
 from airtruth.identification.result import IdentificationResult
 from airtruth.identification.simulated import simulated_records
 from airtruth.identification.stored import Record
-from airtruth.physics.motion import LONGITUDINAL, motion_of
+from airtruth.physics.motion import motion_of
 from airtruth.reporting.pages.frequency_page import frequency_charts, frequency_section
 from airtruth.reporting.pages.identified import (
     NOT_SIMULATED,
@@ -23,9 +24,11 @@ from airtruth.reporting.pages.identified import (
     answer_of,
     refuse_records,
     require_same_aircraft,
+    simulates,
 )
+from airtruth.reporting.pages.motions import Part, report_of
 from airtruth.reporting.pages.origin import of_methods, origin_section
-from airtruth.reporting.pages.page import Report, Section, answer_html, data_table, page_of
+from airtruth.reporting.pages.page import Report, Section, answer_html, data_table
 from airtruth.reporting.pages.records import records_section, records_tables
 from airtruth.reporting.pages.scatter_page import (
     correlation_section,
@@ -35,7 +38,7 @@ from airtruth.reporting.pages.scatter_page import (
 )
 from airtruth.reporting.paper.published import SYMBOLS
 from airtruth.reporting.symbols import LATERAL_SYMBOLS
-from airtruth.table import as_csv, as_latex
+from airtruth.table import as_latex
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,14 +51,18 @@ _SYMBOLS: Final = {**SYMBOLS, **LATERAL_SYMBOLS, "wn_rad_s": r"$\omega_n$"}
 """Symbols of a table that has a column of units."""
 
 
-def estimates_report(title: str, identified: Identified) -> Report:
+def estimates_report(title: str, identified: Sequence[Identified]) -> Report:
     """Return the report of estimates.
 
     Parameters
     ----------
     title : heading.
-    identified : the estimates with their origin.
+    identified : the estimates of each motion with their origin.
     """
+    return report_of(title, {motion_of(one.frame.columns).name: _part(one) for one in identified})
+
+
+def _part(identified: Identified) -> Part:
     frame, histories = identified.frame, identified.histories
     with np.errstate(over="ignore", invalid="ignore"):  # diverged estimates overflow in means
         table = overview(frame, identified.confidence)
@@ -75,7 +82,7 @@ def estimates_report(title: str, identified: Identified) -> Report:
         if stated
         else correlation_section(scattered_correlations(frame), _OVER_RUNS, motion)
     )
-    sections = [
+    sections = (
         records_section(histories, identified.reason, SIMULATED),
         Section("Estimates of all methods", "estimates", data_table(table, "estimates")),
         shift_section,
@@ -84,10 +91,12 @@ def estimates_report(title: str, identified: Identified) -> Report:
         frequency_section(histories),
         Section("Error per record", "errors", records_tables(histories) if histories else ""),
         origin_section(histories, of_methods(identified.records), dict.fromkeys(notes), motion),
-    ]
-    return Report(
-        page=page_of(title, answer_html(*answer_of(frame)), chart, sections),
-        csv=as_csv(table),
+    )
+    return Part(
+        answer=answer_html(*answer_of(frame)),
+        picture=chart,
+        sections=sections,
+        figures=table,
         latex=as_latex(table, "estimates", _SYMBOLS),
         charts=(chart, *shifts, *runs, *correlation, *frequency_charts(histories)),
     )
@@ -106,12 +115,23 @@ def shifts_of(declared: Declared | None, estimates: pd.DataFrame) -> tuple[tuple
 
 
 def identification_report(result: IdentificationResult, aircraft: Aircraft | None = None) -> Report:
-    """Return the report of an identification in memory.
+    """Return the report of an identification in memory, of each motion that it answers.
 
     Parameters
     ----------
-    aircraft : the declared aircraft; None for none.
+    aircraft : the declared aircraft, beside the estimates of the motion whose records are simulated; None for none.
     """
+    every = tuple(result.motions.values())
+    return estimates_report(
+        f"Identification of {result.settings.aircraft}",
+        [
+            _identified(one, aircraft if len(every) == 1 or simulates(one.settings.motion) else None)
+            for one in every
+        ],
+    )
+
+
+def _identified(result: IdentificationResult, aircraft: Aircraft | None) -> Identified:
     stated = result.to_dict()
     record = {
         name: stated[name]
@@ -131,16 +151,15 @@ def identification_report(result: IdentificationResult, aircraft: Aircraft | Non
         rows = declared.before(result.to_frame())
         settings = result.settings
         histories = simulated_records(result.logs, rows, settings.constants, taken=settings.sensors)
-    identified = Identified(
+    return Identified(
         frame=result.to_frame(),
         records=records,
         histories=histories,
         reason="The result holds no logs, so the records are not shown."
-        if result.settings.motion is LONGITUDINAL
+        if simulates(result.settings.motion)
         else NOT_SIMULATED,
         declared=declared,
     )
-    return estimates_report(f"Identification of {result.settings.aircraft}", identified)
 
 
 __all__ = ["estimates_report", "identification_report", "shifts_of"]

@@ -8,18 +8,34 @@ from typing import Final
 
 from scipy.stats import binom, t
 
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import LONGITUDINAL, Motion
+from airtruth.reporting.paper.comparison import together
 from airtruth.reporting.statistics import MethodStatistics, difference
 from airtruth.table import significant
 
 LEVEL: Final = 0.05
 """Level of the tests of the headline [-]."""
-DEFINITION: Final = "RelErr: norm of the mean error of the six derivatives over the norm of the truth."
-"""Meaning of RelErr."""
+
+
+def definition(motion: Motion) -> str:
+    """Meaning of RelErr."""
+    words = (
+        f"RelErr: norm of the mean error of the {together(motion)} derivatives over the norm of the truth."
+    )
+    *others, last = motion.unscored or ("",)
+    return (
+        f"{words} A record does not determine {', '.join(others)} and {last}, which are not counted."
+        if last
+        else words
+    )
 
 
 def headline(
-    statistics: Mapping[str, MethodStatistics], flown: int, planned: int, confidence: float = 0.95
+    statistics: Mapping[str, MethodStatistics],
+    flown: int,
+    planned: int,
+    confidence: float = 0.95,
+    motion: Motion = LONGITUDINAL,
 ) -> list[str]:
     """Sentences of the answer: the comparison of the methods, the intervals that fail, the number of runs.
 
@@ -31,6 +47,7 @@ def headline(
     statistics : method -> its statistics.
     flown, planned : numbers of runs.
     confidence : probability of the intervals [-].
+    motion : whose parameters were estimated.
     """
     known = {m: s for m, s in statistics.items() if math.isfinite(s.relerr.value)}
     runs = f"{flown} of {planned} runs flew."
@@ -39,8 +56,8 @@ def headline(
     ordered = sorted(known, key=lambda m: known[m].relerr.value)
     return [
         _comparison(known, ordered),
-        *_failing(known, confidence),
-        f"{DEFINITION} {runs}",
+        *_failing(known, confidence, motion),
+        f"{definition(motion)} {runs}",
     ]
 
 
@@ -92,15 +109,15 @@ _LARGE_PCT: Final = 100.0
 """RelErr from which three digits are shown [%] (convention)."""
 
 
-def _failing(known: Mapping[str, MethodStatistics], confidence: float) -> Iterator[str]:
+def _failing(known: Mapping[str, MethodStatistics], confidence: float, motion: Motion) -> Iterator[str]:
     """Intervals that hold the truth in too few runs: exact binomial test, Bonferroni over methods and derivatives."""
-    level = LEVEL / (len(known) * len(PARAMETERS))
+    level = LEVEL / (len(known) * len(motion.scored))
     parts = []
     for method, s in known.items():
         used = s.counts.used
         found = []
-        for j, name in enumerate(PARAMETERS):
-            share = float(s.coverage.value[j])
+        for name in motion.scored:
+            share = float(s.coverage.value[motion.index(name)])
             if not math.isfinite(share):
                 continue
             hits = round(share * used)
@@ -115,4 +132,4 @@ def _failing(known: Mapping[str, MethodStatistics], confidence: float) -> Iterat
         )
 
 
-__all__ = ["DEFINITION", "LEVEL", "headline"]
+__all__ = ["LEVEL", "definition", "headline"]

@@ -96,7 +96,7 @@ def read_identified(
     frame, records = read_stored(path, rows)
     motion = motion_of(frame.columns)
     refuse_records(motion, logs, aircraft)
-    if motion is not LONGITUDINAL:
+    if not simulates(motion):
         return Identified(frame, records, None, NOT_SIMULATED)
     if logs is None:
         logs, reason = _beside(path.parent, records)
@@ -118,6 +118,11 @@ def read_identified(
     return Identified(frame, records, histories, declared=declared)
 
 
+def simulates(motion: Motion) -> bool:
+    """Whether a page simulates the records of a motion."""
+    return motion is LONGITUDINAL
+
+
 def refuse_records(motion: Motion, logs: Logs | None, aircraft: Aircraft | None) -> None:
     """Refuse logs and an aircraft for estimates of a motion whose records are not simulated.
 
@@ -127,7 +132,7 @@ def refuse_records(motion: Motion, logs: Logs | None, aircraft: Aircraft | None)
         Naming the option.
     """
     for option, value in (("--log", logs), ("--aircraft", aircraft)):
-        if value is not None and motion is not LONGITUDINAL:
+        if value is not None and not simulates(motion):
             raise ConfigurationError(
                 f"{option} simulates records, which the page of estimates of the {motion.name} motion does not show; leave it out"
             )
@@ -261,4 +266,12 @@ def _disagree(frame: pd.DataFrame, methods: Sequence[str], name: str) -> bool:
     return bool(ends) and max(low for low, _ in ends) > min(high for _, high in ends)
 
 
-__all__ = ["NOT_SIMULATED", "SIMULATED", "Identified", "answer_of", "read_identified", "refuse_records"]
+__all__ = [
+    "NOT_SIMULATED",
+    "SIMULATED",
+    "Identified",
+    "answer_of",
+    "read_identified",
+    "refuse_records",
+    "simulates",
+]

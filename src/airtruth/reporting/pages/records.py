@@ -15,12 +15,13 @@ from airtruth.channels import shown
 from airtruth.charts import colours_of
 from airtruth.charts.model import MODELS
 from airtruth.logs.histories import Histories, History
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS
 from airtruth.physics.proof_of_match import (
     NORMAL_M_S2,
     OF_CHANNEL,
     PITCH_RAD,
+    PROOFS,
     RATE_RAD_S,
-    SOURCE,
     pitch_change,
 )
 from airtruth.reporting.pages.agreement import agreement_of_records, agreement_table
@@ -45,9 +46,9 @@ _QUANTITIES: Final = (
     ("density_kg_m3", "density [kg/m3]", 1.0, 4),
     ("altitude_m", "altitude [m]", 1.0, 0),
     ("trim_alpha_rad", "trim alpha [deg]", DEG, 2),
-    ("trim_elevator_rad", "trim elevator [deg]", DEG, 2),
+    *((f"trim_{c.channel}", f"trim {c.name} [deg]", DEG, 2) for m in MOTIONS.values() for c in m.controls),
     ("mass_kg", "mass [kg]", 1.0, 3),
-    ("inertia_yy_kg_m2", "Iyy [kg m2]", 1.0, 3),
+    *((f"inertia_{axes}_kg_m2", f"I{axes} [kg m2]", 1.0, 3) for axes in ("yy", "xx", "zz", "xz")),
     ("duration_s", "duration [s]", 1.0, 2),
     ("sample_rate_hz", "sample rate [Hz]", 1.0, 1),
 )
@@ -78,8 +79,11 @@ def extract(histories: Histories) -> Extract:
     kept = {round(k) for k in np.linspace(0, len(own) - 1, min(MOST, len(own)))}
     kept |= {own.index(histories.first)}
     records = tuple(own[k] for k in sorted(kept))
-    series = 2 + max(
-        len(r.measured) * (1 + len(r.models) + len(r.innovations)) + (_Q in r.measured) * (1 + len(r.models))
+    series = max(
+        1
+        + len(r.controls_rad)
+        + len(r.measured) * (1 + len(r.models) + len(r.innovations))
+        + (_Q in r.measured) * (1 + len(r.models))
         for r in records
     )
     samples = max(len(r.t_s) for r in records)
@@ -136,13 +140,30 @@ def records_section(histories: Histories | None, reason: str = "", note: str = "
         + notes_html(
             [
                 "Drag over a plot to zoom all of them; a double click shows the whole record.",
-                f"Tolerance of a training simulator ({SOURCE}), dashed in a residual: "
-                f"q within {RATE_RAD_S / DEG:g} deg/s, or pitch within {PITCH_RAD / DEG:g} deg "
-                f"(select it below), and az within {NORMAL_M_S2 / G0:.2f} g of the measurement.",
+                _tolerance_words(chosen.records[0]),
                 *([note] if note else []),
                 *chosen.notes,
             ]
         ),
+    )
+
+
+def _tolerance_words(record: History) -> str:
+    """The tolerances of the motion of a record, as a sentence."""
+    proof = next(
+        (p for p in PROOFS.values() if set(p.tolerances) & set(record.measured)), PROOFS[LONGITUDINAL.name]
+    )
+    if proof.pitch is None:
+        rates = " and ".join(shown(c)[0].split(" ")[0] for c in proof.tolerances)
+        own = next(iter(proof.tolerances.values()))
+        return (
+            f"Tolerance of a training simulator ({proof.source}), dashed in a residual: {rates} within "
+            f"{own.absolute / DEG:g} deg/s, or {100.0 * own.relative:g} % of the measured value."
+        )
+    return (
+        f"Tolerance of a training simulator ({proof.source}), dashed in a residual: "
+        f"q within {RATE_RAD_S / DEG:g} deg/s, or pitch within {PITCH_RAD / DEG:g} deg "
+        f"(select it below), and az within {NORMAL_M_S2 / G0:.2f} g of the measurement."
     )
 
 
@@ -162,8 +183,11 @@ def _data(histories: Histories, chosen: Extract) -> dict[str, object]:
     ranks = {name: k // len(MODELS) for k, name in enumerate(reversed(histories.models))}
     return {
         "first": [r.run_id for r in chosen.records].index(histories.first.run_id),
+        "controls": [shown(c)[0].split(" ")[0] for c in first.controls_rad],
         "channels": [shown(c)[0] for c in first.measured],
-        "tolerances": [OF_CHANNEL.get(c, 0.0) * shown(c)[1] for c in first.measured],
+        "tolerances": [
+            (OF_CHANNEL[c].absolute if c in OF_CHANNEL else 0.0) * shown(c)[1] for c in first.measured
+        ],
         "pitch": {"channel": shown(_Q)[0], "tolerance": PITCH_RAD / DEG},
         "keys": _keys(chosen),
         "models": [
@@ -189,7 +213,7 @@ def _record(record: History, models: tuple[str, ...], step: int) -> dict[str, ob
         "name": record.run_id,
         "words": _words(record),
         "t": encoded(record.t_s),
-        "elevator": encoded(record.elevator_rad, 1.0 / DEG),
+        "controls": [encoded(x, 1.0 / DEG) for x in record.controls_rad.values()],
         "measured": [encoded(record.measured[c], f) for c, f in zip(channels, factors, strict=True)],
         "models": [
             [encoded(record.models[m][c], f) for c, f in zip(channels, factors, strict=True)] for m in models

@@ -11,6 +11,7 @@ from airtruth.charts import as_html as chart_html
 from airtruth.errors import StoreError
 from airtruth.logs.histories import FILE, Histories, read_histories
 from airtruth.logs.provenance import PROVENANCE, Provenance
+from airtruth.physics.motion import MOTIONS
 from airtruth.reporting.pages.frequency_page import frequency_section
 from airtruth.reporting.pages.origin import of_trace, origin_section
 from airtruth.reporting.pages.page import Report, Section, data_table, page_of
@@ -19,7 +20,6 @@ from airtruth.table import Number, Row, Table, as_latex, escaped, flat
 from airtruth.tracing.answer import ANSWER, TraceAnswer
 from airtruth.tracing.presentation.candidates import candidate_table
 from airtruth.tracing.presentation.charts import (
-    COLOURS,
     innovations_chart,
     scores_chart,
     shifts_chart,
@@ -88,8 +88,9 @@ def read_records(folder: Path, cure: str) -> Histories | None:
     if not path.is_file():
         return None
     histories = read_histories(path, cure)
-    if set(histories.first.measured) != set(COLOURS):
-        raise StoreError(f"{path}: does not hold the channels {', '.join(COLOURS)}; {cure}")
+    known = [motion.output_channels for motion in MOTIONS.values()]
+    if not any(set(histories.first.measured) == set(channels) for channels in known):
+        raise StoreError(f"{path}: does not hold the channels {' or '.join(map(', '.join, known))}; {cure}")
     return histories
 
 
@@ -154,7 +155,7 @@ def _shift_table(answer: TraceAnswer) -> Table:
         "upper 95 %",
         "shift [declared std]",
     )
-    return flat("Shifts of the derivatives [1/rad, rates as q c/(2V)]", columns, rows)
+    return flat(f"Shifts of the derivatives [{answer.motion.derivative_units}]", columns, rows)
 
 
 def _sets_table(answer: TraceAnswer) -> Table:

@@ -9,15 +9,22 @@ from typing import Final
 import numpy as np
 
 from airtruth.physics import short_period
+from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.reporting.paper import published
 from airtruth.reporting.paper.published import ESTIMATED, Printed, PublishedColumn
 from airtruth.reporting.statistics import Array, MethodStatistics
 
-SIX: Final = "six"
-"""Name in place of a parameter for statistics of all six derivatives together."""
+_WORDS: Final[Mapping[int, str]] = {6: "six", 12: "twelve", 15: "fifteen"}
+"""Number of derivatives -> word."""
 
 RUNS: Final = ""
 """Name in place of a parameter for statistics of the runs."""
+
+
+def together(motion: Motion) -> str:
+    """Name in place of a parameter for statistics of all scored derivatives together: their number as a word."""
+    return _WORDS[len(motion.scored)]
+
 
 Key = tuple[str, str]
 """Parameter and statistic."""
@@ -55,7 +62,10 @@ def published_figures(
             Printed(rmse, math.hypot(mean.unit * bias, std.unit * std.value) / rmse),
             math.sqrt((2.0 * s2**2 + 4.0 * bias**2 * s2) / runs) / (2.0 * rmse),
         )
-    numbers[SIX, "relerr_pct"] = column.relerr_pct, _relerr_se_pct(column, runs, ours.correlation)
+    numbers[together(LONGITUDINAL), "relerr_pct"] = (
+        column.relerr_pct,
+        _relerr_se_pct(column, runs, ours.correlation),
+    )
     for name, relerr in column.relerr_modal_pct.items():
         se = 100.0 * column.std[name].value / math.sqrt(runs) / truth[name].value
         numbers[name, "relerr_pct"] = relerr, se

@@ -10,10 +10,9 @@ from collections.abc import Iterator
 from typing import Final
 
 from airtruth.errors import counted
-from airtruth.physics import short_period
 from airtruth.reporting.paper import published
-from airtruth.reporting.paper.comparison import RUNS, SIX
-from airtruth.reporting.paper.published import DECIMALS, ESTIMATED
+from airtruth.reporting.paper.comparison import RUNS, together
+from airtruth.reporting.paper.published import DECIMALS
 from airtruth.reporting.paper.tables import PRINTED_STATISTICS, THRESHOLD, TRUTH, Entry, PaperTable
 from airtruth.table import MISSING, Cell, Group, Number, Pair, Row, Table
 
@@ -36,6 +35,10 @@ OUTLIERS: Final = 1.5
 """Ratio of standard deviation to scaled median absolute deviation above which the table shows medians as well [-];
 measured: 0.6 % of
 normal samples of 50 runs and 0.03 % of 100 runs exceed it."""
+
+
+_DIGITS: Final = 4
+"""Digits of a parameter that the paper does not print, counted from the first of the truth [-] (those of most of its figures)."""
 
 
 def lay_out(table: PaperTable) -> Table:
@@ -61,8 +64,8 @@ def lay_out(table: PaperTable) -> Table:
 
 
 def _estimates(table: PaperTable) -> Iterator[Row]:
-    for name in ESTIMATED:
-        d = DECIMALS[name]
+    for name in table.spec.motion.estimated:
+        d = _decimals(table, name)
         true = table.entries[TRUTH, name, "true"]
         pairs = [(table.entries[m, name, "mean"], table.entries[m, name, "std"]) for m in table.methods]
         yield name, Number(true.value, d), *(Pair(_ours(a, d), _ours(b, d)) for a, b in pairs)
@@ -72,42 +75,50 @@ def _estimates(table: PaperTable) -> Iterator[Row]:
 
 
 def _relative_errors(table: PaperTable) -> Iterator[Row]:
+    every = together(table.spec.motion)
     for parameter, statistic, label, decimals in (
-        (SIX, "relerr_pct", "six", 2),
-        (SIX, "relerr_ratio", f"/ {table.spec.reference}", 2),
-        ("wn_rad_s", "relerr_pct", "wn_rad_s", 2),
-        ("zeta", "relerr_pct", "zeta", 2),
+        (every, "relerr_pct", every, 2),
+        (every, "relerr_ratio", f"/ {table.spec.reference}", 2),
+        *((name, "relerr_pct", name, 2) for name in table.spec.motion.modal),
     ):
         yield from _beside(table, parameter, statistic, label, decimals)
-        if statistic == "relerr_pct" and parameter == SIX:
-            floors = (table.entries[m, SIX, "relerr_floor_pct"] for m in table.methods)
+        if statistic == "relerr_pct" and parameter == every:
+            floors = (table.entries[m, every, "relerr_floor_pct"] for m in table.methods)
             yield "  if unbiased", "", *(Number(e.value, 2) for e in floors)
 
 
 def _rmse(table: PaperTable) -> Iterator[Row]:
-    for name in ESTIMATED:
-        yield from _beside(table, name, "rmse", name, DECIMALS[name])
+    for name in table.spec.motion.estimated:
+        yield from _beside(table, name, "rmse", name, _decimals(table, name))
+
+
+def _decimals(table: PaperTable, name: str) -> int:
+    """Decimals of a parameter: those of the paper's truth, or those that show `_DIGITS` digits of the truth."""
+    if name in DECIMALS:
+        return DECIMALS[name]
+    size = abs(table.entries[TRUTH, name, "true"].value)
+    return max(0, _DIGITS - 1 - math.floor(math.log10(size))) if math.isfinite(size) and size else _DIGITS
 
 
 def _rmse_ratios(table: PaperTable) -> Iterator[Row]:
     """RMSE of each method over that of the reference, if the table has methods beyond the paper."""
     if table.spec.reference not in table.methods or set(table.methods).isdisjoint(table.spec.further):
         return
-    for name in ESTIMATED:
+    for name in table.spec.motion.estimated:
         own = table.entries[table.spec.reference, name, "rmse"].value
         yield name, "", *(Number(table.entries[m, name, "rmse"].value / own, 2) for m in table.methods)
 
 
 def _coverage(table: PaperTable) -> Iterator[Row]:
-    for name in ESTIMATED:
+    for name in table.spec.motion.estimated:
         cells = [table.entries[m, name, "coverage_pct"] for m in table.methods]
         if any(math.isfinite(e.value) for e in cells):
             yield name, "", *(Pair(Number(e.value, 1), Number(e.se, 1)) for e in cells)
 
 
 def _medians(table: PaperTable) -> Iterator[Row]:
-    for name in ESTIMATED:
-        d = DECIMALS[name]
+    for name in table.spec.motion.estimated:
+        d = _decimals(table, name)
         pairs = [(table.entries[m, name, "median"], table.entries[m, name, "mad"]) for m in table.methods]
         yield name, "", *(Pair(Number(a.value, d), Number(b.value, d)) for a, b in pairs)
 
@@ -158,9 +169,9 @@ def _printed_pair(first: Entry, second: Entry) -> Cell:
 
 def _medians_matter(table: PaperTable) -> bool:
     """Whether a method has outliers, or finite estimates that did not converge."""
-    six = slice(len(short_period.PARAMETERS))
+    derivatives = slice(len(table.spec.motion.parameters))
     return any(
-        s.counts.not_converged > 0 or bool((s.std.value / OUTLIERS > s.mad)[six].any())
+        s.counts.not_converged > 0 or bool((s.std.value / OUTLIERS > s.mad)[derivatives].any())
         for s in table.statistics.values()
     )
 
@@ -169,9 +180,15 @@ def _notes(table: PaperTable) -> Iterator[str]:
     yield (
         "Mean (standard deviation), RMSE and RelErr are over the used runs: those that flew and converged. "
         "Standard errors are Monte Carlo ones, that of the standard deviation from the fourth moment. "
-        "RelErr = ||mean - truth||/||truth|| over the six derivatives; 'if unbiased': its root mean "
+        f"RelErr = ||mean - truth||/||truth|| over the {together(table.spec.motion)} derivatives; 'if unbiased': its root mean "
         "square for an estimator of this spread without any bias."
     )
+    *others, last = table.spec.motion.unscored or ("",)
+    if last:
+        yield (
+            f"RelErr leaves out {', '.join(others)} and {last}, which a record does not determine: most of their mean, standard "
+            "deviation and root mean square error is noise."
+        )
     gust = table.campaign.gust
     yield f"Campaign: {table.campaign.title}" + (f"; gust: {gust}." if gust else ".")
     if table.spec.published:
@@ -205,7 +222,11 @@ def _published_notes(table: PaperTable) -> Iterator[str]:
         f"rounding of its digits). {differing} of {len(compared)} printed figures differ; "
         f"{CHANCE * len(compared):.1f} would by chance."
     )
-    ranked = [table.entries[m, SIX, "relerr_pct"] for m in table.methods if printed.column(m)]
+    ranked = [
+        table.entries[m, together(table.spec.motion), "relerr_pct"]
+        for m in table.methods
+        if printed.column(m)
+    ]
     ours = sorted((e for e in ranked if math.isfinite(e.value)), key=lambda e: e.value)
     theirs = sorted(ranked, key=lambda e: e.published.value if e.published else math.inf)
     yield (

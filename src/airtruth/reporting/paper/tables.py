@@ -1,4 +1,4 @@
-"""The paper's Tables 1-3 from flown campaigns, each number beside the published one.
+"""The paper's Tables 1-3 from flown campaigns, each number beside the published one, and tables of further campaigns.
 
 `TableSpec` describes a table; `evaluate` computes its numbers from a campaign.
 """
@@ -12,11 +12,12 @@ from typing import Final
 
 import numpy as np
 
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 from airtruth.reporting import partial, statistics
 from airtruth.reporting.campaign import Parted, average_truth
 from airtruth.reporting.paper import comparison, published
-from airtruth.reporting.paper.comparison import RUNS, SIX
-from airtruth.reporting.paper.published import ESTIMATED, Printed
+from airtruth.reporting.paper.comparison import RUNS, together
+from airtruth.reporting.paper.published import Printed
 from airtruth.reporting.statistics import MethodStatistics
 from airtruth.table import Table, flat
 
@@ -61,6 +62,7 @@ class TableSpec:
     columns : methods in order; a method without estimates is omitted and named in a note.
     reference : method by whose RelErr the others are divided.
     further : methods beyond the paper, appended as columns if the campaign has estimates of them.
+    motion : whose parameters are its rows.
     """
 
     name: str
@@ -70,6 +72,7 @@ class TableSpec:
     columns: tuple[str, ...]
     reference: str
     further: tuple[str, ...] = ()
+    motion: Motion = LONGITUDINAL
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -173,23 +176,29 @@ TABLES: Final[Mapping[str, TableSpec]] = {
 }
 """The paper's tables by name."""
 
+_REFERENCE: Final[Mapping[str, str]] = {LONGITUDINAL.name: "iv-f1", LATERAL.name: "iv-lowpass"}
+"""Motion -> method by which `airtruth identify` estimates without a choice."""
+
 
 def all_methods(campaign: Parted) -> TableSpec:
     """Return the description of a table of every method of a campaign, without published numbers."""
-    methods = campaign.methods
+    methods, motion = campaign.methods, campaign.motion
+    longitudinal, reference = motion is LONGITUDINAL, _REFERENCE[motion.name]
     return TableSpec(
-        name=f"methods-{campaign.name}",
-        title="All methods",
+        name=f"{'methods' if longitudinal else motion.name}-{campaign.name}",
+        title="All methods" if longitudinal else f"{motion.heading}, all methods",
         campaign=campaign.name,
         published=None,
         columns=methods,
-        reference="iv-f1" if "iv-f1" in methods else methods[0],
+        reference=reference if reference in methods else methods[0],
+        motion=motion,
     )
 
 
 def shows(spec: TableSpec, campaign: Parted) -> bool:
-    """Return whether a table shows a campaign: the one that it names, or a variant "NAME-..." of it."""
-    return campaign.name == spec.campaign or campaign.name.startswith(spec.campaign + "-")
+    """Return whether a table shows a campaign: the one that it names, or a variant "NAME-..." of it, and its motion."""
+    named = campaign.name == spec.campaign or campaign.name.startswith(spec.campaign + "-")
+    return named and campaign.motion is spec.motion
 
 
 def methods_of(campaign: str) -> tuple[str, ...]:
@@ -221,10 +230,11 @@ def evaluate(
     known = statistics_of(campaign) if known is None else known
     stats = {m: known[m] for m in methods}
     entries = list(_truth(campaign, spec.published is not None))
+    every = together(spec.motion)
     for method in methods:
-        numbers = dict(_numbers(stats[method]))
+        numbers = dict(_numbers(stats[method], spec.motion))
         if spec.reference in stats and method != spec.reference:
-            numbers[SIX, "relerr_ratio"] = _ratio(stats, method, spec.reference)
+            numbers[every, "relerr_ratio"] = _ratio(stats, method, spec.reference)
         beside = _beside(spec, method, stats)
         entries += [
             Entry(method, parameter, statistic, value, se, *beside.get((parameter, statistic), ()))
@@ -264,13 +274,14 @@ def long_form(table: PaperTable) -> Table:
 
 def _truth(campaign: Parted, with_published: bool) -> Iterator[Entry]:
     printed = published.load().truth
-    for name, value in zip(ESTIMATED, average_truth(campaign), strict=True):
+    for name, value in zip(campaign.motion.estimated, average_truth(campaign), strict=True):
         # a true value has no Monte Carlo error and is therefore not compared
         yield Entry(TRUTH, name, "true", float(value), published=printed[name] if with_published else None)
 
 
-def _numbers(s: MethodStatistics) -> Iterator[tuple[comparison.Key, tuple[float, float]]]:
-    for j, name in enumerate(ESTIMATED):
+def _numbers(s: MethodStatistics, motion: Motion) -> Iterator[tuple[comparison.Key, tuple[float, float]]]:
+    every = together(motion)
+    for j, name in enumerate(motion.estimated):
         for statistic, estimate, unit in (
             ("mean", s.mean, 1.0),
             ("std", s.std, 1.0),
@@ -280,9 +291,9 @@ def _numbers(s: MethodStatistics) -> Iterator[tuple[comparison.Key, tuple[float,
             yield (name, statistic), (unit * float(estimate.value[j]), unit * float(estimate.se[j]))
         yield (name, "median"), (float(s.median[j]), math.nan)
         yield (name, "mad"), (float(s.mad[j]), math.nan)
-    yield (SIX, "relerr_pct"), (100.0 * s.relerr.value, 100.0 * s.relerr.se)
-    yield (SIX, "relerr_floor_pct"), (100.0 * s.relerr.floor, math.nan)
-    for j, name in enumerate(ESTIMATED[-2:]):
+    yield (every, "relerr_pct"), (100.0 * s.relerr.value, 100.0 * s.relerr.se)
+    yield (every, "relerr_floor_pct"), (100.0 * s.relerr.floor, math.nan)
+    for j, name in enumerate(motion.modal):
         relerr = s.relerr_modal
         yield (name, "relerr_pct"), (100.0 * float(relerr.value[j]), 100.0 * float(relerr.se[j]))
     yield (RUNS, "iterations"), (float(s.iterations.value), float(s.iterations.se))
@@ -318,7 +329,7 @@ def _beside(spec: TableSpec, method: str, stats: Mapping[str, MethodStatistics])
     reference = table.column(spec.reference)
     if reference and spec.reference in stats:
         own, other, common = _products(stats, method, spec.reference)
-        beside[SIX, "relerr_ratio"] = comparison.published_ratio(
+        beside[together(spec.motion), "relerr_ratio"] = comparison.published_ratio(
             column,
             reference,
             table.runs,

@@ -247,7 +247,12 @@ def lateral_of(bench: Bench) -> tuple[LateralProperties | None, list[str]]:
     off = max(abs(r.v_dot_m_s2), abs(r.p_dot_rad_s2), abs(r.r_dot_rad_s2))
     if off <= _STRAIGHT:
         return None, []
-    found = LateralProperties()
+    commands = {
+        name: surface.command
+        for name, surface in (("aileron", bench.model.aileron), ("rudder", bench.model.rudder))
+        if surface is not None
+    }
+    found = LateralProperties(**commands)
     effects = [
         np.array(
             [

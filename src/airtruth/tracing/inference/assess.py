@@ -19,13 +19,7 @@ from airtruth.tracing.inference.posterior import TraceProblem, likelihood_terms,
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.compile import CompiledChange
 from airtruth.tracing.model.linearise import process_intensity
-from airtruth.tracing.model.parameters import (
-    CORE,
-    GUST_1,
-    LEAD,
-    OUTPUTS,
-    Parameters,
-)
+from airtruth.tracing.model.parameters import LEAD_COUNT, Parameters, core_of
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.response import Response, filter_inputs, kernel_input, respond, respond_to
 from airtruth.tracing.model.settings import GUST_COVARIANCE, Settings, initial_per_record, per_record_prior
@@ -62,9 +56,9 @@ class Assessment:
     Attributes
     ----------
     likelihood : negative log-likelihood, own parameters at their best.
-    innovation, free_run : (3,) root mean squares [units of the channels].
-    residual : (samples, 3) of the free run [same units]; whitened : (samples, 3) innovations [-].
-    expected : (3,) root mean squares of innovations that are gusts and noise alone.
+    innovation, free_run : (outputs,) root mean squares [units of the channels].
+    residual : (samples, outputs) of the free run [same units]; whitened : (samples, outputs) innovations [-].
+    expected : (outputs,) root mean squares of innovations that are gusts and noise alone.
     per_record : (per-record,) own parameters.
     """
 
@@ -168,7 +162,7 @@ class _OwnSearch:
         return [self._evaluate(row) for row in x]
 
     def _evaluate(self, own: Array) -> _OwnEvaluated | None:
-        point = Parameters(self.common, own[None, :], self.sizes)
+        point = Parameters(self.common, own[None, :], self.sizes, self.problem.layout)
         at = sensitivities_of(self.problem, 0, self.hypothesis, point, per_record_only=True)
         if at is None:
             return None
@@ -218,7 +212,7 @@ def free_run(
     per_record: Array,
     unconstrained: Sequence[int] = (),
 ) -> Array:
-    """(samples, 3) residuals of a simulation, initial state, biases and trim coefficients at their best.
+    """(samples, outputs) residuals of a simulation, initial state, biases and trim coefficients at their best.
 
     Least squares with the channels weighted by `noise_floor`.
 
@@ -262,7 +256,7 @@ def _free_run_slopes(
     own: Array,
     weight: Array,
 ) -> tuple[Array, Array]:
-    """Residual of a free run (samples, 3) and its weighted derivatives (own parameters but the gusts, samples * 3)."""
+    """Residual of a free run (samples, outputs) and its weighted derivatives (own parameters but gusts, samples * outputs)."""
     given = filter_inputs(record, compiled)
     residual = respond_to(given, settings, common, own, free_run=True).e
     columns, entries = [], settings.layout.per_record
@@ -277,7 +271,7 @@ def _free_run_slopes(
 def noise_floor(
     record: TraceRecord, settings: Settings, compiled: CompiledChange, common: Array, per_record: Array
 ) -> Array:
-    """What gusts and sensors contribute to a free run to which nothing is fitted: (3,) standard deviations."""
+    """What gusts and sensors contribute to a free run to which nothing is fitted: (outputs,) standard deviations."""
     linear = _linear_model(record, settings, compiled, common, per_record)
     if np.linalg.eigvals(linear.a).real.max() >= 0.0:
         return np.asarray(_UNSTABLE * np.sqrt(linear.variance))
@@ -295,10 +289,10 @@ def fitted_noise_floor(
     seed: int,
     unconstrained: Sequence[int] = (),
 ) -> Array:
-    """What gusts and sensors leave of a free run once initial state, biases and trim are fitted to it: (3,) rms.
+    """What gusts and sensors leave of a free run once initial state, biases and trim are fitted to it: (outputs,) rms.
 
     The mean over `_DRAWS` records of the linear model in its gusts, treated as `free_run` treats the measured one. An
-    angle of attack that no vane measured has the noise that the settings state of a vane.
+    output that no instrument measured has the noise that the settings state of a vane.
 
     Parameters
     ----------
@@ -307,7 +301,7 @@ def fitted_noise_floor(
     """
     linear = _linear_model(record, settings, compiled, common, per_record)
     seen = linear._replace(variance=np.where(settings.measured, linear.variance, settings.noise**2))
-    y = _gust_records(record, seen, seed)
+    y = _gust_records(record, seen, len(settings.layout.motion.states), seed)
     samples = record.samples
     weight = 1.0 / noise_floor(record, settings, compiled, common, per_record)
     t = _free_run_slopes(record, settings, compiled, common, per_record, weight)[1]
@@ -315,7 +309,7 @@ def fitted_noise_floor(
     prior = np.diag(np.diag(per_record_prior(record, settings, unconstrained)[1])[free])
     flat = (y * weight[:, None]).reshape(-1, _DRAWS)
     left = flat - t.T @ np.linalg.solve(t @ t.T + prior, t @ flat)
-    return np.asarray(np.sqrt((left.reshape(samples, OUTPUTS, _DRAWS) ** 2).mean(axis=(0, 2))) / weight)
+    return np.asarray(np.sqrt((left.reshape(samples, -1, _DRAWS) ** 2).mean(axis=(0, 2))) / weight)
 
 
 class _LinearModel(NamedTuple):
@@ -323,7 +317,7 @@ class _LinearModel(NamedTuple):
 
     Attributes
     ----------
-    a, c : (n, n) and (3, n); process : (n,) intensities [1/s]; variance : (3,) of the white noise.
+    a, c : (n, n) and (outputs, n); process : (n,) intensities [1/s]; variance : (outputs,) of the white noise.
     noise : first state of the sensors' correlated noise; -1 for none.
     """
 
@@ -334,8 +328,8 @@ class _LinearModel(NamedTuple):
     noise: int
 
 
-def _gust_records(record: TraceRecord, linear: _LinearModel, seed: int) -> Array:
-    """Outputs (samples, 3, draws) of the linear model in gusts, with noise."""
+def _gust_records(record: TraceRecord, linear: _LinearModel, states: int, seed: int) -> Array:
+    """Outputs (samples, outputs, draws) of the linear model in gusts, with noise; ``states``: number of those of the motion."""
     n, samples = linear.a.shape[0], record.samples
     phi, spread = np.empty((n, n)), np.empty((n, n))
     early, late = np.empty((n, 1)), np.empty((n, 1))
@@ -345,11 +339,11 @@ def _gust_records(record: TraceRecord, linear: _LinearModel, seed: int) -> Array
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     rng = np.random.default_rng([seed, samples])
     x = np.zeros((n, _DRAWS))
-    x[GUST_1 : GUST_1 + 2] = np.linalg.cholesky(GUST_COVARIANCE) @ rng.standard_normal((2, _DRAWS))
-    x[LEAD:CORE] = x[GUST_1]
+    x[states : states + 2] = np.linalg.cholesky(GUST_COVARIANCE) @ rng.standard_normal((2, _DRAWS))
+    x[core_of(states) - LEAD_COUNT : core_of(states)] = x[states]
     if linear.noise >= 0:
-        x[linear.noise :] = rng.standard_normal((OUTPUTS, _DRAWS))
-    y = np.empty((samples, OUTPUTS, _DRAWS))
+        x[linear.noise :] = rng.standard_normal((len(linear.c), _DRAWS))
+    y = np.empty((samples, len(linear.c), _DRAWS))
     for k in range(samples):
         y[k] = linear.c @ x
         x = phi @ x + root @ rng.standard_normal((n, _DRAWS))
@@ -363,7 +357,7 @@ def _linear_model(
     """The filter's linearisation about the record's mean."""
     kernel = kernel_input(filter_inputs(record, compiled), settings, common, per_record)
     n = kernel.model.states.size
-    a, c = np.empty((n, n)), np.empty((OUTPUTS, n))
+    a, c = np.empty((n, n)), np.empty((len(settings.noise), n))
     linearise_at_reference(kernel, a, c)
     process = process_intensity(kernel.reference.airspeed_m_s, kernel.model)
     return _LinearModel(a, c, process, kernel.model.sensors.variance, kernel.model.states.noise)

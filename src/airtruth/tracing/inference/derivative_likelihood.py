@@ -1,4 +1,4 @@
-"""The six derivatives: their likelihood without what is declared, and whether the records contradict the declaration.
+"""The derivatives: their likelihood without what is declared, and whether the records contradict the declaration.
 
 The posterior of a fit is normal in the increments d of the derivatives, with precision C^-1 = I + L: the information I
 of the records, all other parameters eliminated, and the precision L of what is declared. The likelihood alone is
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import inflation, scatter
 
@@ -29,20 +30,22 @@ mode does not move in the others, and the linear theory of a small share is inac
 
 @dataclass(frozen=True)
 class DerivativeLikelihood:
-    """Likelihood of the increments of the six derivatives, normal, all other parameters eliminated.
+    """Likelihood of the increments of the derivatives, normal, all other parameters eliminated.
 
     Attributes
     ----------
-    information : (6, 6), divided by the square of the robust over the plain standard deviation.
-    vector : (6,) slope of the log-likelihood at no increment.
+    information : (derivatives, derivatives), divided by the square of the robust over the plain standard deviation.
+    vector : (derivatives,) slope of the log-likelihood at no increment.
     cost : negative log-likelihood at no increment, by the quadratic, with the priors of all other parameters.
-    declared : (6, 6) covariance of the increments by what is declared.
+    declared : (derivatives, derivatives) covariance of the increments by what is declared.
+    motion : whose derivatives they are.
     """
 
     information: Array
     vector: Array
     cost: float
     declared: Array
+    motion: Motion = LONGITUDINAL
 
 
 @dataclass(frozen=True)
@@ -81,6 +84,7 @@ def derivative_likelihood(
         vector=vector,
         cost=own + float(vector @ mode - 0.5 * mode @ wide @ mode),
         declared=problem.declared_covariance,
+        motion=problem.layout.motion,
     )
 
 
@@ -125,7 +129,7 @@ def _split(problem: TraceProblem, fitted: PosteriorFit) -> tuple[Array, Array]:
 
 
 def _ratio(problem: TraceProblem, fitted: PosteriorFit) -> Array:
-    """(6,) robust over plain standard deviations of the derivatives."""
+    """(derivatives,) robust over plain standard deviations of the derivatives."""
     own = problem.layout.common.derivatives
     return np.maximum(inflation(problem, fitted)[own], scatter(problem, fitted)[own])
 

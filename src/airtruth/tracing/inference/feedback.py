@@ -1,8 +1,8 @@
-"""Feedback from the motion to the elevator: a damper, an autopilot or a pilot.
+"""Feedback from the motion to a control surface: a damper, an autopilot or a pilot.
 
 Innovations of a filter that is right are white and independent of what was measured before, in open and in closed loop, so
-that the likelihood needs no such test. A free run is another matter: where the elevator answers the gusts, the recorded
-elevator is correlated with them, and the free run of a false model may come closer to the record than that of the true one
+that the likelihood needs no such test. A free run is another matter: where a surface answers the gusts, the recorded
+surface is correlated with them, and the free run of a false model may come closer to the record than that of the true one
 (L. Ljung, System Identification, 2nd ed. (1999), section 13.4). The test is that of C. W. J. Granger, Econometrica 37 (1969)
 424-438: the next deflection is regressed on its own past, and on the last innovations besides.
 """
@@ -29,22 +29,27 @@ _LEAST_RAD: Final = 1e-7
 """Standard deviation of the deflection about its own past below which nothing but the command moves it [rad] (judgement: far
 below the resolution of a sensor)."""
 _LEVEL: Final = 1e-6
-"""Probability below which the elevator responds to the motion [-] (judgement: no verdict rests on the test alone)."""
+"""Probability below which a surface responds to the motion [-] (judgement: no verdict rests on the test alone)."""
 _NORMAL: Final = 1.4826
 """Standard deviation over the median of the absolute deviation, of a normal distribution [-]."""
 
 
-def responds_to_motion(elevator_rad: Sequence[Array], whitened: Sequence[Array]) -> bool:
-    """Whether the elevator of records responds to their innovations.
+def responds_to_motion(controls_rad: Sequence[Array], whitened: Sequence[Array]) -> bool:
+    """Whether a control of records responds to their innovations.
 
     Parameters
     ----------
-    elevator_rad : (samples,) of each record [rad].
+    controls_rad : (controls, samples) of each record [rad].
     whitened : (samples, channels) innovations of each [-]; records with a NaN are left out.
     """
+    return any(_responds(control, whitened) for control in zip(*controls_rad, strict=True))
+
+
+def _responds(surface_rad: Sequence[Array], whitened: Sequence[Array]) -> bool:
+    """Whether one control (samples,) of each record [rad] responds."""
     parts = [
         _regression(de - de.mean(), e)
-        for de, e in zip(elevator_rad, whitened, strict=True)
+        for de, e in zip(surface_rad, whitened, strict=True)
         if np.isfinite(e).all() and len(de) > _OWN_PAST + _INNOVATIONS
     ]
     if not parts:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect, Parameter
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.terms import AeroTerm, Change
 from airtruth.tracing.model.compile import CompiledChange, compile_change
 
@@ -30,17 +30,19 @@ class Hypothesis:
     effects : the effects; none is the null hypothesis.
     also_unconstrained : indices of derivatives that the declaration does not constrain, besides those of the effects
         (`unconstrained_by`).
-    trim_alpha_rad : angle of attack about which a curvature is counted [rad]. About any other angle it is a slope and a
+    trim_flow_rad : flow angle of the motion about which a curvature is counted [rad]. About any other angle it is a slope and a
         constant besides, which only the records can determine.
-    spread : (6, 6) covariance of the increments of the derivatives beyond the declared one, where the records
+    spread : (derivatives, derivatives) covariance of the increments of the derivatives beyond the declared one, where the records
         contradict the declared derivatives; None where they do not.
+    motion : the motion of the records.
     """
 
     declared: Change
     effects: tuple[Effect, ...] = ()
     also_unconstrained: tuple[int, ...] = ()
-    trim_alpha_rad: float = 0.0
+    trim_flow_rad: float = 0.0
     spread: Array | None = field(default=None, compare=False)
+    motion: Motion = LONGITUDINAL
     _compiled: dict[bytes, CompiledChange] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
@@ -48,7 +50,7 @@ class Hypothesis:
     @cached_property
     def unconstrained(self) -> tuple[int, ...]:
         """Indices of the derivatives that the declaration does not constrain; nor does it their coefficient at trim."""
-        free = (i for e in self.effects for i in unconstrained_by(e, self.trim_alpha_rad))
+        free = (i for e in self.effects for i in unconstrained_by(e, self.trim_flow_rad, self.motion))
         return tuple(sorted({*self.also_unconstrained, *free}))
 
     @cached_property
@@ -104,7 +106,7 @@ class Hypothesis:
         return replace(total, aero=tuple(self._about_trim(t) for t in total.aero))
 
     def _about_trim(self, term: AeroTerm) -> AeroTerm:
-        return replace(term, at=self.trim_alpha_rad) if _is_quadratic(term) else term
+        return replace(term, at=self.trim_flow_rad) if _is_quadratic(term, self.motion) else term
 
     @cached_property
     def fixed(self) -> tuple[int, ...]:
@@ -128,29 +130,29 @@ class Hypothesis:
         return replace(self, effects=(*self.effects, effect))
 
 
-def unconstrained_by(effect: Effect, trim_alpha_rad: float) -> tuple[int, ...]:
+def unconstrained_by(effect: Effect, trim_flow_rad: float, motion: Motion) -> tuple[int, ...]:
     """Indices of the derivatives that the declaration cannot constrain beside an effect.
 
-    A curvature about an angle of attack other than the trim's is a slope and a constant at the trim besides. They
+    A curvature about a flow angle other than the trim's is a slope and a constant at the trim besides. They
     cannot be declared and present in addition, so that the records have to determine them.
     """
-    bent = {t.coefficient for t in _curved(effect) if t.at != trim_alpha_rad}
-    return tuple(LONGITUDINAL.at(c.name, "alpha") for c in LONGITUDINAL.coefficients if c.name in bent)
+    bent = {t.coefficient for t in _curved(effect, motion) if t.at != trim_flow_rad}
+    return tuple(motion.at(c.name, motion.flow) for c in motion.coefficients if c.name in bent)
 
 
-def is_curvature(effect: Effect) -> bool:
-    """Whether an effect is a quadratic function of the angle of attack."""
-    return bool(_curved(effect))
+def is_curvature(effect: Effect, motion: Motion) -> bool:
+    """Whether an effect is a quadratic function of the flow angle."""
+    return bool(_curved(effect, motion))
 
 
-def _curved(effect: Effect) -> list[AeroTerm]:
-    """Its terms that are quadratic in the angle of attack."""
+def _curved(effect: Effect, motion: Motion) -> list[AeroTerm]:
+    """Its terms that are quadratic in the flow angle."""
     change = effect.change({p.name: p.high for p in effect.parameters})
-    return [t for t in change.aero if _is_quadratic(t)]
+    return [t for t in change.aero if _is_quadratic(t, motion)]
 
 
-def _is_quadratic(term: AeroTerm) -> bool:
-    return term.signal == "alpha" and term.shape == "quadratic" and not term.factor
+def _is_quadratic(term: AeroTerm, motion: Motion) -> bool:
+    return term.signal == motion.flow and term.shape == "quadratic" and not term.factor
 
 
 __all__ = ["Hypothesis", "is_curvature", "unconstrained_by"]

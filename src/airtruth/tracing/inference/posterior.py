@@ -80,12 +80,12 @@ class TraceProblem:
 
     @property
     def declared_derivatives(self) -> Array:
-        """(6,) declared derivatives, averaged over the records' flight conditions [-]."""
+        """(derivatives,) declared, averaged over the records' flight conditions [-]."""
         return declared_derivatives_of(self.records)
 
     @property
     def declared_covariance(self) -> Array:
-        """(6, 6) covariance of the increments of the derivatives, averaged likewise [-]."""
+        """(derivatives, derivatives) covariance of the increments of the derivatives, averaged likewise [-]."""
         return declared_covariance_of(self.records)
 
     @property
@@ -143,7 +143,7 @@ class PosteriorFit:
 
     @property
     def innovations(self) -> list[Array]:
-        """(samples, 3) whitened innovations of each record."""
+        """(samples, outputs) whitened innovations of each record."""
         return [s.r for s in self.sensitivities]
 
     @property

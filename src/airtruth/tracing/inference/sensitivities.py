@@ -8,7 +8,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.tracing.model.parameters import OUTPUTS
 from airtruth.tracing.model.response import Response
 from airtruth.tracing.model.response_slopes import ResponseSlopes
 
@@ -25,11 +24,11 @@ class Sensitivities:
 
     Attributes
     ----------
-    r : (samples, 3) whitened innovations.
+    r : (samples, outputs) whitened innovations.
     logdet : mean of log|S| over the samples.
-    t : (parameters, samples, 3) derivatives of the whitened innovations at fixed whitener; parameters as in `Layout`.
-    w : (parameters, 3, 3) whitened derivatives of S.
-    white : (3, 3) whitener.
+    t : (parameters, samples, outputs) derivatives of the whitened innovations at fixed whitener; parameters as in `Layout`.
+    w : (parameters, outputs, outputs) whitened derivatives of S.
+    white : (outputs, outputs) whitener.
     more : (parameters,) derivatives of the sum of log|S| beyond the steady one, by an uncertain surface; or a zero.
     """
 
@@ -47,7 +46,7 @@ class Derivatives:
     def __init__(self, base: Response, parameters: int) -> None:
         self.base = base
         self.t = np.zeros((parameters, *base.e.shape))
-        self.w = np.zeros((parameters, OUTPUTS, OUTPUTS))
+        self.w = np.zeros((parameters, *base.covariance.shape))
         self.more = np.zeros(parameters)
 
     def put(self, index: int, moved: Response, h: float) -> None:

@@ -13,8 +13,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.tracing.model.parameters import OUTPUTS
-
 Array = NDArray[np.float64]
 
 _UNRESOLVED: Final = 0.5
@@ -30,8 +28,9 @@ class Whitener:
 
     Attributes
     ----------
-    coefficients : (order, 3, 3); root : (3, 3).
-    start : (3, 3) inverse root of the covariance of the innovations themselves, for the first samples, which have no past.
+    coefficients : (order, outputs, outputs); root : (outputs, outputs).
+    start : (outputs, outputs) inverse root of the covariance of the innovations themselves, for the first samples, which have
+        no past.
     """
 
     coefficients: Array
@@ -44,7 +43,7 @@ class Whitener:
         return int(self.coefficients.shape[0])
 
     def apply(self, x: Array) -> Array:
-        """Filter (..., samples, 3) along the samples.
+        """Filter (..., samples, outputs) along the samples.
 
         The first ones are no residuals of the autoregression. A smooth record has residuals far smaller than its innovations, and
         the first samples would outweigh all others if they were divided by them.
@@ -59,12 +58,12 @@ class Whitener:
         return np.asarray(out)
 
 
-NO_WHITENER: Final = Whitener(np.zeros((0, OUTPUTS, OUTPUTS)), np.eye(OUTPUTS), np.eye(OUTPUTS))
+NO_WHITENER: Final = Whitener(np.zeros((0, 0, 0)), np.eye(0), np.eye(0))
 """Leaves innovations as they are."""
 
 
 def autoregression(innovations: Sequence[Array]) -> Whitener:
-    """Vector autoregression of the whitened innovations (samples, 3) of all records, order by Schwarz's criterion.
+    """Vector autoregression of the whitened innovations (samples, outputs) of all records, order by Schwarz's criterion.
 
     Innovations far smaller than their stated covariance count with the white noise that they lack: a model does not know
     more than it resolves, however smooth its residual is.
@@ -74,25 +73,26 @@ def autoregression(innovations: Sequence[Array]) -> Whitener:
     square = np.mean(y**2, axis=0)
     lacking = np.where(square < _UNRESOLVED, 1.0 - square, 0.0)
     start = np.linalg.inv(np.linalg.cholesky(y.T @ y / total + np.diag(lacking)))
+    outputs = y.shape[1]
     best, least = NO_WHITENER, np.inf
     for order in range(_ORDERS + 1):
         x = np.concatenate([_lagged(r, order) for r in innovations])
         more = np.diag(total * np.tile(lacking, order))
-        b = np.linalg.solve(x.T @ x + more, x.T @ y) if order else np.zeros((0, OUTPUTS))
+        b = np.linalg.solve(x.T @ x + more, x.T @ y) if order else np.zeros((0, outputs))
         residual = y - x @ b
         sigma = (residual.T @ residual + b.T @ more @ b) / total + np.diag(lacking)
-        parameters = OUTPUTS * OUTPUTS * order
+        parameters = outputs * outputs * order
         criterion = total * float(np.linalg.slogdet(sigma)[1]) + np.log(total) * parameters
         if criterion < least:
             least, best = criterion, NO_WHITENER
             if order:
-                a = np.ascontiguousarray(b.T.reshape(OUTPUTS, order, OUTPUTS).transpose(1, 0, 2))
+                a = np.ascontiguousarray(b.T.reshape(outputs, order, outputs).transpose(1, 0, 2))
                 best = Whitener(a, np.linalg.inv(np.linalg.cholesky(sigma)), start)
     return best
 
 
 def _lagged(r: Array, order: int) -> Array:
-    """(samples - highest order, 3 order) the samples before each."""
+    """(samples - highest order, outputs order) the samples before each."""
     n = r.shape[0]
     if order == 0:
         return np.zeros((n - _ORDERS, 0))

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError, choices
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.sensor_errors import KINDS, Kind, SensorErrors
 from airtruth.physics.terms import (
     DECLARED,
     DRIVERS,
-    ELEVATOR,
     FACTORS,
     READINGS,
     SHAPES,
@@ -93,10 +93,10 @@ def compile_change(change: Change) -> CompiledChange:
             at = CHANNELS.index(sensor.channel)
             of_kind = outputs[sensor.kind]
             of_kind[at] = KINDS[sensor.kind].combined(float(of_kind[at]), sensor.value)
-        elif (sensor.channel, sensor.kind) != (ELEVATOR, "delay"):
+        elif (sensor.channel, sensor.kind) != (LONGITUDINAL.controls[0].channel, "delay"):
             inputs[sensor.channel] = _with_error(inputs.get(sensor.channel, SensorErrors()), sensor)
     return CompiledChange(
-        surface=change.surface_path,
+        surface=change.surface_path(),
         effects=_effects(change, first),
         effect_states=first,
         motion=motion,

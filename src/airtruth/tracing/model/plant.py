@@ -80,6 +80,11 @@ class Plant:
     trim: Trim | None
 
     @property
+    def trim_signals(self) -> Array:
+        """(signals,) origin of the increments of the derivatives, in the order of the motion [rad, -]."""
+        return np.array([self.trim_alpha_rad, 0.0, self.trim_elevator_rad])
+
+    @property
     def over_alpha(self) -> Array:
         """(alpha, 3) of the tables, at the elevator's point next to its trim and no pitch rate; on a line at the trim."""
         return self._nearest(np.moveaxis(self._steady, 1, 0), self.elevator_rad, self.trim_elevator_rad)

@@ -43,10 +43,15 @@ _MOST_SLOW: Final = 0.99
 
 @dataclass(frozen=True)
 class External:
-    """Signals added to CL, Cm (points,) [-] and to the outputs (samples, 3), for tests that name no effect."""
+    """Signals added to the coefficients, for tests that name no effect.
 
-    lift: Array
-    moment: Array
+    Attributes
+    ----------
+    force : (coefficients, points) in the order of the motion [-].
+    output : (samples, outputs) added to the outputs [their units].
+    """
+
+    force: Array
     output: Array
 
 
@@ -115,7 +120,7 @@ def _inputs(record: TraceRecord, compiled: CompiledChange) -> FilterInputs:
         theta = theta - plant.alpha_shift_rad
     fine = _undo(compiled, "elevator_rad", s.elevator_rad)
     if compiled.surface:
-        fine = through(compiled.surface, fine, s.dt_s / (s.sub * FINE), s.elevator_std_rad)
+        fine = through(compiled.surface, fine, s.dt_s / (s.sub * FINE), float(s.control_std_rad[0]))
     elevator, v = nodes(fine), _airspeed(compiled, s)
     lift, moment = _remainder(record, compiled, elevator.size)
     grid = GridSignals(
@@ -148,8 +153,8 @@ def _inputs(record: TraceRecord, compiled: CompiledChange) -> FilterInputs:
 def _corners(s: Signals, compiled: CompiledChange) -> Array:
     """Variance of the surface that the air sees, per sample; a delay or lag of the surface carries it to later cells."""
     late = tuple(term for term in compiled.surface if term.kind in ("delay", "lag"))
-    known = [own for own in (s.corner_rad2, s.surface_noise_rad2) if own.size]
-    total = np.asarray(sum(known[1:], known[0])) if known else s.corner_rad2
+    known = [own[0] for own in (s.corner_rad2, s.surface_noise_rad2) if own.size]
+    total = np.asarray(sum(known[1:], known[0])) if known else s.corner_rad2[0]
     if total.size == 0 or not late:
         return total
     cells = s.sub * FINE
@@ -244,10 +249,10 @@ def kernel_input(
     more = np.zeros_like(given.y)
     grid = given.grid._replace(lift=given.grid.lift + lift, moment=given.grid.moment + moment)
     if external is not None:
-        own = external.lift.size
+        own = external.force.shape[1]
         more[given.lead :] = external.output
-        grid.lift[-own:] += external.lift
-        grid.moment[-own:] += external.moment
+        grid.lift[-own:] += external.force[0]
+        grid.moment[-own:] += external.force[1]
     signals = given.record.signals
     return KernelInput(
         y=given.y,
@@ -276,7 +281,7 @@ def filter_model(given: FilterInputs, settings: Settings, common: Array, per_rec
     )
     sensors = pack_sensors(compiled, settings, common, per_record, record.plant.aircraft.constants.chord_m)
     return FilterModel(
-        aircraft=pack_aircraft(record.plant, compiled, common),
+        aircraft=pack_aircraft(record.pitch_plant, compiled, common),
         gusts=gusts,
         effects=compiled.effects,
         sensors=sensors,

@@ -96,7 +96,7 @@ def respond_with_slopes(
     samples, count = kernel.y.shape
     e, none = np.full_like(kernel.y, LOST), np.eye(count)
     lost = Response(e[given.lead :], none, none, np.nan)
-    aircraft = moves_of(kernel.model)(given.record.plant, given.compiled, common, kernel.model.gusts.rolloff)
+    aircraft = moves_of(kernel.model)(given.record.pitch_plant, given.compiled, common, kernel.model.gusts.rolloff)
     noise = _noise(kernel, settings, common, parameters)
     moves, column = _moves(settings, noise, parameters)
     uncertain = kernel.corner_rad2.size > 0

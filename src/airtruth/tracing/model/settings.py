@@ -129,15 +129,13 @@ def settings_of(aircraft: Aircraft, thrust_std: float, *, has_vane: bool = True)
         thrust_std=thrust_std,
         trim_std=np.array(_TRIM_STD),
     )
-    return settings if has_vane else without_vane(settings)
+    return settings if has_vane else without(settings, CHANNELS.index(VANE))
 
 
-def without_vane(settings: Settings) -> Settings:
-    """Settings under which the angle of attack is a state of the filter and no output."""
-    unmeasured = np.where(
-        np.arange(len(CHANNELS)) == CHANNELS.index(VANE), _UNMEASURED_RAD, settings.resolution
-    )
-    return replace(settings, resolution=unmeasured)
+def without(settings: Settings, output: int) -> Settings:
+    """Settings under which an angle is a state of the filter and no output; ``output`` is its number."""
+    number = np.arange(len(settings.resolution))
+    return replace(settings, resolution=np.where(number == output, _UNMEASURED_RAD, settings.resolution))
 
 
 def resolved(settings: Settings, records: Sequence[TraceRecord]) -> Settings:
@@ -279,5 +277,5 @@ __all__ = [
     "per_record_prior",
     "resolved",
     "settings_of",
-    "without_vane",
+    "without",
 ]

@@ -35,7 +35,7 @@ def with_surface_noise(record: TraceRecord, settings: Settings) -> TraceRecord:
     change = turning * float(np.sqrt(signals.surface_noise_rad2.max())) * signals.dt_s
     if change > _NEGLIGIBLE * float(settings.noise[1]):
         return record
-    return replace(record, signals=replace(signals, surface_noise_rad2=np.zeros(0)))
+    return replace(record, signals=replace(signals, surface_noise_rad2=signals.surface_noise_rad2[:, :0]))
 
 
 __all__ = ["with_surface_noise"]

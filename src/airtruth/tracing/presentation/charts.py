@@ -25,10 +25,10 @@ Array = NDArray[np.float64]
 
 LEVEL: Final = 0.05
 """Level of Holm's rule that the scores are drawn against [-]; that of the first round of the search."""
-COLOURS: Final[dict[str, Colour]] = {"alpha_rad": "blue", "q_rad_s": "vermillion", "az_m_s2": "green"}
-"""Channel -> colour where one panel shows several."""
-_STROKES: Final[dict[str, Stroke]] = {"q_rad_s": "dashed", "az_m_s2": "dotted"}
-"""Channel -> stroke beside its colour; the first is solid."""
+_COLOURS: Final[tuple[Colour, ...]] = ("blue", "vermillion", "green", "purple", "orange")
+"""Colours of the channels, in their order, where one panel shows several."""
+_STROKES: Final[tuple[Stroke, ...]] = ("solid", "dashed", "dotted", "solid", "dashed")
+"""Strokes beside their colours."""
 _SMALLEST: Final = 1e-290
 """Probability up to which a p-value is converted to a normal variable [-] (above underflow)."""
 _LARGEST_SIGMA: Final = 36.0
@@ -55,6 +55,7 @@ def trace_chart(answer: TraceAnswer, histories: Histories) -> Chart:
     left = [_residuals(record, channel, histories.models[:1], colours) for channel in channels]
     right = [_residuals(record, channel, histories.models[1:], colours) for channel in channels]
     middle = [panel_of(histories), _contribution(record), _stages(answer)]
+    middle += [_control(record, name) for name in record.controls_rad][: len(channels) - len(middle)]
     panels = []
     for i, (first, centre, last) in enumerate(zip(left, middle, right, strict=True)):
         ends = (
@@ -154,12 +155,22 @@ def _contribution(record: History) -> Panel:
             replace(
                 line(record.t_s[::step], moved[::step] / (record.floor.get(channel) or np.nan)),
                 label=_short(channel),
-                colour=COLOURS.get(channel, "ink"),
-                stroke=_STROKES.get(channel, "solid"),
+                colour=colour,
+                stroke=stroke,
             )
-            for channel, moved in record.effect.items()
+            for (channel, moved), colour, stroke in zip(
+                record.effect.items(), _COLOURS, _STROKES, strict=False
+            )
         ),
     )
+
+
+def _control(record: History, channel: str) -> Panel:
+    """A control of the record."""
+    name, factor = shown(channel)
+    step = max(1, -(-len(record.t_s) // _POINTS))
+    drawn = line(record.t_s[::step], record.controls_rad[channel][::step] * factor)
+    return Panel(x_label="time [s]", y_label=name, lines=(replace(drawn, colour="ink"),))
 
 
 def _short(channel: str) -> str:
@@ -175,7 +186,7 @@ def _stages(answer: TraceAnswer) -> Panel:
     if floor is None:
         return Panel(title="rms over the floor", words="no floor recorded")
     marks = []
-    for channel, colour in COLOURS.items():
+    for channel, colour in zip(answer.motion.output_channels, _COLOURS, strict=False):
         for row, rms in enumerate(by_stage.values()):
             if rms is not None and channel in rms.free_run and floor.free_run.get(channel):
                 value = rms.free_run[channel] / floor.free_run[channel]
@@ -375,7 +386,6 @@ def trace_charts(answer: TraceAnswer, histories: Histories | None) -> list[Chart
 
 
 __all__ = [
-    "COLOURS",
     "chart_of_shifts",
     "innovations_chart",
     "scores_chart",

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
-from airtruth.physics.short_period import PARAMETERS
 from airtruth.table import Number, Row, Table, Uncertain, flat
 from airtruth.tracing.answer import TraceAnswer
 
+MOST_COLUMNS: Final = 6
+"""Most derivatives in the columns of the table [-] (judgement: more make lines that no screen holds)."""
+
 
 def derivative_table(answer: TraceAnswer) -> Table:
-    """Return the six derivatives with their standard errors: declared, refitted without and with the effects."""
+    """Return the derivatives with their standard errors: declared, refitted without and with the effects."""
     stated = answer.derivatives
     shifts = {} if answer.declared_model is None else answer.declared_model.shifts
     refitted = ("before", "after") if answer.effects else ("before",)
@@ -18,15 +21,21 @@ def derivative_table(answer: TraceAnswer) -> Table:
     rows += [
         (name, getattr(stated, name), stated.after_std if name == refitted[-1] else {}) for name in refitted
     ]
+    motion = answer.motion
+    names = motion.parameters
     cells: list[Row] = [
-        (stage, *(_estimate(values, errors, name) for name in PARAMETERS)) for stage, values, errors in rows
+        (stage, *(_estimate(values, errors, name) for name in names)) for stage, values, errors in rows
     ]
     if shifts:
-        sigmas = (Number(shifts[d].sigma if d in shifts else math.nan, digits=2) for d in PARAMETERS)
+        sigmas = (Number(shifts[d].sigma if d in shifts else math.nan, digits=2) for d in names)
         cells.append(("shift/declared std", *sigmas))
+    columns: tuple[str, ...] = ("", *names)
+    if len(names) > MOST_COLUMNS:  # one row for each derivative
+        columns = ("", *(str(row[0]) for row in cells))
+        cells = [(name, *(row[k] for row in cells)) for k, name in enumerate(names, start=1)]
     return flat(
-        "Derivatives at the trim [1/rad, rates as q c/(2V)]",
-        ("", *PARAMETERS),
+        f"Derivatives at the trim [{motion.derivative_units}]",
+        columns,
         cells,
         (
             "before: refitted without an effect; after: with the effects; +-: standard error, of a declared value its standard "

@@ -13,29 +13,25 @@ from numpy.typing import NDArray
 from airtruth.channels import SIGNALS, shown
 from airtruth.charts import Band, Line, Mark, Panel, Rule
 from airtruth.effects.registry import EFFECTS
-from airtruth.physics.motion import LONGITUDINAL
-from airtruth.physics.terms import READINGS, AeroTerm, Change, shape_of
+from airtruth.physics.terms import OUTPUTS, AeroTerm, Change, shape_of
 from airtruth.table import significant
 from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
 from airtruth.tracing.answer import TraceAnswer
-from airtruth.tracing.model.compile import CHANNELS
-from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import FINE, TraceRecord
 from airtruth.tracing.model.surface import through
+from airtruth.tracing.presentation.curves import angles_of, curve_of
 from airtruth.tracing.presentation.shown_record import ShownRecord
 from airtruth.tracing.presentation.text import unit_of
 from airtruth.units import DEG
 
 Array = NDArray[np.float64]
 
-_CURVES: Final = ("alpha", "elevator")
-"""Signals over which a coefficient is drawn as a curve."""
 _AROUND_S: Final = 2.5
 """Width of the shown part of a sensor's channel [s] (judgement: one doublet)."""
 _DENSITY: Final = 0.2
 """Height of the density of the samples over that of the band [-] (judgement)."""
 _EDGE_S: Final = 0.8
-"""Width of the shown part of the elevator [s] (judgement: one edge of a doublet)."""
+"""Width of the shown part of a control [s] (judgement: one edge of a doublet)."""
 
 
 def effect_panel(answer: TraceAnswer, shown_: ShownRecord) -> Panel:
@@ -46,7 +42,8 @@ def effect_panel(answer: TraceAnswer, shown_: ShownRecord) -> Panel:
         return learned_panel(table, table.table)
     if change.surface:
         return _surface(shown_.record, change)
-    if change.aero and change.aero[0].signal in _CURVES and not change.aero[0].factor and not change.states:
+    angles = angles_of(shown_.record)
+    if change.aero and change.aero[0].signal in angles and not change.aero[0].factor and not change.states:
         return _curve(shown_, change.aero)
     if change.sensors:
         return _sensor(answer, shown_, change)
@@ -67,15 +64,17 @@ def line(x: Iterable[float], y: Iterable[float]) -> Line:
 def _surface(record: TraceRecord, change: Change) -> Panel:
     s = record.signals
     step = s.dt_s / (s.sub * FINE)
-    air = through(change.surface, s.elevator_rad, step)
+    name = change.surface[0].control
+    control = s.controls_rad[[c.name for c in s.motion.controls].index(name)]
+    air = through(change.of_surface(name), control, step)
     time = np.arange(len(air)) * step
-    middle = float(time[int(np.argmax(np.abs(air - s.elevator_rad)))])
+    middle = float(time[int(np.argmax(np.abs(air - control)))])
     span = np.abs(time - middle) < 0.5 * _EDGE_S
-    measured, seen = (line(time[span], v[span] / DEG) for v in (s.elevator_rad, air))
+    measured, seen = (line(time[span], v[span] / DEG) for v in (control, air))
     return Panel(
         title="the effect: surface",
         x_label="time [s]",
-        y_label="elevator [deg]",
+        y_label=f"{name} [deg]",
         lines=(
             replace(measured, label="measured", colour="grey"),
             replace(seen, label="as the air sees it", colour="vermillion", stroke="dashed"),
@@ -85,28 +84,21 @@ def _surface(record: TraceRecord, change: Change) -> Panel:
 
 def _curve(shown_: ShownRecord, terms: tuple[AeroTerm, ...]) -> Panel:
     """Coefficient over its signal: the declared one, refitted, and with the effect."""
-    first, record = terms[0], shown_.record
-    plant = record.plant
-    over = plant.alpha_rad if first.signal == "alpha" else plant.elevator_rad
-    at = plant.trim_alpha_rad if first.signal == "alpha" else plant.trim_elevator_rad
-    shift = plant.alpha_shift_rad if first.signal == "alpha" else 0.0
-    measured = record.signals.y[:, 0] if first.signal == "alpha" else record.signals.elevator_rad
-    low, high = float(measured.min()), float(measured.max())
-    ends = (
-        over if plant.trim is not None else (low - shift, high - shift)
-    )  # the linear model holds everywhere
-    fine = np.linspace(ends[0], ends[-1], 201)
-    declared = np.interp(fine, over, _declared_curve(plant, first))
+    first, motion = terms[0], shown_.record.signals.motion
+    own = curve_of(shown_.record, first)
+    fine = np.linspace(*own.ends, 201)
+    declared = np.interp(fine, own.over, own.declared)
     models = shown_.stages.models
     before, after = declared, declared
-    if first.coefficient in [c.name for c in LONGITUDINAL.coefficients]:
-        derivative = LONGITUDINAL.at(first.coefficient, first.signal)
-        before = declared + models["before"].common[derivative] * (fine - at)
-        after = declared + models["after"].common[derivative] * (fine - at)
+    if first.coefficient in [c.name for c in motion.coefficients]:
+        derivative = motion.at(first.coefficient, first.signal)
+        before = declared + models["before"].common[derivative] * (fine - own.trim)
+        after = declared + models["after"].common[derivative] * (fine - own.trim)
     for term in terms:
         if term.signal == first.signal and term.coefficient == first.coefficient:
             after = after + term.amplitude * shape_of(term, fine)
-    angle = (fine + shift) / DEG
+    angle = (fine + own.shift) / DEG
+    low, high = own.flown
     return Panel(
         title=f"the effect: {first.coefficient}",
         x_label=f"{first.signal} [deg]",
@@ -151,31 +143,21 @@ def learned_panel(effect: AcceptedEffect, table: IncrementTable | None) -> Panel
 def _subject(effect: AcceptedEffect) -> tuple[str, float]:
     """What a learned increment changes, with its display unit, and the factor to this unit from SI."""
     acts_on, by = effect.acts_on or "", effect.by or ""
-    if acts_on in READINGS and not by:
+    if acts_on in OUTPUTS and not by:
         return shown(acts_on)
-    own = SIGNALS[acts_on].unit if acts_on in READINGS else ""
+    own = SIGNALS[acts_on].unit if acts_on in OUTPUTS else ""
     unit = (f"{own or 1}/rad" if by.endswith("_rad") else own) or "-"
     return f"{effect.subject} [{unit}]", 1.0
 
 
-def _declared_curve(plant: Plant, term: AeroTerm) -> Array:
-    """The declared coefficient over the term's signal, the other angle at its trim and the pitch rate zero."""
-    c = plant.aircraft.constants
-    column = plant.over_alpha if term.signal == "alpha" else plant.over_elevator
-    if term.coefficient == "Cm":
-        return np.asarray(column[:, 2] / (c.wing_area_m2 * c.chord_m))
-    if term.coefficient == "CX":
-        return np.asarray(column[:, 0] / c.wing_area_m2)
-    return np.asarray(-column[:, 1] / c.wing_area_m2)
-
-
 def _sensor(answer: TraceAnswer, shown_: ShownRecord, change: Change) -> Panel:
     """The measured channel about the largest difference, with the simulation through either sensor."""
-    channel = next((t.channel for t in change.sensors if t.channel in CHANNELS), None)
+    channels = shown_.record.signals.motion.output_channels
+    channel = next((t.channel for t in change.sensors if t.channel in channels), None)
     if channel is None:
         return _estimates(answer)
     model = shown_.stages.models["after"]
-    i, factor = CHANNELS.index(channel), shown(channel)[1]
+    i, factor = channels.index(channel), shown(channel)[1]
     full = model.hypothesis.change(model.sizes)
     rest = replace(full, sensors=model.hypothesis.declared.sensors)
     complete, declared = (shown_.free_run(model, c)[:, i] * factor for c in (full, rest))
@@ -224,11 +206,13 @@ def _estimates(answer: TraceAnswer) -> Panel:
     )
 
 
-def _motion(shown_: ShownRecord, channel: str = "q_rad_s") -> Panel:
-    """An effect with memory: a channel of the simulation with it and without."""
+def _motion(shown_: ShownRecord, channel: str = "") -> Panel:
+    """An effect with memory: a channel of the simulation with it and without; by default the first rate."""
     model = shown_.stages.models["after"]
+    motion = shown_.record.signals.motion
+    channel = channel or next(o.channel for o in motion.outputs if o.instrument == "gyro")
     label, factor = shown(channel)
-    i, time_s = CHANNELS.index(channel), shown_.time_s
+    i, time_s = motion.output_channels.index(channel), shown_.time_s
     runs = (
         shown_.free_run(model, change)[:, i] * factor
         for change in (model.hypothesis.declared, model.hypothesis.change(model.sizes))

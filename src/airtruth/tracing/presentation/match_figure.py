@@ -1,4 +1,4 @@
-"""One record of a trace as a figure for readers in a hurry: elevator, measured against both models, residual."""
+"""One record of a trace as a figure for readers in a hurry: controls, measured against both models, residual."""
 
 from __future__ import annotations
 
@@ -13,15 +13,12 @@ from numpy.typing import NDArray
 from airtruth import style
 from airtruth.channels import shown
 from airtruth.logs.histories import Histories, History
+from airtruth.physics.motion import motion_with
 from airtruth.table import significant
 from airtruth.units import DEG
 
 Array = NDArray[np.float64]
 
-CHANNELS: Final = ("alpha_rad", "q_rad_s")
-"""Channels of the columns."""
-_LABELS: Final = {"alpha_rad": "angle of attack [deg]", "q_rad_s": "pitch rate [deg/s]"}
-"""Words of the scales."""
 _SIZE_IN: Final = (8.0, 5.2)
 """Width and height [inch]; judgement: legible at a width of 800 px."""
 _MODELS: Final = ("declared model", "corrected model")
@@ -36,7 +33,7 @@ _SPAN_S: Final = 4.4
 
 @style.themed
 def match_figure(histories: Histories) -> Figure:
-    """Draw the record that a report shows first: elevator, alpha and q beside the first and the last model, residuals.
+    """Draw the record that a report shows first: controls, two outputs beside the first and the last model, residuals.
 
     Parameters
     ----------
@@ -46,31 +43,41 @@ def match_figure(histories: Histories) -> Figure:
     models = (histories.models[0], histories.models[-1])
     span = _span(record)
     figure = style.new_figure(*_SIZE_IN)
-    axes = figure.subplots(3, len(CHANNELS), sharex=True, height_ratios=(0.55, 1.5, 1.0))
-    for column, channel in enumerate(CHANNELS):
-        _elevator(axes[0, column], record, span)
+    columns = columns_of(record)
+    axes = figure.subplots(3, len(columns), sharex=True, height_ratios=(0.55, 1.5, 1.0))
+    for column, (channel, control) in enumerate(columns):
+        _control(axes[0, column], record, control, span)
         _signals(axes[1, column], record, models, channel, span)
         _residuals(axes[2, column], record, models, channel, span)
         axes[2, column].set_xlabel("time [s]")
-    axes[0, 1].set_ylabel("")
+    if len(record.controls_rad) == 1:
+        axes[0, 1].set_ylabel("")
     for ax in axes.flat:
         ax.xaxis.set_major_locator(MultipleLocator(1.0))
-    _words(axes, record, models, span)
+    _words(axes, record, models, span, [channel for channel, _ in columns])
     for column in axes.T:
         figure.align_ylabels(column)
     return figure
 
 
+def columns_of(record: History) -> list[tuple[str, str]]:
+    """The outputs of the columns, each with the control above it: of one control, the first two; of several, its rate each."""
+    controls = motion_with(record.measured).controls
+    if len(controls) == 1:
+        return [(channel, controls[0].channel) for channel in list(record.measured)[:2]]
+    return [(control.damped, control.channel) for control in controls]
+
+
 def _span(record: History) -> NDArray[np.bool_]:
-    """Samples from shortly before the elevator moves."""
-    moved = np.abs(record.elevator_rad - record.elevator_rad[0])
+    """Samples from shortly before a control moves."""
+    moved = np.max([np.abs(x - x[0]) for x in record.controls_rad.values()], axis=0)
     first = float(record.t_s[int(np.argmax(moved > 0.2 * moved.max()))])
     return np.asarray((record.t_s >= first - _LEAD_S) & (record.t_s <= first - _LEAD_S + _SPAN_S))
 
 
-def _elevator(ax: Axes, record: History, span: NDArray[np.bool_]) -> None:
-    ax.plot(record.t_s[span], record.elevator_rad[span] / DEG, color=style.BLACK, lw=1.2)
-    ax.set_ylabel("elevator\n[deg]")
+def _control(ax: Axes, record: History, control: str, span: NDArray[np.bool_]) -> None:
+    ax.plot(record.t_s[span], record.controls_rad[control][span] / DEG, color=style.BLACK, lw=1.2)
+    ax.set_ylabel(shown(control)[0].replace(" ", "\n"))
 
 
 def _signals(
@@ -84,7 +91,8 @@ def _signals(
     )
     for model, colour, dash in zip(models, (style.VERMILLION, style.BLUE), ("--", "-"), strict=True):
         ax.plot(t, record.models[model][channel][span] * factor, dash, color=colour, lw=1.7)
-    ax.set_ylabel(_LABELS[channel])
+    quantity = next(o.quantity for o in motion_with(record.measured).outputs if o.channel == channel)
+    ax.set_ylabel(f"{quantity} [{shown(channel)[0].partition('[')[2]}")
 
 
 def _residuals(
@@ -99,9 +107,13 @@ def _residuals(
 
 
 def _words(
-    axes: NDArray[np.object_], record: History, models: tuple[str, str], span: NDArray[np.bool_]
+    axes: NDArray[np.object_],
+    record: History,
+    models: tuple[str, str],
+    span: NDArray[np.bool_],
+    channels: list[str],
 ) -> None:
-    """Labels beside the curves, in the panel of q where the curves are farthest apart."""
+    """Labels beside the curves, in the second panel; of pitch that of q, where the curves are farthest apart."""
     ax: Axes = axes[1, 1]
     t = record.t_s[span]
     ax.set_xlim(float(t[0]), float(t[-1]))
@@ -132,7 +144,7 @@ def _words(
         va="bottom",
         fontsize=8.5,
     )
-    for below, channel in zip(axes[2], CHANNELS, strict=True):
+    for below, channel in zip(axes[2], channels, strict=True):
         name, factor = shown(channel)
         unit = name.partition("[")[2].rstrip("]")
         rms = [significant(record.rms(m, channel) * factor, 2) for m in models]
@@ -140,4 +152,4 @@ def _words(
         below.text(0.985, 0.96, told, transform=below.transAxes, ha="right", va="top", fontsize=8.5)
 
 
-__all__ = ["CHANNELS", "match_figure"]
+__all__ = ["columns_of", "match_figure"]

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from airtruth.physics.terms import Change
 from airtruth.tracing.inference.assess import Assessment
 from airtruth.tracing.model.compile import compile_change
-from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.response import respond
 from airtruth.tracing.stages import StageModel, Stages, free_run_floor
@@ -28,7 +27,7 @@ class ShownRecord:
     record : the record; of the held-out ones if there are any, that whose free run the effects improve most.
     compared : names of the two stages.
     before, after : assessments of the record in these stages.
-    floor : (3,) root mean squares of a free run that gusts and sensor noise alone explain.
+    floor : (outputs,) root mean squares of a free run that gusts and sensor noise alone explain.
     """
 
     stages: Stages
@@ -50,16 +49,16 @@ class ShownRecord:
         return Change() if model is None else model.hypothesis.added(model.sizes)
 
     def free_run(self, model: StageModel, change: Change) -> Array:
-        """(samples, 3) outputs of a simulation with the parameters of the second stage and another change."""
+        """(samples, outputs) readings of a simulation with the parameters of the second stage and another change."""
         local = self.after.per_record.copy()
-        local[SHORT_PERIOD.per_record.gusts] = 0.0  # no gust
         settings = self.stages.case.fitted.settings
+        local[settings.layout.per_record.gusts] = 0.0  # no gust
         compiled = compile_change(change)
         response = respond(self.record, settings, compiled, model.common, local, free_run=True)
         return np.asarray(self.record.signals.y - response.e)
 
     def contribution(self) -> Array | None:
-        """(samples, 3) free run with the effects less the free run without; None where there are no effects.
+        """(samples, outputs) free run with the effects less the free run without; None where there are no effects.
 
         Released derivatives are part of the effects: without the effects they are the declared ones.
         """
@@ -70,7 +69,7 @@ class ShownRecord:
         without = model
         if model.hypothesis.spread is not None:
             common = model.common.copy()
-            common[SHORT_PERIOD.common.derivatives] = 0.0
+            common[self.stages.case.fitted.layout.common.derivatives] = 0.0
             without = replace(model, common=common)
         return self.free_run(model, complete) - self.free_run(without, declared)
 

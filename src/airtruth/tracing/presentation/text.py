@@ -8,7 +8,7 @@ from typing import Final
 
 from airtruth.effects.increment import STEP
 from airtruth.effects.registry import EFFECTS
-from airtruth.physics.terms import READINGS
+from airtruth.physics.terms import OUTPUTS
 from airtruth.table import WIDTH, as_text, significant
 from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable, ParameterEstimate
 from airtruth.tracing.answer import ANOMALY_LEVEL, Evidence, TraceAnswer
@@ -223,7 +223,7 @@ def increment_words(effect: AcceptedEffect) -> str:
     if effect.relative_size is not None:
         whole = (
             f"motion of {effect.acts_on}"
-            if effect.acts_on in READINGS
+            if effect.acts_on in OUTPUTS
             else "declared CX over the flown angles of attack"
             if effect.acts_on == "CX"
             else "declared derivative"

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from airtruth.charts import Panel
@@ -16,11 +17,12 @@ from airtruth.logs.provenance import PROVENANCE, Provenance
 from airtruth.tracing.answer import TraceAnswer
 from airtruth.tracing.inference.assess import Assessment
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.model.compile import CHANNELS
-from airtruth.tracing.model.records import FINE, TraceRecord
+from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.presentation.effect_panel import effect_panel
 from airtruth.tracing.presentation.shown_record import ShownRecord, shown_record
 from airtruth.tracing.stages import Stages, free_run_floor
+
+Array = NDArray[np.float64]
 
 MODELS: Final = ("declared", "before", "after")
 """Stages whose simulations are kept; the control is a number in the table of errors."""
@@ -62,7 +64,11 @@ def _of(
     models: tuple[str, ...],
     group: str,
 ) -> Iterator[History]:
-    best = stages.best
+    best, motion = stages.best, problem.layout.motion
+
+    def by_channel(values: Array) -> dict[str, Array]:
+        return {channel: values[:, i] for i, channel in enumerate(motion.output_channels)}
+
     floors = free_run_floor(problem, stages.models[best], assessed[best])
     for i, (record, floor) in enumerate(zip(problem.records, floors, strict=True)):
         own = {name: assessed[name][i] for name in models}
@@ -72,12 +78,15 @@ def _of(
             run_id=record.signals.run_id,
             group=group,
             t_s=seen.time_s,
-            elevator_rad=record.signals.elevator_rad[:: record.signals.sub * FINE][: record.samples],
-            measured=_by_channel(record.signals.y),
-            models={name: _by_channel(record.signals.y - a.residual) for name, a in own.items()},
-            innovations={name: _by_channel(a.whitened) for name, a in own.items()},
-            effect={} if moved is None else _by_channel(moved),
-            floor=dict(zip(CHANNELS, floor.tolist(), strict=True)),
+            controls_rad={
+                c.channel: series[: record.samples]
+                for c, series in zip(motion.controls, record.signals.sampled_controls_rad, strict=True)
+            },
+            measured=by_channel(record.signals.y),
+            models={name: by_channel(record.signals.y - a.residual) for name, a in own.items()},
+            innovations={name: by_channel(a.whitened) for name, a in own.items()},
+            effect={} if moved is None else by_channel(moved),
+            floor=dict(zip(motion.output_channels, floor.tolist(), strict=True)),
             conditions=_conditions(record),
         )
 
@@ -91,21 +100,21 @@ def _stated(value: object) -> object:
     return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _by_channel(values: np.ndarray[Any, np.dtype[np.float64]]) -> dict[str, Any]:
-    return {channel: values[:, i] for i, channel in enumerate(CHANNELS)}
-
-
 def _conditions(record: TraceRecord) -> dict[str, float]:
     s, plant = record.signals, record.plant
     constants = plant.aircraft.constants
+    signals = [signal.channel for signal in s.motion.signals]
     return {
         "airspeed_m_s": float(s.airspeed_m_s.mean()),
         "density_kg_m3": float(s.density_kg_m3.mean()),
         "altitude_m": float(s.altitude_m),
         "trim_alpha_rad": float(plant.trim_alpha_rad + plant.alpha_shift_rad),
-        "trim_elevator_rad": float(plant.trim_elevator_rad),
+        **{
+            f"trim_{c.channel}": float(plant.trim_signals[signals.index(c.channel)])
+            for c in s.motion.controls
+        },
         "mass_kg": float(constants.mass_kg),
-        "inertia_yy_kg_m2": float(constants.inertia_yy_kg_m2),
+        **{f"{name}_kg_m2": float(getattr(constants, f"{name}_kg_m2")) for name in s.motion.inertias},
         "duration_s": float(s.dt_s * (record.samples - 1)),
         "sample_rate_hz": float(1.0 / s.dt_s),
     }

@@ -14,14 +14,12 @@ from scipy.stats import chi2
 from airtruth.aircraft.dynamics import declared_dynamics
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment
-from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.inference.assess import Assessment, noise_floor
 from airtruth.tracing.inference.cross_validate import LeftOut, leave_one_out, one_by_the_other
 from airtruth.tracing.inference.feedback import responds_to_motion
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import MEMORY_S, inflation, long_run
-from airtruth.tracing.model.parameters import OUTPUTS
-from airtruth.tracing.model.plant import alpha_dot
+from airtruth.tracing.model.plant import Plant, alpha_dot
 from airtruth.tracing.selection.score_test import Score
 
 Array = NDArray[np.float64]
@@ -44,8 +42,6 @@ WORSE_FREE_RUN: Final = "it worsens the free run of records left out"
 """Reason of a candidate whose free run of these records is worse."""
 IMPROBABLE: Final = 0.001
 """Probability below which refitted derivatives contradict the declared ones [-] (convention: three standard errors)."""
-_ALPHA_DOT: Final = "alpha_dot_hat"
-"""Signal of a term in alpha_dot c/(2V)."""
 _SLIGHT: Final = 0.25
 """Overshoot allowed to an effect that cancels a declared term, as a fraction of that term [-] (judgement: a flight tells a
 term in alpha_dot to about that)."""
@@ -99,8 +95,8 @@ class Reference:
     Attributes
     ----------
     left_out : one for each way of leaving records out: `leave_one_out`, and with two records `one_by_the_other`.
-    weight : (3,) of each record, standard deviations of the free run that gusts and sensors explain.
-    in_loop : whether the elevator responds to the motion, so that free runs do not judge a model.
+    weight : (outputs,) of each record, standard deviations of the free run that gusts and sensors explain.
+    in_loop : whether a control responds to the motion, so that free runs do not judge a model.
     """
 
     left_out: tuple[LeftOut, ...]
@@ -116,8 +112,8 @@ def reference_of(problem: TraceProblem, null: PosteriorFit) -> Reference:
         for record, local in zip(problem.records, null.point.per_record, strict=True)
     )
     left_out = tuple(way(problem, null) for way in _ways(problem))
-    elevators = [r.signals.sampled_elevator_rad for r in problem.records]
-    in_loop = responds_to_motion(elevators, [a.whitened for a in left_out[0].assessments])
+    controls = [r.signals.sampled_controls_rad for r in problem.records]
+    in_loop = responds_to_motion(controls, [a.whitened for a in left_out[0].assessments])
     return Reference(left_out, weight, in_loop)
 
 
@@ -258,16 +254,15 @@ def is_plausible(problem: TraceProblem, own: PosteriorFit) -> bool:
 
 
 def declared_part(problem: TraceProblem, effect: Effect) -> float:
-    """Size that the declared aircraft has of an effect of alpha_dot, in its JSBSim model and in [dynamics]; 0 for others."""
-    plant = problem.records[0].plant
+    """Size that the declared aircraft has of an effect of the flow angle's rate, in its model and in [dynamics]; 0 for others."""
+    plant, motion = problem.records[0].plant, problem.layout.motion
     stated = declared_dynamics(plant.aircraft.file.dynamics).aero
     for term in effect.change({p.name: 1.0 for p in effect.parameters}).aero:
-        if term.signal == _ALPHA_DOT:
+        if term.signal == motion.flow_rate:
             like = (term.coefficient, term.signal)
             own = sum(t.amplitude for t in stated if (t.coefficient, t.signal) == like)
-            return own + float(
-                alpha_dot(plant)[[c.name for c in LONGITUDINAL.coefficients].index(term.coefficient)]
-            )
+            row = [c.name for c in motion.coefficients].index(term.coefficient)
+            return own + (float(alpha_dot(plant)[row]) if isinstance(plant, Plant) else 0.0)
     return 0.0
 
 
@@ -309,8 +304,9 @@ def shape_reasons(effect: Effect, sizes: Array) -> Iterator[str]:
 def _free_run_gain(
     problem: TraceProblem, unaided: list[Assessment], after: list[Assessment], weights: tuple[Array, ...]
 ) -> tuple[Array, Array]:
-    """(records, 3) gains in squared residual over the weight by channel, and (3, 3) covariance of their sums."""
-    free, covariance = np.zeros((len(after), OUTPUTS)), np.zeros((OUTPUTS, OUTPUTS))
+    """(records, outputs) gains in squared residual over the weight, and (outputs, outputs) covariance of their sums."""
+    outputs = len(problem.settings.noise)
+    free, covariance = np.zeros((len(after), outputs)), np.zeros((outputs, outputs))
     for i, (old, new, weight) in enumerate(zip(unaided, after, weights, strict=True)):
         if not (np.abs(old.residual) < _DIVERGED * weight).all():
             free[i] = 0.0 if (np.abs(new.residual) < _DIVERGED * weight).all() else -np.inf

@@ -106,7 +106,7 @@ def _most_probable(
 
     further = problem.each(extended, range(len(problem.records)))
     sensitivities = [
-        inserted(base, null.layout.sizes.stop, t, np.zeros((len(t), 3, 3)))
+        inserted(base, null.layout.sizes.stop, t, np.zeros((len(t), *base.white.shape)))
         for base, t in zip(null.sensitivities, further, strict=True)
     ]
     gradient, information = projected(null, problem, sensitivities, NO_WHITENER)

@@ -77,7 +77,7 @@ def _with(
     """`extended_by` of one record: the change of the null, those with a step in each direction, and the steps."""
     base = null.sensitivities[index]
     t = np.zeros((len(steps), *base.r.shape))
-    w = np.zeros((len(steps), 3, 3))
+    w = np.zeros((len(steps), *base.white.shape))
     more = np.zeros(len(steps))
 
     def respond_with(change: CompiledChange) -> Response:
@@ -100,7 +100,8 @@ def inserted(base: Sensitivities, at: int, t: Array, w: Array, more: Array | Non
 
     Parameters
     ----------
-    t, w, more : (directions, samples, 3), (directions, 3, 3) and (directions,), as of `Sensitivities`; None is zero.
+    t, w, more : (directions, samples, outputs), (directions, outputs, outputs) and (directions,), as of `Sensitivities`;
+        None is zero.
     """
     added = np.zeros(len(t)) if more is None else more
     return Sensitivities(

@@ -1,6 +1,6 @@
 """Why the derivatives differ from the declared ones: sets of physical causes and of wrong declarations, by evidence.
 
-A cause k of size s adds s v_k to the six derivatives, v_k by `airtruth.physics.composition`; a wrong declaration
+A cause k of size s adds s v_k to the derivatives, v_k by `airtruth.physics.composition`; a wrong declaration
 leaves a derivative with a standard deviation ten times the declared one. Each set of causes is a normal prior of the
 increments, so that its evidence over the likelihood of the derivatives is known in closed form.
 
@@ -21,10 +21,12 @@ from scipy.special import ndtr
 
 from airtruth.effects.effect import Prior
 from airtruth.effects.registry import EFFECTS
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import Motion
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood
 
 Array = NDArray[np.float64]
+Subset = tuple[int, ...]
+"""Numbers of derivatives."""
 
 DERIVATIVES: Final = "derivatives"
 """Key of the effect that states wrong declarations of derivatives."""
@@ -48,6 +50,8 @@ is named where the odds for it are strong, from ten to one by H. Jeffreys, Theor
 _AS_PROBABLE_IN_EVENT: Final = 0.5
 """Posterior weight over that of the most probable effects from which fewer effects of the same event are preferred [-]
 (judgement: a changed loading changes CG, mass and inertia, as a rule)."""
+_EVERY: Final = 6
+"""Number of derivatives of which every set of wrong declarations is compared [-] (judgement: 64 sets; of 15 there are 32768)."""
 _NEGLIGIBLE: Final = 60.0
 """Log-posterior behind the most probable set from which a set is left out [-] (judgement: twice what a refit may still change).
 """
@@ -61,7 +65,7 @@ class Cause:
 
     Attributes
     ----------
-    key : of the effect; direction : (6,) change of the derivatives per unit of size.
+    key : of the effect; direction : (derivatives,) change of the derivatives per unit of size.
     prior, event : as of `airtruth.effects.effect.Effect`.
     """
 
@@ -85,7 +89,7 @@ class CauseSet:
     ----------
     causes : keys of the physical causes; wrong : names of the derivatives whose declaration is wrong.
     sizes, size_std : (causes,) estimates without the prior of the sizes, and their standard deviations.
-    covariance : (6, 6) prior covariance of the increments under the set.
+    covariance : (derivatives, derivatives) prior covariance of the increments under the set.
     cost : negative logarithm of posterior and prior odds; comparable with the cost of a refitted effect.
     """
 
@@ -113,15 +117,17 @@ class CauseSet:
 
 
 def causes_of(directions: Mapping[str, Array]) -> tuple[Cause, ...]:
-    """Every effect with a prior as a cause, those of one event first.
+    """Every effect with a prior as a cause of the derivatives of a motion, those of one event first.
 
     Parameters
     ----------
-    directions : see `airtruth.physics.composition.directions`.
+    directions : of the motion, see `airtruth.physics.composition.directions`.
     """
     effects = sorted(EFFECTS.values(), key=lambda e: not e.event)
     return tuple(
-        Cause(e.key, directions[e.quantity], e.prior, e.event) for e in effects if e.prior is not None
+        Cause(e.key, directions[e.quantity], e.prior, e.event)
+        for e in effects
+        if e.prior is not None and e.quantity in directions
     )
 
 
@@ -137,12 +143,12 @@ def explain(
     likelihood : of the derivatives; causes : physical causes.
     wrong_allowed : whether declarations may be wrong.
     """
-    subsets = tuple(_subsets()) if wrong_allowed else ((),)
-    evidence: list[tuple[tuple[_Evidence, ...], NDArray[np.int64], Array]] = []
-    for count in range(min(MOST_CAUSES, len(causes)) + 1):
-        for chosen in combinations(causes, count):
-            scales = tuple(_evidence(likelihood, chosen, subsets, scale) for scale in WRONG_BY)
-            evidence.append((scales, *_mixed(scales)))
+    evidence = [
+        compared
+        for count in range(min(MOST_CAUSES, len(causes)) + 1)
+        for chosen in combinations(causes, count)
+        for compared in _compared(likelihood, chosen, wrong_allowed)
+    ]
     least = min(float(np.nanmin(cost, initial=np.inf)) for _, _, cost in evidence)
     found = (
         scales[best[i]].set_of(i, cost[i])
@@ -214,9 +220,40 @@ def predicted_cost(likelihood: DerivativeLikelihood, causes: Sequence[Cause]) ->
     return likelihood.cost - 0.5 * float(gained)
 
 
-def _subsets() -> Iterator[tuple[int, ...]]:
-    for count in range(len(PARAMETERS) + 1):
-        yield from combinations(range(len(PARAMETERS)), count)
+def _compared(
+    likelihood: DerivativeLikelihood, chosen: Sequence[Cause], wrong_allowed: bool
+) -> Iterator[_Compared]:
+    """Evidence of some causes with sets of wrong declarations: every set of up to `_EVERY` derivatives.
+
+    Of more derivatives, none, those of each coefficient and all; and from none on the sets that add one derivative to the best
+    set so far, as long as the cost falls.
+    """
+    count, motion = len(likelihood.vector), likelihood.motion
+
+    def of(subsets: tuple[Subset, ...]) -> _Compared:
+        scales = tuple(_evidence(likelihood, chosen, subsets, scale) for scale in WRONG_BY)
+        return (scales, *_mixed(scales))
+
+    if not wrong_allowed:
+        yield of(((),))
+        return
+    if count <= _EVERY:
+        yield of(tuple(s for n in range(count + 1) for s in combinations(range(count), n)))
+        return
+    rows = (tuple(range(*motion.row(c.name).indices(count))) for c in motion.coefficients)
+    first: tuple[Subset, ...] = ((), *rows, tuple(range(count)))
+    found = of(first)
+    yield found
+    best, least = first[0], float(found[2][0])
+    while len(best) < count:
+        grown = tuple(tuple(sorted((*best, i))) for i in range(count) if i not in best)
+        grown = tuple(s for s in grown if s not in first)
+        found = of(grown)
+        yield found
+        cost = found[2]
+        if not float(cost.min()) < least:
+            return
+        least, best = float(cost.min()), grown[int(np.argmin(cost))]
 
 
 @dataclass(frozen=True)
@@ -224,7 +261,8 @@ class _Evidence:
     """Physical causes with each set of wrong declarations; attributes as of `CauseSet`, one row per set."""
 
     causes: tuple[str, ...]
-    subsets: tuple[tuple[int, ...], ...]
+    subsets: tuple[Subset, ...]
+    motion: Motion
     sizes: Array
     size_std: Array
     covariance: Array
@@ -234,7 +272,7 @@ class _Evidence:
         """One of the sets, with the cost of its mixture."""
         return CauseSet(
             causes=self.causes,
-            wrong=tuple(PARAMETERS[k] for k in self.subsets[number]),
+            wrong=tuple(self.motion.parameters[k] for k in self.subsets[number]),
             sizes=tuple(self.sizes[number].tolist()),
             size_std=tuple(self.size_std[number].tolist()),
             covariance=self.covariance[number],
@@ -242,10 +280,14 @@ class _Evidence:
         )
 
 
+_Compared = tuple[tuple[_Evidence, ...], NDArray[np.int64], Array]
+"""Evidence for each of `WRONG_BY`, number of the best of these of each set, and the cost of their mixture."""
+
+
 def _evidence(
     likelihood: DerivativeLikelihood,
     chosen: Sequence[Cause],
-    subsets: tuple[tuple[int, ...], ...],
+    subsets: tuple[Subset, ...],
     wrong_by: float,
 ) -> _Evidence:
     """One set of physical causes with each set of wrong declarations, see `WRONG_BY`."""
@@ -282,7 +324,7 @@ def _evidence(
     odds = _log_odds(chosen) + np.where(wrong > 0, _LOG_WRONG * (1 + wrong), 0.0)
     several = (wrong > 0) | bool(chosen)
     cost = likelihood.cost - gained + occam - in_range - odds - np.where(several, REFERENCE, 0.0)
-    return _Evidence(tuple(c.key for c in chosen), subsets, sizes, std, covariance, cost)
+    return _Evidence(tuple(c.key for c in chosen), subsets, likelihood.motion, sizes, std, covariance, cost)
 
 
 def _log_odds(chosen: Sequence[Cause]) -> float:

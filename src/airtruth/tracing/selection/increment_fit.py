@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from airtruth.effects.increment import Increment
-from airtruth.physics.motion import LONGITUDINAL
-from airtruth.physics.readings import reading_increments
-from airtruth.physics.terms import READINGS
+from airtruth.physics.motion import Motion
+from airtruth.physics.readings import increments_over
+from airtruth.physics.terms import QBAR
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import inflation, robust_covariance
-from airtruth.tracing.model.records import FINE, TraceRecord
+from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.selection.acceptance import (
     IMMATERIAL,
     UNCONVERGED,
@@ -27,7 +27,8 @@ from airtruth.tracing.selection.acceptance import (
     tested_on_left_out,
 )
 from airtruth.tracing.selection.direction import Direction
-from airtruth.tracing.selection.increments import Screened, flown
+from airtruth.tracing.selection.flown import flown
+from airtruth.tracing.selection.increments import Screened
 from airtruth.tracing.selection.refit import refit_without
 from airtruth.tracing.selection.score_test import Score
 
@@ -55,9 +56,6 @@ _LEAST_DECLARED: Final = 1e-3
 """Least declared derivative with which an increment is compared [-] (judgement: one that is declared as zero)."""
 _FLOWN: Final = (0.02, 0.98)
 """Quantiles of the flown signal between which the swing counts [-] (judgement)."""
-_DERIVATIVE: Final[Mapping[str, str]] = {"alpha_dot_hat": "qhat", "qbar": "alpha"}
-"""Signal of the derivative with which an increment over another signal is compared: a moment by alpha' with the damping, one
-by the dynamic pressure with what the angle of attack does in the same records."""
 
 
 @dataclass(frozen=True)
@@ -218,8 +216,8 @@ def relative_swing(problem: TraceProblem, own: PosteriorFit, effect: Increment) 
     if shape.of_reading:
         return _share_of_channel(problem.records, own, effect)
     bends, _ = fitted_bends(own, effect, own.covariance)
-    by = shape.factor or shape.signal
-    index = LONGITUDINAL.at(shape.acts_on, _DERIVATIVE.get(by, by))
+    motion = problem.layout.motion
+    index = motion.at(shape.acts_on, _compared(motion, shape.factor or shape.signal))
     declared = max(abs(float(problem.declared_derivatives[index])), _LEAST_DECLARED)
     if not shape.cells:
         return abs(float(bends[0])) / declared
@@ -227,9 +225,20 @@ def relative_swing(problem: TraceProblem, own: PosteriorFit, effect: Increment) 
     values = shape.basis(np.linspace(low, high, 101)) @ bends
     if shape.factor:
         return float(np.ptp(values) / declared)
-    if shape.signal == "qbar":
-        low, high = _flown_range(problem.records, "alpha")
+    if shape.signal == QBAR:
+        low, high = _flown_range(problem.records, motion.flow)
     return float(np.ptp(values) / (declared * (high - low)))
+
+
+def _compared(motion: Motion, signal: str) -> str:
+    """Signal of the derivative with which an increment is compared.
+
+    A moment by the rate of the flow angle is compared with the damping, and one by the dynamic pressure or a known input with
+    what the flow angle does in the same records.
+    """
+    if signal == motion.flow_rate:
+        return next(s.name for s in reversed(motion.signals) if s.length is not None)
+    return signal if signal in (s.name for s in motion.signals) else motion.flow
 
 
 def _flown_range(records: Sequence[TraceRecord], signal: str) -> tuple[float, float]:
@@ -242,19 +251,15 @@ def _share_of_channel(records: Sequence[TraceRecord], own: PosteriorFit, effect:
     sizes = own.point.sizes[own.hypothesis.span(effect.key)]
     names = [p.name for p in effect.parameters]
     terms = effect.describe(dict(zip(names, sizes.tolist(), strict=True)))
-    channel = READINGS.index(effect.shape.acts_on)
+    states = {state.name for state in terms.states}
+    named = {name for t in terms.readings for name in (t.signal, t.behind)} - {"", *states}
+    named |= {state.signal for state in terms.states}
     parts = []
     for r in records:
         s = r.signals
-        signals = {
-            "alpha_rad": s.y[None, :, 0] - r.plant.alpha_shift_rad,
-            "elevator_rad": s.elevator_rad[None, :: s.sub * FINE],
-            "q_rad_s": s.y[None, :, 1],
-            "airspeed_m_s": s.airspeed_m_s[None, :: s.sub],
-            "density_kg_m3": s.density_kg_m3[None, :: s.sub],
-        }
-        chord = r.plant.aircraft.constants.chord_m
-        more = reading_increments(terms.readings, terms.states, signals, chord, s.dt_s)
+        signals = {name: flown(r, name)[None, :] for name in named}
+        more = increments_over(terms.readings, terms.states, signals, s.dt_s)
+        channel = s.motion.output_channels.index(effect.shape.acts_on)
         parts.append((more[effect.shape.acts_on].var(), s.y[:, channel].var()))
     added, whole = np.mean(parts, axis=0)
     return float(np.sqrt(added / whole))

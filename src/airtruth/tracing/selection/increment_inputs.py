@@ -169,7 +169,11 @@ def _of_record(
     if tangent is None:
         return None
     motion = Motion(tangent)
-    trims = {"alpha": record.plant.trim_alpha_rad, "qhat": 0.0, "elevator": record.plant.trim_elevator_rad}
+    trims = {
+        "alpha": record.plant.trim_alpha_rad,
+        "qhat": 0.0,
+        "elevator": record.pitch_plant.trim_elevator_rad,
+    }
     linear = np.stack([motion.signal(name) - trims[name] for name in _FACTORS], axis=-1)
     count, derivatives = len(_FACTORS), base.t[null.point.of.common.derivatives]
     force = np.zeros((*linear.shape[:2], 2, 2 * count))

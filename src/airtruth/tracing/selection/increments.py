@@ -14,31 +14,28 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from airtruth.effects.increment import STEPS, Increment, Memory, Shape, increment
-from airtruth.numerics.rates import smooth_rate
-from airtruth.physics.terms import FACTORS, READINGS
+from airtruth.physics.motion import Motion
+from airtruth.physics.terms import QBAR, factors_of
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import Whitener
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.selection.direction import projected
+from airtruth.tracing.selection.flown import flown, known
 from airtruth.tracing.selection.increment_inputs import sensitivities_to
 
 Array = NDArray[np.float64]
 
-_COEFFICIENTS: Final[tuple[Literal["CL", "Cm"], ...]] = ("CL", "Cm")
-"""Coefficients that an increment changes."""
 CELLS: Final = 8
 """Number of cells of a function [-] (judgement: a six-record flight test resolves no finer function)."""
 _QUANTILES: Final = (0.005, 0.995)
 """Quantiles of a signal between which an increment is learned [-] (judgement: a bend outside has no samples)."""
-_RATE_S: Final = 0.1
-"""Width of the mean over which the rate of the angle of attack is taken [s] (judgement: noise of the vane)."""
 _LAGS_S: Final = (0.03, 0.08, 0.2, 0.5, 1.2)
 """Time constants of lags that are tried [s] (judgement: a refit moves them by up to a factor of three)."""
 _LEAST_PRESSURE: Final = 0.04
@@ -63,15 +60,15 @@ _STRUCTURE_HZ: Final = (2.8, 4.0, 5.6, 8.0, 11.0)
 """Natural frequencies of modes that are tried at a sensor [Hz] (judgement: closer than `_MODES_HZ`, because the refit has
 to find a narrow peak)."""
 _PLAYS: Final = (0.01, 0.03, 0.1, 0.25)
-"""Half widths of plays of the angle of attack that are tried, over its range [-] (judgement: a refit moves them by up to a factor
+"""Half widths of plays of the flow angle that are tried, over its range [-] (judgement: a refit moves them by up to a factor
 of three)."""
 _RELAYS: Final = (0.03, 0.06, 0.09, 0.13, 0.2)
 """Half widths of plays behind which steps are tried, over the range [-] (judgement: closer than `_PLAYS`, because a refit does
 not move them)."""
 _FINER_STEPS: Final = (12, 16, 24)
 """Numbers of cells tried for a leading step [-] (judgement: as `_FINER`)."""
-_SENSED: Final = ("q_rad_s", "az_m_s2")
-"""Channels at which a mode is tried: gyro and accelerometer feel the structure, a vane does not (judgement)."""
+_SENSED: Final = ("gyro", "accelerometer")
+"""Instruments at which a mode is tried: they feel the structure, a vane does not (judgement)."""
 _NYQUIST_SHARE: Final = 0.5
 """Highest frequency of a mode over the Nyquist frequency [-] (judgement)."""
 _SCALES: Final = tuple(np.geomspace(1e-3, 1.0, 7).tolist())
@@ -94,55 +91,107 @@ class Screened:
     start: Array
 
 
+@dataclass(frozen=True)
+class _Flown:
+    """What the records of a problem cover.
+
+    Attributes
+    ----------
+    motion : of the records.
+    ranges : signal -> lowest and highest value; trims : angle -> value at the trim [unit of the signal].
+    pressure : range of the dynamic pressure [Pa].
+    """
+
+    motion: Motion
+    ranges: Mapping[str, tuple[float, float]]
+    trims: Mapping[str, float]
+    pressure: tuple[float, float]
+
+    @classmethod
+    def of(cls, problem: TraceProblem) -> _Flown:
+        """Of a problem."""
+        records, motion = problem.records, problem.layout.motion
+        names = (*factors_of(motion), motion.flow_rate, *(s.name for s in motion.known_signals))
+        origins = np.array([r.plant.trim_signals for r in records]).T
+        trims = {
+            s.name: float(np.mean(at))
+            for s, at in zip(motion.signals, origins, strict=True)
+            if s.length is None
+        }
+        trims |= {
+            s.name: float(np.mean([known(r, s.name).mean() for r in records])) for s in motion.known_signals
+        }
+        ranges = {name: _range(records, name) for name in names}
+        return cls(motion, ranges, trims, _range(records, QBAR))
+
+    def trim(self, name: str) -> float:
+        """The trim of a signal within its range."""
+        low, high = self.ranges[name]
+        return min(max(self.trims.get(name, 0.0), low), high)
+
+    def excited(self, names: Sequence[str]) -> list[str]:
+        """The signals that move."""
+        return [name for name in names if self.ranges[name][1] > self.ranges[name][0]]
+
+    @property
+    def middle(self) -> float:
+        """Middle of the range of the dynamic pressure [Pa]."""
+        return 0.5 * (self.pressure[0] + self.pressure[1])
+
+    @property
+    def varies(self) -> bool:
+        """Whether the dynamic pressure changes."""
+        return self.pressure[1] - self.pressure[0] > _LEAST_PRESSURE * self.middle
+
+
 def shapes(problem: TraceProblem) -> list[Shape]:
     """Every shape that the records can hold, over the range that they cover: of the coefficients, then of the readings."""
-    records = problem.records
-    ranges = {name: _range(records, name) for name in ("alpha", "elevator", "qhat", "alpha_dot_hat")}
-    trims = {
-        "alpha": float(np.mean([r.plant.trim_alpha_rad for r in records])),
-        "elevator": float(np.mean([r.plant.trim_elevator_rad for r in records])),
-    }
-    highest_hz = _NYQUIST_SHARE * 0.5 / max(r.signals.dt_s for r in records)
+    covers = _Flown.of(problem)
+    motion = covers.motion
+    highest_hz = _NYQUIST_SHARE * 0.5 / max(r.signals.dt_s for r in problem.records)
     found: list[Shape] = []
-    for coefficient in _COEFFICIENTS:
-        for name, (low, high) in ranges.items():
-            trim = min(max(trims.get(name, 0.0), low), high)
+    for coefficient in motion.coefficients:
+        for name in covers.excited(list(covers.ranges)):
+            low, high = covers.ranges[name]
+            trim = covers.trim(name)
 
             def add(cells: int, memory: Memory | None = None) -> None:
-                found.append(Shape(coefficient, name, low, high, cells, trim, memory))  # noqa: B023
+                found.append(Shape(coefficient.name, name, low, high, cells, trim, memory))  # noqa: B023
 
-            if high <= low:
-                continue
-            if name == "alpha_dot_hat":
-                if coefficient == "Cm":  # lift over its own alpha' is an implicit equation
+            if name == motion.flow_rate:
+                if (
+                    coefficient.name != motion.implicit[0]
+                ):  # over the rate that it drives is an implicit equation
                     add(CELLS)
                 continue
             add(CELLS)
+            if name in (s.name for s in motion.known_signals):
+                continue
             for time_s in _LAGS_S:
                 add(0, Memory("lag", time_s))
             for hz in _MODES_HZ:
                 if hz < highest_hz:
                     add(0, _mode(hz))
-            if name == "alpha":
+            if name == motion.flow:
                 for time_s in _SLOW_S:
                     add(CELLS, Memory("lag", time_s))
                 for share in _PLAYS:
                     play = Memory("play", half_width=share * (high - low))
                     add(0, play)
                     add(CELLS, play)
-                found += _relays(coefficient, low, high, trim)
-    found += _over_pressure_and_pairs(records, ranges, trims)
-    of_readings = [*_of_readings(ranges, trims, highest_hz), *_of_a_changing_lag(records, trims)]
-    measured = dict(zip(READINGS, problem.settings.measured, strict=True))
+                found += _relays(coefficient.name, name, low, high, trim)
+    found += _over_pressure_and_pairs(covers)
+    of_readings = [*_of_readings(covers, highest_hz), *_of_a_changing_lag(covers)]
+    measured = dict(zip(motion.output_channels, problem.settings.measured, strict=True))
     return found + [shape for shape in of_readings if measured[shape.acts_on]]
 
 
-def _relays(coefficient: Literal["CL", "Cm"], low: float, high: float, trim: float) -> Iterator[Shape]:
-    """Steps behind a play of the angle of attack: what switches on at one angle and off at a smaller one."""
+def _relays(coefficient: str, flow: str, low: float, high: float, trim: float) -> Iterator[Shape]:
+    """Steps behind a play of the flow angle: what switches on at one angle and off at a smaller one."""
     for share in _RELAYS:
         play = Memory("play", half_width=share * (high - low))
         for cell in range(STEPS):
-            yield Shape(coefficient, "alpha", low, high, STEPS, trim, play, step_cell=cell)
+            yield Shape(coefficient, flow, low, high, STEPS, trim, play, step_cell=cell)
 
 
 def _finer_steps(shape: Shape) -> Iterator[Shape]:
@@ -159,83 +208,61 @@ def _finer_steps(shape: Shape) -> Iterator[Shape]:
             yield replace(shape, cells=cells, step_cell=k, memory=play)
 
 
-def _over_pressure_and_pairs(
-    records: Sequence[TraceRecord], ranges: Mapping[str, tuple[float, float]], trims: Mapping[str, float]
-) -> Iterator[Shape]:
-    """Coefficients over the dynamic pressure, and derivatives over the angle of attack and the dynamic pressure.
+def _over_pressure_and_pairs(covers: _Flown) -> Iterator[Shape]:
+    """Coefficients over the dynamic pressure, and derivatives over an angle and the dynamic pressure.
 
-    The derivative in alpha over alpha is the coefficient over alpha, which is tried without a factor.
+    The angle is the flow angle, or a known one. The derivative in the flow angle over itself is the coefficient over it, which
+    is tried without a factor.
     """
-    pressure = _range(records, "qbar")
-    middle = 0.5 * (pressure[0] + pressure[1])
-    varies = pressure[1] - pressure[0] > _LEAST_PRESSURE * middle
-    low, high = ranges["alpha"]
-    trim = min(max(trims["alpha"], low), high)
-    excited = [name for name in FACTORS if ranges[name][1] > ranges[name][0]]
-    for coefficient in _COEFFICIENTS:
-        if varies:
-            yield Shape(coefficient, "qbar", *pressure, CELLS, middle)
-        for name in excited:
-            by = (name, trims.get(name, 0.0))
-            if name != "alpha" and high > low:
-                yield Shape(coefficient, "alpha", low, high, CELLS, trim, None, *by)
-            if varies:
-                yield Shape(coefficient, "qbar", *pressure, CELLS, middle, None, *by)
+    motion = covers.motion
+    over = covers.excited([s.name for s in motion.known_signals] or [motion.flow])
+    for coefficient in (c.name for c in motion.coefficients):
+        if covers.varies:
+            yield Shape(coefficient, QBAR, *covers.pressure, CELLS, covers.middle)
+        for name in covers.excited(factors_of(motion)):
+            by = (name, covers.trims.get(name, 0.0))
+            for angle in over:
+                if name != angle:
+                    yield Shape(
+                        coefficient, angle, *covers.ranges[angle], CELLS, covers.trim(angle), None, *by
+                    )
+            if covers.varies:
+                yield Shape(coefficient, QBAR, *covers.pressure, CELLS, covers.middle, None, *by)
 
 
-def _of_readings(
-    ranges: Mapping[str, tuple[float, float]], trims: Mapping[str, float], highest_hz: float
-) -> Iterator[Shape]:
-    """A curve and a friction of the vane, a gyro that feels the load, and modes of the structure at gyro and accelerometer.
+def _of_readings(covers: _Flown, highest_hz: float) -> Iterator[Shape]:
+    """A curve and a friction of the vane, gyros that feel the load, and modes of the structure at gyros and accelerometer.
 
-    The load factor follows the angle of attack, so that the gyro's increment is a function of it.
+    The load factor follows the flow angle, so that the increment of a gyro is a function of it.
     """
-    for name in ("alpha", "elevator", "qhat"):
-        low, high = ranges[name]
-        if high <= low:
-            continue
-        trim = min(max(trims.get(name, 0.0), low), high)
-        if name == "alpha":
-            yield Shape("alpha_rad", name, low, high, CELLS, trim)
-            yield Shape("q_rad_s", name, low, high, CELLS, trim)
+    outputs = covers.motion.outputs
+    vane = next(y.channel for y in outputs if y.instrument == "vane")
+    for name in covers.excited(factors_of(covers.motion)):
+        low, high = covers.ranges[name]
+        trim = covers.trim(name)
+        if name == covers.motion.flow:
+            for channel in (vane, *(y.channel for y in outputs if y.instrument == "gyro")):
+                yield Shape(channel, name, low, high, CELLS, trim)
             for share in _PLAYS:
-                yield Shape(
-                    "alpha_rad", name, low, high, 0, trim, Memory("play", half_width=share * (high - low))
-                )
-        for channel in _SENSED:
+                yield Shape(vane, name, low, high, 0, trim, Memory("play", half_width=share * (high - low)))
+        for channel in (y.channel for y in outputs if y.instrument in _SENSED):
             for hz in _STRUCTURE_HZ:
                 if hz < highest_hz:
                     yield Shape(channel, name, low, high, 0, trim, _mode(hz))
 
 
-def _of_a_changing_lag(records: Sequence[TraceRecord], trims: Mapping[str, float]) -> Iterator[Shape]:
+def _of_a_changing_lag(covers: _Flown) -> Iterator[Shape]:
     """A lag of the vane over the dynamic pressure: a vane turns into the wind the faster, the faster the wind is."""
-    low, high = _range(records, "qbar")
-    middle = 0.5 * (low + high)
-    if high - low > _LEAST_PRESSURE * middle:
+    vane = next(y.channel for y in covers.motion.outputs if y.instrument == "vane")
+    flow = covers.motion.flow
+    if covers.varies:
         for time_s in _SENSOR_LAGS_S:
             memory = Memory("lag", time_s)
-            yield Shape("alpha_rad", "qbar", low, high, CELLS, middle, memory, "alpha", trims["alpha"])
+            yield Shape(vane, QBAR, *covers.pressure, CELLS, covers.middle, memory, flow, covers.trims[flow])
 
 
 def _mode(hz: float) -> Memory:
     return Memory("mode", 1.0 / (2.0 * np.pi * hz), _MODE_DAMPING)
-
-
-def flown(record: TraceRecord, signal: str) -> Array:
-    """(samples,) measured values of a signal of a term, see `airtruth.physics.terms.SIGNALS`."""
-    s, chord = record.signals, record.plant.aircraft.constants.chord_m
-    alpha = s.y[:, 0] - record.plant.alpha_shift_rad
-    if signal == "alpha":
-        return alpha
-    if signal == "elevator":
-        return s.sampled_elevator_rad
-    if signal == "qbar":
-        return np.asarray(0.5 * s.density_kg_m3 * s.airspeed_m_s**2)[:: s.sub]
-    half = 0.5 * chord / s.airspeed_m_s[:: s.sub]
-    if signal == "qhat":
-        return np.asarray(s.y[:, 1] * half)
-    return smooth_rate(alpha, _RATE_S, s.dt_s) * half
 
 
 def _range(records: Sequence[TraceRecord], signal: str) -> tuple[float, float]:
@@ -331,7 +358,6 @@ __all__ = [
     "Screened",
     "best_prior",
     "covered",
-    "flown",
     "log_evidences",
     "screen",
     "shapes",

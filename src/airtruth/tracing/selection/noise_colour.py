@@ -25,14 +25,14 @@ from airtruth.tracing.inference.posterior import (
     sensitivities_of,
 )
 from airtruth.tracing.inference.whitening import NO_WHITENER
-from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
+from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.direction import eliminated
 
 Array = NDArray[np.float64]
 
 LEVEL: Final = 1e-9
-"""Significance level of the three scores together [-] (judgement: half of the variance correlated over 80 ms scores 8 to
+"""Significance level of the scores of all outputs together [-] (judgement: half of the variance correlated over 80 ms scores 8 to
 17 standard deviations in four records of some seconds; a model error scores too, and less correlated noise than that does no
 harm as white noise)."""
 TYPICAL: Final = 0.3
@@ -41,11 +41,9 @@ the mean of 37 flights of one or two fitted records."""
 _LATER: Final = 2.0 / 3.0
 """Share of the typical score that is enough beside accepted effects [-] (judgement)."""
 LATER_LEVEL: Final = 5e-4
-"""Largest significance level of the three scores together beside accepted effects [-] (judgement)."""
+"""Largest significance level of the scores of all outputs together beside accepted effects [-] (judgement)."""
 FIRST_SHARE: Final = 0.2
 """Share of correlated noise at which a search begins [-] (judgement; at zero the correlation time has no effect)."""
-SHARES: Final = np.r_[SHORT_PERIOD.common.colour_shares]
-"""Indices of the shares among the common parameters."""
 
 
 def with_coloured_noise(case: Case) -> tuple[Case, Parameters]:
@@ -60,17 +58,17 @@ def _diverges_nearby(case: Case, null: PosteriorFit) -> bool:
     return not null.converged and fit(case.fitted, null.hypothesis, null.point, iterations=0) is None
 
 
-def later_level(samples: int) -> float:
-    """Significance level of the three scores together beside accepted effects [-].
+def later_level(samples: int, outputs: int) -> float:
+    """Significance level of the scores of all outputs together beside accepted effects [-].
 
     The limit of a score is two thirds of the typical one. A short record cannot reach the limit of `LEVEL`, and intervals under
     white noise are then too narrow. From 953 samples on the level is `LEVEL`, because a model error scores too.
 
     Parameters
     ----------
-    samples : of all fitted records.
+    samples : of all fitted records; outputs : number of outputs.
     """
-    level = len(SHARES) * float(norm.sf(_LATER * TYPICAL * np.sqrt(samples)))
+    level = outputs * float(norm.sf(_LATER * TYPICAL * np.sqrt(samples)))
     return min(max(level, LEVEL), LATER_LEVEL)
 
 
@@ -80,7 +78,7 @@ def beside(case: Case, null: PosteriorFit, level: float = LEVEL) -> tuple[Case, 
     Parameters
     ----------
     null : a fit of the case without correlated noise.
-    level : significance level of the three scores together [-].
+    level : significance level of the scores of all outputs together [-].
     """
     problem, hypothesis = case.fitted, null.hypothesis
     if not problem.settings.noise_is_declared:
@@ -88,10 +86,10 @@ def beside(case: Case, null: PosteriorFit, level: float = LEVEL) -> tuple[Case, 
     settings = replace(problem.settings, coloured=True)
     slow = replace(problem, settings=settings)
     z = scores(slow, null)
-    if not (norm.sf(z) < level / len(SHARES)).any():
+    if not (norm.sf(z) < level / len(z)).any():
         return case, null.point
     common = null.point.common.copy()
-    common[SHARES] = np.where(z > 0.0, FIRST_SHARE, 0.0)
+    common[slow.layout.common.colour_shares] = np.where(z > 0.0, FIRST_SHARE, 0.0)
     again = fit(slow, hypothesis, replace(null.point, common=common))
     entries = slow.layout.common
     if (
@@ -105,7 +103,7 @@ def beside(case: Case, null: PosteriorFit, level: float = LEVEL) -> tuple[Case, 
 
 
 def scores(problem: TraceProblem, null: PosteriorFit) -> Array:
-    """(3,) signed roots of the score of each sensor's share, every parameter but the other shares refitted.
+    """(outputs,) signed roots of the score of each sensor's share, every parameter but the other shares refitted.
 
     Parameters
     ----------
@@ -116,20 +114,21 @@ def scores(problem: TraceProblem, null: PosteriorFit) -> Array:
 
 
 def share_slopes(problem: TraceProblem, null: PosteriorFit) -> tuple[Array, Array]:
-    """Slope (3,) of the cost in the shares and their information (3, 3), every other parameter refitted.
+    """Slope (outputs,) of the cost in the shares and their information (outputs, outputs), every other parameter refitted.
 
     Parameters
     ----------
     problem, null : as of `scores`.
     """
+    shares = np.r_[problem.layout.common.colour_shares]
     sensitivities = [
         sensitivities_of(problem, i, null.hypothesis, null.point) for i in range(len(problem.records))
     ]
     if any(t is None for t in sensitivities):
-        return np.zeros(len(SHARES)), np.eye(len(SHARES))
+        return np.zeros(len(shares)), np.eye(len(shares))
     pieces = [likelihood_terms(t, NO_WHITENER, levels=True) for t in sensitivities if t is not None]
-    held = tuple(i for i in null.point.at_bounds if i not in SHARES)
+    held = tuple(i for i in null.point.at_bounds if i not in shares)
     gradient, information, _ = marginal_information(
         problem.priors(null.hypothesis), null.point, pieces, levels=True, fixed=held
     )
-    return eliminated(gradient, information, SHARES)
+    return eliminated(gradient, information, shares)

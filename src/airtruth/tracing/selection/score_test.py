@@ -22,6 +22,7 @@ from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import NO_WHITENER, Whitener
 from airtruth.tracing.model.response import respond
 from airtruth.tracing.selection.direction import Direction, change_along, extended_by, with_freedoms
+from airtruth.tracing.selection.flown import flown
 
 Array = NDArray[np.float64]
 
@@ -91,8 +92,8 @@ def directions(effect: Effect, null: PosteriorFit, problem: TraceProblem) -> lis
     rest = tuple(p.size(float(np.sqrt(p.low * p.high))) for p in others[1:])
     low, high = location.low, location.high
     if location.unit == "rad":
-        alpha = np.concatenate([r.signals.y[:, 0] - r.plant.alpha_shift_rad for r in problem.records])
-        first_seen, last_seen = np.quantile(alpha, _QUANTILES)
+        angle = np.concatenate([flown(r, problem.layout.motion.flow) for r in problem.records])
+        first_seen, last_seen = np.quantile(angle, _QUANTILES)
         if max(first_seen, low) < min(last_seen, high):
             low, high = max(first_seen, low), min(last_seen, high)
         grid = np.linspace(low, high, LOCATIONS)

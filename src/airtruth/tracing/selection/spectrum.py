@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from airtruth.tracing.model.compile import CHANNELS
 from airtruth.tracing.selection.anomaly import Anomaly
 
 Array = NDArray[np.float64]
@@ -24,7 +23,7 @@ _LOWEST_HZ: Final = 1.0
 """Lowest frequency of the spectral test [Hz]; gust level, biases and correlated noise are free below (judgement)."""
 
 
-def lines(residuals: Sequence[Array], dt_s: Sequence[float]) -> Anomaly:
+def lines(residuals: Sequence[Array], dt_s: Sequence[float], channels: Sequence[str]) -> Anomaly:
     """Test the power of the innovations in bands: a lightly damped mode raises it in one.
 
     Each channel is whitened by an autoregression of first order, which absorbs the colour of a sensor's noise. A
@@ -32,14 +31,15 @@ def lines(residuals: Sequence[Array], dt_s: Sequence[float]) -> Anomaly:
 
     Parameters
     ----------
-    residuals : of each record (samples, 3).
+    residuals : of each record (samples, channels).
     dt_s : of each record [s].
+    channels : names.
     """
     residuals = _whitened(residuals)
     top = 0.5 / max(dt_s)
     edges = np.arange(_LOWEST_HZ, top + 1e-9, _BAND_HZ)
     bands = max(len(edges) - 1, 0)
-    power, degrees = np.zeros((bands, 3)), np.zeros(bands)
+    power, degrees = np.zeros((bands, len(channels))), np.zeros(bands)
     square = np.maximum(np.mean(np.concatenate(residuals) ** 2, axis=0), 1e-300)
     for r, dt in zip(residuals, dt_s, strict=True):
         f = np.fft.rfftfreq(len(r), dt)
@@ -50,18 +50,18 @@ def lines(residuals: Sequence[Array], dt_s: Sequence[float]) -> Anomaly:
             degrees[b] += 2.0 * np.count_nonzero(inside)
     seen = degrees > 0.0
     if not seen.any():
-        return Anomaly(CHANNELS[0], 0.0, 1, 1.0)
+        return Anomaly(channels[0], 0.0, 1, 1.0)
     p = np.ones_like(power)
     p[seen] = chi2.sf(power[seen], degrees[seen][:, None])
     excess = np.sqrt(2.0 * power) - np.sqrt(2.0 * degrees)[:, None]
     # among p-values that underflow to zero, the band with the most power
     b, channel = divmod(int(np.lexsort((-excess.ravel(), p.ravel()))[0]), p.shape[1])
-    where = f"{CHANNELS[channel]} at {edges[b]:.1f} to {edges[b + 1]:.1f} Hz"
+    where = f"{channels[channel]} at {edges[b]:.1f} to {edges[b + 1]:.1f} Hz"
     return Anomaly(
         where,
         float(power[b, channel]),
         int(degrees[b]),
-        min(1.0, 3.0 * int(np.count_nonzero(seen)) * float(p[b, channel])),
+        min(1.0, float(len(channels)) * int(np.count_nonzero(seen)) * float(p[b, channel])),
     )
 
 

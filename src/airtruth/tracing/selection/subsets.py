@@ -94,7 +94,7 @@ class _Quadratic:
         for i, own_sizes in zip(chosen, every, strict=True):
             own_sizes[0] = np.clip(own_sizes[0], *self.effects[i].parameters[0].reach)
         effects = tuple(self.effects[i] for i in chosen)
-        start = Parameters(common, per_record, np.concatenate(every))
+        start = Parameters(common, per_record, np.concatenate(every), entries)
         return Subset(effects, start, cost)
 
 

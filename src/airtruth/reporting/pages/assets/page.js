@@ -196,8 +196,10 @@
     for (const plot of plots) plot.destroy();
     plots = [];
     plotsBox.textContent = "";
-    const solid = { label: "elevator", stroke: () => shade("ink"), width: 1.1, points: { show: false } };
-    plotOf("elevator [deg]", 92, [solid], [time, numbers(record.elevator)], 0, false);
+    data.controls.forEach((control, i) => {
+      const solid = { label: control, stroke: () => shade("ink"), width: 1.1, points: { show: false } };
+      plotOf(`${control} [deg]`, 92, [solid], [time, numbers(record.controls[i])], 0, false);
+    });
     data.channels.forEach((channel, i) => {
       const measured = numbers(record.measured[i]);
       const models = record.models.map((own) => numbers(own[i]));

@@ -1,0 +1,97 @@
+"""What the compiled filter reads of the lateral-directional motion: its aircraft, and its inputs along a record."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class LateralAircraft(NamedTuple):
+    """The declared aircraft with its changes of declared quantities.
+
+    The forces of the air are a sum of tables, one for each signal of the motion (beta, phat, rhat, aileron, rudder), each over
+    the angle of attack and its signal.
+
+    Attributes
+    ----------
+    area_m2, span_m, chord_m : reference area [m2], span and chord [m].
+    mass_kg : mass [kg].
+    inertia_xx_kg_m2, inertia_yy_kg_m2, inertia_zz_kg_m2, inertia_xz_kg_m2 : moments and product of inertia [kg m2].
+    trim : (signals,) values about which increments of derivatives count [rad, -].
+    neutral_rad : (controls,) deflections about which a deflection is scaled [rad]; effectiveness : (controls,) that scale [-].
+    cg_shift, cg_y_m : CG aft of the declared one [chords], and to the right of it [m].
+    yaw_moment_n_m : of an asymmetric thrust, nose right [N m].
+    constant : (alpha, 3) Y [N], L and N [N m] that the dynamic pressure leaves alone.
+    increments : (15,) of the derivatives, in the order of the motion [-].
+    alpha_rad : (alpha,) axis of the tables [rad].
+    points : (signals, points) axis of each signal, ascending [rad, -].
+    values : (signals, alpha, points, 3) Y [m2], L and N [m3] of the air over the dynamic pressure.
+    """
+
+    area_m2: float
+    span_m: float
+    chord_m: float
+    mass_kg: float
+    inertia_xx_kg_m2: float
+    inertia_yy_kg_m2: float
+    inertia_zz_kg_m2: float
+    inertia_xz_kg_m2: float
+    trim: Array
+    neutral_rad: Array
+    effectiveness: Array
+    cg_shift: float
+    cg_y_m: float
+    yaw_moment_n_m: float
+    constant: Array
+    increments: Array
+    alpha_rad: Array
+    points: Array
+    values: Array
+
+
+class LateralPoint(NamedTuple):
+    """Known inputs at one time.
+
+    Attributes
+    ----------
+    aileron_rad, rudder_rad : surfaces that the air sees [rad].
+    airspeed_m_s, ground_m_s : speed through the air, and without the gust along the path [m/s].
+    qbar_pa : dynamic pressure [Pa].
+    alpha_rad, theta_rad : angle of attack and pitch attitude [rad]; q_rad_s : pitch rate [rad/s].
+    side, roll, yaw : increments of CY, Cl and Cn [-].
+    """
+
+    aileron_rad: float
+    rudder_rad: float
+    airspeed_m_s: float
+    ground_m_s: float
+    qbar_pa: float
+    alpha_rad: float
+    theta_rad: float
+    q_rad_s: float
+    side: float
+    roll: float
+    yaw: float
+
+
+class LateralGrid(NamedTuple):
+    """The inputs of `LateralPoint` on the filter's grid, (points,) each."""
+
+    aileron_rad: Array
+    rudder_rad: Array
+    airspeed_m_s: Array
+    ground_m_s: Array
+    qbar_pa: Array
+    alpha_rad: Array
+    theta_rad: Array
+    q_rad_s: Array
+    side: Array
+    roll: Array
+    yaw: Array
+
+
+__all__ = ["LateralAircraft", "LateralGrid", "LateralPoint"]
