@@ -61,7 +61,7 @@ class Derivatives:
         if at.size == 0:
             return
         white = self.base.white
-        t = slopes.e @ white.T
+        t = (slopes.e.reshape(-1, len(white)) @ white.T).reshape(slopes.e.shape)
         lost = np.abs(t).max(axis=(1, 2)) * step >= _DIVERGED
         t[lost] = np.nan
         self.t[at], self.w[at] = t, white @ slopes.covariance @ white.T

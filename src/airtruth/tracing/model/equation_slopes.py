@@ -13,8 +13,6 @@ from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.model.compile import CompiledChange
 from airtruth.tracing.model.equations import (
     ALPHA_DOT,
-    PLAY,
-    PLAY_S,
     READING,
     Signals,
     air_alpha,
@@ -22,13 +20,11 @@ from airtruth.tracing.model.equations import (
     effective_elevator,
     gust,
     rates,
-    shape,
-    signal_of,
     terms,
 )
-from airtruth.tracing.model.kernel_input import AircraftArrays, AirPoint, EffectArrays, FilterModel
+from airtruth.tracing.model.kernel_input import AircraftArrays, AirPoint, FilterModel
 from airtruth.tracing.model.parameters import CORE, GUST_1, LEAD, OUTPUTS, SHORT_PERIOD
-from airtruth.tracing.model.plant import Plant
+from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.slopes import (
     INERTIA,
     LOG_GUST,
@@ -41,6 +37,7 @@ from airtruth.tracing.model.slopes import (
     SlopeWork,
     register_slopes,
 )
+from airtruth.tracing.model.term_slopes import add_term, effect_slopes, reading_slopes
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
@@ -137,72 +134,6 @@ def _look_up(
 
 
 @inner
-def _shape_slope(number: int, s: float) -> float:
-    """Slope of `airtruth.physics.terms.numbered_shape`."""
-    if number == 1:
-        return 2.0 * s
-    if number == 2:
-        return 1.0 if s > 0.0 else 0.0
-    if number == 3:
-        return 1.0 if s < 0.0 else 0.0
-    return 1.0
-
-
-@inner
-def _add(by: float, d: Array, row: Array) -> None:
-    for p in range(row.size):
-        row[p] += by * d[p]
-
-
-@inner
-def _add_signal(number: int, by: float, work: SlopeWork, row: Array) -> None:
-    """Add a multiple of the derivatives of a signal; the surface and the dynamic pressure are known inputs."""
-    if number == 0:
-        _add(by, work.alpha, row)
-    elif number == 2:
-        _add(by, work.qhat, row)
-    elif number == ALPHA_DOT:
-        _add(by, work.alpha_dot_hat, row)
-
-
-@inner
-def _add_term(
-    t: int,
-    x: Array,
-    d_x: Array,
-    signals: Signals,
-    effects: EffectArrays,
-    feedback: float,
-    by_alpha: float,
-    work: SlopeWork,
-) -> None:
-    """Add the derivatives of a term of CL or Cm.
-
-    Parameters
-    ----------
-    feedback : loss of alpha_dot_hat by a unit of CL [-]; by_alpha : its slope in alpha.
-    """
-    number, state, factor = effects.term_index[t, 1], effects.term_index[t, 3], effects.term_index[t, 4]
-    amplitude, of_lift = effects.amplitude[t], effects.term_index[t, 0] == 0
-    raw = x[state] if state >= 0 else signal_of(signals, number)
-    loop = 1.0
-    if number == ALPHA_DOT and of_lift:
-        loop = 1.0 / (1.0 + amplitude * feedback)
-    s = raw * loop - effects.origin[t]
-    weight = signal_of(signals, factor) - effects.factor_origin[t] if factor >= 0 else 1.0
-    bent = amplitude * _shape_slope(effects.term_index[t, 2], s) * weight
-    row = work.lift if of_lift else work.moment
-    if state >= 0:
-        _add(bent, d_x[state], row)
-    else:
-        _add_signal(number, bent * loop, work, row)
-        if loop != 1.0:
-            _add(-bent * raw * loop * loop * amplitude * by_alpha, work.alpha, row)
-    if factor >= 0:
-        _add_signal(factor, amplitude * shape(effects.term_index[t, 2], s), work, row)
-
-
-@inner
 def _all_terms(
     x: Array,
     d_x: Array,
@@ -228,7 +159,7 @@ def _all_terms(
                 work.alpha_dot_hat[p] *= half
         for t in range(effects.amplitude.size):
             if effects.term_index[t, 0] < READING and (effects.term_index[t, 1] == ALPHA_DOT) == (turn == 1):
-                _add_term(t, x, d_x, turned, effects, loss * math.cos(alpha), -loss * math.sin(alpha), work)
+                add_term(t, x, d_x, turned, effects, loss * math.cos(alpha), -loss * math.sin(alpha), work)
 
 
 @inner
@@ -325,34 +256,6 @@ def _turning(
 
 
 @inner
-def _effect_slopes(half: float, d_x: Array, model: FilterModel, slope: Array, work: SlopeWork) -> None:
-    """Derivatives of the rates of the effects' states."""
-    effects = model.effects
-    if effects.time_s.size > 0:
-        for p in range(work.lift.size):
-            work.alpha_dot_hat[p] = half * slope[0, p]
-    for k in range(effects.time_s.size):
-        at, signal, wn = model.states.effect[k], effects.state_index[k, 1], 1.0 / effects.time_s[k]
-        row = slope[at]
-        for p in range(row.size):
-            row[p] = 0.0
-        if effects.state_index[k, 0] == PLAY:
-            _add_signal(signal, 1.0 / PLAY_S, work, row)
-            _add(-1.0 / PLAY_S, d_x[at], row)
-        elif effects.state_index[k, 0] == 0:
-            _add_signal(signal, wn, work, row)
-            _add(-wn, d_x[at], row)
-        else:
-            _add(1.0, d_x[at + 1], row)
-            row = slope[at + 1]
-            for p in range(row.size):
-                row[p] = 0.0
-            _add_signal(signal, wn * wn, work, row)
-            _add(-wn * wn, d_x[at], row)
-            _add(-2.0 * effects.damping[k] * wn, d_x[at + 1], row)
-
-
-@inner
 def _gust_slopes(v: float, d_x: Array, model: FilterModel, slope: Array) -> None:
     """Derivatives of the rates of the gusts, but for the late gust and the low-passed copies."""
     a = v / model.gusts.length_m
@@ -404,48 +307,8 @@ def longitudinal_rate_slopes(
     slope[1, column[INERTIA]] -= out[1] / moved.inertia
     slope[motion, column[THRUST]] += f.z_thrust / mass
     _gust_slopes(v, d_x, model, slope)
-    _effect_slopes(half, d_x, model, slope, work)
+    effect_slopes(half, d_x, model, slope, work)
     return az
-
-
-@inner
-def _add_reading(
-    t: int, x: Array, d_x: Array, signals: Signals, model: FilterModel, work: SlopeWork, row: Array
-) -> None:
-    """Add the derivatives of an increment of a reading."""
-    effects = model.effects
-    number, state, behind = effects.term_index[t, 1], effects.term_index[t, 3], effects.term_index[t, 5]
-    s = (x[state] if state >= 0 else signal_of(signals, number)) - effects.origin[t]
-    weight = 1.0
-    if behind >= 0:
-        driver, own = effects.state_index[behind, 1], model.states.effect[behind]
-        weight = x[own] - signal_of(signals, driver)
-        value = effects.amplitude[t] * shape(effects.term_index[t, 2], s)
-        _add(value, d_x[own], row)
-        _add_signal(driver, -value, work, row)
-    by = effects.amplitude[t] * _shape_slope(effects.term_index[t, 2], s) * weight
-    if state >= 0:
-        _add(by, d_x[state], row)
-    else:
-        _add_signal(number, by, work, row)
-
-
-@inner
-def _reading_slopes(
-    x: Array, d_x: Array, at: AirPoint, model: FilterModel, out: Array, work: SlopeWork
-) -> None:
-    """Add the derivatives of the increments of the readings, which take q c/(2V) of the body and no alpha'."""
-    half, effects = 0.5 * model.aircraft.chord_m / at.airspeed_m_s, model.effects
-    if effects.amplitude.size == 0:
-        return
-    for p in range(out.shape[1]):
-        work.qhat[p], work.alpha_dot_hat[p] = half * d_x[1, p], 0.0
-    alpha = air_alpha(x, gust(x, model.gusts.rolloff), model.gusts.level_m_s, at)
-    surface = effective_elevator(at.elevator_rad, model.aircraft)
-    signals = Signals(alpha, surface, x[1] * half, 0.0, at.qbar_pa)
-    for t in range(effects.amplitude.size):
-        if effects.term_index[t, 0] >= READING:
-            _add_reading(t, x, d_x, signals, model, work, out[effects.term_index[t, 0] - READING])
 
 
 @inner
@@ -472,23 +335,26 @@ def longitudinal_output_slopes(
         out[2, p] = slope[motion, p] - ahead * slope[1, p]
     out[0, column[MOUNTING]] -= x[1] / v * moved.mounting_m
     out[2, column[MOUNTING]] -= rate[1] * moved.mounting_m
-    _reading_slopes(x, d_x, at, model, out, work)
+    reading_slopes(x, d_x, at, model, out, work)
     for i in range(OUTPUTS):
         if scale[i] != 1.0:
             for p in range(out.shape[1]):
                 out[i, p] *= scale[i]
 
 
-def pack_moves(plant: Plant, compiled: CompiledChange, common: Array, rolloff: float) -> AircraftMoves:
+def pack_moves(record: TraceRecord, compiled: CompiledChange, common: Array, rolloff: float) -> AircraftMoves:
     """What the parameters move of `airtruth.tracing.model.response.pack_aircraft`."""
     entries, moment, unit = SHORT_PERIOD.common, LONGITUDINAL.row("Cm"), np.eye(CORE)
+    plant = record.pitch_plant
+    upward = np.array([gust(row, 0.0) for row in unit])
+    lead = np.array([gust(row, 1.0) for row in unit]) - upward
     return AircraftMoves(
         inertia=1.0 + float(common[entries.inertia]),
         turned=plant.derivatives[moment] + common[moment],
         engine=np.zeros_like(plant.constant) + plant.engine,
         mounting_m=compiled.declared["cg"] * plant.aircraft.constants.chord_m,
-        upward=np.array([gust(row, rolloff) for row in unit]),
-        lead=np.array([gust(row, 1.0) - gust(row, 0.0) for row in unit]),
+        upward=upward + rolloff * lead,
+        lead=lead,
     )
 
 

@@ -74,16 +74,17 @@ _NOT_KEPT: Final = path_of(0, 0, 1)
 """The path of a flight of which innovations alone are wanted."""
 
 
-def initial_state(given: KernelInput) -> Array:
+def initial_state(given: KernelInput, start: Array) -> Array:
     """The stated start; the gust at the tail and its copies, and the effects' states, in equilibrium with it."""
     model = given.model
     x = np.zeros(model.states.size)
     states = equations_of(model).states
-    x[: given.start.size] = given.start
-    x[lead_of(states) : core_of(states)] = given.start[states]
-    x[given.start.size] = gust(x, model.gusts.rolloff)
-    at = type(given.reference)(*(column[0] for column in given.grid))
-    equations_of(model).settle(x, at, model)
+    x[: start.size] = start
+    x[lead_of(states) : core_of(states)] = start[states]
+    x[start.size] = gust(x, model.gusts.rolloff)
+    if model.effects.time_s.size:
+        at = type(given.reference)(*(column[0] for column in given.grid))
+        equations_of(model).settle(x, at, model)
     return x
 
 
@@ -304,7 +305,7 @@ def innovations(
     """
     steps = steps_of(given.model, given.dt_s, given.sub)
     work = work_of(given.model)
-    sound, more = _innovations(given, steps, work, initial_state(given), steady, e, path)
+    sound, more = _innovations(given, steps, work, initial_state(given, given.start), steady, e, path)
     return bool(sound), float(more)
 
 

@@ -16,29 +16,23 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airtruth.numerics.compiled import allocating, inner
+from airtruth.numerics.compiled import allocating
 from airtruth.numerics.discretise import DOUBLINGS, congruence, multiply, riccati, step, whitener
-from airtruth.tracing.model.by_motion import output_count, outputs, state_count
+from airtruth.tracing.model.by_motion import state_count
 from airtruth.tracing.model.corners import (
-    STEP_RAD,
     corrected,
     drive_sensors,
-    moved_surface,
     spread_of,
 )
-from airtruth.tracing.model.equations import gust
 from airtruth.tracing.model.kernel_input import AirPoint, FilterModel
+from airtruth.tracing.model.linear_slopes import Linear, linear_slopes
 from airtruth.tracing.model.linearise import (
-    LEAST_MOVE,
     FirstUpdate,
     add_sensors,
     covariance_of,
     first_update,
-    half_width,
     update_gain,
 )
-from airtruth.tracing.model.parameters import CORE, GUST_1, LEAD
-from airtruth.tracing.model.slopes import LOG_GUST, ROLLOFF, SlopeWork, output_slopes, rate_slopes, slope_work
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -80,150 +74,10 @@ class Conditions(NamedTuple):
     c: Array
 
 
-class _Linear(NamedTuple):
-    """Linearisation of the motion, and its slopes in the columns behind those of the states.
-
-    Attributes
-    ----------
-    a, c : (motion, motion), (outputs, motion); input, direct : (motion,), (outputs,) slopes in the surface.
-    d_a, d_c, d_input, d_direct : the same with a last axis of columns.
-    """
-
-    a: Array
-    c: Array
-    input: Array
-    direct: Array
-    d_a: Array
-    d_c: Array
-    d_input: Array
-    d_direct: Array
-
-
-class _Ends(NamedTuple):
-    """Rates (2, states), outputs, and their slopes at both ends of a difference, in the states and then the movers.
-
-    Attributes
-    ----------
-    unit, column : derivatives of the states, and numbers of the movers, along the last axis.
-    """
-
-    unit: Array
-    column: Ints
-    rate: Array
-    y: Array
-    slope: Array
-    out: Array
-
-
-@inner
-def _at_end(
-    side: int, x: Array, at: AirPoint, model: FilterModel, aircraft: Any, ends: _Ends, work: SlopeWork
-) -> None:
-    rate, slope = ends.rate[side], ends.slope[side]
-    az = rate_slopes(x, ends.unit, at, model, aircraft, ends.column, rate, slope, work)
-    output_slopes(x, ends.unit, rate, slope, at, model, aircraft, ends.column, ends.out[side], work)
-    outputs(x, ends.rate[side], az, at, model, ends.y[side])
-
-
-@allocating
-def _linear(
-    x: Array, at: AirPoint, model: FilterModel, aircraft: Any, columns: int, with_input: bool
-) -> _Linear:
-    """Linearisation about a state by the differences of `airtruth.tracing.model.linearise.linearise`, and its slopes.
-
-    The half width in a gust depends on the level and the rolloff, and the difference with it where the tables bend.
-    """
-    motion, count, wide = model.states.motion, output_count(model), model.states.motion + columns
-    ends = _Ends(
-        np.zeros((x.size, wide)),
-        motion + np.arange(columns),
-        np.zeros((2, x.size)),
-        np.zeros((2, count)),
-        np.zeros((2, motion + 1, wide)),
-        np.zeros((2, count, wide)),
-    )
-    for i in range(motion):
-        ends.unit[i, i] = 1.0
-    work = slope_work(wide)
-    made = _Linear(
-        np.zeros((motion, motion)),
-        np.zeros((count, motion)),
-        np.zeros(motion),
-        np.zeros(count),
-        np.zeros((motion, motion, columns)),
-        np.zeros((count, motion, columns)),
-        np.zeros((motion, columns)),
-        np.zeros((count, columns)),
-    )
-    for j in range(motion + (1 if with_input else 0)):
-        h, middle = STEP_RAD, 0.0
-        if j < motion:
-            h, middle = half_width(j, at, model), x[j]
-        for side in range(2):
-            sign = h if side == 0 else -h
-            if j < motion:
-                x[j] = middle + sign
-            moved = moved_surface(at, sign if j == motion else 0.0)
-            _at_end(side, x, moved, model, aircraft, ends, work)
-        if j == motion:
-            for i in range(motion):
-                made.input[i] = (ends.rate[0, i] - ends.rate[1, i]) / (2.0 * h)
-                for q in range(columns):
-                    made.d_input[i, q] = (ends.slope[0, i, motion + q] - ends.slope[1, i, motion + q]) / (
-                        2.0 * h
-                    )
-            for i in range(count):
-                made.direct[i] = (ends.y[0, i] - ends.y[1, i]) / (2.0 * h)
-                for q in range(columns):
-                    made.d_direct[i, q] = (ends.out[0, i, motion + q] - ends.out[1, i, motion + q]) / (
-                        2.0 * h
-                    )
-            continue
-        x[j] = middle
-        _difference(j, h, ends.rate, ends.slope, motion, made.a, made.d_a)
-        _difference(j, h, ends.y, ends.out, motion, made.c, made.d_c)
-        _widths(j, at, model, ends, made)
-    return made
-
-
-@inner
-def _difference(j: int, h: float, values: Array, slope: Array, motion: int, out: Array, d_out: Array) -> None:
-    """A column of a matrix, and its slopes."""
-    for i in range(out.shape[0]):
-        out[i, j] = (values[0, i] - values[1, i]) / (2.0 * h)
-        for q in range(d_out.shape[2]):
-            d_out[i, j, q] = (slope[0, i, motion + q] - slope[1, i, motion + q]) / (2.0 * h)
-
-
-@allocating
-def _widths(j: int, at: AirPoint, model: FilterModel, ends: _Ends, made: _Linear) -> None:
-    """Add the slopes by those of the half width in a gust, whose logarithm falls by one with that of the level."""
-    first = state_count(model)
-    core = first + CORE - GUST_1
-    if j < first or j >= core:
-        return
-    unit = np.zeros(core)
-    unit[j] = 1.0
-    by_gust = gust(unit, model.gusts.rolloff)
-    if not abs(model.gusts.level_m_s * by_gust) / at.airspeed_m_s > LEAST_MOVE:
-        return
-    by_rolloff = (gust(unit, 1.0) - gust(unit, 0.0)) / by_gust
-    for i in range(made.a.shape[0]):
-        if first + LEAD - GUST_1 <= i < core:
-            continue  # the low-passed copies are linear
-        more = 0.5 * (ends.slope[0, i, j] + ends.slope[1, i, j]) - made.a[i, j]
-        made.d_a[i, j, LOG_GUST] -= more
-        made.d_a[i, j, ROLLOFF] -= by_rolloff * more
-    for i in range(made.c.shape[0]):
-        more = 0.5 * (ends.out[0, i, j] + ends.out[1, i, j]) - made.c[i, j]
-        made.d_c[i, j, LOG_GUST] -= more
-        made.d_c[i, j, ROLLOFF] -= by_rolloff * more
-
-
 @allocating
 def _moved_system(
     row: int,
-    linear: _Linear,
+    linear: Linear,
     moves: Moves,
     model: FilterModel,
     a: Array,
@@ -316,7 +170,7 @@ def _conditions(
 ) -> None:
     """`conditions` into ``out``."""
     n, rows, with_input = x.size, moves.h.size, out.spread.shape[0] > 0
-    linear = _linear(x, at, model, aircraft, columns, with_input)
+    linear = linear_slopes(x, at, model, aircraft, columns, with_input)
     system, process, column = np.zeros((n, n + 1)), np.zeros(n), np.zeros(n)
     a, early, late = np.zeros((n, n)), np.empty((n, 1)), np.empty((n, 1))
     count, powers = 0, np.zeros((0, n, n))
@@ -401,3 +255,6 @@ def conditions(
     )
     _conditions(x.copy(), at, model, aircraft, columns, moves, dt_s, out)
     return out
+
+
+__all__ = ["Conditions", "Moves", "conditions"]

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from airtruth.numerics.discretise import multiply
 from airtruth.tracing.model.corners import CornerNodes, corrected, gain_at, predicted, settled
-from airtruth.tracing.model.flight_slopes import GainSlopes, width_of
 from airtruth.tracing.model.gain_slopes import Conditions, Moves
 from airtruth.tracing.model.linearise import FirstUpdate
+from airtruth.tracing.model.sensor_slopes import GainSlopes, width_of
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -98,35 +98,30 @@ def slopes_along(
     samples = lower.size or corner_rad2.size
     node = lower + (share > 0.5) if lower.size else np.zeros(samples, dtype=np.int64)
     uncertain = np.zeros(samples, dtype=np.bool_)
-    made, more = [], np.zeros(rows)
+    made: list[_Gains] = []
+    more = np.zeros(rows)
+    corners = _corners(nodes, moves)
+    scale = np.tril(np.linalg.inv(corners.white[:, common, None]) @ corners.white)
+    scale[:, common] = np.eye(count)
+
+    def along(every: Array) -> Array:
+        if not lower.size:
+            return np.repeat(every[:1], samples, axis=0)
+        low, by = every[lower], share.reshape(-1, *[1] * (every.ndim - 1))
+        return np.ascontiguousarray(low + by * (every[lower + 1] - low))
+
     for row in range(rows):
         if row > 0 and moves.h[row] == 0.0:
             made.append(made[0])
             more[row] = more[0]
             continue
-        root = np.linalg.inv(nodes[common].white[row])
-        scale = np.stack(
-            [np.eye(count) if i == common else np.tril(root @ own.white[row]) for i, own in enumerate(nodes)]
-        )
-
-        def along(x: Sequence[Array]) -> Array:
-            every = np.stack(x)
-            if not lower.size:
-                return np.repeat(every[:1], samples, axis=0)
-            low, by = every[lower], share.reshape(-1, *[1] * (every.ndim - 1))
-            return np.ascontiguousarray(low + by * (every[lower + 1] - low))
-
         gains = _Gains(
-            along([own.k_gain[row] for own in nodes]),
-            FirstUpdate(
-                along([own.first.gain[row] for own in nodes]), along([own.first.share[row] for own in nodes])
-            ),
-            along([own.direct[row] for own in nodes]),
-            along(list(scale)),
+            along(corners.k_gain[row]),
+            FirstUpdate(along(corners.first.gain[row]), along(corners.first.share[row])),
+            along(corners.direct[row]),
+            along(scale[row]),
         )
-        more[row] = _recursion(
-            gains, _corners(nodes, row, moves), scale, node, corner_rad2, uncertain, row == 0
-        )
+        more[row] = _recursion(gains, corners.row(row), scale[row], node, corner_rad2, uncertain, row == 0)
         made.append(gains)
     h = np.where(moves.h[1:] == 0.0, 1.0, moves.h[1:])
     stacked = _Gains(
@@ -138,19 +133,48 @@ def slopes_along(
     return _divided(stacked, moves), (more[1:] - more[0]) / h
 
 
-def _corners(nodes: Sequence[Conditions], row: int, moves: Moves) -> CornerNodes:
-    """The recursion after one step."""
-    spread = [own.spread[row] if own.spread.size else np.zeros((0, 0)) for own in nodes]
-    return CornerNodes(
-        phi=np.stack([own.phi[row] for own in nodes]),
-        noise=np.stack([own.noise[row] for own in nodes]),
-        spread=np.stack(spread),
-        steady=np.stack([own.steady[row] for own in nodes]),
-        c=np.stack([own.c[row] for own in nodes]),
-        variance=moves.variance[row],
-        covariance=np.stack([own.covariance[row] for own in nodes]),
-        root=np.stack([np.linalg.inv(own.white[row]) for own in nodes]),
-        logdet=np.array([own.logdet[row] for own in nodes]),
+class _Nodes(NamedTuple):
+    """The filter at the flight conditions after each step, (rows, nodes, ...)."""
+
+    k_gain: Array
+    first: FirstUpdate
+    direct: Array
+    white: Array
+    corners: CornerNodes
+
+    def row(self, row: int) -> CornerNodes:
+        """The recursion after one step."""
+        own = self.corners
+        return CornerNodes._make(x[row] for x in own)
+
+
+def _corners(nodes: Sequence[Conditions], moves: Moves) -> _Nodes:
+    """Stack the flight conditions."""
+
+    def stacked(x: Sequence[Array]) -> Array:
+        return np.ascontiguousarray(np.stack(x, axis=1))
+
+    rows, white = moves.h.size, stacked([own.white for own in nodes])
+    # a step of none leaves no whitener
+    white[moves.h == 0.0] = white[0]
+    none = np.zeros((rows, len(nodes), 0, 0))
+    uncertain = nodes[0].spread.size > 0
+    corners = CornerNodes(
+        phi=stacked([own.phi for own in nodes]),
+        noise=stacked([own.noise for own in nodes]),
+        spread=stacked([own.spread for own in nodes]) if uncertain else none,
+        steady=stacked([own.steady for own in nodes]),
+        c=stacked([own.c for own in nodes]),
+        variance=moves.variance,
+        covariance=stacked([own.covariance for own in nodes]),
+        root=np.asarray(np.linalg.inv(white)),
+        logdet=stacked([own.logdet for own in nodes]),
+    )
+    first = FirstUpdate(
+        stacked([own.first.gain for own in nodes]), stacked([own.first.share for own in nodes])
+    )
+    return _Nodes(
+        stacked([own.k_gain for own in nodes]), first, stacked([own.direct for own in nodes]), white, corners
     )
 
 
@@ -161,13 +185,12 @@ def _divided(rows: _Gains, moves: Moves) -> GainSlopes:
     ----------
     rows : (rows, samples, ...), or (rows, ...) where all samples have the same gains.
     """
-    moved = np.flatnonzero(moves.h)
-    by, width = 1.0 / moves.h[moved], width_of(moves.h.size - 1)
-    each = rows.direct.ndim > _ONE
+    h, each = moves.h[1:], rows.direct.ndim > _ONE
+    by = np.where(h == 0.0, 0.0, 1.0 / np.where(h == 0.0, 1.0, h))
 
     def slope(x: Array) -> Array:
-        out = np.zeros((*x.shape[1:], width))
-        out[..., moved - 1] = np.moveaxis(x[moved] - x[0], 0, -1) * by
+        out = np.zeros((*x.shape[1:], width_of(h.size)))
+        out[..., : h.size] = np.moveaxis(x[1:] - x[0], 0, -1) * by
         return out if each else out[None]
 
     first = FirstUpdate(slope(rows.first.gain), slope(rows.first.share))

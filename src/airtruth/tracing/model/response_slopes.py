@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -11,12 +14,14 @@ from airtruth.tracing.model.corners import Corners
 from airtruth.tracing.model.equation_slopes import AircraftMoves
 from airtruth.tracing.model.equations import PLAY
 from airtruth.tracing.model.filter import initial_state, innovations, path_of
-from airtruth.tracing.model.flight_slopes import Moved, innovation_slopes, width_of
+from airtruth.tracing.model.flight_slopes import innovation_slopes
 from airtruth.tracing.model.gain_slopes import Conditions, Moves, conditions
 from airtruth.tracing.model.gains_along import slopes_along
 from airtruth.tracing.model.kernel_input import KernelInput
 from airtruth.tracing.model.linearise import FirstUpdate
+from airtruth.tracing.model.parameters import ParameterLayout
 from airtruth.tracing.model.response import LOST, FilterInputs, Response, kernel_input, respond_to
+from airtruth.tracing.model.sensor_slopes import Moved, width_of
 from airtruth.tracing.model.settings import Settings
 from airtruth.tracing.model.slopes import has_slopes, moves_of, moving
 from airtruth.tracing.model.steady import Condition, common_of, conditions_of, equilibrium, joined
@@ -50,7 +55,7 @@ NO_SLOPES: Final = ResponseSlopes(np.zeros(0, dtype=np.int64), *(np.zeros((0, 0,
 
 
 class _Noise(NamedTuple):
-    """Sensors' noise after small steps of the parameters (parameters + 1, outputs), and its derivatives.
+    """Sensors' noise after small steps of the parameters, and its derivatives.
 
     Attributes
     ----------
@@ -96,9 +101,10 @@ def respond_with_slopes(
     samples, count = kernel.y.shape
     e, none = np.full_like(kernel.y, LOST), np.eye(count)
     lost = Response(e[given.lead :], none, none, np.nan)
-    aircraft = moves_of(kernel.model)(given.record.pitch_plant, given.compiled, common, kernel.model.gusts.rolloff)
-    noise = _noise(kernel, settings, common, parameters)
-    moves, column = _moves(settings, noise, parameters)
+    aircraft = moves_of(kernel.model)(given.record, given.compiled, common, kernel.model.gusts.rolloff)
+    places = _places(settings.layout, tuple(parameters.tolist()))
+    noise = _noise(kernel, settings, common, places)
+    moves = Moves(places.h, places.of_row, noise.variance, noise.slow_std, noise.slow_time_s)
     uncertain = kernel.corner_rad2.size > 0
     nodes = [
         conditions(
@@ -106,7 +112,7 @@ def respond_with_slopes(
             air,
             kernel.model,
             aircraft,
-            column.size,
+            places.column.size,
             moves,
             kernel.dt_s,
             uncertain,
@@ -123,7 +129,7 @@ def respond_with_slopes(
         return lost, None
     at = common_of(kernel, given.along)
     gains, more_slopes = slopes_along(nodes, at, moves, steady.lower, steady.share, kernel.corner_rad2)
-    own = _moved(kernel, settings, parameters, aircraft, noise, column)
+    own = _moved(kernel, aircraft, noise, places)
     slopes = innovation_slopes(kernel, own, path, gains, steady.shown)
     h = np.where(moved, moves.h, 1.0)[1:, None, None]
     covariance = nodes[at].covariance
@@ -134,54 +140,83 @@ def respond_with_slopes(
     return response, ResponseSlopes(parameters, by_e, by_covariance, more_slopes)
 
 
-def _moves(settings: Settings, noise: _Noise, parameters: Ints) -> tuple[Moves, Ints]:
-    """Small steps of the parameters that move gains, and the number of each mover among the parameters; -1 for none."""
-    entries, own = settings.layout.common, settings.layout.per_record
-    number = np.full(entries.size + own.size, -1, dtype=np.int64)
-    number[parameters] = np.arange(parameters.size)
-    movers = moving(settings.layout, 0)
-    column = number[movers]
-    moves_gain = np.append(np.ones(entries.size), np.zeros(own.size))
-    moves_gain[entries.size + own.log_gust] = 1.0
-    step = _SHARE * np.append(entries.step, own.step) * moves_gain
-    of_row = np.full(parameters.size + 1, -1, dtype=np.int64)
-    for q in np.flatnonzero(column >= 0):
-        # the trim moves the motion and no gain
-        if moves_gain[movers[q]]:
-            of_row[1 + column[q]] = q
-    h = np.append(0.0, step[parameters])
-    return Moves(h, of_row, noise.variance, noise.slow_std, noise.slow_time_s), column
+@dataclass(frozen=True)
+class _Places:
+    """Where the parameters that a record is differentiated in are.
+
+    Attributes
+    ----------
+    h : (parameters + 1,) small steps of those that move gains, else zero.
+    column : (movers,) number of each among the parameters; -1 for none.
+    of_row : (parameters + 1,) number of the mover; -1 for none.
+    noise, colour, time : (parameter, output) of each logarithm of the noise, each share of correlated noise, and the correlation
+        time.
+    start, bias : (parameter, number) of the initial state and of the biases.
+    """
+
+    h: Array
+    column: Ints
+    of_row: Ints
+    noise: tuple[tuple[int, int], ...]
+    colour: tuple[tuple[int, int], ...]
+    time: tuple[tuple[int, int], ...]
+    start: tuple[tuple[int, int], ...]
+    bias: tuple[tuple[int, int], ...]
 
 
-def _noise(kernel: KernelInput, settings: Settings, common: Array, parameters: Ints) -> _Noise:
+@lru_cache
+def _places(layout: ParameterLayout, parameters: tuple[int, ...]) -> _Places:
+    entries, own = layout.common, layout.per_record
+    number = {index: p for p, index in enumerate(parameters)}
+    movers, level = moving(layout, 0).tolist(), entries.size + own.log_gust
+    h, of_row = np.zeros(len(parameters) + 1), np.full(len(parameters) + 1, -1, dtype=np.int64)
+    for index, p in number.items():
+        # of what a record has for itself, the level alone moves gains
+        if index < entries.size or index == level:
+            h[p + 1] = _SHARE * np.append(entries.step, own.step)[index]
+            of_row[p + 1] = movers.index(index) if index in movers else -1
+
+    def span(first: int, part: slice) -> tuple[tuple[int, int], ...]:
+        places = range(first + part.start, first + part.stop)
+        return tuple((number[at], i) for i, at in enumerate(places) if at in number)
+
+    return _Places(
+        h=h,
+        column=np.array([number.get(index, -1) for index in movers], dtype=np.int64),
+        of_row=of_row,
+        noise=span(0, entries.log_noise),
+        colour=span(0, entries.colour_shares),
+        time=span(0, slice(entries.log_colour_time, entries.log_colour_time + 1)),
+        start=span(entries.size, own.start),
+        bias=span(entries.size, own.bias),
+    )
+
+
+def _noise(kernel: KernelInput, settings: Settings, common: Array, places: _Places) -> _Noise:
     """Steps of the sensors' noise, see `airtruth.tracing.model.response.pack_sensors`."""
-    entries, sensors = settings.layout.common, kernel.model.sensors
-    rows, count = parameters.size + 1, sensors.scale.size
+    sensors, rows, h = kernel.model.sensors, places.h.size, places.h
+    width, count = width_of(rows - 1), sensors.scale.size
     made = _Noise(
         np.tile(sensors.variance, (rows, 1)),
         np.tile(sensors.slow_std, (rows, 1)),
         np.full(rows, sensors.slow_time_s),
-        np.zeros((count, parameters.size)),
-        np.zeros(parameters.size),
+        np.zeros((count, width)),
+        np.zeros(width),
     )
-    white, share = sensors.variance - settings.resolution**2, common[entries.colour_shares]
-    for p, index in enumerate(parameters):
-        h = _SHARE * entries.step[index] if index < entries.size else 0.0
-        if entries.log_noise.start <= index < entries.log_noise.stop:
-            i = index - entries.log_noise.start
-            made.variance[p + 1, i] += white[i] * np.expm1(2.0 * h)
-            made.slow_std[p + 1, i] *= np.exp(h)
-            made.d_slow_std[i, p] = sensors.slow_std[i]
-        elif entries.colour_shares.start <= index < entries.colour_shares.stop:
-            i = index - entries.colour_shares.start
-            variance = sensors.slow_std[i] ** 2 / share[i]
-            made.variance[p + 1, i] -= variance * h
-            made.slow_std[p + 1, i] *= np.sqrt(1.0 + h / share[i])
-            made.d_slow_std[i, p] = 0.5 * sensors.slow_std[i] / share[i]
-        elif index == entries.log_colour_time:
-            made.slow_time_s[p + 1] *= np.exp(h)
-            ratio = kernel.dt_s / sensors.slow_time_s
-            made.d_forget[p] = ratio * np.exp(-ratio)
+    share = common[settings.layout.common.colour_shares]
+    for p, i in places.noise:
+        white = sensors.variance[i] - settings.resolution[i] ** 2
+        made.variance[p + 1, i] += white * math.expm1(2.0 * h[p + 1])
+        made.slow_std[p + 1, i] *= math.exp(h[p + 1])
+        made.d_slow_std[i, p] = sensors.slow_std[i]
+    for p, i in places.colour:
+        made.variance[p + 1, i] -= sensors.slow_std[i] ** 2 / share[i] * h[p + 1]
+        made.slow_std[p + 1, i] *= math.sqrt(1.0 + h[p + 1] / share[i])
+        made.d_slow_std[i, p] = 0.5 * sensors.slow_std[i] / share[i]
+    for p, _ in places.time:
+        ratio = kernel.dt_s / sensors.slow_time_s
+        made.slow_time_s[p + 1] *= math.exp(h[p + 1])
+        made.d_forget[p] = ratio * math.exp(-ratio)
     return made
 
 
@@ -207,24 +242,19 @@ def _condition(own: Conditions, moves: Moves) -> Condition:
     )
 
 
-def _moved(
-    kernel: KernelInput, settings: Settings, parameters: Ints, aircraft: AircraftMoves, noise: _Noise, column: Ints
-) -> Moved:
+def _moved(kernel: KernelInput, aircraft: AircraftMoves, noise: _Noise, places: _Places) -> Moved:
     """What the parameters move beside the gains."""
-    entries, own, spare = settings.layout.common, settings.layout.per_record, parameters.size
-    n, count = kernel.model.states.size, kernel.model.sensors.scale.size
+    spare, n, count = places.h.size - 1, kernel.model.states.size, kernel.model.sensors.scale.size
     start, bias = np.zeros((n, width_of(spare))), np.full(count, spare, dtype=np.int64)
-    slow_std, forget = np.zeros((count, start.shape[1])), np.zeros(start.shape[1])
-    slow_std[:, :spare], forget[:spare] = noise.d_slow_std, noise.d_forget
-    at_rest = initial_state(kernel)
-    for p, index in enumerate(parameters - entries.size):
-        if 0 <= index < own.start.stop:
-            # the initial state is linear in it
-            shifted = kernel._replace(start=kernel.start + np.eye(kernel.start.size)[index])
-            start[:, p] = initial_state(shifted) - at_rest
-        elif own.bias.start <= index < own.bias.stop:
-            bias[index - own.bias.start] = p
-    return Moved(aircraft, np.where(column < 0, spare, column), bias, slow_std, forget, start)
+    at_rest, none = initial_state(kernel, np.zeros(kernel.start.size)), np.zeros(kernel.start.size)
+    for p, i in places.start:
+        none[i] = 1.0
+        start[:, p] = initial_state(kernel, none) - at_rest  # it is linear
+        none[i] = 0.0
+    for p, i in places.bias:
+        bias[i] = p
+    column = np.where(places.column < 0, spare, places.column)
+    return Moved(aircraft, column, bias, noise.d_slow_std, noise.d_forget, start)
 
 
 __all__ = ["ResponseSlopes", "respond_with_slopes"]

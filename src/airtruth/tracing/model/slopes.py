@@ -50,7 +50,7 @@ class MotionSlopes(NamedTuple):
     Attributes
     ----------
     rates, outputs : as `rate_slopes` and `output_slopes`, `airtruth.numerics.compiled.inner`.
-    moves : (plant, compiled change, common parameters, rolloff) -> what the parameters move of the aircraft.
+    moves : (record, compiled change, common parameters, rolloff) -> what the parameters move of the aircraft.
     """
 
     rates: Callable[..., float]
