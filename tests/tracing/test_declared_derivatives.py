@@ -10,8 +10,8 @@ from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.declared_model import remaining_evidence
 from airtruth.tracing.inference import derivative_likelihood as module
 from airtruth.tracing.inference.derivative_likelihood import contradiction, derivative_likelihood
+from airtruth.tracing.model.declared import declared_covariance
 from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
-from airtruth.tracing.model.plant import declared_covariance
 from airtruth.tracing.selection.anomaly import DERIVATIVES_MOVED, Anomaly
 from airtruth.tracing.selection.families import advice
 

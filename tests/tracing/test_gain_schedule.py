@@ -74,7 +74,7 @@ def test_a_condition_is_the_mean_near_its_airspeed():
     """A constant is kept; airspeeds rise, those at the ends lie within half a step of the range, and the pressure is theirs."""
     grid = filter_inputs(slowing(np.random.default_rng(1), 0.3), Change()).grid
     along = schedule(np.full(SAMPLES, 0.05), grid, 2)
-    assert along.alpha_rad == pytest.approx([0.05] * 5, rel=1e-12)
+    assert along.flow_rad == pytest.approx([0.05] * 5, rel=1e-12)
     speeds = np.array([air.airspeed_m_s for air in along.air])
     assert (np.diff(speeds) > 0.0).all()
     assert speeds[1:-1] == pytest.approx(np.geomspace(SLOW, FAST, 5)[1:-1], rel=0.01)
@@ -88,7 +88,7 @@ def test_a_node_that_the_airspeed_jumps_over_has_the_mean():
     v = np.repeat([FAST, SLOW], [300, grid.airspeed_m_s.size - 300])
     alpha = np.where(v[::2] == FAST, 0.05, 0.1)
     along = schedule(alpha, grid._replace(airspeed_m_s=v, qbar_pa=0.5 * tr.DENSITY * v * v), 2)
-    assert along.alpha_rad == pytest.approx([0.1, *[alpha.mean()] * 3, 0.05], rel=1e-6)
+    assert along.flow_rad == pytest.approx([0.1, *[alpha.mean()] * 3, 0.05], rel=1e-6)
 
 
 def test_an_airspeed_of_zero_has_the_gain_of_a_quarter_of_the_largest():
@@ -104,7 +104,7 @@ def test_an_airspeed_of_zero_has_the_gain_of_a_quarter_of_the_largest():
 def test_equal_conditions_are_as_one():
     made = slowing(np.random.default_rng(2), 0.3)
     given = filter_inputs(made, Change())
-    equal = given.along._replace(alpha_rad=(given.reference_alpha_rad,) * 5, air=(given.reference,) * 5)
+    equal = given.along._replace(flow_rad=(given.reference_flow_rad,) * 5, air=(given.reference,) * 5)
     r, found = whitened(made, 0.3, equal)
     expected, single = whitened(made, 0.3, UNSCHEDULED)
     np.testing.assert_allclose(r, expected, rtol=0.0, atol=1e-9)

@@ -43,7 +43,7 @@ def _uncached(monkeypatch):
 def model(derivatives, level=LEVEL):
     none, ints = np.empty(0), np.empty((0, 6), dtype=np.int64)
     three = np.zeros(3)
-    sensors = SensorArrays(three, np.ones(3), three, three, three, STD**2, three, 1.0)
+    sensors = SensorArrays(three, np.ones(3), three, three, three, STD**2, three, 1.0, three)
     return FilterModel(
         ToyAircraft(np.asarray(derivatives, dtype=float), HALF_CHORD_M),
         GustModel(level, LENGTH_M, 0.0, 0.0, 1.0),

@@ -19,7 +19,7 @@ from airtruth.logs.store import write_log
 from airtruth.physics.terms import Change, SensorTerm
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing import run as tracing
-from airtruth.tracing.model import records
+from airtruth.tracing.model import reading
 from airtruth.tracing.prepare import prepare
 from airtruth.units import DEG
 
@@ -272,7 +272,7 @@ def test_an_acceleration_without_gravity(command, log, tmp_path):
 def test_no_altitude_has_that_density(log):
     slugs = with_channel(without(log, "altitude_m"), "density_kg_m3", np.full_like(log.t_s, 0.0019))
     with pytest.raises(LogError, match=r"density_kg_m3 is 0\.0019 kg/m3"):
-        records.read(slugs)
+        reading.read(slugs)
 
 
 @pytest.mark.parametrize("gone", ["throttle", "theta_rad", "ax_m_s2", "elevator_command_rad", "altitude_m"])

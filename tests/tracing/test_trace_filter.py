@@ -314,10 +314,9 @@ def test_signals_of_a_part_act_in_the_part():
     part = replace(whole, signals=whole.signals.part("part", 0, 45, whole.samples))
     rng = np.random.default_rng(9)
     points, sub = (part.samples - 1) * whole.signals.sub + 1, whole.signals.sub
-    more = External(*(1e-3 * rng.standard_normal((2, points))), 1e-3 * rng.standard_normal((part.samples, 3)))
+    more = External(1e-3 * rng.standard_normal((2, points)), 1e-3 * rng.standard_normal((part.samples, 3)))
     padded = External(
-        np.pad(more.lift, (45 * sub, 0)),
-        np.pad(more.moment, (45 * sub, 0)),
+        np.pad(more.force, ((0, 0), (45 * sub, 0))),
         np.pad(more.output, ((45, 0), (0, 0))),
     )
     common, per_record = tr.still()

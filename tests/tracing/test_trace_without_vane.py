@@ -18,7 +18,7 @@ from airtruth.tracing.model.response import filter_inputs, kernel_input, respond
 from airtruth.tracing.model.settings import declared_change, initial_per_record, settings_of
 from airtruth.tracing.model.steady import linearise_at_reference
 
-WITHOUT = settings_of(GTM, 0.05, has_vane=False)
+WITHOUT = settings_of(GTM, 0.05, absent=("alpha_rad",))
 UNITS = {
     "airspeed_m_s": "m_s", "theta_rad": "rad", "q_rad_s": "rad_s", "ax_m_s2": "m_s2", "az_m_s2": "m_s2",
     "elevator_rad": "rad", "altitude_m": "m", "density_kg_m3": "kg_m3",
@@ -43,7 +43,9 @@ def own_of(one):
 def test_without_a_vane_alpha_is_no_output():
     assert SETTINGS.measured.tolist() == [True, True, True]
     assert WITHOUT.measured.tolist() == [False, True, True]
-    assert not any(term.channel == "alpha_rad" for term in declared_change(GTM, has_vane=False).sensors)
+    assert not any(
+        term.channel == "alpha_rad" for term in declared_change(GTM, absent=("alpha_rad",)).sensors
+    )
 
 
 @pytest.mark.slow

@@ -110,4 +110,18 @@ def settle(x, at, model):
     pass
 
 
-register(ToyAircraft, ToyGrid, Equations(2, 2, rates, outputs, air_at, move_plays, settle))
+@inner
+def shifted(at, field, by):
+    return ToyPoint(at.left + by * (field == 0), at.right + by * (field == 1), at.wind, at.airspeed_m_s)
+
+
+@inner
+def signals_at(x, at, rate, model, out):
+    pass
+
+
+register(
+    ToyAircraft,
+    ToyGrid,
+    Equations(2, 2, rates, outputs, air_at, move_plays, settle, shifted, signals_at, ToyPoint, 1),
+)

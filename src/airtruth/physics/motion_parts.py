@@ -114,11 +114,13 @@ class Declared:
     name : of the quantity in terms of effects.
     neutral : value of an error that changes nothing: 1 of a factor, 0 of a shift.
     divides : coefficients that a factor on it divides: mass the forces, an inertia its moment.
+    entry : its entry in the table [mass] of aircraft.toml; empty for none.
     """
 
     name: str
     neutral: float = 0.0
     divides: tuple[str, ...] = ()
+    entry: str = ""
 
 
 @dataclass(frozen=True)

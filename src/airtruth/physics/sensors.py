@@ -166,7 +166,14 @@ def vane_beta(
     The vane moves to the right with r x - p z, the y component of omega x r.
     """
     beta, p, r, v = (np.asarray(x, dtype=np.float64) for x in (beta_rad, p_rad_s, r_rad_s, airspeed_m_s))
-    return np.asarray(beta + (x_m * r - z_m * p) / v)
+    return side_vane_equation(beta, p, r, x_m, z_m, v)
+
+
+def side_vane_equation(
+    beta_rad: Array, p_rad_s: Array, r_rad_s: Array, x_m: float, z_m: float, airspeed_m_s: Array
+) -> Array:
+    """`vane_beta` as arithmetic alone, which the tracer's filter compiles for single numbers."""
+    return beta_rad + (x_m * r_rad_s - z_m * p_rad_s) / airspeed_m_s
 
 
 def rotation_acceleration(
@@ -242,6 +249,7 @@ __all__ = [
     "lag",
     "measure",
     "rotation_acceleration",
+    "side_vane_equation",
     "vane_alpha",
     "vane_beta",
     "vane_equation",

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from airtruth.aircraft import Aircraft
 from airtruth.physics.longitudinal import ForceTables
 from airtruth.simulation.linearise import Linearisation, linearise
+from airtruth.simulation.linearise_lateral import LateralLinearisation, linearise_lateral
 from airtruth.simulation.probe import Grid, forces_at_speeds, forces_over_alpha, probe, with_breaks
+from airtruth.simulation.probe_lateral import LateralGrid, LateralTables, probe_lateral
 from airtruth.simulation.trim import Trim
 
 Array = NDArray[np.float64]
@@ -60,4 +62,28 @@ def operating_point(aircraft: Aircraft, trim: Trim, grid: Grid, ratios: Array) -
     )
 
 
-__all__ = ["OperatingPoint", "operating_point"]
+@dataclass(frozen=True)
+class LateralOperatingPoint:
+    """An aircraft about a trim in six axes: its tables and its derivatives."""
+
+    tables: LateralTables
+    derivatives: LateralLinearisation
+
+
+def lateral_operating_point(aircraft: Aircraft, trim: Trim, grid: LateralGrid) -> LateralOperatingPoint:
+    """Probe the lateral forces of an aircraft about a trim in six axes.
+
+    Parameters
+    ----------
+    aircraft, trim : the aircraft and its equilibrium.
+    grid : states of the tables.
+
+    Raises
+    ------
+    TrimError
+        If aileron and rudder do not follow their commands at the trim.
+    """
+    return LateralOperatingPoint(probe_lateral(aircraft, trim, grid), linearise_lateral(aircraft, trim))
+
+
+__all__ = ["LateralOperatingPoint", "OperatingPoint", "lateral_operating_point", "operating_point"]

@@ -110,7 +110,7 @@ def probe(
     )
     forces = executive.nodes(["forces/fbx-total-lbs", "forces/fbz-total-lbs"])
     inertia = aircraft.constants.inertia_yy_kg_m2
-    states = _States(executive, trim)
+    states = HeldStates(executive, trim)
     values = np.empty((*(axis.size for axis in axes), 3))
     surface = np.empty(values.shape[:-1])
     # commands innermost: they cost the least
@@ -149,7 +149,7 @@ def with_breaks(aircraft: Aircraft, trim: Trim, grid: Grid, dt_s: float = 1.0 / 
     """
     executive = Executive(aircraft, dt_s)
     force = executive.node("forces/fbz-total-lbs")
-    states = _States(executive, trim)
+    states = HeldStates(executive, trim)
 
     def at(alpha: float) -> Array:
         answer = states.respond(trim.condition, alpha, trim.controls, 0.0)
@@ -269,7 +269,7 @@ def forces_over_alpha(
     """
     executive = Executive(aircraft, dt_s)
     forces = executive.nodes(["forces/fbx-total-lbs", "forces/fbz-total-lbs"])
-    states = _States(executive, trim)
+    states = HeldStates(executive, trim)
     values = np.empty((ratios.size, alpha_rad.size, 3))
     for i, j in np.ndindex(values.shape[:2]):
         condition = replace(trim.condition, eas_m_s=trim.condition.eas_m_s * float(ratios[i]))
@@ -279,7 +279,7 @@ def forces_over_alpha(
     return values
 
 
-class _States:
+class HeldStates:
     """States of the grid, one after the other in one executive.
 
     Engines that run until they are steady keep the speed of the trim, because they cannot follow the motion of a flight
@@ -297,17 +297,27 @@ class _States:
             steady = executive.respond()
             executive.initialise(trim.condition, trim.alpha_rad, trim.controls, 0.0, _FILTERS_S)
             self.loses_power = executive.respond().differs(steady) > _SAME_RESPONSE
-        self.motion: tuple[Condition, float, float] | None = None
+        self.motion: tuple[object, ...] | None = None
 
-    def respond(self, condition: Condition, alpha_rad: float, controls: Controls, q_rad_s: float) -> Response:
+    def respond(
+        self,
+        condition: Condition,
+        alpha_rad: float,
+        controls: Controls,
+        q_rad_s: float,
+        *,
+        p_rad_s: float = 0.0,
+        r_rad_s: float = 0.0,
+    ) -> Response:
         """Response in a state of the grid."""
+        rates = (q_rad_s, p_rad_s, r_rad_s)
         if not self.holds:
-            return self._settled(condition, alpha_rad, controls, q_rad_s)
+            return self._settled(condition, alpha_rad, controls, rates)
         command = controls.elevator_command_rad
         wanted = self.trim.elevator_rad + command - self.trim.controls.elevator_command_rad
         for _ in range(_HOLDS):
             answer = self._settled(
-                condition, alpha_rad, replace(controls, elevator_command_rad=command), q_rad_s
+                condition, alpha_rad, replace(controls, elevator_command_rad=command), rates
             )
             error = wanted - answer.elevator_rad
             if abs(error) < _SAME_SURFACE_RAD:
@@ -316,14 +326,15 @@ class _States:
         return answer
 
     def _settled(
-        self, condition: Condition, alpha_rad: float, controls: Controls, q_rad_s: float
+        self, condition: Condition, alpha_rad: float, controls: Controls, rates: tuple[float, float, float]
     ) -> Response:
-        motion = (condition, alpha_rad, q_rad_s)
+        motion = (condition, alpha_rad, controls.sideslip_rad, controls.bank_rad, rates)
         if self.loses_power and motion == self.motion:
             self.executive.change_controls(controls, _FILTERS_S)
         else:
             settling_s = _POWER_S if self.loses_power else _FILTERS_S
-            self.executive.initialise(condition, alpha_rad, controls, q_rad_s, settling_s)
+            q, p, r = rates
+            self.executive.initialise(condition, alpha_rad, controls, q, settling_s, p_rad_s=p, r_rad_s=r)
         self.motion = motion
         return self.executive.respond()
 

@@ -10,8 +10,17 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import LogError, TrimError
-from airtruth.physics.gust_figures import gust_scales
+from airtruth.physics.gust_figures import gust_scales, side_gust
+from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.simulation.trim import Trim
+from airtruth.tracing.lateral_conditions import (
+    at_throttle,
+    flies_in_six_axes,
+    lateral_plants,
+    with_steady_flight,
+)
+from airtruth.tracing.model.lateral_plant import lateral_trim
+from airtruth.tracing.model.lateral_remainder import lateral_remainders
 from airtruth.tracing.model.plant import (
     Plant,
     declared_derivatives,
@@ -44,6 +53,8 @@ _OTHER_TRIM: Final = 2.0 * _SAME_SPEED
 _FAR: Final = 2.0
 """Ratio of dynamic pressures, up or down, from which a record is reported to leave its trim [-] (judgement: the engines are
 probed within 6 % and extrapolated as a line)."""
+_FIGURES: Final = "mil-f-8785c"
+"""Source of the gusts' scale lengths."""
 _GUST_ALTITUDE_M: Final = (30.0, 20000.0)
 """Altitudes between which the gust scales are evaluated [m] (judgement: within the range of MIL-F-8785C)."""
 
@@ -69,11 +80,43 @@ def records_of(
     for group in _conditions(signals, held):
         everyone = [signals[i] for i in group]
         members = [s for s in everyone if s.run_id not in held] or everyone
-        length = gust_length_m(float(np.mean([s.altitude_m for s in members])))
-        plants = _plants(everyone, members, aircraft, model)
-        for i, plant, more in zip(group, plants, remainders(everyone, plants), strict=True):
-            records[i] = TraceRecord(signals[i], plant, length, more)
+        motion = members[0].motion
+        length = gust_length_m(float(np.mean([s.altitude_m for s in members])), motion)
+        made = (_in_pitch if motion is LONGITUDINAL else _in_six_axes)(
+            everyone, members, aircraft, model, length
+        )
+        records |= dict(zip(group, made, strict=True))
     return [records[i] for i in range(len(signals))]
+
+
+def _in_pitch(
+    everyone: Sequence[Signals], members: Sequence[Signals], aircraft: Aircraft, model: str, length_m: float
+) -> list[TraceRecord]:
+    plants = _plants(everyone, members, aircraft, model)
+    return [
+        TraceRecord(s, plant, length_m, more)
+        for s, plant, more in zip(everyone, plants, remainders(everyone, plants), strict=True)
+    ]
+
+
+def _in_six_axes(
+    everyone: Sequence[Signals], members: Sequence[Signals], aircraft: Aircraft, model: str, length_m: float
+) -> list[TraceRecord]:
+    speed, density = _speed_and_density(members)
+    at = _trim(aircraft, members, speed, density) if flies_in_six_axes(aircraft) else None
+    steady = [with_steady_flight(s, at) for s in everyone]
+    own = [full for s, full in zip(everyone, steady, strict=True) if any(s is m for m in members)]
+    plants = lateral_plants(steady, own, aircraft, model, at)
+    return [
+        TraceRecord(s, plant, length_m, more)
+        for s, plant, more in zip(steady, plants, lateral_remainders(steady, plants), strict=True)
+    ]
+
+
+def _speed_and_density(members: Sequence[Signals]) -> tuple[float, float]:
+    """Mean airspeed [m/s] and density [kg/m3] of the runs that determine a condition."""
+    speed = float(np.mean([s.airspeed_m_s.mean() for s in members]))
+    return speed, float(np.mean([s.density_kg_m3.mean() for s in members]))
 
 
 def _conditions(signals: Sequence[Signals], held: Sequence[str]) -> list[list[int]]:
@@ -95,8 +138,7 @@ def _plants(
     everyone: Sequence[Signals], members: Sequence[Signals], aircraft: Aircraft, model: str
 ) -> list[Plant]:
     """The plant of each run of one flight condition; ``members`` are the runs that determine the condition."""
-    speed = float(np.mean([s.airspeed_m_s.mean() for s in members]))
-    density = float(np.mean([s.density_kg_m3.mean() for s in members]))
+    speed, density = _speed_and_density(members)
     if model == "linear":
         at = _trim(aircraft, members, speed, density) if aircraft.file.jsbsim is not None else None
         derivatives = declared_derivatives(aircraft, at)
@@ -129,19 +171,20 @@ def _reach(series: Sequence[Array]) -> tuple[float, float]:
 
 
 def _trim(aircraft: Aircraft, members: Sequence[Signals], speed: float, density: float) -> Trim:
-    s = members[0]
+    s, is_pitch = members[0], members[0].motion is LONGITUDINAL
+    trimmed, at_lever = (trim_of, with_throttle) if is_pitch else (lateral_trim, at_throttle)
     climb = float(
-        np.mean(
-            [m.theta_rad[: _CLIMB_SAMPLES * m.sub].mean() - m.y[:_CLIMB_SAMPLES, 0].mean() for m in members]
-        )
+        np.mean([m.theta_rad[: _CLIMB_SAMPLES * m.sub].mean() - _first_alpha_rad(m) for m in members])
     )
     gamma = climb if abs(climb) > _CLIMB_RAD else 0.0
     level = (speed, 0.0)
     problems: dict[tuple[float, float], TrimError] = {}
     for tried in dict.fromkeys([(speed, gamma), level, *((v, 0.0) for v in _reached_speeds(members, speed))]):
         try:
-            at = trim_of(aircraft, tried[0], density, s.altitude_m, tried[1])
-            return _at_logged_throttle(aircraft, at, members)
+            at = trimmed(aircraft, tried[0], density, s.altitude_m, tried[1])
+            levers = [m.throttle for m in members if m.throttle is not None]
+            # the logged throttle counts, not that of the declared trim
+            return at_lever(aircraft, at, float(np.mean(levers))) if levers else at
         except TrimError as error:
             problems[tried] = error
     raise LogError(
@@ -151,10 +194,11 @@ def _trim(aircraft: Aircraft, members: Sequence[Signals], speed: float, density:
     )
 
 
-def _at_logged_throttle(aircraft: Aircraft, at: Trim, members: Sequence[Signals]) -> Trim:
-    """The trim at the mean of the logged throttle, which counts, not that of the declared trim."""
-    levers = [m.throttle for m in members if m.throttle is not None]
-    return with_throttle(aircraft, at, float(np.mean(levers))) if levers else at
+def _first_alpha_rad(s: Signals) -> float:
+    """Mean angle of attack over the start of a run [rad]."""
+    if s.motion is LONGITUDINAL:
+        return float(s.y[:_CLIMB_SAMPLES, 0].mean())
+    return float(s.alpha_rad[: _CLIMB_SAMPLES * s.sub].mean())
 
 
 def _reached_speeds(members: Sequence[Signals], speed: float) -> list[float]:
@@ -201,10 +245,11 @@ def _departs(record: TraceRecord) -> list[str]:
     ]
 
 
-def gust_length_m(altitude_m: float) -> float:
-    """Scale length of the vertical gust [m] in light turbulence at an altitude [m]."""
+def gust_length_m(altitude_m: float, motion: Motion = LONGITUDINAL) -> float:
+    """Scale length of the gust that the filter of a motion estimates [m], in light turbulence at an altitude [m]."""
     lowest, highest = _GUST_ALTITUDE_M
-    return gust_scales("mil-f-8785c", "light", min(max(altitude_m, lowest), highest)).length_w_m
+    scales = gust_scales(_FIGURES, "light", min(max(altitude_m, lowest), highest))
+    return scales.length_w_m if motion is LONGITUDINAL else side_gust(_FIGURES, scales)[1]
 
 
 __all__ = ["condition_notes", "gust_length_m", "records_of"]

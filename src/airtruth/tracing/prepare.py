@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from statistics import fmean
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +18,12 @@ from airtruth.effects.effect import Effect
 from airtruth.errors import ConfigurationError, LogError, choices
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.composition import directions
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
 from airtruth.physics.reconstruction import is_reconstructed
-from airtruth.physics.short_period import PARAMETERS
 from airtruth.tracing.conditions import condition_notes, records_of
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem
+from airtruth.tracing.lateral_conditions import flies_in_six_axes
 from airtruth.tracing.model.reading import measured_controls, read
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, fine
 from airtruth.tracing.model.settings import VANE, declared_change, resolved, settings_of
@@ -46,6 +46,8 @@ _LEAD_S: Final = 3.0
 constants of slow sensors)."""
 _AIR: Final = "each record has its own gust level, and the measured airspeed contains the horizontal gusts"
 """Why an effect of the air is not tested."""
+_RECONSTRUCTED: Final = "alpha was reconstructed: no vane measured it"
+"""Why an effect of a vane is not tested."""
 _NO_VANE: Final = (
     "alpha was reconstructed, because no vane measured it: the filter takes q and az as outputs and alpha as a state, and "
     "no effect of a vane can be tested"
@@ -101,21 +103,20 @@ def prepare(
         Naming what is wrong, where, and what to do.
     """
     _one_aircraft(logs, aircraft)
-    controls = measured_controls(aircraft, LONGITUDINAL)
-    signals = [undo_input_sensors(s, aircraft) for log in logs for s in read(log, LONGITUDINAL, controls)]
+    motion = LONGITUDINAL if options.motion is None else MOTIONS[options.motion]
+    controls = measured_controls(aircraft, motion)
+    signals = [undo_input_sensors(s, aircraft) for log in logs for s in read(log, motion, controls)]
     signals.sort(key=lambda s: s.run_id)  # the answer does not depend on the order of the logs
     chosen = _hold_out([s.run_id for s in signals], options)
     _check(signals, chosen, logs)
-    model = options.model if aircraft.file.jsbsim is not None else "linear"
-    notes = []
-    if model != options.model:
-        notes.append("the aircraft has no JSBSim model: it is traced with the linear short-period model")
+    model, notes = _model_of(aircraft, motion, options)
+    notes.extend(_steady_notes(signals))
     records = records_of(signals, aircraft, model, chosen)
     fitted = tuple(r for r in records if r.signals.run_id not in chosen)
     has_throttle = all(r.signals.throttle is not None for r in fitted)
-    has_vane = not any(is_reconstructed(log.channels) for log in logs)
+    absent = _absent(logs, motion)
     thrust_std = _THRUST_STD if has_throttle else _THRUST_UNKNOWN_STD
-    settings = settings_of(aircraft, thrust_std, has_vane=has_vane)
+    settings = settings_of(aircraft, thrust_std, motion, absent=absent)
     settings = resolved(settings, fitted)
     fitted = tuple(with_surface_noise(r, settings) for r in fitted)
     held = tuple(with_surface_noise(r, settings) for r in records if r.signals.run_id in chosen)
@@ -125,35 +126,78 @@ def prepare(
     notes.extend(condition_notes(records))
     if not held:
         notes.append("nothing is held out: the verdict is provisional")
-    if not has_vane:
-        notes.append(_NO_VANE)
-    slopes = dict(
-        zip(PARAMETERS, np.mean([r.plant.derivatives for r in fitted], axis=0).tolist(), strict=True)
-    )
-    effects = [effect.for_aircraft(slopes) for effect in effects]
+    notes.extend(_NO_VANE if channel == VANE else _unmeasured(channel, motion) for channel in absent)
+    mean = np.mean([r.plant.derivatives for r in fitted], axis=0)
+    slopes = dict(zip(motion.parameters, mean.tolist(), strict=True))
+    foreign = [e for e in effects if not e.applies_to(motion)]
+    effects = [effect.for_aircraft(slopes) for effect in effects if effect not in foreign]
     columns = set.intersection(*(set(log.channels) for log in logs))
-    reasons = {effect.key: _why_not(effect, columns, has_vane) for effect in effects}
-    first = fitted[0].plant.trim_alpha_rad
-    trim_alpha_rad = first + fmean(r.plant.trim_alpha_rad - first for r in fitted)
+    reasons = {effect.key: _why_not(effect, columns, absent) for effect in effects}
+    untestable = [(e, reasons[e.key]) for e in effects if reasons[e.key]]
+    if options.effects is not None:  # those of the library were not asked for
+        untestable += [(e, f"it does not act on the {motion.name} motion") for e in foreign]
+    trims = [float(r.plant.trim_signals[0]) for r in fitted]
+    trim_flow_rad = trims[0] + fmean(trim - trims[0] for trim in trims)
     return Case(
         fitted=TraceProblem(fitted, settings, options.threads),
         held=TraceProblem(held, settings, options.threads) if held else None,
-        hypothesis=Hypothesis(declared_change(aircraft, has_vane=has_vane), trim_flow_rad=trim_alpha_rad),
+        hypothesis=Hypothesis(declared_change(aircraft, motion, absent=absent), trim_flow_rad=trim_flow_rad),
         effects=tuple(e for e in effects if not reasons[e.key]),
-        untestable=tuple((e, reasons[e.key]) for e in effects if reasons[e.key]),
+        untestable=tuple(untestable),
         model=model,
         notes=tuple(notes),
-        declared=_declared_causes(fitted, aircraft, effects, options),
+        declared=_declared_causes(fitted, aircraft, effects, options, motion),
+    )
+
+
+def _model_of(aircraft: Aircraft, motion: Motion, options: TraceOptions) -> tuple[str, list[str]]:
+    """The model of the declared aircraft, and a note where it is not the one that the options name."""
+    if aircraft.file.jsbsim is None:
+        flies = False
+        why = "the aircraft has no JSBSim model"
+    else:
+        flies = motion is LONGITUDINAL or flies_in_six_axes(aircraft)
+        why = "the JSBSim model has no jsbsim.aileron and jsbsim.rudder in aircraft.toml"
+    if flies or options.model == "linear":
+        return options.model, []
+    name = "short-period" if motion is LONGITUDINAL else motion.name
+    return "linear", [f"{why}: it is traced with the linear {name} model"]
+
+
+def _steady_notes(signals: Sequence[Signals]) -> list[str]:
+    """A note on the known inputs that the logs lack."""
+    lacking = sorted({name for s in signals for name in s.assumed})
+    if not lacking:
+        return []
+    return [f"the logs lack {', '.join(lacking)}: those of a steady flight at the trim stand for them"]
+
+
+def _absent(logs: Sequence[FlightLog], motion: Motion) -> tuple[str, ...]:
+    """Outputs that no instrument measured in some log."""
+    if motion is LONGITUDINAL:
+        return (VANE,) if any(is_reconstructed(log.channels) for log in logs) else ()
+    return tuple(c for c in motion.output_channels if any(c not in log.channels for log in logs))
+
+
+def _unmeasured(channel: str, motion: Motion) -> str:
+    others = ", ".join(c for c in motion.output_channels if c != channel)
+    return (
+        f"{channel} was not measured: the filter takes {others} as far as they are measured as outputs and {channel} as a state, "
+        "and no effect of its sensor can be tested"
     )
 
 
 def _declared_causes(
-    fitted: Sequence[TraceRecord], aircraft: Aircraft, effects: Sequence[Effect], options: TraceOptions
+    fitted: Sequence[TraceRecord],
+    aircraft: Aircraft,
+    effects: Sequence[Effect],
+    options: TraceOptions,
+    motion: Motion,
 ) -> DeclaredCauses:
     """Causes that move several derivatives, and wrong declarations, as far as they are requested."""
     mean = np.mean([r.plant.derivatives for r in fitted], axis=0)
     keys = options.keys
-    causes = causes_of(directions(mean, tail_geometry(aircraft)))
+    causes = causes_of(directions(mean, tail_geometry(aircraft), motion))
     return DeclaredCauses(
         tuple(c for c in causes if keys is None or c.key in keys),
         keys is None or DERIVATIVES in keys,
@@ -161,13 +205,14 @@ def _declared_causes(
     )
 
 
-def _why_not(effect: Effect, columns: Collection[str], has_vane: bool) -> str:
+def _why_not(effect: Effect, columns: Collection[str], absent: Collection[str]) -> str:
     """Why an effect cannot be tested; empty if it can."""
     missing = [channel for channel in effect.channels if channel not in columns]
     if missing:
         return f"the log lacks {', '.join(missing)}"
-    if not has_vane and VANE in effect.channels:
-        return "alpha was reconstructed: no vane measured it"
+    reconstructed = [channel for channel in absent if channel in effect.channels]
+    if reconstructed:
+        return _RECONSTRUCTED if reconstructed == [VANE] else f"{reconstructed[0]} was not measured"
     return _AIR if effect.where == "air" else ""
 
 
@@ -180,7 +225,7 @@ def _one_aircraft(logs: Sequence[FlightLog], aircraft: Aircraft) -> None:
 
 
 def undo_input_sensors(s: Signals, aircraft: Aircraft) -> Signals:
-    """A run with the declared errors of the elevator's and the airspeed's sensors undone."""
+    """A run with the declared errors of the sensors of its controls and known inputs undone."""
 
     def true(channel: str, x: Array, cells: int) -> Array:
         errors = aircraft.file.sensors.get(channel, Sensor()).errors()
@@ -192,10 +237,19 @@ def undo_input_sensors(s: Signals, aircraft: Aircraft) -> Signals:
 
     airspeed = true("airspeed_m_s", s.airspeed_m_s, s.sub)
     declared = aircraft.file.sensors.get("airspeed_m_s", Sensor()).errors()
+    alpha = s.alpha_rad if s.alpha_rad.size else fine(s.y[:, 0], s.sub)
     if declared.alpha_slope_per_rad != 0.0:
-        airspeed = airspeed / declared.slope(fine(s.y[:, 0], s.sub))
+        airspeed = airspeed / declared.slope(alpha)
+    known: dict[str, Any] = {
+        n: true(n, getattr(s, n), s.sub) for n in ("alpha_rad", "q_rad_s") if n in s.motion.known
+    }
+    if known:
+        vane = aircraft.file.sensors.get("alpha_rad", Sensor()).errors()
+        p = fine(s.y[:, s.motion.output_channels.index("p_rad_s")], s.sub)
+        known["alpha_rad"] = known["alpha_rad"] + (vane.x_m * known["q_rad_s"] - vane.y_m * p) / airspeed
     return replace(
         s,
+        **known,
         controls_rad=np.stack(
             [
                 true(control.channel, x, s.sub * FINE)
@@ -213,20 +267,27 @@ def _check(signals: Sequence[Signals], held: Sequence[str], logs: Sequence[Fligh
             raise LogError(
                 f"run {s.run_id}: {s.y.shape[0]} samples; a record needs at least {_LEAST_SAMPLES} to be traced"
             )
-    moved = max(float(np.ptp(s.elevator_rad)) for s in signals if s.run_id not in held)
-    if moved < LEAST_ELEVATOR_RAD:
+    motion = signals[0].motion
+    fitted = [s for s in signals if s.run_id not in held]
+    moved = np.max([np.ptp(s.controls_rad, axis=1) for s in fitted], axis=0)
+    if moved.max() < LEAST_ELEVATOR_RAD:
         which = "record that is not held out" if held else "record"
+        controls = " or the ".join(control.name for control in motion.controls)
+        ranges = " and ".join(
+            _range_of(logs, held, control.channel, float(own))
+            for control, own in zip(motion.controls, moved, strict=True)
+        )
         raise LogError(
-            f"no {which} moves the elevator by {LEAST_ELEVATOR_RAD / DEG:g} deg: {_range_of(logs, held, moved)}; without an "
+            f"no {which} moves the {controls} by {LEAST_ELEVATOR_RAD / DEG:g} deg: {ranges}; without an "
             "input no effect can be separated from another; fly doublets or 3-2-1-1 of at least 1 deg"
         )
 
 
-def _range_of(logs: Sequence[FlightLog], held: Sequence[str], moved_rad: float) -> str:
-    """The range of the elevator's column in words, and the part of it that is no noise."""
+def _range_of(logs: Sequence[FlightLog], held: Sequence[str], channel: str, moved_rad: float) -> str:
+    """The range of a control's column in words, and the part of it that is no noise."""
     runs = ((log, i) for log in logs for i, run_id in enumerate(log.run_ids) if run_id not in held)
-    raw = max(float(np.ptp(log.channels["elevator_rad"][log.rows(i)])) for log, i in runs)
-    column = f"elevator_rad has a range of {raw / DEG:.2g} deg"
+    raw = max(float(np.ptp(log.channels[channel][log.rows(i)])) for log, i in runs)
+    column = f"{channel} has a range of {raw / DEG:.2g} deg"
     if moved_rad >= raw:
         return column
     rest = "all of it" if moved_rad == 0.0 else f"all but {moved_rad / DEG:.2g} deg of it"
@@ -245,12 +306,12 @@ def _hold_out(runs: Sequence[str], options: TraceOptions) -> tuple[str, ...]:
 
 
 def _halves(record: TraceRecord) -> tuple[TraceRecord, TraceRecord]:
-    """The record cut where the elevator has made half of its travel, so that both parts are excited.
+    """The record cut where the controls have made half of their travel, so that both parts are excited.
 
     The second part begins in motion: surfaces, sensors and effects that act late still show what came before.
     """
     s = record.signals
-    travel = np.cumsum(np.abs(np.diff(s.elevator_rad[:: s.sub * FINE])))
+    travel = np.cumsum(np.abs(np.diff(s.sampled_controls_rad, axis=1)).sum(axis=0))
     half = int(np.searchsorted(travel, 0.5 * travel[-1]))
     middle = min(max(half, _LEAST_SAMPLES // 2), s.y.shape[0] - _LEAST_SAMPLES // 2)
     start = max(middle - math.ceil(_LEAD_S / s.dt_s), 0)

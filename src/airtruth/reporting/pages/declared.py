@@ -16,7 +16,8 @@ from airtruth.logs.histories import Histories
 from airtruth.physics.atmosphere import altitude_of_density_m
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.table import Number, Row, Table, flat
-from airtruth.tracing.model.plant import declared_covariance, declared_derivatives, trim_of
+from airtruth.tracing.model.declared import declared_covariance
+from airtruth.tracing.model.plant import declared_derivatives, trim_of
 from airtruth.tracing.presentation.charts import chart_of_shifts
 
 if TYPE_CHECKING:

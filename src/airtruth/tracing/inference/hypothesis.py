@@ -92,7 +92,7 @@ class Hypothesis:
         key = sizes.tobytes()
         found = self._compiled.get(key)
         if found is None:
-            found = compile_change(self.change(sizes))
+            found = compile_change(self.change(sizes), self.motion)
             if len(self._compiled) >= _KEPT:
                 self._compiled.clear()
             self._compiled[key] = found

@@ -24,8 +24,9 @@ from airtruth.tracing.model.by_motion import (
     rates,
     state_count,
 )
-from airtruth.tracing.model.equations import hold_plays, lead_decay
-from airtruth.tracing.model.kernel_input import FilterModel, GridSignals
+from airtruth.tracing.model.equations import hold_plays
+from airtruth.tracing.model.gust_states import lead_decay
+from airtruth.tracing.model.kernel_input import AnyGrid, FilterModel
 from airtruth.tracing.model.linearise import delay_system
 from airtruth.tracing.model.parameters import DELAY_ORDER, GUST_1, LEAD, LEAD_COUNT
 
@@ -114,9 +115,7 @@ def work_of(model: FilterModel) -> Work:
 
 
 @inner
-def advance_motion(
-    x: Array, point: int, grid: GridSignals, model: FilterModel, steps: Steps, work: Work
-) -> None:
+def advance_motion(x: Array, point: int, grid: AnyGrid, model: FilterModel, steps: Steps, work: Work) -> None:
     """One Runge-Kutta step of motion, gusts and effects; the outputs at its start into ``work`` for late sensors."""
     h, rate, tried, motion = steps.h, work.rate, work.tried, model.states.motion
     count = state_count(model)
@@ -149,7 +148,7 @@ def advance_motion(
 
 @inner
 def advance_sensors(
-    x: Array, point: int, grid: GridSignals, model: FilterModel, steps: Steps, work: Work
+    x: Array, point: int, grid: AnyGrid, model: FilterModel, steps: Steps, work: Work
 ) -> None:
     """Lags and delays over the parts of the step that `advance_motion` has made.
 

@@ -21,7 +21,7 @@ from airtruth.tracing.model.kernel_input import (
 from airtruth.tracing.model.linearise import linearise
 from airtruth.tracing.model.parameters import CORE, OUTPUTS, SHORT_PERIOD, state_layout
 from airtruth.tracing.model.steady import without_update
-from airtruth.tracing.model.tangent import matrices_along
+from airtruth.tracing.model.tangent import FLOWN, matrices_along
 
 _AT: Final = AirPoint(*[1.0] * len(AirPoint._fields))
 """Inputs at a point."""
@@ -35,8 +35,8 @@ def _model() -> FilterModel:
             [*[1.0] * 12, np.zeros((2, 3)), increments, axis, axis, axis, np.zeros((2, 2, 2, 3))]
         ),
         GustModel(*[1.0] * len(GustModel._fields)),
-        EffectArrays(whole.reshape(0, 5), none, none, none, whole.reshape(0, 2), none, none, none),
-        SensorArrays._make([*[ones] * 7, 1.0]),
+        EffectArrays(whole.reshape(0, 6), none, none, none, whole.reshape(0, 2), none, none, none),
+        SensorArrays._make([*[ones] * 7, 1.0, ones]),
         state_layout(whole, CORE, 0.0 * ones, 0.0 * ones, slow=False),
     )
 
@@ -58,7 +58,7 @@ def _filter() -> None:
 
 def _tangent() -> None:
     given = _given()
-    matrices_along(given, path_of(2, CORE, OUTPUTS), 1.0)
+    matrices_along(given, path_of(2, CORE, OUTPUTS), 1.0, np.array([1, 4]), len(FLOWN))
 
 
 KERNELS: Final[tuple[tuple[str, Callable[[], None]], ...]] = (

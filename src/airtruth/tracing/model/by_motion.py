@@ -14,28 +14,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import by_types
-from airtruth.tracing.model.kernel_input import AirPoint, FilterModel, GridSignals
+from airtruth.tracing.model.kernel_input import AnyGrid, AnyPoint, FilterModel
 
 Array = NDArray[np.float64]
 
 
 class Equations(NamedTuple):
-    """Equations of one motion; functions but the last are `airtruth.numerics.compiled.inner`.
+    """Equations of one motion; functions but ``settle`` are `airtruth.numerics.compiled.inner`.
 
     Attributes
     ----------
     states, early : numbers of its states and of its early outputs; one more output is late.
     rates, outputs, air_at, move_plays : as the functions of this module.
     settle : (state, inputs, model) -> None: the effects' states into equilibrium with the states of the motion.
+    shifted : (inputs at one time, number of a field, amount) -> the inputs with the amount added to the field.
+    signals_at : (state, inputs, rate of the first state, model, out) -> None: the signals of
+        `airtruth.tracing.model.tangent.flown_of` into ``out``.
+    point : type of its inputs at one time, with the fields of those along a record: controls first, coefficients last.
+    coefficients : number of its coefficients.
+    has_roll_gust : whether a state of a roll gust, of unit variance, follows the other states of the gusts.
     """
 
     states: int
     early: int
     rates: Callable[..., float]
     outputs: Callable[..., None]
-    air_at: Callable[..., AirPoint]
+    air_at: Callable[..., AnyPoint]
     move_plays: Callable[..., None]
-    settle: Callable[[Array, AirPoint, FilterModel], None]
+    settle: Callable[[Array, AnyPoint, FilterModel], None]
+    shifted: Callable[..., AnyPoint]
+    signals_at: Callable[..., None]
+    point: Any
+    coefficients: int
+    has_roll_gust: bool = False
 
 
 _OF: Final[dict[type, Equations]] = {}
@@ -49,12 +60,23 @@ def register(aircraft: type, grid: type, equations: Equations) -> None:
     ----------
     aircraft : type of `FilterModel.aircraft`; grid : type of `KernelInput.grid`.
     """
-    _OF[aircraft] = _OF[grid] = equations
+    _OF[aircraft] = _OF[grid] = _OF[equations.point] = equations
 
 
 def equations_of(model: FilterModel) -> Equations:
     """Equations of a model."""
     return _OF[type(model.aircraft)]
+
+
+def equations_of_grid(grid: tuple[Array, ...]) -> Equations:
+    """Equations of inputs along a record."""
+    return _OF[type(grid)]
+
+
+def coefficients_of(grid: tuple[Array, ...]) -> tuple[str, ...]:
+    """Names of the increments of coefficients among inputs along a record."""
+    own = _OF[type(grid)]
+    return tuple(own.point._fields[-own.coefficients :])
 
 
 def _typed(model: Any) -> Equations:
@@ -87,9 +109,25 @@ def _outputs(x: Any, rate: Any, force: Any, at: Any, model: Any, y: Any) -> Call
     return lambda x, rate, force, at, model, y: own(x, rate, force, at, model, y)
 
 
-def _air_at(grid: Any, point: Any) -> Callable[..., AirPoint]:
+def _air_at(grid: Any, point: Any) -> Callable[..., AnyPoint]:
     own = _OF[grid.instance_class].air_at
     return lambda grid, point: own(grid, point)
+
+
+def _signals_at(x: Any, at: Any, rate: Any, model: Any, out: Any) -> Callable[..., None]:
+    own = _typed(model).signals_at
+    return lambda x, at, rate, model, out: own(x, at, rate, model, out)
+
+
+def _shifted(at: Any, field: Any, by: Any) -> Callable[..., AnyPoint]:
+    own = _OF[at.instance_class].shifted
+    return lambda at, field, by: own(at, field, by)
+
+
+def _coefficient_field(grid: Any) -> Callable[..., int]:
+    own = _OF[grid.instance_class]
+    first = len(own.point._fields) - own.coefficients
+    return lambda grid: first
 
 
 def _move_plays(x: Any, at: Any, model: Any) -> Callable[..., None]:
@@ -116,7 +154,7 @@ def output_count(model: FilterModel) -> int:
 
 
 @by_types(_rates)
-def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
+def rates(x: Array, at: AnyPoint, model: FilterModel, out: Array) -> float:
     """x' of the motion, the gusts and the effects' states into ``out``; returns the force of the late output at the CG [m/s2].
 
     A play has no x': that of a lag in its place serves the linearisation, and `airtruth.tracing.model.equations.hold_plays`
@@ -126,7 +164,7 @@ def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
 
 
 @by_types(_outputs)
-def outputs(x: Array, rate: Array, force: float, at: AirPoint, model: FilterModel, y: Array) -> None:
+def outputs(x: Array, rate: Array, force: float, at: AnyPoint, model: FilterModel, y: Array) -> None:
     """What the sensors read without bias, lag, delay and noise, into ``y`` [units of the outputs].
 
     Parameters
@@ -137,13 +175,31 @@ def outputs(x: Array, rate: Array, force: float, at: AirPoint, model: FilterMode
 
 
 @by_types(_air_at)
-def air_at(grid: GridSignals, point: int) -> AirPoint:
+def air_at(grid: AnyGrid, point: int) -> AnyPoint:
     """Inputs at a point of the filter's grid."""
     raise NotImplementedError
 
 
+@by_types(_signals_at)
+def signals_at(x: Array, at: AnyPoint, rate: float, model: FilterModel, out: Array) -> None:
+    """The signals of terms at a state into ``out``; ``rate``: x' of the first state [rad/s]."""
+    raise NotImplementedError
+
+
+@by_types(_coefficient_field)
+def coefficient_field(grid: AnyGrid) -> int:
+    """Number of the field of the first increment of a coefficient among the inputs."""
+    raise NotImplementedError
+
+
+@by_types(_shifted)
+def shifted(at: AnyPoint, field: int, by: float) -> AnyPoint:
+    """Inputs with an amount added to one of them [its unit]; controls are the first fields, coefficients the last."""
+    raise NotImplementedError
+
+
 @by_types(_move_plays)
-def move_plays(x: Array, at: AirPoint, model: FilterModel) -> None:
+def move_plays(x: Array, at: AnyPoint, model: FilterModel) -> None:
     """Move the states of plays to no more than their half width from their signals."""
     raise NotImplementedError
 
@@ -151,12 +207,17 @@ def move_plays(x: Array, at: AirPoint, model: FilterModel) -> None:
 __all__ = [
     "Equations",
     "air_at",
+    "coefficient_field",
+    "coefficients_of",
     "early_count",
     "equations_of",
+    "equations_of_grid",
     "move_plays",
     "output_count",
     "outputs",
     "rates",
     "register",
+    "shifted",
+    "signals_at",
     "state_count",
 ]

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import allocating, inner
 from airtruth.numerics.discretise import congruence, multiply, step, whitener
-from airtruth.tracing.model.by_motion import output_count, outputs, rates
-from airtruth.tracing.model.kernel_input import AirPoint, FilterModel
+from airtruth.tracing.model.by_motion import output_count, outputs, rates, shifted
+from airtruth.tracing.model.kernel_input import AnyPoint, FilterModel
 from airtruth.tracing.model.linearise import (
     FirstUpdate,
     covariance_of,
@@ -46,7 +46,7 @@ class Corners(NamedTuple):
     Attributes
     ----------
     phi, noise : (states, states) transition and process noise of a sample.
-    spread : (states, states) what a unit variance of the surface's mean over a cell adds.
+    spread : (controls, states, states) what a unit variance of the mean of each surface over a cell adds.
     steady : (states, states) covariance of the prediction; c : (outputs, states).
     variance : (outputs,) of the white noise; covariance : (outputs, outputs) of the steady innovations.
     root : (outputs, outputs) inverse of the steady whitener; logdet : log|covariance|.
@@ -97,25 +97,12 @@ def stacked(corners: Sequence[Corners]) -> CornerNodes:
     )
 
 
-@inner
-def moved_surface(at: AirPoint, by_rad: float) -> AirPoint:
-    """Inputs with another surface."""
-    return AirPoint(
-        at.elevator_rad + by_rad,
-        at.airspeed_m_s,
-        at.ground_m_s,
-        at.qbar_pa,
-        at.theta_rad,
-        at.lift,
-        at.moment,
-    )
-
-
-def input_column(x: Array, at: AirPoint, model: FilterModel) -> Array:
-    """(states,) slope of x' in the surface [1/rad], late sensors included."""
-    column, direct = np.zeros(x.size), np.empty(model.sensors.scale.size)
-    _input_differences(x, at, model, column, direct)
-    return column
+def input_columns(x: Array, at: AnyPoint, model: FilterModel, controls: int) -> Array:
+    """(controls, states) slopes of x' in each surface [1/rad], late sensors included."""
+    columns, direct = np.zeros((controls, x.size)), np.empty(model.sensors.scale.size)
+    for number, column in enumerate(columns):
+        _input_differences(x, at, number, model, column, direct)
+    return columns
 
 
 @allocating
@@ -132,12 +119,14 @@ def drive_sensors(direct: Array, model: FilterModel, column: Array) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _input_differences(x: Array, at: AirPoint, model: FilterModel, column: Array, direct: Array) -> None:
-    """Slopes in the surface of the rates of the motion and of the outputs, and of the rates of late sensors."""
+def _input_differences(
+    x: Array, at: AnyPoint, control: int, model: FilterModel, column: Array, direct: Array
+) -> None:
+    """Slopes in a surface of the rates of the motion and of the outputs, and of the rates of late sensors."""
     count = output_count(model)
     rate, y = np.zeros((2, x.size)), np.empty((2, count))
     for side in range(2):
-        moved = moved_surface(at, STEP_RAD if side == 0 else -STEP_RAD)
+        moved = shifted(at, control, STEP_RAD if side == 0 else -STEP_RAD)
         az = rates(x, moved, model, rate[side])
         outputs(x, rate[side], az, moved, model, y[side])
     for i in range(model.states.motion):
@@ -187,15 +176,27 @@ def corrected(p: Array, k_gain: Array, c: Array) -> Array:
     return out
 
 
+@inner
+def is_uncertain(corner_rad2: Array, sample: int) -> bool:
+    """Whether a surface is uncertain in the cell that ends at a sample."""
+    found = False
+    for c in range(corner_rad2.shape[0]):
+        found = found or corner_rad2[c, sample] > 0.0
+    return found
+
+
 @allocating
-def predicted(p: Array, corners: CornerNodes, node: int, corner_rad2: float) -> Array:
-    """Covariance of the next prediction, with the corner of the cell in between."""
+def predicted(p: Array, corners: CornerNodes, node: int, corner_rad2: Array, sample: int) -> Array:
+    """Covariance of the prediction of a sample, with the corners of the cell before it."""
     n = p.shape[0]
     work, out = np.empty((n, n)), np.empty((n, n))
     congruence(corners.phi[node], p, work, out)
     for i in range(n):
         for j in range(n):
-            out[i, j] += corners.noise[node, i, j] + corner_rad2 * corners.spread[node, i, j]
+            more = corners.noise[node, i, j]
+            for c in range(corner_rad2.shape[0]):
+                more += corner_rad2[c, sample] * corners.spread[node, c, i, j]
+            out[i, j] += more
     return out
 
 
@@ -236,8 +237,8 @@ __all__ = [
     "corrected",
     "drive_sensors",
     "gain_at",
-    "input_column",
-    "moved_surface",
+    "input_columns",
+    "is_uncertain",
     "predicted",
     "settled",
     "spread_of",

@@ -26,33 +26,24 @@ from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import inner, shared
 from airtruth.physics.longitudinal import lower_point
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.sensors import vane_equation
 from airtruth.physics.terms import numbered_shape
 from airtruth.tracing.model.by_motion import Equations, register
+from airtruth.tracing.model.gust_states import gust_of, gust_rates
 from airtruth.tracing.model.kernel_input import (
     AircraftArrays,
     AirPoint,
     EffectArrays,
     FilterModel,
     GridSignals,
-    GustModel,
 )
-from airtruth.tracing.model.parameters import LEAD, LEAD_COUNT, OUTPUTS
+from airtruth.tracing.model.parameters import GUST_1, OUTPUTS
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
-_W1: Final = math.sqrt(1.5)
-"""Gain of the first state of MIL-F-8785C's vertical Dryden filter, states of unit drive [-]."""
-_W2: Final = math.sqrt(1.5) * (1.0 / math.sqrt(3.0) - 1.0)
-"""Gain of its second state [-]."""
-_LEAD_RAD_S: Final = (2.1, 21.0, 217.0)
-"""Corners of the rolloff [rad/s]. Fitted here: with `_LEAD_GAIN` they turn Dryden's spectrum into von Karman's, both
-of 840 m at 43 m/s, within 6 % (rms 2 %) from 0.5 to 600 rad/s, the level left free. In this band both spectra are
-powers of the frequency, so that the corners serve any speed and length; a record of seconds shows little below it."""
-_LEAD_GAIN: Final = (0.58, 0.84, 1.39)
-"""Gains at these corners [-]; fitted with them."""
-READING: Final = 2
+READING: Final = len(LONGITUDINAL.coefficients)
 """First number of a reading among what a term acts on, see `EffectArrays`."""
 PLAY: Final = 2
 """Number of the play in `airtruth.physics.terms.STATE_KINDS`."""
@@ -85,10 +76,7 @@ class Signals(NamedTuple):
 @shared
 def gust(x: Array, rolloff: float) -> float:
     """Upward gust over the level of Dryden's part [-]."""
-    lead = 0.0
-    for i in range(LEAD_COUNT):
-        lead += _LEAD_GAIN[i] * (x[2] - x[LEAD + i])
-    return float(_W1 * x[2] + _W2 * x[3] + rolloff * lead)
+    return gust_of(x, GUST_1, rolloff)
 
 
 @inner
@@ -139,14 +127,9 @@ def _look_up(
 
 
 @inner
-def signal_of(signals: Signals, number: int) -> float:
-    if number == 0:
-        return signals.alpha
-    if number == 1:
-        return signals.elevator
-    if number == ALPHA_DOT:
-        return signals.alpha_dot_hat
-    return signals.qhat if number == 2 else signals.qbar
+def signal_of(signals: tuple[float, ...], number: int) -> float:
+    """A signal of any motion by its number."""
+    return signals[number]
 
 
 @inner
@@ -216,23 +199,14 @@ def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
     )
     out[0] = q + (fz * cosine - fx * sine) / (mass * ground) + weight
     out[1] = fm / aircraft.inertia_kg_m2
-    _gust_rates(x, v, late, gusts, out)
-    _effect_rates(x, Signals(alpha, surface, qhat, out[0] * half, qbar), model, out)
+    gust_rates(x, GUST_1, v, late, gusts, out)
+    effect_rates(x, Signals(alpha, surface, qhat, out[0] * half, qbar), model, out)
     return float(fz / mass)
 
 
 @inner
-def _gust_rates(x: Array, v: float, late: float, gusts: GustModel, out: Array) -> None:
-    a = v / gusts.length_m
-    out[2] = -a * x[2]
-    out[3] = a * (x[2] - x[3])
-    out[4] = late
-    for i in range(LEAD_COUNT):
-        out[LEAD + i] = _LEAD_RAD_S[i] * (x[2] - x[LEAD + i])
-
-
-@inner
-def _effect_rates(x: Array, signals: Signals, model: FilterModel, out: Array) -> None:
+def effect_rates(x: Array, signals: tuple[float, ...], model: FilterModel, out: Array) -> None:
+    """x' of the effects' states."""
     effects = model.effects
     for k in range(effects.time_s.size):
         at = model.states.effect[k]
@@ -257,17 +231,39 @@ def hold_plays(x: Array, tried: Array, model: FilterModel) -> None:
 
 
 @inner
-def move_plays(x: Array, at: AirPoint, model: FilterModel) -> None:
+def has_plays(effects: EffectArrays) -> bool:
+    """Whether an effect has a play."""
+    found = False
+    for k in range(effects.time_s.size):
+        found = found or effects.state_index[k, 0] == PLAY
+    return found
+
+
+@inner
+def follow(x: Array, signals: tuple[float, ...], model: FilterModel) -> None:
     """Move the states of plays to no more than their half width from their signals."""
     effects = model.effects
     for k in range(effects.time_s.size):
         if effects.state_index[k, 0] == PLAY:
-            alpha = air_alpha(x, gust(x, model.gusts.rolloff), model.gusts.level_m_s, at)
-            surface = effective_elevator(at.elevator_rad, model.aircraft)
-            qhat = x[1] * 0.5 * model.aircraft.chord_m / at.airspeed_m_s
-            s = signal_of(Signals(alpha, surface, qhat, 0.0, at.qbar_pa), effects.state_index[k, 1])
+            s = signal_of(signals, effects.state_index[k, 1])
             i, half = model.states.effect[k], effects.half_width[k]
             x[i] = min(max(x[i], s - half), s + half)
+
+
+@inner
+def _measured(x: Array, alpha: float, at: AirPoint, model: FilterModel) -> Signals:
+    """The signals that need no acceleration."""
+    surface = effective_elevator(at.elevator_rad, model.aircraft)
+    qhat = x[1] * 0.5 * model.aircraft.chord_m / at.airspeed_m_s
+    return Signals(alpha, surface, qhat, 0.0, at.qbar_pa)
+
+
+@inner
+def move_plays(x: Array, at: AirPoint, model: FilterModel) -> None:
+    """See `airtruth.tracing.model.by_motion.move_plays`."""
+    if has_plays(model.effects):
+        alpha = air_alpha(x, gust(x, model.gusts.rolloff), model.gusts.level_m_s, at)
+        follow(x, _measured(x, alpha, at, model), model)
 
 
 def settle_effects(x: Array, at: AirPoint, model: FilterModel) -> None:
@@ -296,16 +292,13 @@ def air_at(grid: GridSignals, point: int) -> AirPoint:
 
 
 @inner
-def _add_readings(x: Array, alpha: float, at: AirPoint, model: FilterModel, y: Array) -> None:
-    """Add the increments of the readings."""
+def add_readings(x: Array, signals: tuple[float, ...], first: int, model: FilterModel, y: Array) -> None:
+    """Add the increments of the readings; ``first``: first number of a reading among what a term acts on."""
     effects = model.effects
     for t in range(effects.amplitude.size):
-        output = effects.term_index[t, 0] - READING
+        output = effects.term_index[t, 0] - first
         if output >= 0:
-            surface = effective_elevator(at.elevator_rad, model.aircraft)
-            qhat = x[1] * 0.5 * model.aircraft.chord_m / at.airspeed_m_s
             state = effects.term_index[t, 3]
-            signals = Signals(alpha, surface, qhat, 0.0, at.qbar_pa)
             s = x[state] if state >= 0 else signal_of(signals, effects.term_index[t, 1])
             more = effects.amplitude[t] * shape(effects.term_index[t, 2], s - effects.origin[t])
             behind = effects.term_index[t, 5]
@@ -323,19 +316,57 @@ def outputs(x: Array, rate: Array, az: float, at: AirPoint, model: FilterModel, 
     y[0] = _vane(alpha, x[1], arm[0], at.airspeed_m_s)
     y[1] = x[1]
     y[2] = az - arm[2] * rate[1]
-    _add_readings(x, alpha, at, model, y)
+    if model.effects.amplitude.size > 0:
+        add_readings(x, _measured(x, alpha, at, model), READING, model, y)
     for i in range(OUTPUTS):
         y[i] *= scale[i]
 
 
-def lead_decay(dt_s: float, i: int) -> tuple[float, float]:
-    """Decay of a low-passed copy over a time [s], and its mean over that time [-]."""
-    r = _LEAD_RAD_S[i] * dt_s
-    decay = math.exp(-r)
-    return decay, (1.0 - decay) / r
+@inner
+def signals_at(x: Array, at: AirPoint, rate: float, model: FilterModel, out: Array) -> None:
+    """See `airtruth.tracing.model.by_motion.signals_at`."""
+    gusts, half = model.gusts, 0.5 * model.aircraft.chord_m / at.airspeed_m_s
+    upward = gust(x, gusts.rolloff)
+    late = (upward - x[GUST_1 + 2]) / gusts.rotary_time_s
+    out[0] = air_alpha(x, upward, gusts.level_m_s, at)
+    out[1] = effective_elevator(at.elevator_rad, model.aircraft)
+    out[2] = (x[1] - gusts.rotary * gusts.level_m_s * late / at.airspeed_m_s) * half
+    out[3] = rate * half
+    out[4] = at.qbar_pa
+    out[5] = x[1] * half
 
 
-register(AircraftArrays, GridSignals, Equations(2, 2, rates, outputs, air_at, move_plays, settle_effects))
+@inner
+def shifted(at: AirPoint, field: int, by: float) -> AirPoint:
+    """See `airtruth.tracing.model.by_motion.shifted`; no effect moves the fields between the control and the coefficients."""
+    return AirPoint(
+        at.elevator_rad + (by if field == 0 else 0.0),
+        at.airspeed_m_s,
+        at.ground_m_s,
+        at.qbar_pa,
+        at.theta_rad,
+        at.lift + (by if field == 5 else 0.0),
+        at.moment + (by if field == 6 else 0.0),
+    )
+
+
+register(
+    AircraftArrays,
+    GridSignals,
+    Equations(
+        states=len(LONGITUDINAL.states),
+        early=len(LONGITUDINAL.outputs) - 1,
+        rates=rates,
+        outputs=outputs,
+        air_at=air_at,
+        move_plays=move_plays,
+        settle=settle_effects,
+        shifted=shifted,
+        signals_at=signals_at,
+        point=AirPoint,
+        coefficients=len(LONGITUDINAL.coefficients),
+    ),
+)
 
 __all__ = [
     "ALPHA_DOT",
@@ -343,13 +374,16 @@ __all__ = [
     "PLAY_S",
     "READING",
     "Signals",
+    "add_readings",
     "air_alpha",
     "air_at",
     "cell",
+    "effect_rates",
     "effective_elevator",
+    "follow",
     "gust",
+    "has_plays",
     "hold_plays",
-    "lead_decay",
     "rates",
     "settle_effects",
     "shape",

@@ -20,12 +20,13 @@ from airtruth.tracing.model.by_motion import air_at, early_count, equations_of, 
 from airtruth.tracing.model.corners import (
     corrected,
     gain_at,
+    is_uncertain,
     predicted,
     settled,
 )
-from airtruth.tracing.model.equations import gust
 from airtruth.tracing.model.gains import Gains, interpolate, scaled
-from airtruth.tracing.model.kernel_input import AirPoint, FilterModel, KernelInput
+from airtruth.tracing.model.gust_states import gust_of
+from airtruth.tracing.model.kernel_input import AnyPoint, FilterModel, KernelInput
 from airtruth.tracing.model.linearise import FirstUpdate
 from airtruth.tracing.model.parameters import DELAY_ORDER, core_of, lead_of
 from airtruth.tracing.model.steady import SteadyFilter, without_update
@@ -81,10 +82,9 @@ def initial_state(given: KernelInput, start: Array) -> Array:
     states = equations_of(model).states
     x[: start.size] = start
     x[lead_of(states) : core_of(states)] = start[states]
-    x[start.size] = gust(x, model.gusts.rolloff)
-    if model.effects.time_s.size:
-        at = type(given.reference)(*(column[0] for column in given.grid))
-        equations_of(model).settle(x, at, model)
+    x[start.size] = gust_of(x, states, model.gusts.rolloff)
+    at = type(given.reference)(*(column[0] for column in given.grid))
+    equations_of(model).settle(x, at, model)
     return x
 
 
@@ -127,7 +127,7 @@ def _update(x: Array, k_gain: Array, e: Array, model: FilterModel) -> bool:
 
 
 @inner
-def _read(x: Array, at: AirPoint, model: FilterModel, work: Work) -> None:
+def _read(x: Array, at: AnyPoint, model: FilterModel, work: Work) -> None:
     """What the sensors read before lags, delays and correlated noise, into ``work.out``."""
     az = rates(x, at, model, work.rate[0])
     outputs(x, work.rate[0], az, at, model, work.out)
@@ -144,7 +144,7 @@ def _residual(x: Array, i: int, k: int, given: KernelInput, work: Work) -> float
 def innovation(
     x: Array,
     k: int,
-    at: AirPoint,
+    at: AnyPoint,
     given: KernelInput,
     first: FirstUpdate,
     direct: Array,
@@ -275,10 +275,10 @@ def _innovations(
         if keeps:
             for i in range(n):
                 path.corrected[k, i] = x[i]
-        if given.corner_rad2.size > 0 and (uncertain or given.corner_rad2[k + 1] > 0.0):
+        if given.corner_rad2.size > 0 and (uncertain or is_uncertain(given.corner_rad2, k + 1)):
             if is_steady:
                 p = corners.steady[node].copy()
-            p = predicted(corrected(p, now, corners.c[node]), corners, node, given.corner_rad2[k + 1])
+            p = predicted(corrected(p, now, corners.c[node]), corners, node, given.corner_rad2, k + 1)
             uncertain = True
         if states.noise >= 0:
             for i in range(states.noise, n):
@@ -314,7 +314,7 @@ def free_run(given: KernelInput, e: Array) -> bool:
 
     The surface is taken as known between the samples.
     """
-    certain = given._replace(corner_rad2=np.zeros(0))
+    certain = given._replace(corner_rad2=np.zeros((0, 0)))
     return innovations(certain, without_update(given.model), e)[0]
 
 

@@ -16,7 +16,7 @@ from airtruth.numerics.compiled import inner
 from airtruth.tracing.model.advance import Steps, steps_of
 from airtruth.tracing.model.by_motion import air_at, early_count, output_count, state_count
 from airtruth.tracing.model.filter import Path
-from airtruth.tracing.model.kernel_input import FilterModel, GridSignals, KernelInput
+from airtruth.tracing.model.kernel_input import AnyGrid, FilterModel, KernelInput
 from airtruth.tracing.model.parameters import GUST_1, LEAD, LEAD_COUNT
 from airtruth.tracing.model.sensor_slopes import (
     GainSlopes,
@@ -165,9 +165,7 @@ def _end(model: FilterModel, steps: Steps, own: Lanes) -> None:
 
 
 @inner
-def _advance(
-    point: int, grid: GridSignals, model: FilterModel, moved: Moved, steps: Steps, own: Lanes
-) -> None:
+def _advance(point: int, grid: AnyGrid, model: FilterModel, moved: Moved, steps: Steps, own: Lanes) -> None:
     """One step of the motion, and of the sensors behind it."""
     for stage in range(5 if steps.has_late_sensors else 4):
         if stage < 4:

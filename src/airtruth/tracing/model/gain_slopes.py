@@ -18,19 +18,19 @@ from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import allocating
 from airtruth.numerics.discretise import DOUBLINGS, congruence, multiply, riccati, step, whitener
-from airtruth.tracing.model.by_motion import state_count
 from airtruth.tracing.model.corners import (
     corrected,
     drive_sensors,
     spread_of,
 )
-from airtruth.tracing.model.kernel_input import AirPoint, FilterModel
+from airtruth.tracing.model.kernel_input import AnyPoint, FilterModel
 from airtruth.tracing.model.linear_slopes import Linear, linear_slopes
 from airtruth.tracing.model.linearise import (
     FirstUpdate,
     add_sensors,
     covariance_of,
     first_update,
+    process_intensity,
     update_gain,
 )
 
@@ -88,16 +88,13 @@ def _moved_system(
     """Linearisation after a step of a parameter, late sensors and correlated noise included."""
     motion, h, q = model.states.motion, moves.h[row], moves.column[row]
     for i in range(a.shape[0]):
-        column[i] = direct[i] = 0.0
+        direct[i] = 0.0
         for j in range(a.shape[0]):
             a[i, j] = 0.0
-    driven = linear.direct.copy()
     for i in range(motion):
-        column[i] = linear.input[i] + (h * linear.d_input[i, q] if q >= 0 else 0.0)
         for j in range(motion):
             a[i, j] = linear.a[i, j] + (h * linear.d_a[i, j, q] if q >= 0 else 0.0)
     for i in range(c.shape[0]):
-        driven[i] += h * linear.d_direct[i, q] if q >= 0 else 0.0
         for j in range(a.shape[0]):
             c[i, j] = 0.0
         for j in range(motion):
@@ -105,7 +102,14 @@ def _moved_system(
     for j in range(a.shape[0]):
         direct[j] = c[c.shape[0] - 1, j]
     add_sensors(model, moves.slow_std[row], moves.slow_time_s[row], a, c)
-    drive_sensors(driven, model, column)
+    driven = np.zeros(c.shape[0])
+    for control in range(column.shape[0]):
+        at = motion + control
+        for i in range(motion):
+            column[control, i] = linear.a[i, at] + (h * linear.d_a[i, at, q] if q >= 0 else 0.0)
+        for i in range(c.shape[0]):
+            driven[i] = linear.c[i, at] + (h * linear.d_c[i, at, q] if q >= 0 else 0.0)
+        drive_sensors(driven, model, column[control])
 
 
 @allocating
@@ -160,18 +164,19 @@ def _gains(row: int, c: Array, variance: Array, out: Conditions) -> None:
 @njit(cache=True, nogil=True, error_model="numpy")
 def _conditions(
     x: Array,
-    at: AirPoint,
+    at: AnyPoint,
     model: FilterModel,
     aircraft: Any,
     columns: int,
     moves: Moves,
+    process: Array,
     dt_s: float,
     out: Conditions,
 ) -> None:
     """`conditions` into ``out``."""
-    n, rows, with_input = x.size, moves.h.size, out.spread.shape[0] > 0
-    linear = linear_slopes(x, at, model, aircraft, columns, with_input)
-    system, process, column = np.zeros((n, n + 1)), np.zeros(n), np.zeros(n)
+    n, rows, controls = x.size, moves.h.size, out.spread.shape[1]
+    linear = linear_slopes(x, at, model, aircraft, columns, controls)
+    system, column = np.zeros((n, n + 1)), np.zeros((controls, n))
     a, early, late = np.zeros((n, n)), np.empty((n, 1)), np.empty((n, 1))
     count, powers = 0, np.zeros((0, n, n))
     for row in range(rows):
@@ -183,7 +188,6 @@ def _conditions(
             for j in range(n):
                 moves_motion = moves_motion or a[i, j] != system[i, j]
         if moves_motion:
-            process[state_count(model)] = 2.0 * at.airspeed_m_s / model.gusts.length_m
             if model.states.noise >= 0:
                 for i in range(model.states.noise, n):
                     process[i] = 2.0 / moves.slow_time_s[row]
@@ -198,8 +202,8 @@ def _conditions(
             for i in range(n):
                 for j in range(n):
                     out.phi[row, i, j], out.noise[row, i, j] = out.phi[0, i, j], out.noise[0, i, j]
-        if with_input:
-            out.spread[row] = spread_of(a, column, dt_s)
+        for control in range(controls):
+            out.spread[row, control] = spread_of(a, column[control], dt_s)
         if row == 0:
             out.steady[0] = riccati(out.phi[0], out.c[0], out.noise[0], moves.variance[0])
             _gains(0, out.c[0], moves.variance[0], out)
@@ -222,13 +226,13 @@ def _conditions(
 
 def conditions(
     x: Array,
-    at: AirPoint,
+    at: AnyPoint,
     model: FilterModel,
     aircraft: Any,
     columns: int,
     moves: Moves,
     dt_s: float,
-    uncertain: bool,
+    controls: int,
 ) -> Conditions:
     """The filter at one flight condition after small steps of the parameters.
 
@@ -236,7 +240,7 @@ def conditions(
     ----------
     x, at : (states,) where it is linearised, and the inputs there.
     aircraft : what the parameters move of it; columns : number of the slopes' columns behind those of the states.
-    uncertain : whether the surface is uncertain between samples.
+    controls : number of surfaces that are uncertain between samples.
     """
     n, count, rows = x.size, model.sensors.scale.size, moves.h.size
     square = (rows, n, n)
@@ -250,10 +254,12 @@ def conditions(
         steady=np.zeros(square),
         phi=np.zeros(square),
         noise=np.zeros(square),
-        spread=np.zeros(square if uncertain else (0, 0, 0)),
+        spread=np.zeros((rows, controls, n, n)),
         c=np.zeros((rows, count, n)),
     )
-    _conditions(x.copy(), at, model, aircraft, columns, moves, dt_s, out)
+    _conditions(
+        x.copy(), at, model, aircraft, columns, moves, process_intensity(at.airspeed_m_s, model), dt_s, out
+    )
     return out
 
 

@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from airtruth.numerics.discretise import multiply
-from airtruth.tracing.model.corners import CornerNodes, corrected, gain_at, predicted, settled
+from airtruth.tracing.model.corners import CornerNodes, corrected, gain_at, is_uncertain, predicted, settled
 from airtruth.tracing.model.gain_slopes import Conditions, Moves
 from airtruth.tracing.model.linearise import FirstUpdate
 from airtruth.tracing.model.sensor_slopes import GainSlopes, width_of
@@ -71,11 +71,11 @@ def _recursion(
         if k + 1 == samples or corner_rad2.size == 0:
             continue
         if decides:
-            uncertain[k + 1] = lasts or corner_rad2[k + 1] > 0.0
+            uncertain[k + 1] = lasts or is_uncertain(corner_rad2, k + 1)
         if uncertain[k + 1]:
             if not uncertain[k]:
                 p = corners.steady[at].copy()
-            p = predicted(corrected(p, gains.k_gain[k], corners.c[at]), corners, at, corner_rad2[k + 1])
+            p = predicted(corrected(p, gains.k_gain[k], corners.c[at]), corners, at, corner_rad2, k + 1)
     return total
 
 
@@ -88,14 +88,14 @@ def slopes_along(
     ----------
     nodes : the filter at each flight condition after each step of the parameters; common : number of the common one.
     lower, share : see `airtruth.tracing.model.schedule.Schedule`; empty with a single node.
-    corner_rad2 : (samples,) see `airtruth.tracing.model.kernel_input.KernelInput`.
+    corner_rad2 : (controls, samples) see `airtruth.tracing.model.kernel_input.KernelInput`.
     """
     rows, count = moves.h.size, nodes[0].white.shape[1]
     if lower.size == 0 and corner_rad2.size == 0:
         own = nodes[0]
         steady = _Gains(own.k_gain, own.first, own.direct, np.zeros((rows, count, count)))
         return _divided(steady, moves), np.zeros(rows - 1)
-    samples = lower.size or corner_rad2.size
+    samples = lower.size or corner_rad2.shape[1]
     node = lower + (share > 0.5) if lower.size else np.zeros(samples, dtype=np.int64)
     uncertain = np.zeros(samples, dtype=np.bool_)
     made: list[_Gains] = []
@@ -154,15 +154,13 @@ def _corners(nodes: Sequence[Conditions], moves: Moves) -> _Nodes:
     def stacked(x: Sequence[Array]) -> Array:
         return np.ascontiguousarray(np.stack(x, axis=1))
 
-    rows, white = moves.h.size, stacked([own.white for own in nodes])
+    white = stacked([own.white for own in nodes])
     # a step of none leaves no whitener
     white[moves.h == 0.0] = white[0]
-    none = np.zeros((rows, len(nodes), 0, 0))
-    uncertain = nodes[0].spread.size > 0
     corners = CornerNodes(
         phi=stacked([own.phi for own in nodes]),
         noise=stacked([own.noise for own in nodes]),
-        spread=stacked([own.spread for own in nodes]) if uncertain else none,
+        spread=stacked([own.spread for own in nodes]),
         steady=stacked([own.steady for own in nodes]),
         c=stacked([own.c for own in nodes]),
         variance=moves.variance,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,15 +52,16 @@ class AircraftArrays(NamedTuple):
 
 
 class GustModel(NamedTuple):
-    """Vertical gusts.
+    """The gusts that the filter estimates, vertical in the pitch plane and from the side in the lateral-directional motion.
 
     Attributes
     ----------
     level_m_s : standard deviation of Dryden's part [m/s].
     length_m : scale length [m].
     rolloff : 0 for Dryden's spectrum, 1 for von Karman's [-].
-    rotary : share of the rotary gust [-].
-    rotary_time_s : time the gust takes to the tail, 4 b/(pi V) [s].
+    rotary : share of the rotary gusts [-].
+    rotary_time_s : time the gust takes to the tail, 4 b/(pi V), of the side gust 3 b/(pi V) [s].
+    roll_1_m : standard deviation of the roll gust over the level [1/m]; roll_time_s : its correlation time [s].
     """
 
     level_m_s: float
@@ -68,6 +69,8 @@ class GustModel(NamedTuple):
     rolloff: float
     rotary: float
     rotary_time_s: float
+    roll_1_m: float = 0.0
+    roll_time_s: float = 1.0
 
 
 class EffectArrays(NamedTuple):
@@ -75,7 +78,7 @@ class EffectArrays(NamedTuple):
 
     Attributes
     ----------
-    term_index : (terms, 6) what it acts on (0 CL, 1 Cm, 2 + i the reading of output i), signal (-1 for a state), shape,
+    term_index : (terms, 6) what it acts on (coefficients, then readings of the outputs), signal (-1 for a state), shape,
         state (-1 for a signal), signal of its factor (-1 for none), row of ``state_index`` of the lag whose lag error x - s
         multiplies the term (-1 for none).
     amplitude, origin, factor_origin : (terms,) of each term.
@@ -94,15 +97,14 @@ class EffectArrays(NamedTuple):
 
 
 class SensorArrays(NamedTuple):
-    """Errors of the outputs alpha, q, az.
+    """Errors of the outputs of the motion, (outputs,) each.
 
     Attributes
     ----------
-    bias : (3,) [units of the outputs]; scale : (3,) [-]; arm_m : (3,) position ahead of the CG [m].
-    lag_s, delay_s : (3,) [s]; 0 for none.
-    variance : (3,) of the white noise [units of the outputs squared].
-    slow_std : (3,) of the correlated noise, a Gauss-Markov process [units of the outputs]; slow_time_s : its correlation
-        time [s].
+    bias : [units of the outputs]; scale : [-]; arm_m, down_m : position ahead of the CG and below it [m].
+    lag_s, delay_s : [s]; 0 for none.
+    variance : of the white noise [units of the outputs squared].
+    slow_std : of the correlated noise, a Gauss-Markov process [units of the outputs]; slow_time_s : its correlation time [s].
     """
 
     bias: Array
@@ -113,12 +115,21 @@ class SensorArrays(NamedTuple):
     variance: Array
     slow_std: Array
     slow_time_s: float
+    down_m: Array
+
+
+AnyAircraft: TypeAlias = Any
+"""The aircraft of a motion: `AircraftArrays` or `LateralAircraft`."""
+AnyPoint: TypeAlias = Any
+"""Inputs of a motion at one time: `AirPoint` or `LateralPoint`."""
+AnyGrid: TypeAlias = Any
+"""Inputs of a motion on the filter's grid: `GridSignals` or `LateralGrid`."""
 
 
 class FilterModel(NamedTuple):
     """Everything that does not change along a record."""
 
-    aircraft: AircraftArrays
+    aircraft: AnyAircraft
     gusts: GustModel
     effects: EffectArrays
     sensors: SensorArrays
@@ -163,31 +174,35 @@ class KernelInput(NamedTuple):
 
     Attributes
     ----------
-    y : (samples, 3) measured alpha [rad], q [rad/s], az [m/s2]; more : (samples, 3) added to the predicted outputs.
+    y : (samples, outputs) measured outputs [their units]; more : (samples, outputs) added to the predicted ones.
     grid : known inputs, ``sub`` (even) cells to a sample.
-    corner_rad2 : (samples,) variance of the surface's mean over the cell that ends at each sample, about that of the
-        grid [rad2]; empty if the surface is known between the samples.
+    corner_rad2 : (controls, samples) variance of a surface's mean over the cell that ends at each sample, about that of the
+        grid [rad2]; empty if the surfaces are known between the samples.
     dt_s : sample period [s].
-    start : (4,) initial alpha [rad], q [rad/s] and gust states [-].
-    reference_alpha_rad, reference : means of the record, about which it is linearised.
+    start : initial states of the motion [their units] and of the gust's filter [-].
+    reference_flow_rad, reference : means of the record, about which it is linearised: of the first output, the flow angle, and of
+        the inputs.
     model : see there.
     """
 
     y: Array
     more: Array
-    grid: GridSignals
+    grid: AnyGrid
     corner_rad2: Array
     dt_s: float
     sub: int
     start: Array
-    reference_alpha_rad: float
-    reference: AirPoint
+    reference_flow_rad: float
+    reference: AnyPoint
     model: FilterModel
 
 
 __all__ = [
     "AirPoint",
     "AircraftArrays",
+    "AnyAircraft",
+    "AnyGrid",
+    "AnyPoint",
     "EffectArrays",
     "FilterModel",
     "GridSignals",

@@ -61,7 +61,8 @@ class LateralPoint(NamedTuple):
     aileron_rad, rudder_rad : surfaces that the air sees [rad].
     airspeed_m_s, ground_m_s : speed through the air, and without the gust along the path [m/s].
     qbar_pa : dynamic pressure [Pa].
-    alpha_rad, theta_rad : angle of attack and pitch attitude [rad]; q_rad_s : pitch rate [rad/s].
+    alpha_rad, ground_alpha_rad : angle of attack of the air and over ground [rad]; theta_rad : pitch attitude [rad].
+    q_rad_s : pitch rate [rad/s]; speed_rate_1_s : V'/V of the speed without the gust [1/s].
     side, roll, yaw : increments of CY, Cl and Cn [-].
     """
 
@@ -71,8 +72,10 @@ class LateralPoint(NamedTuple):
     ground_m_s: float
     qbar_pa: float
     alpha_rad: float
+    ground_alpha_rad: float
     theta_rad: float
     q_rad_s: float
+    speed_rate_1_s: float
     side: float
     roll: float
     yaw: float
@@ -87,8 +90,10 @@ class LateralGrid(NamedTuple):
     ground_m_s: Array
     qbar_pa: Array
     alpha_rad: Array
+    ground_alpha_rad: Array
     theta_rad: Array
     q_rad_s: Array
+    speed_rate_1_s: Array
     side: Array
     roll: Array
     yaw: Array

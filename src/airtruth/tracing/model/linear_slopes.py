@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import allocating, inner
-from airtruth.tracing.model.by_motion import output_count, outputs, state_count
-from airtruth.tracing.model.corners import STEP_RAD, moved_surface
-from airtruth.tracing.model.equations import gust
-from airtruth.tracing.model.kernel_input import AirPoint, FilterModel
+from airtruth.tracing.model.by_motion import output_count, outputs, shifted, state_count
+from airtruth.tracing.model.corners import STEP_RAD
+from airtruth.tracing.model.gust_states import gust_of
+from airtruth.tracing.model.kernel_input import AnyPoint, FilterModel
 from airtruth.tracing.model.linearise import LEAST_MOVE, half_width
 from airtruth.tracing.model.parameters import CORE, GUST_1, LEAD
 from airtruth.tracing.model.slopes import LOG_GUST, ROLLOFF, SlopeWork, output_slopes, rate_slopes, slope_work
@@ -25,18 +25,14 @@ class Linear(NamedTuple):
 
     Attributes
     ----------
-    a, c : (motion, motion), (outputs, motion); input, direct : (motion,), (outputs,) slopes in the surface.
-    d_a, d_c, d_input, d_direct : the same with a last axis of columns.
+    a, c : (motion, motion + controls), (outputs, motion + controls): slopes in the states, then in the surfaces.
+    d_a, d_c : the same with a last axis of columns.
     """
 
     a: Array
     c: Array
-    input: Array
-    direct: Array
     d_a: Array
     d_c: Array
-    d_input: Array
-    d_direct: Array
 
 
 class _Ends(NamedTuple):
@@ -57,7 +53,7 @@ class _Ends(NamedTuple):
 
 @inner
 def _at_end(
-    side: int, x: Array, at: AirPoint, model: FilterModel, aircraft: Any, ends: _Ends, work: SlopeWork
+    side: int, x: Array, at: AnyPoint, model: FilterModel, aircraft: Any, ends: _Ends, work: SlopeWork
 ) -> None:
     rate, slope = ends.rate[side], ends.slope[side]
     az = rate_slopes(x, ends.unit, at, model, aircraft, ends.column, rate, slope, work)
@@ -67,7 +63,7 @@ def _at_end(
 
 @allocating
 def linear_slopes(
-    x: Array, at: AirPoint, model: FilterModel, aircraft: Any, columns: int, with_input: bool
+    x: Array, at: AnyPoint, model: FilterModel, aircraft: Any, columns: int, controls: int
 ) -> Linear:
     """Linearisation about a state by the differences of `airtruth.tracing.model.linearise.linearise`, and its slopes.
 
@@ -86,43 +82,25 @@ def linear_slopes(
         ends.unit[i, i] = 1.0
     work = slope_work(wide)
     made = Linear(
-        np.zeros((motion, motion)),
-        np.zeros((count, motion)),
-        np.zeros(motion),
-        np.zeros(count),
-        np.zeros((motion, motion, columns)),
-        np.zeros((count, motion, columns)),
-        np.zeros((motion, columns)),
-        np.zeros((count, columns)),
+        np.zeros((motion, motion + controls)),
+        np.zeros((count, motion + controls)),
+        np.zeros((motion, motion + controls, columns)),
+        np.zeros((count, motion + controls, columns)),
     )
-    for j in range(motion + (1 if with_input else 0)):
-        h, middle = STEP_RAD, 0.0
+    for j in range(motion + controls):
+        h, middle, control = STEP_RAD, 0.0, max(j - motion, 0)
         if j < motion:
             h, middle = half_width(j, at, model), x[j]
         for side in range(2):
             sign = h if side == 0 else -h
             if j < motion:
                 x[j] = middle + sign
-            moved = moved_surface(at, sign if j == motion else 0.0)
-            _at_end(side, x, moved, model, aircraft, ends, work)
-        if j == motion:
-            for i in range(motion):
-                made.input[i] = (ends.rate[0, i] - ends.rate[1, i]) / (2.0 * h)
-                for q in range(columns):
-                    made.d_input[i, q] = (ends.slope[0, i, motion + q] - ends.slope[1, i, motion + q]) / (
-                        2.0 * h
-                    )
-            for i in range(count):
-                made.direct[i] = (ends.y[0, i] - ends.y[1, i]) / (2.0 * h)
-                for q in range(columns):
-                    made.d_direct[i, q] = (ends.out[0, i, motion + q] - ends.out[1, i, motion + q]) / (
-                        2.0 * h
-                    )
-            continue
-        x[j] = middle
+            _at_end(side, x, shifted(at, control, sign if j >= motion else 0.0), model, aircraft, ends, work)
         _difference(j, h, ends.rate, ends.slope, motion, made.a, made.d_a)
         _difference(j, h, ends.y, ends.out, motion, made.c, made.d_c)
-        _widths(j, at, model, ends, made)
+        if j < motion:
+            x[j] = middle
+            _widths(j, at, model, ends, made)
     return made
 
 
@@ -136,7 +114,7 @@ def _difference(j: int, h: float, values: Array, slope: Array, motion: int, out:
 
 
 @allocating
-def _widths(j: int, at: AirPoint, model: FilterModel, ends: _Ends, made: Linear) -> None:
+def _widths(j: int, at: AnyPoint, model: FilterModel, ends: _Ends, made: Linear) -> None:
     """Add the slopes by those of the half width in a gust, whose logarithm falls by one with that of the level."""
     first = state_count(model)
     core = first + CORE - GUST_1
@@ -144,10 +122,10 @@ def _widths(j: int, at: AirPoint, model: FilterModel, ends: _Ends, made: Linear)
         return
     unit = np.zeros(core)
     unit[j] = 1.0
-    by_gust = gust(unit, model.gusts.rolloff)
+    by_gust = gust_of(unit, first, model.gusts.rolloff)
     if not abs(model.gusts.level_m_s * by_gust) / at.airspeed_m_s > LEAST_MOVE:
         return
-    by_rolloff = (gust(unit, 1.0) - gust(unit, 0.0)) / by_gust
+    by_rolloff = (gust_of(unit, first, 1.0) - gust_of(unit, first, 0.0)) / by_gust
     for i in range(made.a.shape[0]):
         if first + LEAD - GUST_1 <= i < core:
             continue  # the low-passed copies are linear

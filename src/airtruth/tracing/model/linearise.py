@@ -17,9 +17,9 @@ from airtruth.numerics.ahead import awaited
 from airtruth.numerics.compiled import allocating, inner, shared
 from airtruth.numerics.discretise import multiply, riccati, step, whitener
 from airtruth.tracing.model.by_motion import equations_of, output_count, outputs, rates, state_count
-from airtruth.tracing.model.equations import gust
-from airtruth.tracing.model.kernel_input import AirPoint, FilterModel
-from airtruth.tracing.model.parameters import CORE, DELAY_ORDER, GUST_1
+from airtruth.tracing.model.gust_states import gust_of
+from airtruth.tracing.model.kernel_input import AnyPoint, FilterModel
+from airtruth.tracing.model.parameters import CORE, DELAY_ORDER, GUST_1, core_of
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ def delay_system(delay_s: float) -> Array:
 
 
 @allocating
-def half_width(state: int, at: AirPoint, model: FilterModel) -> float:
+def half_width(state: int, at: AnyPoint, model: FilterModel) -> float:
     """Half width of the central difference in a state of the motion."""
     states = state_count(model)
     core = states + _GUSTS
@@ -83,11 +83,11 @@ def half_width(state: int, at: AirPoint, model: FilterModel) -> float:
     # a gust that moves alpha as far as above, so that no level or rolloff shifts the breaks that are met
     unit = np.zeros(core)
     unit[state] = 1.0
-    moves = abs(model.gusts.level_m_s * gust(unit, model.gusts.rolloff)) / at.airspeed_m_s
+    moves = abs(model.gusts.level_m_s * gust_of(unit, states, model.gusts.rolloff)) / at.airspeed_m_s
     return ANGLE_RAD / moves if moves > LEAST_MOVE else _GUST
 
 
-def linearise(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array) -> Array:
+def linearise(x: Array, at: AnyPoint, model: FilterModel, a: Array, c: Array) -> Array:
     """A and C of the motion, effects' states, late sensors and correlated noise about a state, by central differences.
 
     Parameters
@@ -106,7 +106,7 @@ def linearise(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array) ->
 
 @awaited
 @njit(cache=True, nogil=True, error_model="numpy")
-def _differences(x: Array, at: AirPoint, model: FilterModel, a: Array, c: Array, direct: Array) -> None:
+def _differences(x: Array, at: AnyPoint, model: FilterModel, a: Array, c: Array, direct: Array) -> None:
     """`linearise` about ``x``, which is moved and returns; ``direct``: (states,) the row that it returns."""
     count = output_count(model)
     rate, y = np.empty((2, x.size)), np.empty((2, count))
@@ -156,7 +156,10 @@ def add_sensors(model: FilterModel, slow_std: Array, slow_time_s: float, a: Arra
 def process_intensity(airspeed_m_s: float, model: FilterModel) -> Array:
     """(states,) intensities [1/s] of the white noise that drives gusts and correlated noise."""
     process = np.zeros(model.states.size)
-    process[equations_of(model).states] = 2.0 * airspeed_m_s / model.gusts.length_m
+    equations = equations_of(model)
+    process[equations.states] = 2.0 * airspeed_m_s / model.gusts.length_m
+    if equations.has_roll_gust:
+        process[core_of(equations.states)] = 2.0 / model.gusts.roll_time_s
     if model.states.noise >= 0:
         process[model.states.noise :] = 2.0 / model.sensors.slow_time_s
     return process

@@ -177,7 +177,6 @@ class ParameterLayout:
 
     Attributes
     ----------
-    motion : the motion.
     common, per_record : entries of the vectors.
     """
 
@@ -328,19 +327,24 @@ def lead_of(states: int) -> int:
 
 
 def core_of(states: int) -> int:
-    """Number of states of a motion and its gusts."""
+    """Number of states of a motion, of the gust's filter, of the late gust and of the low-passed copies."""
     return states + CORE - GUST_1
 
 
-def effect_states(kinds: list[str], states: int = GUST_1) -> tuple[Ints, int]:
+def core_states(motion: Motion) -> int:
+    """Number of states of a motion and its gusts, the roll gust included."""
+    return core_of(len(motion.states)) + ("p" in motion.gusts)
+
+
+def effect_states(kinds: list[str], motion: Motion = LONGITUDINAL) -> tuple[Ints, int]:
     """First state of each effect with states, and the number of states up to the last.
 
     Parameters
     ----------
     kinds : kind of each `airtruth.physics.terms.StateTerm`: a mode has two states, others have one.
-    states : number of states of the motion.
+    motion : whose states precede them.
     """
-    first, at = [], core_of(states)
+    first, at = [], core_states(motion)
     for kind in kinds:
         first.append(at)
         at += 2 if kind == "mode" else 1
@@ -388,6 +392,7 @@ __all__ = [
     "RecordEntries",
     "StateLayout",
     "core_of",
+    "core_states",
     "effect_states",
     "lead_of",
     "state_layout",

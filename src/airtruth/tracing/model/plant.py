@@ -10,30 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.errors import AircraftError, TrimError
+from airtruth.errors import TrimError
 from airtruth.physics.motion import LONGITUDINAL
-from airtruth.physics.short_period import PARAMETERS
 from airtruth.simulation.disposable import isolated
 from airtruth.simulation.linearise import linearise
 from airtruth.simulation.operating_point import operating_point
 from airtruth.simulation.probe import Grid, alpha_dot_terms, forces_at_speeds
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim, trim
+from airtruth.tracing.model.declared import declared_covariance, stated_derivatives
 from airtruth.units import DEG, G0
 
 Array = NDArray[np.float64]
 
 _LIFT, _MOMENT = LONGITUDINAL.row("CL"), LONGITUDINAL.row("Cm")
 """Positions of the derivatives of lift and of the pitching moment."""
-RELATIVE_STD: Final = (0.05, 0.30, 0.10, 0.05, 0.15, 0.05)
-"""Standard deviation of a declared derivative that states none, over its value [-] (judgement): smaller ones
-let a declared error pass for an effect, larger ones let the derivatives absorb an effect."""
-_LEAST_STD: Final = (0.005, 0.1, 0.002, 0.001, 0.05, 0.001)
-"""Least standard deviation of a declared derivative [-] (judgement): keeps the prior regular where a
-derivative is near zero."""
-_CERTAIN: Final = 1e-6
-"""Relative standard deviation of a pitch inertia that is declared without one [-]: none, but the prior stays regular."""
-_SPEEDS: Final = np.array([0.97, 1.0, 1.03])
+SPEEDS: Final = np.array([0.97, 1.0, 1.03])
 """Airspeeds over the trim's at which the engines are probed [-] (judgement): a flight test's scatter."""
 _RATE_MARGIN: Final = 1.2
 """Range of the tables' pitch rate over the largest measured one [-] (judgement)."""
@@ -157,7 +149,7 @@ def probed(
     rates = np.linspace(-1.0, 1.0, _RATES) * max(q * _RATE_MARGIN, _LEAST_RATE_RAD_S)
     commands = whole(elevator[0] + offset, elevator[1] + offset, DEG)
     grid = Grid(whole(alpha[0], alpha[1], DEG), commands, rates, np.ones(1))
-    point = isolated(f"the table of forces of {aircraft.name}", operating_point, aircraft, at, grid, _SPEEDS)
+    point = isolated(f"the table of forces of {aircraft.name}", operating_point, aircraft, at, grid, SPEEDS)
     tables, declared, constants = point.tables, point.derivatives, aircraft.constants
     power = _engines_of(at, point.at_speeds)
     constant = power.constant + _constants_over_alpha(at, tables.alpha_rad, point.over_alpha)
@@ -184,15 +176,15 @@ def probed(
 def _constants_over_alpha(at: Trim, alpha_rad: Array, forces: Array) -> Array:
     """(alpha, 3) X, Z [N] and M [N m] that do not go with the dynamic pressure, less those at the trim's angle of attack.
 
-    ``forces`` (speeds, alpha, 3) are those at `_SPEEDS`.
+    ``forces`` (speeds, alpha, 3) are those at `SPEEDS`.
     """
-    constant = _lines(at, forces.reshape(_SPEEDS.size, -1))[0].reshape(-1, 3)
+    constant = _lines(at, forces.reshape(SPEEDS.size, -1))[0].reshape(-1, 3)
     return np.asarray(constant - constant[int(np.argmin(np.abs(alpha_rad - at.alpha_rad)))])
 
 
 def _lines(at: Trim, rows: Array) -> Array:
-    """(2, n) values at no dynamic pressure, and slopes over it, of (speeds, n) values at `_SPEEDS`."""
-    pressures = 0.5 * at.density_kg_m3 * (at.airspeed_m_s * _SPEEDS) ** 2
+    """(2, n) values at no dynamic pressure, and slopes over it, of (speeds, n) values at `SPEEDS`."""
+    pressures = 0.5 * at.density_kg_m3 * (at.airspeed_m_s * SPEEDS) ** 2
     basis = np.column_stack([np.ones_like(pressures), pressures])
     return np.asarray(np.linalg.lstsq(basis, rows, rcond=None)[0], dtype=np.float64)
 
@@ -214,7 +206,7 @@ class Engines:
 def engines(aircraft: Aircraft, at: Trim) -> Engines:
     """The engines of the JSBSim aircraft, from three airspeeds about a trim."""
     work = f"the forces of the engines of {aircraft.name}"
-    return _engines_of(at, isolated(work, forces_at_speeds, aircraft, at, _SPEEDS))
+    return _engines_of(at, isolated(work, forces_at_speeds, aircraft, at, SPEEDS))
 
 
 def _engines_of(at: Trim, at_speeds: Array) -> Engines:
@@ -290,56 +282,14 @@ def declared_derivatives(aircraft: Aircraft, at: Trim | None) -> Array:
     """
     if at is not None:
         return isolated(f"the derivatives of {aircraft.name}", linearise, aircraft, at).central
-    stated = aircraft.file.derivatives
-    missing = [name for name in PARAMETERS if name not in stated]
-    if missing:
-        raise AircraftError(
-            f"{aircraft.folder}: without a JSBSim model aircraft.toml needs [derivatives] with {', '.join(missing)}; "
-            "write what `airtruth identify` estimates there, each as { value = ..., std = ... }"
-        )
-    return np.array([stated[name].value for name in PARAMETERS])
-
-
-def declared_covariance(aircraft: Aircraft, derivatives: Array) -> Array:
-    """(6, 6) covariance of the derivatives as aircraft.toml declares it, with what mass, inertia and CG add.
-
-    A coefficient that acts on another mass or inertia looks like another coefficient: 1/m on the three of
-    lift, 1/Iyy on the three of moment; a CG aft by dx chords adds CLalpha dx, CLq dx, CLde dx to the moment.
-    """
-    stated = aircraft.file.derivatives
-    std = np.empty(len(PARAMETERS))
-    for i, name in enumerate(PARAMETERS):
-        quantity = stated.get(name)
-        own = RELATIVE_STD[i] * abs(derivatives[i])
-        if quantity and quantity.std > 0.0:
-            own = quantity.std * (abs(derivatives[i] / quantity.value) if quantity.value else 1.0)
-        std[i] = max(own, _LEAST_STD[i])
-    covariance = np.diag(std**2)
-    mass = aircraft.file.mass
-    if mass is not None:
-        for quantity, row in ((mass.mass, _LIFT), (mass.inertia_yy, _MOMENT)):
-            direction = np.zeros(len(PARAMETERS))
-            direction[row] = derivatives[row]
-            relative = quantity.std / quantity.value
-            covariance += relative**2 * np.outer(direction, direction)
-        shift = np.zeros(len(PARAMETERS))
-        shift[_MOMENT] = derivatives[_LIFT]
-        covariance += mass.cg.std**2 * np.outer(shift, shift)
-    return covariance
-
-
-def inertia_std(aircraft: Aircraft) -> float:
-    """Relative standard deviation of the declared pitch inertia [-]; next to none where none is stated."""
-    mass = aircraft.file.mass
-    return _CERTAIN if mass is None else max(mass.inertia_yy.std / mass.inertia_yy.value, _CERTAIN)
+    return stated_derivatives(aircraft, LONGITUDINAL)
 
 
 __all__ = [
+    "SPEEDS",
     "Plant",
     "alpha_dot",
-    "declared_covariance",
     "declared_derivatives",
-    "inertia_std",
     "linear",
     "probed",
     "trim_of",

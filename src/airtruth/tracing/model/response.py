@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -10,19 +11,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.physics.motion import LONGITUDINAL
-from airtruth.physics.terms import Change
+from airtruth.physics.terms import Change, SurfaceTerm
 from airtruth.tracing.model import filter as record_filter
+from airtruth.tracing.model.by_motion import coefficients_of, equations_of_grid
 from airtruth.tracing.model.compile import CompiledChange, compile_change
 from airtruth.tracing.model.kernel_input import (
     AircraftArrays,
-    AirPoint,
+    AnyAircraft,
+    AnyGrid,
+    AnyPoint,
     FilterModel,
     GridSignals,
     GustModel,
     KernelInput,
     SensorArrays,
 )
-from airtruth.tracing.model.parameters import COLOUR_TIME_S, OUTPUTS, SHORT_PERIOD
+from airtruth.tracing.model.lateral_input import LateralGrid
+from airtruth.tracing.model.lateral_packing import pack_lateral, side_gusts
+from airtruth.tracing.model.lateral_plant import LateralPlant
+from airtruth.tracing.model.parameters import COLOUR_TIME_S, SHORT_PERIOD, CommonEntries
 from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, nodes
 from airtruth.tracing.model.records import fine as on_grid
@@ -61,8 +68,8 @@ class Response:
 
     Attributes
     ----------
-    e : (samples, 3) innovations, or residuals of a free run [units of the outputs]; `LOST` from where the motion is lost.
-    white, covariance : (3, 3) whitener W with W S W' = I, and S.
+    e : (samples, outputs) innovations, or residuals of a free run [units of the outputs]; `LOST` from where the motion is lost.
+    white, covariance : (outputs, outputs) whitener W with W S W' = I, and S.
     logdet : mean of log|S| over the samples; nan where the motion is lost.
     more_logdet : sum over the samples of log|S| beyond that of ``covariance``, by an uncertain surface.
     steady : the filter that made the innovations; None for a free run, and where there is none.
@@ -87,24 +94,24 @@ class FilterInputs:
     lead : number of samples before the part.
     grid : inputs on the filter's grid, the errors of their sensors undone.
     corner_rad2 : see `KernelInput`; 0 in the lead, whose innovations do not count.
-    reference_alpha_rad, reference : means of the record; along : flight conditions at which the gain is made.
+    reference_flow_rad, reference : means of the record; along : flight conditions at which the gain is made.
     """
 
     record: TraceRecord
     compiled: CompiledChange
     y: Array
     lead: int
-    grid: GridSignals
+    grid: AnyGrid
     corner_rad2: Array
-    reference_alpha_rad: float
-    reference: AirPoint
+    reference_flow_rad: float
+    reference: AnyPoint
     along: Schedule
 
 
 def filter_inputs(record: TraceRecord, change: Change | CompiledChange) -> FilterInputs:
     """Undo what a change says of the inputs' sensors, and put what it says of the surface behind the elevator."""
-    compiled = change if isinstance(change, CompiledChange) else compile_change(change)
-    if compiled.surface or compiled.inputs:
+    compiled = change if isinstance(change, CompiledChange) else compile_change(change, record.signals.motion)
+    if any(compiled.surface) or compiled.inputs:
         return _inputs(record, compiled)
     as_measured: FilterInputs | None = record.kept.get(_AS_MEASURED)
     if as_measured is None:
@@ -113,61 +120,84 @@ def filter_inputs(record: TraceRecord, change: Change | CompiledChange) -> Filte
 
 
 def _inputs(record: TraceRecord, compiled: CompiledChange) -> FilterInputs:
-    s, plant = record.signals.with_lead, record.plant
+    s, shift = record.signals.with_lead, record.plant.alpha_shift_rad
     y, theta = s.y, s.theta_rad
-    if plant.alpha_shift_rad != 0.0:
-        y = y - np.array([plant.alpha_shift_rad, 0.0, 0.0])
-        theta = theta - plant.alpha_shift_rad
-    fine = _undo(compiled, "elevator_rad", s.elevator_rad)
-    if compiled.surface:
-        fine = through(compiled.surface, fine, s.dt_s / (s.sub * FINE), float(s.control_std_rad[0]))
-    elevator, v = nodes(fine), _airspeed(compiled, s)
-    lift, moment = _remainder(record, compiled, elevator.size)
-    grid = GridSignals(
-        elevator_rad=elevator,
-        airspeed_m_s=v,
-        ground_m_s=_undo(compiled, "airspeed_m_s", s.ground_m_s),
-        qbar_pa=0.5 * s.density_kg_m3 * v * v,
-        theta_rad=theta,
-        lift=lift,
-        moment=moment,
-    )
+    if shift != 0.0:
+        y = y - np.array([shift, 0.0, 0.0])
+        theta = theta - shift
+    controls = [nodes(fine) for fine in _surfaces(s, compiled)]
+    v, ground = _airspeed(compiled, s), _undo(compiled, "airspeed_m_s", s.ground_m_s)
+    qbar, force = 0.5 * s.density_kg_m3 * v * v, _remainder(record, compiled, v.size)
+    grid: AnyGrid
+    if s.motion is LONGITUDINAL:
+        grid = GridSignals._make([*controls, v, ground, qbar, theta, *force])
+    else:
+        alpha, q = _angle_of_attack(compiled, s), _undo(compiled, "q_rad_s", s.q_rad_s)
+        known = (v, ground, qbar, alpha, alpha, theta, q, _relative_rate(ground, s))
+        grid = LateralGrid._make([*controls, *known, *force])
     speed = float(v.mean())
-    reference = AirPoint(
-        elevator_rad=float(elevator.mean()),
-        airspeed_m_s=speed,
-        ground_m_s=speed,
-        qbar_pa=0.5 * float(s.density_kg_m3.mean()) * speed * speed,
-        theta_rad=float(theta.mean()),
-        lift=0.0,
-        moment=0.0,
-    )
+    means = {name: float(x.mean()) for name, x in grid._asdict().items()}
+    means |= {"airspeed_m_s": speed, "ground_m_s": speed} | dict.fromkeys(coefficients_of(grid), 0.0)
+    means["qbar_pa"] = 0.5 * float(s.density_kg_m3.mean()) * speed * speed
     corner = _corners(s, compiled)
     lead = len(y) - record.samples
     if lead and corner.size:
-        corner = np.concatenate([np.zeros(lead), corner[lead:]])
+        corner = np.concatenate([np.zeros((len(corner), lead)), corner[:, lead:]], axis=1)
+    reference = equations_of_grid(grid).point(**means)
     along = schedule(y[:, 0], grid, s.sub)
     return FilterInputs(record, compiled, y, lead, grid, corner, float(y[:, 0].mean()), reference, along)
 
 
+def _surfaces(s: Signals, compiled: CompiledChange) -> Iterator[Array]:
+    """(fine points,) each control as the air sees it [rad]."""
+    step_s = s.dt_s / (s.sub * FINE)
+    for number, control in enumerate(s.motion.controls):
+        fine = _undo(compiled, control.channel, s.controls_rad[number])
+        yield through(compiled.surface[number], fine, step_s, float(s.control_std_rad[number]))
+
+
+def _angle_of_attack(compiled: CompiledChange, s: Signals) -> Array:
+    """Angle of attack at the CG, without the errors of a vane that may be off the plane of symmetry [rad]."""
+    errors = compiled.inputs.get(s.motion.known_signals[0].channel)
+    if errors is None:
+        return s.alpha_rad
+    roll = on_grid(s.y[:, s.motion.output_channels.index(s.motion.controls[0].damped)], s.sub)
+    return errors.unscaled(s.alpha_rad) - roll * errors.y_m / s.airspeed_m_s
+
+
+def _relative_rate(ground_m_s: Array, s: Signals) -> Array:
+    """V'/V of the speed without the gust, from its samples [1/s]."""
+    sampled = ground_m_s[:: s.sub]
+    return on_grid(np.gradient(sampled, s.dt_s, edge_order=2 if sampled.size > 2 else 1) / sampled, s.sub)
+
+
 def _corners(s: Signals, compiled: CompiledChange) -> Array:
-    """Variance of the surface that the air sees, per sample; a delay or lag of the surface carries it to later cells."""
-    late = tuple(term for term in compiled.surface if term.kind in ("delay", "lag"))
-    known = [own[0] for own in (s.corner_rad2, s.surface_noise_rad2) if own.size]
-    total = np.asarray(sum(known[1:], known[0])) if known else s.corner_rad2[0]
-    if total.size == 0 or not late:
+    """(controls, samples) variance of the surfaces that the air sees; a delay or lag of a surface carries it to later cells."""
+    known = [own for own in (s.corner_rad2, s.surface_noise_rad2) if own.size]
+    total = np.asarray(sum(known[1:], known[0])) if known else s.corner_rad2
+    if total.size == 0:
         return total
+    return np.stack([_late(row, path, s) for row, path in zip(total, compiled.surface, strict=True)])
+
+
+def _late(variance: Array, path: Sequence[SurfaceTerm], s: Signals) -> Array:
+    """(samples,) variance of a surface behind its delays and lags."""
+    late = tuple(term for term in path if term.kind in ("delay", "lag"))
+    if not late:
+        return variance
     cells = s.sub * FINE
-    fine = np.append(np.repeat(total[1:], cells), 0.0)
+    fine = np.append(np.repeat(variance[1:], cells), 0.0)
     moved = through(late, fine, s.dt_s / cells)
     return np.append(0.0, moved[:-1].reshape(-1, cells).mean(axis=1))
 
 
 def _remainder(record: TraceRecord, compiled: CompiledChange, points: int) -> Array:
-    """(2, points) of what the JSBSim model has beyond the tables, later with the surface where a change is linear in it."""
+    """(coefficients, points) of what the JSBSim model has beyond the tables, later with the surface where a change is
+    linear in it and there is no other surface."""
     if record.remainder is None:
-        return np.zeros((2, points))
-    late = [term for term in compiled.surface if term.kind in ("delay", "lag")]
+        return np.zeros((len(record.signals.motion.coefficients), points))
+    path, *others = compiled.surface
+    late = [] if others else [term for term in path if term.kind in ("delay", "lag")]
     step = record.signals.dt_s / record.signals.sub
     return np.stack([through(late, row, step) for row in record.remainder])
 
@@ -224,7 +254,7 @@ def respond_to(
     """
     e = np.full_like(given.y, LOST)
     kernel = kernel_input(given, settings, common, per_record, external)
-    none = np.eye(OUTPUTS)
+    none = np.eye(given.y.shape[1])
     if free_run:
         sound = record_filter.free_run(kernel, e)
         return Response(e[given.lead :], none, none, 0.0 if sound else math.nan)
@@ -245,24 +275,24 @@ def kernel_input(
     external: External | None = None,
 ) -> KernelInput:
     """What the compiled filter reads."""
-    lift, moment = per_record[settings.layout.per_record.trim]
+    trim = per_record[settings.layout.per_record.trim]
     more = np.zeros_like(given.y)
-    grid = given.grid._replace(lift=given.grid.lift + lift, moment=given.grid.moment + moment)
+    named = zip(coefficients_of(given.grid), trim, strict=True)
+    force = {name: getattr(given.grid, name) + own for name, own in named}
     if external is not None:
-        own = external.force.shape[1]
         more[given.lead :] = external.output
-        grid.lift[-own:] += external.force[0]
-        grid.moment[-own:] += external.force[1]
+        for row, own in zip(force.values(), external.force, strict=True):
+            row[-own.size :] += own
     signals = given.record.signals
     return KernelInput(
         y=given.y,
         more=more,
-        grid=grid,
+        grid=given.grid._replace(**force),
         corner_rad2=given.corner_rad2,
         dt_s=signals.dt_s,
         sub=signals.sub,
         start=per_record[settings.layout.per_record.start],
-        reference_alpha_rad=given.reference_alpha_rad,
+        reference_flow_rad=given.reference_flow_rad,
         reference=given.reference,
         model=filter_model(given, settings, common, per_record),
     )
@@ -271,17 +301,23 @@ def kernel_input(
 def filter_model(given: FilterInputs, settings: Settings, common: Array, per_record: Array) -> FilterModel:
     """Aircraft, gusts, effects and sensors at a vector of parameters."""
     record, compiled = given.record, given.compiled
-    span, entries = record.plant.aircraft.constants.span_m, settings.layout.common
+    constants, entries = record.plant.aircraft.constants, settings.layout.common
+    sensors = pack_sensors(compiled, settings, common, per_record, constants.chord_m)
+    aircraft: AnyAircraft
     gusts = GustModel(
         level_m_s=float(np.exp(per_record[settings.layout.per_record.log_gust])),
         length_m=record.gust_length_m,
         rolloff=0.5 + float(common[entries.rolloff]),
         rotary=0.5 + float(common[entries.rotary]),
-        rotary_time_s=4.0 * span / (np.pi * given.reference.airspeed_m_s),
+        rotary_time_s=4.0 * constants.span_m / (np.pi * given.reference.airspeed_m_s),
     )
-    sensors = pack_sensors(compiled, settings, common, per_record, record.plant.aircraft.constants.chord_m)
+    if isinstance(record.plant, LateralPlant):
+        aircraft = pack_lateral(record.plant, compiled, common, entries)
+        gusts = side_gusts(gusts, constants.span_m)
+    else:
+        aircraft = pack_aircraft(record.plant, compiled, common)
     return FilterModel(
-        aircraft=pack_aircraft(record.pitch_plant, compiled, common),
+        aircraft=aircraft,
         gusts=gusts,
         effects=compiled.effects,
         sensors=sensors,
@@ -318,9 +354,11 @@ def pack_aircraft(plant: Plant, compiled: CompiledChange, common: Array) -> Airc
     )
 
 
-def moved_past_sensors_m(common: Array, shift: float, chord_m: float) -> float:
+def moved_past_sensors_m(
+    common: Array, shift: float, chord_m: float, entries: CommonEntries = SHORT_PERIOD.common
+) -> float:
     """Distance by which a CG that lies ``shift`` chords aft has moved past the sensors [m]; see `CommonEntries.mounting`."""
-    return (0.5 + float(common[SHORT_PERIOD.common.mounting])) * shift * chord_m
+    return (0.5 + float(common[entries.mounting])) * shift * chord_m
 
 
 def pack_sensors(
@@ -333,12 +371,13 @@ def pack_sensors(
     return SensorArrays(
         bias=per_record[settings.layout.per_record.bias] + compiled.bias,
         scale=compiled.scale,
-        arm_m=compiled.arm_m + moved_past_sensors_m(common, compiled.declared["cg"], chord_m),
+        arm_m=compiled.arm_m + moved_past_sensors_m(common, compiled.declared["cg"], chord_m, entries),
         lag_s=compiled.lag_s,
         delay_s=compiled.delay_s,
         variance=noise * (1.0 - share) + settings.resolution**2,
         slow_std=np.sqrt(noise * share),
         slow_time_s=COLOUR_TIME_S * float(np.exp(common[entries.log_colour_time])),
+        down_m=compiled.down_m,
     )
 
 

@@ -105,7 +105,7 @@ def respond_with_slopes(
     places = _places(settings.layout, tuple(parameters.tolist()))
     noise = _noise(kernel, settings, common, places)
     moves = Moves(places.h, places.of_row, noise.variance, noise.slow_std, noise.slow_time_s)
-    uncertain = kernel.corner_rad2.size > 0
+    controls = len(kernel.corner_rad2) if kernel.corner_rad2.size else 0
     nodes = [
         conditions(
             equilibrium(alpha, air, kernel.model),
@@ -115,7 +115,7 @@ def respond_with_slopes(
             places.column.size,
             moves,
             kernel.dt_s,
-            uncertain,
+            controls,
         )
         for alpha, air in conditions_of(kernel, given.along)
     ]

@@ -15,7 +15,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.tracing.model.kernel_input import AirPoint, GridSignals
+from airtruth.tracing.model.by_motion import coefficients_of, equations_of_grid
+from airtruth.tracing.model.kernel_input import AnyGrid, AnyPoint
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -33,14 +34,14 @@ class Schedule(NamedTuple):
 
     Attributes
     ----------
-    alpha_rad : (nodes,) mean angle of attack near each airspeed [rad]; empty where the mean of the record serves.
+    flow_rad : (nodes,) mean flow angle near each airspeed [rad]; empty where the mean of the record serves.
     air : (nodes,) means of the other inputs there.
     lower : (samples,) number of the node below the airspeed of each sample.
     share : (samples,) of the next node in the interpolation, linear in log V [-].
     """
 
-    alpha_rad: tuple[float, ...]
-    air: tuple[AirPoint, ...]
+    flow_rad: tuple[float, ...]
+    air: tuple[AnyPoint, ...]
     lower: Ints
     share: Array
 
@@ -49,12 +50,12 @@ UNSCHEDULED: Final = Schedule((), (), np.zeros(0, dtype=np.int64), np.zeros(0))
 """The mean of the record serves."""
 
 
-def schedule(alpha_rad: Array, grid: GridSignals, sub: int) -> Schedule:
+def schedule(flow_rad: Array, grid: AnyGrid, sub: int) -> Schedule:
     """The flight conditions of a record, by its airspeed.
 
     Parameters
     ----------
-    alpha_rad : (samples,) measured angle of attack [rad].
+    flow_rad : (samples,) measured angle of attack, or sideslip of the lateral-directional motion [rad].
     grid : inputs on the filter's grid, ``sub`` cells to a sample.
     """
     measured = grid.airspeed_m_s[::sub]
@@ -74,11 +75,11 @@ def schedule(alpha_rad: Array, grid: GridSignals, sub: int) -> Schedule:
     nodes = {name: _nodes(weights, x[::sub]) for name, x in grid._asdict().items()}
     v = _nodes(weights, airspeed)
     density = 2.0 * float(grid.qbar_pa[::sub].sum() / (measured**2).sum())
-    none = np.zeros(cells + 1)
-    nodes |= {"airspeed_m_s": v, "qbar_pa": 0.5 * density * v * v, "lift": none, "moment": none}
-    points = zip(*(nodes[name].tolist() for name in AirPoint._fields), strict=True)
-    air = tuple(AirPoint(*point) for point in points)
-    return Schedule(tuple(_nodes(weights, alpha_rad).tolist()), air, lower, share)
+    nodes |= {"airspeed_m_s": v, "qbar_pa": 0.5 * density * v * v}
+    nodes |= dict.fromkeys(coefficients_of(grid), np.zeros(cells + 1))
+    points = zip(*(nodes[name].tolist() for name in grid._fields), strict=True)
+    air = tuple(equations_of_grid(grid).point(*point) for point in points)
+    return Schedule(tuple(_nodes(weights, flow_rad).tolist()), air, lower, share)
 
 
 def _nodes(weights: Array, x: Array) -> Array:

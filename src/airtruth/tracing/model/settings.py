@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -11,21 +11,29 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.aircraft.dynamics import declared_dynamics
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 from airtruth.physics.sensor_errors import KINDS, Kind
 from airtruth.physics.terms import Change, SensorTerm
 from airtruth.tracing.model.compile import CHANNELS
+from airtruth.tracing.model.declared import inertia_std
 from airtruth.tracing.model.parameters import SHORT_PERIOD, ParameterLayout
-from airtruth.tracing.model.plant import inertia_std
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.units import DEG
 
 Array = NDArray[np.float64]
 
+LAYOUTS: Final[Mapping[str, ParameterLayout]] = {
+    LONGITUDINAL.name: SHORT_PERIOD,
+    LATERAL.name: ParameterLayout(LATERAL),
+}
+"""Motion -> its free parameters."""
 VANE: Final = CHANNELS[0]
 """Output that a log without a vane does not have."""
-_CARRIED: Final[tuple[Kind, ...]] = ("arm", "lag", "delay", "scale")
-"""Declared errors of a sensor that the filter carries; its bias is a per-record parameter."""
+_CARRIED: Final[Mapping[str, tuple[Kind, ...]]] = {
+    LONGITUDINAL.name: ("arm", "lag", "delay", "scale"),
+    LATERAL.name: ("arm", "arm_down", "lag", "delay", "scale"),
+}
+"""Motion -> declared errors of a sensor that the filter carries; its bias is a per-record parameter."""
 _UNCONSTRAINED_STD: Final = 10.0
 """Prior standard deviation of an unconstrained derivative in alpha [1/rad]: twice a lift slope (judgement)."""
 _UNCONSTRAINED_TRIM_STD: Final = 0.5
@@ -35,29 +43,30 @@ _NOISE_STD: Final = 0.1
 """Prior standard deviation of the logarithm of declared noise [-]: data sheets are right within 10 % (judgement)."""
 _NOISE_UNKNOWN_STD: Final = 1.0
 """Prior standard deviation of the logarithm of the noise where none is declared [-]: a factor of e (judgement)."""
-_NOISE: Final = (0.1 * DEG, 0.3 * DEG, 0.1)
-"""Noise of alpha [rad], q [rad/s], az [m/s2] where none is declared: small flight-test instruments (judgement)."""
+_NOISE: Final = {"vane": 0.1 * DEG, "gyro": 0.3 * DEG, "accelerometer": 0.1, "attitude": 0.1 * DEG}
+"""Instrument -> noise where none is declared [rad], [rad/s], [m/s2]: small flight-test instruments (judgement)."""
 _RESOLUTION: Final = 0.01
 """Least error of a model, as a share of a channel's standard deviation [-] (judgement): tables, steps of integration and
 frames of a simulator. Sensors of flight tests have several times that noise, the GTM's 4 to 8 %."""
 _UNMEASURED_RAD: Final = 1e3
-"""Standard deviation that an angle of attack without a vane has as an output [rad]: large enough that it adds nothing to
+"""Standard deviation that an angle without an instrument has as an output [rad]: large enough that it adds nothing to
 the likelihood in double precision, small enough for the inverse of the covariance (judgement)."""
-_BIAS_STD: Final = (0.5 * DEG, 0.5 * DEG, 0.3)
+_BIAS_STD: Final = {"vane": 0.5 * DEG, "gyro": 0.5 * DEG, "accelerometer": 0.3, "attitude": 0.5 * DEG}
 """Prior standard deviations of their biases [same units] (judgement)."""
-_TRIM_STD: Final = (0.1, 0.03)
-"""Prior standard deviations of CL and Cm at the trim about the declared aircraft's [-] (judgement)."""
+_TRIM_STD: Final[Mapping[str | None, float]] = {None: 0.1, "chord": 0.03, "span": 0.02}
+"""Reference length of a coefficient, None for a force -> prior standard deviation at the trim about the declared aircraft's [-]
+(judgement)."""
 _GUST_M_S: Final = 0.2
 """Median of the prior of a record's gust level [m/s]: calm morning air (judgement)."""
 _LOG_GUST_STD: Final = 1.5
 """Prior standard deviation of its logarithm [-]: a factor of 4.5 to either side (judgement)."""
-_START_STD: Final = (0.05, 0.2)
-"""Prior standard deviations of the initial alpha [rad] and q [rad/s] about the first samples (judgement)."""
+_START_ANGLE_STD, _START_RATE_STD = 0.05, 0.2
+"""Prior standard deviations of an initial angle [rad] and of a rate [rad/s] about the first samples (judgement)."""
 GUST_COVARIANCE: Final = np.array([[1.0, 0.5], [0.5, 0.5]])
 """Stationary covariance of the two states of Dryden's vertical filter at unit gust variance [-] (MIL-F-8785C,
 3.7.1.2, by the Lyapunov equation)."""
 _FIRST_SAMPLES: Final = 5
-"""Samples whose mean starts alpha and q [-]: less noise than one, less motion than many (judgement)."""
+"""Samples whose mean starts the states [-]: less noise than one, less motion than many (judgement)."""
 
 
 @dataclass(frozen=True)
@@ -66,15 +75,15 @@ class Settings:
 
     Attributes
     ----------
-    noise : (3,) standard deviation per sample of alpha [rad], q [rad/s], az [m/s2].
+    noise : (outputs,) standard deviation per sample [units of the outputs].
     noise_prior : prior standard deviation of its logarithm [-].
-    bias_std : (3,) of the sensors' biases [same units].
+    bias_std : (outputs,) of the sensors' biases [same units].
     gust_m_s, log_gust_std : median of the prior of a record's gust level [m/s], and standard deviation of its
         logarithm [-].
     thrust_std : relative standard deviation of the engines' thrust [-].
-    trim_std : (2,) of CL and Cm at the trim, about those of the declared aircraft [-].
+    trim_std : (coefficients,) at the trim, about those of the declared aircraft [-].
     coloured : whether part of the sensors' noise may be slow.
-    resolution : (3,) standard deviation of what the model does not resolve of the outputs, beside the noise [same units].
+    resolution : (outputs,) standard deviation of what the model does not resolve of the outputs, beside the noise [same units].
     layout : free parameters of the motion.
     """
 
@@ -91,7 +100,7 @@ class Settings:
 
     @property
     def measured(self) -> NDArray[np.bool_]:
-        """(3,) whether an instrument measured the output; the angle of attack may be reconstructed."""
+        """(outputs,) whether an instrument measured the output; an angle may be reconstructed."""
         return np.asarray(self.resolution < _UNMEASURED_RAD)
 
     @property
@@ -100,19 +109,27 @@ class Settings:
         return self.noise_prior < _NOISE_UNKNOWN_STD
 
 
-def settings_of(aircraft: Aircraft, thrust_std: float, *, has_vane: bool = True) -> Settings:
+def settings_of(
+    aircraft: Aircraft,
+    thrust_std: float,
+    motion: Motion = LONGITUDINAL,
+    *,
+    absent: Collection[str] = (),
+) -> Settings:
     """Read what aircraft.toml declares of the sensors; where it is silent, assume judgements with wide priors.
 
     Parameters
     ----------
     thrust_std : relative standard deviation of the engines' thrust [-].
-    has_vane : whether alpha was measured; without a vane it is a state of the filter and no output.
+    motion : whose outputs are measured.
+    absent : outputs that no instrument measured; each is a state of the filter and no output.
     """
-    noise, bias = np.array(_NOISE), np.array(_BIAS_STD)
+    instruments = [output.instrument for output in motion.outputs]
+    noise, bias = (np.array([table[name] for name in instruments]) for table in (_NOISE, _BIAS_STD))
     prior = _NOISE_STD
-    for i, channel in enumerate(CHANNELS):
+    for i, channel in enumerate(motion.output_channels):
         sensor = aircraft.file.sensors.get(channel)
-        if channel == VANE and not has_vane:
+        if channel in absent:
             continue
         if sensor is None or sensor.noise_std.value <= 0.0:
             prior = _NOISE_UNKNOWN_STD
@@ -127,9 +144,13 @@ def settings_of(aircraft: Aircraft, thrust_std: float, *, has_vane: bool = True)
         gust_m_s=_GUST_M_S,
         log_gust_std=_LOG_GUST_STD,
         thrust_std=thrust_std,
-        trim_std=np.array(_TRIM_STD),
+        trim_std=np.array([_TRIM_STD[c.length] for c in motion.coefficients]),
+        resolution=np.zeros(len(motion.outputs)),
+        layout=LAYOUTS[motion.name],
     )
-    return settings if has_vane else without(settings, CHANNELS.index(VANE))
+    for channel in absent:
+        settings = without(settings, motion.output_channels.index(channel))
+    return settings
 
 
 def without(settings: Settings, output: int) -> Settings:
@@ -151,22 +172,25 @@ def resolved(settings: Settings, records: Sequence[TraceRecord]) -> Settings:
     )
 
 
-def declared_change(aircraft: Aircraft, *, has_vane: bool = True) -> Change:
+def declared_change(
+    aircraft: Aircraft, motion: Motion = LONGITUDINAL, *, absent: Collection[str] = ()
+) -> Change:
     """What aircraft.toml declares beyond forces at rest: the sensors' position, lag, delay and scale, the dynamics.
 
     Parameters
     ----------
-    has_vane : whether alpha was measured; without a vane its declared errors are left out.
+    motion : whose outputs count; the dynamics are those of the pitch plane.
+    absent : outputs that no instrument measured; their declared errors are left out.
     """
     sensors = aircraft.file.sensors
     terms = [
         SensorTerm(channel, kind, sensors[channel].errors().value(kind))
-        for channel in CHANNELS
-        if channel in sensors and (has_vane or channel != VANE)
-        for kind in _CARRIED
+        for channel in motion.output_channels
+        if channel in sensors and channel not in absent
+        for kind in _CARRIED[motion.name]
     ]
-    effective = tuple(t for t in terms if t.value != KINDS[t.kind].neutral)
-    return Change(sensors=effective) + declared_dynamics(aircraft.file.dynamics)
+    effective = Change(sensors=tuple(t for t in terms if t.value != KINDS[t.kind].neutral))
+    return effective if motion is LATERAL else effective + declared_dynamics(aircraft.file.dynamics)
 
 
 def free_common(settings: Settings) -> tuple[int, ...]:
@@ -199,7 +223,9 @@ def per_record_prior(
     """
     entries, motion = settings.layout.per_record, settings.layout.motion
     std = np.ones(entries.size)
-    std[entries.motion_start] = _START_STD
+    std[entries.motion_start] = [
+        _START_RATE_STD if state.channel.endswith("_rad_s") else _START_ANGLE_STD for state in motion.states
+    ]
     std[entries.bias] = settings.bias_std
     free = [
         bool({*range(*motion.row(c.name).indices(len(motion.parameters)))} & {*unconstrained})
@@ -245,7 +271,7 @@ def common_prior(
     precision = np.zeros((entries.size, entries.size))
     derivatives, inertia = entries.derivatives, entries.inertia
     # an inertia larger by i makes the derivatives of the moment look smaller by i
-    std = inertia_std(records[0].plant.aircraft)
+    std = inertia_std(records[0].plant.aircraft, motion)
     turn = np.zeros(derivatives.stop)
     for row in (motion.row(c.name) for c in motion.coefficients if c.length is not None):
         turn[row] = -declared_derivatives_of(records)[row]
@@ -266,6 +292,7 @@ def common_prior(
 
 __all__ = [
     "GUST_COVARIANCE",
+    "LAYOUTS",
     "VANE",
     "Settings",
     "common_prior",

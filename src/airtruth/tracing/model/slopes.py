@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import by_types, shared
-from airtruth.tracing.model.kernel_input import AirPoint, FilterModel
+from airtruth.tracing.model.kernel_input import AnyPoint, FilterModel
 from airtruth.tracing.model.parameters import ParameterLayout
 
 Array = NDArray[np.float64]
@@ -136,7 +136,7 @@ def _output_slopes(
 def rate_slopes(
     x: Array,
     d_x: Array,
-    at: AirPoint,
+    at: AnyPoint,
     model: FilterModel,
     moved: Any,
     column: Ints,
@@ -164,7 +164,7 @@ def output_slopes(
     d_x: Array,
     rate: Array,
     d_rate: Array,
-    at: AirPoint,
+    at: AnyPoint,
     model: FilterModel,
     moved: Any,
     column: Ints,

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.tracing.model.by_motion import equations_of
-from airtruth.tracing.model.corners import CornerNodes, Corners, input_column, spread_of, stack, stacked
-from airtruth.tracing.model.kernel_input import AirPoint, FilterModel, KernelInput
+from airtruth.tracing.model.corners import CornerNodes, Corners, input_columns, spread_of, stack, stacked
+from airtruth.tracing.model.kernel_input import AnyPoint, FilterModel, KernelInput
 from airtruth.tracing.model.linearise import (
     FirstUpdate,
     discrete,
@@ -30,7 +30,7 @@ Ints = NDArray[np.int64]
 
 _NONE: Final = np.zeros((0, 0))
 """A matrix that is not used."""
-_CERTAIN: Final = stacked([Corners(_NONE, _NONE, _NONE, _NONE, _NONE, np.zeros(0), _NONE, _NONE, 0.0)])
+_CERTAIN: Final = stacked([Corners(_NONE, _NONE, _NONE[None], _NONE, _NONE, np.zeros(0), _NONE, _NONE, 0.0)])
 """The recursion of a surface that is known everywhere."""
 
 
@@ -88,11 +88,11 @@ def steady_filter(given: KernelInput, along: Schedule) -> SteadyFilter | None:
     return joined(given, sound, along) if len(sound) == len(nodes) else None
 
 
-def conditions_of(given: KernelInput, along: Schedule) -> list[tuple[float, AirPoint]]:
-    """Angle of attack and inputs at the flight conditions of a record."""
-    if not along.alpha_rad:
-        return [(given.reference_alpha_rad, given.reference)]
-    return list(zip(along.alpha_rad, along.air, strict=True))
+def conditions_of(given: KernelInput, along: Schedule) -> list[tuple[float, AnyPoint]]:
+    """Flow angle and inputs at the flight conditions of a record."""
+    if not along.flow_rad:
+        return [(given.reference_flow_rad, given.reference)]
+    return list(zip(along.flow_rad, along.air, strict=True))
 
 
 def common_of(given: KernelInput, along: Schedule) -> int:
@@ -132,12 +132,12 @@ def _unit(model: FilterModel) -> Array:
     return np.eye(model.sensors.scale.size)[None]
 
 
-def _at(given: KernelInput, alpha_rad: float, air: AirPoint) -> Condition | None:
+def _at(given: KernelInput, flow_rad: float, air: AnyPoint) -> Condition | None:
     """The filter at one flight condition; None where its innovations have no covariance."""
     model = given.model
     n = model.states.size
     a, c = np.empty((n, n)), np.empty((model.sensors.scale.size, n))
-    x = equilibrium(alpha_rad, air, model)
+    x = equilibrium(flow_rad, air, model)
     direct = linearise(x, air, model, a, c)
     phi, noise = discrete(a, process_intensity(air.airspeed_m_s, model), given.dt_s)
     k_gain, white, covariance, logdet, p, first = gain_of(phi, c, noise, model.sensors.variance)
@@ -145,7 +145,8 @@ def _at(given: KernelInput, alpha_rad: float, air: AirPoint) -> Condition | None
         return None
     corners = None
     if given.corner_rad2.size > 0:
-        spread = spread_of(a, input_column(x, air, model), given.dt_s)
+        columns = input_columns(x, air, model, len(given.corner_rad2))
+        spread = np.stack([spread_of(a, column, given.dt_s) for column in columns])
         root = np.asarray(np.linalg.inv(white))
         corners = Corners(phi, noise, spread, p, c, model.sensors.variance, covariance, root, logdet)
     return Condition(k_gain, first, white, covariance, logdet, corners, direct)
@@ -177,17 +178,17 @@ def without_update(model: FilterModel) -> SteadyFilter:
     )
 
 
-def equilibrium(alpha_rad: float, air: AirPoint, model: FilterModel) -> Array:
-    """(states,) at an angle of attack, effects' states in equilibrium with it."""
+def equilibrium(flow_rad: float, air: AnyPoint, model: FilterModel) -> Array:
+    """(states,) at a flow angle, effects' states in equilibrium with it."""
     x = np.zeros(model.states.size)
-    x[0] = alpha_rad
+    x[0] = flow_rad
     equations_of(model).settle(x, air, model)
     return x
 
 
 def linearise_at_reference(given: KernelInput, a: Array, c: Array) -> Array:
     """`linearise` at the record's mean, effects' states in equilibrium with it."""
-    x = equilibrium(given.reference_alpha_rad, given.reference, given.model)
+    x = equilibrium(given.reference_flow_rad, given.reference, given.model)
     return linearise(x, given.reference, given.model, a, c)
 
 

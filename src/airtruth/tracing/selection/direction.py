@@ -55,7 +55,7 @@ class Direction:
 def change_along(null: PosteriorFit, d: Direction) -> CompiledChange:
     """What a null and a step in a direction change."""
     sizes = np.concatenate([null.point.sizes, d.sizes(d.step)])
-    return compile_change(null.hypothesis.plus(d.effect).change(sizes))
+    return compile_change(null.hypothesis.plus(d.effect).change(sizes), null.hypothesis.motion)
 
 
 def extended_by(null: PosteriorFit, problem: TraceProblem, tried: Sequence[Direction]) -> list[Sensitivities]:

@@ -183,7 +183,7 @@ def _of_record(
     by_gain = derivatives - propagated(tangent, force, nothing) @ base.white.T
     by_gain[~derivatives.any(axis=(1, 2))] = 0.0
     at, chord = given.reference, record.plant.aircraft.constants.chord_m
-    reference = {"alpha": given.reference_alpha_rad, "elevator": at.elevator_rad, "qbar": at.qbar_pa}
+    reference = {"alpha": given.reference_flow_rad, "elevator": at.elevator_rad, "qbar": at.qbar_pa}
     alpha_dot = np.linalg.lstsq(
         np.column_stack([linear.reshape(-1, count), np.ones(linear.shape[0] * POINTS)]),
         motion.signal("alpha_dot_hat").ravel(),

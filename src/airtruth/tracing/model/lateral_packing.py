@@ -1,0 +1,71 @@
+"""The declared aircraft and the gusts of the lateral-directional motion as the compiled filter reads them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.physics.lateral_gusts import roll_deviation_rad_s
+from airtruth.physics.motion import LATERAL
+from airtruth.tracing.model.by_motion import register
+from airtruth.tracing.model.compile import CompiledChange
+from airtruth.tracing.model.kernel_input import GustModel
+from airtruth.tracing.model.lateral_equations import EQUATIONS
+from airtruth.tracing.model.lateral_input import LateralAircraft, LateralGrid
+from airtruth.tracing.model.lateral_plant import LateralPlant
+from airtruth.tracing.model.parameters import CommonEntries
+
+Array = NDArray[np.float64]
+
+register(LateralAircraft, LateralGrid, EQUATIONS)
+
+
+def pack_lateral(
+    plant: LateralPlant, compiled: CompiledChange, common: Array, entries: CommonEntries
+) -> LateralAircraft:
+    """The declared aircraft of a flight condition, with its changes and increments.
+
+    A relative change of the inertia at equal derivatives of the angular accelerations changes all inertias alike.
+    """
+    c, declared = plant.aircraft.constants, compiled.declared
+    inertia = float(common[entries.inertia])
+    increments = common[entries.derivatives].copy()
+    for row in (LATERAL.row(x.name) for x in LATERAL.coefficients if x.length is not None):
+        increments[row] += inertia * (plant.derivatives[row] + common[row])
+    ixx, izz = c.inertia_xx_kg_m2, c.inertia_zz_kg_m2
+    ixz = c.inertia_xz_kg_m2 + declared["inertia_xz"] * math.sqrt(ixx * izz)
+    return LateralAircraft(
+        area_m2=c.wing_area_m2,
+        span_m=c.span_m,
+        chord_m=c.chord_m,
+        mass_kg=c.mass_kg * declared["mass"],
+        inertia_xx_kg_m2=ixx * declared["inertia_xx"] * (1.0 + inertia),
+        inertia_yy_kg_m2=c.inertia_yy_kg_m2 * (1.0 + inertia),
+        inertia_zz_kg_m2=izz * declared["inertia_zz"] * (1.0 + inertia),
+        inertia_xz_kg_m2=ixz * (1.0 + inertia),
+        trim=plant.trim_signals,
+        neutral_rad=plant.neutral_rad,
+        effectiveness=np.array([declared[control.name] for control in LATERAL.controls]),
+        cg_shift=declared["cg"],
+        cg_y_m=declared["cg_y"],
+        yaw_moment_n_m=declared["yaw_moment"],
+        constant=plant.constant,
+        increments=increments,
+        alpha_rad=plant.alpha_rad,
+        points=plant.points,
+        values=plant.values,
+    )
+
+
+def side_gusts(vertical: GustModel, span_m: float) -> GustModel:
+    """Side gusts of the level, length, rolloff and share of vertical ones, with the times of their own rotary parts."""
+    return vertical._replace(
+        rotary_time_s=0.75 * vertical.rotary_time_s,
+        roll_1_m=roll_deviation_rad_s(1.0, vertical.length_m, span_m),
+        roll_time_s=vertical.rotary_time_s,
+    )
+
+
+__all__ = ["pack_lateral", "side_gusts"]
