@@ -105,7 +105,7 @@ def test_gains_that_follow_the_airspeed():
     v = np.linspace(1.0, 0.65, signals.airspeed_m_s.size) * signals.airspeed_m_s
     slower = replace(record, signals=replace(signals, airspeed_m_s=v, ground_m_s=v))
     given = filter_inputs(slower, Change())
-    assert len(given.along.alpha_rad) > 1
+    assert len(given.along.flow_rad) > 1
     point = tr.point([slower])
     check((given, tr.SETTINGS, point.common, point.per_record[0]))
 

@@ -74,7 +74,7 @@ class AircraftMoves(NamedTuple):
 
 
 class _Force(NamedTuple):
-    """X, Z [N] and M [N m] of the tables, and their slopes in alpha, qhat and the thrust."""
+    """X, Z [N] and M [N m] of the tables, their slopes in alpha and qhat, and all three in the thrust."""
 
     x: float
     z: float
@@ -85,9 +85,7 @@ class _Force(NamedTuple):
     x_qhat: float
     z_qhat: float
     m_qhat: float
-    x_thrust: float
-    z_thrust: float
-    m_thrust: float
+    thrust: tuple[float, float, float]
 
 
 @inner
@@ -115,6 +113,11 @@ def _look_up(
                 fx, fz, fm = fx + w * x, fz + w * z, fm + w * m
                 ax, az, am = ax + wda * x, az + wda * z, am + wda * m
                 qx, qz, qm = qx + wdc * x, qz + wdc * z, qm + wdc * m
+    thrust = (
+        (1.0 - si) * engine[i, 0] + si * engine[i + 1, 0],
+        (1.0 - si) * engine[i, 1] + si * engine[i + 1, 1],
+        (1.0 - si) * engine[i, 2] + si * engine[i + 1, 2],
+    )
     by_alpha = 1.0 / (aircraft.alpha_rad[i + 1] - aircraft.alpha_rad[i])
     by_qhat = qbar / (aircraft.qhat[n + 1] - aircraft.qhat[n])
     return _Force(
@@ -127,9 +130,7 @@ def _look_up(
         qx * by_qhat,
         qz * by_qhat,
         qm * by_qhat,
-        (1.0 - si) * engine[i, 0] + si * engine[i + 1, 0],
-        (1.0 - si) * engine[i, 1] + si * engine[i + 1, 1],
-        (1.0 - si) * engine[i, 2] + si * engine[i + 1, 2],
+        thrust,
     )
 
 
@@ -138,24 +139,24 @@ def _all_terms(
     x: Array,
     d_x: Array,
     f: _Force,
-    lift: float,
+    own: float,
     signals: Signals,
     at: AirPoint,
     model: FilterModel,
     column: Ints,
     work: SlopeWork,
 ) -> None:
-    """Add the derivatives of the effects' terms of CL and Cm; ``lift``: CL of the increments without them."""
+    """Add the derivatives of the effects' terms of CL and Cm; ``own``: CL of the increments without them."""
     aircraft, effects, half = model.aircraft, model.effects, 0.5 * model.aircraft.chord_m / at.airspeed_m_s
     force, alpha, mass = at.qbar_pa * aircraft.area_m2, signals.alpha, aircraft.mass_kg
     loss, weight = half * force / (mass * at.airspeed_m_s), G0 * math.cos(at.theta_rad - x[0]) / at.ground_m_s
-    fz = f.z - force * (lift + terms(x, signals, effects, False, 0.0)[0])
+    fz = f.z - force * (own + terms(x, signals, effects, False, 0.0)[0])
     first = x[1] + (fz * math.cos(alpha) - f.x * math.sin(alpha)) / (mass * at.ground_m_s) + weight
     turned = Signals(alpha, signals.elevator, signals.qhat, first * half, signals.qbar)
     for turn in range(2):  # terms in alpha' take that of all other forces
         if turn == 1:
             _turning(x, d_x, fz, alpha, f, at, model, column, work.alpha_dot_hat, work)
-            for p in range(work.lift.size):
+            for p in range(work.alpha.size):
                 work.alpha_dot_hat[p] *= half
         for t in range(effects.amplitude.size):
             if effects.term_index[t, 0] < READING and (effects.term_index[t, 1] == ALPHA_DOT) == (turn == 1):
@@ -211,22 +212,22 @@ def _coefficient_slopes(
 ) -> None:
     """Derivatives of CL and Cm beside the tables, without the effects' terms."""
     aircraft, more = model.aircraft, model.aircraft.increments
-    lift_alpha, lift_qhat, moment_alpha, moment_qhat = more[0], more[1], more[_ROW], more[_ROW + 1]
-    for p in range(work.lift.size):
-        work.lift[p] = lift_alpha * work.alpha[p] + lift_qhat * work.qhat[p]
-    for p in range(work.lift.size):
-        work.moment[p] = moment_alpha * work.alpha[p] + moment_qhat * work.qhat[p]
+    z_by_alpha, z_by_qhat, m_by_alpha, m_by_qhat = more[0], more[1], more[_ROW], more[_ROW + 1]
+    for p in range(work.alpha.size):
+        work.increment[0, p] = z_by_alpha * work.alpha[p] + z_by_qhat * work.qhat[p]
+    for p in range(work.alpha.size):
+        work.increment[1, p] = m_by_alpha * work.alpha[p] + m_by_qhat * work.qhat[p]
     for i in range(_ROW):
         value = signals.qhat
         if i == 0:
             value = signals.alpha - aircraft.trim_alpha_rad
         elif i == 2:
             value = signals.elevator - aircraft.trim_elevator_rad
-        work.lift[column[_DERIVATIVES + i]] += value
-        work.moment[column[_DERIVATIVES + _ROW + i]] += moved.inertia * value
-        work.moment[column[INERTIA]] += moved.turned[i] * value
-    work.lift[column[_TRIM]] += 1.0
-    work.moment[column[_TRIM + 1]] += 1.0
+        work.increment[0, column[_DERIVATIVES + i]] += value
+        work.increment[1, column[_DERIVATIVES + _ROW + i]] += moved.inertia * value
+        work.increment[1, column[INERTIA]] += moved.turned[i] * value
+    work.increment[0, column[_TRIM]] += 1.0
+    work.increment[1, column[_TRIM + 1]] += 1.0
 
 
 @inner
@@ -247,12 +248,12 @@ def _turning(
     by = 1.0 / (model.aircraft.mass_kg * at.ground_m_s)
     by_alpha = by * (f.z_alpha * cosine - f.x_alpha * sine - fz * sine - f.x * cosine)
     by_qhat = by * (f.z_qhat * cosine - f.x_qhat * sine)
-    by_lift = by * at.qbar_pa * model.aircraft.area_m2 * cosine
+    by_first = by * at.qbar_pa * model.aircraft.area_m2 * cosine
     falls = G0 * math.sin(at.theta_rad - x[0]) / at.ground_m_s
     for p in range(row.size):
-        more = by_alpha * work.alpha[p] + by_qhat * work.qhat[p] - by_lift * work.lift[p]
+        more = by_alpha * work.alpha[p] + by_qhat * work.qhat[p] - by_first * work.increment[0, p]
         row[p] = falls * d_x[0, p] + d_x[1, p] + more
-    row[column[THRUST]] += by * (f.z_thrust * cosine - f.x_thrust * sine)
+    row[column[THRUST]] += by * (f.thrust[1] * cosine - f.thrust[0] * sine)
 
 
 @inner
@@ -290,22 +291,22 @@ def longitudinal_rate_slopes(
     _coefficient_slopes(signals, model, moved, column, work)
     if model.effects.amplitude.size > 0:
         d_alpha, d_de = alpha - aircraft.trim_alpha_rad, surface - aircraft.trim_elevator_rad
-        lift = at.lift + more[0] * d_alpha + more[1] * signals.qhat + more[2] * d_de
-        _all_terms(x, d_x, f, lift, signals, at, model, column, work)
+        own = at.lift + more[0] * d_alpha + more[1] * signals.qhat + more[2] * d_de
+        _all_terms(x, d_x, f, own, signals, at, model, column, work)
     mass, force = aircraft.mass_kg, at.qbar_pa * aircraft.area_m2
     arm, by = aircraft.chord_m * aircraft.cg_shift, 1.0 / aircraft.inertia_kg_m2
     _turning(x, d_x, az * mass, alpha, f, at, model, column, slope[0], work)
-    z_alpha, z_qhat, z_lift = f.z_alpha / mass, f.z_qhat / mass, force / mass
+    z_alpha, z_qhat, z_first = f.z_alpha / mass, f.z_qhat / mass, force / mass
     for p in range(slope.shape[1]):
-        slope[motion, p] = z_alpha * work.alpha[p] + z_qhat * work.qhat[p] - z_lift * work.lift[p]
+        slope[motion, p] = z_alpha * work.alpha[p] + z_qhat * work.qhat[p] - z_first * work.increment[0, p]
     m_alpha, m_qhat = by * (f.m_alpha - arm * f.z_alpha), by * (f.m_qhat - arm * f.z_qhat)
-    m_lift, m_moment = by * arm * force, by * force * aircraft.chord_m
+    m_first, m_second = by * arm * force, by * force * aircraft.chord_m
     for p in range(slope.shape[1]):
         tables = m_alpha * work.alpha[p] + m_qhat * work.qhat[p]
-        slope[1, p] = tables + m_lift * work.lift[p] + m_moment * work.moment[p]
-    slope[1, column[THRUST]] += by * (f.m_thrust - arm * f.z_thrust)
+        slope[1, p] = tables + m_first * work.increment[0, p] + m_second * work.increment[1, p]
+    slope[1, column[THRUST]] += by * (f.thrust[2] - arm * f.thrust[1])
     slope[1, column[INERTIA]] -= out[1] / moved.inertia
-    slope[motion, column[THRUST]] += f.z_thrust / mass
+    slope[motion, column[THRUST]] += f.thrust[1] / mass
     _gust_slopes(v, d_x, model, slope)
     effect_slopes(half, d_x, model, slope, work)
     return az
@@ -344,13 +345,13 @@ def longitudinal_output_slopes(
 
 def pack_moves(record: TraceRecord, compiled: CompiledChange, common: Array, rolloff: float) -> AircraftMoves:
     """What the parameters move of `airtruth.tracing.model.response.pack_aircraft`."""
-    entries, moment, unit = SHORT_PERIOD.common, LONGITUDINAL.row("Cm"), np.eye(CORE)
+    entries, row, unit = SHORT_PERIOD.common, LONGITUDINAL.row("Cm"), np.eye(CORE)
     plant = record.pitch_plant
-    upward = np.array([gust(row, 0.0) for row in unit])
-    lead = np.array([gust(row, 1.0) for row in unit]) - upward
+    upward = np.array([gust(x, 0.0) for x in unit])
+    lead = np.array([gust(x, 1.0) for x in unit]) - upward
     return AircraftMoves(
         inertia=1.0 + float(common[entries.inertia]),
-        turned=plant.derivatives[moment] + common[moment],
+        turned=plant.derivatives[row] + common[row],
         engine=np.zeros_like(plant.constant) + plant.engine,
         mounting_m=compiled.declared["cg"] * plant.aircraft.constants.chord_m,
         upward=upward + rolloff * lead,

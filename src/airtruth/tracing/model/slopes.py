@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import by_types, shared
+from airtruth.physics.motion import MOTIONS
 from airtruth.tracing.model.kernel_input import AnyPoint, FilterModel
 from airtruth.tracing.model.parameters import ParameterLayout
 
@@ -23,25 +24,26 @@ Ints = NDArray[np.int64]
 
 MOVERS: Final = ("rotary", "thrust", "rolloff", "inertia", "mounting", "log_gust")
 """Parameters that move any motion; the derivatives and the increments at the trim follow them in `moving`."""
+_COEFFICIENTS: Final = max(len(motion.coefficients) for motion in MOTIONS.values())
+"""Most coefficients of a motion [-]."""
 ROTARY, THRUST, ROLLOFF, INERTIA, MOUNTING, LOG_GUST = range(len(MOVERS))
 """Their numbers."""
 
 
 class SlopeWork(NamedTuple):
-    """Derivatives of what forces and readings depend on, (parameters,) each.
+    """Derivatives of what forces and readings depend on, (parameters,) each but the last.
 
     Attributes
     ----------
     upward, alpha, qhat, alpha_dot_hat : of the gust [-] and the signals of the terms.
-    lift, moment : of the coefficients beside the tables.
+    increment : (coefficients, parameters) of the coefficients beside the tables.
     """
 
     upward: Array
     alpha: Array
     qhat: Array
     alpha_dot_hat: Array
-    lift: Array
-    moment: Array
+    increment: Array
 
 
 class MotionSlopes(NamedTuple):
@@ -85,8 +87,7 @@ def slope_work(parameters: int) -> SlopeWork:
         np.zeros(parameters),
         np.zeros(parameters),
         np.zeros(parameters),
-        np.zeros(parameters),
-        np.zeros(parameters),
+        np.zeros((_COEFFICIENTS, parameters)),
     )
 
 

@@ -68,15 +68,15 @@ def add_term(
     feedback : loss of alpha_dot_hat by a unit of CL [-]; by_alpha : its slope in alpha.
     """
     number, state, factor = effects.term_index[t, 1], effects.term_index[t, 3], effects.term_index[t, 4]
-    amplitude, of_lift = effects.amplitude[t], effects.term_index[t, 0] == 0
+    amplitude, is_first = effects.amplitude[t], effects.term_index[t, 0] == 0
     raw = x[state] if state >= 0 else signal_of(signals, number)
     loop = 1.0
-    if number == ALPHA_DOT and of_lift:
+    if number == ALPHA_DOT and is_first:
         loop = 1.0 / (1.0 + amplitude * feedback)
     s = raw * loop - effects.origin[t]
     weight = signal_of(signals, factor) - effects.factor_origin[t] if factor >= 0 else 1.0
     bent = amplitude * _shape_slope(effects.term_index[t, 2], s) * weight
-    row = work.lift if of_lift else work.moment
+    row = work.increment[effects.term_index[t, 0]]
     if state >= 0:
         _add(bent, d_x[state], row)
     else:
@@ -92,7 +92,7 @@ def effect_slopes(half: float, d_x: Array, model: FilterModel, slope: Array, wor
     """Derivatives of the rates of the effects' states."""
     effects = model.effects
     if effects.time_s.size > 0:
-        for p in range(work.lift.size):
+        for p in range(work.alpha.size):
             work.alpha_dot_hat[p] = half * slope[0, p]
     for k in range(effects.time_s.size):
         at, signal, wn = model.states.effect[k], effects.state_index[k, 1], 1.0 / effects.time_s[k]
