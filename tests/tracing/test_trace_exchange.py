@@ -19,6 +19,7 @@ from airtruth.tracing.selection.acceptance import (
 from airtruth.tracing.selection.exchange import better_set, other_kinds
 from airtruth.tracing.selection.refit import Refit
 from airtruth.tracing.selection.rounds import scored_round
+from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.selection.significance import MISFIT_FAMILY_LEVEL, significant_gain
 
 LIBRARY = tuple(e for e in EFFECTS.values() if not e.in_derivatives)
@@ -43,13 +44,13 @@ def reached(problem, first, second, rivals, scored=()):
     return (
         SimpleNamespace(tied=leaders[:1], candidates=leaders[:1]),
         SimpleNamespace(tied=leaders[1:], candidates=(leaders[1], *others)),
-        scored_round(problem, leaders[1].fit, scored, 2, 1, lambda step: None),
+        scored_round(SetTable(problem), leaders[1].fit, scored, 2, 1, lambda step: None),
     )
 
 
 def better_of(problem, *search):
     rounds = reached(problem, *search)
-    return better_set(problem, rounds, rounds[-1].null, LIBRARY, LEAST, lambda step: None)[0]
+    return better_set(SetTable(problem), rounds, rounds[-1].null, LIBRARY, LEAST, lambda step: None)
 
 
 @pytest.mark.slow
@@ -89,9 +90,12 @@ def test_what_remains_points_to_an_effect_that_makes_another_redundant(problem):
 @pytest.mark.slow
 def test_every_exchange_is_kept_for_the_look_alikes(problem):
     rounds = reached(problem, GYRO, VANE, [ACCELEROMETER])
-    better, fits = better_set(problem, rounds, rounds[-1].null, LIBRARY, LEAST, lambda step: None)
+    sets = SetTable(problem)
+    better = better_set(sets, rounds, rounds[-1].null, LIBRARY, LEAST, lambda step: None)
     assert better is None
-    assert ["gyro_scale", "accelerometer_scale"] in [[e.key for e in f.hypothesis.effects] for f in fits]
+    assert ["gyro_scale", "accelerometer_scale"] in [
+        [e.key for e in f.hypothesis.effects] for f in sets.exchanges(rounds[-1].null)
+    ]
 
 
 def test_late_members_are_late_in_another_way():
@@ -120,7 +124,9 @@ def test_one_late_member_has_its_rival_alone():
 @pytest.mark.slow
 def test_records_left_out_do_not_refuse_the_effect_that_leads(problem, monkeypatch):
     """Another effect that the set still lacks may make them worse; the other reasons remain."""
-    last = scored_round(problem, fitted(problem, GYRO), [VANE, ACCELEROMETER], 1, 1, lambda step: None)
+    last = scored_round(
+        SetTable(problem), fitted(problem, GYRO), [VANE, ACCELEROMETER], 1, 1, lambda step: None
+    )
     refits = [
         Refit(score, fitted(problem, GYRO, score.effect), 0.0)
         for score in sorted(last.table.scores, key=lambda s: -abs(s.z))

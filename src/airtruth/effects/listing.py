@@ -28,11 +28,12 @@ def as_json(effects: Iterable[Effect]) -> str:
 
 def as_markdown(effects: Iterable[Effect]) -> str:
     """A table with one row per parameter: meaning, range, and the smallest material value."""
-    rows = ["| effect | parameter | meaning | range | material from |", "|---|---|---|---|---|"]
+    rows = ["| effect | motion | parameter | meaning | range | material from |", "|---|---|---|---|---|---|"]
     for effect in effects:
         for number, p in enumerate(effect.parameters):
             cells = (
                 "" if number else f"`{effect.key}`",
+                "" if number else ", ".join(effect.motions),
                 f"`{p.name}`",
                 p.meaning,
                 f"{p.low:g} to {p.high:g}{_unit(p)}",
@@ -43,7 +44,7 @@ def as_markdown(effects: Iterable[Effect]) -> str:
 
 
 def _paragraph(effect: Effect) -> str:
-    lines = [f"{effect.key}  ({effect.where})"]
+    lines = [f"{effect.key}  ({', '.join((effect.where, *effect.motions))})"]
     lines += [f"  {_parameter(p)}" for p in effect.parameters]
     paragraphs = (
         ("", effect.explanation),
@@ -90,12 +91,14 @@ def _entry(effect: Effect) -> dict[str, Any]:
         "name": effect.name,
         "variant": effect.variant,
         "where": effect.where,
+        "motions": list(effect.motions),
         "in_derivatives": effect.in_derivatives,
         "parameters": [
             {k: None if isinstance(v, float) and math.isinf(v) else v for k, v in asdict(p).items()}
             for p in effect.parameters
         ],
         "channels": list(effect.channels),
+        "motions": list(effect.motions),
         "explanation": effect.explanation,
         "source": effect.source,
         "distinguished_by": effect.distinguished_by,

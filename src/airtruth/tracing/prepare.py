@@ -83,8 +83,10 @@ class Case:
 
     @property
     def has_vane(self) -> bool:
-        """Whether alpha was measured in every record."""
-        return bool(self.fitted.settings.measured.all())
+        """Whether a vane measured the flow angle in every record."""
+        outputs = self.fitted.layout.motion.outputs
+        vanes = [y.instrument == "vane" for y in outputs]
+        return bool(self.fitted.settings.measured[vanes].all())
 
 
 def prepare(
@@ -141,7 +143,9 @@ def prepare(
     return Case(
         fitted=TraceProblem(fitted, settings, options.threads),
         held=TraceProblem(held, settings, options.threads) if held else None,
-        hypothesis=Hypothesis(declared_change(aircraft, motion, absent=absent), trim_flow_rad=trim_flow_rad),
+        hypothesis=Hypothesis(
+            declared_change(aircraft, motion, absent=absent), trim_flow_rad=trim_flow_rad, motion=motion
+        ),
         effects=tuple(e for e in effects if not reasons[e.key]),
         untestable=tuple(untestable),
         model=model,

@@ -242,6 +242,7 @@ def fit(
         covariance=_covariance(search, at),
         converged=converged,
         shortfall=0.0 if converged else search.shortfall(x, at),
+        outrun=status is Status.OUTRUN,
     )
 
 

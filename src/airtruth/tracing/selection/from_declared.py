@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.tracing.inference.hypothesis import Hypothesis
-from airtruth.tracing.inference.optimise import fit, initial_parameters
-from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.inference.optimise import initial_parameters
+from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.score_test import Score
+from airtruth.tracing.selection.set_table import SetTable
 
 Array = NDArray[np.float64]
 
@@ -21,7 +22,7 @@ _ITERATIONS: Final = 6
 
 
 def from_declared(
-    problem: TraceProblem,
+    sets: SetTable,
     null: PosteriorFit,
     hypothesis: Hypothesis,
     sizes: Array,
@@ -37,12 +38,12 @@ def from_declared(
     ----------
     hypothesis, sizes : what is refitted, and the sizes of its effects at which the search begins.
     """
-    start = initial_parameters(problem, hypothesis, sizes, _ITERATIONS).with_levels(null.point)
-    return fit(problem, hypothesis, start, rival=rival, only_better=only_better, near=null)
+    start = initial_parameters(sets.problem, hypothesis, sizes, _ITERATIONS).with_levels(null.point)
+    return sets.fit_from(hypothesis, start, rival=rival, only_better=only_better, near=null)
 
 
 def with_effect(
-    problem: TraceProblem,
+    sets: SetTable,
     null: PosteriorFit,
     s: Score,
     size: float,
@@ -58,7 +59,7 @@ def with_effect(
     """
     hypothesis = null.hypothesis.plus(s.effect)
     sizes = at(null, s, size).sizes
-    return from_declared(problem, null, hypothesis, sizes, rival, only_better=only_better)
+    return from_declared(sets, null, hypothesis, sizes, rival, only_better=only_better)
 
 
 def at(null: PosteriorFit, s: Score, size: float) -> Parameters:

@@ -14,6 +14,7 @@ from airtruth.effects.increment import Increment
 from airtruth.physics.motion import Motion
 from airtruth.physics.readings import increments_over
 from airtruth.physics.terms import QBAR
+from airtruth.tracing.inference.direction import Direction
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import inflation, robust_covariance
@@ -26,11 +27,11 @@ from airtruth.tracing.selection.acceptance import (
     has_converged,
     tested_on_left_out,
 )
-from airtruth.tracing.selection.direction import Direction
 from airtruth.tracing.selection.flown import flown
 from airtruth.tracing.selection.increments import Screened
 from airtruth.tracing.selection.refit import refit_without
 from airtruth.tracing.selection.score_test import Score
+from airtruth.tracing.selection.set_table import SetTable
 
 Array = NDArray[np.float64]
 
@@ -279,7 +280,7 @@ def evidence_score(own: FittedIncrement) -> Score:
     )
 
 
-def redundant_increment(problem: TraceProblem, fitted: PosteriorFit, tried: float) -> Increment | None:
+def redundant_increment(sets: SetTable, fitted: PosteriorFit, tried: float) -> Increment | None:
     """The first increment that the last effect makes redundant: its posterior odds beside the others are too low.
 
     Parameters
@@ -289,7 +290,7 @@ def redundant_increment(problem: TraceProblem, fitted: PosteriorFit, tried: floa
     """
     for effect in fitted.hypothesis.effects[:-1]:
         if isinstance(effect, Increment):
-            less = refit_without(problem, fitted, effect)
+            less = refit_without(sets, fitted, effect)
             if less is not None and log_evidence(less, fitted, effect, tried) < LEAST_ODDS:
                 return effect
     return None
