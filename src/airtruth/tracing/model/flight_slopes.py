@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from airtruth.numerics.ahead import awaited
 from airtruth.numerics.compiled import inner
 from airtruth.tracing.model.advance import Steps, steps_of
 from airtruth.tracing.model.by_motion import air_at, early_count, output_count, state_count
@@ -197,6 +198,7 @@ def _advance(point: int, grid: AnyGrid, model: FilterModel, moved: Moved, steps:
         _end(model, steps, own)
 
 
+@awaited
 @njit(cache=True, nogil=True, error_model="numpy")
 def _along(
     given: KernelInput,

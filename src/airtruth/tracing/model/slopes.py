@@ -24,10 +24,10 @@ Ints = NDArray[np.int64]
 
 MOVERS: Final = ("rotary", "thrust", "rolloff", "inertia", "mounting", "log_gust")
 """Parameters that move any motion; the derivatives and the increments at the trim follow them in `moving`."""
-_COEFFICIENTS: Final = max(len(motion.coefficients) for motion in MOTIONS.values())
-"""Most coefficients of a motion [-]."""
 ROTARY, THRUST, ROLLOFF, INERTIA, MOUNTING, LOG_GUST = range(len(MOVERS))
 """Their numbers."""
+_COEFFICIENTS: Final = max(len(motion.coefficients) for motion in MOTIONS.values())
+"""Most coefficients of a motion [-]."""
 
 
 class SlopeWork(NamedTuple):
