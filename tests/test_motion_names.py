@@ -39,7 +39,7 @@ CAPS: dict[str, int] = {
     "starting": 23,
     "tracing": 141,
     "tracing/inference": 3,
-    "tracing/model": 392,
+    "tracing/model": 420,
     "tracing/presentation": 11,
     "tracing/selection": 7,
 }

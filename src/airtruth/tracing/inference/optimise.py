@@ -35,8 +35,6 @@ Ints = NDArray[np.int64]
 
 ITERATIONS: Final = 45
 """Most iterations of a fit [-]; judgement: three times what a fit of one effect takes as a rule."""
-_ATTEMPTS: Final = 2
-"""Number of times that `converged_fit` may begin again where it ended [-] (judgement)."""
 _FIRST_ITERATIONS: Final = 4
 """Iterations with the levels held, before a search [-]; judgement."""
 _LEAST_DAMPING: Final = 1e-9
@@ -55,7 +53,7 @@ _SEARCH: Final = Options(
 )
 """How the posterior is searched; decreases in log-likelihood [-], judgements. A step that would gain 0.002 moves the
 estimates by 0.06 standard errors, one of 0.05 by 0.3. The last 0.5 is for tables with breaks, which give the gain of
-the filter, and with it the cost, small breaks too. Derivatives cost twenty times what a trial costs, so that they serve
+the filter, and with it the cost, small breaks too. Derivatives cost six times what a trial costs, so that they serve
 until they gain less than 1, or less than half of what they promise."""
 _ROUGH_M_S: Final = 1.0
 """Gust level in which a search starts where nothing is known [m/s]: the records then weigh little and no start is far
@@ -246,22 +244,6 @@ def fit(
     )
 
 
-def converged_fit(
-    problem: TraceProblem,
-    hypothesis: Hypothesis,
-    start: Parameters,
-    rival: float = np.inf,
-    near: PosteriorFit | None = None,
-) -> PosteriorFit | None:
-    """A fit that begins again where it ended, until it converges or `_ATTEMPTS` are spent; None, options as of `fit`."""
-    own = fit(problem, hypothesis, start, rival=rival, near=near)
-    for _ in range(_ATTEMPTS):
-        if own is None or own.converged:
-            break
-        own = fit(problem, hypothesis, own.point, rival=rival, near=own)
-    return own
-
-
 def initial_parameters(
     problem: TraceProblem,
     hypothesis: Hypothesis,
@@ -320,4 +302,4 @@ def _covariance(search: PosteriorSearch, at: Evaluated) -> Array:
     return scaled_inverse(marginal.information, _RIDGE)
 
 
-__all__ = ["ITERATIONS", "Evaluated", "PosteriorSearch", "converged_fit", "fit", "initial_parameters"]
+__all__ = ["ITERATIONS", "Evaluated", "PosteriorSearch", "fit", "initial_parameters"]
