@@ -107,8 +107,8 @@ def plan(
 
     Returns
     -------
-    ForecastResult, SplitResult or NarrowResult
-        The second where effects are separated, the third for derivatives and increments, a `LateralPlan` for lateral ones; their ``campaign`` can be flown.
+    ForecastResult, SplitResult, NarrowResult or LateralPlan
+        The first of a campaign; the campaigns of the others, ``campaign``, can be flown.
 
     Raises
     ------
