@@ -246,11 +246,6 @@ class Effect:
         """The variant where it is a column of a log."""
         return self.variant if self.variant in SIGNALS else None
 
-    @property
-    def motions(self) -> tuple[str, ...]:
-        """Names of the motions that it concerns."""
-        return tuple(name for name, motion in MOTIONS.items() if self.applies_to(motion))
-
     def applies_to(self, motion: Motion) -> bool:
         """Whether every name in its terms is one of a motion, and every error of a sensor one that the motion shows.
 
