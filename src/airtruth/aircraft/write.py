@@ -249,12 +249,13 @@ def _changed_file(plane: Aircraft, change: Change, model_name: str, origin: Orig
                 moved[key] = origin.stated(stated, value, std)
         if moved:
             updates["mass"] = old.model_copy(update=moved)
-    if shift and file.tail is not None and file.tail.arm is not None:
-        arm = file.tail.arm
+    for name, part in (("tail", file.tail), ("fin", file.fin)):
+        if not shift or part is None or part.arm is None:
+            continue
         std = origin.std_of("cg", plane.chord_m)
-        both = None if std is None else math.hypot(arm.std, std)
-        shorter = origin.stated(arm, arm.value - shift * plane.chord_m, both)
-        updates["tail"] = file.tail.model_copy(update={"arm": shorter})
+        both = None if std is None else math.hypot(part.arm.std, std)
+        shorter = origin.stated(part.arm, part.arm.value - shift * plane.chord_m, both)
+        updates[name] = part.model_copy(update={"arm": shorter})
     dynamics = with_change(file.dynamics, change)
     if dynamics is not None:
         updates["dynamics"] = dynamics

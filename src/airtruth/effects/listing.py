@@ -91,7 +91,6 @@ def _entry(effect: Effect) -> dict[str, Any]:
         "name": effect.name,
         "variant": effect.variant,
         "where": effect.where,
-        "motions": list(effect.motions),
         "in_derivatives": effect.in_derivatives,
         "parameters": [
             {k: None if isinstance(v, float) and math.isinf(v) else v for k, v in asdict(p).items()}

@@ -139,7 +139,7 @@ def lift_slope(geometry: SideGeometry) -> float:
     Examples
     --------
     >>> round(lift_slope(SideGeometry(aspect_ratio=8.0)), 3)
-    4.907
+    4.906
     """
     ratio = geometry.aspect_ratio
     return 2.0 * np.pi * ratio / (2.0 + float(np.hypot(2.0, ratio)))
