@@ -33,7 +33,7 @@ from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.compile import compile_change
 from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
 from airtruth.tracing.presentation.text import increment_words
-from airtruth.tracing.selection.acceptance import SUPERSEDED, Candidate
+from airtruth.tracing.selection.acceptance import Candidate
 from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.flown import flown
 from airtruth.tracing.selection.increment_fit import (
@@ -45,6 +45,7 @@ from airtruth.tracing.selection.increment_fit import (
 )
 from airtruth.tracing.selection.increments import log_evidences, screen, shapes, sharpened
 from airtruth.tracing.selection.pruning import pruned
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import Release
 from airtruth.tracing.selection.rounds import RoundStart, search_round
 from airtruth.tracing.selection.set_table import SetTable
@@ -497,7 +498,7 @@ def test_a_name_and_a_release_that_an_increment_makes_unnecessary_are_given_up(r
     before = tuple(replace(last, candidates=(c,), tied=(c,)) for c in (name, learned))
     kept = pruned(SetTable(problem), (*before, last), every, 1, 0.01, lambda step: None)
     assert [[c.score.effect.key for c in r.tied] for r in kept] == [[], [NEEDED.key], []]
-    assert kept[0].candidates[0].reasons == (SUPERSEDED,)
+    assert kept[0].candidates[0].reasons == (Refusal.SUPERSEDED,)
     assert [e.key for e in kept[-1].null.hypothesis.effects] == [NEEDED.key]
     assert kept[-1].null.hypothesis.spread is None
     assert {s.effect.key for s in kept[-1].table.scores} == {"gyro_scale", "elevator_delay"}

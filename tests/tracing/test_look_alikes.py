@@ -14,9 +14,10 @@ from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.profile import relocated
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection import look_alikes
-from airtruth.tracing.selection.acceptance import OUTDONE, SURPASSED, Candidate
+from airtruth.tracing.selection.acceptance import Candidate
 from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.look_alikes import with_look_alikes
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import Release
 from airtruth.tracing.selection.rounds import RoundStart, search_round
 from airtruth.tracing.selection.set_table import SetTable
@@ -52,7 +53,7 @@ def test_ties_are_those_beside_the_other_effects(problem):
     vane = candidate(problem, first, 60.0, (), VANE)
     tied = candidate(problem, first, 58.0, (), ACCELEROMETER)
     gyro = candidate(problem, second, 50.0, (), VANE, GYRO)
-    twin = candidate(problem, second, 40.0, (SURPASSED,), VANE, TWIN)
+    twin = candidate(problem, second, 40.0, (Refusal.SURPASSED,), VANE, TWIN)
     rounds = (
         replace(first, candidates=(vane, tied), tied=(vane, tied)),
         replace(second, candidates=(gyro, twin), tied=(gyro,)),
@@ -63,7 +64,7 @@ def test_ties_are_those_beside_the_other_effects(problem):
     assert [c.score.effect.key for c in before.tied] == ["vane_scale"]
     assert {c.score.effect.key: c.reasons for c in before.candidates} == {
         "vane_scale": (),
-        "accelerometer_scale": (OUTDONE,),
+        "accelerometer_scale": (Refusal.OUTDONE,),
     }
     assert [c.score.effect.key for c in after.tied] == ["gyro_scale", "gyro_twin"]
     assert after.tied[1].gain == pytest.approx(50.0, abs=1e-3)

@@ -8,21 +8,17 @@ import trace_records as tr
 from scaled_records import ACCELEROMETER, GYRO, VANE, fitted, scaled_problem
 
 from airtruth.effects.registry import EFFECTS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.selection import ranking
-from airtruth.tracing.selection.acceptance import (
-    UNCONVERGED,
-    WORSE_FREE_RUN,
-    WORSE_LIKELIHOOD,
-    predicts_records_left_out,
-    untested,
-)
+from airtruth.tracing.selection.acceptance import predicts_records_left_out, untested
 from airtruth.tracing.selection.exchange import better_set, other_kinds
 from airtruth.tracing.selection.refit import Refit
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.rounds import scored_round
 from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.selection.significance import MISFIT_FAMILY_LEVEL, significant_gain
 
-LIBRARY = tuple(e for e in EFFECTS.values() if not e.in_derivatives)
+LIBRARY = tuple(e for e in EFFECTS.values() if not e.in_derivatives and e.applies_to(LONGITUDINAL))
 LEAST = significant_gain(33, MISFIT_FAMILY_LEVEL)
 
 
@@ -134,14 +130,16 @@ def test_records_left_out_do_not_refuse_the_effect_that_leads(problem, monkeypat
     first = refits[0].score.effect.key
 
     def refused(problem, score, own, gain, *rest):
-        return untested(score, own, gain, WORSE_LIKELIHOOD, WORSE_FREE_RUN, UNCONVERGED)
+        return untested(
+            score, own, gain, Refusal.WORSE_LIKELIHOOD, Refusal.WORSE_FREE_RUN, Refusal.UNCONVERGED
+        )
 
     monkeypatch.setattr(ranking, "assess_candidate", refused)
     free, *_ = ranking.rank(problem, last.null, refits, LEAST)
     led, *_ = ranking.rank(problem, last.null, refits, LEAST, leader=first)
     assert free.score.effect.key == led.score.effect.key == first
-    assert free.reasons == (WORSE_LIKELIHOOD, WORSE_FREE_RUN, UNCONVERGED)
-    assert led.reasons == (UNCONVERGED,)
+    assert free.reasons == (Refusal.WORSE_LIKELIHOOD, Refusal.WORSE_FREE_RUN, Refusal.UNCONVERGED)
+    assert led.reasons == (Refusal.UNCONVERGED,)
 
 
 @pytest.mark.slow

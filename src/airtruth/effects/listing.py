@@ -97,7 +97,6 @@ def _entry(effect: Effect) -> dict[str, Any]:
             for p in effect.parameters
         ],
         "channels": list(effect.channels),
-        "motions": list(effect.motions),
         "explanation": effect.explanation,
         "source": effect.source,
         "distinguished_by": effect.distinguished_by,

@@ -44,11 +44,11 @@ from airtruth.tracing.result import TraceResult
 from airtruth.tracing.selection.budget import Advance, Budget, may_begin
 from airtruth.tracing.selection.learn import with_increments
 from airtruth.tracing.selection.look_alikes import with_look_alikes
+from airtruth.tracing.selection.outcome import total_cost
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.selection.search import search
 from airtruth.tracing.selection.set_table import SetTable
-from airtruth.tracing.selection.settled import total_cost
 from airtruth.tracing.selection.significance import LEVEL
 from airtruth.tracing.selection.weights import with_rival
 from airtruth.tracing.stage_errors import Replay

@@ -10,8 +10,7 @@ import numpy as np
 
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.selection.budget import Advance, may_begin
-from airtruth.tracing.selection.from_declared import with_effect
-from airtruth.tracing.selection.refit import Refit
+from airtruth.tracing.selection.refit import Refit, with_effect
 from airtruth.tracing.selection.score_test import Score, Table
 from airtruth.tracing.selection.set_table import SetTable
 

@@ -14,13 +14,7 @@ from airtruth.effects.increment import Increment, Shape
 from airtruth.tracing.inference.derivative_likelihood import contradiction
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.whitening import NO_WHITENER
-from airtruth.tracing.selection.acceptance import (
-    OUTDONE,
-    SUPERSEDED,
-    Candidate,
-    reference_of,
-    untested,
-)
+from airtruth.tracing.selection.acceptance import Candidate, reference_of, untested
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.increment_fit import (
     FittedIncrement,
@@ -32,12 +26,13 @@ from airtruth.tracing.selection.increment_fit import (
     refitted,
 )
 from airtruth.tracing.selection.increments import Screened, screen, shapes, sharpened
+from airtruth.tracing.selection.outcome import settled, total_cost
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.ranking import TIE
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import CONTRADICTED, DeclaredCauses, explained
 from airtruth.tracing.selection.rounds import NOTHING_DECLARED, Rival, SearchRound, scored_round
 from airtruth.tracing.selection.set_table import SetTable
-from airtruth.tracing.selection.settled import settled, total_cost
 from airtruth.tracing.selection.significance import REMAINS
 
 Array = NDArray[np.float64]
@@ -231,7 +226,8 @@ class _Learning:
         if leader.reasons:
             return None
         others = (
-            replace(c, reasons=(SUPERSEDED,)) if c.score.effect.key == old.key else c for c in own.candidates
+            replace(c, reasons=(Refusal.SUPERSEDED,)) if c.score.effect.key == old.key else c
+            for c in own.candidates
         )
         return (*rounds[:index], replace(own, candidates=(*others, leader), tied=(leader,)))
 
@@ -267,7 +263,7 @@ class _Learning:
         for own in ranked:
             accepted = next((c for c in found if not c.reasons), None)
             if accepted is not None and 2.0 * own.log_evidence < accepted.gain - TIE:
-                found.append(untested(evidence_score(own), own.fit, 2.0 * own.log_evidence, OUTDONE))
+                found.append(untested(evidence_score(own), own.fit, 2.0 * own.log_evidence, Refusal.OUTDONE))
             else:
                 found.append(assessed(self.sets.problem, own, reference))
         return tuple(found)

@@ -14,11 +14,12 @@ from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.model.parameters import Parameters
-from airtruth.tracing.selection.acceptance import OUTDONE, Candidate, has_converged
+from airtruth.tracing.selection.acceptance import Candidate, has_converged
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import best_rival, starts_in_place_of
 from airtruth.tracing.selection.ranking import TIE, gains_of
 from airtruth.tracing.selection.refit import Refit
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.selection.set_table import SetTable
 
@@ -83,7 +84,7 @@ def _beside_the_others(
         is_alike = gain >= leader.gain - TIE and has_converged(r.fit, gain)
         before = next((c for c in own.candidates if c.score.effect.key == key), None)
         new = before or replace(leader, score=r.score, fit=r.fit)
-        reasons = () if is_alike else new.reasons or (OUTDONE,)
+        reasons = () if is_alike else new.reasons or (Refusal.OUTDONE,)
         tested[key] = replace(new, gain=gain, reasons=reasons)
     alike = (c for c in tested.values() if not c.reasons)
     known = {c.score.effect.key: c for c in own.candidates}

@@ -16,15 +16,14 @@ from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment
 from airtruth.tracing.inference.derivative_likelihood import contradiction
 from airtruth.tracing.inference.posterior import PosteriorFit
-from airtruth.tracing.selection.acceptance import SUPERSEDED
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.explanation import REFERENCE, CauseSet
+from airtruth.tracing.selection.outcome import STRONG_ODDS, total_cost
 from airtruth.tracing.selection.refit import losses_without
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import CONTRADICTED
-from airtruth.tracing.selection.replacement import STRONG_ODDS
 from airtruth.tracing.selection.rounds import SearchRound, scored_round
 from airtruth.tracing.selection.set_table import SetTable
-from airtruth.tracing.selection.settled import as_declared, total_cost
 from airtruth.tracing.selection.significance import FAMILY_LEVEL, MISFIT_FAMILY_LEVEL, significant_gain
 from airtruth.tracing.selection.weights import with_rival
 
@@ -87,7 +86,7 @@ def _as_declared(sets: SetTable, last: SearchRound, learned: bool) -> PosteriorF
     """
     if last.null.hypothesis.spread is None:
         return None
-    own = as_declared(sets, last.null)
+    own = sets.declared(last.null)
     if own is None or contradiction(sets.problem, own).p_value <= CONTRADICTED:
         return None
     behind = own.cost + len(own.point.sizes) - REFERENCE - total_cost(last)
@@ -131,7 +130,7 @@ def _kept(own: SearchRound, gone: set[str], is_declared: bool) -> SearchRound:
     """A round without the effects that are gone, and without its release where nothing of its explanation is left."""
     if own.tied and own.tied[0].score.effect.key in gone:
         first = own.tied[0]
-        others = (replace(c, reasons=(SUPERSEDED,)) if c is first else c for c in own.candidates)
+        others = (replace(c, reasons=(Refusal.SUPERSEDED,)) if c is first else c for c in own.candidates)
         own = replace(own, tied=(), profile=None, candidates=tuple(others))
     if is_declared:
         return replace(own, release=None, sets=(), rival=None)

@@ -13,9 +13,9 @@ from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.assess import likelihood_at
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import IMPROBABLE, declared_probability, own_probability
 from airtruth.tracing.selection.budget import Advance, may_begin
-from airtruth.tracing.selection.from_declared import at, with_effect
 from airtruth.tracing.selection.score_test import Score, Table
 from airtruth.tracing.selection.set_table import SetTable
 
@@ -284,7 +284,7 @@ def refit_scored(
     is_limit = s.effect.parameters[0].is_limit
     best: PosteriorFit | None = None
     for share in _ordered_shares(sets.problem, null, hypothesis, s):
-        tried = sets.fit_from(hypothesis, at(null, s, share * s.size), rival=rival, near=null)
+        tried = sets.fit_from(hypothesis, _at(null, s, share * s.size), rival=rival, near=null)
         if tried is None:
             continue
         again = best is not None and abs(tried.cost - best.cost) < _SAME
@@ -302,6 +302,27 @@ def refit_scored(
     return best
 
 
+def with_effect(
+    sets: SetTable, null: PosteriorFit, s: Score, size: float, rival: float, *, only_better: bool = False
+) -> PosteriorFit | None:
+    """A null's effects and one more, from the declared aircraft; None and options as of `SetTable.fit_from_declared`.
+
+    Parameters
+    ----------
+    s, size : score of the further effect, and the size at which it begins.
+    """
+    sizes = _at(null, s, size).sizes
+    hypothesis = null.hypothesis.plus(s.effect)
+    return sets.fit_from_declared(hypothesis, sizes, null, rival=rival, only_better=only_better)
+
+
+def _at(null: PosteriorFit, s: Score, size: float) -> Parameters:
+    """The parameters of a null with an effect of a size beside them."""
+    low, high = s.effect.parameters[0].reach
+    sizes = s.direction.sizes(min(max(size, low), high))
+    return replace(null.point, sizes=np.concatenate([null.point.sizes, sizes]))
+
+
 def _is_improbable(problem: TraceProblem, null: PosteriorFit) -> bool:
     """Whether derivatives, biases or trim coefficients of a null contradict the declared ones."""
     return min(declared_probability(problem, null), own_probability(problem, null)) < IMPROBABLE
@@ -311,7 +332,7 @@ def _ordered_shares(
     problem: TraceProblem, null: PosteriorFit, hypothesis: Hypothesis, s: Score
 ) -> list[float]:
     """`_SHARES`, the most likely size first, all other parameters as in the null."""
-    costs = [likelihood_at(problem, hypothesis, at(null, s, share * s.size)) for share in _SHARES]
+    costs = [likelihood_at(problem, hypothesis, _at(null, s, share * s.size)) for share in _SHARES]
     return [_SHARES[i] for i in np.argsort(costs, kind="stable")]
 
 
@@ -325,4 +346,5 @@ __all__ = [
     "refit_leaders",
     "refit_scored",
     "refit_without",
+    "with_effect",
 ]

@@ -27,7 +27,6 @@ from airtruth.tracing.selection.explanation import (
     predicted_cost,
     simplest_first,
 )
-from airtruth.tracing.selection.from_declared import from_declared
 from airtruth.tracing.selection.set_table import SetTable
 
 CONTRADICTED: Final = 0.01
@@ -189,7 +188,7 @@ def _as_effects(
         )
         sizes.append(size)
     first = np.array(sizes)
-    own = from_declared(sets, null, hypothesis, first, rival)
+    own = sets.fit_from_declared(hypothesis, first, null, rival=rival)
     if _leads(own, null):
         return own
     starts = [replace(start, sizes=first) for start in (null.point, replace(free.point, common=away))]

@@ -20,12 +20,12 @@ from airtruth.tracing.inference.whitening import Whitener, autoregression
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection import score_test
 from airtruth.tracing.selection.absorbed import refit_absorbed
-from airtruth.tracing.selection.acceptance import SUPERSEDED, SURPASSED, UNSUPPORTED, Candidate, has_converged
+from airtruth.tracing.selection.acceptance import Candidate, has_converged
 from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.budget import Advance
 from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.omnibus import anomalies
-from airtruth.tracing.selection.ranking import TIE, rank
+from airtruth.tracing.selection.ranking import TIE, WHITENED_ITERATIONS, rank
 from airtruth.tracing.selection.refit import (
     LEADING,
     LED,
@@ -34,6 +34,7 @@ from airtruth.tracing.selection.refit import (
     refit_known,
     refit_leaders,
 )
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import DeclaredCauses, Release, explained, release
 from airtruth.tracing.selection.score_test import Table
 from airtruth.tracing.selection.set_table import SetTable
@@ -55,8 +56,6 @@ MOST_EFFECTS: Final = 3
 not been separable)."""
 _RESTARTS: Final = 2
 """Number of times that a round begins again at a better optimum of its null [-] (judgement: one has been enough)."""
-_GLS_ITERATIONS: Final = 6
-"""Iterations of the refit under the autoregression [-] (judgement: it begins next to its optimum)."""
 NOTHING_KNOWN: Final[Mapping[str, float]] = MappingProxyType({})
 """No effect has a size that is known beforehand."""
 NOTHING_DECLARED: Final = DeclaredCauses(wrong_allowed=False)
@@ -310,7 +309,7 @@ def _refit_whitened(problem: TraceProblem, null: PosteriorFit, whitener: Whitene
         null.hypothesis,
         null.point,
         whitener,
-        iterations=_GLS_ITERATIONS,
+        iterations=WHITENED_ITERATIONS,
         free_levels=False,
         near=null,
     )
@@ -338,7 +337,7 @@ def _with_evidence(own: SearchRound, begin: RoundStart) -> SearchRound:
         begin.tested, MISFIT_FAMILY_LEVEL
     ):
         return own
-    weak = (replace(c, reasons=(*c.reasons, UNSUPPORTED)) for c in own.candidates)
+    weak = (replace(c, reasons=(*c.reasons, Refusal.UNSUPPORTED)) for c in own.candidates)
     return replace(own, tied=(), candidates=tuple(weak))
 
 
@@ -348,7 +347,11 @@ def _tied(candidates: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
     if not accepted:
         return ()
     best = accepted[0]
-    others = (c for c in candidates if c is not best and c.reasons[:1] not in ((SUPERSEDED,), (SURPASSED,)))
+    others = (
+        c
+        for c in candidates
+        if c is not best and c.reasons[:1] not in ((Refusal.SUPERSEDED,), (Refusal.SURPASSED,))
+    )
     near = (c for c in others if abs(best.gain - c.gain) <= TIE and has_converged(c.fit, c.gain))
     return (best, *near)
 

@@ -13,13 +13,14 @@ from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.profile import relocated
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.absorbed import refit_absorbed
-from airtruth.tracing.selection.acceptance import OUTDONE, Candidate, is_plausible, predicts_records_left_out
+from airtruth.tracing.selection.acceptance import Candidate, is_plausible, predicts_records_left_out
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import AHEAD, BETTER, better_set
 from airtruth.tracing.selection.explanation import events
+from airtruth.tracing.selection.outcome import CLEAN, STRONG_ODDS, Outcome, required_lead, settled, total_cost
 from airtruth.tracing.selection.refit import redundant_effect
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import DeclaredCauses, Release
-from airtruth.tracing.selection.replacement import CLEAN, STRONG_ODDS, Outcome, required_lead
 from airtruth.tracing.selection.rounds import (
     NOTHING_DECLARED,
     NOTHING_KNOWN,
@@ -29,7 +30,6 @@ from airtruth.tracing.selection.rounds import (
     search_round,
 )
 from airtruth.tracing.selection.set_table import SetTable
-from airtruth.tracing.selection.settled import as_declared, settled, total_cost
 from airtruth.tracing.selection.significance import REMAINS, later_gain, significant_gain
 from airtruth.tracing.selection.weights import rival_of, with_rival
 
@@ -125,7 +125,7 @@ class _Search:
             is_single = len(rounds[-1].null.hypothesis.effects) + len(rounds[-1].sets[:1]) < 2
             if is_single and rounds[-1].anomaly.p_value > REMAINS:
                 return rounds
-            last = as_declared(self.sets, rounds[-1].null)
+            last = self.sets.declared(rounds[-1].null)
             if last is None:
                 return rounds
             least = later_gain(first.tested, rounds[-1].anomaly)
@@ -156,7 +156,7 @@ class _Search:
         last = rounds[-1]
         accepted = last.null.hypothesis.effects
         base = last if beside else rounds[0]
-        null = as_declared(self.sets, base.null)
+        null = self.sets.declared(base.null)
         if null is None:
             return rounds
         taken = {e.key for e in accepted}
@@ -346,7 +346,7 @@ def _variants(own: SearchRound) -> tuple[Candidate, ...]:
         replace(c, reasons=())
         for c in own.candidates
         if c.score.effect.name == best.score.effect.name
-        and c.reasons == (OUTDONE,)
+        and c.reasons == (Refusal.OUTDONE,)
         and np.isfinite(c.likelihood_gain).all()
     )
 

@@ -12,14 +12,19 @@ from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.nearby import reordered, rows_of
-from airtruth.tracing.inference.optimise import fit
+from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.parameters import Parameters
 
+Array = NDArray[np.float64]
+
+_FIRST_ITERATIONS: Final = 6
+"""Iterations from the declared aircraft with gusts taken as strong [-] (judgement)."""
 _ATTEMPTS: Final = 3
 """Number of refits that a fit is given to converge [-] (judgement)."""
 
@@ -109,6 +114,33 @@ class SetTable:
             if not (own.outrun and only_better):  # of no use to anyone
                 self.keep(own, rival)
         return own
+
+    def fit_from_declared(
+        self,
+        hypothesis: Hypothesis,
+        sizes: Array,
+        null: PosteriorFit,
+        *,
+        rival: float = np.inf,
+        only_better: bool = False,
+    ) -> PosteriorFit | None:
+        """`fit_from` the declared aircraft, and not from a null, which may have absorbed an effect.
+
+        It begins with the levels of noise and gusts of the null: from strong gusts these would fall for many steps far behind a
+        rival, and the search would be given up.
+
+        Parameters
+        ----------
+        sizes : of the effects, at which the search begins; null : a fit whose derivatives the first steps use.
+        """
+        start = initial_parameters(self.problem, hypothesis, sizes, _FIRST_ITERATIONS).with_levels(null.point)
+        return self.fit_from(hypothesis, start, rival=rival, only_better=only_better, near=null)
+
+    def declared(self, last: PosteriorFit) -> PosteriorFit | None:
+        """The fit of the same effects under the declaration: released derivatives absorb what a wrong effect leaves."""
+        if last.hypothesis.spread is None:
+            return last
+        return self.fit(replace(last.hypothesis, spread=None), last.point, near=last)
 
     def best_from(
         self,
