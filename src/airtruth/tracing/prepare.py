@@ -141,7 +141,9 @@ def prepare(
     return Case(
         fitted=TraceProblem(fitted, settings, options.threads),
         held=TraceProblem(held, settings, options.threads) if held else None,
-        hypothesis=Hypothesis(declared_change(aircraft, motion, absent=absent), trim_flow_rad=trim_flow_rad),
+        hypothesis=Hypothesis(
+            declared_change(aircraft, motion, absent=absent), trim_flow_rad=trim_flow_rad, motion=motion
+        ),
         effects=tuple(e for e in effects if not reasons[e.key]),
         untestable=tuple(untestable),
         model=model,
