@@ -14,12 +14,14 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Containers set this variable, and every process then compiles all modules that it imports, which takes seconds.
 unexport PYTHONDONTWRITEBYTECODE
 BUDGET ?= 1
+# make lateral RUNS=600
+RUNS ?= 300
 # make campaign-quick STORE=s3://BUCKET/FOLDER flies into an object store (docs/stores.md)
 AT := $(if $(STORE),--store $(STORE))
 LATE := elevator_delay actuator_lag gyro_lag sensor_delay
 CAMPAIGNS := light light-fit moderate moderate-fit
 
-.PHONY: planned planned-ties check-study help setup setup-dev lock installed docs docs-links campaign campaign-further campaign-quick loop study blind test test-slow test-long test-all fuzz robustness mutants lint kernels picture screenshots browser bench clean
+.PHONY: lateral planned planned-ties check-study help setup setup-dev lock installed docs docs-links campaign campaign-further campaign-quick loop study blind test test-slow test-long test-all fuzz robustness mutants lint kernels picture screenshots browser bench clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -74,6 +76,11 @@ study: $(DEVELOP) ## every cause behind docs/paper.md and docs/closed_loop.md, o
 	$(BIN)/python -m studies.closed_loop_study
 	$(BIN)/python -m pytest -q -n $(JOBS) --dist loadgroup -m study
 	$(BIN)/python -m studies.foreign_aircraft
+
+lateral: $(DEVELOP) ## the lateral estimators: affine aircraft, RUNS flights of the GTM's tables, every cause off and on (an hour at 300)
+	for level in 0 1 2; do $(BIN)/python -m studies.lateral_study --runs $(RUNS) --level $$level || exit 1; done
+	$(BIN)/python -m studies.lateral_flights --out $(OUT)/lateral --runs $(RUNS) --jobs $(JOBS)
+	$(BIN)/python -m studies.lateral_causes
 
 fleet: $(READY) ## 35 aircraft of the JSBSim package surveyed, flown and traced (hours; continues after an interruption)
 	$(BIN)/python -m studies.foreign_fleet --out $(OUT)/fleet

@@ -108,11 +108,16 @@ def fly(
     start=None,
     q=None,
     curvature=0.0,
+    alpha=None,
+    slopes=None,
+    aerodynamics=None,
 ):
     """Records of runs at 50 Hz as a `Batch`: doublets of alternating sign, light gusts and the GTM's noise so many times.
 
-    ``start`` is the initial state (4,); ``q`` a function of time [s] for the pitch rate [rad/s]; ``curvature`` times
-    beta |beta| is added to Cl.
+    ``start`` is the initial state (4,); ``q`` a function of time [s] for the pitch rate [rad/s], or its values (runs, samples
+    at 200 Hz), and ``alpha`` the same for the deviation of the angle of attack [rad]; ``curvature`` times beta |beta| is
+    added to Cl, and ``slopes`` (15,) times alpha to ``theta``. ``aerodynamics`` makes CY, Cl, Cn (3, runs) from the signals
+    (5, runs) and that deviation (runs,) in place of all this.
     """
     rng = np.random.default_rng(seed)
     sign = np.where(np.arange(runs) % 2 == 0, 1.0, -1.0)
@@ -124,7 +129,13 @@ def fly(
     inertia = np.array([[c.inertia_xx_kg_m2, -c.inertia_xz_kg_m2], [-c.inertia_xz_kg_m2, c.inertia_zz_kg_m2]])
     inverse = np.linalg.inv(inertia)
     table = np.asarray(theta).reshape(3, 5)
-    pitch = np.zeros_like(t) if q is None else q(t)
+    shift = np.zeros(15) if slopes is None else np.asarray(slopes)
+    pitch, attack = (
+        np.broadcast_to(
+            given(t) if callable(given) else np.zeros_like(t) if given is None else given, u_gust.shape
+        )
+        for given in (q, alpha)
+    )
     # a servo behind a held command moves in exponentials: half a step later by the square root of its decay
     half_decay = np.exp(-0.5 / (RATE * SERVO_S))
     held = np.concatenate(
@@ -132,19 +143,26 @@ def fly(
     )
     middle = half_decay * surface[..., :-1] + (1.0 - half_decay) * held
 
-    def rates(x, da_dr, u, v, pitch):
+    def affine(signals, attack):
+        made = table @ signals + shift.reshape(3, 5) @ (signals * attack)
+        made[1] += curvature * signals[0] * np.abs(signals[0])
+        return made
+
+    coefficients = affine if aerodynamics is None else aerodynamics
+
+    def rates(x, da_dr, u, v, pitch, attack):
         beta, p, r, phi = x
         speed = SPEED + u
         force = 0.5 * DENSITY * speed**2 * c.wing_area_m2
         signals = np.stack([beta + v / SPEED, p * c.span_m / (2 * speed), r * c.span_m / (2 * speed), *da_dr])
-        cy, cl, cn = table @ signals
-        cl = cl + curvature * signals[0] * np.abs(signals[0])
+        cy, cl, cn = coefficients(signals, attack)
+        path = ALPHA + attack
         ixx, iyy, izz, ixz = c.inertia_xx_kg_m2, c.inertia_yy_kg_m2, c.inertia_zz_kg_m2, c.inertia_xz_kg_m2
         roll = force * c.span_m * cl + ixz * p * pitch - (izz - iyy) * pitch * r
         yaw = force * c.span_m * cn - ixz * pitch * r - (iyy - ixx) * p * pitch
         p_dot, r_dot = inverse @ np.stack([roll, yaw])
         ay = force * cy / c.mass_kg
-        beta_dot = ay / SPEED + p * np.sin(ALPHA) - r * np.cos(ALPHA)
+        beta_dot = ay / SPEED + p * np.sin(path) - r * np.cos(path)
         beta_dot = beta_dot + G0 / SPEED * np.cos(ALPHA) * np.sin(phi)
         phi_dot = p + (pitch * np.sin(phi) + r * np.cos(phi)) * np.tan(ALPHA)
         return np.stack([beta_dot, p_dot, r_dot, phi_dot]), ay
@@ -153,7 +171,7 @@ def fly(
     out = np.empty((5, runs, samples))
     h = 1.0 / RATE
     for k in range(samples):
-        now = (surface[:, :, k], u_gust[:, k], v_gust[:, k], pitch[k])
+        now = (surface[:, :, k], u_gust[:, k], v_gust[:, k], pitch[:, k], attack[:, k])
         first, ay = rates(x, *now)
         out[:4, :, k], out[4, :, k] = x, ay
         if k + 1 == samples:
@@ -162,9 +180,16 @@ def fly(
             middle[:, :, k],
             0.5 * (u_gust[:, k] + u_gust[:, k + 1]),
             0.5 * (v_gust[:, k] + v_gust[:, k + 1]),
-            0.5 * (pitch[k] + pitch[k + 1]),
+            0.5 * (pitch[:, k] + pitch[:, k + 1]),
+            0.5 * (attack[:, k] + attack[:, k + 1]),
         )
-        after = (surface[:, :, k + 1], u_gust[:, k + 1], v_gust[:, k + 1], pitch[k + 1])
+        after = (
+            surface[:, :, k + 1],
+            u_gust[:, k + 1],
+            v_gust[:, k + 1],
+            pitch[:, k + 1],
+            attack[:, k + 1],
+        )
         second, _ = rates(x + 0.5 * h * first, *half)
         third, _ = rates(x + 0.5 * h * second, *half)
         fourth, _ = rates(x + h * third, *after)
@@ -172,7 +197,7 @@ def fly(
     one = np.ones((runs, samples))
     channels = {
         "airspeed_m_s": SPEED + u_gust,
-        "alpha_rad": ALPHA * one,
+        "alpha_rad": ALPHA + attack * one,
         "theta_rad": ALPHA * one,
         "q_rad_s": pitch * one,
         "density_kg_m3": DENSITY * one,

@@ -55,8 +55,8 @@ def _held(points: Sequence[Array], values: Array) -> Callable[..., Array]:
     return at
 
 
-def _of_csv(name: str) -> Callable[..., Array]:
-    """Table of tables/NAME.csv: coefficients that it lacks are zero."""
+def figures(name: str) -> tuple[list[Array], Array]:
+    """Breakpoints and values (..., coefficients) of tables/NAME.csv; coefficients that it lacks are zero."""
     lines = (FOLDER / "tables" / f"{name}.csv").read_text(encoding="utf-8").splitlines()
     rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
     keys = [k for k in rows[0] if k not in COEFFICIENTS]
@@ -65,7 +65,7 @@ def _of_csv(name: str) -> Callable[..., Array]:
     for r in rows:
         where = tuple(int(np.searchsorted(p, float(r[k]))) for p, k in zip(points, keys, strict=True))
         values[where] = [float(r.get(c, 0.0)) for c in COEFFICIENTS]
-    return _held(points, values)
+    return points, values
 
 
 def _of_xml(kind: str) -> Callable[..., Array]:
@@ -94,7 +94,7 @@ def tables() -> Tables:
     """The figures of aircraft/gtm by name; angles in degrees, rates as p b/(2V), q c/(2V), r b/(2V)."""
     xml = {kind: _of_xml(kind) for kind in ("static", "elevator", "pitch-rate")}
     names = ("sideslip", "right_aileron", "rudder", "roll_rate", "yaw_rate")
-    return xml | {name: _of_csv(name) for name in names}
+    return xml | {name: _held(*figures(name)) for name in names}
 
 
 def coefficients(v: float, alpha: float, beta: float, rates: Array, surfaces: Array) -> Array:

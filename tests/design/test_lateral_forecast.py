@@ -145,6 +145,8 @@ def test_the_bound_of_the_lateral_campaign():
     assert set(found.gusts) == {"sigma_v"}
     assert tuple(found.to_frame()["parameter"]) == LATERAL.parameters
     assert "lateral (gtm)" in found.summary()
+    assert found.undetermined == ("CYp", "CYda")
+    assert "One record does not determine CYp, CYda" in found.summary()
     assert len(found.plot().axes[0].get_xticklabels()) == 15
 
 

@@ -7,14 +7,14 @@ import pytest
 
 from airtruth.identification import Options, identify, identify_batch, identify_joint
 from airtruth.identification.lateral.observation import condition_of, known_inputs
-from airtruth.identification.lateral.predictor import SURPLUS, levels, predictor_of, records_of
+from airtruth.identification.lateral.predictor import SURPLUS, factor_names, levels, predictor_of, records_of
 from airtruth.identification.likelihood.fit import scored
 from airtruth.identification.likelihood.linearise import values_of
 from airtruth.identification.likelihood.predictor import layout
 from airtruth.numerics.discretise import assemble
 from airtruth.physics.lateral import lateral_system
 from airtruth.physics.motion import LATERAL
-from validation.affine_lateral import GTM, NAMES, THETA, fly, log_of, pitching
+from validation.affine_lateral import ALPHA, GTM, NAMES, THETA, fly, log_of, pitching
 
 DETERMINED = [NAMES.index(n) for n in ("CYbeta", "Clbeta", "Clp", "Clda", "Cnbeta", "Cndr")]
 QUIET = fly(runs=2, noise=1e-3)
@@ -127,3 +127,54 @@ def test_filter_error_states_its_error(gust):
     std = np.sqrt(np.diagonal(made.covariance, axis1=1, axis2=2))
     assert (np.abs(error) < 1.96 * std).mean() == pytest.approx(0.95, abs=0.03)
     assert np.sqrt((error**2).mean(axis=0) / (std**2).mean(axis=0)).mean() == pytest.approx(1.0, abs=0.1)
+
+
+def swinging(t):
+    """A slow change of the angle of attack [rad]."""
+    return 0.02 * np.sin(2.2 * t) + 0.01 * np.sin(0.9 * t)
+
+
+SLOPES = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.6, 0.8, 2.0, 0.3, -0.3, 0.0, -0.7, 0.0, 0.0, 0.2])
+"""Changes of the derivatives with alpha [1/rad]."""
+
+
+@pytest.mark.parametrize("method", ["filter-error", "output-error"])
+def test_terms_in_alpha_and_beta_give_the_derivatives_at_the_mean_alpha(method):
+    """Without the terms the same records are off by several times the tolerance."""
+    batch = fly(runs=2, noise=1e-3, alpha=swinging, slopes=SLOPES, curvature=0.3)
+    mean = batch.channels["alpha_rad"].mean(axis=1) - ALPHA
+    truth = THETA + mean[:, None] * SLOPES
+    plain = identify_batch(batch, GTM, method, motion=LATERAL)
+    freed = identify_batch(batch, GTM, method, Options(terms=("alpha", "beta")), LATERAL)
+    assert freed.converged.all()
+    assert freed.theta.shape == (2, 15)
+    error, without = (np.abs(made.theta - truth)[:, DETERMINED] for made in (freed, plain))
+    assert (error < 1e-3 * np.abs(truth[:, DETERMINED])).all()
+    assert without.max() > 10.0 * error.max()
+
+
+def test_the_gradient_of_the_factors_is_that_of_differences():
+    batch = fly(runs=1, seconds=6.0, gust=0.6, seed=8, alpha=swinging, slopes=SLOPES)
+    options = Options(terms=("alpha", "beta"))
+    data = records_of(batch, GTM, options, 533.4, gusts=True)
+    names = factor_names(options.terms)
+    assert len(names) == 18
+    noise = np.log([0.6, 6e-4, 9e-3, 6e-3, 9e-4, 0.064, 0.01, 0.01])
+    z = np.concatenate([1.02 * THETA, np.linspace(-0.5, 0.5, 18), noise])[None]
+    free = np.arange(z.shape[1])
+    run = np.arange(1)
+    _, gradient, information = scored(data, z, run, free)
+    step = 1e-5
+    for i in range(15, 33, 2):
+        up, down = z.copy(), z.copy()
+        up[0, i] += step
+        down[0, i] -= step
+        slope = (scored(data, up, run, free)[0] - scored(data, down, run, free)[0]) / (2.0 * step)
+        assert slope[0] == pytest.approx(gradient[0, i], rel=1e-5, abs=1e-5 * np.sqrt(information[0, i, i]))
+
+
+def test_terms_of_all_runs_are_shared():
+    batch = fly(runs=4, gust=0.4, seed=4, alpha=swinging, slopes=SLOPES)
+    made = identify_joint([batch], GTM, "filter-error", Options(terms=("alpha",)), motion=LATERAL)
+    std = np.sqrt(np.diagonal(made.covariance[0]))
+    assert (np.abs(made.theta[0] - THETA) < 4.0 * std).all()

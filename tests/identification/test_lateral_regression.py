@@ -10,7 +10,7 @@ from airtruth.identification import identify_batch
 from airtruth.identification.estimates import Status, quantities
 from airtruth.identification.lateral.curvature import SIGNIFICANT, p_values
 from airtruth.identification.lateral.observation import observe
-from airtruth.identification.lateral.problems import ls_problem, rate_of
+from airtruth.identification.lateral.problems import ls_problem, rate_of, smoothed
 from airtruth.identification.lateral.solve import POSES, regress_batch, regress_joint
 from airtruth.identification.options import TERMS, Options
 from airtruth.numerics.prefilter import butterworth, edge_samples
@@ -189,7 +189,9 @@ def test_names_of_the_table_are_those_of_the_motion():
     observation = observe(CALM, GTM, Options())
     assert observation.scale.airspeed_m_s == pytest.approx(SPEED)
     assert observation.scale.alpha_rad == pytest.approx(ALPHA)
-    rows = ls_problem(observation, Options()).rows(np.empty((2, 15)), np.arange(2))
+    rows = ls_problem(observation, Options(), smoothed(observation, Options())).rows(
+        np.empty((2, 15)), np.arange(2)
+    )
     assert rows.x.shape == (2, 5, CALM.t_s.shape[1] - 4)
     assert DENSITY > 0.0
 

@@ -10,7 +10,7 @@ import pytest
 
 from airtruth.identification import Options, identify_batch, quantities
 from airtruth.identification.lateral.observation import observe
-from airtruth.identification.lateral.problems import ls_problem
+from airtruth.identification.lateral.problems import ls_problem, smoothed
 from airtruth.importers.sources import open_source
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.motion import LATERAL
@@ -97,7 +97,9 @@ def test_least_squares_of_the_files_own_accelerations_is_the_published_one(measu
         added=np.stack([o.added[:, 0], roll, yaw], axis=1),
         bend=np.zeros_like(o.bend),
     )
-    rows = ls_problem(own, Options(cutoff_hz=24.9)).rows(np.empty((1, 15)), np.arange(1))
+    rows = ls_problem(own, Options(cutoff_hz=24.9), smoothed(own, Options(cutoff_hz=24.9))).rows(
+        np.empty((1, 15)), np.arange(1)
+    )
     theta = np.linalg.lstsq(rows.x[0].T, rows.y[0].T, rcond=None)[0].T
     for row, name in ((1, "Cl"), (2, "Cn")):
         published = np.array(EQUATION_ERROR[name])

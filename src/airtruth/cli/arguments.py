@@ -42,7 +42,7 @@ Terms = Annotated[
     typer.Option(
         "--term",
         metavar="NAME",
-        help="Nonlinear term to free in the lateral regressions, may be repeated: alpha, products with the angle of attack; "
+        help="Nonlinear term to free in the lateral coefficients, may be repeated: alpha, products with the angle of attack; "
         "beta, beta |beta|.",
     ),
 ]

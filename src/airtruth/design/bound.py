@@ -56,6 +56,10 @@ _OF_KIND: Final = re.compile(r"amplitude_\d+_rad|sigma_v_m_s|length_v_m")
 """Further such columns, where the table has them."""
 
 
+_NORMAL_95: Final = 1.959964
+"""Quantile 0.975 of the normal distribution [-]."""
+
+
 @dataclass(frozen=True)
 class ForecastResult:
     """Least standard errors of the derivatives of a motion, in the order of its ``parameters``.
@@ -97,6 +101,12 @@ class ForecastResult:
         """(2, n) standard errors of one record and of all records, relative to the derivative [%]."""
         return 100.0 * np.stack([self.single, self.together]) / np.abs(self.theta)
 
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Derivatives that one record does not determine: their 95 % interval at the bound contains zero."""
+        open_ = _NORMAL_95 * self.single > np.abs(self.theta)
+        return tuple(name for name, own in zip(self.parameters, open_, strict=True) if own)
+
     def table(self) -> Table:
         """One row per derivative, with the gusts and the assumptions as notes."""
         single, together = self.percent
@@ -121,6 +131,13 @@ class ForecastResult:
                 f"Gusts [m/s]: {gusts}. Kinds of runs evaluated: {self.kinds}.",
                 "Cramer-Rao bound with noise levels, gust levels, biases and initial states unknown; "
                 "filter-error comes nearest to it (docs/plan.md).",
+                *(
+                    [
+                        f"One record does not determine {', '.join(self.undetermined)}: the 95 % interval contains zero."
+                    ]
+                    if self.undetermined
+                    else []
+                ),
             ),
         )
 

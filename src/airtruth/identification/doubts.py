@@ -145,7 +145,7 @@ def curvature(curved: Mapping[tuple[str, str], int], runs: int) -> Iterator[str]
             most = max(curved[term, name] for name in names)
             yield (
                 f"the derivatives of {' and '.join(names)} change {change}{_some(most, runs)}: the intervals of a linear model "
-                f"do not allow for that; --term {term} frees the change in ls, iv-lowpass, iv-f1 and frequency."
+                f"do not allow for that; --term {term} frees the change."
             )
 
 

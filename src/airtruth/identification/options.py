@@ -69,9 +69,9 @@ class Options:
         the data (`airtruth.identification.regression.frequency.band_of`).
     confidence : probability of the intervals [-].
     auxiliary : model that makes the instruments; None is the linear short-period model.
-    terms : nonlinear terms that are free in each equation of the lateral regressions: "alpha", the products of the signals
-        with the angle of attack about its mean, and "beta", beta |beta|. They widen the intervals; the derivatives of
-        ls, iv-lowpass, iv-f1 and frequency are then those at the mean angle of attack and small sideslip.
+    terms : nonlinear terms that are free in each lateral coefficient: "alpha", the products of the signals with the angle of
+        attack about its mean, and "beta", beta |beta|. They widen the intervals; the derivatives are then those at the
+        mean angle of attack and small sideslip.
     """
 
     cutoff_hz: float | None = None

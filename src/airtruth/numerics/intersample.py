@@ -85,7 +85,8 @@ def servo_decay(increments: Array, noise_std_rad: float, declared: float = 0.0) 
     at = np.stack([np.argmax(total >= share * total[:, -1:], axis=1) for share in _QUANTILES], axis=1)
     decays = np.take_along_axis(ratios, at, axis=1)
     tried = np.concatenate([np.nan_to_num(decays), np.zeros((runs, 1)), np.full((runs, 1), declared)], axis=1)
-    moving = np.stack([_moving_cells(increments, rho) for rho in tried.T], axis=1)
+    least = _least_move(increments)
+    moving = np.stack([_moving_cells(increments, rho, least) for rho in tried.T], axis=1)
     best = np.argmin(moving[:, : len(_QUANTILES)], axis=1)
     row = np.arange(runs)
     is_fewer = moving[row, best] < _FEWER * np.minimum(moving[:, _MEDIAN], moving[:, _NONE])
@@ -113,11 +114,16 @@ def _ratios(increments: Array) -> tuple[Array, Array]:
     return np.take_along_axis(ratios, order, axis=1), np.take_along_axis(weights, order, axis=1)
 
 
-def _moving_cells(increments: Array, decay: Array) -> Array:
+def _least_move(increments: Array) -> Array:
+    """(runs, 1) move of the command that counts by half [rad]."""
+    size = np.abs(increments)
+    noise = np.median(size, axis=1, keepdims=True)
+    return np.asarray(np.maximum(_NOISE * noise, _STILL * size.max(axis=1, keepdims=True)))
+
+
+def _moving_cells(increments: Array, decay: Array, least: Array) -> Array:
     """(runs,) number of cells in which the command moves behind a servo of a decay (runs,); a small move counts in part."""
     moves = increments[:, 1:] - decay[:, None] * increments[:, :-1]
-    noise = np.median(np.abs(increments), axis=1, keepdims=True)
-    least = np.maximum(_NOISE * noise, _STILL * np.abs(increments).max(axis=1, keepdims=True))
     size = np.square(np.square(moves))  # the noise of the many cells at rest adds little
     share = np.divide(size, size + least**4, out=np.zeros_like(size), where=least > 0.0)
     return np.asarray(share.sum(axis=1))

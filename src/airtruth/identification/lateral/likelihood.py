@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from airtruth.identification.condition import AircraftConstants
 from airtruth.identification.estimates import JOINT, AnyScale, Estimates, concatenated, mean_scale
-from airtruth.identification.lateral.predictor import PROCESS, levels, outputs_of, records_of
+from airtruth.identification.lateral.predictor import PROCESS, factor_names, levels, outputs_of, records_of
 from airtruth.identification.lateral.solve import regress_batch, regress_joint
 from airtruth.identification.likelihood.fit import joint_maximum, maximum_of_each, memory_of
 from airtruth.identification.likelihood.method import (
@@ -54,14 +54,21 @@ def search_of(noise: Array, options: Options, *, gusts: bool) -> Search:
         gust, process = np.full((groups, 1), np.log(GUST_M_S)), np.full((groups, 2), np.log(PROCESS_NOISE))
         declared = np.concatenate([gust, declared, process], axis=1)
         prior = np.concatenate([[GUST_PRIOR], prior, np.full(len(PROCESS), GUST_PRIOR)])
+    count = _COUNT + len(factor_names(options.terms))
     return Search(
-        declared=np.concatenate([np.zeros((groups, _COUNT)), declared], axis=1),
-        free=np.arange(_COUNT + prior.size),
-        weight=np.concatenate([np.zeros(_COUNT), prior**-2.0]),
-        level=slice(_COUNT, _COUNT + prior.size),
+        declared=np.concatenate([np.zeros((groups, count)), declared], axis=1),
+        free=np.arange(count + prior.size),
+        weight=np.concatenate([np.zeros(count), prior**-2.0]),
+        level=slice(count, count + prior.size),
         tolerance=FilterOptions.tolerance,
         maximum_iterations=STEPS * options.maximum_iterations,
+        to_prior=True,
     )
+
+
+def _with_factors(theta: Array, options: Options) -> Array:
+    """Start of a search from derivatives (rows, 15): the factors of nonlinear terms, which follow them, start from zero."""
+    return np.concatenate([theta, np.zeros((len(theta), len(factor_names(options.terms))))], axis=1)
 
 
 def _noise(batch: Batch, constants: AircraftConstants) -> Array:
@@ -85,7 +92,7 @@ def estimate(
         start = regress_batch(part, values, "ls", None, replace(options, covariance="none"))
         data = records_of(part, values, options, GUST_LENGTH_M, gusts=gusts)
         search = search_of(_noise(part, constants), options, gusts=gusts)
-        maxima = maximum_of_each(data, start.theta, search)
+        maxima = maximum_of_each(data, _with_factors(start.theta, options), search)
         made = _estimates(maxima, part.run_ids, data.scale, options, gusts=gusts)
         parts.append(replace(made, memory=memory_of(data, maxima.z)))
     return concatenated(parts, batch.run_ids)
@@ -108,7 +115,7 @@ def estimate_joint(
         for part in chunks(batch)
     ]
     search = search_of(np.median(noise, axis=0, keepdims=True), options, gusts=gusts)
-    maxima = joint_maximum(data, start.theta[0], search)
+    maxima = joint_maximum(data, _with_factors(start.theta, options)[0], search)
     made = _estimates(maxima, (JOINT,), mean_scale([d.scale for d in data]), options, gusts=gusts)
     each = [memory_of(d, np.repeat(maxima.z, d.signals.y.shape[0], axis=0)) for d in data]
     return replace(made, memory=np.concatenate(each).mean(keepdims=True))

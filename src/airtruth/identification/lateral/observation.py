@@ -39,6 +39,8 @@ REGRESSORS: Final = tuple(signal.channel for signal in LATERAL.signals)
 """Channels of the regressors."""
 CONTROLS: Final = tuple(control.channel for control in LATERAL.controls)
 """Channels of the controls."""
+_BETA: Final = REGRESSORS.index("beta_rad")
+"""Number of the regressor whose square is a term."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,13 @@ class Observation:
         return np.concatenate([np.broadcast_to(powers, (runs, *powers.shape)), self.terms], axis=1)
 
 
+def nonlinear_columns(names: Collection[str]) -> tuple[tuple[str, int], ...]:
+    """Terms of `nonlinear` in their order: name, and position of the signal."""
+    signals = len(REGRESSORS)
+    made = [("alpha", j) for j in range(signals)] if "alpha" in names else []
+    return (*made, *([("beta", _BETA)] if "beta" in names else []))
+
+
 def nonlinear(regressors: Array, alpha: Array, names: Collection[str]) -> Array:
     """Terms (runs, terms, samples) that a linear model lacks.
 
@@ -113,7 +122,7 @@ def nonlinear(regressors: Array, alpha: Array, names: Collection[str]) -> Array:
     if "alpha" in names:
         made.append(regressors * (alpha - alpha.mean(axis=1, keepdims=True))[:, None])
     if "beta" in names:
-        beta = regressors[:, [REGRESSORS.index("beta_rad")]]
+        beta = regressors[:, [_BETA]]
         made.append(beta * np.abs(beta))
     return np.concatenate(made, axis=1)
 
@@ -255,5 +264,6 @@ __all__ = [
     "integrated",
     "known_inputs",
     "nonlinear",
+    "nonlinear_columns",
     "observe",
 ]

@@ -4,19 +4,29 @@ States are beta, p, r, phi and two of the gust v, whose sideslip v/V acts throug
 the inertial path. White noise drives p' and r': what the linear moments do not explain. Its intensity is estimated: set to
 zero, intervals are too narrow wherever the aerodynamics are not linear. With v = V(t)/V0 and p = q_bar(t)/q_bar0, forces and
 moments act p times on angles and p/v times on rates; the surplus over the reference is made of measured signals and enters as
-a known input, as do the products of rates and the changes of alpha, theta and gravity.
+a known input, as do the products of rates and the changes of alpha, theta and gravity. So do the terms of
+`airtruth.identification.lateral.observation.nonlinear`, with a factor of their own in each coefficient.
 
 Sources: V. Klein and E. A. Morelli, Aircraft System Identification, AIAA, 2006, 3.2; MIL-F-8785C, 3.7.1.2 (Dryden form).
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.identification.lateral.observation import CONTROLS, Known, condition_of, known_inputs
+from airtruth.identification.lateral.observation import (
+    CONTROLS,
+    REGRESSORS,
+    Known,
+    condition_of,
+    known_inputs,
+    nonlinear,
+    nonlinear_columns,
+)
 from airtruth.identification.likelihood.fit import Records
 from airtruth.identification.likelihood.kalman_kernel import Signals
 from airtruth.identification.likelihood.predictor import W_SHARES, W_START, Predictor, Term, layout
@@ -27,6 +37,7 @@ from airtruth.numerics.prefilter import butterworth, zero_phase
 from airtruth.physics.atmosphere import air_density
 from airtruth.physics.lateral import LateralConstants, LateralScale, places, structure
 from airtruth.physics.motion import LATERAL
+from airtruth.physics.motion_parts import Derivative
 from airtruth.units import G0
 
 Array = NDArray[np.float64]
@@ -41,6 +52,8 @@ KINEMATIC: Final = tuple(f"known_{state.name}" for state in LATERAL.states)
 """Known inputs of the rates of the states: kinematics and inertia beyond the linear model."""
 SURPLUS: Final = tuple(f"surplus_{signal.name}" for signal in LATERAL.signals)
 """Known inputs: each signal times the surplus of the dynamic pressure."""
+TERM: Final = "term_{}_{}"
+"""Known input: a nonlinear term by its name and the name of its signal."""
 _FLOOR: Final = 1e-5
 """Least noise of every output over its spread [-]; judgement: a record without noise has no likelihood."""
 
@@ -51,8 +64,23 @@ def levels(outputs: tuple[str, ...], *, gusts: bool) -> tuple[str, ...]:
     return (GUST, *noise, *PROCESS) if gusts else noise
 
 
+def factor_names(terms: Collection[str]) -> tuple[str, ...]:
+    """Names of the factors of nonlinear terms, which follow the derivatives among the parameters."""
+    return tuple(
+        f"{LATERAL.derivatives[LATERAL.at(c.name, LATERAL.signals[j].name)].name}_{name}"
+        for c in LATERAL.coefficients
+        for name, j in nonlinear_columns(terms)
+    )
+
+
 def predictor_of(
-    scale: LateralScale, outputs: tuple[str, ...], length_m: float, *, gusts: bool, measured: bool
+    scale: LateralScale,
+    outputs: tuple[str, ...],
+    length_m: float,
+    *,
+    gusts: bool,
+    measured: bool,
+    terms: Collection[str] = (),
 ) -> Predictor:
     """The predictor at a flight condition.
 
@@ -63,59 +91,80 @@ def predictor_of(
     length_m : scale length of the gust [m].
     gusts : with the gust and the noise of the moments; without, it is output error.
     measured : with the inputs `SURPLUS`.
+    terms : nonlinear terms, of `airtruth.identification.options.TERMS`.
     """
     own, state_names = structure(scale), [state.name for state in LATERAL.states]
     controls = [control.name for control in LATERAL.controls]
-    coefficients = [c.name for c in LATERAL.coefficients]
-    terms = []
+    made = []
     for i, row in enumerate(state_names):
         for j, column in enumerate(state_names):
             if own.kinematics[..., i, j].any():
-                terms.append(Term("A", row, column, own.kinematics[..., i, j]))
-        terms.append(Term("B", row, KINEMATIC[i], 1.0))
-    terms += [Term("C", name, name, 1.0) for name in state_names if name in outputs]
+                made.append(Term("A", row, column, own.kinematics[..., i, j]))
+        made.append(Term("B", row, KINEMATIC[i], 1.0))
+    made += [Term("C", name, name, 1.0) for name in state_names if name in outputs]
     for derivative in LATERAL.derivatives:
         is_state, number = places(LATERAL)[derivative.column]
         signal = (state_names if is_state else controls)[number]
         rate = own.rates[..., derivative.column]
+        known = _known_inputs(derivative, terms, measured=measured)
         for kinds, rows, factors in (("AB", state_names, own.forces), ("CD", OUTPUTS, own.accelerations)):
             for i, row in enumerate(rows):
                 factor = factors[..., i, derivative.row] * rate
                 if not factor.any() or (kinds == "CD" and row not in outputs):
                     continue
-                terms.append(Term(kinds[0 if is_state else 1], row, signal, factor, (derivative.name,)))
-                if measured:
-                    terms.append(Term(kinds[1], row, SURPLUS[derivative.column], factor, (derivative.name,)))
+                made.append(Term(kinds[0 if is_state else 1], row, signal, factor, (derivative.name,)))
+                made += [Term(kinds[1], row, name, factor, (parameter,)) for name, parameter in known]
                 if gusts and signal == LATERAL.implicit[1]:
-                    terms += [
+                    made += [
                         Term(
                             kinds[0], row, state, factor * share / scale.airspeed_m_s, (derivative.name, GUST)
                         )
                         for state, share in W_SHARES.items()
                     ]
     names = levels(outputs, gusts=gusts)
-    terms += [Term("R", name, "", 1.0, (f"noise_{name}",) * 2) for name in outputs]
+    made += [Term("R", name, "", 1.0, (f"noise_{name}",) * 2) for name in outputs]
     if gusts:
-        a = scale.airspeed_m_s / length_m
-        first, second = W_SHARES
-        terms += [Term("A", first, first, -a), Term("A", second, second, -a), Term("A", second, first, a)]
-        terms.append(Term("Q", first, "", 2.0 * a))
-        terms += [Term("Q", name[6:7], "", 1.0, (name,) * 2) for name in PROCESS]
-        if LATERAL.implicit[1] in outputs:
-            terms += [
-                Term("C", LATERAL.implicit[1], state, share / scale.airspeed_m_s, (GUST,))
-                for state, share in W_SHARES.items()
-            ]
-    assert coefficients[0] == LATERAL.implicit[0]
+        made += _air_terms(scale, outputs, length_m)
     return Predictor(
         states=(*state_names, *(W_SHARES if gusts else ())),
-        inputs=(*controls, *KINEMATIC, *(SURPLUS if measured else ())),
+        inputs=(
+            *controls,
+            *KINEMATIC,
+            *(SURPLUS if measured else ()),
+            *(TERM.format(name, LATERAL.signals[j].name) for name, j in nonlinear_columns(terms)),
+        ),
         outputs=outputs,
-        parameters=(*LATERAL.parameters, *names),
+        parameters=(*LATERAL.parameters, *factor_names(terms), *names),
         logarithmic=names,
-        terms=tuple(terms),
+        terms=tuple(made),
         start=((tuple(W_SHARES), W_START),) if gusts else (),
     )
+
+
+def _known_inputs(derivative: Derivative, terms: Collection[str], *, measured: bool) -> list[tuple[str, str]]:
+    """Known inputs that act as the signal of a derivative does, each with its parameter."""
+    made = [(SURPLUS[derivative.column], derivative.name)] if measured else []
+    signal = LATERAL.signals[derivative.column].name
+    return made + [
+        (TERM.format(name, signal), f"{derivative.name}_{name}")
+        for name, j in nonlinear_columns(terms)
+        if j == derivative.column
+    ]
+
+
+def _air_terms(scale: LateralScale, outputs: tuple[str, ...], length_m: float) -> list[Term]:
+    """The gust's own motion, its effect on the vane, and the noise of the moments."""
+    a = scale.airspeed_m_s / length_m
+    first, second = W_SHARES
+    made = [Term("A", first, first, -a), Term("A", second, second, -a), Term("A", second, first, a)]
+    made.append(Term("Q", first, "", 2.0 * a))
+    made += [Term("Q", name[6:7], "", 1.0, (name,) * 2) for name in PROCESS]
+    if LATERAL.implicit[1] in outputs:
+        made += [
+            Term("C", LATERAL.implicit[1], state, share / scale.airspeed_m_s, (GUST,))
+            for state, share in W_SHARES.items()
+        ]
+    return made
 
 
 def kinematic_inputs(batch: Batch, constants: LateralConstants, scale: LateralScale, known: Known) -> Array:
@@ -134,6 +183,12 @@ def kinematic_inputs(batch: Batch, constants: LateralConstants, scale: LateralSc
     return np.stack([beta, p_dot, r_dot, phi_dot], axis=2)
 
 
+def _signals(batch: Batch, known: Known) -> Array:
+    """Channels of the signals, (runs, signals, samples); the sideslip measured or reconstructed."""
+    columns = {**batch.channels, "beta_rad": known.beta}
+    return np.stack([columns[name] for name in REGRESSORS], axis=1)
+
+
 def surplus_inputs(batch: Batch, scale: LateralScale, known: Known, options: Options) -> Array:
     """Signals about their means times the surplus of the dynamic pressure, (runs, samples, signals): `SURPLUS`."""
     c = batch.channels
@@ -141,13 +196,17 @@ def surplus_inputs(batch: Batch, scale: LateralScale, known: Known, options: Opt
     v = zero_phase(c["airspeed_m_s"], sos) / scale.airspeed_m_s[:, None]
     density = air_density(c)
     pressure = v**2 * density / density.mean(axis=1, keepdims=True)
-    columns = {**c, "beta_rad": known.beta}
     made = []
-    for signal in LATERAL.signals:
-        x = columns[signal.channel]
+    for signal, x in zip(LATERAL.signals, np.swapaxes(_signals(batch, known), 0, 1), strict=True):
         factor = pressure - 1.0 if signal.length is None else pressure / v - 1.0
         made.append(factor * (x - x.mean(axis=1, keepdims=True)))
     return np.stack(made, axis=2)
+
+
+def term_inputs(batch: Batch, known: Known, options: Options) -> Array:
+    """Nonlinear terms of the signals about their first samples, (runs, samples, terms), by ``options.terms``."""
+    signals = _signals(batch, known)
+    return np.swapaxes(nonlinear(signals - signals[..., :1], known.alpha, options.terms), 1, 2)
 
 
 def records_of(
@@ -168,13 +227,14 @@ def records_of(
     measured = options.pressure != "constant" and options.airspeed_m_s is None
     if measured:
         u.append(surplus_inputs(batch, scale, known, options))
+    u.append(term_inputs(batch, known, options))
     inputs = np.concatenate(u, axis=2)
     edge = np.concatenate([inputs[:, :1], inputs, inputs[:, -1:]], axis=1)
     bend = np.zeros_like(inputs)
     bend[:, 1:] = (edge[:, 1:-2] + edge[:, 2:-1] - edge[:, :-3] - edge[:, 3:]) / 24.0
     for number, name in enumerate(CONTROLS):
         bend[:, :, number] += servo_bend(batch.channels[name])
-    predictor = predictor_of(scale, outputs, length_m, gusts=gusts, measured=measured)
+    predictor = predictor_of(scale, outputs, length_m, gusts=gusts, measured=measured, terms=options.terms)
     floor = _FLOOR * y.std(axis=1)
     least = tuple(Term("R", name, "", floor[:, i] ** 2) for i, name in enumerate(outputs))
     made = Predictor(**{**vars(predictor), "terms": (*predictor.terms, *least)})
@@ -186,4 +246,4 @@ def outputs_of(batch: Batch) -> tuple[str, ...]:
     return tuple(output.name for output in LATERAL.outputs if output.channel in batch.channels)
 
 
-__all__ = ["GUST", "OUTPUTS", "PROCESS", "levels", "outputs_of", "predictor_of", "records_of"]
+__all__ = ["GUST", "OUTPUTS", "PROCESS", "factor_names", "levels", "outputs_of", "predictor_of", "records_of"]

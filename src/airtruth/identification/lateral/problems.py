@@ -123,15 +123,13 @@ def picked(rows: Rows, active: Ints) -> Rows:
     return Rows(z, z if rows.z is rows.x else rows.x[active], rows.y[active], rows.free[active])
 
 
-def ls_problem(o: Observation, options: Options) -> Problem:
-    """Least squares: the regressors are their own instruments."""
-    rows = smoothed(o, options)
+def ls_problem(o: Observation, options: Options, rows: Rows) -> Problem:
+    """Least squares of `smoothed` rows: the regressors are their own instruments."""
     return Problem(lambda theta, active: picked(rows, active), _all, rows.x.shape[0])
 
 
-def lowpass_problem(o: Observation, options: Options) -> Problem:
-    """Instruments of the low-passed surfaces for the rows of least squares: IV(de_f) of the paper."""
-    rows = smoothed(o, options)
+def lowpass_problem(o: Observation, options: Options, rows: Rows) -> Problem:
+    """Instruments of the low-passed surfaces for the `smoothed` rows of least squares: IV(de_f) of the paper."""
     u = zero_phase(
         with_corners(o)[:, -len(CONTROLS) :], butterworth(options.cutoff_of(o.dt_s), options.order, o.dt_s)
     )
@@ -149,11 +147,12 @@ def lowpass_problem(o: Observation, options: Options) -> Problem:
     return Problem(at, lambda theta, active: bounded(o, theta, active), rows.x.shape[0])
 
 
-def f1_problem(o: Observation, options: Options) -> Problem:
+def f1_problem(o: Observation, options: Options, rows: Rows) -> Problem:
     """Regressors, instruments and left sides behind F(p) = 1/Delta(p), Delta = |p I - A| of beta, p and r.
 
     Filters start from rest, and left sides count from the first sample, so that F p x = F x' holds exactly. Signals are
     linear between samples plus the area of the cubic through the four nearest; surfaces have the corners of their servo.
+    The `smoothed` rows of least squares have no effect.
     """
     count = len(LATERAL.signals)
     coefficients = len(LATERAL.coefficients)

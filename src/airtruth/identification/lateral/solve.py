@@ -18,6 +18,7 @@ from airtruth.identification.lateral.problems import (
     f1_problem,
     lowpass_problem,
     ls_problem,
+    smoothed,
 )
 from airtruth.identification.options import Options
 from airtruth.identification.regression.iterate import Outcome, repeat
@@ -29,7 +30,7 @@ from airtruth.physics.motion import LATERAL
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
-Pose = Callable[[Observation, Options], Problem]
+Pose = Callable[[Observation, Options, Rows], Problem]
 
 _COUNT: Final = len(LATERAL.parameters)
 """Number of derivatives."""
@@ -105,18 +106,19 @@ def regress_batch(
     ----------
     batch, constants : runs and aircraft.
     name : of the estimates.
-    pose : (observation, options) -> the regression to iterate, from least squares; None is least squares.
+    pose : (observation, options, rows of least squares) -> the regression to iterate, from least squares; None is least squares.
     options : choices.
     """
     outcomes, covariances, scales = [], [], []
     for part in chunks(batch):
         o = observe(part, constants, options)
-        problem = ls_problem(o, options)
+        smooth = smoothed(o, options)
+        problem = ls_problem(o, options, smooth)
         every = np.arange(problem.runs)
         nothing = np.full((problem.runs, _COUNT), np.nan)
         outcome = _once(solution(*_normal(problem.rows(nothing, every))))
         if pose is not None:
-            problem = pose(o, options)
+            problem = pose(o, options, smooth)
 
             def step(theta: Array, active: Ints, iteration: int, own: Problem = problem) -> Array:
                 return solution(*_normal(own.rows(theta, active)))
@@ -160,11 +162,13 @@ def regress_joint(
     observations = [
         observe(part, c, options) for batch, c in zip(parts, own, strict=True) for part in chunks(batch)
     ]
-    several = _Several([ls_problem(o, options) for o in observations])
+    smooth = [smoothed(o, options) for o in observations]
+    posed = list(zip(observations, smooth, strict=True))
+    several = _Several([ls_problem(o, options, rows) for o, rows in posed])
     runs = sum(problem.runs for problem in several.problems)
     outcome = _once(several.step(np.full((runs, _COUNT), np.nan), np.arange(runs), 0))
     if pose is not None:
-        several = _Several([pose(o, options) for o in observations])
+        several = _Several([pose(o, options, rows) for o, rows in posed])
         outcome = _iterated(several.step, several.usable, runs, outcome.theta, options, True)
     covariance = np.full((1, _COUNT, _COUNT), np.nan)
     if options.covariance != "none" and np.isfinite(outcome.theta).all():

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from airtruth.identification.likelihood.linearise import Matrices
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 
 class Signals(NamedTuple):
@@ -115,6 +116,20 @@ def innovate(step: Matrices, white: Array, gain_p: Array, signals: Signals, rows
 
 
 @njit(cache=True)
+def _moved_rows(slope: FilterSlopes, run: int) -> tuple[Bools, Bools, Bools, Bools]:
+    """Rows of phi, of early and late, of c and of d that a parameter moves; those of a gust, for example, none does."""
+    n, m = slope.phi.shape[1], slope.c.shape[1]
+    by_state, by_input = np.empty(n, dtype=np.bool_), np.empty(n, dtype=np.bool_)
+    out_state, out_input = np.empty(m, dtype=np.bool_), np.empty(m, dtype=np.bool_)
+    for i in range(n):
+        by_state[i] = slope.phi[run, i].any()
+        by_input[i] = slope.early[run, i].any() or slope.late[run, i].any()
+    for a in range(m):
+        out_state[a], out_input[a] = slope.c[run, a].any(), slope.d[run, a].any()
+    return by_state, by_input, out_state, out_input
+
+
+@njit(cache=True)
 def innovate_slopes(
     steady: Filter, slope: FilterSlopes, nuisance: Array, signals: Signals, rows: Array
 ) -> None:
@@ -126,13 +141,9 @@ def innovate_slopes(
     nuisance : (runs, states + outputs) initial means and biases.
     rows : (runs, 1 + states + outputs + free, samples outputs), its last ``free`` written.
     """
-    phi, early, late, c, d = (
-        steady.step.phi,
-        steady.step.early,
-        steady.step.late,
-        steady.step.c,
-        steady.step.d,
-    )
+    step = steady.step
+    phi, early, late, c, d = step.phi, step.early, step.late, step.c, step.d
+    d_early, d_late = slope.early, slope.late
     white, gain_p = steady.white, steady.gain_p
     y, u, bend = signals.y, signals.u, signals.bend
     runs, samples, m = y.shape
@@ -144,6 +155,7 @@ def innovate_slopes(
         for i in range(n):
             state[i] = nuisance[run, i]
         dx[:] = 0.0
+        by_state, by_input, out_state, out_input = _moved_rows(slope, run)
         for k in range(samples):
             for a in range(m):
                 total = y[run, k, a] - nuisance[run, n + a]
@@ -151,12 +163,17 @@ def innovate_slopes(
                     de[a, f] = 0.0
                 for i in range(n):
                     total -= c[run, a, i] * state[i]
-                    for f in range(count):
-                        de[a, f] -= c[run, a, i] * dx[i, f] + slope.c[run, a, i, f] * state[i]
+                    if out_state[a]:
+                        for f in range(count):
+                            de[a, f] -= c[run, a, i] * dx[i, f] + slope.c[run, a, i, f] * state[i]
+                    elif c[run, a, i] != 0.0:
+                        for f in range(count):
+                            de[a, f] -= c[run, a, i] * dx[i, f]
                 for i in range(inputs):
                     total -= d[run, a, i] * u[run, k, i]
-                    for f in range(count):
-                        de[a, f] -= slope.d[run, a, i, f] * u[run, k, i]
+                    if out_input[a]:
+                        for f in range(count):
+                            de[a, f] -= slope.d[run, a, i, f] * u[run, k, i]
                 now[a] = total
             for a in range(m):
                 for f in range(count):
@@ -172,8 +189,12 @@ def innovate_slopes(
                     dx_ahead[i, f] = 0.0
                 for h in range(n):
                     total += phi[run, i, h] * state[h]
-                    for f in range(count):
-                        dx_ahead[i, f] += phi[run, i, h] * dx[h, f] + slope.phi[run, i, h, f] * state[h]
+                    if by_state[i]:
+                        for f in range(count):
+                            dx_ahead[i, f] += phi[run, i, h] * dx[h, f] + slope.phi[run, i, h, f] * state[h]
+                    elif phi[run, i, h] != 0.0:
+                        for f in range(count):
+                            dx_ahead[i, f] += phi[run, i, h] * dx[h, f]
                 for a in range(m):
                     total += gain_p[run, i, a] * now[a]
                     for f in range(count):
@@ -182,10 +203,9 @@ def innovate_slopes(
                     first = u[run, k, h] + bend[run, k + 1, h]
                     second = u[run, k + 1, h] + bend[run, k + 1, h]
                     total += early[run, i, h] * first + late[run, i, h] * second
-                    for f in range(count):
-                        dx_ahead[i, f] += (
-                            slope.early[run, i, h, f] * first + slope.late[run, i, h, f] * second
-                        )
+                    if by_input[i]:
+                        for f in range(count):
+                            dx_ahead[i, f] += d_early[run, i, h, f] * first + d_late[run, i, h, f] * second
                 ahead[i] = total
             state, ahead = ahead, state
             dx, dx_ahead = dx_ahead, dx

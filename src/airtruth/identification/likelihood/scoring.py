@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import lambertw
 
 from airtruth.identification.estimates import Status
 from airtruth.numerics import levenberg_marquardt as solver
@@ -40,6 +41,8 @@ class Search:
     level : positions of the levels among the free parameters.
     tolerance : length of the last step [standard errors].
     maximum_iterations : steps after which a fit is reported as not converged.
+    to_prior : whether a step of a level that the record does not show goes to where likelihood and prior balance, and not as
+        far as Newton's, which is at most 1/2.
     """
 
     declared: Array
@@ -48,6 +51,7 @@ class Search:
     level: slice
     tolerance: float
     maximum_iterations: int
+    to_prior: bool = False
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,7 @@ class _Posterior:
     declared : (groups, parameters) centre of the prior.
     weight : (free,) inverse variances of the prior.
     free : indices of the estimated parameters; level : positions of the levels among them.
+    to_prior : as in `Search`.
     """
 
     evaluate_likelihood: Callable[[Array, Ints], Scored]
@@ -93,6 +98,7 @@ class _Posterior:
     weight: Array
     free: Ints
     level: slice
+    to_prior: bool
 
     def evaluate(self, x: Array, index: Ints, near: Sequence[_Point] | None) -> list[_Point | None]:
         """Posterior at points x (rows, free); None where the cost is not finite."""
@@ -110,6 +116,12 @@ class _Posterior:
         known = np.diagonal(information, axis1=1, axis2=2)
         hidden[:, self.level] = np.maximum(2.0 * gradient - known, 0.0)[:, self.level]
         off = x - self.declared[np.ix_(index, self.free)]
+        if self.to_prior:
+            own = self.level
+            balanced = to_balance(gradient[:, own], off[:, own], self.weight[own])
+            faint = (hidden[:, own] > 0.0) & np.isfinite(balanced)
+            least = np.maximum(balanced - known[:, own] - self.weight[own], 0.0)
+            hidden[:, own] = np.where(faint, least, hidden[:, own])
         cost = cost + 0.5 * (self.weight * off**2).sum(axis=1)
         gradient = gradient + self.weight * off
         information = information + np.diag(self.weight)
@@ -140,6 +152,33 @@ class _Posterior:
         return x + step
 
 
+def to_balance(gradient: Array, off: Array, weight: Array) -> Array:
+    """Curvature whose Newton step leads to the least g/2 exp(2 d) + w/2 (off + d)^2 over the step d of a logarithm of a level.
+
+    The first term is the cost of a level s that enters by s^2 alone, g its gradient; the second is the prior. Setting the slope
+    to zero, y exp(y) = 2 g/w exp(-2 off) with y = -2 (off + d): Lambert's function.
+
+    Parameters
+    ----------
+    gradient : (..., levels) g of the likelihood; off : (..., levels) level less the centre of its prior; weight : (levels,) w.
+
+    Returns
+    -------
+    (..., levels); NaN without a balance, such as with a negative gradient.
+
+    Examples
+    --------
+    >>> curvature = to_balance(np.array([3.0]), np.array([0.5]), np.array([2.0]))
+    >>> step = -(3.0 + 2.0 * 0.5) / curvature
+    >>> bool(abs(3.0 * np.exp(2.0 * step) + 2.0 * (0.5 + step))[0] < 1e-12)
+    True
+    """
+    with np.errstate(all="ignore"):
+        y = np.real(lambertw(2.0 * gradient / weight * np.exp(-2.0 * off)))
+        step = -0.5 * y - off
+        return np.asarray(-(gradient + weight * off) / step)
+
+
 def maximise(evaluate: Callable[[Array, Ints], Scored], start: Array, search: Search) -> Maxima:
     """Maximise the likelihood of each group.
 
@@ -150,7 +189,7 @@ def maximise(evaluate: Callable[[Array, Ints], Scored], start: Array, search: Se
     search : parameters, prior, and how to search.
     """
     count, free, declared = start.shape[1], search.free, search.declared
-    problems = _Posterior(evaluate, declared, search.weight, free, search.level)
+    problems = _Posterior(evaluate, declared, search.weight, free, search.level, search.to_prior)
     x = declared[:, free]
     x[:, :count] = start
     how = Options(

@@ -1,0 +1,188 @@
+"""The lateral estimators on flights of the GTM's tables in JSBSim: tables as the paper's, coverage, nonlinear terms.
+
+Variants of data/campaigns/lateral.toml are flown: surfaces at 3 deg in light and moderate turbulence, and at 3 to 4 deg in
+light turbulence. Every method estimates each run with the measured dynamic pressure, in the first two campaigns with the
+constant one as well, and joint sets of four runs. `airtruth tables` shows the single runs: files lateral-NAME.* of OUT/tables.
+An interrupted study continues.
+
+    python -m studies.lateral_flights --out DIR [--runs N] [--jobs J] [METHOD ...]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import shutil
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from airtruth.aircraft import Aircraft, load
+from airtruth.identification import (
+    FILES,
+    LATERAL_METHODS,
+    Estimates,
+    Options,
+    identify,
+    identify_batch,
+    identify_joint,
+    write_estimates,
+)
+from airtruth.logs.flight_log import Batch, batches
+from airtruth.logs.sources import log_files
+from airtruth.logs.store import read_log, read_table
+from airtruth.physics.motion import LATERAL
+from airtruth.reporting import write_tables
+from airtruth.simulation.campaign import plan
+from airtruth.simulation.campaign import run as campaign
+from airtruth.table import Table, as_markdown, flat
+
+ROOT = Path(__file__).resolve().parents[1]
+CAMPAIGN = ROOT / "data" / "campaigns" / "lateral.toml"
+FLOWN = {
+    "light-3": ((3.0, 3.0), "light"),
+    "moderate-3": ((3.0, 3.0), "moderate"),
+    "light": ((3.0, 4.0), "light"),
+}
+"""Name -> least and largest deflection [deg], level of the turbulence."""
+CONSTANT = ("light-3", "moderate-3")
+"""Campaigns that are identified with a constant dynamic pressure as well."""
+SET = 4
+"""Runs of a joint estimate."""
+TERMS = ((), ("beta",), ("alpha",), ("alpha", "beta"))
+WITH_TERMS = ("ls", "filter-error")
+"""Methods in the table of nonlinear terms."""
+WORST = ("Clbeta", "Clr", "Cldr", "Cnp")
+"""Derivatives in that table: those with the largest bias."""
+SCORED = [LATERAL.index(name) for name in LATERAL.scored]
+
+
+def fly(name: str, out: Path, runs: int, jobs: int) -> Path:
+    """Fly a campaign into OUT/NAME; return its folder."""
+    (low, high), level = FLOWN[name]
+    text = CAMPAIGN.read_text(encoding="utf-8")
+    text = re.sub(
+        r"\{ low = 3.0, high = 4.0 \}", f"{{ low = {low}, high = {high} }}" if low < high else f"{low}", text
+    )
+    text = re.sub(
+        r"\{ low = -4.0, high = -3.0 \}",
+        f"{{ low = {-high}, high = {-low} }}" if low < high else f"{-low}",
+        text,
+    )
+    text = text.replace('name = "lateral"', f'name = "{name}"').replace(
+        'level = "light"', f'level = "{level}"'
+    )
+    out.mkdir(parents=True, exist_ok=True)
+    file = out / f"{name}.toml"
+    file.write_text(text, encoding="utf-8")
+    campaign.fly(plan.make(file, runs=runs), out / name, jobs)
+    return out / name
+
+
+def estimate(folder: Path, gtm: Aircraft, methods: Sequence[str]) -> list[Path]:
+    """Write the estimates of a campaign; return the folders that `airtruth tables` reads, that of the constant pressure last."""
+    made = [folder]
+    if folder.name in CONSTANT:
+        other = folder.with_name(f"{folder.name}-constant")
+        other.mkdir(exist_ok=True)
+        shutil.copy(folder / "truth.parquet", other)
+        stated = json.loads((folder / "campaign.json").read_text(encoding="utf-8"))
+        stated |= {"name": other.name, "title": f"{stated['title']}, constant dynamic pressure"}
+        (other / "campaign.json").write_text(json.dumps(stated), encoding="utf-8")
+        made.append(other)
+    for target, options in zip(made, (Options(), Options(pressure="constant")), strict=False):
+        result = identify(folder, gtm, methods, options, motion=LATERAL)
+        write_estimates(target / FILES[LATERAL.name], result, force=True)
+    return made
+
+
+def records(folder: Path) -> list[Batch]:
+    """The runs of a campaign, one batch each."""
+    own = [batch for file in log_files(folder) for batch in batches(read_log(file))]
+    return [
+        Batch((run,), b.dt_s, b.t_s[k : k + 1], {name: x[k : k + 1] for name, x in b.channels.items()})
+        for b in own
+        for k, run in enumerate(b.run_ids)
+    ]
+
+
+def errors(made: Sequence[Estimates], truth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Errors (estimates, 15) [% of the truth] of converged estimates, and whether their 95 % intervals hold the truth."""
+    theta = np.concatenate([e.theta[e.converged] for e in made])
+    covariance = np.concatenate([e.covariance[e.converged] for e in made])
+    std = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    off = theta - truth
+    return 100.0 * off / np.abs(truth), np.abs(off) <= 1.96 * std
+
+
+def joint(own: Sequence[Batch], gtm: Aircraft, method: str, options: Options) -> Iterator[Estimates]:
+    """Estimates of sets of `SET` runs."""
+    for first in range(0, len(own) - SET + 1, SET):
+        yield identify_joint(own[first : first + SET], gtm, method, options, LATERAL)
+
+
+def joint_table(
+    name: str, own: Sequence[Batch], gtm: Aircraft, truth: np.ndarray, methods: Sequence[str]
+) -> Table:
+    """RMSE of joint estimates [% of the truth], coverage of single runs and of joint sets."""
+    rows = []
+    for method in methods:
+        for options in (Options(), Options(terms=("alpha", "beta"))):
+            single = errors([identify_batch(one, gtm, method, options, LATERAL) for one in own], truth)[1]
+            error, hits = errors(list(joint(own, gtm, method, options)), truth)
+            rmse = np.sqrt((error**2).mean(axis=0))
+            label = f"{method}{', terms' if options.terms else ''}"
+            shares = [f"{100.0 * x.mean():.0f}" for x in (single, hits)]
+            rows.append((label, *(f"{rmse[j]:.1f}" for j in SCORED), *shares))
+    columns = ("method", *LATERAL.scored, "coverage, single [%]", f"coverage, {SET} runs [%]")
+    return flat(f"{name}: RMSE of joint estimates of {SET} runs [%]", columns, rows)
+
+
+def terms_table(name: str, own: Sequence[Batch], gtm: Aircraft, truth: np.ndarray) -> Table:
+    """Bias and standard deviation of single runs [% of the truth] with nonlinear terms."""
+    rows = []
+    for method in WITH_TERMS:
+        for terms in TERMS:
+            made = [identify_batch(one, gtm, method, Options(terms=terms), LATERAL) for one in own]
+            error, hits = errors(made, truth)
+            chosen = error[:, [LATERAL.index(n) for n in WORST]]
+            cells = [
+                f"{b:.1f} ({s:.1f})"
+                for b, s in zip(chosen.mean(axis=0), chosen.std(axis=0, ddof=1), strict=True)
+            ]
+            rows.append((method, " and ".join(terms) or "none", *cells, f"{100.0 * hits.mean():.1f}"))
+    return flat(
+        f"{name}: bias (standard deviation) of single runs [%]",
+        ("method", "terms", *WORST, "coverage [%]"),
+        rows,
+    )
+
+
+def main() -> None:
+    """Fly, estimate, print and write the tables."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--runs", type=int, default=40)
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("methods", nargs="*", default=list(LATERAL_METHODS))
+    asked = parser.parse_args()
+    gtm = load(ROOT / "aircraft" / "gtm")
+    folders: list[Path] = []
+    for name in FLOWN:
+        folder = fly(name, asked.out, asked.runs, asked.jobs)
+        folders += estimate(folder, gtm, asked.methods)
+        truth = read_table(folder / "truth.parquet")[list(LATERAL.parameters)].iloc[0].to_numpy()
+        own = records(folder)
+        chosen = [m for m in asked.methods if m != "output-error"]
+        print(as_markdown(joint_table(name, own, gtm, truth, chosen)), flush=True)
+        if name.startswith("light"):
+            print(as_markdown(terms_table(name, own, gtm, truth)), flush=True)
+    print(write_tables(folders, asked.out / "tables").text)
+
+
+if __name__ == "__main__":
+    main()
