@@ -46,6 +46,8 @@ _LEAD_S: Final = 3.0
 constants of slow sensors)."""
 _AIR: Final = "each record has its own gust level, and the measured airspeed contains the horizontal gusts"
 """Why an effect of the air is not tested."""
+_OF_INPUTS: Final = ("bias", "scale", "arm_right")
+"""Errors of the sensor of a known input that the filter takes."""
 _RECONSTRUCTED: Final = "alpha was reconstructed: no vane measured it"
 """Why an effect of a vane is not tested."""
 _NO_VANE: Final = (
@@ -129,7 +131,7 @@ def prepare(
     notes.extend(_NO_VANE if channel == VANE else _unmeasured(channel, motion) for channel in absent)
     mean = np.mean([r.plant.derivatives for r in fitted], axis=0)
     slopes = dict(zip(motion.parameters, mean.tolist(), strict=True))
-    foreign = [e for e in effects if not e.applies_to(motion)]
+    foreign = [e for e in effects if not e.applies_to(motion) or _delays_input(e, motion)]
     effects = [effect.for_aircraft(slopes) for effect in effects if effect not in foreign]
     columns = set.intersection(*(set(log.channels) for log in logs))
     reasons = {effect.key: _why_not(effect, columns, absent) for effect in effects}
@@ -205,6 +207,13 @@ def _declared_causes(
         keys is None or DERIVATIVES in keys,
         tuple(e for e in effects if e.key in {c.key for c in causes}),
     )
+
+
+def _delays_input(effect: Effect, motion: Motion) -> bool:
+    """Whether it delays a known input, or moves its sensor in the plane of symmetry, which the motion does not show."""
+    change = effect.change({p.name: p.value(p.step) for p in effect.parameters})
+    known = set(motion.known) - {"airspeed_m_s"}
+    return any(t.channel in known and t.kind not in _OF_INPUTS for t in change.sensors)
 
 
 def _why_not(effect: Effect, columns: Collection[str], absent: Collection[str]) -> str:
