@@ -251,10 +251,9 @@ def undo_input_sensors(s: Signals, aircraft: Aircraft) -> Signals:
     alpha = s.alpha_rad if s.alpha_rad.size else fine(s.y[:, 0], s.sub)
     if declared.alpha_slope_per_rad != 0.0:
         airspeed = airspeed / declared.slope(alpha)
-    known: dict[str, Any] = {
-        n: true(n, getattr(s, n), s.sub) for n in ("alpha_rad", "q_rad_s") if n in s.motion.known
-    }
-    if known:
+    known: dict[str, Any] = {}
+    if s.motion is not LONGITUDINAL:
+        known = {n: true(n, getattr(s, n), s.sub) for n in ("alpha_rad", "q_rad_s", "theta_rad")}
         vane = aircraft.file.sensors.get("alpha_rad", Sensor()).errors()
         p = fine(s.y[:, s.motion.output_channels.index("p_rad_s")], s.sub)
         known["alpha_rad"] = known["alpha_rad"] + (vane.x_m * known["q_rad_s"] - vane.y_m * p) / airspeed
