@@ -144,6 +144,7 @@ bench: $(DEVELOP) ## ratios against bare baselines and peers
 	$(BIN)/python -m benchmarks.bench_identify
 	$(BIN)/python -m benchmarks.bench_import
 	$(BIN)/python -m benchmarks.bench_filter_error
+	$(BIN)/python -m benchmarks.bench_lateral
 	$(BIN)/python -m benchmarks.bench_peers
 	$(BIN)/python -m benchmarks.bench_trace
 

@@ -44,6 +44,7 @@ CLASSES: Final = {
 
 DECIDING: Final = (
     "tracing/answer.py",
+    "tracing/calibration/*.py",
     "tracing/confirmation.py",
     "tracing/friction.py",
     "tracing/record_differences.py",

@@ -27,13 +27,14 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.errors import AirtruthError
 from airtruth.logs.sources import named_logs
 from airtruth.logs.store import read_log
+from airtruth.tracing.calibration.corner_share import with_corner_share
 from airtruth.tracing.inference.hypothesis import Hypothesis
-from airtruth.tracing.inference.optimise import converged_fit, initial_parameters
+from airtruth.tracing.inference.optimise import initial_parameters
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.prepare import Case, prepare
-from airtruth.tracing.selection.corner_share import with_corner_share
 from airtruth.tracing.selection.rounds import RoundStart, search_round
+from airtruth.tracing.selection.set_table import SetTable
 from validation.blind.figures import DECLARED
 
 Array = NDArray[np.float64]
@@ -104,13 +105,13 @@ def _fitted(case: Case, hypothesis: Hypothesis, true: Array, trial: dict[str, An
     common = start.common.copy()
     if coloured:
         common[SHORT_PERIOD.common.colour_shares] = _SLOW_SHARE
-    best = converged_fit(problem, hypothesis, replace(start, common=common, sizes=true))
+    best = SetTable(problem).converged(hypothesis, replace(start, common=common, sizes=true))
     if best is None:
         raise AirtruthError(f"{name}: the motion is lost at the true sizes")
     case = with_corner_share(replace(case, fitted=problem, hypothesis=hypothesis), best.point)
     others = tuple(e for e in case.effects if e not in hypothesis.effects)
     scored = RoundStart(hypothesis, best.point, others, scores_only=True)
-    found = search_round(case.fitted, scored, 1, 0, lambda step: None)
+    found = search_round(SetTable(case.fitted), scored, 1, 0, lambda step: None)
     if found is None:
         raise AirtruthError(f"{name}: the motion is lost at the fitted sizes")
     fit = found.null

@@ -26,12 +26,12 @@ from airtruth import aircraft
 from airtruth.effects.registry import EFFECTS
 from airtruth.logs.store import read_log
 from airtruth.tracing import TraceOptions
+from airtruth.tracing.calibration.corner_share import with_corner_share
+from airtruth.tracing.calibration.noise_colour import with_coloured_noise
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.prepare import Case, prepare
-from airtruth.tracing.selection.corner_share import with_corner_share
-from airtruth.tracing.selection.noise_colour import with_coloured_noise
 from validation.blind.scoring import Share, base
 
 _DECLARED: Final = "gtm"

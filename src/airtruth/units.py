@@ -73,6 +73,7 @@ _PRINTED: Final = {
     "m_s": "m/s",
     "m_s2": "m/s2",
     "kg_m2": "kg m2",
+    "n_m": "N m",
     "per_rad": "1/rad",
 }
 """Unit -> its printed form; others are printed as they are."""

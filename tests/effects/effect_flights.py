@@ -9,9 +9,10 @@ import numpy as np
 import oracle
 
 from airtruth.aircraft import write as writing
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.physics.resolution import LinearPoint, resolved
 from airtruth.physics.terms import Change
-from airtruth.simulation.flight import Flight, Inputs
+from airtruth.simulation.flight import Flight, Inputs, LateralInputs
 from airtruth.simulation.manoeuvres import Manoeuvre, sample
 from airtruth.simulation.resolution import linear_point
 from airtruth.simulation.simulator import Condition
@@ -29,7 +30,7 @@ def changed(plane, change: Change, folder: Path, at: Condition | None = None, **
     if at is not None and change.derivatives:
         key = (plane.name, at)
         if key not in _POINTS:
-            _POINTS[key] = linear_point(plane, at)
+            _POINTS[key] = linear_point(plane, at, motion=LATERAL if at.six_axes else LONGITUDINAL)
         change = resolved(change, _POINTS[key])
     return writing.changed(plane, change, folder / plane.name, **options)
 
@@ -43,6 +44,19 @@ def fly(plane, at: Condition, hz=200.0, amplitude=2.0 * DEG, duration=3.0, surfa
     flight = Flight(plane, start, 1.0 / hz)
     flown = flight.fly(
         Inputs(command if surface is None else surface, zero, zero, surface=surface is not None)
+    )
+    return start, flown
+
+
+def fly_lateral(plane, at: Condition, hz=200.0, amplitude=3.0 * DEG, duration=4.0):
+    """Noise-free channels of an aileron doublet at 0.5 s and a rudder doublet of three times its size at 2 s, in six axes."""
+    t = np.arange(round(duration * hz) + 1) / hz
+    zero = np.zeros_like(t)
+    aileron = sample(Manoeuvre("doublet", amplitude, start_s=0.5, step_s=0.4), t)
+    rudder = sample(Manoeuvre("doublet", 3.0 * amplitude, start_s=2.0, step_s=0.4), t)
+    start = trim(plane, at, 1.0 / hz)
+    flown = Flight(plane, start, 1.0 / hz).fly(
+        Inputs(zero, zero, zero, lateral=LateralInputs(aileron, rudder))
     )
     return start, flown
 

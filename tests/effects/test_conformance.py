@@ -1,6 +1,7 @@
 """What every effect of the library keeps, those that other packages bring too."""
 
 import math
+from dataclasses import replace
 from typing import get_args, get_type_hints
 
 import effect_flights as flights
@@ -15,22 +16,26 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.effects.sensors import sensor_effects
 from airtruth.errors import ConfigurationError
 from airtruth.physics.composition import CAUSES, TailGeometry, directions
-from airtruth.physics.motion import LATERAL, LONGITUDINAL
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, MOTIONS
 from airtruth.physics.sensor_errors import Kind
 from airtruth.physics.terms import (
     DECLARED,
     SHAPES,
-    SIGNALS,
     STATE_KINDS,
     AirTerm,
     Change,
     SurfaceTerm,
+    coefficients_of,
+    signals_of,
 )
 from airtruth.simulation import instruments as measure
 from airtruth.units import UNITS
 
 ALL = sorted(EFFECTS)
+LONG = [key for key in ALL if EFFECTS[key].applies_to(LONGITUDINAL)]
+SIDE = [key for key in ALL if key not in LONG]
 DELAY = EFFECTS["elevator_delay"].change({"delay_s": 0.03})
+LATE = EFFECTS["aileron_delay"].change({"delay_s": 0.03}) + EFFECTS["rudder_delay"].change({"delay_s": 0.03})
 
 
 def kinds(term, field):
@@ -103,10 +108,13 @@ def test_change_is_in_plain_known_terms(key):
     change = effect.change(values(effect, 3.0))
     assert change != Change()
     assert effective(change) == change
-    signals = (*SIGNALS, *(s.name for s in change.states))
+    motions = [m for m in MOTIONS.values() if effect.applies_to(m)]
+    known = {signal for m in motions for signal in signals_of(m)}
+    signals = {*known, *(s.name for s in change.states)}
     assert all(t.kind in kinds(SurfaceTerm, "kind") for t in change.surface)
-    assert all(t.kind in STATE_KINDS and t.signal in SIGNALS and t.time_s > 0.0 for t in change.states)
-    assert all(t.coefficient in ("CL", "Cm") and t.shape in SHAPES for t in change.aero)
+    assert all(t.kind in STATE_KINDS and t.signal in known and t.time_s > 0.0 for t in change.states)
+    assert all(t.coefficient in {c for m in motions for c in coefficients_of(m)} for t in change.aero)
+    assert all(t.shape in SHAPES for t in change.aero)
     assert all(t.signal in signals for t in change.aero)
     assert all(t.quantity in DECLARED for t in change.declared)
     assert all(t.cause in CAUSES for t in change.derivatives)
@@ -115,9 +123,9 @@ def test_change_is_in_plain_known_terms(key):
 
 
 @pytest.mark.parametrize("key", ALL)
-def test_it_concerns_the_longitudinal_motion(key):
-    """Every name in its terms is one of the motion, or the tracer could not fly it."""
-    assert EFFECTS[key].applies_to(LONGITUDINAL)
+def test_it_concerns_a_motion(key):
+    """Every name in its terms is one of a motion, or the tracer could not fly it."""
+    assert any(EFFECTS[key].applies_to(motion) for motion in MOTIONS.values())
 
 
 def test_an_effect_concerns_a_motion_that_has_all_its_names():
@@ -135,7 +143,9 @@ def test_an_effect_concerns_a_motion_that_has_all_its_names():
 @pytest.mark.parametrize("key", [key for key in ALL if EFFECTS[key].prior])
 def test_a_cause_of_changed_derivatives_has_a_direction_and_a_plausible_range(key):
     effect = EFFECTS[key]
-    assert np.any(directions(np.arange(1.0, 7.0), TailGeometry())[effect.quantity])
+    motion = LONGITUDINAL if key in LONG else LATERAL
+    derivatives = np.arange(1.0, 1.0 + len(motion.parameters))
+    assert np.any(directions(derivatives, TailGeometry(), motion)[effect.quantity])
     assert effect.prior.std > 0.0
     assert effect.prior.low <= 0.0 < effect.prior.high
 
@@ -166,6 +176,7 @@ def test_effects_compose(key):
     assert change + Change() == change == Change() + change
     both = effective(change + DELAY)
     assert both.surface == change.surface + DELAY.surface
+    assert both.of_surface("elevator") == change.of_surface("elevator") + DELAY.surface
     for field in ("aero", "declared", "derivatives", "sensors", "air"):
         assert getattr(both, field) == getattr(change, field)
 
@@ -184,39 +195,69 @@ def plain(gtm, paper_condition):
     return flights.fly(gtm, paper_condition)[1]
 
 
-def distance(flown, plain):
+@pytest.fixture(scope="module")
+def level(paper_condition):
+    return replace(paper_condition, straight="wings-level")
+
+
+@pytest.fixture(scope="module")
+def rolled(gtm, level):
+    return flights.fly_lateral(gtm, level)[1]
+
+
+def distance(flown, plain, channels=("alpha_rad", "q_rad_s", "az_m_s2")):
     """Largest change of a channel's motion over that motion."""
     found = []
-    for name in ("alpha_rad", "q_rad_s", "az_m_s2"):
+    for name in channels:
         motion = plain[name] - plain[name][0]
         found.append(np.abs(flown[name] - flown[name][0] - motion).max() / np.abs(motion).max())
     return max(found)
 
 
-IN_AIRCRAFT = [k for k in ALL if EFFECTS[k].change(values(EFFECTS[k], 1.0)).in_aircraft]
+def in_aircraft(keys):
+    return [k for k in keys if EFFECTS[k].change(values(EFFECTS[k], 1.0)).in_aircraft]
 
 
-@pytest.mark.parametrize("key", sampled(IN_AIRCRAFT, 4))
+def grows_and_composes(effect, fly, distance, delay):
+    material = fly(effect.change(values(effect, 3.0)), "material")
+    seen = distance(material)
+    assert seen > 1e-4, "three times the material size does not move the aircraft"
+    assert distance(fly(effect.change(values(effect, 0.003)), "little")) < 0.01 * seen + 1e-12
+    both = fly(effect.change(values(effect, 3.0)) + delay, "both")
+    assert distance(both) > 0.5 * seen
+    return both, material
+
+
+@pytest.mark.parametrize("key", sampled(in_aircraft(LONG), 4))
 def test_written_effect_grows_from_nothing_and_composes(gtm, paper_condition, plain, tmp_path, key):
-    effect = EFFECTS[key]
-
     def fly(change, name):
         plane = flights.changed(gtm, change, tmp_path / name, paper_condition)
         return flights.fly(plane, paper_condition)[1]
 
-    material = fly(effect.change(values(effect, 3.0)), "material")
-    seen = distance(material, plain)
-    assert seen > 1e-4, "three times the material size does not move the aircraft"
-    assert distance(fly(effect.change(values(effect, 0.003)), "little"), plain) < 0.01 * seen + 1e-12
-    both = fly(effect.change(values(effect, 3.0)) + DELAY, "both")
-    assert distance(both, plain) > 0.5 * seen
+    both, material = grows_and_composes(EFFECTS[key], fly, lambda flown: distance(flown, plain), DELAY)
     assert distance(both, material) > 1e-3
 
 
+SIDE_CHANNELS = ("beta_rad", "p_rad_s", "r_rad_s", "ay_m_s2")
+
+
+@pytest.mark.parametrize("key", sampled(in_aircraft(SIDE), 4))
+def test_written_lateral_effect_grows_from_nothing_and_composes(gtm, level, rolled, tmp_path, key):
+    def fly(change, name):
+        plane = flights.changed(gtm, change, tmp_path / name, level)
+        return flights.fly_lateral(plane, level)[1]
+
+    def seen(flown):
+        return distance(flown, rolled, SIDE_CHANNELS)
+
+    both, material = grows_and_composes(EFFECTS[key], fly, seen, LATE)
+    assert distance(both, material, SIDE_CHANNELS) > 1e-3
+
+
 @pytest.mark.parametrize("key", [k for k in ALL if EFFECTS[k].where == "sensor"])
-def test_sensor_effect_shows_in_its_channel_alone(plain, key):
+def test_sensor_effect_shows_in_its_channel_alone(plain, rolled, key):
     effect = EFFECTS[key]
-    truth = {name: channel[None] for name, channel in plain.items()}
+    truth = {name: channel[None] for name, channel in (plain if key in LONG else rolled).items()}
     terms = effect.change(values(effect, 3.0)).sensors
     errors = {name: sensor.errors() for name, sensor in fitted({}, terms).items()}
     before = measure.log_channels(truth, {}, {}, 1 / 200, 4)

@@ -204,8 +204,8 @@ def test_what_cannot_be_written_says_why(gtm, tmp_path):
     corrections = writing.Corrections({"Cmalfa": 0.1}, {"alpha": 0.1})
     with pytest.raises(ConfigurationError, match=r"did you mean 'Cmalpha'"):
         writing.write_aircraft(gtm, Change(), tmp_path / "a", derivatives=corrections)
-    nonsense = Change(aero=(AeroTerm("Cm", "beta", "linear", 1.0),))
-    with pytest.raises(ConfigurationError, match="signal 'beta'"):
+    nonsense = Change(aero=(AeroTerm("Cm", "mach", "linear", 1.0),))
+    with pytest.raises(ConfigurationError, match="signal 'mach'"):
         writing.write_aircraft(gtm, nonsense, tmp_path / "b")
     lift = EFFECTS["lift_lag"].change({"dCLalpha": 1.0, "tau_s": 0.1})
     with pytest.raises(ConfigurationError, match="two states are named 'lift-lag'"):

@@ -81,7 +81,9 @@ def test_lateral_directions_of_declared_quantities():
     row = dict(zip(("CY", "Cl", "Cn"), derivatives.reshape(3, 5), strict=True))
     zero = np.zeros(5)
     # a side force acts a chord, an eighth of the span, ahead of a CG that lies a chord farther aft
-    np.testing.assert_allclose(found["cg"], [*zero, *zero, *(row["CY"] / 8.0)])
+    moment = np.vstack([zero, zero, row["CY"]])
+    moment[:, 2] += 2.0 * derivatives.reshape(3, 5)[:, 0]  # and a yaw rate turns its sideslip
+    np.testing.assert_allclose(found["cg"], moment.ravel() / 8.0)
     np.testing.assert_allclose(found["mass"], [*-row["CY"], *zero, *zero])
     np.testing.assert_allclose(found["inertia_zz"], [*zero, *zero, *-row["Cn"]])
     rudder = np.zeros((3, 5))

@@ -191,7 +191,7 @@ def test_derivatives_that_are_off_enter_by_the_share_of_the_motion():
 def test_response_is_the_integral_of_the_equations():
     t = np.arange(0.0, 3.0001, 0.02)
     lift, moment = 0.05 * np.interp(t, [0.5, 1.0], [0.0, 1.0]), -0.01 * np.interp(t, [0.3, 0.7], [0.0, 1.0])
-    found = response(TRUTH, scales(1), lift[None], moment[None], 0.02)[:, 0]
+    found = response(TRUTH, scales(1), np.stack([lift[None], moment[None]]), 0.02)[:, 0]
     a, _ = short_period.system(TRUTH, SCALE)
 
     def slope(time, x):
@@ -217,9 +217,10 @@ def scales(runs):
 def test_response_is_linear_and_runs_are_apart(seed, factor):
     rng = np.random.default_rng(seed)
     lift, moment = 1e-2 * rng.standard_normal((2, 3, 40))
-    whole = response(TRUTH, scales(3), lift, moment, 0.02)
-    assert np.allclose(response(TRUTH, scales(3), factor * lift, factor * moment, 0.02), factor * whole)
-    one = response(TRUTH, scales(1), lift[1:2], moment[1:2], 0.02)
+    both = np.stack([lift, moment])
+    whole = response(TRUTH, scales(3), both, 0.02)
+    assert np.allclose(response(TRUTH, scales(3), factor * both, 0.02), factor * whole)
+    one = response(TRUTH, scales(1), both[:, 1:2], 0.02)
     assert np.allclose(one[:, 0], whole[:, 1], rtol=0.0, atol=1e-14)
 
 
@@ -337,11 +338,11 @@ def test_the_elevator_becomes_the_surface_that_the_air_sees():
 
 
 def test_mass_and_inertia_change_the_constants():
-    taken = Compensation((Condition(V, TRUTH),), mass_factor=1.1, inertia_factor=0.9)
+    taken = Compensation((Condition(V, TRUTH),), declared={"mass": 1.1, "inertia": 0.9})
     heavier = updated_constants(GTM, taken)
     assert heavier.mass_kg == pytest.approx(1.1 * GTM.mass_kg)
     assert heavier.inertia_yy_kg_m2 == pytest.approx(0.9 * GTM.inertia_yy_kg_m2)
-    assert updated_constants(GTM, replace(taken, mass_factor=1.0, inertia_factor=1.0)) is GTM
+    assert updated_constants(GTM, replace(taken, declared={"mass": 1.0, "inertia": 1.0})) is GTM
 
 
 def test_each_record_takes_the_derivatives_of_its_flight_condition():

@@ -33,7 +33,7 @@ from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.compile import compile_change
 from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
 from airtruth.tracing.presentation.text import increment_words
-from airtruth.tracing.selection.acceptance import SUPERSEDED, Candidate
+from airtruth.tracing.selection.acceptance import Candidate
 from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.flown import flown
 from airtruth.tracing.selection.increment_fit import (
@@ -45,8 +45,10 @@ from airtruth.tracing.selection.increment_fit import (
 )
 from airtruth.tracing.selection.increments import log_evidences, screen, shapes, sharpened
 from airtruth.tracing.selection.pruning import pruned
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import Release
 from airtruth.tracing.selection.rounds import RoundStart, search_round
+from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.update import from_zero_alpha
 from airtruth.units import DEG
 
@@ -463,7 +465,7 @@ def test_an_increment_that_a_later_one_makes_redundant_is_named(order, expected)
     start = initial_parameters(problem, hypothesis)
     zero = np.zeros(order[0].bends + order[1].bends)
     found = fit(problem, hypothesis, Parameters(start.common, start.per_record, zero))
-    named = redundant_increment(problem, found, tried=70)
+    named = redundant_increment(SetTable(problem), found, tried=70)
     assert (named.key if named else None) == expected
 
 
@@ -485,7 +487,7 @@ def test_a_name_and_a_release_that_an_increment_makes_unnecessary_are_given_up(r
     point = Parameters(start.common, start.per_record, np.zeros(1 + NEEDED.bends))
     every = (named, EFFECTS["elevator_delay"])
     last = search_round(
-        problem, RoundStart(hypothesis, point, every[1:], scores_only=True), 2, 1, lambda step: None
+        SetTable(problem), RoundStart(hypothesis, point, every[1:], scores_only=True), 2, 1, lambda step: None
     )
     name, learned = (
         Candidate(
@@ -494,9 +496,9 @@ def test_a_name_and_a_release_that_an_increment_makes_unnecessary_are_given_up(r
         for e in (named, NEEDED)
     )
     before = tuple(replace(last, candidates=(c,), tied=(c,)) for c in (name, learned))
-    kept = pruned(problem, (*before, last), every, 1, 0.01, lambda step: None)
+    kept = pruned(SetTable(problem), (*before, last), every, 1, 0.01, lambda step: None)
     assert [[c.score.effect.key for c in r.tied] for r in kept] == [[], [NEEDED.key], []]
-    assert kept[0].candidates[0].reasons == (SUPERSEDED,)
+    assert kept[0].candidates[0].reasons == (Refusal.SUPERSEDED,)
     assert [e.key for e in kept[-1].null.hypothesis.effects] == [NEEDED.key]
     assert kept[-1].null.hypothesis.spread is None
     assert {s.effect.key for s in kept[-1].table.scores} == {"gyro_scale", "elevator_delay"}
@@ -505,13 +507,13 @@ def test_a_name_and_a_release_that_an_increment_makes_unnecessary_are_given_up(r
     # a set keeps what is left of it; where nothing is left of the answer's, no other one takes its place
     for sets, left in (((causes, bare), [("cg_shift",)]), ((bare, causes), None)):
         followed = replace(before[0], release=Release(last.declared_test, last.null, sets, 0.0))
-        first = pruned(problem, (followed, before[1], last), every, 1, 0.01, lambda step: None)[0]
+        first = pruned(SetTable(problem), (followed, before[1], last), every, 1, 0.01, lambda step: None)[0]
         if released or left is None:
             assert first.release is None
         else:
             assert [s.effects for s in first.release.sets] == left
     without = (replace(last, null=replace(last.null, hypothesis=tr.NOTHING)),)
-    assert pruned(problem, without, every, 1, 0.01, lambda step: None) is without
+    assert pruned(SetTable(problem), without, every, 1, 0.01, lambda step: None) is without
 
 
 NONE = np.zeros(0)

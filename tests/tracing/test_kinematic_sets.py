@@ -10,6 +10,7 @@ from scaled_records import disturbed_problem
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.inference.optimise import initial_parameters
 from airtruth.tracing.selection.search import search
+from airtruth.tracing.selection.set_table import SetTable
 
 CANDIDATES = tuple(EFFECTS[key] for key in ("gyro_scale", "vane_scale"))
 AGAIN = "round 1: refit without further effects"
@@ -25,7 +26,7 @@ def searched(problem, *causes):
     steps = []
     start = initial_parameters(problem, tr.NOTHING)
     sets = [frozenset(cause) for cause in causes]
-    rounds = search(problem, tr.NOTHING, start, CANDIDATES, 1, steps.append, causes=sets)
+    rounds = search(SetTable(problem), tr.NOTHING, start, CANDIDATES, 1, steps.append, causes=sets)
     keys = [e.key for e in rounds[-1].null.hypothesis.effects]
     return keys, rounds[-1].anomaly.p_value, steps.count(AGAIN)
 

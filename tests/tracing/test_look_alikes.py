@@ -14,11 +14,13 @@ from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.profile import relocated
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection import look_alikes
-from airtruth.tracing.selection.acceptance import OUTDONE, SURPASSED, Candidate
+from airtruth.tracing.selection.acceptance import Candidate
 from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.look_alikes import with_look_alikes
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import Release
 from airtruth.tracing.selection.rounds import RoundStart, search_round
+from airtruth.tracing.selection.set_table import SetTable
 
 TWIN = replace(GYRO, name="gyro_twin")
 LIBRARY = (VANE, GYRO, ACCELEROMETER, TWIN)
@@ -36,7 +38,7 @@ def scored(problem, *effects):
     keys = {e.key for e in effects}
     left = tuple(e for e in LIBRARY if e.key not in keys)
     begin = RoundStart(start.hypothesis, start.point, left, scores_only=True)
-    return search_round(problem, begin, len(effects), 1, lambda step: None)
+    return search_round(SetTable(problem), begin, len(effects), 1, lambda step: None)
 
 
 def candidate(problem, own, gain, reasons, *effects):
@@ -51,18 +53,18 @@ def test_ties_are_those_beside_the_other_effects(problem):
     vane = candidate(problem, first, 60.0, (), VANE)
     tied = candidate(problem, first, 58.0, (), ACCELEROMETER)
     gyro = candidate(problem, second, 50.0, (), VANE, GYRO)
-    twin = candidate(problem, second, 40.0, (SURPASSED,), VANE, TWIN)
+    twin = candidate(problem, second, 40.0, (Refusal.SURPASSED,), VANE, TWIN)
     rounds = (
         replace(first, candidates=(vane, tied), tied=(vane, tied)),
         replace(second, candidates=(gyro, twin), tied=(gyro,)),
         last,
     )
     steps = []
-    before, after, end = with_look_alikes(problem, rounds, LIBRARY, steps.append)
+    before, after, end = with_look_alikes(SetTable(problem), rounds, LIBRARY, steps.append)
     assert [c.score.effect.key for c in before.tied] == ["vane_scale"]
     assert {c.score.effect.key: c.reasons for c in before.candidates} == {
         "vane_scale": (),
-        "accelerometer_scale": (OUTDONE,),
+        "accelerometer_scale": (Refusal.OUTDONE,),
     }
     assert [c.score.effect.key for c in after.tied] == ["gyro_scale", "gyro_twin"]
     assert after.tied[1].gain == pytest.approx(50.0, abs=1e-3)
@@ -78,7 +80,7 @@ def test_a_single_effect_keeps_the_ties_of_its_round(problem):
     first, last = scored(problem), scored(problem, VANE)
     vane = candidate(problem, first, 60.0, (), VANE)
     rounds = (replace(first, candidates=(vane,), tied=(vane,)), last)
-    assert with_look_alikes(problem, rounds, LIBRARY, lambda step: None) is rounds
+    assert with_look_alikes(SetTable(problem), rounds, LIBRARY, lambda step: None) is rounds
 
 
 def test_every_release_that_was_followed_states_its_causes(problem):
@@ -132,7 +134,7 @@ def test_a_late_rival_is_followed_by_its_own_twin(problem, monkeypatch, near):
     start = RoundStart(
         fitted(problem, VANE).hypothesis, fitted(problem, VANE).point, library[1:], scores_only=True
     )
-    second = search_round(problem, start, 1, 1, lambda step: None)
+    second = search_round(SetTable(problem), start, 1, 1, lambda step: None)
     gyro = candidate(problem, second, 50.0, (), VANE, GYRO)
     tied = candidate(problem, second, 49.0, (), VANE, lag)
     first, last = scored(problem), scored(problem, VANE, GYRO)
@@ -143,5 +145,5 @@ def test_a_late_rival_is_followed_by_its_own_twin(problem, monkeypatch, near):
         last,
     )
     steps = []
-    with_look_alikes(problem, rounds, library, steps.append)
+    with_look_alikes(SetTable(problem), rounds, library, steps.append)
     assert ("sensor_delay:q_rad_s in place of gyro_scale beside the other effects" in steps) == near

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from airtruth.tracing.selection.replacement import Outcome, required_lead
+from airtruth.tracing.selection.outcome import Outcome, required_lead
 
 LEAD = 5.0
 MISFIT, REMAINS, CLEAN = 9e-7, 2e-6, 0.06

@@ -8,8 +8,8 @@ import pytest
 
 from airtruth.effects.increment import Shape, increment
 from airtruth.effects.registry import EFFECTS
-from airtruth.tracing.selection.acceptance import IMMATERIAL, OUTDONE
 from airtruth.tracing.selection.learn import chosen
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.rounds import Rival
 from airtruth.tracing.selection.weights import alike_in_rivals, rival_of, weights, with_rival
 
@@ -84,10 +84,10 @@ def test_ties_weigh_by_half_their_difference_in_2_log_l():
 def test_an_outdone_effect_has_the_weight_of_its_gain():
     """8 behind in 2 log L; not so where it fails a test, has not converged, or is within the ties that are listed already."""
     outdone = (
-        candidate("accelerometer_delay", 52.0, OUTDONE),
-        candidate("gyro_lag", 52.0, OUTDONE, IMMATERIAL),
-        candidate("gyro_scale", 52.0, OUTDONE, converged=False),
-        candidate("vane_scale", 56.0, OUTDONE),
+        candidate("accelerometer_delay", 52.0, Refusal.OUTDONE),
+        candidate("gyro_lag", 52.0, Refusal.OUTDONE, Refusal.IMMATERIAL),
+        candidate("gyro_scale", 52.0, Refusal.OUTDONE, converged=False),
+        candidate("vane_scale", 56.0, Refusal.OUTDONE),
     )
     found = weights([tied(accelerometer_lag=60.0, outdone=outdone)])
     assert found == pytest.approx(
@@ -98,7 +98,7 @@ def test_an_outdone_effect_has_the_weight_of_its_gain():
 def test_an_effect_that_a_later_round_accepts_is_no_rival_of_an_earlier_one():
     """It was outdone by 7 in 2 log L and then accepted beside the leader; neither explains the records alone."""
     found = weights(
-        [tied(vane_arm=60.0, outdone=[candidate("gyro_lag", 53.0, OUTDONE)]), tied(gyro_lag=50.0)]
+        [tied(vane_arm=60.0, outdone=[candidate("gyro_lag", 53.0, Refusal.OUTDONE)]), tied(gyro_lag=50.0)]
     )
     assert found == pytest.approx(
         {

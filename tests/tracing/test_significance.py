@@ -13,6 +13,7 @@ from airtruth.tracing.inference.robust import inflation
 from airtruth.tracing.selection import acceptance
 from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.search import search
+from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.selection.significance import (
     FAMILY_LEVEL,
     LATER_FAMILY_LEVEL,
@@ -45,7 +46,7 @@ def test_a_small_second_effect_is_accepted_unless_an_anomaly_is_beyond_doubt(gyr
     """Its gain is between the two limits of three candidates, 11.5 and 20.4."""
     problem = disturbed_problem([1.0, gyro, 1.15], 0, sinusoid_rad)
     start = initial_parameters(problem, tr.NOTHING)
-    rounds = search(problem, tr.NOTHING, start, CANDIDATES, 1)
+    rounds = search(SetTable(problem), tr.NOTHING, start, CANDIDATES, 1)
     (gain,) = (c.gain for c in rounds[1].candidates if c.score.effect.key == "gyro_scale")
     low, high = (significant_gain(3, level) for level in (LATER_FAMILY_LEVEL, MISFIT_FAMILY_LEVEL))
     assert low < gain < high
@@ -65,5 +66,5 @@ def test_with_one_or_two_records_the_variance_is_unbiased(count, unbiased, monke
     monkeypatch.setattr(acceptance, "inflation", spy)
     problem = disturbed_problem([1.0, 1.0, 1.15], 0, 0.0)
     problem = replace(problem, records=problem.records[:count])
-    search(problem, tr.NOTHING, initial_parameters(problem, tr.NOTHING), CANDIDATES, 1)
+    search(SetTable(problem), tr.NOTHING, initial_parameters(problem, tr.NOTHING), CANDIDATES, 1)
     assert set(asked) == {unbiased}

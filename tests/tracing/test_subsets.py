@@ -8,10 +8,11 @@ from scaled_records import ACCELEROMETER, GYRO, VANE, fitted, scaled_problem
 from scipy.optimize import minimize
 
 from airtruth.effects.registry import EFFECTS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.selection.explanation import REFERENCE
 from airtruth.tracing.selection.subsets import minima, subsets
 
-LIBRARY = tuple(e for e in EFFECTS.values() if not e.in_derivatives)
+LIBRARY = tuple(e for e in EFFECTS.values() if not e.in_derivatives and e.applies_to(LONGITUDINAL))
 
 
 @pytest.fixture(scope="module")

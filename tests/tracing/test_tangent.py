@@ -8,15 +8,16 @@ import trace_records as tr
 from scipy.signal import lsim, lti
 
 from airtruth.effects.increment import Memory, Shape, increment
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import Change, SensorTerm
+from airtruth.tracing.inference.direction import Direction, extended_by
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.records import FINE
 from airtruth.tracing.model.response import External, filter_inputs, respond_to
 from airtruth.tracing.model.tangent import FLOWN, POINTS, propagated, tangent_of
-from airtruth.tracing.selection.direction import Direction, extended_by
-from airtruth.tracing.selection.increment_inputs import Motion, sensitivities_to
+from airtruth.tracing.selection.increment_inputs import FlownMotion, sensitivities_to
 
 LATE = Change(sensors=(SensorTerm("q_rad_s", "lag", 0.03), SensorTerm("az_m_s2", "delay", 0.015)))
 """Sensors with a lag and a delay."""
@@ -154,7 +155,7 @@ def test_many_shapes_pass_in_blocks(null, monkeypatch):
 def test_memories_follow_the_motion():
     """A lag, a mode and a play of the elevator against `scipy.signal.lsim` and a loop, on the filter's own grid."""
     _, tangent = flown(*CASES["plain"])
-    motion = Motion(tangent)
+    motion = FlownMotion(tangent, LONGITUDINAL)
     surface = tangent.matrices.flown[:, :, FLOWN.index("elevator")]
     series = np.append(surface[:, 0], surface[-1, -1])
     t = np.arange(series.size) * tangent.h_s

@@ -56,7 +56,7 @@ def model(derivatives, level=LEVEL):
 def given(y, derivatives, grid, start):
     mean = ToyPoint(*(float(x.mean()) for x in grid))
     return KernelInput(
-        y, np.zeros_like(y), grid, np.empty(0), DT_S, SUB, start, 0.0, mean, model(derivatives)
+        y, np.zeros_like(y), grid, np.empty((0, 0)), DT_S, SUB, start, 0.0, mean, model(derivatives)
     )
 
 

@@ -11,6 +11,7 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.selection import absorbed
 from airtruth.tracing.selection.absorbed import refit_absorbed
 from airtruth.tracing.selection.score_test import table
+from airtruth.tracing.selection.set_table import SetTable
 from airtruth.units import DEG
 
 NAMES = ("vane_scale", "gyro_scale", "accelerometer_scale", "airspeed_scale", "vane_lag")
@@ -35,7 +36,7 @@ def refits(problem, most, monkeypatch):
     steps = []
     null = fitted(problem)
     scores = table(null, problem, CANDIDATES, null.whitener, 1)
-    return refit_absorbed(problem, null, scores, (), steps.append, either_sign=True), steps
+    return refit_absorbed(SetTable(problem), null, scores, (), steps.append, either_sign=True), steps
 
 
 def test_the_best_of_few_records_is_the_best_of_all(problem, monkeypatch):

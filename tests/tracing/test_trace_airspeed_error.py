@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from airtruth.tracing import TraceOptions
+from airtruth.tracing.calibration.airspeed_error import corrected, modes, with_corrected_airspeed
 from airtruth.tracing.inference.optimise import initial_parameters
 from airtruth.tracing.model.records import fine
 from airtruth.tracing.prepare import prepare
-from airtruth.tracing.selection.airspeed_error import corrected, modes, with_corrected_airspeed
 from validation import small_aircraft
 
 SEED = 61

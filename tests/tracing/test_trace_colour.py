@@ -10,11 +10,8 @@ import pytest
 import trace_records as tr
 from scipy.stats import norm
 
-from airtruth.tracing.inference.optimise import fit, initial_parameters
-from airtruth.tracing.model.parameters import SHORT_PERIOD
-from airtruth.tracing.prepare import Case
-from airtruth.tracing.selection import noise_colour
-from airtruth.tracing.selection.noise_colour import (
+from airtruth.tracing.calibration import noise_colour
+from airtruth.tracing.calibration.noise_colour import (
     LATER_LEVEL,
     LEVEL,
     TYPICAL,
@@ -23,6 +20,9 @@ from airtruth.tracing.selection.noise_colour import (
     share_slopes,
     with_coloured_noise,
 )
+from airtruth.tracing.inference.optimise import fit, initial_parameters
+from airtruth.tracing.model.parameters import SHORT_PERIOD
+from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.release import DeclaredCauses
 from airtruth.units import DEG
 

@@ -8,20 +8,17 @@ import trace_records as tr
 from scaled_records import ACCELEROMETER, GYRO, VANE, fitted, scaled_problem
 
 from airtruth.effects.registry import EFFECTS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.selection import ranking
-from airtruth.tracing.selection.acceptance import (
-    UNCONVERGED,
-    WORSE_FREE_RUN,
-    WORSE_LIKELIHOOD,
-    predicts_records_left_out,
-    untested,
-)
+from airtruth.tracing.selection.acceptance import predicts_records_left_out, untested
 from airtruth.tracing.selection.exchange import better_set, other_kinds
 from airtruth.tracing.selection.refit import Refit
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.rounds import scored_round
+from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.selection.significance import MISFIT_FAMILY_LEVEL, significant_gain
 
-LIBRARY = tuple(e for e in EFFECTS.values() if not e.in_derivatives)
+LIBRARY = tuple(e for e in EFFECTS.values() if not e.in_derivatives and e.applies_to(LONGITUDINAL))
 LEAST = significant_gain(33, MISFIT_FAMILY_LEVEL)
 
 
@@ -43,13 +40,13 @@ def reached(problem, first, second, rivals, scored=()):
     return (
         SimpleNamespace(tied=leaders[:1], candidates=leaders[:1]),
         SimpleNamespace(tied=leaders[1:], candidates=(leaders[1], *others)),
-        scored_round(problem, leaders[1].fit, scored, 2, 1, lambda step: None),
+        scored_round(SetTable(problem), leaders[1].fit, scored, 2, 1, lambda step: None),
     )
 
 
 def better_of(problem, *search):
     rounds = reached(problem, *search)
-    return better_set(problem, rounds, rounds[-1].null, LIBRARY, LEAST, lambda step: None)[0]
+    return better_set(SetTable(problem), rounds, rounds[-1].null, LIBRARY, LEAST, lambda step: None)
 
 
 @pytest.mark.slow
@@ -89,9 +86,12 @@ def test_what_remains_points_to_an_effect_that_makes_another_redundant(problem):
 @pytest.mark.slow
 def test_every_exchange_is_kept_for_the_look_alikes(problem):
     rounds = reached(problem, GYRO, VANE, [ACCELEROMETER])
-    better, fits = better_set(problem, rounds, rounds[-1].null, LIBRARY, LEAST, lambda step: None)
+    sets = SetTable(problem)
+    better = better_set(sets, rounds, rounds[-1].null, LIBRARY, LEAST, lambda step: None)
     assert better is None
-    assert ["gyro_scale", "accelerometer_scale"] in [[e.key for e in f.hypothesis.effects] for f in fits]
+    assert ["gyro_scale", "accelerometer_scale"] in [
+        [e.key for e in f.hypothesis.effects] for f in sets.exchanges(rounds[-1].null)
+    ]
 
 
 def test_late_members_are_late_in_another_way():
@@ -120,7 +120,9 @@ def test_one_late_member_has_its_rival_alone():
 @pytest.mark.slow
 def test_records_left_out_do_not_refuse_the_effect_that_leads(problem, monkeypatch):
     """Another effect that the set still lacks may make them worse; the other reasons remain."""
-    last = scored_round(problem, fitted(problem, GYRO), [VANE, ACCELEROMETER], 1, 1, lambda step: None)
+    last = scored_round(
+        SetTable(problem), fitted(problem, GYRO), [VANE, ACCELEROMETER], 1, 1, lambda step: None
+    )
     refits = [
         Refit(score, fitted(problem, GYRO, score.effect), 0.0)
         for score in sorted(last.table.scores, key=lambda s: -abs(s.z))
@@ -128,14 +130,16 @@ def test_records_left_out_do_not_refuse_the_effect_that_leads(problem, monkeypat
     first = refits[0].score.effect.key
 
     def refused(problem, score, own, gain, *rest):
-        return untested(score, own, gain, WORSE_LIKELIHOOD, WORSE_FREE_RUN, UNCONVERGED)
+        return untested(
+            score, own, gain, Refusal.WORSE_LIKELIHOOD, Refusal.WORSE_FREE_RUN, Refusal.UNCONVERGED
+        )
 
     monkeypatch.setattr(ranking, "assess_candidate", refused)
     free, *_ = ranking.rank(problem, last.null, refits, LEAST)
     led, *_ = ranking.rank(problem, last.null, refits, LEAST, leader=first)
     assert free.score.effect.key == led.score.effect.key == first
-    assert free.reasons == (WORSE_LIKELIHOOD, WORSE_FREE_RUN, UNCONVERGED)
-    assert led.reasons == (UNCONVERGED,)
+    assert free.reasons == (Refusal.WORSE_LIKELIHOOD, Refusal.WORSE_FREE_RUN, Refusal.UNCONVERGED)
+    assert led.reasons == (Refusal.UNCONVERGED,)
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.refit import redundant_effect
 from airtruth.tracing.selection.release import Release
 from airtruth.tracing.selection.rounds import RoundStart, search_round
+from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.selection.significance import significant_gain
 from airtruth.units import DEG
 
@@ -43,7 +44,7 @@ def test_an_effect_that_is_there_stays_and_one_that_is_not_goes(gyro, expected):
     problem, found = fitted(gyro, 1.1)
     std = np.sqrt(found.covariance[-2, -2])
     assert found.point.sizes[0] == pytest.approx(gyro - 1.0, abs=3.0 * std)
-    assert redundant_effect(problem, found, LEAST) == expected
+    assert redundant_effect(SetTable(problem), found, LEAST) == expected
 
 
 def test_an_immaterial_effect_goes_however_sure():
@@ -52,7 +53,7 @@ def test_an_immaterial_effect_goes_however_sure():
     for share, expected in ((0.99, 0), (1.01, None)):
         sizes = np.array([share * MATERIAL, found.point.sizes[1]])
         moved = replace(found, point=replace(found.point, sizes=sizes), cost=found.cost - 1e3)
-        assert redundant_effect(problem, moved, LEAST) == expected
+        assert redundant_effect(SetTable(problem), moved, LEAST) == expected
 
 
 @pytest.mark.grid
@@ -64,11 +65,11 @@ def test_a_finished_search_gives_up_an_effect_that_is_not_there(gyro, expected):
     problem, found = fitted(gyro, 1.1)
     candidates = (EARLIER, LATER, EFFECTS["vane_scale"])
     begin = RoundStart(found.hypothesis, found.point, candidates[2:], scores_only=True)
-    last = search_round(problem, begin, 2, 1, lambda step: None)
-    kept = pruned(problem, (last,), candidates, 1, 0.05, lambda step: None)
+    last = search_round(SetTable(problem), begin, 2, 1, lambda step: None)
+    kept = pruned(SetTable(problem), (last,), candidates, 1, 0.05, lambda step: None)
     assert [e.key for e in kept[-1].null.hypothesis.effects] == expected
     alone = (replace(last, null=replace(last.null, hypothesis=tr.NOTHING.plus(LATER))),)
-    assert pruned(problem, alone, candidates, 1, 0.05, lambda step: None) is alone
+    assert pruned(SetTable(problem), alone, candidates, 1, 0.05, lambda step: None) is alone
 
 
 @pytest.mark.grid
@@ -79,13 +80,13 @@ def test_derivatives_beside_names_need_strong_odds(odds, is_kept):
     wide = replace(right.hypothesis, spread=9.0 * np.diag(np.diag(problem.declared_covariance)))
     candidates = (EARLIER, LATER, EFFECTS["vane_scale"])
     begin = RoundStart(wide, right.point, candidates[2:], scores_only=True)
-    last = search_round(problem, begin, 2, 1, lambda step: None)
+    last = search_round(SetTable(problem), begin, 2, 1, lambda step: None)
     cost = right.cost - REFERENCE - np.log(odds)
     wrong = (CauseSet((), ("Cmq",), (), (), problem.declared_covariance, cost),)
     last = replace(last, sets=wrong, release=Release(last.declared_test, last.null, wrong, 0.0))
     accepted = (SimpleNamespace(score=SimpleNamespace(effect=e), gain=100.0) for e in (EARLIER, LATER))
     before = tuple(replace(last, tied=(c,), candidates=()) for c in accepted)
-    kept = pruned(problem, (*before, last), candidates, 1, 0.05, lambda step: None)
+    kept = pruned(SetTable(problem), (*before, last), candidates, 1, 0.05, lambda step: None)
     assert (kept[-1] is last) == is_kept
     if not is_kept:
         assert kept[-1].null.hypothesis.spread is None

@@ -11,16 +11,18 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 
 from airtruth import quantity as qt
 from airtruth.aircraft.model import JsbsimModel
+from airtruth.aircraft.parts import Fin, Tail, Wing
 from airtruth.aircraft.probe import Constants
 from airtruth.channels import SIGNALS
 from airtruth.errors import choices
 from airtruth.physics import terms
 from airtruth.physics.motion import MOTIONS, Motion
 from airtruth.physics.sensor_errors import KINDS, SensorErrors
-from airtruth.physics.short_period import PARAMETERS
 from airtruth.physics.terms import AeroTerm, ReadingTerm, StateTerm, SurfaceTerm
 from airtruth.quantity import Quantity, Strict
 
+DERIVATIVES: Final = tuple(name for motion in MOTIONS.values() for name in motion.parameters)
+"""Names in the table [derivatives]."""
 FILE: Final = "aircraft.toml"
 """Name of the file that makes a folder an aircraft."""
 
@@ -118,26 +120,6 @@ class MassProperties(Strict):
         return self
 
 
-class Tail(Strict):
-    """Horizontal tail; an entry that is not stated is inferred from the derivatives.
-
-    arm: distance from the CG aft to the tail's aerodynamic centre; area: exposed to the stream; lift_slope: of the
-    isolated tail per its area [1/rad]; efficiency: dynamic pressure at the tail over that of the free stream.
-    """
-
-    arm: qt.Length | None = None
-    area: qt.Area | None = None
-    lift_slope: qt.Ratio | None = None
-    efficiency: qt.Ratio = Quantity(value=1.0)
-
-    @model_validator(mode="after")
-    def _complete(self) -> Tail:
-        qt.require_positive(self, type(self).model_fields)
-        if (self.area is None) != (self.lift_slope is None):
-            raise ValueError("area and lift_slope give the lift of the tail together; state both or neither")
-        return self
-
-
 class Dynamics(Strict):
     """Dynamics of the JSBSim model that its forces in a steady state do not show; a trace adds them to its filter.
 
@@ -209,9 +191,8 @@ def _of_any(of: Callable[[Motion], tuple[str, ...]]) -> tuple[str, ...]:
 class AircraftFile(Strict):
     """aircraft.toml.
 
-    derivatives: the six short-period derivatives about the CG, by the names of
-    `airtruth.physics.short_period.PARAMETERS`, with their uncertainty. Where there is a JSBSim model its
-    own values count, and only the ratio std/value is taken from here.
+    derivatives: those of any motion about the CG, by their names (`airtruth.physics.motion`), with their
+    uncertainty. Where there is a JSBSim model its own values count, and only the ratio std/value is taken from here.
     """
 
     schema_: Literal[1] = Field(default=1, alias="schema")
@@ -220,6 +201,8 @@ class AircraftFile(Strict):
     geometry: Geometry | None = None
     mass: MassProperties | None = None
     tail: Tail | None = None
+    fin: Fin | None = None
+    wing: Wing | None = None
     jsbsim: JsbsimModel | None = None
     elevator_actuator: Actuator | None = None
     aileron_actuator: Actuator | None = None
@@ -232,8 +215,8 @@ class AircraftFile(Strict):
     @classmethod
     def _known_derivatives(cls, value: dict[str, Quantity]) -> dict[str, Quantity]:
         for name in value:
-            if name not in PARAMETERS:
-                raise ValueError(f"{name!r} is not a derivative; {choices(name, PARAMETERS)}")
+            if name not in DERIVATIVES:
+                raise ValueError(f"{name!r} is not a derivative; {choices(name, DERIVATIVES)}")
         control = value.get("Cmde")
         if control is not None and control.value > 0.0:
             raise ValueError(

@@ -18,6 +18,7 @@ _UNITS: Final = {
     "chord": "m",
     "span": "m",
     "arm": "m",
+    "height": "m",
     "area": "m2",
     "mass": "kg",
     "inertia_yy": "kg_m2",

@@ -14,10 +14,9 @@ from airtruth import aircraft as planes
 from airtruth.aircraft import Aircraft, AircraftFile, JsbsimModel
 from airtruth.aircraft import toml as toml_text
 from airtruth.aircraft.dynamics import with_change
-from airtruth.aircraft.jsbsim import aerodynamics as aerodynamics_xml
+from airtruth.aircraft.jsbsim import changes as changes_xml
 from airtruth.aircraft.jsbsim import files as model_files
 from airtruth.aircraft.jsbsim import mass_balance as declared_xml
-from airtruth.aircraft.jsbsim import surface as surface_xml
 from airtruth.aircraft.jsbsim.mass_balance import Masses
 from airtruth.aircraft.neutral import effective, fitted
 from airtruth.aircraft.origin import MARK, UNKNOWN, Origin, Term, number_of
@@ -27,9 +26,16 @@ from airtruth.logs import ledger
 from airtruth.logs.atomic import new_folder
 from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.resolution import linear_terms
-from airtruth.physics.terms import AeroTerm, Change, declared_total
+from airtruth.physics.terms import DECLARED, AeroTerm, Change, declared_total
 
-_QUANTITIES: Final = {"mass": "mass", "inertia_yy": "inertia", "cg": "cg"}
+_QUANTITIES: Final = {
+    "mass": "mass",
+    "inertia_yy": "inertia",
+    "inertia_xx": "inertia_xx",
+    "inertia_zz": "inertia_zz",
+    "inertia_xz": "inertia_xz",
+    "cg": "cg",
+}
 """Entry of [mass] -> quantity of a `DeclaredTerm`."""
 HIGHEST_HZ: Final = 400.0
 """Simulation rate up to which a written delay holds, unless another is asked for [Hz]."""
@@ -197,42 +203,18 @@ def _write_model(
     root, where = read.root, f"{plane.name} ({read.source.name})"
     constants = plane.constants
     masses = Masses(
-        mass_kg=constants.mass_kg, inertia_kg_m2=constants.inertia_yy_kg_m2, chord_m=constants.chord_m
+        mass_kg=constants.mass_kg,
+        inertia_kg_m2=constants.inertia_yy_kg_m2,
+        chord_m=constants.chord_m,
+        inertia_xx_kg_m2=constants.inertia_xx_kg_m2,
+        inertia_zz_kg_m2=constants.inertia_zz_kg_m2,
     )
     declared_xml.write(root, change.declared, masses, where)
-    _write_functions(root, model, change.in_motion, where, highest_hz, origin)
+    changes_xml.write(root, model, change.in_motion, where, highest_hz, origin)
     if change.in_aircraft or change.readings:
         declared = [f"{t.quantity}: {number_of(t)!r}{origin.words(t)}" for t in change.declared]
         _document(root, [*heading.splitlines(), *declared])
     model_files.write(read, out / f"{out.name}.xml")
-
-
-def _write_functions(
-    root: Element, model: JsbsimModel, change: Change, where: str, highest_hz: float, origin: Origin
-) -> None:
-    factor = declared_total(change.declared, "elevator")
-    moved = bool(change.surface) or factor != 1.0
-    if not moved and not change.aero:
-        return
-    aerodynamics = root.find("aerodynamics")
-    if aerodynamics is None:
-        raise AircraftError(f"{where}: the model has no <aerodynamics>")
-    named = surface_xml.names(root, model.elevator.surface)
-    surface = surface_xml.Surface(named, model.elevator.surface_rad, moved)
-    components = surface_xml.Components()
-    if moved:
-        components += surface_xml.chain(surface, change.surface, factor, highest_hz, origin)
-        components += surface_xml.redirect(aerodynamics, named, where)
-    if change.aero:
-        components += aerodynamics_xml.write(
-            aerodynamics, change.aero, change.states, surface, model.rotary_gust, origin, where
-        )
-    if not components.parts:
-        return
-    control = root.find("flight_control")
-    if control is None:
-        control = SubElement(root, "flight_control", {"name": "Effects"})
-    control.extend(surface_xml.channel(components))
 
 
 def _document(root: Element, lines: Sequence[str]) -> None:
@@ -253,25 +235,27 @@ def _changed_file(plane: Aircraft, change: Change, model_name: str, origin: Orig
         updates["jsbsim"] = file.jsbsim.model_copy(update={"model": model_name, "root": "."})
     if file.mass is not None:
         old = file.mass
-        values = {
-            "mass": old.mass.value * declared_total(change.declared, "mass"),
-            "inertia_yy": old.inertia_yy.value * declared_total(change.declared, "inertia"),
-            "cg": old.cg.value + shift,
-        }
-        scales = {"mass": old.mass.value, "inertia_yy": old.inertia_yy.value, "cg": 1.0}
-        moved = {
-            key: origin.stated(getattr(old, key), value, origin.std_of(_QUANTITIES[key], scales[key]))
-            for key, value in values.items()
-            if value != getattr(old, key).value
-        }
+        product = math.sqrt(plane.constants.inertia_xx_kg_m2 * plane.constants.inertia_zz_kg_m2)
+        moved = {}
+        for key, quantity in _QUANTITIES.items():
+            stated = getattr(old, key)
+            if stated is None:
+                continue
+            total, unit = declared_total(change.declared, quantity), product if key == "inertia_xz" else 1.0
+            is_factor = DECLARED[quantity] == 1.0
+            value = stated.value * total if is_factor else stated.value + unit * total
+            if value != stated.value:
+                std = origin.std_of(quantity, stated.value if is_factor else unit)
+                moved[key] = origin.stated(stated, value, std)
         if moved:
             updates["mass"] = old.model_copy(update=moved)
-    if shift and file.tail is not None and file.tail.arm is not None:
-        arm = file.tail.arm
+    for name, part in (("tail", file.tail), ("fin", file.fin)):
+        if not shift or part is None or part.arm is None:
+            continue
         std = origin.std_of("cg", plane.chord_m)
-        both = None if std is None else math.hypot(arm.std, std)
-        shorter = origin.stated(arm, arm.value - shift * plane.chord_m, both)
-        updates["tail"] = file.tail.model_copy(update={"arm": shorter})
+        both = None if std is None else math.hypot(part.arm.std, std)
+        shorter = origin.stated(part.arm, part.arm.value - shift * plane.chord_m, both)
+        updates[name] = part.model_copy(update={"arm": shorter})
     dynamics = with_change(file.dynamics, change)
     if dynamics is not None:
         updates["dynamics"] = dynamics

@@ -60,7 +60,7 @@ class TraceTask:
     @property
     def answers(self) -> tuple[Path, ...]:
         """Files of the result that are there, that of a second motion in the folder of its name."""
-        from airtruth.tracing.motions import FOLDERS
+        from airtruth.physics.motion import FOLDERS
 
         each = (self.answer, *(self.out / name / self.answer.name for name in FOLDERS[1:]))
         return tuple(path for path in each if path.is_file())

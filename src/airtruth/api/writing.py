@@ -53,7 +53,7 @@ def trace_outputs(
     if out is None:
         yield declared
         return
-    from airtruth.tracing.motions import FOLDERS
+    from airtruth.physics.motion import FOLDERS
 
     with writing(command, [*log_files(logs), *aircraft_files(declared)], force=force) as outputs:
         for name in FOLDERS:

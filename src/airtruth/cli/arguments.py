@@ -103,7 +103,9 @@ Replace = Annotated[
 ]
 Model = Annotated[
     TraceModel,
-    typer.Option("--model", help="aircraft: forces probed in JSBSim; linear: the linear short-period model."),
+    typer.Option(
+        "--model", help="aircraft: forces probed in JSBSim; linear: the linear model of the motion."
+    ),
 ]
 HeldOut = Annotated[
     list[str] | None,

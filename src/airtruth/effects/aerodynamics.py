@@ -1,9 +1,9 @@
-"""Effects in the aerodynamics: nonlinear and unsteady lift and pitching moment."""
+"""Effects in the aerodynamics: nonlinear and unsteady lift and moments."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Final, Literal
 
 from airtruth.effects.effect import Effect, Parameter
@@ -33,6 +33,17 @@ def _cl_break(values: Values) -> Change:
 
 def _cl_quadratic(values: Values) -> Change:
     return Change(aero=(AeroTerm("CL", "alpha", "quadratic", values["CLalpha2"]),))
+
+
+def _beta_break(coefficient: str, slope: str) -> Callable[[Values], Change]:
+    """A change of slope beyond an angle of sideslip to either side."""
+
+    def describe(values: Values) -> Change:
+        amount, at = values[slope], values["at_beta_rad"]
+        sides: tuple[tuple[Literal["above", "below"], float], ...] = (("above", at), ("below", -at))
+        return Change(aero=tuple(AeroTerm(coefficient, "beta", shape, amount, x) for shape, x in sides))
+
+    return describe
 
 
 def _downwash(values: Values) -> Change:
@@ -73,6 +84,19 @@ _AT_ALPHA: Final = Parameter(
     step=5e-3,
 )
 """Break of a slope: from below zero lift to the stall of a wing of moderate aspect ratio (judgement)."""
+
+
+_AT_BETA: Final = Parameter(
+    "at_beta_rad",
+    "rad",
+    "magnitude of the sideslip from which the slope changes",
+    low=0.01,
+    high=0.3,
+    material=0.0,
+    is_location=True,
+    step=5e-3,
+)
+"""Break of a slope over the sideslip, the same to both sides (judgement: from what noise leaves to a stalled fin)."""
 
 
 def _slope(
@@ -251,6 +275,46 @@ EFFECTS: Final = (
         "quasi-steady part in Cmalpha. A damping ratio of at most 0.2 (judgement): a mode with more is a lag, which is not "
         "a structure or a liquid.",
         distinguished_by="A sweep or multisine through its frequency.",
+    ),
+    Effect(
+        name="cn_beta_nonlinear",
+        variant="break",
+        where="dynamics",
+        parameters=(
+            _slope(
+                "dCnbeta",
+                "change of Cnbeta beyond the break, to both sides [1/rad]",
+                1.0,
+                0.01,
+                0.01,
+                "Cnbeta",
+            ),
+            _AT_BETA,
+        ),
+        describe=_beta_break("Cn", "dCnbeta"),
+        explanation="Weathercock stability changes at a sideslip: the fin stalls, or leaves the wake of the fuselage.",
+        source="Cn += dCnbeta (max(0, beta - at) + min(0, beta + at)). Material: 5 % of the GTM's Cnbeta of 0.22.",
+        distinguished_by="Two amplitudes; records beyond the break locate it.",
+    ),
+    Effect(
+        name="cl_beta_nonlinear",
+        variant="break",
+        where="dynamics",
+        parameters=(
+            _slope(
+                "dClbeta",
+                "change of Clbeta beyond the break, to both sides [1/rad]",
+                1.0,
+                0.01,
+                0.01,
+                "Clbeta",
+            ),
+            _AT_BETA,
+        ),
+        describe=_beta_break("Cl", "dClbeta"),
+        explanation="The rolling moment due to sideslip changes its slope: the flow over the windward wing separates.",
+        source="Cl += dClbeta (max(0, beta - at) + min(0, beta + at)). Material: 7 % of the GTM's Clbeta of -0.14.",
+        distinguished_by="Two amplitudes; records beyond the break locate it.",
     ),
 )
 """Effects of this module."""

@@ -1,7 +1,7 @@
-"""Effects that move several derivatives together: tail, wing, flow, ice, and the derivatives themselves.
+"""Effects that move several derivatives together: tail, wing, fin, flow, ice, and the derivatives themselves.
 
-Each is a `DerivativeTerm`; `airtruth.physics.composition` gives the direction of the six derivatives per unit of it. The
-priors are judgement: tail and wing that lose lift rather than gain it, and the accuracy of first-order contributions.
+Each is a `DerivativeTerm`; `airtruth.physics.composition` gives the direction of the derivatives per unit of it. The
+priors are judgement: parts that lose lift rather than gain it, and the accuracy of first-order contributions.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def _caused(cause: str, parameter: str) -> Callable[[Values], Change]:
 
 
 def _shifted(values: Values) -> Change:
-    terms = (DerivativeTerm(name.removeprefix("d"), x) for name, x in values.items() if x != 0.0)
+    terms = (DerivativeTerm(name[1:], x) for name, x in values.items() if x != 0.0)
     return Change(derivatives=tuple(terms))
 
 
@@ -44,6 +44,83 @@ def _shift(name: str, reach: float, material: float) -> Parameter:
         default=0.0,
     )
 
+
+def _tip(side: str, variant: str) -> Effect:
+    return Effect(
+        name="wing_tip_loss",
+        variant=variant,
+        where="declared",
+        parameters=(
+            Parameter(
+                "fraction",
+                "-",
+                f"part of the {side} semispan that is lost",
+                low=0.0,
+                high=0.5,
+                material=0.02,
+                one_sided=True,
+                step=1e-3,
+            ),
+        ),
+        describe=_caused(f"{side}_wing_tip", "fraction"),
+        explanation=f"The {side} wing tip is lost: roll damping and dihedral effect fall, the {side} aileron with them, the "
+        "aircraft rolls to that side at rest, and the CG moves away from it.",
+        source=f"Strip theory; {_LATERAL}, section 5.7. Taper, ailerons and mass of the wing are those of [wing] in "
+        "aircraft.toml. Exact for a fifth of the semispan, linear in the loss. Material: 2 % of the semispan, a change of "
+        "Clp by 3 %.",
+        distinguished_by="Roll damping falls with the aileron; aileron_effectiveness leaves Clp as it is. The rolling moment "
+        "at rest grows with the lift.",
+        in_derivatives=True,
+        prior=Prior(0.15, 0.0, 0.5, shape=0.3, log_odds=-4.0),
+    )
+
+
+def _of_one(name: str, derivative: str, reach: float, material: float, words: tuple[str, str, str]) -> Effect:
+    """A change of one derivative with a name of its own; its parameter is d and the derivative."""
+    explanation, source, distinguished_by = words
+    parameter = Parameter(
+        f"d{derivative}",
+        "-",
+        f"change of {derivative} [1/rad]",
+        low=-reach,
+        high=reach,
+        material=material,
+        step=material,
+    )
+    return Effect(
+        name=name,
+        where="declared",
+        parameters=(parameter,),
+        describe=_caused(derivative, parameter.name),
+        explanation=explanation,
+        source=source,
+        distinguished_by=distinguished_by,
+        in_derivatives=True,
+        prior=Prior(10.0 * material, -reach, reach, log_odds=-4.0),
+    )
+
+
+_LATERAL: Final = "Etkin and Reid, Dynamics of Flight, 3rd ed., 1996"
+"""Source of the contributions of fin and wing to the lateral derivatives."""
+_REACHES: Final = {
+    "CYbeta": (3.0, 0.05),
+    "CYp": (1.0, 0.05),
+    "CYr": (3.0, 0.09),
+    "CYda": (0.5, 0.005),
+    "CYdr": (1.0, 0.02),
+    "Clbeta": (0.5, 0.01),
+    "Clp": (1.0, 0.02),
+    "Clr": (0.5, 0.015),
+    "Clda": (0.5, 0.004),
+    "Cldr": (0.2, 0.003),
+    "Cnbeta": (0.5, 0.01),
+    "Cnp": (0.5, 0.01),
+    "Cnr": (1.0, 0.03),
+    "Cnda": (0.2, 0.002),
+    "Cndr": (0.5, 0.01),
+}
+"""Lateral derivative -> largest and material change [1/rad] (judgement: 5 to 10 % of the GTM's, or of the largest of its
+coefficient)."""
 
 EFFECTS: Final = (
     Effect(
@@ -148,6 +225,56 @@ EFFECTS: Final = (
         source="Increments of the derivatives about the trim. Material: 3 to 6 % of the GTM's derivatives, 15 % of its "
         "CLq.",
         distinguished_by="A cause with fewer parameters explains the same shifts if there is one: mass, CG, tail, wing.",
+        in_derivatives=True,
+    ),
+    Effect(
+        name="fin_effectiveness",
+        where="declared",
+        parameters=(factor("on the side force of the fin and its rudder", 0.0, 1.6, 0.03),),
+        describe=_caused("fin", "factor"),
+        explanation="The fin has more or less side force than declared: part of it is lost, iced, or in the wake of the "
+        "fuselage.",
+        source=f"Contribution of the fin to CY, Cl and Cn of beta, p and r, and of a rudder on it, times factor; {_LATERAL}, "
+        "sections 5.5 to 5.8. Arm, height and lift slope are those of [fin] in aircraft.toml, or inferred from Cndr/CYdr, "
+        "Cldr/CYdr and Cnr. Material: 3 %, a change of Cnbeta by 5 %.",
+        distinguished_by="Cnbeta and Cnr change together; an error of the yaw inertia scales Cndr by the same share.",
+        in_derivatives=True,
+        prior=Prior(0.3, -1.0, 0.05, shape=0.25),
+    ),
+    _tip("left", ""),
+    _tip("right", "right"),
+    _of_one(
+        "adverse_yaw",
+        "Cnda",
+        0.2,
+        0.002,
+        (
+            "The ailerons yaw the aircraft more or less than declared: another differential, or spoilers.",
+            "Cn += dCnda aileron. Material: 3 % of the GTM's Clda of -0.07.",
+            "A rudder that is held still, and both senses of the aileron.",
+        ),
+    ),
+    _of_one(
+        "dihedral",
+        "Clbeta",
+        0.5,
+        0.01,
+        (
+            "The rolling moment due to sideslip differs from the declared one: elastic wings, fuel, another sweep.",
+            "Cl += dClbeta beta. Material: 7 % of the GTM's Clbeta of -0.14.",
+            "Steady sideslips, and rudder inputs at a constant aileron.",
+        ),
+    ),
+    Effect(
+        name="derivatives",
+        variant="lateral",
+        where="declared",
+        parameters=tuple(_shift(name, *reach) for name, reach in _REACHES.items()),
+        describe=_shifted,
+        explanation="Lateral derivatives differ from the declared ones, for a cause that the library does not contain.",
+        source="Increments of the derivatives about the trim. Material: 5 to 10 % of the GTM's derivatives, or of the largest "
+        "of the same coefficient.",
+        distinguished_by="A cause with fewer parameters explains the same shifts if there is one: fin, wing tip, inertia, CG.",
         in_derivatives=True,
     ),
 )

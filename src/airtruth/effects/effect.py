@@ -11,7 +11,7 @@ from airtruth.channels import SIGNALS
 from airtruth.errors import ConfigurationError, choices
 from airtruth.physics.composition import PARTS
 from airtruth.physics.motion import MOTIONS, Motion
-from airtruth.physics.terms import LATE, Change
+from airtruth.physics.terms import LATE, Change, coefficients_of
 from airtruth.quantity import LARGEST
 from airtruth.units import UNITS, printed
 
@@ -21,8 +21,12 @@ GTM: Final[Mapping[str, float]] = {
     "Cmalpha": 1.785,
     "Cmq": 41.2,
     "Cmde": 1.787,
+    "Clbeta": 0.140,
+    "Clda": 0.0718,
+    "Cnbeta": 0.219,
 }
-"""Magnitudes of the derivatives for which material sizes are stated (aircraft/gtm/aircraft.toml) [-]."""
+"""Magnitudes of the derivatives for which material sizes are stated (aircraft/gtm/aircraft.toml; lateral ones of the JSBSim
+model) [-]."""
 _LEAST_RATIO: Final = 0.1
 """Least ratio of a derivative to that of the GTM by which a material size scales [-] (judgement: a derivative near zero is no
 measure of what matters)."""
@@ -179,7 +183,7 @@ class Effect:
     source : equation with its source, and the reason of the material size.
     variant : name of the variant, "" if there is only one.
     distinguished_by : manoeuvre or sensor that separates it from effects with a similar response, as a sentence.
-    in_derivatives : whether it changes the six derivatives alone, by an amount that depends on the aircraft at its trim
+    in_derivatives : whether it changes the derivatives of a motion, by an amount that depends on the aircraft at its trim
         (`airtruth.physics.terms.DerivativeTerm`).
     prior : of an effect that explains changed derivatives; None of any other.
     event : what moves it together with other effects of the same event; empty for an effect of its own.
@@ -231,7 +235,7 @@ class Effect:
 
     @property
     def late_signal(self) -> str:
-        """Channel whose reading it delays, or "surface"; empty for any other effect. Its size is a time [s]."""
+        """Channel whose reading it delays, or "surface" of its control; empty for any other effect. Its size is a time [s]."""
         change = self._example
         if any(term.kind in LATE for term in change.surface):
             return "surface"
@@ -243,10 +247,23 @@ class Effect:
         return self.variant if self.variant in SIGNALS else None
 
     def applies_to(self, motion: Motion) -> bool:
-        """Whether every name in its terms is one of a motion."""
-        names = self._example.names()
+        """Whether every name in its terms is one of a motion, and every error of a sensor one that the motion shows.
+
+        Of a known input, that is an error of what every motion knows, or one that an output of the motion brings about.
+        """
+        example = self._example
+        names = example.names()
+        seen = {*motion.channels, *set.intersection(*(set(m.known) for m in MOTIONS.values()))}
+        shown = all(t.channel in seen or t.rate in motion.output_channels for t in example.sensors)
         parts = names & PARTS.keys()
-        return names - parts <= motion.names and all(PARTS[name].motion == motion.name for name in parts)
+        known = motion.names | set(coefficients_of(motion))
+        of_motion = all(PARTS[name].motion == motion.name for name in parts)
+        return shown and names - parts <= known and of_motion
+
+    @property
+    def motions(self) -> tuple[str, ...]:
+        """Names of the motions to which it applies."""
+        return tuple(name for name, motion in MOTIONS.items() if self.applies_to(motion))
 
     def change(self, values: Mapping[str, float]) -> Change:
         """Return the terms that the effect changes at these values.

@@ -28,11 +28,12 @@ def as_json(effects: Iterable[Effect]) -> str:
 
 def as_markdown(effects: Iterable[Effect]) -> str:
     """A table with one row per parameter: meaning, range, and the smallest material value."""
-    rows = ["| effect | parameter | meaning | range | material from |", "|---|---|---|---|---|"]
+    rows = ["| effect | motion | parameter | meaning | range | material from |", "|---|---|---|---|---|---|"]
     for effect in effects:
         for number, p in enumerate(effect.parameters):
             cells = (
                 "" if number else f"`{effect.key}`",
+                "" if number else ", ".join(effect.motions),
                 f"`{p.name}`",
                 p.meaning,
                 f"{p.low:g} to {p.high:g}{_unit(p)}",
@@ -43,7 +44,7 @@ def as_markdown(effects: Iterable[Effect]) -> str:
 
 
 def _paragraph(effect: Effect) -> str:
-    lines = [f"{effect.key}  ({effect.where})"]
+    lines = [f"{effect.key}  ({', '.join((effect.where, *effect.motions))})"]
     lines += [f"  {_parameter(p)}" for p in effect.parameters]
     paragraphs = (
         ("", effect.explanation),

@@ -1,4 +1,4 @@
-"""Errors in declared mass properties, elevator effectiveness and thrust line.
+"""Errors in declared mass properties, effectiveness of controls and thrust.
 
 The priors are judgement: usual errors of declarations.
 """
@@ -24,18 +24,47 @@ def _change(quantity: str, parameter: str) -> Callable[[Values], Change]:
     return describe
 
 
-EFFECTS: Final = (
-    Effect(
-        name="elevator_effectiveness",
+_KNOWN_BY: Final = {
+    "elevator": ("Cmde", "CLde"),
+    "aileron": ("Clda", "Cnda"),
+    "rudder": ("Cndr", "CYdr"),
+}
+"""Control -> derivatives whose declared accuracy limits what is known of its effectiveness."""
+
+
+def _effectiveness(control: str) -> Effect:
+    first, second = _KNOWN_BY[control]
+    return Effect(
+        name=f"{control}_effectiveness",
         where="declared",
-        parameters=(factor("on the forces and moments of the elevator", 0.3, 2.0, 0.05),),
-        describe=_change("elevator", "factor"),
-        explanation="The elevator is more or less effective than declared: damage, a gap, an error of gearing.",
-        source="Forces and moments of the elevator times factor; written as deflection times factor, exact where they "
-        "are linear in it. Material: 5 %, the usual uncertainty of a wind-tunnel Cmde.",
-        distinguished_by="It is known only as accurately as Cmde and CLde are declared.",
+        parameters=(factor(f"on the forces and moments of the {control}", 0.3, 2.0, 0.05),),
+        describe=_change(control, "factor"),
+        explanation=f"The {control} is more or less effective than declared: damage, a gap, an error of gearing.",
+        source=f"Forces and moments of the {control} times factor; written as deflection times factor, exact where they "
+        f"are linear in it. Material: 5 %, the usual uncertainty of a wind-tunnel {first}.",
+        distinguished_by=f"It is known only as accurately as {first} and {second} are declared.",
         prior=Prior(0.3, -0.7, 1.0),
-    ),
+    )
+
+
+def _inertia(axis: str, motion: str, moment: str) -> Effect:
+    return Effect(
+        name="inertia_error",
+        variant=f"i{axis}",
+        where="declared",
+        parameters=(factor(f"on the {motion} inertia", 0.6, 1.6, 0.05),),
+        describe=_change(f"inertia_{axis}", "factor"),
+        explanation=f"The {motion} inertia differs from the declared one.",
+        source="Euler's equations. Material: 5 %, the accuracy of a swing test.",
+        distinguished_by=f"It scales the derivatives of {moment} together, and is known only as accurately as they are "
+        "declared.",
+        prior=Prior(0.15, -0.4, 0.6),
+        event=LOADING,
+    )
+
+
+EFFECTS: Final = (
+    *(_effectiveness(control) for control in _KNOWN_BY),
     Effect(
         name="mass_error",
         where="declared",
@@ -100,6 +129,74 @@ EFFECTS: Final = (
         explanation="The thrust line is lower (nose-up) or higher than declared.",
         source="M += arm T. Material: 2 cm on a model of the GTM's size.",
         distinguished_by="Change the thrust during the record: the trim absorbs the moment of a constant thrust.",
+    ),
+    _inertia("xx", "roll", "Cl"),
+    _inertia("zz", "yaw", "Cn"),
+    Effect(
+        name="inertia_error",
+        variant="ixz",
+        where="declared",
+        parameters=(
+            Parameter(
+                "shift",
+                "-",
+                "increment of the product of inertia Ixz over the square root of Ixx Izz",
+                low=-0.3,
+                high=0.3,
+                material=0.02,
+                step=1e-3,
+            ),
+        ),
+        describe=_change("inertia_xz", "shift"),
+        explanation="The product of inertia differs from the declared one: the principal axes are inclined to the body axes "
+        "by another angle.",
+        source="Euler's equations; Ixz is the integral of x z dm. Material: 0.02, one degree of inclination of the GTM's "
+        "axes.",
+        distinguished_by="It couples roll and yaw both ways; adverse yaw and Clr couple one way.",
+        prior=Prior(0.05, -0.3, 0.3, log_odds=-4.0),
+        event=LOADING,
+    ),
+    Effect(
+        name="cg_shift_y",
+        where="declared",
+        parameters=(
+            Parameter(
+                "dy_m",
+                "m",
+                "CG to the right of its declared position",
+                low=-1.0,
+                high=1.0,
+                material=0.01,
+                step=1e-3,
+                spans=0.1,
+            ),
+        ),
+        describe=_change("cg_y", "dy_m"),
+        explanation="The centre of gravity is beside the plane of symmetry: a lost part, or fuel on one side.",
+        source="Moment transfer: L += dy q_bar S CL, N grows with the axial force; Etkin and Reid, Dynamics of Flight, 3rd "
+        "ed., 1996, ch. 2. Material: 1 cm, half a percent of the GTM's span.",
+        distinguished_by="The rolling moment at rest grows with the load factor; that of a rigging error does not.",
+        event=LOADING,
+    ),
+    Effect(
+        name="thrust_asymmetry",
+        where="declared",
+        parameters=(
+            Parameter(
+                "moment_n_m",
+                "n_m",
+                "constant yawing moment, nose right",
+                low=-5e4,
+                high=5e4,
+                material=0.5,
+                step=0.05,
+            ),
+        ),
+        describe=_change("yaw_moment", "moment_n_m"),
+        explanation="The thrust of one side differs from that of the other.",
+        source="N += moment. Material: 0.5 N m, which the rudder of the GTM holds with 0.2 deg.",
+        distinguished_by="Change the thrust or the airspeed during the record: a rudder out of rig grows with the dynamic "
+        "pressure.",
     ),
 )
 """Effects of this module."""

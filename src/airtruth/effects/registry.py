@@ -94,7 +94,8 @@ def named(name: str) -> list[Effect]:
 def chosen(name: str, variant: str = "", keys: Iterable[str] = ()) -> Effect:
     """Return one effect by name and variant.
 
-    The variant may be omitted if there is only one, or if a single variant has a parameter for each of ``keys``.
+    The variant may be omitted if there is only one, if a single variant has a parameter for each of ``keys``, or if one has no
+    name: that of the elevator, of the pitch plane or of the left side.
 
     Parameters
     ----------
@@ -109,7 +110,9 @@ def chosen(name: str, variant: str = "", keys: Iterable[str] = ()) -> Effect:
     effects = named(name)
     if len(effects) == 1 and not variant:
         return effects[0]
-    for effect in effects:
+    given = set(keys)
+    fitting = [e for e in effects if given <= {key for p in e.parameters for key in p.spellings()}]
+    for effect in effects if variant else fitting or effects:
         if effect.variant == variant:
             return effect
     variants = [e.variant for e in effects if e.variant]
@@ -117,8 +120,6 @@ def chosen(name: str, variant: str = "", keys: Iterable[str] = ()) -> Effect:
         raise ConfigurationError(f"effect {name!r} has no variants; leave variant out")
     if variant:
         raise ConfigurationError(f"effect {name!r}: variant {variant!r}: {choices(variant, variants)}")
-    given = set(keys)
-    fitting = [e for e in effects if given <= {key for p in e.parameters for key in p.spellings()}]
     if len(fitting) != 1:
         raise ConfigurationError(
             f"effect {name!r}: state its variant; allowed: {', '.join(sorted(variants))}"
@@ -141,7 +142,8 @@ def stated(table: Mapping[str, Any]) -> tuple[Effect, dict[str, float]]:
     """
     name, raw = str(table["name"]), {key: value for key, value in table.items() if key != "name"}
     variant = str(raw.pop("variant", ""))
-    if "channel" in raw and all(effect.variant in SIGNALS for effect in named(name)):
+    variants = {effect.variant for effect in named(name)} - {""}
+    if "channel" in raw and variants and variants <= SIGNALS.keys():
         channel = str(raw.pop("channel"))
         if variant not in ("", channel):
             raise ConfigurationError(

@@ -7,11 +7,12 @@ position error; controls have a delay.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Final
 
-from airtruth.channels import SIGNALS
+from airtruth.channels import LATERAL, SIGNALS
 from airtruth.effects.effect import Effect, Parameter
-from airtruth.physics.motion import LONGITUDINAL, Motion
+from airtruth.physics.motion import MOTIONS, Motion
 from airtruth.physics.sensor_errors import Kind, error_name
 from airtruth.physics.terms import Change, SensorTerm
 from airtruth.units import DEG, UNITS
@@ -33,36 +34,122 @@ _BIASES: Final[Mapping[str, tuple[float, float]]] = {
     "acceleration": (1.0, 0.02),
 }
 """Dimension of a channel -> largest and material bias [SI] (judgement)."""
-_ARMS: Final[Mapping[str, tuple[str, float, float, str]]] = {
+
+
+@dataclass(frozen=True)
+class _Arm:
+    """How a reading depends on the position of its instrument.
+
+    Attributes
+    ----------
+    kind, parameter : of the error.
+    equation : of the reading.
+    reach, material : largest and material distance [m].
+    distinguished_by : what tells it apart.
+    """
+
+    kind: Kind
+    parameter: str
+    equation: str
+    reach: float
+    material: float
+    distinguished_by: str
+
+
+_TURBULENCE: Final = (
+    "Survey the position. Turbulence distinguishes it from a lag: a vane with a lag follows a gust late, an arm does not "
+    "delay it."
+)
+"""What tells the arm of a vane apart."""
+_ARMS: Final[Mapping[str, tuple[_Arm, ...]]] = {
     "alpha_rad": (
-        "alpha_vane = alpha - q x/V, first order in q x/V",
-        30.0,
-        0.05,
-        "Survey the position. Turbulence distinguishes it from a lag: a vane with a lag follows a gust late, an arm "
-        "does not delay it.",
+        _Arm("arm", "x_m", "alpha_vane = alpha - q x/V, first order in q x/V", 30.0, 0.05, _TURBULENCE),
     ),
     "az_m_s2": (
-        "az = az_cg - x q_dot",
-        10.0,
-        0.02,
-        "Survey the position, or compare inertial alpha with the vane.",
+        _Arm(
+            "arm",
+            "x_m",
+            "az = az_cg - x q_dot",
+            10.0,
+            0.02,
+            "Survey the position, or compare inertial alpha with the vane.",
+        ),
+    ),
+    "beta_rad": (
+        _Arm(
+            "arm",
+            "x_m",
+            "beta_vane = beta + r x/V - p z/V, first order in the rates, z as declared",
+            30.0,
+            0.05,
+            _TURBULENCE,
+        ),
+    ),
+    "ay_m_s2": (
+        _Arm(
+            "arm",
+            "x_m",
+            "ay = ay_cg + x r_dot - z p_dot",
+            10.0,
+            0.02,
+            "Survey the position, or a rudder input, which yaws more than it rolls.",
+        ),
+        _Arm(
+            "arm_down",
+            "z_m",
+            "ay = ay_cg + x r_dot - z p_dot",
+            10.0,
+            0.02,
+            "Survey the position, or an aileron input, which rolls more than it yaws.",
+        ),
     ),
 }
-"""Output whose reading depends on the position of its instrument -> equation, largest and material distance [m], and what
-tells it apart."""
+"""Output whose reading depends on the position of its instrument -> each coordinate."""
+_ARMS_OF_KNOWN: Final[Mapping[str, tuple[_Arm, ...]]] = {
+    "alpha_rad": (
+        _Arm(
+            "arm_right",
+            "y_m",
+            "alpha_vane = alpha + p y/V, first order in p y/V",
+            30.0,
+            0.05,
+            "Survey the position; a roll at constant alpha shows it.",
+        ),
+    ),
+}
+"""Known input of a motion whose reading depends on the position of its instrument through that motion -> each coordinate."""
+_DIRECTIONS: Final[Mapping[str, tuple[str, str, str]]] = {
+    "arm": ("ahead of", "forward", "behind"),
+    "arm_down": ("below", "down", "above"),
+    "arm_right": ("right of", "to the right", "left of"),
+}
+"""Kind of an arm -> where the instrument is, its positive sense, and the opposite side."""
 _LAGS: Final[Mapping[str, str]] = {
     "alpha_rad": "Turbulence, or a surveyed position of the vane.",
     "q_rad_s": "theta as a second measurement of q.",
     "az_m_s2": "A second accelerometer, or inertial lift from alpha.",
+    "beta_rad": "Turbulence, or a surveyed position of the vane.",
+    "p_rad_s": "phi as a second measurement of p.",
+    "r_rad_s": "psi as a second measurement of r.",
+    "phi_rad": "p as a second measurement of its rate.",
 }
 """Output -> what tells a lag of its sensor apart."""
 _SCALED: Final[Mapping[str, str]] = {
     "alpha_rad": "az, or theta minus the flight-path angle.",
     "q_rad_s": "theta as a second measurement of q.",
     "az_m_s2": "Gravity at the trim: az of level flight is known.",
+    "beta_rad": "ay, or phi and psi with the flight path.",
+    "p_rad_s": "phi as a second measurement of p.",
+    "r_rad_s": "psi as a second measurement of r.",
+    "phi_rad": "p as a second measurement of its rate.",
+    "ay_m_s2": "Gravity in a steady sideslip with bank.",
     "airspeed_m_s": "A speed course.",
 }
 """Channel -> what tells an error of its scale apart."""
+_KINEMATICS: Final = "Kinematics: alpha, theta, q and az must agree (`airtruth check`)."
+"""What tells a delay apart in the pitch plane."""
+_SIDE_KINEMATICS: Final = "Kinematics: beta, phi, p, r and ay must agree (`airtruth check`)."
+"""What tells a delay of a lateral channel apart."""
 _SECOND: Final = "A second sensor of the same quantity."
 """What tells an error apart where no other channel does."""
 _MOST_SPANS: Final = 1.5
@@ -165,28 +252,28 @@ def _delay(channel: str) -> Effect:
         ),
         f"{channel} is recorded late: a wrong time stamp, a data bus, a filter.",
         "y(t) = x(t - delay). Material: a tenth of a sample at 50 Hz.",
-        "Kinematics: alpha, theta, q and az must agree (`airtruth check`).",
+        _SIDE_KINEMATICS if channel in LATERAL else _KINEMATICS,
     )
 
 
-def _arm(channel: str) -> Effect:
-    equation, reach, material, distinguished_by = _ARMS[channel]
+def _arm(channel: str, arm: _Arm) -> Effect:
+    where, sense, opposite = _DIRECTIONS[arm.kind]
     return _error(
         channel,
-        "arm",
+        arm.kind,
         Parameter(
-            "x_m",
+            arm.parameter,
             "m",
-            "ahead of the declared position, forward positive",
-            low=-reach,
-            high=reach,
-            material=material,
+            f"{where} the declared position, {sense} positive",
+            low=-arm.reach,
+            high=arm.reach,
+            material=arm.material,
             step=0.01,
             spans=_MOST_SPANS,
         ),
-        f"The sensor of {channel} is ahead of its declared position, or behind it.",
-        f"{equation}; {_SOURCE}.",
-        distinguished_by,
+        f"The sensor of {channel} is {where} its declared position, or {opposite} it.",
+        f"{arm.equation}; {_SOURCE}.",
+        arm.distinguished_by,
     )
 
 
@@ -217,9 +304,10 @@ def sensor_effects(motion: Motion) -> Iterator[Effect]:
     yield from (_scale(channel) for channel in (*outputs, "airspeed_m_s"))
     yield _POSITION_ERROR
     yield from (_bias(channel) for channel in outputs)
-    yield from (_arm(channel) for channel in outputs if channel in _ARMS)
+    yield from (_arm(channel, arm) for channel in outputs for arm in _ARMS.get(channel, ()))
+    yield from (_arm(channel, arm) for channel in motion.known for arm in _ARMS_OF_KNOWN.get(channel, ()))
     yield from (_delay(channel) for channel in (*outputs, *(c.channel for c in motion.controls)))
 
 
-EFFECTS: Final = tuple(sensor_effects(LONGITUDINAL))
+EFFECTS: Final = tuple({e.key: e for m in MOTIONS.values() for e in sensor_effects(m)}.values())
 """Effects of this module."""

@@ -1,39 +1,31 @@
-"""Effects between the measured elevator surface and the surface that causes the forces."""
+"""Effects between the measured surface of a control and the surface that causes the forces, for each control."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Final
 
 from airtruth.effects.effect import Effect, Parameter
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
+from airtruth.physics.motion_parts import Control
 from airtruth.physics.terms import Change, SurfaceTerm
 from airtruth.units import DEG
 
 Values = Mapping[str, float]
 
 
-def _delay(values: Values) -> Change:
-    return Change(surface=(SurfaceTerm("delay", values["delay_s"]),))
+def _variant(motion: Motion, control: Control) -> str:
+    """The channel of a control, by which its effects differ from those of the elevator."""
+    return "" if motion is LONGITUDINAL else control.channel
 
 
-def _lag(values: Values) -> Change:
-    bandwidth = values["bandwidth_hz"]
-    time_s = 0.0 if math.isinf(bandwidth) else 1.0 / (2.0 * math.pi * bandwidth)
-    return Change(surface=(SurfaceTerm("lag", time_s),))
+def _delay(motion: Motion, control: Control) -> Effect:
+    def describe(values: Values) -> Change:
+        return Change(surface=(SurfaceTerm("delay", values["delay_s"], control.name),))
 
-
-def _rate_limit(values: Values) -> Change:
-    return Change(surface=(SurfaceTerm("rate_limit", values["rate_rad_s"]),))
-
-
-def _backlash(values: Values) -> Change:
-    return Change(surface=(SurfaceTerm("backlash", values["width_rad"]),))
-
-
-EFFECTS: Final = (
-    Effect(
-        name="elevator_delay",
+    return Effect(
+        name=f"{control.name}_delay",
         where="surface",
         parameters=(
             Parameter(
@@ -47,15 +39,24 @@ EFFECTS: Final = (
                 step=1e-3,
             ),
         ),
-        describe=_delay,
+        describe=describe,
         explanation="The forces follow the measured surface with a delay: a wrong time stamp, a data bus, or a position "
         "transducer ahead of the linkage.",
         source="y(t) = x(t - delay). Material: 2 ms, a tenth of a sample at 50 Hz and 2 deg of phase at 3 Hz.",
         distinguished_by="A measured surface and a multisine up to 5 Hz distinguish it from a lag. If the surface is not "
         "measured, an equal delay of every sensor looks the same.",
-    ),
-    Effect(
+    )
+
+
+def _lag(motion: Motion, control: Control) -> Effect:
+    def describe(values: Values) -> Change:
+        bandwidth = values["bandwidth_hz"]
+        time_s = 0.0 if math.isinf(bandwidth) else 1.0 / (2.0 * math.pi * bandwidth)
+        return Change(surface=(SurfaceTerm("lag", time_s, control.name),))
+
+    return Effect(
         name="actuator_lag",
+        variant=_variant(motion, control),
         where="surface",
         parameters=(
             Parameter(
@@ -72,15 +73,22 @@ EFFECTS: Final = (
                 step=1e-3,
             ),
         ),
-        describe=_lag,
+        describe=describe,
         explanation="The surface follows its measurement with a first-order lag: a soft linkage, or a position measured "
         "at the servo instead of the surface.",
         source="tau y' = x - y, tau = 1/(2 pi bandwidth). Material: tau of 2 ms, a bandwidth of 80 Hz.",
-        distinguished_by="High frequencies in the elevator (multisine, doublets of short steps) distinguish it from a "
+        distinguished_by=f"High frequencies in the {control.name} (multisine, doublets of short steps) distinguish it from a "
         "delay.",
-    ),
-    Effect(
+    )
+
+
+def _rate_limit(motion: Motion, control: Control) -> Effect:
+    def describe(values: Values) -> Change:
+        return Change(surface=(SurfaceTerm("rate_limit", values["rate_rad_s"], control.name),))
+
+    return Effect(
         name="rate_limit",
+        variant=_variant(motion, control),
         where="surface",
         parameters=(
             Parameter(
@@ -96,14 +104,21 @@ EFFECTS: Final = (
                 step=0.3,
             ),
         ),
-        describe=_rate_limit,
+        describe=describe,
         explanation="The surface moves no faster than a limit that its measurement does not show.",
         source="|y'| <= rate. Material: a limit below 2 rad/s (115 deg/s), which a doublet of 2 deg through a servo of "
         "5 Hz reaches.",
         distinguished_by="Two amplitudes: only the larger one reaches the limit.",
-    ),
-    Effect(
+    )
+
+
+def _backlash(motion: Motion, control: Control) -> Effect:
+    def describe(values: Values) -> Change:
+        return Change(surface=(SurfaceTerm("backlash", values["width_rad"], control.name),))
+
+    return Effect(
         name="backlash",
+        variant=_variant(motion, control),
         where="surface",
         parameters=(
             Parameter(
@@ -117,11 +132,20 @@ EFFECTS: Final = (
                 step=0.1 * DEG,
             ),
         ),
-        describe=_backlash,
+        describe=describe,
         explanation="Play in the linkage: the surface rests until the measured position has crossed the play.",
         source="y stays within width/2 of x and moves only when pushed; it starts in the middle. Material: 3 % of a "
         "doublet of 1 deg.",
         distinguished_by="A small multisine: play removes a larger share of a smaller motion.",
-    ),
-)
+    )
+
+
+def surface_effects() -> Iterator[Effect]:
+    """Each element between measured and effective surface, for the controls of every motion."""
+    every = [(motion, control) for motion in MOTIONS.values() for control in motion.controls]
+    for make in (_delay, _lag, _rate_limit, _backlash):
+        yield from (make(*of) for of in every)
+
+
+EFFECTS: Final = tuple(surface_effects())
 """Effects of this module."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from airtruth.identification.result import IdentificationResult
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import motion_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -95,20 +95,21 @@ def changes_of(
     declared : derivative -> declared value.
     simulated : "declared" and "corrected" -> estimates of the simulated records; None where there are none.
     """
-    tables = {name: _converged(result) for name, result in simulated.items()}
-    tables |= {"before": _converged(before), "after": _converged(after)}
+    names = motion_of(declared).parameters
+    tables = {name: _converged(result, names) for name, result in simulated.items()}
+    tables |= {"before": _converged(before, names), "after": _converged(after, names)}
     return tuple(
         _change(method, name, declared[name], {k: t[t["method"] == method] for k, t in tables.items()})
         for method in before.methods
-        for name in PARAMETERS
+        for name in names
     )
 
 
-def _converged(result: IdentificationResult | None) -> pd.DataFrame:
+def _converged(result: IdentificationResult | None, names: Sequence[str]) -> pd.DataFrame:
     import pandas as pd
 
     if result is None:
-        return pd.DataFrame({"method": [], "run_id": [], **{name: [] for name in PARAMETERS}})
+        return pd.DataFrame({"method": [], "run_id": [], **{name: [] for name in names}})
     table = result.to_frame()
     return table[table["converged"]]
 

@@ -8,7 +8,7 @@ from typing import Final
 
 from airtruth.charts import Chart, Mark, Panel, Rule
 from airtruth.loop.changes import DerivativeChange
-from airtruth.physics.short_period import PARAMETERS, UNITS
+from airtruth.physics.motion import Motion, motion_of
 from airtruth.table import MISSING, Cell, Group, Interval, Number, Row, Table, Uncertain
 from airtruth.tracing.answer import Derivatives
 from airtruth.tracing.compensate import Treatment
@@ -33,7 +33,8 @@ def loop_table(
     methods = list(dict.fromkeys(c.method for c in changes))
     cells = {(c.derivative, c.method): c for c in changes}
     groups = []
-    for name in PARAMETERS:
+    motion = motion_of(refit.declared)
+    for name in motion.parameters:
         own = [cells[name, method] for method in methods]
         groups.append(Group(name, (*(_row(c) for c in own), *([_refit_row(name, refit)] if own else []))))
     converged = [next(c for c in changes if c.method == m) for m in methods]
@@ -52,7 +53,7 @@ def loop_table(
             "after less declared, same inputs",
         ),
         groups=(*groups, Group("runs", tuple(counts))),
-        notes=tuple(_notes(changes, treatments, refit)),
+        notes=tuple(_notes(changes, treatments, refit, motion)),
     )
 
 
@@ -86,11 +87,14 @@ def _refit_row(name: str, refit: Derivatives) -> Row:
 
 
 def _notes(
-    changes: Sequence[DerivativeChange], treatments: Sequence[Treatment], refit: Derivatives
+    changes: Sequence[DerivativeChange],
+    treatments: Sequence[Treatment],
+    refit: Derivatives,
+    motion: Motion,
 ) -> Iterator[str]:
     yield (
         "before, after: mean over the converged runs +- its standard error; refit: estimate +- standard error "
-        "[1/rad, rates as q c/(2V)]; brackets: 95 % interval over the runs."
+        f"[{motion.derivative_units}]; brackets: 95 % interval over the runs."
     )
     yield from (f"{t.sentence}." for t in treatments)
     if not any(c.runs_compared for c in changes):
@@ -150,7 +154,8 @@ def loop_chart(changes: Sequence[DerivativeChange]) -> Chart:
     """Draw every derivative by every method before and after, with two standard errors, and the declared value."""
     methods = list(dict.fromkeys(c.method for c in changes))
     panels = []
-    for name in PARAMETERS:
+    motion = motion_of([c.derivative for c in changes])
+    for name in motion.parameters:
         own = [c for c in changes if c.derivative == name]
         marks = []
         for c in own:
@@ -171,7 +176,9 @@ def loop_chart(changes: Sequence[DerivativeChange]) -> Chart:
             ]
         rules = tuple(Rule(c.declared, label="declared") for c in own[:1])
         panels.append(
-            Panel(x_label=f"{name} [{UNITS[name]}]", rows=tuple(methods), marks=tuple(marks), rules=rules)
+            Panel(
+                x_label=f"{name} [{motion.units[name]}]", rows=tuple(methods), marks=tuple(marks), rules=rules
+            )
         )
     title = "Derivatives before and after the traced effects are taken out"
     return Chart(NAME, title, tuple(panels), columns=3)

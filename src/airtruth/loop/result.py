@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -43,6 +43,7 @@ class LoopResult:
     treatments : treatment of each traced effect.
     before, after : estimates of every run by every method.
     changes : every derivative by every method, before and after, and by the same method on simulated records.
+    others : loops of the other motions that the same logs answer.
     """
 
     trace: TraceResult
@@ -50,6 +51,17 @@ class LoopResult:
     before: IdentificationResult
     after: IdentificationResult
     changes: tuple[DerivativeChange, ...]
+    others: tuple[LoopResult, ...] = ()
+
+    @property
+    def motion(self) -> str:
+        """Name of the motion."""
+        return self.trace.motion
+
+    @property
+    def motions(self) -> dict[str, LoopResult]:
+        """Name of each motion that is answered -> its loop."""
+        return {one.motion: one for one in (self, *self.others)}
 
     def table(self) -> Table:
         """The derivatives of every method before and after, beside the declared ones."""
@@ -66,7 +78,12 @@ class LoopResult:
         return self.trace.effects
 
     def summary(self) -> str:
-        """Verdict, effects and the table of before and after."""
+        """Verdict, effects and the table of before and after, of several motions each under its heading."""
+        if self.others:
+            return "\n\n".join(
+                f"{one.trace.answer.motion.heading}\n\n{replace(one, others=()).summary().rstrip()}"
+                for one in self.motions.values()
+            )
         answer = self.trace.answer
         lines = [verdict(answer), *(effect_line(e) for e in answer.effects), ""]
         if not self.treatments:
@@ -85,7 +102,9 @@ class LoopResult:
         return pd.DataFrame([asdict(c) for c in self.changes])
 
     def to_dict(self) -> dict[str, Any]:
-        """The content of loop.json: the trace, the treatments and the changes of the derivatives."""
+        """The content of loop.json: trace, treatments and changes of the derivatives; of several motions each under its name."""
+        if self.others:
+            return {name: replace(one, others=()).to_dict() for name, one in self.motions.items()}
         changes = [{k: _finite(v) for k, v in asdict(c).items()} for c in self.changes]
         return {
             "trace": self.trace.to_dict(),

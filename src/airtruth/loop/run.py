@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -10,14 +11,20 @@ from airtruth import aircraft as planes
 from airtruth.aircraft import Aircraft
 from airtruth.errors import LogError
 from airtruth.identification import Options, identify
+from airtruth.identification.methods import DEFAULT, OF_MOTION
 from airtruth.identification.result import IdentificationResult
+from airtruth.logs import atomic
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.sources import Logs, named_logs
 from airtruth.loop.changes import changes_of
-from airtruth.loop.result import LoopResult
+from airtruth.loop.result import OUTPUTS, LoopResult
 from airtruth.loop.same_inputs import simulated_logs
-from airtruth.tracing import TraceOptions, TraceResult, trace
+from airtruth.physics.motion import FOLDERS
+from airtruth.tracing import TraceOptions, TraceResult
 from airtruth.tracing.compensate import Compensation, compensated_log, compensation_of, updated_constants
+from airtruth.tracing.motions import Part, parts_of
+from airtruth.tracing.run import trace
+from airtruth.tracing.selection.budget import Advance
 
 METHODS: Final = ("ls", "iv-f1")
 """Methods of a loop by default: least squares, and the default method of `airtruth identify`."""
@@ -56,17 +63,51 @@ def close_loop(
         As `airtruth.tracing.trace` and `airtruth.identification.identify`.
     """
     declared = aircraft if isinstance(aircraft, Aircraft) else planes.load(aircraft)
-    advance("identify before")
-    before = identify(logs, declared, methods, options, force=force)
+    parts = parts_of(logs, declared, trace_options or TraceOptions())
+    if out is not None:  # of an earlier command that answered more motions
+        for name in FOLDERS[1:]:
+            atomic.remove_file(out / name / OUTPUTS[2])
+    first, *others = [
+        _closed(logs, declared, part, part.into(out), _methods_of(methods, part), options, force, advance)
+        for part in parts
+    ]
+    return replace(first, others=tuple(others))
+
+
+def _methods_of(methods: Sequence[str], part: Part) -> tuple[str, ...]:
+    """The estimators that the motion has, where the records choose the motions; all where one is named."""
+    every = (methods,) if isinstance(methods, str) else tuple(methods)
+    known = OF_MOTION[part.motion.name]
+    if not part.folder:
+        return every
+    return tuple(name for name in every if name in known) or (DEFAULT[part.motion.name],)
+
+
+def _closed(
+    logs: Logs,
+    declared: Aircraft,
+    part: Part,
+    out: Path | None,
+    methods: Sequence[str],
+    options: Options | None,
+    force: bool,
+    advance: Advance,
+) -> LoopResult:
+    """The loop of one motion."""
+    step = part.named(advance)
+    read = [log for _, log in named_logs(logs, run_ids=part.runs)]
+    given: Logs = logs if part.runs is None else read
+    motion = part.motion
+    step("identify before")
+    before = identify(given, declared, methods, options, force=force, motion=motion)
     folder = None if out is None else out / "trace"
-    result = trace(logs, declared, trace_options, folder, force, advance)
+    result = trace(logs, declared, part.options, folder, force, step, part.runs, part.notes)
     taken = compensation_of(result)
-    advance("identify after")
+    step("identify after")
     after = before
-    read = [log for _, log in named_logs(logs)]
     if taken.treatments:
         after = identify_without_effects(read, declared, methods, taken, options, force)
-    advance("identify simulated records of the same inputs")
+    step("identify simulated records of the same inputs")
     simulated = _identified_simulations(read, declared, methods, result, taken, options)
     loop = LoopResult(
         trace=result,
@@ -104,7 +145,7 @@ def identify_without_effects(
     """
     updated = updated_constants(aircraft, taken)
     compensated = [compensated_log(log, updated, taken) for log in logs]
-    return identify(compensated, updated, methods, options, force=force)
+    return identify(compensated, updated, methods, options, force=force, motion=taken.motion)
 
 
 def _identified_simulations(
@@ -124,7 +165,9 @@ def _identified_simulations(
     # the gate has admitted the inputs, and a simulation need not agree with the measured airspeed
     try:
         if declared_logs:
-            found["declared"] = identify(declared_logs, aircraft, methods, options, force=True)
+            found["declared"] = identify(
+                declared_logs, aircraft, methods, options, force=True, motion=taken.motion
+            )
         if corrected_logs:
             found["corrected"] = identify_without_effects(
                 corrected_logs, aircraft, methods, taken, options, force=True

@@ -15,18 +15,21 @@ from numpy.typing import NDArray
 
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.histories import Histories, History
+from airtruth.physics.motion import LONGITUDINAL, Motion, motion_with
 
 Array = NDArray[np.float64]
 
-INPUTS: Final = (
-    "airspeed_m_s",
-    "altitude_m",
-    "density_kg_m3",
-    "elevator_rad",
-    "elevator_command_rad",
-    "throttle",
-)
-"""Channels that a simulated record takes from the measured one; other channels contain the measured motion."""
+_ALWAYS: Final = ("airspeed_m_s", "altitude_m", "density_kg_m3", "throttle")
+"""Channels that a simulated record of every motion takes from the measured one."""
+_FLOWN: Final = {LONGITUDINAL.name: ("theta_rad",)}
+"""Motion -> known inputs that contain the measured motion all the same."""
+
+
+def inputs_of(motion: Motion) -> tuple[str, ...]:
+    """Channels that a simulated record takes from the measured one; other channels contain the measured motion."""
+    controls = [name for c in motion.controls for name in (c.channel, c.command)]
+    known = [name for name in motion.known if name not in _FLOWN.get(motion.name, ())]
+    return tuple(dict.fromkeys((*_ALWAYS, *controls, *known)))
 
 
 def simulated_logs(logs: Sequence[FlightLog], histories: Histories, model: str) -> list[FlightLog]:
@@ -43,6 +46,7 @@ def simulated_logs(logs: Sequence[FlightLog], histories: Histories, model: str) 
     One log for each of ``logs`` that has such a record; a run without a finite simulation of its whole length is left out.
     """
     known = {record.run_id: record for record in histories.records}
+    inputs = inputs_of(motion_with(histories.first.measured))
     found = []
     for log in logs:
         whole = [
@@ -52,7 +56,7 @@ def simulated_logs(logs: Sequence[FlightLog], histories: Histories, model: str) 
         ]
         if whole:
             found.append(
-                _simulated(log.select(whole, [c for c in log.channels if c in INPUTS]), known, model)
+                _simulated(log.select(whole, [c for c in log.channels if c in inputs]), known, model)
             )
     return found
 
@@ -71,4 +75,4 @@ def _simulated(log: FlightLog, known: dict[str, History], model: str) -> FlightL
     return replace(log, channels={**log.channels, **outputs})
 
 
-__all__ = ["INPUTS", "simulated_logs"]
+__all__ = ["inputs_of", "simulated_logs"]

@@ -1,4 +1,4 @@
-"""Contributions of tail, wing and flow to the six derivatives, from the declared derivatives and the geometry.
+"""Contributions of parts and flow to the derivatives, from the declared derivatives and the geometry.
 
 A cause that acts on a whole part of the aircraft moves several derivatives in one direction. The directions are first
 order: a fraction s of the cause adds s times its direction to the derivatives.
@@ -10,14 +10,22 @@ M. B. Bragg et al., Effect of Ice Accretion on Aircraft Flight Dynamics, AIAA 20
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
+from airtruth.physics.composition_lateral import (
+    SideGeometry,
+    cg_part,
+    fin_part,
+    inertia_parts,
+    tip_at_rest,
+    tip_part,
+)
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, MOTIONS, Motion
 from airtruth.physics.short_period import CL_ALPHA, CL_DE, CL_Q, CM_ALPHA, CM_DE, CM_Q
 
 Array = NDArray[np.float64]
@@ -34,18 +42,20 @@ ICED: Final = (-0.100, -0.0135, -0.095, -0.099, -0.035, -0.100)
 
 @dataclass(frozen=True)
 class TailGeometry:
-    """What is declared of the tail; None where it has to be inferred.
+    """What is declared of wing, tail and fin; None where it has to be inferred.
 
     Attributes
     ----------
     aspect_ratio : of the wing [-].
     arm : distance from the CG to the tail's aerodynamic centre over the chord [-].
     lift : lift slope of the tail by the wing area and the free dynamic pressure, a_t S_t/S efficiency [1/rad].
+    side : what the lateral motion needs.
     """
 
     aspect_ratio: float | None = None
     arm: float | None = None
     lift: float | None = None
+    side: SideGeometry = field(default_factory=SideGeometry)
 
 
 def tail_part(derivatives: Array, geometry: TailGeometry) -> Array:
@@ -111,13 +121,32 @@ class Part:
     Attributes
     ----------
     neutral : value that changes nothing: 1 of a factor, 0 of a shift or of a severity.
-    direction : derivatives (6,) and geometry -> change of the derivatives per unit, at the neutral value.
+    direction : derivatives of the motion and geometry -> change of the derivatives per unit, at the neutral value.
     motion : name of the motion whose derivatives they are.
+    at_rest : geometry -> what it adds per unit beside the derivatives: a coefficient per lift coefficient of the aircraft
+        [-], or a declared quantity [its unit]; None for nothing.
     """
 
     neutral: float
     direction: Callable[[Array, TailGeometry], Array]
     motion: str = LONGITUDINAL.name
+    at_rest: Callable[[TailGeometry], Mapping[str, float]] | None = None
+
+
+def _fin(derivatives: Array, geometry: TailGeometry) -> Array:
+    return fin_part(derivatives, geometry.side)
+
+
+def _tip(derivatives: Array, geometry: TailGeometry) -> Array:
+    return tip_part(derivatives, geometry.side)
+
+
+def _without_left_tip(geometry: TailGeometry) -> Mapping[str, float]:
+    return {name: -value for name, value in tip_at_rest(geometry.side).items()}
+
+
+def _without_right_tip(geometry: TailGeometry) -> Mapping[str, float]:
+    return tip_at_rest(geometry.side)
 
 
 PARTS: Final[Mapping[str, Part]] = MappingProxyType(
@@ -127,10 +156,13 @@ PARTS: Final[Mapping[str, Part]] = MappingProxyType(
         "dynamic_pressure": Part(1.0, lambda derivatives, _: derivatives.copy()),
         "aerodynamic_center": Part(0.0, _centre),
         "icing": Part(0.0, lambda derivatives, _: np.array(ICED) * derivatives),
+        "fin": Part(1.0, _fin, LATERAL.name),
+        "left_wing_tip": Part(0.0, _tip, LATERAL.name, _without_left_tip),
+        "right_wing_tip": Part(0.0, _tip, LATERAL.name, _without_right_tip),
     }
 )
-"""Causes by name: tail, wing and dynamic pressure are factors, the aerodynamic centre counts aft in chords, and icing is a
-severity, 1 for the reference ice."""
+"""Causes by name: tail, wing, dynamic pressure and fin are factors, the aerodynamic centre counts aft in chords, icing is a
+severity, 1 for the reference ice, and a wing tip is the part of its semispan that is lost."""
 CAUSES: Final[Mapping[str, float]] = MappingProxyType(
     {name: part.neutral for name, part in PARTS.items()}
     | dict.fromkeys((name for m in MOTIONS.values() for name in m.parameters), 0.0)
@@ -139,13 +171,16 @@ CAUSES: Final[Mapping[str, float]] = MappingProxyType(
 cause."""
 
 
-_LEVERS: Final[Mapping[str, tuple[str, str, Callable[[TailGeometry], float]]]] = MappingProxyType(
-    {
-        "longitudinal": ("CL", "Cm", lambda _: 1.0),
-        "lateral": ("CY", "Cn", lambda geometry: 1.0 / (geometry.aspect_ratio or _ASPECT_RATIO)),
-    }
-)
-"""Motion -> force whose moment changes with the CG, that moment, and the chord over the reference length of the moment [-]."""
+def cause_motion(cause: str) -> Motion:
+    """The motion whose derivatives a cause changes.
+
+    Parameters
+    ----------
+    cause : one of `CAUSES`.
+    """
+    if cause in PARTS:
+        return MOTIONS[PARTS[cause].motion]
+    return next(motion for motion in MOTIONS.values() if cause in motion.parameters)
 
 
 def directions(
@@ -160,7 +195,7 @@ def directions(
 
     Returns
     -------
-    quantity or part -> change of the derivatives. A factor on the mass or an inertia divides its coefficients, the
+    quantity, part or derivative -> change of the derivatives. A factor on the mass or an inertia divides its coefficients, the
     effectiveness of a control multiplies its derivatives, and "cg" counts aft in chords: lift pitches the nose up about a
     centre of gravity that lies farther aft, and a side force yaws it to the right.
     """
@@ -175,13 +210,29 @@ def directions(
         found[control.name] = np.zeros_like(derivatives)
         column = motion.column(control.name)
         found[control.name][column] = derivatives[column]
-    force, moment, chords = _LEVERS[motion.name]
-    found["cg"] = np.zeros_like(derivatives)
-    found["cg"][motion.row(moment)] = chords(geometry) * derivatives[motion.row(force)]
+    found |= _LOADING[motion.name](derivatives, geometry)
     parts = {name: part for name, part in PARTS.items() if part.motion == motion.name}
-    return MappingProxyType(
-        found | {name: part.direction(derivatives, geometry) for name, part in parts.items()}
-    )
+    found |= {name: part.direction(derivatives, geometry) for name, part in parts.items()}
+    return MappingProxyType(found | dict(zip(motion.parameters, np.eye(len(derivatives)), strict=True)))
+
+
+def _pitch_loading(derivatives: Array, _geometry: TailGeometry) -> dict[str, Array]:
+    """A CG farther aft."""
+    aft = np.zeros_like(derivatives)
+    aft[LONGITUDINAL.row("Cm")] = derivatives[LONGITUDINAL.row("CL")]
+    return {"cg": aft}
+
+
+def _side_loading(derivatives: Array, geometry: TailGeometry) -> dict[str, Array]:
+    """Inertias, which a product of inertia couples, and a CG farther aft."""
+    side = geometry.side
+    return {**inertia_parts(derivatives, side), "cg": cg_part(derivatives, side)}
+
+
+_LOADING: Final[Mapping[str, Callable[[Array, TailGeometry], dict[str, Array]]]] = MappingProxyType(
+    {LONGITUDINAL.name: _pitch_loading, LATERAL.name: _side_loading}
+)
+"""Motion -> directions of the loading that do not divide a coefficient alone."""
 
 
 def cg_transfer(shift: float) -> Array:
@@ -209,7 +260,9 @@ __all__ = [
     "ICED",
     "PARTS",
     "Part",
+    "SideGeometry",
     "TailGeometry",
+    "cause_motion",
     "cg_transfer",
     "directions",
     "tail_part",

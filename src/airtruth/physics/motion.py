@@ -347,6 +347,10 @@ VANES: Final = frozenset(y.channel for m in MOTIONS.values() for y in m.outputs 
 """Columns of the vanes of every motion."""
 
 
+FOLDERS: Final = ("", *list(MOTIONS)[1:])
+"""Folders of the answers of several motions within that of a command; the first motion that is answered has none of its own."""
+
+
 def motion_with(outputs: Iterable[str]) -> Motion:
     """The motion with most of some outputs; the longitudinal one of none.
 
@@ -369,4 +373,4 @@ def _named(name: str) -> Motion:
     return MOTIONS[name]
 
 
-__all__ = ["LATERAL", "LONGITUDINAL", "MOTIONS", "VANES", "Motion", "motion_of", "motion_with"]
+__all__ = ["FOLDERS", "LATERAL", "LONGITUDINAL", "MOTIONS", "VANES", "Motion", "motion_of", "motion_with"]

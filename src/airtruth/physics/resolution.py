@@ -1,21 +1,22 @@
 """Causes of a change of the derivatives, as linear terms about a trim.
 
-The increments are first order (`airtruth.physics.composition`): several causes add. Lift and moment stay as they are at
-the trim, whose own change by the cause is left out.
+The increments are first order (`airtruth.physics.composition`): several causes add. Forces and moments stay as they are at
+the trim, whose own change by the cause is left out; a lost wing tip alone states what it adds at rest.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError, choices
-from airtruth.physics.composition import CAUSES, TailGeometry, directions
+from airtruth.physics.composition import CAUSES, PARTS, TailGeometry, cause_motion, directions
+from airtruth.physics.composition_lateral import lift_slope
 from airtruth.physics.motion import LONGITUDINAL, Motion
-from airtruth.physics.terms import AeroTerm, Change, DerivativeTerm
+from airtruth.physics.terms import DECLARED, AeroTerm, Change, DeclaredTerm, DerivativeTerm
 
 Array = NDArray[np.float64]
 
@@ -27,15 +28,24 @@ class LinearPoint:
     Attributes
     ----------
     derivatives : of the motion, in its order [-].
-    trim : signal of the motion -> value at the trim [rad]; those left out are zero there.
-    geometry : what is declared of the tail.
+    trim : signal of the motion, or alpha -> value at the trim [rad]; those left out are zero there.
+    geometry : what is declared of wing, tail and fin.
     motion : the motion of the model.
+    weight : weight over the dynamic pressure and the wing area at the trim, its lift coefficient [-].
     """
 
     derivatives: Array
     trim: Mapping[str, float]
     geometry: TailGeometry
     motion: Motion = LONGITUDINAL
+    weight: float = 0.0
+
+    def at_rest(self, coefficient: str, amount: float) -> AeroTerm:
+        """An increment of ``amount`` per lift coefficient, with the lift linear in the angle of attack."""
+        slope = lift_slope(self.geometry.side)
+        return AeroTerm(
+            coefficient, "alpha", "linear", amount * slope, self.trim.get("alpha", 0.0) - self.weight / slope
+        )
 
 
 def derivative_increments(
@@ -60,9 +70,8 @@ def derivative_increments(
     ConfigurationError
         If a cause is none of the motion.
     """
-    names = motion.parameters
-    unit = dict(directions(derivatives, geometry, motion)) | dict(zip(names, np.eye(len(names)), strict=True))
-    total = np.zeros(len(names))
+    unit = directions(derivatives, geometry, motion)
+    total = np.zeros(len(motion.parameters))
     for term in terms:
         if term.cause not in CAUSES or term.cause not in unit:
             known = [cause for cause in CAUSES if cause in unit]
@@ -71,29 +80,59 @@ def derivative_increments(
     return total
 
 
-def resolved(change: Change, at: LinearPoint) -> Change:
+def resolved(change: Change, *points: LinearPoint) -> Change:
     """Return a change without `DerivativeTerm`s, with the linear terms that they amount to at a trim.
 
     Parameters
     ----------
     change : the terms of one or several effects.
-    at : the declared aircraft at the trim.
+    points : the declared aircraft at the trim, once for each motion whose derivatives change.
 
     Raises
     ------
     ConfigurationError
-        If a cause is not known.
+        If a cause is not known, or none of a motion of the points.
     """
     if not change.derivatives:
         return change
+    of: dict[str, list[DerivativeTerm]] = {at.motion.name: [] for at in points}
+    for term in change.derivatives:
+        motion = cause_motion(term.cause).name if term.cause in CAUSES else points[0].motion.name
+        of.get(motion, of[points[0].motion.name]).append(term)
+    rest = replace(change, derivatives=())
+    for at in points:
+        rest += _resolved(tuple(of[at.motion.name]), at)
+    return rest
+
+
+def _resolved(causes: tuple[DerivativeTerm, ...], at: LinearPoint) -> Change:
+    """The terms that the causes of one motion amount to."""
+    if not causes:
+        return Change()
     motion = at.motion
-    amounts = derivative_increments(change.derivatives, at.derivatives, at.geometry, motion)
+    amounts = derivative_increments(causes, at.derivatives, at.geometry, motion)
     # a derivative of lift counts across the flight path, a term of it along -z of the body
     for coefficient in (c.name for c in motion.coefficients if c.sign < 0):
         amounts[motion.row(coefficient)] /= np.cos(at.trim[motion.implicit[1]])
     named = {name: float(x) for name, x in zip(motion.parameters, amounts, strict=True) if x != 0.0}
-    terms = linear_terms(named, at.trim, motion)
-    return replace(change, aero=change.aero + terms, derivatives=())
+    resting = tuple(_at_rest(causes, at))
+    return Change(
+        aero=(
+            *linear_terms(named, at.trim, motion),
+            *(t for t in resting if isinstance(t, AeroTerm)),
+        ),
+        declared=tuple(t for t in resting if isinstance(t, DeclaredTerm)),
+    )
+
+
+def _at_rest(causes: Iterable[DerivativeTerm], at: LinearPoint) -> Iterator[AeroTerm | DeclaredTerm]:
+    """What parts add beside the derivatives."""
+    for term in causes:
+        part = PARTS.get(term.cause)
+        if part is not None and part.at_rest is not None:
+            for name, amount in part.at_rest(at.geometry).items():
+                added = (term.value - part.neutral) * amount
+                yield DeclaredTerm(name, added) if name in DECLARED else at.at_rest(name, added)
 
 
 def linear_terms(

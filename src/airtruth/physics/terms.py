@@ -310,6 +310,11 @@ class SensorTerm:
     kind: Kind
     value: float
 
+    @property
+    def rate(self) -> str:
+        """Rate of rotation that brings the error about where the channel itself does not imply it; empty elsewhere."""
+        return _ACROSS.get(self.kind, "")
+
 
 @dataclass(frozen=True)
 class AirTerm:
@@ -380,7 +385,7 @@ class Change:
         found = {t.quantity for t in self.declared} | {t.cause for t in self.derivatives}
         found |= {t.channel for t in self.sensors} | {t.level for t in self.air}
         found |= {t.control for t in self.surface}
-        found |= {_ACROSS[t.kind] for t in self.sensors if t.kind in _ACROSS}
+        found |= {t.rate for t in self.sensors}
         found |= {name for r in self.readings for name in (r.channel, r.signal)} | {
             x.signal for x in self.states
         }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
@@ -12,7 +13,7 @@ from airtruth.logs.names import ESTIMATES as FILES
 from airtruth.logs.parquet import SUFFIX, is_parquet
 from airtruth.logs.remote import location
 from airtruth.logs.sources import Logs
-from airtruth.physics.motion import LONGITUDINAL, motion_of
+from airtruth.physics.motion import FOLDERS, LONGITUDINAL, motion_of
 from airtruth.reporting.campaign import TRUTH, Campaign, Parted
 from airtruth.reporting.columns import columns_of
 from airtruth.reporting.stored_campaign import open_campaigns
@@ -94,9 +95,11 @@ def _of_result(result: Result, logs: Logs | None, aircraft: Aircraft | None) -> 
         return identification_report(result, aircraft)
     _refuse(logs, aircraft)
     if isinstance(result, TraceResult):
-        return trace_report(result.answer, result.histories)
+        return _together(
+            {name: trace_report(one.answer, one.histories) for name, one in result.motions.items()}
+        )
     if isinstance(result, LoopResult):
-        return loop_report(result)
+        return _together({name: loop_report(one) for name, one in result.motions.items()})
     return result_report(result)
 
 
@@ -107,12 +110,13 @@ def _of_path(path: Path, logs: Logs | None, aircraft: Aircraft | None) -> Report
         from airtruth.reporting.pages.loop_page import stored_loop_report
 
         _refuse(logs, aircraft)
-        return stored_loop_report(path)
+        return _together({name: stored_loop_report(own) for name, own in _folders(path, "loop.json").items()})
     if (path / "trace.json").is_file():
         from airtruth.reporting.pages.trace_page import read_trace, trace_report
 
         _refuse(logs, aircraft)
-        return trace_report(*read_trace(path))
+        folders = _folders(path, "trace.json")
+        return _together({name: trace_report(*read_trace(own)) for name, own in folders.items()})
     if (path / TRUTH).is_file():
         return _of_campaign(open_campaigns(path), logs, aircraft)
     if path.is_file() and path.suffix != SUFFIX and not is_parquet(path):
@@ -144,6 +148,18 @@ def _of_estimates(files: Sequence[Path], logs: Logs | None, aircraft: Aircraft |
         made.append(read_identified(file, *asked))
     name = next((record["aircraft"] for record in made[0].records.values()), "")
     return estimates_report(f"Identification of {name}" if name else files[0].stem, made)
+
+
+def _folders(path: Path, file: str) -> dict[str, Path]:
+    """Folder of the answer, and of that of each other motion by its name, for which it has a folder."""
+    others = {name: path / name for name in FOLDERS[1:] if (path / name / file).is_file()}
+    return {"": path, **others}
+
+
+def _together(reports: dict[str, Report]) -> Report:
+    """The report of the first motion with those of the others beside it."""
+    (_, first), *others = reports.items()
+    return replace(first, beside=dict(others))
 
 
 def _of_campaign(campaigns: Sequence[Parted], logs: Logs | None, aircraft: Aircraft | None) -> Report:

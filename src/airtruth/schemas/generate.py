@@ -11,6 +11,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from airtruth.aircraft import AircraftFile
+from airtruth.aircraft.file import DERIVATIVES
 from airtruth.channels import SIGNALS
 from airtruth.effects.effect import Effect, Parameter
 from airtruth.effects.registry import EFFECTS
@@ -27,7 +28,6 @@ from airtruth.importers.mapping import (
 from airtruth.importers.mapping import Constant as RecordConstant
 from airtruth.physics.gust_figures import FIGURES, LEVELS
 from airtruth.physics.sensor_errors import KINDS as ERROR_KINDS
-from airtruth.physics.short_period import PARAMETERS
 from airtruth.quantity import FromTable
 from airtruth.simulation.campaign.effect_table import EffectTable
 from airtruth.simulation.campaign.file import NO_GUST, GustTable, SensorTable
@@ -100,7 +100,7 @@ def _complete(model: type[BaseModel], described: Schema) -> None:
         properties["channel"] = sensors()
     elif model is AircraftFile:
         properties["sensors"] = sensors()
-        properties["derivatives"] = _table({name: quantity("ratio") for name in PARAMETERS})
+        properties["derivatives"] = _table({name: quantity("ratio") for name in DERIVATIVES})
     elif model is MappingFile:
         properties["channels"] = _by_dimension(properties["channels"], MAPPED)
         properties["constants"] = _by_dimension(properties["constants"], CONSTANTS)

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from airtruth.aircraft import Aircraft
 from airtruth.aircraft.tail import tail_geometry
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.composition import CAUSES, cause_motion
+from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 from airtruth.physics.resolution import LinearPoint, resolved
 from airtruth.physics.terms import Change
 from airtruth.simulation.disposable import isolated
 from airtruth.simulation.linearise import Linearisation, linearise
+from airtruth.simulation.linearise_lateral import LateralLinearisation, linearise_lateral
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import Trim, trim
+from airtruth.units import G0
 
 
 def trimmed_and_linear(
@@ -37,21 +42,44 @@ def _trimmed_and_linear(aircraft: Aircraft, condition: Condition, dt_s: float) -
     return at, linearise(aircraft, at, dt_s)
 
 
-def linear_point(aircraft: Aircraft, condition: Condition, dt_s: float = 1.0 / 200.0) -> LinearPoint:
-    """Derivatives (central differences), trim and tail of an aircraft; JSBSim runs in a disposable process.
+def linear_point(
+    aircraft: Aircraft, condition: Condition, dt_s: float = 1.0 / 200.0, motion: Motion = LONGITUDINAL
+) -> LinearPoint:
+    """Derivatives (central differences), trim and geometry of an aircraft; JSBSim runs in a disposable process.
 
     Parameters
     ----------
     aircraft : with a JSBSim model.
-    condition : flight condition of the trim.
+    condition : flight condition of the trim; for the lateral motion in six axes, with the wings level where it states the pitch
+        plane.
     dt_s : simulation step of the executive [s].
+    motion : whose derivatives.
 
     Raises
     ------
     TrimError
         If the aircraft cannot be trimmed.
     """
-    return point_of(aircraft, *trimmed_and_linear(aircraft, condition, dt_s))
+    if motion is LONGITUDINAL:
+        return point_of(aircraft, *trimmed_and_linear(aircraft, condition, dt_s))
+    straight = condition if condition.six_axes else replace(condition, straight="wings-level")
+    at, linear = isolated(f"the trim of {aircraft.name}", _trimmed_and_lateral, aircraft, straight, dt_s)
+    trimmed = {
+        LATERAL.flow: at.controls.sideslip_rad,
+        **{c.name: getattr(at, c.channel) for c in LATERAL.controls},
+        **{s.name: getattr(at, s.channel) for s in LATERAL.known_signals},
+    }
+    force = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2 * aircraft.wing_area_m2
+    return LinearPoint(
+        linear.central, trimmed, tail_geometry(aircraft), LATERAL, weight=at.mass_kg * G0 / force
+    )
+
+
+def _trimmed_and_lateral(
+    aircraft: Aircraft, condition: Condition, dt_s: float
+) -> tuple[Trim, LateralLinearisation]:
+    at = trim(aircraft, condition, dt_s)
+    return at, linearise_lateral(aircraft, at, dt_s)
 
 
 def point_of(aircraft: Aircraft, at: Trim, linear: Linearisation) -> LinearPoint:
@@ -78,7 +106,9 @@ def at_condition(
     """
     if not change.derivatives:
         return change
-    return resolved(change, linear_point(aircraft, condition, dt_s))
+    motions = [cause_motion(term.cause) for term in change.derivatives if term.cause in CAUSES]
+    points = (linear_point(aircraft, condition, dt_s, m) for m in dict.fromkeys(motions or [LONGITUDINAL]))
+    return resolved(change, *points)
 
 
 __all__ = ["at_condition", "linear_point", "point_of", "trimmed_and_linear"]

@@ -32,10 +32,10 @@ from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.answer import Z95
 from airtruth.tracing.axial_series import CHANNEL, AxialSeries, axial_series
 from airtruth.tracing.increment_table import table_of
+from airtruth.tracing.inference.direction import eliminated
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import MEMORY_S, long_run
 from airtruth.tracing.prepare import Case
-from airtruth.tracing.selection.direction import eliminated
 from airtruth.tracing.selection.increment_fit import LEAST_ODDS, effective_bends, is_apart_from_zero
 from airtruth.tracing.selection.increments import CELLS, best_prior, covered
 from airtruth.tracing.selection.learn import LEAST_RECORDS

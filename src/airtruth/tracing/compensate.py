@@ -1,9 +1,9 @@
 """Records with traced effects taken out: what an aircraft without the effects would have logged.
 
-Each kind of effect has its own treatment: the errors of a sensor are undone in its channel; the elevator is replaced
-by the surface that the air sees; the response to increments of CL and Cm in measured signals is subtracted
-(`airtruth.tracing.increment_response`); mass and inertia change the constants of the identification. The result obeys
-the linear model under the elevator, whatever the method: the instruments of a regression, an identified servo and a
+Each kind of effect has its own treatment: the errors of a sensor are undone in its channel; a control is replaced
+by the surface that the air sees; the response to increments of the coefficients in measured signals is subtracted
+(`airtruth.tracing.increment_response`); mass and inertias change the constants of the identification. The result obeys
+the linear model under its controls, whatever the method: the instruments of a regression, an identified servo and a
 simulated output remain functions of inputs alone.
 
 The response to increments needs the derivatives that are to be estimated. Their error enters multiplied by the share
@@ -13,8 +13,9 @@ be used again.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -23,12 +24,12 @@ from numpy.typing import NDArray
 from airtruth.aircraft import Aircraft
 from airtruth.aircraft.neutral import fitted
 from airtruth.identification import AircraftConstants
+from airtruth.identification.record_constants import stated_value
 from airtruth.logs.flight_log import Batch, FlightLog, batches
 from airtruth.numerics.prefilter import butterworth
-from airtruth.physics import short_period
 from airtruth.physics.atmosphere import air_density
-from airtruth.physics.motion import LONGITUDINAL
-from airtruth.physics.readings import reading_increments, state_of
+from airtruth.physics.motion import LONGITUDINAL, Motion
+from airtruth.physics.readings import increments_over, reading_increments, state_of
 from airtruth.physics.sensor_errors import SensorErrors
 from airtruth.physics.terms import (
     AeroTerm,
@@ -40,19 +41,17 @@ from airtruth.physics.terms import (
     declared_total,
     measured_of,
 )
-from airtruth.tracing.increment_response import increments, response
+from airtruth.tracing.increment_response import increments, linear_scale, response
 from airtruth.tracing.model.records import head_samples
 from airtruth.tracing.model.surface import through
 from airtruth.tracing.result import TraceResult
 
 Array = NDArray[np.float64]
 
-OUTPUTS: Final = LONGITUDINAL.output_channels
-"""Channels that the response to increments changes."""
 _FINE: Final = 8
 """Points between two samples on which the surface moves [-] (judgement: 2.5 ms at 50 Hz, below any traced delay)."""
 _CUTOFF_HZ: Final = 5.0
-"""Low-pass of the pitch rate before it is differentiated [Hz]; that of the identification methods."""
+"""Low-pass of a rate before it is differentiated [Hz]; that of the identification methods."""
 
 TreatmentKind = Literal["subtracted", "undone", "replaced", "declared", "kept"]
 
@@ -64,7 +63,7 @@ class Treatment:
     Attributes
     ----------
     effect : key of the effect.
-    kind : "subtracted", the response to its increments; "undone", the error of a sensor; "replaced", the elevator by
+    kind : "subtracted", the response to its increments; "undone", the error of a sensor; "replaced", a control by
         the surface that the air sees; "declared", changed constants of the aircraft; "kept", left in the records.
     sentence : the treatment in words.
     """
@@ -81,7 +80,7 @@ class Condition:
     Attributes
     ----------
     airspeed_m_s : true airspeed of the condition [m/s].
-    derivatives : (6,) in the order of `short_period.PARAMETERS` [-].
+    derivatives : in the order of the motion [-].
     """
 
     airspeed_m_s: float
@@ -99,7 +98,9 @@ class Compensation:
     from_trim : whether alpha counts from the record's own trim, as in a trace with the linear model.
     sensors, readings : errors of sensors, and increments of what they read.
     surface : dynamics between measured surface and air.
-    mass_factor, inertia_factor : factors on the declared constants [-].
+    declared : quantity -> error of the declared constant: a factor on mass and inertias, of the product of inertia its increment
+        over the root of Ixx Izz [-].
+    motion : of the records.
     treatments : what happens to each effect.
     """
 
@@ -110,8 +111,8 @@ class Compensation:
     sensors: tuple[SensorTerm, ...] = ()
     readings: tuple[ReadingTerm, ...] = ()
     surface: tuple[SurfaceTerm, ...] = ()
-    mass_factor: float = 1.0
-    inertia_factor: float = 1.0
+    declared: Mapping[str, float] = field(default_factory=dict)
+    motion: Motion = LONGITUDINAL
     treatments: tuple[Treatment, ...] = ()
 
 
@@ -120,13 +121,14 @@ def compensation_of(result: TraceResult) -> Compensation:
     fit = result.rounds[-1].gls
     total, treatments = Change(), []
     hypothesis, at = fit.hypothesis, 0
+    motion = result.case.fitted.layout.motion
     for effect in hypothesis.effects:
         sizes = fit.point.sizes[at : at + len(effect.parameters)]
         at += len(effect.parameters)
         change = replace(hypothesis, effects=(effect,)).added(sizes)
-        treatments.append(treatment_of(effect.key, change))
+        treatments.append(treatment_of(effect.key, change, motion))
         total = total + change
-    aero, states = _measurable(total)
+    aero, states = _measurable(total, motion)
     increment = fit.point.common[fit.point.of.common.derivatives]
     records = result.case.fitted.records
     return Compensation(
@@ -139,21 +141,28 @@ def compensation_of(result: TraceResult) -> Compensation:
         sensors=total.sensors,
         readings=total.readings,
         surface=total.surface,
-        mass_factor=declared_total(total.declared, "mass"),
-        inertia_factor=declared_total(total.declared, "inertia"),
+        declared={name: declared_total(total.declared, name) for name in _constants(motion)},
+        motion=motion,
         treatments=tuple(treatments),
     )
 
 
-def _measurable(change: Change) -> tuple[tuple[AeroTerm, ...], tuple[StateTerm, ...]]:
+def _constants(motion: Motion) -> dict[str, str]:
+    """Declared quantities of a motion that are constants of the identification, and their fields."""
+    fields = {"mass": "mass_kg", "inertia": "inertia_yy_kg_m2"}
+    named = [d.name for d in motion.declared if d.name in fields or d.name.startswith("inertia_")]
+    return {name: fields.get(name, f"{name}_kg_m2") for name in named}
+
+
+def _measurable(change: Change, motion: Motion) -> tuple[tuple[AeroTerm, ...], tuple[StateTerm, ...]]:
     """Increments in measured signals, and the states that measured signals drive."""
-    measured = measured_of(LONGITUDINAL)
+    measured = measured_of(motion)
     states = tuple(s for s in change.states if s.signal in measured)
     known = {*measured, *(s.name for s in states)}
     return tuple(t for t in change.aero if t.signal in known and t.factor in ("", *known)), states
 
 
-def treatment_of(key: str, change: Change) -> Treatment:
+def treatment_of(key: str, change: Change, motion: Motion = LONGITUDINAL) -> Treatment:
     """The treatment of one effect, by what it changes."""
     if change.sensors or change.readings:
         channels = ", ".join(
@@ -161,10 +170,14 @@ def treatment_of(key: str, change: Change) -> Treatment:
         )
         return Treatment(key, "undone", f"{key}: its error is undone in {channels}")
     if change.surface:
-        return Treatment(key, "replaced", f"{key}: elevator_rad is replaced by the surface that the air sees")
+        channels = " and ".join(c.channel for c in motion.controls if change.of_surface(c.name))
+        verb = "are" if " and " in channels else "is"
+        return Treatment(
+            key, "replaced", f"{key}: {channels} {verb} replaced by the surface that the air sees"
+        )
     if change.declared:
         names = {t.quantity for t in change.declared}
-        if names & {"mass", "inertia"}:
+        if names & _constants(motion).keys():
             return Treatment(
                 key, "declared", f"{key}: identified with the updated {' and '.join(sorted(names))}"
             )
@@ -173,24 +186,26 @@ def treatment_of(key: str, change: Change) -> Treatment:
         return Treatment(
             key, "kept", f"{key}: kept, because an axial force moves none of the channels of a regression"
         )
-    if change.aero and _measurable(change)[0] == change.aero:
-        return Treatment(
-            key, "subtracted", f"{key}: the response to its increments of CL and Cm is subtracted"
-        )
+    if change.aero and _measurable(change, motion)[0] == change.aero:
+        *most, last = [c.name for c in motion.coefficients]
+        named = f"{', '.join(most)} and {last}"
+        return Treatment(key, "subtracted", f"{key}: the response to its increments of {named} is subtracted")
     return Treatment(key, "kept", f"{key}: kept, because no channel of a log measures its signal")
 
 
 def updated_constants(aircraft: Aircraft, taken: Compensation) -> Aircraft:
-    """The aircraft with the traced mass and inertia."""
-    if taken.mass_factor == 1.0 and taken.inertia_factor == 1.0:
+    """The aircraft with the traced mass and inertias."""
+    own = aircraft.constants
+    cross = math.sqrt(max(own.inertia_xx_kg_m2 * own.inertia_zz_kg_m2, 0.0))
+    neutral, changed = taken.motion.neutral, {}
+    for name, field_name in _constants(taken.motion).items():
+        total = taken.declared.get(name, neutral[name])
+        if total != neutral[name]:
+            value = getattr(own, field_name)
+            changed[field_name] = value * total if neutral[name] == 1.0 else value + total * cross
+    if not changed:
         return aircraft
-    constants = aircraft.constants.model_copy(
-        update={
-            "mass_kg": aircraft.mass_kg * taken.mass_factor,
-            "inertia_yy_kg_m2": aircraft.inertia_yy_kg_m2 * taken.inertia_factor,
-        }
-    )
-    return aircraft.model_copy(update={"constants": constants})
+    return aircraft.model_copy(update={"constants": own.model_copy(update=changed)})
 
 
 def compensated_log(log: FlightLog, constants: AircraftConstants, taken: Compensation) -> FlightLog:
@@ -219,50 +234,65 @@ def compensated_batch(batch: Batch, constants: AircraftConstants, taken: Compens
     channels = dict(batch.channels)
     _undo_sensors(channels, taken.sensors, batch.dt_s)
     _undo_readings(channels, batch.dt_s, constants, taken)
-    if taken.surface:
-        elevator = channels["elevator_rad"]
-        channels["elevator_rad"] = np.array([_air_surface(taken.surface, de, batch.dt_s) for de in elevator])
+    for control in taken.motion.controls:
+        terms = tuple(term for term in taken.surface if term.control == control.name)
+        if terms:
+            channels[control.channel] = np.array(
+                [_air_surface(terms, own, batch.dt_s) for own in channels[control.channel]]
+            )
     if taken.aero:
         moved = _increment_response(channels, batch.dt_s, constants, taken)
-        for name, d in zip(OUTPUTS, moved, strict=True):
-            channels[name] = channels[name] - d
+        for name, d in zip(taken.motion.output_channels, moved, strict=True):
+            if name in channels:
+                channels[name] = channels[name] - d
     return replace(batch, channels=channels)
 
 
 def _increment_response(
     channels: dict[str, Array], dt_s: float, constants: AircraftConstants, taken: Compensation
 ) -> Array:
-    alpha, airspeed = channels["alpha_rad"], channels["airspeed_m_s"].mean(axis=1)
-    scale = short_period.scale(
-        constants.wing_area_m2,
-        constants.chord_m,
-        constants.mass_kg,
-        constants.inertia_yy_kg_m2,
-        airspeed,
-        np.asarray(air_density(channels)).mean(axis=1),
-    )
-    signals = {
-        "alpha": alpha - _origin(alpha, dt_s, taken),
-        "elevator": channels["elevator_rad"],
-        "qhat": channels["q_rad_s"] * scale.half_chord_time[:, None],
-        "qbar": 0.5 * np.asarray(air_density(channels)) * channels["airspeed_m_s"] ** 2,
-    }
+    airspeed = channels["airspeed_m_s"].mean(axis=1)
+    signals = _signals(channels, constants, dt_s, taken)
     signals |= {s.name: state_of(s, signals[s.signal], dt_s) for s in taken.states}
-    more = increments(taken.aero, signals)
+    more = increments(taken.aero, signals, taken.motion)
     more -= more[..., : head_samples(dt_s)].mean(axis=2, keepdims=True)
     conditions = np.array([c.airspeed_m_s for c in taken.conditions])
     nearest = np.abs(airspeed[:, None] - conditions).argmin(axis=1)
     derivatives = np.array([c.derivatives for c in taken.conditions])[nearest]
-    return response(derivatives, scale, more[0], more[1], dt_s)
+    return response(derivatives, linear_scale(taken.motion, constants, channels), more, dt_s)
+
+
+def _signals(
+    channels: dict[str, Array], constants: AircraftConstants, dt_s: float, taken: Compensation
+) -> dict[str, Array]:
+    """Measured signals of the motion, as its terms count them."""
+    motion = taken.motion
+    lengths = {"chord": constants.chord_m, "span": stated_value(constants, "span_m")}
+    airspeed = channels["airspeed_m_s"].mean(axis=1)
+    found = {}
+    for s in (*motion.signals, *motion.known_signals):
+        if s.channel in channels:
+            rate = 1.0 if s.length is None else (lengths[s.length] / (2.0 * airspeed))[:, None]
+            found[s.name] = channels[s.channel] * rate
+    if motion is LONGITUDINAL:
+        alpha = channels["alpha_rad"]
+        found["alpha"] = alpha - _origin(alpha, dt_s, taken)
+    found["qbar"] = 0.5 * np.asarray(air_density(channels)) * channels["airspeed_m_s"] ** 2
+    return found
 
 
 def _undo_readings(
     channels: dict[str, Array], dt_s: float, constants: AircraftConstants, taken: Compensation
 ) -> None:
     """Subtract the increments of the readings, in the measured signals, from ``channels``."""
-    alpha = channels["alpha_rad"]
-    signals = channels | {"alpha_rad": alpha - _origin(alpha, dt_s, taken)}
-    more = reading_increments(taken.readings, taken.states, signals, constants.chord_m, dt_s)
+    if not taken.readings:
+        return
+    if taken.motion is LONGITUDINAL:
+        alpha = channels["alpha_rad"]
+        signals = channels | {"alpha_rad": alpha - _origin(alpha, dt_s, taken)}
+        more = reading_increments(taken.readings, taken.states, signals, constants.chord_m, dt_s)
+    else:
+        more = increments_over(taken.readings, taken.states, _signals(channels, constants, dt_s, taken), dt_s)
     for name, increment in more.items():
         channels[name] = channels[name] - increment
 
@@ -287,7 +317,7 @@ def _undo_sensors(channels: dict[str, Array], terms: Sequence[SensorTerm], dt_s:
             channels["alpha_rad"]
         )
     for name, own in errors.items():
-        if own.x_m != 0.0:
+        if (own.x_m, own.y_m, own.z_m) != (0.0, 0.0, 0.0):
             channels[name] = channels[name] + _arm(name, own, channels, dt_s)
 
 
@@ -300,14 +330,24 @@ def _advanced(x: Array, samples: float) -> Array:
 
 
 def _arm(name: str, own: SensorErrors, channels: dict[str, Array], dt_s: float) -> Array:
-    """Value at the CG less the reading, by `airtruth.physics.sensors.vane_alpha` and `accelerometer_az`."""
-    q = channels["q_rad_s"]
+    """Value at the CG less the reading, by `airtruth.physics.sensors.at_instrument`, to first order in the rates."""
+    airspeed = channels["airspeed_m_s"]
     if name == "alpha_rad":
-        return np.asarray(q * own.x_m / channels["airspeed_m_s"])
+        moved = channels["q_rad_s"] * own.x_m / airspeed
+        return np.asarray(moved - channels["p_rad_s"] * own.y_m / airspeed if own.y_m else moved)
+    if name == "beta_rad":
+        return np.asarray((channels["p_rad_s"] * own.z_m - channels["r_rad_s"] * own.x_m) / airspeed)
+    if name == "ay_m_s2":
+        return own.z_m * _rate(channels["p_rad_s"], dt_s) - own.x_m * _rate(channels["r_rad_s"], dt_s)
+    return own.x_m * _rate(channels["q_rad_s"], dt_s)
+
+
+def _rate(x: Array, dt_s: float) -> Array:
+    """(runs, samples) derivative of a low-passed rate [rad/s2]."""
     from scipy.signal import sosfiltfilt
 
-    smooth = sosfiltfilt(butterworth(_CUTOFF_HZ, 2, dt_s).copy(), q, axis=1)
-    return np.asarray(own.x_m * np.gradient(smooth, dt_s, axis=1))
+    smooth = sosfiltfilt(butterworth(_CUTOFF_HZ, 2, dt_s).copy(), x, axis=1)
+    return np.asarray(np.gradient(smooth, dt_s, axis=1))
 
 
 def _air_surface(terms: tuple[SurfaceTerm, ...], elevator: Array, dt_s: float) -> Array:

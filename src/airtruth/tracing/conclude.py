@@ -55,9 +55,10 @@ from airtruth.tracing.prepare import Case
 from airtruth.tracing.record_differences import CERTAIN, DIFFERENCES, differences
 from airtruth.tracing.replay import worsened
 from airtruth.tracing.reservations import reservations
-from airtruth.tracing.selection.acceptance import SURPASSED, Candidate
+from airtruth.tracing.selection.acceptance import Candidate
 from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.families import FRICTION
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import CONTRADICTED
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.selection.score_test import Table
@@ -293,7 +294,7 @@ def _candidates(
         if s.effect.key in tied:
             why = ""
         elif known is not None:
-            why = "; ".join(known.reasons) or SURPASSED
+            why = "; ".join(known.reasons or (Refusal.SURPASSED,))
         elif any(step.startswith(f"refit {s.effect.key}") for step in case.left_out):
             why = "the time budget ended before its refit"
         else:

@@ -9,7 +9,7 @@ aircraft to the increments,
     d_az = -normal (CLalpha d_alpha + CLq hat d_q + dCL),
 
 with hat = c/(2V) and the factors of eqs (2)-(4) of M. Brunot, "An Instrumental Variable Approach for Aircraft
-Identification".
+Identification", in the pitch plane, and likewise with the matrices of `airtruth.physics.lateral`.
 """
 
 from __future__ import annotations
@@ -20,58 +20,106 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from airtruth.identification import AircraftConstants
+from airtruth.identification.record_constants import LateralValues, values_of
 from airtruth.physics import short_period
+from airtruth.physics.atmosphere import air_density
+from airtruth.physics.lateral import LateralScale, lateral_scale, lateral_system, structure
+from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.terms import AeroTerm, term_value
 
 Array = NDArray[np.float64]
 
 
-def increments(aero: Sequence[AeroTerm], signals: Mapping[str, Array]) -> Array:
-    """(2, ...) increments dCL and dCm [-] of terms.
+def increments(
+    aero: Sequence[AeroTerm], signals: Mapping[str, Array], motion: Motion = LONGITUDINAL
+) -> Array:
+    """(coefficients, ...) increments of the coefficients of a motion by terms [-]; an axial force is none of them.
 
     Parameters
     ----------
-    signals : name -> values of one shape: alpha as the terms count it [rad], elevator [rad], qhat = q c/(2V), qbar [Pa], states.
+    signals : name -> values of one shape: those of the motion as the terms count them [rad, -], qbar [Pa], states.
     """
-    total = np.zeros((2, *next(iter(signals.values())).shape))
-    for term in (t for t in aero if t.coefficient != "CX"):
-        total[0 if term.coefficient == "CL" else 1] += term_value(term, signals)
+    rows = [c.name for c in motion.coefficients]
+    total = np.zeros((len(rows), *next(iter(signals.values())).shape))
+    for term in (t for t in aero if t.coefficient in rows):
+        total[rows.index(term.coefficient)] += term_value(term, signals)
     return total
 
 
-def response(derivatives: Array, scale: short_period.Scale, lift: Array, moment: Array, dt_s: float) -> Array:
-    """Response of the linear aircraft to increments of CL and Cm, from rest, increments linear between samples.
+def linear_scale(
+    motion: Motion, constants: AircraftConstants, channels: Mapping[str, Array]
+) -> short_period.Scale | LateralScale:
+    """Factors (runs,) of the linear model at the mean condition of each run.
 
     Parameters
     ----------
-    derivatives : (6,) or (runs, 6) in the order of `short_period.PARAMETERS` [-].
-    scale : factors (runs,).
-    lift, moment : (runs, samples) dCL, dCm [-].
+    channels : (runs, samples) of a log.
+    """
+    airspeed = channels["airspeed_m_s"].mean(axis=1)
+    density = np.asarray(air_density(channels)).mean(axis=1)
+    if motion is LONGITUDINAL:
+        c = constants
+        return short_period.scale(c.wing_area_m2, c.chord_m, c.mass_kg, c.inertia_yy_kg_m2, airspeed, density)
+    values = values_of(constants, motion)
+    assert isinstance(values, LateralValues)
+    level = np.zeros_like(airspeed)
+    alpha = channels["alpha_rad"].mean(axis=1) if "alpha_rad" in channels else level
+    theta = channels["theta_rad"].mean(axis=1) if "theta_rad" in channels else alpha
+    return lateral_scale(values, airspeed, density, alpha, theta)
+
+
+def response(
+    derivatives: Array, scale: short_period.Scale | LateralScale, coefficients: Array, dt_s: float
+) -> Array:
+    """Response of the linear aircraft to increments of its coefficients, from rest, increments linear between samples.
+
+    Parameters
+    ----------
+    derivatives : (derivatives,) or (runs, derivatives) in the order of the motion [-].
+    scale : factors (runs,), whose type decides the motion.
+    coefficients : (coefficients, runs, samples) increments [-].
     dt_s : sample period [s].
 
     Returns
     -------
-    (3, runs, samples) alpha [rad], q [rad/s], az [m/s2].
+    (outputs, runs, samples) in the order of the motion [units of the outputs].
     """
-    runs, samples = lift.shape
+    runs = coefficients.shape[1]
     every = np.broadcast_to(derivatives, (runs, derivatives.shape[-1]))
+    if isinstance(scale, LateralScale):
+        system, own = lateral_system(every, scale), structure(scale)
+        u = np.einsum("rij,jrn->rni", own.forces, coefficients)
+        x = _driven(system.a, u, dt_s)
+        read = np.einsum("rij,rnj->irn", system.c, x)
+        return np.asarray(read + np.einsum("rij,jrn->irn", own.accelerations, coefficients))
+    lift, moment = coefficients
     a, _ = short_period.system(every, scale)
     u = np.stack([-scale.lift[:, None] * lift, scale.moment[:, None] * moment], axis=2)
-    # x' = A x + u, u' = (u1 - u0)/dt: one exponential gives the exact step (Franklin, Powell and Workman,
-    # Digital Control of Dynamic Systems, 3rd ed., 1998, 6.3.2, triangle hold)
-    whole = np.zeros((runs, 3 * 2, 3 * 2))  # states, u and u'
-    whole[:, :2, :2] = a * dt_s
-    whole[:, :2, 2:4] = np.eye(2) * dt_s
-    whole[:, 2:4, 4:] = np.eye(2)
-    step = expm(whole)
-    driven = np.einsum("rij,rnj->rni", step[:, :2, 2:4], u[:, :-1])
-    driven += np.einsum("rij,rnj->rni", step[:, :2, 4:], np.diff(u, axis=1))
-    x = np.zeros((runs, samples, 2))
-    for k in range(samples - 1):
-        x[:, k + 1] = np.einsum("rij,rj->ri", step[:, :2, :2], x[:, k]) + driven[:, k]
+    x = _driven(a, u, dt_s)
     row = short_period.normal_force_row(every, scale)[:, :2]
     az = np.einsum("rj,rnj->rn", row, x) - scale.normal[:, None] * lift
     return np.stack([x[..., 0], x[..., 1], az])
 
 
-__all__ = ["increments", "response"]
+def _driven(a: Array, u: Array, dt_s: float) -> Array:
+    """(runs, samples, n) states of x' = a x + u from rest, for u (runs, samples, n) linear between samples.
+
+    With u' = (u1 - u0)/dt one exponential gives the exact step (Franklin, Powell and Workman, Digital Control of Dynamic
+    Systems, 3rd ed., 1998, 6.3.2, triangle hold).
+    """
+    runs, samples, n = u.shape
+    whole = np.zeros((runs, 3 * n, 3 * n))  # states, u and u'
+    whole[:, :n, :n] = a * dt_s
+    whole[:, :n, n : 2 * n] = np.eye(n) * dt_s
+    whole[:, n : 2 * n, 2 * n :] = np.eye(n)
+    step = expm(whole)
+    driven = np.einsum("rij,rnj->rni", step[:, :n, n : 2 * n], u[:, :-1])
+    driven += np.einsum("rij,rnj->rni", step[:, :n, 2 * n :], np.diff(u, axis=1))
+    x = np.zeros((runs, samples, n))
+    for k in range(samples - 1):
+        x[:, k + 1] = np.einsum("rij,rj->ri", step[:, :n, :n], x[:, k]) + driven[:, k]
+    return x
+
+
+__all__ = ["increments", "linear_scale", "response"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
 
 from airtruth import aircraft as planes
 from airtruth.aircraft import Aircraft
@@ -15,15 +14,12 @@ from airtruth.identification.excited import excited_motions, excited_runs
 from airtruth.identification.record_constants import values_of
 from airtruth.logs import atomic
 from airtruth.logs.sources import Logs, named_logs
-from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
+from airtruth.physics.motion import FOLDERS, LONGITUDINAL, MOTIONS, Motion
 from airtruth.tracing.answer import ANSWER
 from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.result import TraceResult
 from airtruth.tracing.run import trace as trace_one
 from airtruth.tracing.selection.budget import Advance
-
-FOLDERS: Final = ("", *list(MOTIONS)[1:])
-"""Folders of the answers within that of a command: the first motion that is answered has none of its own."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +44,10 @@ class Part:
     def into(self, out: Path | None) -> Path | None:
         """Its folder; None where nothing is written."""
         return out if out is None or not self.folder else out / self.folder
+
+    def named(self, advance: Advance) -> Advance:
+        """Steps of a motion with a folder of its own, with its name."""
+        return (lambda step: advance(f"{self.motion.name}: {step}")) if self.folder else advance
 
 
 def parts_of(logs: Logs, aircraft: Aircraft, options: TraceOptions) -> tuple[Part, ...]:
@@ -159,7 +159,7 @@ def trace(
             part.options,
             part.into(out),
             force,
-            _named(advance, part),
+            part.named(advance),
             part.runs,
             part.notes,
         )
@@ -168,9 +168,4 @@ def trace(
     return replace(first, others=tuple(others))
 
 
-def _named(advance: Advance, part: Part) -> Advance:
-    """The steps of a motion with a folder of its own, with its name."""
-    return (lambda step: advance(f"{part.motion.name}: {step}")) if part.folder else advance
-
-
-__all__ = ["FOLDERS", "Part", "parts_of", "trace"]
+__all__ = ["Part", "parts_of", "trace"]

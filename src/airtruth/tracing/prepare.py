@@ -85,8 +85,10 @@ class Case:
 
     @property
     def has_vane(self) -> bool:
-        """Whether alpha was measured in every record."""
-        return bool(self.fitted.settings.measured.all())
+        """Whether a vane measured the flow angle in every record."""
+        outputs = self.fitted.layout.motion.outputs
+        vanes = [y.instrument == "vane" for y in outputs]
+        return bool(self.fitted.settings.measured[vanes].all())
 
 
 def prepare(

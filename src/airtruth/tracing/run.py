@@ -21,8 +21,11 @@ from airtruth.logs import atomic
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.provenance import Provenance, digests_of
 from airtruth.logs.sources import Logs, named_logs
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS
 from airtruth.tracing.answer import ANSWER, DECLARED_LEVEL
 from airtruth.tracing.axial_force import axial_force
+from airtruth.tracing.calibration.calibrated import calibrated
+from airtruth.tracing.calibration.noise_colour import beside, later_level
 from airtruth.tracing.conclude import conclude
 from airtruth.tracing.declared_model import declared_p_value
 from airtruth.tracing.kinematic_start import (
@@ -38,16 +41,14 @@ from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.prepare import Case, prepare
 from airtruth.tracing.replay import flown_again
 from airtruth.tracing.result import TraceResult
-from airtruth.tracing.selection.airspeed_error import with_corrected_airspeed
 from airtruth.tracing.selection.budget import Advance, Budget, may_begin
-from airtruth.tracing.selection.corner_share import with_corner_share
 from airtruth.tracing.selection.learn import with_increments
 from airtruth.tracing.selection.look_alikes import with_look_alikes
-from airtruth.tracing.selection.noise_colour import beside, later_level, with_coloured_noise
+from airtruth.tracing.selection.outcome import total_cost
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.rounds import SearchRound
 from airtruth.tracing.selection.search import search
-from airtruth.tracing.selection.settled import total_cost
+from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.selection.significance import LEVEL
 from airtruth.tracing.selection.weights import with_rival
 from airtruth.tracing.stage_errors import Replay
@@ -178,15 +179,15 @@ def _search(
     advance("refit the declared aircraft")
     limited = None if options.time_budget_s is None else Budget(options.time_budget_s, advance)
     steps = advance if limited is None else limited
-    case, start = with_coloured_noise(case)
-    case = with_corrected_airspeed(with_corner_share(case, start), start)
-    rounds = _pruned_search(case, start, options, steps, kinematics)
+    case, start = calibrated(case)
+    sets = SetTable(case.fitted)
+    rounds = _pruned_search(case, sets, start, options, steps, kinematics)
     if rounds and rounds[-1].null.hypothesis.effects and not case.fitted.settings.coloured:
-        case, rounds = _with_later_colour(case, rounds, options, steps, kinematics)
+        case, sets, rounds = _with_later_colour(case, sets, rounds, options, steps, kinematics)
     if options.learns:
-        rounds = with_increments(case.fitted, rounds, case.effects, options.seed, steps, case.declared)
+        rounds = with_increments(sets, rounds, case.effects, options.seed, steps, case.declared)
     if rounds:
-        rounds = with_look_alikes(case.fitted, rounds, case.effects, steps)
+        rounds = with_look_alikes(sets, rounds, case.effects, steps)
     else:
         raise LogError(
             f"the declared aircraft {case.fitted.records[0].plant.aircraft.name} does not fly like these records: its "
@@ -197,6 +198,7 @@ def _search(
 
 def _pruned_search(
     case: Case,
+    sets: SetTable,
     start: Parameters,
     options: TraceOptions,
     advance: Advance,
@@ -205,7 +207,7 @@ def _pruned_search(
 ) -> tuple[SearchRound, ...]:
     """The rounds of a search without the names that later ones make unnecessary."""
     rounds = search(
-        case.fitted,
+        sets,
         case.hypothesis,
         start,
         case.effects,
@@ -216,7 +218,7 @@ def _pruned_search(
         other,
         sets_of(kinematics, _longest_period_s(case)),
     )
-    return rounds and pruned(case.fitted, rounds, case.effects, options.seed, LEVEL, advance)
+    return rounds and pruned(sets, rounds, case.effects, options.seed, LEVEL, advance)
 
 
 def _longest_period_s(case: Case) -> float:
@@ -226,11 +228,12 @@ def _longest_period_s(case: Case) -> float:
 
 def _with_later_colour(
     case: Case,
+    sets: SetTable,
     rounds: tuple[SearchRound, ...],
     options: TraceOptions,
     advance: Advance,
     kinematics: CheckResult | None,
-) -> tuple[Case, tuple[SearchRound, ...]]:
+) -> tuple[Case, SetTable, tuple[SearchRound, ...]]:
     """The search again with correlated noise that shows beside what it explained, where that explains more.
 
     At the declared aircraft a strong effect drives correlated noise to its limits, and it does not enter. Correlated noise can
@@ -240,31 +243,33 @@ def _with_later_colour(
     coloured, point = beside(case, rounds[-1].null, level)
     phrase = "search with correlated noise"
     if not coloured.fitted.settings.coloured or not may_begin(advance, phrase):
-        return case, rounds
+        return case, sets, rounds
+    slow = SetTable(coloured.fitted)
     start = replace(point, sizes=np.empty(0))
     accepted = rounds[-1].null.hypothesis.effects
-    again = _pruned_search(coloured, start, options, advance, kinematics, accepted)
+    again = _pruned_search(coloured, slow, start, options, advance, kinematics, accepted)
     if not again:
-        return case, rounds
+        return case, sets, rounds
     if total_cost(again[-1]) < total_cost(rounds[-1]):
-        return coloured, with_rival(again, rounds)
-    return case, with_rival(rounds, again)
+        return coloured, slow, with_rival(again, rounds)
+    return case, sets, with_rival(rounds, again)
 
 
 def _effects(options: TraceOptions) -> list[Effect]:
-    """The requested candidates, each once; a name without a variant selects all of its variants."""
+    """The requested candidates of the motion, each once; a name without a variant selects all of its variants."""
+    motion = MOTIONS[options.motion or LONGITUDINAL.name]
+    library = {key: effect for key, effect in EFFECTS.items() if effect.applies_to(motion)}
     if options.effects is None:
-        return [effect for effect in EFFECTS.values() if not effect.in_derivatives]
+        return [effect for effect in library.values() if not effect.in_derivatives]
     found: dict[str, Effect] = {}
     for key in options.effects:
         if isinstance(key, Effect):
             found[key.key] = key
             continue
-        matching = {k: e for k, e in EFFECTS.items() if key in (k, e.name)}
+        matching = {k: e for k, e in library.items() if key in (k, e.name)}
         if not matching:
-            raise ConfigurationError(
-                f"effect {key!r}: {choices(key, {*EFFECTS, *(e.name for e in EFFECTS.values())})}"
-            )
+            known = {*library, *(e.name for e in library.values())}
+            raise ConfigurationError(f"effect {key!r}: {choices(key, known)}")
         found |= {k: e for k, e in matching.items() if not e.in_derivatives}
     return list(found.values())
 

@@ -55,7 +55,7 @@ def accepted_change(case: Case, fit: PosteriorFit, sizes: Array, chord_m: float)
     shift = declared_total(change.declared, "cg")
     if shift == DECLARED["cg"]:
         return change
-    moved_m = moved_past_sensors_m(fit.point.common, shift, chord_m)
+    moved_m = moved_past_sensors_m(fit.point.common, shift, chord_m, fit.point.of.common)
     outputs = case.fitted.layout.motion.outputs
     moved = [y for y in outputs if y.instrument in _WITH_ARM and (y.channel not in VANES or case.has_vane)]
     arms = (SensorTerm(y.channel, "arm", moved_m) for y in moved)

@@ -1,4 +1,4 @@
-"""Increments of CL and Cm, and their states, as functions of a JSBSim model's <aerodynamics>.
+"""Increments of coefficients, and their states, as functions of a JSBSim model's <aerodynamics>.
 
 Signals are read inside <aerodynamics>, where the state is that of the present step. A control channel copies the
 values that a state needs of the previous step, at the start of the next one, before anything has changed.
@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from copy import deepcopy
-from dataclasses import dataclass
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
+from airtruth.aircraft.jsbsim.axes import CARRIED, to_axes
 from airtruth.aircraft.jsbsim.functions import (
     STEP,
     TIME,
@@ -27,70 +26,42 @@ from airtruth.aircraft.jsbsim.functions import (
 from airtruth.aircraft.jsbsim.surface import Components, Surface
 from airtruth.aircraft.origin import Origin
 from airtruth.errors import AircraftError, ConfigurationError, choices
-from airtruth.physics.terms import FORMULAS, SIGNALS, AeroTerm, StateTerm, shape_of
+from airtruth.physics.motion import MOTIONS
+from airtruth.physics.terms import FORMULAS, QBAR, AeroTerm, StateTerm, shape_of, signals_of
 from airtruth.units import PSF
 
-_ALPHA_DOT: Final = "aero/alphadot-rad_sec"
-"""Property of alpha_dot over ground, one step old [rad/s]."""
-_PROPERTIES: Final = {"alpha": "aero/alpha-rad"}
+_PROPERTIES: Final = {"alpha": "aero/alpha-rad", "beta": "aero/beta-rad"}
 """Signal -> property of JSBSim that holds it in SI."""
+_ANGLES: Final = {
+    "alpha": "Angle of attack of the air at the CG [rad]",
+    "beta": "Sideslip of the air at the CG [rad]",
+}
+"""Signal -> description."""
+_RATES: Final = {
+    "qhat": ("velocities/q-rad_sec", "aero/ci2vel", "q c/(2V) of the air [-]"),
+    "phat": ("velocities/p-rad_sec", "aero/bi2vel", "p b/(2V) of the air [-]"),
+    "rhat": ("velocities/r-rad_sec", "aero/bi2vel", "r b/(2V) of the air [-]"),
+}
+"""Signal -> rate of the body [rad/s], half the reference length over the airspeed [s], and description."""
+_CHANGES: Final = {
+    "alpha_dot_hat": ("aero/alphadot-rad_sec", "aero/ci2vel", "alpha_dot c/(2V), inertial [-]"),
+    "beta_dot_hat": ("aero/betadot-rad_sec", "aero/bi2vel", "beta_dot b/(2V), inertial [-]"),
+}
+"""Signal -> rate over ground, one step old [rad/s], half the reference length over the airspeed [s], and description."""
 _LEAST_BENDS: Final = 3
 """Least number of bends that are written as a table [-]; a single break is a formula (convention)."""
 _ROUNDING: Final = 1e-9
 """Sum of slopes beyond the last bend, over the largest, that counts as zero [-] (judgement: above rounding)."""
-_PARTNER: Final = {"Z": "X", "X": "Z", "NORMAL": "AXIAL", "AXIAL": "NORMAL"}
-"""Axis beside which JSBSim accepts another."""
-
-
-@dataclass(frozen=True)
-class _Force:
-    """How a force that a coefficient states reaches the axes of a model.
-
-    Attributes
-    ----------
-    total : last part of the name of its sum.
-    direction : along which axis of the body.
-    body : body axis that carries it -> its sign; JSBSim counts AXIAL aft.
-    wind : axis of lift and drag -> sign, and function of the angle of attack.
-    across : coordinate whose distance from the CG gives it a moment.
-    missing : what the model lacks where neither carries it.
-    """
-
-    total: str
-    direction: str
-    body: Mapping[str, float]
-    wind: Mapping[str, tuple[float, str]]
-    across: str
-    missing: str
-
-
-_FORCES: Final[Mapping[str, _Force]] = {
-    "CL": _Force(
-        "force",
-        "-z",
-        {"Z": -1.0, "NORMAL": 1.0},
-        {"LIFT": (1.0, "cos"), "DRAG": (1.0, "sin")},
-        "x",
-        "LIFT, Z or NORMAL that could carry lift",
-    ),
-    "CX": _Force(
-        "axial",
-        "x",
-        {"X": 1.0, "AXIAL": -1.0},
-        {"LIFT": (1.0, "sin"), "DRAG": (-1.0, "cos")},
-        "z",
-        "DRAG, X or AXIAL that could carry an axial force",
-    ),
-}
-"""Coefficient of a force -> how it reaches the axes."""
+_SENSES: Final = {"rudder": "trailing edge left", "aileron": "(right - left)/2, trailing edge down"}
+"""Control -> its positive sense, where that is not the trailing edge down."""
 
 
 def write(
     aerodynamics: Element,
     terms: Sequence[AeroTerm],
     states: Sequence[StateTerm],
-    surface: Surface,
-    rotary_gust: str | None,
+    surfaces: Mapping[str, Surface],
+    gusts: Mapping[str, str | None],
     origin: Origin,
     where: str,
 ) -> Components:
@@ -100,8 +71,8 @@ def write(
     ----------
     aerodynamics : the model's element, changed.
     terms, states : see `airtruth.physics.terms`.
-    surface : names of the new properties, and the surface that causes the forces.
-    rotary_gust : property that holds the rotation of the air [rad/s], or None.
+    surfaces : control -> names of the new properties, and the surface that causes the forces.
+    gusts : signal of a rate -> property that holds the rotation of the air [rad/s], or None.
     origin : standard deviations and source, for the descriptions.
     where : subject of error messages.
 
@@ -110,9 +81,9 @@ def write(
     ConfigurationError
         If a term's signal is unknown, or two states have one name.
     AircraftError
-        If the model has no axis that can carry lift.
+        If the model lacks the control of a term, or has no axis that can carry a force.
     """
-    root = f"aero/{surface.names.label}/"
+    root = f"aero/{next(iter(surfaces.values())).names.label}/"
     twice = {s.name for s in states if sum(o.name == s.name for o in states) > 1}
     if twice:
         raise ConfigurationError(
@@ -126,19 +97,19 @@ def write(
     for name in dict.fromkeys([s.signal for s in states] + [t.signal for t in terms] + factors):
         if name in (s.name for s in states):
             continue
-        direct = _PROPERTIES.get(name, surface.direct if name == "elevator" else None)
+        direct = surfaces[name].direct if name in surfaces else _PROPERTIES.get(name)
         if direct is not None and name not in held:
             made[name] = direct
             continue
         made[name] = f"{root}{name.replace('_', '-')}"
-        extra, more = _signal(name, made[name], surface, rotary_gust)
+        extra, more = _signal(name, made[name], surfaces, gusts, where)
         functions += extra
         memory += more
     for state in states:
         made[state.name] = f"{root}state-{state.name}"
         functions.append(_state(state, made[state.name], made[state.signal], origin.words(state)))
         memory += _memory(state, made[state.name], made[state.signal])
-    by_coefficient: dict[str, list[str]] = {"CL": [], "Cm": [], "CX": []}
+    by_coefficient: dict[str, list[str]] = {name: [] for name in CARRIED}
     learned, single = _grouped(terms)
     for number, group in enumerate(learned, start=1):
         output = f"{root}{group[0].coefficient}-table-{number}"
@@ -158,7 +129,7 @@ def write(
     first = next((i for i, e in enumerate(aerodynamics) if e.tag == "axis"), len(aerodynamics))
     for offset, element in enumerate(functions):
         aerodynamics.insert(first + offset, element)
-    _to_axes(aerodynamics, by_coefficient, root, where)
+    to_axes(aerodynamics, by_coefficient, root, where)
     return memory
 
 
@@ -229,36 +200,36 @@ def _shape(term: AeroTerm, deviation: Element) -> Element:
 
 
 def _signal(
-    name: str, output: str, surface: Surface, rotary_gust: str | None
+    name: str, output: str, surfaces: Mapping[str, Surface], gusts: Mapping[str, str | None], where: str
 ) -> tuple[list[Element], Components]:
-    if name == "alpha":
-        words = "Angle of attack of the air at the CG [rad]"
-        return [function(output, words, prop(_PROPERTIES[name]))], Components()
-    if name == "elevator":
-        formula = op("product", surface.unit_rad, surface.source)
-        return [
-            function(output, "Surface as the air sees it, trailing edge down [rad]", formula)
-        ], Components()
-    if name == "qhat":
-        rate = (
-            op("difference", "velocities/q-rad_sec", rotary_gust)
-            if rotary_gust
-            else prop("velocities/q-rad_sec")
-        )
-        formula = op("product", rate, "aero/ci2vel")
-        return [function(output, "q c/(2V) of the air [-]", formula)], Components()
-    if name == "alpha_dot_hat":
+    if name in _ANGLES:
+        return [function(output, _ANGLES[name], prop(_PROPERTIES[name]))], Components()
+    if name in surfaces:
+        formula = op("product", surfaces[name].unit_rad, surfaces[name].source)
+        words = f"Surface as the air sees it, {_SENSES.get(name, 'trailing edge down')} [rad]"
+        return [function(output, words, formula)], Components()
+    if name in _RATES:
+        rate, time, words = _RATES[name]
+        gust = gusts.get(name)
+        of_air = op("difference", rate, gust) if gust else prop(rate)
+        return [function(output, words, op("product", of_air, time))], Components()
+    if name in _CHANGES:
         # JSBSim's value is one step old; the line through it and the one before reaches the present. A
         # settled state is taken as steady: JSBSim's value there may be that of the state it was in before
+        change, time, words = _CHANGES[name]
         before = f"{output}-before"
-        now = from_start(0.0, op("difference", op("product", 2.0, _ALPHA_DOT), before))
-        formula = op("product", now, "aero/ci2vel")
-        memory = Components((component(before, "", prop(_ALPHA_DOT)),), (before,))
-        return [function(output, "alpha_dot c/(2V), inertial [-]", formula)], memory
-    if name == "qbar":
+        now = from_start(0.0, op("difference", op("product", 2.0, change), before))
+        memory = Components((component(before, "", prop(change)),), (before,))
+        return [function(output, words, op("product", now, time))], memory
+    if name == QBAR:
         formula = op("product", PSF, "aero/qbar-psf")
         return [function(output, "Dynamic pressure [Pa]", formula)], Components()
-    raise ConfigurationError(f"signal {name!r}: {choices(name, SIGNALS)}, or a state of the change")
+    signals = [s for m in MOTIONS.values() for s in signals_of(m)]
+    if name in signals:
+        raise AircraftError(
+            f"{where}: the model has no control {name}, which the effect reads; state jsbsim.{name}"
+        )
+    raise ConfigurationError(f"signal {name!r}: {choices(name, signals)}, or a state of the change")
 
 
 def _state(state: StateTerm, output: str, source: str, origin: str) -> Element:
@@ -308,63 +279,4 @@ def _memory(state: StateTerm, output: str, source: str) -> Components:
     return Components(tuple(parts), names + tuple(f"{to}-2" for to in names if state.kind == "mode"))
 
 
-def _to_axes(aerodynamics: Element, by_coefficient: dict[str, list[str]], root: str, where: str) -> None:
-    pressure = "aero/qbar-psf", "metrics/Sw-sqft"
-    if by_coefficient["Cm"]:
-        formula = op("product", *pressure, "metrics/cbarw-ft", _sum(by_coefficient["Cm"]))
-        words = "Increments of Cm about the CG [lbf ft]"
-        _axis(aerodynamics, "PITCH").append(function(f"{root}moment-lbsft", words, formula))
-    for coefficient, force in _FORCES.items():
-        if not by_coefficient[coefficient]:
-            continue
-        total = f"{root}{force.total}-lbs"
-        words = f"Sum of the increments of {coefficient}: force along {force.direction} of the body [lbf]"
-        formula = op("product", *pressure, _sum(by_coefficient[coefficient]))
-        first = next((i for i, e in enumerate(aerodynamics) if e.tag == "axis"), len(aerodynamics))
-        aerodynamics.insert(first, function(total, words, formula))
-        for name, share in _shares(aerodynamics, force, total, where).items():
-            words = f"Increments of {coefficient} [lbf]"
-            _axis(aerodynamics, name).append(function(f"{root}{force.total}-{name}-lbs", words, share))
-        # JSBSim applies forces at its reference point; this takes them back to the CG
-        shift = op("product", -1.0, _arm(aerodynamics, force.across), total)
-        words = f"Increments of {coefficient} taken to the CG [lbf ft]"
-        _axis(aerodynamics, "PITCH").append(function(f"{root}{force.total}-moment-lbsft", words, shift))
-
-
-def _sum(properties: Sequence[str]) -> Element:
-    return op("sum", *properties) if len(properties) > 1 else prop(properties[0])
-
-
-def _arm(aerodynamics: Element, across: str) -> Element:
-    """Distance along a structural axis from JSBSim's reference point of the forces to the CG [ft]."""
-    ends = f"inertia/cg-{across}-in", f"metrics/aero-rp-{across}-in"
-    arm = op("quotient", op("difference", *ends), 12.0)
-    shift = aerodynamics.find("aero_ref_pt_shift_x/function")
-    if across != "x" or shift is None:
-        return arm
-    chords = deepcopy(next(e for e in shift if e.tag not in ("description", "documentation")))
-    for element in chords.iter():
-        element.attrib.pop("name", None)  # a property is bound once
-    return op("difference", arm, op("product", chords, "metrics/cbarw-ft"))
-
-
-def _axis(aerodynamics: Element, name: str) -> Element:
-    axis = next((a for a in aerodynamics.findall("axis") if a.get("name", "").upper() == name), None)
-    return SubElement(aerodynamics, "axis", {"name": name}) if axis is None else axis
-
-
-def _shares(aerodynamics: Element, force: _Force, total: str, where: str) -> dict[str, Element]:
-    """Axis of the model -> what it carries of a force whose property is ``total``."""
-    names = {a.get("name", "").upper() for a in aerodynamics.findall("axis")}
-    for name, sign in force.body.items():
-        if name in names or _PARTNER[name] in names:
-            return {name: op("product", sign, total)}
-    if not names & set(force.wind):
-        raise AircraftError(
-            f"{where}: its <aerodynamics> have no axis {force.missing}, to which the effect adds; add the axis to the model"
-        )
-    found = {}
-    for name, (sign, component_of) in force.wind.items():
-        share = op(component_of, "aero/alpha-rad")
-        found[name] = op("product", total, share if sign > 0.0 else op("product", sign, share))
-    return found
+__all__ = ["write"]

@@ -1,7 +1,8 @@
-"""Changes of mass, pitch inertia, CG and thrust line of a JSBSim model."""
+"""Changes of mass, inertias, CG and thrust line of a JSBSim model."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -28,24 +29,27 @@ _DEFAULTS: Final = {"length": "IN", "mass": "LBS", "inertia": "SLUG*FT2"}
 
 
 class Masses(Strict):
-    """Mass [kg], pitch inertia [kg m2] and chord [m] of the aircraft as loaded."""
+    """Mass [kg], pitch, roll and yaw inertia [kg m2] and chord [m] of the aircraft as loaded."""
 
     mass_kg: float
     inertia_kg_m2: float
     chord_m: float
+    inertia_xx_kg_m2: float = 0.0
+    inertia_zz_kg_m2: float = 0.0
 
 
 @dataclass(frozen=True)
 class _Item:
-    """A mass [kg] at a location, x aft and z up [m]."""
+    """A mass [kg] at a location, x aft, y right and z up [m]."""
 
     mass_kg: float
     x_m: float
+    y_m: float
     z_m: float
 
 
 def write(root: Element, terms: Sequence[DeclaredTerm], loaded: Masses, where: str) -> None:
-    """Write mass, inertia, CG and thrust line into a model; the elevator's factor is the surface's.
+    """Write mass, inertias, CG and thrust line into a model; the factors of controls are those of their surfaces.
 
     Parameters
     ----------
@@ -62,8 +66,10 @@ def write(root: Element, terms: Sequence[DeclaredTerm], loaded: Masses, where: s
     balance = root.find("mass_balance")
     shift, mass = declared_total(terms, "cg"), declared_total(terms, "mass")
     inertia, arm = declared_total(terms, "inertia"), declared_total(terms, "thrust_arm")
+    aside, cross = declared_total(terms, "cg_y"), declared_total(terms, "inertia_xz")
+    roll, yaw = declared_total(terms, "inertia_xx"), declared_total(terms, "inertia_zz")
     if balance is None:
-        if shift or mass != 1.0 or inertia != 1.0:
+        if shift or aside or cross or {mass, inertia, roll, yaw} != {1.0}:
             raise AircraftError(
                 f"{where}: the model has no <mass_balance>, so mass, inertia and CG cannot be changed; "
                 "add one, or choose another effect"
@@ -71,9 +77,25 @@ def write(root: Element, terms: Sequence[DeclaredTerm], loaded: Masses, where: s
     else:
         about = 0.0
         if shift:
-            about = _move(root, balance, shift * loaded.chord_m, loaded.mass_kg, where)
+            before = _items(root, balance)
+            _move(balance, "x", shift * loaded.chord_m * loaded.mass_kg / before[0].mass_kg, where)
+            about = _about_centre(_items(root, balance)) - _about_centre(before)
         if inertia != 1.0 or about:
             _add(balance, "iyy", (inertia - 1.0) * loaded.inertia_kg_m2 - about, "inertia", where)
+        sideways = 0.0
+        if aside:
+            before = _items(root, balance)
+            _move(balance, "y", aside * loaded.mass_kg / before[0].mass_kg, where)
+            sideways = _beside_centre(_items(root, balance)) - _beside_centre(before)
+        for tag, factor, declared in (
+            ("ixx", roll, loaded.inertia_xx_kg_m2),
+            ("izz", yaw, loaded.inertia_zz_kg_m2),
+        ):
+            if factor != 1.0 or sideways:
+                _add(balance, tag, (factor - 1.0) * declared - sideways, "inertia", where)
+        if cross:
+            unit = math.sqrt(loaded.inertia_xx_kg_m2 * loaded.inertia_zz_kg_m2)
+            _add(balance, "ixz", _product_sign(balance) * cross * unit, "inertia", where)
         if mass != 1.0:
             _add_mass(root, balance, (mass - 1.0) * loaded.mass_kg, where)
     if arm:
@@ -107,7 +129,7 @@ def _location(parent: Element) -> Element:
 
 def _item(mass_kg: float, location: Element) -> _Item:
     unit = location.get("unit")
-    return _Item(mass_kg, *(_number(location.find(axis), "length", unit) for axis in ("x", "z")))
+    return _Item(mass_kg, *(_number(location.find(axis), "length", unit) for axis in ("x", "y", "z")))
 
 
 def _items(root: Element, balance: Element) -> list[_Item]:
@@ -130,12 +152,22 @@ def _about_centre(items: Sequence[_Item]) -> float:
     return sum(i.mass_kg * ((i.x_m - x) ** 2 + (i.z_m - z) ** 2) for i in items)
 
 
-def _move(root: Element, balance: Element, aft_m: float, mass_kg: float, where: str) -> float:
-    """Move the CG by moving the empty aircraft; return the increment of the pitch inertia [kg m2]."""
-    before = _items(root, balance)
+def _beside_centre(items: Sequence[_Item]) -> float:
+    """Roll or yaw inertia of the items as points, as far as it follows from their distances to the side [kg m2]."""
+    mass = sum(i.mass_kg for i in items)
+    y = sum(i.mass_kg * i.y_m for i in items) / mass
+    return sum(i.mass_kg * (i.y_m - y) ** 2 for i in items)
+
+
+def _product_sign(balance: Element) -> float:
+    """Sign of JSBSim's <ixz> against the integral of x z dm, x forward and z down."""
+    return -1.0 if balance.get("negated_crossproduct_inertia", "true") == "true" else 1.0
+
+
+def _move(balance: Element, along: str, by_m: float, where: str) -> None:
+    """Move the empty aircraft along a structural axis, and with it the CG."""
     location = _location(balance)
-    _add(location, "x", aft_m * mass_kg / before[0].mass_kg, "length", where, location.get("unit"))
-    return _about_centre(_items(root, balance)) - _about_centre(before)
+    _add(location, along, by_m, "length", where, location.get("unit"))
 
 
 def _add_mass(root: Element, balance: Element, more_kg: float, where: str) -> None:

@@ -16,7 +16,7 @@ from xml.etree.ElementTree import Element
 from airtruth.aircraft.jsbsim.functions import component, declaration, from_start, lag, op, prop, step
 from airtruth.aircraft.origin import Origin
 from airtruth.errors import AircraftError
-from airtruth.physics.terms import SurfaceTerm
+from airtruth.physics.terms import ELEVATOR, SurfaceTerm
 
 _CHANNEL: Final = "Effects"
 """Name of the channels that hold effects."""
@@ -33,16 +33,18 @@ class Names:
     label : part of every property's name.
     surface : the surface's own property.
     earlier : effective surface of each earlier change, oldest first.
+    control : name of the control.
     """
 
     label: str
     surface: str
     earlier: tuple[str, ...] = ()
+    control: str = ELEVATOR
 
     @property
     def effective(self) -> str:
         """Property of the surface that causes the forces, effectiveness included [units of ``surface``]."""
-        return f"fcs/{self.label}/elevator"
+        return f"fcs/{self.label}/{self.control}"
 
     @property
     def source(self) -> str:
@@ -50,19 +52,20 @@ class Names:
         return self.earlier[-1] if self.earlier else self.surface
 
 
-def names(root: Element, surface: str) -> Names:
+def names(root: Element, surface: str, control: str = ELEVATOR) -> Names:
     """Return names that no earlier change uses.
 
     Parameters
     ----------
-    root : root element of the model; surface : the surface's own property.
+    root : root element of the model; surface : the surface's own property; control : name of the control.
     """
     words = [w for e in root.iter() if isinstance(e.tag, str) for w in (e.text or "", e.get("name", ""))]
     taken = {label for word in words for label in _PROPERTY.findall(word)}
     outputs = {(o.text or "").strip() for o in root.iter("output")}
     labels = [f"effects-{k}" if k > 1 else "effects" for k in range(1, len(taken) + 2)]
-    earlier = [f"fcs/{label}/elevator" for label in labels if f"fcs/{label}/elevator" in outputs]
-    return Names(next(label for label in labels if label not in taken), surface, tuple(earlier))
+    effective = [f"fcs/{label}/{control}" for label in labels]
+    earlier = tuple(name for name in effective if name in outputs)
+    return Names(next(label for label in labels if label not in taken), surface, earlier, control)
 
 
 @dataclass(frozen=True)
@@ -131,7 +134,7 @@ def chain(
         last = output
     formula = op("product", effectiveness, last)
     words = f"Surface as the air sees it; effectiveness {effectiveness!r}"
-    return result + _component(named.effective, words + origin.of_declared("elevator"), formula)
+    return result + _component(named.effective, words + origin.of_declared(named.control), formula)
 
 
 def _component(output: str, description: str, formula: Element) -> Components:
@@ -200,13 +203,14 @@ def redirect(aerodynamics: Element, named: Names, where: str) -> Components:
     }
     surfaces = dict.fromkeys((named.surface, *named.earlier), new)
     others = {f"{old}-{alias}": f"{new}-{alias}" for old in named.earlier for alias in aliases}
-    if named.surface == "fcs/elevator-pos-rad":
-        others |= {"fcs/elevator-pos-deg": f"{new}-deg", "fcs/mag-elevator-pos-rad": f"{new}-magnitude"}
+    if named.surface.startswith("fcs/") and named.surface.endswith("-pos-rad"):
+        own = named.surface.removeprefix("fcs/").removesuffix("-pos-rad")
+        others |= {f"fcs/{own}-pos-deg": f"{new}-deg", f"fcs/mag-{own}-pos-rad": f"{new}-magnitude"}
     read = {_text(element).removeprefix("-") for element in aerodynamics.iter()}
     if not read & set(surfaces):
         raise AircraftError(
             f"{where}: its <aerodynamics> do not read {named.surface!r}, so nothing can be put between the surface and "
-            "the air; state the property that they read as jsbsim.elevator.surface, or choose an effect elsewhere"
+            f"the air; state the property that they read as jsbsim.{named.control}.surface, or choose an effect elsewhere"
         )
     targets = surfaces | others
     for element in aerodynamics.iter():

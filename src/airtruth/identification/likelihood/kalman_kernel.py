@@ -118,14 +118,20 @@ def innovate(step: Matrices, white: Array, gain_p: Array, signals: Signals, rows
 @njit(cache=True)
 def _moved_rows(slope: FilterSlopes, run: int) -> tuple[Bools, Bools, Bools, Bools]:
     """Rows of phi, of early and late, of c and of d that a parameter moves; those of a gust, for example, none does."""
-    n, m = slope.phi.shape[1], slope.c.shape[1]
-    by_state, by_input = np.empty(n, dtype=np.bool_), np.empty(n, dtype=np.bool_)
-    out_state, out_input = np.empty(m, dtype=np.bool_), np.empty(m, dtype=np.bool_)
-    for i in range(n):
-        by_state[i] = slope.phi[run, i].any()
-        by_input[i] = slope.early[run, i].any() or slope.late[run, i].any()
-    for a in range(m):
-        out_state[a], out_input[a] = slope.c[run, a].any(), slope.d[run, a].any()
+    n, m, inputs, count = slope.phi.shape[1], slope.c.shape[1], slope.d.shape[2], slope.phi.shape[3]
+    by_state, by_input = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
+    out_state, out_input = np.zeros(m, dtype=np.bool_), np.zeros(m, dtype=np.bool_)
+    for f in range(count):
+        for h in range(n):
+            for i in range(n):
+                by_state[i] |= slope.phi[run, i, h, f] != 0.0
+            for a in range(m):
+                out_state[a] |= slope.c[run, a, h, f] != 0.0
+        for h in range(inputs):
+            for i in range(n):
+                by_input[i] |= slope.early[run, i, h, f] != 0.0 or slope.late[run, i, h, f] != 0.0
+            for a in range(m):
+                out_input[a] |= slope.d[run, a, h, f] != 0.0
     return by_state, by_input, out_state, out_input
 
 

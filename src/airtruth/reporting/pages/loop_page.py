@@ -109,7 +109,7 @@ def _report(
         Section("Derivatives before and after", NAME, data_table(table, NAME)),
         Section("Intervals of all methods", "intervals", "".join(map(chart_html, intervals))),
         *others,
-        origin_section(histories, origin, closing(answer)),
+        origin_section(histories, origin, closing(answer), answer.motion),
     ]
     return Report(
         page=page_of("Closed loop", verdict_html(answer), chart, sections),

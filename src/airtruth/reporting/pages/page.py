@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -13,6 +13,7 @@ from airtruth.charts import Chart, as_figure
 from airtruth.charts import as_html as chart_html
 from airtruth.errors import StoreError, choices
 from airtruth.logs.atomic import make_folder, write_text
+from airtruth.physics.motion import MOTIONS
 from airtruth.reporting.pages.assets import own, uplot
 from airtruth.table import Table, as_csv, escaped
 from airtruth.table import as_html as table_html
@@ -47,6 +48,7 @@ class Report:
     csv, latex : its tables.
     charts : its charts.
     figures : name -> figure of a result that draws itself.
+    beside : name of a motion that the same result answers -> its report, a page beside this one.
     """
 
     page: str
@@ -54,6 +56,7 @@ class Report:
     latex: str
     charts: tuple[Chart, ...] = ()
     figures: Mapping[str, Figure] = field(default_factory=dict)
+    beside: Mapping[str, Report] = field(default_factory=dict)
 
     @property
     def drawn(self) -> list[str]:
@@ -166,11 +169,17 @@ def files_of(report: Report, out: Path, kind: str) -> tuple[Path, ...]:
     StoreError
         If a figure is asked for and the report has none.
     """
+    more = [path for name, own in report.beside.items() for path in files_of(own, beside(out, name), kind)]
     if kind == PAGE:
-        return (out, out.with_suffix(".csv"), out.with_suffix(".tex"))
+        return (out, out.with_suffix(".csv"), out.with_suffix(".tex"), *more)
     if not report.drawn:
         raise StoreError(f"--out {out}: this report has no figure; name a page, {out.stem}.html")
-    return tuple(out.with_name(f"{out.stem}-{name}{out.suffix}") for name in report.drawn)
+    return (*(out.with_name(f"{out.stem}-{name}{out.suffix}") for name in report.drawn), *more)
+
+
+def beside(out: Path, motion: str) -> Path:
+    """File of the report of another motion: STEM-MOTION."""
+    return out.with_stem(f"{out.stem}-{motion}")
 
 
 def write_files(report: Report, out: Path, kind: str) -> tuple[Path, ...]:
@@ -181,18 +190,30 @@ def write_files(report: Report, out: Path, kind: str) -> tuple[Path, ...]:
     StoreError
         If a file cannot be written.
     """
-    paths = files_of(report, out, kind)
     make_folder(out.parent)
+    alone = replace(report, beside={})
+    paths = files_of(alone, out, kind)
     if kind == PAGE:
-        for path, content in zip(paths, (report.page, report.csv, report.latex), strict=True):
+        page = _linked(report.page, {name: beside(out, name).name for name in report.beside})
+        for path, content in zip(paths, (page, report.csv, report.latex), strict=True):
             write_text(path, content)
-        return paths
-    from airtruth import style
+    else:
+        from airtruth import style
 
-    figures = [*map(as_figure, report.charts), *report.figures.values()]
-    for path, figure in zip(paths, figures, strict=True):
-        style.save(figure, path)
-    return paths
+        figures = [*map(as_figure, report.charts), *report.figures.values()]
+        for path, figure in zip(paths, figures, strict=True):
+            style.save(figure, path)
+    more = [path for name, own in report.beside.items() for path in write_files(own, beside(out, name), kind)]
+    return (*paths, *more)
+
+
+def _linked(page: str, files: Mapping[str, str]) -> str:
+    """A page with links to those of other motions above its navigation."""
+    links = "".join(
+        f'<p class="note">{html.escape(MOTIONS[name].heading)}: <a href="{html.escape(file)}">{html.escape(file)}</a></p>\n'
+        for name, file in files.items()
+    )
+    return page.replace("<nav>", f"{links}<nav>", 1)
 
 
 __all__ = [

@@ -52,7 +52,11 @@ def trace_report(answer: TraceAnswer, histories: Histories | None = None) -> Rep
     charts = tuple(trace_charts(answer, histories))
     origin = of_trace(Provenance.read(histories.facts.get(PROVENANCE) if histories else None))
     picture = trace_chart(answer, histories) if histories else scores_chart(answer)
-    sections = [*trace_sections(answer, histories), origin_section(histories, origin, closing(answer))]
+    motion = answer.motion
+    sections = [
+        *trace_sections(answer, histories),
+        origin_section(histories, origin, closing(answer), motion),
+    ]
     latex = "\n".join(
         as_latex(table, f"trace-{name}")
         for name, table in _tables(answer)

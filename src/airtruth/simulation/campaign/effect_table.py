@@ -9,6 +9,7 @@ from typing import Any, Final
 from pydantic import ConfigDict, Field, field_serializer, model_validator
 
 from airtruth.errors import ConfigurationError
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import Change
 from airtruth.quantity import Strict
 
@@ -50,6 +51,13 @@ class EffectTable(Strict):
     def _finite(self, values: dict[str, float]) -> dict[str, float | str]:
         """JSON has no infinity."""
         return {name: value if math.isfinite(value) else str(value) for name, value in values.items()}
+
+    @property
+    def lateral(self) -> bool:
+        """Whether it concerns no motion in the pitch plane."""
+        from airtruth.effects import registry as library
+
+        return not library.chosen(self.name, self.variant).applies_to(LONGITUDINAL)
 
     def change(self) -> Change:
         """Return the terms that it changes."""

@@ -24,6 +24,8 @@ from airtruth.simulation.campaign.file import NO_GUST, Campaign
 from airtruth.simulation.resolution import at_condition
 from airtruth.simulation.simulator import Condition
 
+LEVELS: Final = ("sigma_u", "sigma_v", "sigma_w")
+"""Standard deviations of the gust components, columns of a run table with their unit."""
 EFFECTS: Final = "effects"
 """Column of plan.parquet and truth.parquet with the effects as JSON; absent without effects."""
 
@@ -43,6 +45,10 @@ def read(campaign: Campaign) -> Change:
     if change.air and campaign.gust.level == NO_GUST:
         raise ConfigurationError(
             "effect: a factor on the gusts needs gusts; set gust.level to light, moderate or severe, or leave the effect out"
+        )
+    if any(term.level == "sigma_v" for term in change.air) and not campaign.side_gusts:
+        raise ConfigurationError(
+            "effect: a factor on the side gusts needs them; leave gust.lateral out or set it to true, or leave the effect out"
         )
     return change
 
@@ -86,14 +92,16 @@ def aircraft(plane: Aircraft, change: Change, simulation_hz: float, nominal: Con
 
 def in_the_air(table: pd.DataFrame, change: Change) -> pd.DataFrame:
     """Return a run table with the gust levels of the change; the side gust follows the vertical one."""
-    declared = {name: table[f"{name}_m_s"].to_numpy() for name in ("sigma_u", "sigma_w")}
+    levels = [name for name in LEVELS if f"{name}_m_s" in table]
+    declared = {name: table[f"{name}_m_s"].to_numpy() for name in levels}
     other = {"sigma_u": declared["sigma_w"], "sigma_w": declared["sigma_u"]}
     flown = dict(declared)
     for level in {term.level for term in change.air}:
         factor = math.prod(term.factor for term in change.air if term.level == level)
-        flown[level] = factor * np.where(declared[level] > 0.0, declared[level], other[level])
-        if level == "sigma_w" and "sigma_v_m_s" in table:
-            flown["sigma_v"] = factor * table["sigma_v_m_s"].to_numpy()
+        if level in other:
+            flown[level] = factor * np.where(declared[level] > 0.0, declared[level], other[level])
+        if level in ("sigma_v", "sigma_w") and "sigma_v" in flown:
+            flown["sigma_v"] = factor * flown["sigma_v"]
     return table.assign(**{f"{name}_m_s": values for name, values in flown.items()})
 
 

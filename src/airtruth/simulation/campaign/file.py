@@ -139,11 +139,12 @@ class Campaign(Table):
 
     @property
     def lateral(self) -> bool:
-        """Whether its flights roll and yaw: a manoeuvre or a feedback moves aileron or rudder, or there are side gusts."""
+        """Whether its flights roll and yaw: a manoeuvre, a feedback, side gusts or an effect of the lateral motion."""
         return (
             bool(self.moved - {ELEVATOR})
             or self.augmentation.lateral
             or (self.gust.lateral is True and self.in_gusts)
+            or any(effect.lateral for effect in self.effect)
         )
 
     @property

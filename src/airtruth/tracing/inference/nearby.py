@@ -27,6 +27,14 @@ def reordered(
     sensitivities: Sequence[Sensitivities], entries: ParameterLayout, of: Hypothesis, hypothesis: Hypothesis
 ) -> tuple[Sensitivities, ...]:
     """`nearby` of the derivatives of each record under a hypothesis ``of``."""
+    rows = rows_of(entries, of, hypothesis)
+    return tuple(_ordered(s, rows) for s in sensitivities)
+
+
+def rows_of(
+    entries: ParameterLayout, of: Hypothesis, hypothesis: Hypothesis
+) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    """(parameters,) number that each parameter of a hypothesis has under another one ``of``; -1 for what that lacks."""
     old, new = Layout(entries, len(of.parameters)), Layout(entries, len(hypothesis.parameters))
     rows = np.full(new.total, -1)
     rows[new.common] = np.arange(old.total)[old.common]
@@ -37,7 +45,7 @@ def reordered(
             own, there = hypothesis.span(effect.key), of.span(effect.key)
             first, last = new.sizes.start, old.sizes.start
             rows[first + own.start : first + own.stop] = np.arange(last + there.start, last + there.stop)
-    return tuple(_ordered(s, rows) for s in sensitivities)
+    return rows
 
 
 def begins_at(fitted: PosteriorFit, hypothesis: Hypothesis, start: Parameters) -> bool:
@@ -55,4 +63,4 @@ def _ordered(s: Sensitivities, rows: np.ndarray[tuple[int], np.dtype[np.int64]])
     return Sensitivities(s.r, s.logdet, t, w, s.white, more)
 
 
-__all__ = ["begins_at", "nearby", "reordered"]
+__all__ = ["begins_at", "nearby", "reordered", "rows_of"]

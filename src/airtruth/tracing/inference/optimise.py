@@ -35,8 +35,6 @@ Ints = NDArray[np.int64]
 
 ITERATIONS: Final = 45
 """Most iterations of a fit [-]; judgement: three times what a fit of one effect takes as a rule."""
-_ATTEMPTS: Final = 2
-"""Number of times that `converged_fit` may begin again where it ended [-] (judgement)."""
 _FIRST_ITERATIONS: Final = 4
 """Iterations with the levels held, before a search [-]; judgement."""
 _LEAST_DAMPING: Final = 1e-9
@@ -242,23 +240,8 @@ def fit(
         covariance=_covariance(search, at),
         converged=converged,
         shortfall=0.0 if converged else search.shortfall(x, at),
+        outrun=status is Status.OUTRUN,
     )
-
-
-def converged_fit(
-    problem: TraceProblem,
-    hypothesis: Hypothesis,
-    start: Parameters,
-    rival: float = np.inf,
-    near: PosteriorFit | None = None,
-) -> PosteriorFit | None:
-    """A fit that begins again where it ended, until it converges or `_ATTEMPTS` are spent; None, options as of `fit`."""
-    own = fit(problem, hypothesis, start, rival=rival, near=near)
-    for _ in range(_ATTEMPTS):
-        if own is None or own.converged:
-            break
-        own = fit(problem, hypothesis, own.point, rival=rival, near=own)
-    return own
 
 
 def initial_parameters(
@@ -319,4 +302,4 @@ def _covariance(search: PosteriorSearch, at: Evaluated) -> Array:
     return scaled_inverse(marginal.information, _RIDGE)
 
 
-__all__ = ["ITERATIONS", "Evaluated", "PosteriorSearch", "converged_fit", "fit", "initial_parameters"]
+__all__ = ["ITERATIONS", "Evaluated", "PosteriorSearch", "fit", "initial_parameters"]

@@ -146,6 +146,7 @@ class PosteriorFit:
     covariance : (common and sizes, common and sizes), per-record parameters free.
     converged : whether the search ended by its tolerance.
     shortfall : log-likelihood that an undamped step promises where it did not, else none.
+    outrun : whether the search ended early, out of reach of a rival; it counts as converged.
     """
 
     hypothesis: Hypothesis
@@ -157,6 +158,7 @@ class PosteriorFit:
     covariance: Array
     converged: bool
     shortfall: float = 0.0
+    outrun: bool = False
 
     @property
     def layout(self) -> Layout:

@@ -48,7 +48,7 @@ def _linearise() -> None:
 def _given() -> KernelInput:
     zeros = np.zeros((2, OUTPUTS))
     grid = GridSignals(*[np.ones(3)] * len(GridSignals._fields))
-    return KernelInput(zeros, zeros, grid, np.empty(0), 1.0, 2, np.zeros(4), 0.0, _AT, _model())
+    return KernelInput(zeros, zeros, grid, np.empty((0, 0)), 1.0, 2, np.zeros(4), 0.0, _AT, _model())
 
 
 def _filter() -> None:

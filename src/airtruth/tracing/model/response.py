@@ -212,7 +212,8 @@ def _airspeed(compiled: CompiledChange, s: Signals) -> Array:
     errors = compiled.inputs.get("airspeed_m_s")
     if errors is None:
         return s.airspeed_m_s
-    return errors.unscaled(s.airspeed_m_s) / errors.slope(on_grid(s.y[:, 0], s.sub))
+    alpha = s.alpha_rad if s.alpha_rad.size else on_grid(s.y[:, 0], s.sub)
+    return errors.unscaled(s.airspeed_m_s) / errors.slope(alpha)
 
 
 def respond(

@@ -53,7 +53,7 @@ class ShownRecord:
         local = self.after.per_record.copy()
         settings = self.stages.case.fitted.settings
         local[settings.layout.per_record.gusts] = 0.0  # no gust
-        compiled = compile_change(change)
+        compiled = compile_change(change, self.record.signals.motion)
         response = respond(self.record, settings, compiled, model.common, local, free_run=True)
         return np.asarray(self.record.signals.y - response.e)
 

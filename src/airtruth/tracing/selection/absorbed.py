@@ -8,12 +8,11 @@ from typing import Final
 
 import numpy as np
 
-from airtruth.tracing.inference.optimise import fit
-from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.selection.budget import Advance, may_begin
-from airtruth.tracing.selection.from_declared import with_effect
-from airtruth.tracing.selection.refit import Refit
+from airtruth.tracing.selection.refit import Refit, with_effect
 from airtruth.tracing.selection.score_test import Score, Table
+from airtruth.tracing.selection.set_table import SetTable
 
 _USUAL: Final = 0.15
 """Share of its plausible range at which the search for an effect without a score begins [-] (judgement)."""
@@ -30,7 +29,7 @@ Starts = Sequence[tuple[Score, tuple[float, ...]]]
 
 
 def refit_absorbed(
-    problem: TraceProblem,
+    sets: SetTable,
     null: PosteriorFit,
     table: Table,
     fits: Sequence[Refit],
@@ -56,15 +55,15 @@ def refit_absorbed(
     known = {r.score.effect.key for r in fits} | set(skip)
     untried = (s for s in table.scores if s.effect.key not in known and len(s.effect.parameters) == 1)
     starts: Starts = [(s, _usual_sizes(s, either_sign)) for s in untried]
-    if len(problem.records) > RECORDS:
-        starts = _leading_starts(problem, null, starts, advance)
+    if len(sets.problem.records) > RECORDS:
+        starts = _leading_starts(sets, null, starts, advance)
     ahead = min([rival, *(r.fit.cost for r in fits)])
-    ends = _refitted(problem, null, starts, advance, "from the declared aircraft", ahead, only_better)
+    ends = _refitted(sets, null, starts, advance, "from the declared aircraft", ahead, only_better)
     return sorted([*fits, *(r for r, _ in ends)], key=lambda r: r.cost)
 
 
 def _refitted(
-    problem: TraceProblem,
+    sets: SetTable,
     null: PosteriorFit,
     starts: Starts,
     advance: Advance,
@@ -79,7 +78,7 @@ def _refitted(
             continue
         for size in sizes:
             ahead = min([rival, *(r.fit.cost for r, _ in found)])
-            tried = with_effect(problem, null, s, size, ahead, only_better=only_better)
+            tried = with_effect(sets, null, s, size, ahead, only_better=only_better)
             if tried is not None:
                 found.append((Refit(s, tried, 0.0), size))
     return found
@@ -96,12 +95,13 @@ def _usual_sizes(s: Score, either_sign: bool) -> tuple[float, ...]:
     return tuple(share * end for share in (_USUAL, _LARGE) for end in (high, low))
 
 
-def _leading_starts(problem: TraceProblem, null: PosteriorFit, starts: Starts, advance: Advance) -> Starts:
+def _leading_starts(sets: SetTable, null: PosteriorFit, starts: Starts, advance: Advance) -> Starts:
     """The scores of the effects that explain some of the records best, each with the best of its starts."""
+    problem = sets.problem
     number = len(problem.records)
     kept = np.linspace(0, number - 1, RECORDS).round().astype(int)
-    some = replace(problem, records=tuple(problem.records[i] for i in kept))
-    base = fit(some, null.hypothesis, replace(null.point, per_record=null.point.per_record[kept]))
+    some = SetTable(replace(problem, records=tuple(problem.records[i] for i in kept)))
+    base = some.fit(null.hypothesis, replace(null.point, per_record=null.point.per_record[kept]))
     if base is None:
         return starts
     ends = _refitted(some, base, starts, advance, f"to {RECORDS} of {number} records")

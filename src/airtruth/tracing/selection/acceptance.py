@@ -20,26 +20,11 @@ from airtruth.tracing.inference.feedback import responds_to_motion
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import MEMORY_S, inflation, long_run
 from airtruth.tracing.model.plant import Plant, alpha_dot
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.score_test import Score
 
 Array = NDArray[np.float64]
 
-UNCONVERGED: Final = "its refit did not converge"
-"""Reason of a candidate without an optimum."""
-OUTDONE: Final = "another effect explains more"
-"""Reason of a candidate that gains less than an accepted one."""
-SUPERSEDED: Final = "it explains nothing beside another effect"
-"""Reason of a candidate that became redundant."""
-SURPASSED: Final = "a set of effects without it explains more"
-"""Reason of a candidate that leads alone, and not beside other effects."""
-UNSUPPORTED: Final = "no test of the declared aircraft is significant over all tests"
-"""Reason of a candidate whose score is significant among the scores alone."""
-IMMATERIAL: Final = "its size is immaterial"
-"""Reason of a candidate that is too small to matter."""
-WORSE_LIKELIHOOD: Final = "it worsens the likelihood of records left out"
-"""Reason of a candidate that predicts the records left out of its fit worse than the fit without it."""
-WORSE_FREE_RUN: Final = "it worsens the free run of records left out"
-"""Reason of a candidate whose free run of these records is worse."""
 IMPROBABLE: Final = 0.001
 """Probability below which refitted derivatives contradict the declared ones [-] (convention: three standard errors)."""
 _SLIGHT: Final = 0.25
@@ -190,8 +175,12 @@ def tested_on_left_out(
     in_channels = loses_in_two_channels(free.sum(axis=0), covariance)
     in_loop = reference.in_loop or reads_alpha(own)
     reasons = (
-        *([WORSE_LIKELIHOOD] if _is_loss(likelihood_gain) else []),
-        *([WORSE_FREE_RUN] if (loses or in_channels) and not (in_loop and gain >= _BEYOND_DOUBT) else []),
+        *([Refusal.WORSE_LIKELIHOOD] if _is_loss(likelihood_gain) else []),
+        *(
+            [Refusal.WORSE_FREE_RUN]
+            if (loses or in_channels) and not (in_loop and gain >= _BEYOND_DOUBT)
+            else []
+        ),
     )
     return LeftOutTest(likelihood_gain, free.sum(axis=1), reasons)
 
@@ -229,11 +218,11 @@ def loses_in_two_channels(gains: Array, covariance: Array) -> bool:
 def _fit_reasons(s: Score, own: PosteriorFit, gain: float, least: float, excess: float) -> Iterator[str]:
     size, std = _size(s, own)
     if not has_converged(own, gain):
-        yield UNCONVERGED
+        yield Refusal.UNCONVERGED
     if gain < least * excess**2:
-        yield "after its refit it explains nothing significant"
+        yield Refusal.INSIGNIFICANT
     if not s.effect.parameters[0].one_sided and abs(size) < _ERRORS * std * excess:
-        yield "after its refit its size is no larger than its uncertainty"
+        yield Refusal.UNCERTAIN
 
 
 def implausibility(problem: TraceProblem, effect: Effect, own: PosteriorFit) -> Iterator[str]:
@@ -275,15 +264,15 @@ def size_reasons(effect: Effect, size: float, span_m: float, declared: float = 0
     """
     first = effect.parameters[0]
     if first.sign * size < 0.0 and first.sign * (declared + size) < -_SLIGHT * abs(declared):
-        yield "its size has a sign that no aircraft has"
+        yield Refusal.WRONG_SIGN
     if abs(size) > first.spans * span_m:
-        yield "its size is beyond the ends of the aircraft"
+        yield Refusal.BEYOND_ENDS
     if abs(size) < first.material:
-        yield IMMATERIAL
+        yield Refusal.IMMATERIAL
     low, high = first.reach
     span = high - low
     if high - size < _AT_END * span or (size - low < _AT_END * span and low != 0.0):
-        yield "its size ends at the limit of the plausible range"
+        yield Refusal.AT_LIMIT
 
 
 def shape_reasons(effect: Effect, sizes: Array) -> Iterator[str]:

@@ -21,13 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
-from airtruth.tracing.inference.optimise import fit
-from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import Candidate, is_plausible
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.refit import losses_without, refit_scored
 from airtruth.tracing.selection.rounds import MOST_EFFECTS, SearchRound
+from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.selection.significance import REMAINS
 from airtruth.tracing.selection.subsets import Subset, subsets
 
@@ -45,14 +45,14 @@ _NEARLY: Final = 3.0
 
 
 def better_set(
-    problem: TraceProblem,
+    sets: SetTable,
     rounds: Sequence[SearchRound],
     last: PosteriorFit,
     effects: Sequence[Effect],
     least: float,
     advance: Advance,
-) -> tuple[tuple[Effect, ...] | None, tuple[PosteriorFit, ...]]:
-    """The effects of a better set, the one that explains most first, and the fit of every exchange.
+) -> tuple[Effect, ...] | None:
+    """The effects of a better set, the one that explains most first; the table notes every exchange.
 
     There is no better set where none leads by `AHEAD`, with more parameters by `BETTER`.
 
@@ -63,51 +63,50 @@ def better_set(
     least : gain in 2 log L below which a member of the new set is removed.
     """
     best: PosteriorFit | None = None
-    fits: list[PosteriorFit] = []
-    for phrase, refit in _tries(problem, rounds, last, effects):
+    for phrase, refit in _tries(sets, rounds, last, effects):
         if not may_begin(advance, phrase):
-            return None, tuple(fits)
+            return None
         tried = refit()
         if tried is not None:
-            fits.append(tried)
+            sets.exchange(last, tried)
             lead = BETTER if len(tried.point.sizes) > len(last.point.sizes) else AHEAD
             leads = _cost(tried) < min(_cost(last) - lead, np.inf if best is None else _cost(best))
-            if leads and is_plausible(problem, tried):
+            if leads and is_plausible(sets.problem, tried):
                 best = tried
-    needed = () if best is None else _needed(problem, best, least)
+    needed = () if best is None else _needed(sets, best, least)
     kept = {e.key for e in needed} != {e.key for e in last.hypothesis.effects}
-    return needed if kept and 0 < len(needed) <= MOST_EFFECTS else None, tuple(fits)
+    return needed if kept and 0 < len(needed) <= MOST_EFFECTS else None
 
 
 def _tries(
-    problem: TraceProblem,
+    sets: SetTable,
     rounds: Sequence[SearchRound],
     last: PosteriorFit,
     effects: Sequence[Effect],
 ) -> Iterator[tuple[str, Callable[[], PosteriorFit | None]]]:
     """Each exchange as a phrase for the progress line, and the function that refits it."""
-    for s in _predicted(problem, last, effects):
+    for s in _predicted(sets, last, effects):
         phrase = f"{', '.join(e.key for e in s.effects)} as a set"
         hypothesis = replace(last.hypothesis, effects=s.effects)
-        yield phrase, partial(fit, problem, hypothesis, s.start, rival=last.cost, near=last)
+        yield phrase, partial(sets.fit, hypothesis, s.start, rival=last.cost, near=last)
     for index, effect in enumerate(last.hypothesis.effects):
         own = next((r for r in rounds if r.tied and r.tied[0].score.effect.key == effect.key), None)
         rival = None if own is None else best_rival(own, last, effect)
         if rival is not None:
             phrase = f"{rival.score.effect.key} in place of {effect.key} beside the other effects"
-            yield phrase, partial(_exchanged, problem, last, index, rival)
+            yield phrase, partial(_exchanged, sets, last, index, rival)
     for swapped, sizes in other_kinds(effects, last):
         phrase = f"{' and '.join(e.key for e in swapped)} beside the other effects"
         hypothesis, start = replace(last.hypothesis, effects=swapped), replace(last.point, sizes=sizes)
-        yield phrase, partial(fit, problem, hypothesis, start, rival=last.cost, near=last)
+        yield phrase, partial(sets.fit, hypothesis, start, rival=last.cost, near=last)
     scored = _scored(rounds, last)
     for i in np.argsort(scored.adjusted, kind="stable")[:_ADDED]:
         if scored.adjusted[i] < REMAINS:
             phrase = f"{scored.table.scores[i].effect.key} beside the other effects"
-            yield phrase, partial(refit_scored, problem, last, scored.table, int(i))
+            yield phrase, partial(refit_scored, sets, last, scored.table, int(i))
 
 
-def _predicted(problem: TraceProblem, last: PosteriorFit, effects: Sequence[Effect]) -> list[Subset]:
+def _predicted(sets: SetTable, last: PosteriorFit, effects: Sequence[Effect]) -> list[Subset]:
     """The sets that the quadratic about a fit puts before it or next to it; of those that are late in the same places the best.
 
     What delays the same signal is tried by `other_kinds` and among the look-alikes.
@@ -115,7 +114,7 @@ def _predicted(problem: TraceProblem, last: PosteriorFit, effects: Sequence[Effe
     found: list[Subset] = []
     own, behind = _places(last.hypothesis.effects), np.inf
     seen = {own}
-    for s in subsets(problem, last, effects, MOST_EFFECTS):
+    for s in subsets(sets.problem, last, effects, MOST_EFFECTS):
         places = _places(s.effects)
         if places == own and not np.isfinite(behind):
             behind = s.cost + _NEARLY
@@ -177,17 +176,14 @@ def best_rival(own: SearchRound, last: PosteriorFit, effect: Effect) -> Candidat
     return max(others, key=lambda c: c.gain, default=None)
 
 
-def _exchanged(
-    problem: TraceProblem, last: PosteriorFit, index: int, rival: Candidate
-) -> PosteriorFit | None:
+def _exchanged(sets: SetTable, last: PosteriorFit, index: int, rival: Candidate) -> PosteriorFit | None:
     """The better of the fits with a rival in place of a member."""
     effects = last.hypothesis.effects
     hypothesis = replace(
         last.hypothesis, effects=(*effects[:index], rival.score.effect, *effects[index + 1 :])
     )
     starts = starts_in_place_of(last, effects[index], rival)
-    ends = (fit(problem, hypothesis, start, rival=last.cost, near=last) for start in starts)
-    return min((end for end in ends if end is not None), key=_cost, default=None)
+    return sets.best_from(hypothesis, starts, rival=last.cost, near=last)
 
 
 def starts_in_place_of(last: PosteriorFit, member: Effect, rival: Candidate) -> list[Parameters]:
@@ -213,11 +209,11 @@ def _cost(fitted: PosteriorFit) -> float:
     return fitted.cost + len(fitted.point.sizes)
 
 
-def _needed(problem: TraceProblem, fitted: PosteriorFit, least: float) -> tuple[Effect, ...]:
+def _needed(sets: SetTable, fitted: PosteriorFit, least: float) -> tuple[Effect, ...]:
     """The effects whose removal costs at least ``least`` in 2 log L, the one that costs most first."""
     while True:
         effects = fitted.hypothesis.effects
-        removals = losses_without(problem, fitted, effects)
+        removals = losses_without(sets, fitted, effects)
         order = sorted(range(len(effects)), key=lambda i: -removals[i][0])
         loss, less = removals[order[-1]]
         if less is None or loss >= least or len(effects) == 1:

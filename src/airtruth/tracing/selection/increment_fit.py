@@ -14,23 +14,18 @@ from airtruth.effects.increment import Increment
 from airtruth.physics.motion import Motion
 from airtruth.physics.readings import increments_over
 from airtruth.physics.terms import QBAR
+from airtruth.tracing.inference.direction import Direction
 from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import inflation, robust_covariance
 from airtruth.tracing.model.records import TraceRecord
-from airtruth.tracing.selection.acceptance import (
-    IMMATERIAL,
-    UNCONVERGED,
-    Candidate,
-    Reference,
-    has_converged,
-    tested_on_left_out,
-)
-from airtruth.tracing.selection.direction import Direction
+from airtruth.tracing.selection.acceptance import Candidate, Reference, has_converged, tested_on_left_out
 from airtruth.tracing.selection.flown import flown
 from airtruth.tracing.selection.increments import Screened
 from airtruth.tracing.selection.refit import refit_without
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.score_test import Score
+from airtruth.tracing.selection.set_table import SetTable
 
 Array = NDArray[np.float64]
 
@@ -44,8 +39,6 @@ LEAST_ODDS: Final = 5.0
 (judgement: the gain of a named effect has to be 10 in 2 log L)."""
 _TWO_DEVIATIONS: Final = 0.0455
 """Probability beyond two standard deviations [-] (convention), as for the size of a named effect."""
-WITHIN_ERROR: Final = "its size is within two standard deviations"
-"""Reason of an increment that its scatter between records explains."""
 _MATERIAL: Final = 0.02
 """Least swing of an increment over that of the declared derivative in the same range [-] (judgement: 2 % is about the
 material size of the named effects)."""
@@ -175,11 +168,15 @@ def assessed(problem: TraceProblem, own: FittedIncrement, reference: Reference) 
     )
     bends, covariance = fitted_bends(own.fit, own.effect, robust_covariance(problem, own.fit))
     reasons = (
-        *([] if has_converged(own.fit, gain) else [UNCONVERGED]),
-        *(["its evidence is not significant"] if own.log_evidence < LEAST_ODDS * excess else []),
-        *([] if is_apart_from_zero(bends, covariance, degrees) else [WITHIN_ERROR]),
+        *([] if has_converged(own.fit, gain) else [Refusal.UNCONVERGED]),
+        *([Refusal.WEAK_EVIDENCE] if own.log_evidence < LEAST_ODDS * excess else []),
+        *([] if is_apart_from_zero(bends, covariance, degrees) else [Refusal.WITHIN_ERROR]),
         *left_out.reasons,
-        *([IMMATERIAL] if swing < (_MATERIAL_READING if own.effect.shape.of_reading else _MATERIAL) else []),
+        *(
+            [Refusal.IMMATERIAL]
+            if swing < (_MATERIAL_READING if own.effect.shape.of_reading else _MATERIAL)
+            else []
+        ),
     )
     return Candidate(
         score=evidence_score(own),
@@ -279,7 +276,7 @@ def evidence_score(own: FittedIncrement) -> Score:
     )
 
 
-def redundant_increment(problem: TraceProblem, fitted: PosteriorFit, tried: float) -> Increment | None:
+def redundant_increment(sets: SetTable, fitted: PosteriorFit, tried: float) -> Increment | None:
     """The first increment that the last effect makes redundant: its posterior odds beside the others are too low.
 
     Parameters
@@ -289,7 +286,7 @@ def redundant_increment(problem: TraceProblem, fitted: PosteriorFit, tried: floa
     """
     for effect in fitted.hypothesis.effects[:-1]:
         if isinstance(effect, Increment):
-            less = refit_without(problem, fitted, effect)
+            less = refit_without(sets, fitted, effect)
             if less is not None and log_evidence(less, fitted, effect, tried) < LEAST_ODDS:
                 return effect
     return None
@@ -297,7 +294,6 @@ def redundant_increment(problem: TraceProblem, fitted: PosteriorFit, tried: floa
 
 __all__ = [
     "LEAST_ODDS",
-    "WITHIN_ERROR",
     "FittedIncrement",
     "assessed",
     "converged",

@@ -18,34 +18,31 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from airtruth.effects.increment import Memory, Shape
-from airtruth.physics.terms import READINGS
+from airtruth.physics.motion import Motion
+from airtruth.physics.terms import QBAR
+from airtruth.tracing.inference.direction import inserted
 from airtruth.tracing.inference.posterior import PosteriorFit, Sensitivities, TraceProblem
 from airtruth.tracing.model.linearise import ANGLE_RAD, RATE_RAD_S
-from airtruth.tracing.model.parameters import OUTPUTS
 from airtruth.tracing.model.response import filter_inputs
-from airtruth.tracing.model.tangent import FLOWN, POINTS, Tangent, propagated, tangent_of
-from airtruth.tracing.selection.direction import inserted
+from airtruth.tracing.model.tangent import POINTS, Tangent, flown_of, propagated, tangent_of
 
 Array = NDArray[np.float64]
 
-_COEFFICIENTS: Final = ("CL", "Cm")
-"""Coefficients that the filter has."""
-_FACTORS: Final = ("alpha", "qhat", "elevator")
-"""Signals of the derivatives, in the order of `airtruth.physics.short_period.PARAMETERS`."""
 _BLOCK: Final = 200_000
 """Coefficients times samples that pass through the tangent linear model at once [-] (judgement: 30 MB)."""
 
 
 @dataclass
-class Motion:
+class FlownMotion:
     """The flown motion of one record; memories are kept, because many shapes share them."""
 
     tangent: Tangent
+    motion: Motion
     kept: dict[tuple[Memory, str], Array] = field(default_factory=dict)
 
     def signal(self, name: str) -> Array:
         """(steps, points) of a signal."""
-        return self.tangent.matrices.flown[:, :, FLOWN.index(name)]
+        return self.tangent.matrices.flown[:, :, flown_of(self.motion).index(name)]
 
     def state(self, memory: Memory, name: str) -> Array:
         """(steps, points) of a memory that a signal drives."""
@@ -54,11 +51,21 @@ class Motion:
             self.kept[key] = self._driven(memory, name)
         return self.kept[key]
 
+    def felt(self, name: str) -> Array:
+        """(steps, points) of a signal; a rate is that of the body, which a gyro feels."""
+        return self.signal(f"body_{name}" if name in _rates(self.motion) else name)
+
     def _driven(self, memory: Memory, name: str) -> Array:
-        start = dict(zip(("alpha", "elevator"), self.tangent.start, strict=True)).get(name, 0.0)
+        at_first = (self.motion.flow, *(control.name for control in self.motion.controls))
+        start = dict(zip(at_first, self.tangent.start, strict=True)).get(name, 0.0)
         if memory.kind == "play":
-            return _play(self.signal("body_qhat" if name == "qhat" else name)[:, -1], start, memory)
+            return _play(self.felt(name)[:, -1], start, memory)
         return _linear(self.signal(name), start, memory, self.tangent.h_s)
+
+
+def _rates(motion: Motion) -> set[str]:
+    """Signals that are nondimensional rates."""
+    return {s.name for s in motion.signals if s.length is not None}
 
 
 def _play(ends: Array, start: float, memory: Memory) -> Array:
@@ -105,11 +112,10 @@ def _late(values: Array, lag_s: float, delay_s: float, h_s: float) -> Array:
     return values
 
 
-def _along(shape: Shape, motion: Motion) -> Array:
+def _along(shape: Shape, motion: FlownMotion) -> Array:
     """(steps, points, coefficients) of an increment by a unit of each of its coefficients."""
-    of_reading, memory = shape.of_reading, shape.memory
-    named = "body_qhat" if of_reading and shape.signal == "qhat" else shape.signal
-    signal = motion.signal(named)
+    memory = shape.memory
+    signal = motion.felt(shape.signal) if shape.of_reading else motion.signal(shape.signal)
     if shape.factor and memory is not None:
         behind = motion.state(memory, shape.factor) - motion.signal(shape.factor)
         return shape.basis(signal) * behind[..., None]
@@ -122,30 +128,39 @@ def _along(shape: Shape, motion: Motion) -> Array:
     return values
 
 
-def _slopes(shape: Shape, reference: Mapping[str, float], half_s: float, alpha_dot: Array) -> Array:
-    """(coefficients, 2, derivatives of a coefficient) with which an increment begins at the reference of a record.
+def _slopes(
+    shape: Shape, motion: Motion, reference: Mapping[str, float], half_s: float, flow_rate: Array
+) -> Array:
+    """(coefficients, coefficients of the motion, signals) with which an increment begins at the reference of a record.
 
     Parameters
     ----------
     reference : values of the signals there.
-    half_s : chord over twice the airspeed [s].
-    alpha_dot : slopes of alpha_dot_hat in the signals of the derivatives.
+    half_s : reference length of the rates over twice the airspeed [s].
+    flow_rate : slopes of the rate of the flow angle in the signals of the derivatives.
     """
-    every = np.zeros((_size(shape), 2, len(_FACTORS)))
+    factors = [s.name for s in motion.signals]
+    every = np.zeros((_size(shape), *motion.shape))
     if shape.of_reading or not shape.cells or shape.memory is not None:
         return every
-    slopes = every[:, _COEFFICIENTS.index(shape.acts_on)]
+    slopes = every[:, _row(shape, motion)]
     if shape.factor:
-        slopes[:, _FACTORS.index(shape.factor)] = shape.basis(reference[shape.signal])
+        slopes[:, factors.index(shape.factor)] = shape.basis(reference[shape.signal])
         return every
     middle = reference.get(shape.signal, 0.0)
-    h = ANGLE_RAD if shape.signal in ("alpha", "elevator") else RATE_RAD_S * half_s
+    angle = shape.signal in factors and shape.signal not in _rates(motion)
+    h = ANGLE_RAD if angle else RATE_RAD_S * half_s
     rise = (shape.basis(middle + h) - shape.basis(middle - h)) / (2.0 * h)
-    if shape.signal in _FACTORS:
-        slopes[:, _FACTORS.index(shape.signal)] = rise
-    elif shape.signal == "alpha_dot_hat":
-        slopes[:] = np.outer(rise, alpha_dot)
+    if shape.signal in factors:
+        slopes[:, factors.index(shape.signal)] = rise
+    elif shape.signal == motion.flow_rate:
+        slopes[:] = np.outer(rise, flow_rate)
     return every
+
+
+def _row(shape: Shape, motion: Motion) -> int:
+    """Number of the coefficient that an increment changes."""
+    return [c.name for c in motion.coefficients].index(shape.acts_on)
 
 
 def sensitivities_to(
@@ -168,34 +183,36 @@ def _of_record(
     tangent = tangent_of(given, problem.settings, point.common, point.per_record[index])
     if tangent is None:
         return None
-    motion = Motion(tangent)
-    trims = {
-        "alpha": record.plant.trim_alpha_rad,
-        "qhat": 0.0,
-        "elevator": record.pitch_plant.trim_elevator_rad,
-    }
-    linear = np.stack([motion.signal(name) - trims[name] for name in _FACTORS], axis=-1)
-    count, derivatives = len(_FACTORS), base.t[null.point.of.common.derivatives]
-    force = np.zeros((*linear.shape[:2], 2, 2 * count))
-    for k in range(2):
+    described = problem.layout.motion
+    motion = FlownMotion(tangent, described)
+    pairs = zip(described.signals, record.plant.trim_signals.tolist(), strict=True)
+    linear = np.stack([motion.signal(s.name) - trim for s, trim in pairs], axis=-1)
+    (rows, count), derivatives = described.shape, base.t[null.point.of.common.derivatives]
+    force = np.zeros((*linear.shape[:2], rows, rows * count))
+    for k in range(rows):
         force[:, :, k, k * count : (k + 1) * count] = linear
-    nothing = np.zeros((len(tangent.path.scale), OUTPUTS, 2 * count))
+    nothing = np.zeros((len(tangent.path.scale), len(base.white), rows * count))
     by_gain = derivatives - propagated(tangent, force, nothing) @ base.white.T
     by_gain[~derivatives.any(axis=(1, 2))] = 0.0
-    at, chord = given.reference, record.plant.aircraft.constants.chord_m
-    reference = {"alpha": given.reference_flow_rad, "elevator": at.elevator_rad, "qbar": at.qbar_pa}
-    alpha_dot = np.linalg.lstsq(
+    at = given.reference
+    inputs = [(c.name, c.channel) for c in described.controls]
+    inputs += [(s.name, s.channel) for s in described.known_signals]
+    reference = {name: float(getattr(at, channel)) for name, channel in inputs}
+    reference |= {described.flow: given.reference_flow_rad, QBAR: at.qbar_pa}
+    flow_rate = np.linalg.lstsq(
         np.column_stack([linear.reshape(-1, count), np.ones(linear.shape[0] * POINTS)]),
-        motion.signal("alpha_dot_hat").ravel(),
+        motion.signal(described.flow_rate).ravel(),
         rcond=None,
     )[0][:count]
+    length = next(s.length for s in described.signals if s.length is not None)
+    half_s = 0.5 * float(getattr(record.plant.aircraft.constants, f"{length}_m")) / at.airspeed_m_s
     parts = []
     for block in _blocks(tried, len(base.r)):
-        slopes = [_slopes(shape, reference, 0.5 * chord / at.airspeed_m_s, alpha_dot) for shape in block]
+        slopes = [_slopes(shape, described, reference, half_s, flow_rate) for shape in block]
         e = _changes(block, motion) @ base.white.T
-        parts.append(e + np.tensordot(np.concatenate(slopes).reshape(-1, 2 * count), by_gain, axes=1))
+        parts.append(e + np.tensordot(np.concatenate(slopes).reshape(-1, rows * count), by_gain, axes=1))
     t = np.concatenate(parts) if parts else np.zeros((0, *base.r.shape))
-    return inserted(base, point.layout.sizes.stop, t, np.zeros((len(t), OUTPUTS, OUTPUTS)))
+    return inserted(base, point.layout.sizes.stop, t, np.zeros((len(t), *base.white.shape)))
 
 
 def _size(shape: Shape) -> int:
@@ -217,21 +234,22 @@ def _blocks(tried: Sequence[Shape], samples: int) -> Iterator[list[Shape]]:
         yield block
 
 
-def _changes(tried: Sequence[Shape], motion: Motion) -> Array:
+def _changes(tried: Sequence[Shape], motion: FlownMotion) -> Array:
     """(coefficients, samples, outputs) changes of the innovations by a unit of each coefficient, at the gain of the filter."""
     tangent, stops = motion.tangent, np.cumsum([_size(shape) for shape in tried])
-    force = np.zeros((len(tangent.matrices.phi), POINTS, 2, stops[-1]))
-    reading = np.zeros((len(tangent.path.scale), OUTPUTS, stops[-1]))
+    described = motion.motion
+    force = np.zeros((len(tangent.matrices.phi), POINTS, len(described.coefficients), stops[-1]))
+    reading = np.zeros((len(tangent.path.scale), len(described.outputs), stops[-1]))
     for shape, stop in zip(tried, stops.tolist(), strict=True):
         span, values = slice(stop - _size(shape), stop), _along(shape, motion)
         if shape.of_reading:
-            output, sensors = READINGS.index(shape.acts_on), tangent.sensors
+            output, sensors = described.output_channels.index(shape.acts_on), tangent.sensors
             values = _late(values, sensors.lag_s[output], sensors.delay_s[output], tangent.h_s)
             ends = values[tangent.steps - 1 :: tangent.steps, -1]
             reading[:, output, span] = np.concatenate([values[:1, 0], ends])
         else:
-            force[:, :, _COEFFICIENTS.index(shape.acts_on), span] = values
+            force[:, :, _row(shape, described), span] = values
     return propagated(tangent, force, reading)
 
 
-__all__ = ["Motion", "sensitivities_to"]
+__all__ = ["FlownMotion", "sensitivities_to"]

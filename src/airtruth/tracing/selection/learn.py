@@ -12,16 +12,9 @@ from numpy.typing import NDArray
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment, Shape
 from airtruth.tracing.inference.derivative_likelihood import contradiction
-from airtruth.tracing.inference.optimise import fit
-from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.whitening import NO_WHITENER
-from airtruth.tracing.selection.acceptance import (
-    OUTDONE,
-    SUPERSEDED,
-    Candidate,
-    reference_of,
-    untested,
-)
+from airtruth.tracing.selection.acceptance import Candidate, reference_of, untested
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.increment_fit import (
     FittedIncrement,
@@ -33,11 +26,13 @@ from airtruth.tracing.selection.increment_fit import (
     refitted,
 )
 from airtruth.tracing.selection.increments import Screened, screen, shapes, sharpened
+from airtruth.tracing.selection.outcome import settled, total_cost
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.ranking import TIE
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import CONTRADICTED, DeclaredCauses, explained
 from airtruth.tracing.selection.rounds import NOTHING_DECLARED, Rival, SearchRound, scored_round
-from airtruth.tracing.selection.settled import settled, total_cost
+from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.selection.significance import REMAINS
 
 Array = NDArray[np.float64]
@@ -71,7 +66,7 @@ true names lead by 3.7 to 26 in the 13 trials of 28 where such increments were l
 
 
 def with_increments(
-    problem: TraceProblem,
+    sets: SetTable,
     rounds: tuple[SearchRound, ...],
     effects: Sequence[Effect],
     seed: int,
@@ -91,35 +86,35 @@ def with_increments(
     seed : seed of the draws behind p-values; advance : receives the step that begins.
     declared : candidates that explain released derivatives, which they do again beside the increments.
     """
-    if len(problem.records) < LEAST_RECORDS or not rounds:
+    if len(sets.problem.records) < LEAST_RECORDS or not rounds:
         return rounds
-    grown = _learned(problem, rounds, effects, seed, advance)
+    grown = _learned(sets, rounds, effects, seed, advance)
     if len(grown) == len(rounds) and grown[-1].null is rounds[-1].null:
         return grown
-    grown = pruned(problem, grown, effects, seed, REMAINS, advance)
+    grown = pruned(sets, grown, effects, seed, REMAINS, advance)
     last = grown[-1]
     if last.null.hypothesis.spread is None:
         return grown
     first = next((r.release for r in rounds if r.release is not None), None)
     if first is not None:
         declared = replace(declared, corrections=first.corrections)
-    return settled(problem, (*grown[:-1], replace(last, sets=explained(problem, last.null, declared))))
+    return settled(sets, (*grown[:-1], replace(last, sets=explained(sets.problem, last.null, declared))))
 
 
 def _learned(
-    problem: TraceProblem,
+    sets: SetTable,
     rounds: tuple[SearchRound, ...],
     effects: Sequence[Effect],
     seed: int,
     advance: Advance,
 ) -> tuple[SearchRound, ...]:
     """The rounds with increments beside the names, or instead of them."""
-    learn = _Learning(problem, tuple(effects), seed, advance)
+    learn = _Learning(sets, tuple(effects), seed, advance)
     grown, evidence = learn.grown(rounds)
     named = rounds[-1].null.hypothesis.effects
     last = rounds[-1]
     explains = last.sets[0].effects if last.sets else ()
-    unexplained = bool(explains) and contradiction(problem, last.null).p_value <= CONTRADICTED
+    unexplained = bool(explains) and contradiction(sets.problem, last.null).p_value <= CONTRADICTED
     released = rounds[0].release is not None or last.null.hypothesis.spread is not None
     if not unexplained and (released or not named):
         return grown
@@ -179,7 +174,7 @@ class _Learning:
     promising : log evidence without a refit that a first increment needs for one [-].
     """
 
-    problem: TraceProblem
+    sets: SetTable
     effects: tuple[Effect, ...]
     seed: int
     advance: Advance
@@ -187,7 +182,7 @@ class _Learning:
 
     def grown(self, rounds: tuple[SearchRound, ...]) -> tuple[tuple[SearchRound, ...], float]:
         """The rounds with one more for each accepted increment, and the log evidence of all of them."""
-        every = shapes(self.problem)
+        every = shapes(self.sets.problem)
         for _ in range(2 * MOST_INCREMENTS):
             last, accepted = rounds[-1], _accepted(rounds)
             if len(accepted) >= MOST_INCREMENTS:
@@ -214,7 +209,7 @@ class _Learning:
     def _replacing(self, rounds: tuple[SearchRound, ...], tried: float) -> tuple[SearchRound, ...] | None:
         """The rounds with the last increment in place of an earlier one that it makes redundant."""
         best = rounds[-1].tied[0].fit
-        new, old = best.hypothesis.effects[-1], redundant_increment(self.problem, best, tried)
+        new, old = best.hypothesis.effects[-1], redundant_increment(self.sets, best, tried)
         if old is None or not isinstance(new, Increment):
             return None
         if not may_begin(self.advance, f"{new.key} instead of {old.key}"):
@@ -222,22 +217,23 @@ class _Learning:
         index = next(i for i, r in enumerate(rounds) if r.tied and r.tied[0].score.effect.key == old.key)
         own = rounds[index]
         sizes = np.concatenate([own.null.point.sizes, best.point.sizes[best.hypothesis.span(new.key)]])
-        alone = fit(self.problem, own.null.hypothesis.plus(new), replace(own.null.point, sizes=sizes))
+        alone = self.sets.fit(own.null.hypothesis.plus(new), replace(own.null.point, sizes=sizes))
         if alone is None:
             return None
         evidence = log_evidence(own.null, alone, new, tried)
-        reference = reference_of(self.problem, own.null)
-        leader = assessed(self.problem, FittedIncrement(new, alone, evidence), reference)
+        reference = reference_of(self.sets.problem, own.null)
+        leader = assessed(self.sets.problem, FittedIncrement(new, alone, evidence), reference)
         if leader.reasons:
             return None
         others = (
-            replace(c, reasons=(SUPERSEDED,)) if c.score.effect.key == old.key else c for c in own.candidates
+            replace(c, reasons=(Refusal.SUPERSEDED,)) if c.score.effect.key == old.key else c
+            for c in own.candidates
         )
         return (*rounds[:index], replace(own, candidates=(*others, leader), tied=(leader,)))
 
     def _following(self, rounds: tuple[SearchRound, ...], fitted: PosteriorFit) -> SearchRound | None:
         """The round whose null has the increment; its candidates are scored and none is refitted."""
-        own = scored_round(self.problem, fitted, self.effects, len(rounds), self.seed, self.advance)
+        own = scored_round(self.sets, fitted, self.effects, len(rounds), self.seed, self.advance)
         last = rounds[-1]
         return None if own is None else replace(own, sets=last.sets, release=last.release)
 
@@ -250,26 +246,26 @@ class _Learning:
         present = {e.variant for e in _increments_of(null)}
         tried = [s for s in every if s.variant not in present]
         least = 0.0 if present else self.promising
-        screened = _of_each_variant(screen(self.problem, last.null, NO_WHITENER, tried))[:_SHARPENED]
-        leading = _leading(sharpened(self.problem, last.null, NO_WHITENER, screened), least)
+        screened = _of_each_variant(screen(self.sets.problem, last.null, NO_WHITENER, tried))[:_SHARPENED]
+        leading = _leading(sharpened(self.sets.problem, last.null, NO_WHITENER, screened), least)
         if not leading or leading[0].log_evidence < evident:
             return ()
         learned = []
         for s in leading:
             if may_begin(self.advance, f"refit {s.effect.key}"):
-                own = refitted(self.problem, null, s, _weight(tried))
+                own = refitted(self.sets.problem, null, s, _weight(tried))
                 learned += [] if own is None else [own]
         if not learned:
             return ()
-        reference = reference_of(self.problem, null)
-        ranked = converged(self.problem, null, learned, _weight(tried))
+        reference = reference_of(self.sets.problem, null)
+        ranked = converged(self.sets.problem, null, learned, _weight(tried))
         found: list[Candidate] = []
         for own in ranked:
             accepted = next((c for c in found if not c.reasons), None)
             if accepted is not None and 2.0 * own.log_evidence < accepted.gain - TIE:
-                found.append(untested(evidence_score(own), own.fit, 2.0 * own.log_evidence, OUTDONE))
+                found.append(untested(evidence_score(own), own.fit, 2.0 * own.log_evidence, Refusal.OUTDONE))
             else:
-                found.append(assessed(self.problem, own, reference))
+                found.append(assessed(self.sets.problem, own, reference))
         return tuple(found)
 
 

@@ -12,19 +12,20 @@ from dataclasses import replace
 
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment
-from airtruth.tracing.inference.optimise import converged_fit
-from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.model.parameters import Parameters
-from airtruth.tracing.selection.acceptance import OUTDONE, Candidate, has_converged
+from airtruth.tracing.selection.acceptance import Candidate, has_converged
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import best_rival, starts_in_place_of
 from airtruth.tracing.selection.ranking import TIE, gains_of
 from airtruth.tracing.selection.refit import Refit
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.rounds import SearchRound
+from airtruth.tracing.selection.set_table import SetTable
 
 
 def with_look_alikes(
-    problem: TraceProblem, rounds: tuple[SearchRound, ...], effects: Sequence[Effect], advance: Advance
+    sets: SetTable, rounds: tuple[SearchRound, ...], effects: Sequence[Effect], advance: Advance
 ) -> tuple[SearchRound, ...]:
     """The rounds, each accepted effect tied with those that explain as much in its place at the end of the search.
 
@@ -44,12 +45,12 @@ def with_look_alikes(
             (i for i, r in enumerate(rounds) if r.tied and r.tied[0].score.effect.key == member.key), None
         )
         if at is not None and not isinstance(member, Increment):
-            found[at] = _beside_the_others(problem, rounds, at, effects, advance)
+            found[at] = _beside_the_others(sets, rounds, at, effects, advance)
     return tuple(found)
 
 
 def _beside_the_others(
-    problem: TraceProblem,
+    sets: SetTable,
     rounds: Sequence[SearchRound],
     at: int,
     effects: Sequence[Effect],
@@ -68,18 +69,14 @@ def _beside_the_others(
         score = next((s for s in own.table.scores if s.effect.key == effect.key), None)
         exchanged = tuple(effect if e.key == member.key else e for e in last.hypothesis.effects)
         hypothesis = replace(last.hypothesis, effects=exchanged)
-        ends: list[PosteriorFit | None] = [
-            f for f in rounds[-1].exchanged if _keys(f) == {e.key for e in exchanged} and f.converged
-        ]
-        ends = ends or [converged_fit(problem, hypothesis, start, last.cost) for start in starts]
-        tried = min((end for end in ends if end is not None), key=lambda end: end.cost, default=None)
+        tried = sets.best_from(hypothesis, starts, rival=last.cost)
         if score is not None and tried is not None:
             fits.append(Refit(score, tried, 0.0))
             near = tried.cost - last.cost < TIE
             for twin in list(_twins(effect, effects, known_keys)) if near else ():
                 known_keys.add(twin.key)
                 waiting.append((twin, [tried.point]))
-    gains = gains_of(problem, last, sorted(fits, key=lambda r: r.cost))
+    gains = gains_of(sets.problem, last, sorted(fits, key=lambda r: r.cost))
     tested: dict[str, Candidate] = {}
     for r in fits[1:]:
         key = r.score.effect.key
@@ -87,7 +84,7 @@ def _beside_the_others(
         is_alike = gain >= leader.gain - TIE and has_converged(r.fit, gain)
         before = next((c for c in own.candidates if c.score.effect.key == key), None)
         new = before or replace(leader, score=r.score, fit=r.fit)
-        reasons = () if is_alike else new.reasons or (OUTDONE,)
+        reasons = () if is_alike else new.reasons or (Refusal.OUTDONE,)
         tested[key] = replace(new, gain=gain, reasons=reasons)
     alike = (c for c in tested.values() if not c.reasons)
     known = {c.score.effect.key: c for c in own.candidates}

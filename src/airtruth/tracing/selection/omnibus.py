@@ -18,13 +18,13 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from airtruth.physics.motion import Motion
+from airtruth.tracing.inference.direction import inserted, projected
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import Whitener
 from airtruth.tracing.model.records import TraceRecord, nodes
 from airtruth.tracing.model.response import External, Response, filter_inputs, respond_to
 from airtruth.tracing.model.settings import without
 from airtruth.tracing.selection.anomaly import Anomaly
-from airtruth.tracing.selection.direction import inserted, projected
 from airtruth.tracing.selection.families import Destinations, Series, View, families
 from airtruth.tracing.selection.spectrum import lines
 

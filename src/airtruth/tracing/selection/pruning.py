@@ -15,16 +15,15 @@ import numpy as np
 from airtruth.effects.effect import Effect
 from airtruth.effects.increment import Increment
 from airtruth.tracing.inference.derivative_likelihood import contradiction
-from airtruth.tracing.inference.optimise import fit
-from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
-from airtruth.tracing.selection.acceptance import SUPERSEDED
+from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.explanation import REFERENCE, CauseSet
+from airtruth.tracing.selection.outcome import STRONG_ODDS, total_cost
 from airtruth.tracing.selection.refit import losses_without
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import CONTRADICTED
-from airtruth.tracing.selection.replacement import STRONG_ODDS
 from airtruth.tracing.selection.rounds import SearchRound, scored_round
-from airtruth.tracing.selection.settled import total_cost
+from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.selection.significance import FAMILY_LEVEL, MISFIT_FAMILY_LEVEL, significant_gain
 from airtruth.tracing.selection.weights import with_rival
 
@@ -34,7 +33,7 @@ missing anyway, two decades do not keep a name that explains nothing)."""
 
 
 def pruned(
-    problem: TraceProblem,
+    sets: SetTable,
     rounds: tuple[SearchRound, ...],
     effects: Sequence[Effect],
     seed: int,
@@ -61,12 +60,12 @@ def pruned(
     if not may_begin(advance, "remove what later effects make unnecessary"):
         return rounds
     learned = any(isinstance(e, Increment) for e in members)
-    declared = _as_declared(problem, last, learned)
+    declared = _as_declared(sets, last, learned)
     least = significant_gain(len(effects), MISFIT_FAMILY_LEVEL if learned else FAMILY_LEVEL)
-    fitted = _with_needed_names(problem, declared or last.null, least, _latest_causes(rounds))
+    fitted = _with_needed_names(sets, declared or last.null, least, _latest_causes(rounds))
     if fitted is last.null:
         return rounds
-    end = scored_round(problem, fitted, effects, len(rounds), seed, advance)
+    end = scored_round(sets, fitted, effects, len(rounds), seed, advance)
     if end is None or end.anomaly.p_value < min(remains, _ALIKE * last.anomaly.p_value):
         return rounds
     if declared is None:
@@ -77,7 +76,7 @@ def pruned(
     return kept if declared is None or learned else with_rival(kept, rounds)
 
 
-def _as_declared(problem: TraceProblem, last: SearchRound, learned: bool) -> PosteriorFit | None:
+def _as_declared(sets: SetTable, last: SearchRound, learned: bool) -> PosteriorFit | None:
     """A released fit under the declaration again; None where it was not released, where the records contradict that, or, beside
     names alone, where the odds for what explains the release are strong.
 
@@ -87,8 +86,8 @@ def _as_declared(problem: TraceProblem, last: SearchRound, learned: bool) -> Pos
     """
     if last.null.hypothesis.spread is None:
         return None
-    own = fit(problem, replace(last.null.hypothesis, spread=None), last.null.point, near=last.null)
-    if own is None or contradiction(problem, own).p_value <= CONTRADICTED:
+    own = sets.declared(last.null)
+    if own is None or contradiction(sets.problem, own).p_value <= CONTRADICTED:
         return None
     behind = own.cost + len(own.point.sizes) - REFERENCE - total_cost(last)
     return own if learned or behind <= -STRONG_ODDS else None
@@ -108,7 +107,7 @@ def _latest_causes(rounds: Sequence[SearchRound]) -> Collection[str]:
 
 
 def _with_needed_names(
-    problem: TraceProblem, fitted: PosteriorFit, least: float, kept: Collection[str]
+    sets: SetTable, fitted: PosteriorFit, least: float, kept: Collection[str]
 ) -> PosteriorFit:
     """The fit without the names whose absence costs less than ``least`` in 2 log L, the cheapest one first.
 
@@ -120,7 +119,7 @@ def _with_needed_names(
         effects = fitted.hypothesis.effects
         names = [e for e in effects if not isinstance(e, Increment) and e.name not in kept]
         loss, less = min(
-            losses_without(problem, fitted, names), key=lambda removal: removal[0], default=(np.inf, None)
+            losses_without(sets, fitted, names), key=lambda removal: removal[0], default=(np.inf, None)
         )
         if less is None or loss >= least:
             return fitted
@@ -131,7 +130,7 @@ def _kept(own: SearchRound, gone: set[str], is_declared: bool) -> SearchRound:
     """A round without the effects that are gone, and without its release where nothing of its explanation is left."""
     if own.tied and own.tied[0].score.effect.key in gone:
         first = own.tied[0]
-        others = (replace(c, reasons=(SUPERSEDED,)) if c is first else c for c in own.candidates)
+        others = (replace(c, reasons=(Refusal.SUPERSEDED,)) if c is first else c for c in own.candidates)
         own = replace(own, tied=(), profile=None, candidates=tuple(others))
     if is_declared:
         return replace(own, release=None, sets=(), rival=None)

@@ -12,13 +12,6 @@ from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.whitening import Whitener, autoregression
 from airtruth.tracing.selection.acceptance import (
-    IMMATERIAL,
-    OUTDONE,
-    SUPERSEDED,
-    SURPASSED,
-    UNCONVERGED,
-    WORSE_FREE_RUN,
-    WORSE_LIKELIHOOD,
     Candidate,
     assess_candidate,
     implausibility,
@@ -26,6 +19,7 @@ from airtruth.tracing.selection.acceptance import (
     untested,
 )
 from airtruth.tracing.selection.refit import Refit
+from airtruth.tracing.selection.refusal import Refusal
 
 TIE: Final = 6.0
 """Difference in 2 log L up to which two effects explain the records equally well [-] (judgement: a likelihood ratio of
@@ -33,8 +27,8 @@ TIE: Final = 6.0
 _NEAR: Final = 30.0
 """Difference in log L up to which candidates are compared under one autoregression [-] (judgement: wide enough for
 the change of a gain by the autoregression)."""
-_ITERATIONS: Final = 6
-"""Iterations of a refit under the common autoregression [-] (judgement: it begins next to its optimum)."""
+WHITENED_ITERATIONS: Final = 6
+"""Iterations of a refit under an autoregression [-] (judgement: it begins next to its optimum)."""
 
 
 def rank(
@@ -66,24 +60,28 @@ def rank(
     led = gains.get(leader, np.inf)
     for gain, r in ranked:
         if leader in gains and gain > led:
-            candidates.append(untested(r.score, r.fit, gain, SURPASSED))
+            candidates.append(untested(r.score, r.fit, gain, Refusal.SURPASSED))
             continue
         if replacement is not None and r.score.effect.key == replacement[0]:
-            candidates.append(untested(r.score, r.fit, gain, SUPERSEDED, f"that is {replacement[1]}"))
+            candidates.append(untested(r.score, r.fit, gain, Refusal.SUPERSEDED, f"that is {replacement[1]}"))
             continue
         if gain < accepted - TIE and r.score.effect.name != leading:
             implausible = implausibility(problem, r.score.effect, r.fit)
-            candidates.append(untested(r.score, r.fit, gain, OUTDONE, *implausible))
+            candidates.append(untested(r.score, r.fit, gain, Refusal.OUTDONE, *implausible))
             continue
         candidate = assess_candidate(problem, r.score, r.fit, gain, reference, least)
         if r.score.effect.key == leader:
-            alone = set(candidate.reasons) - {UNCONVERGED} if in_set else {WORSE_LIKELIHOOD, WORSE_FREE_RUN}
+            alone = (
+                set(candidate.reasons) - {Refusal.UNCONVERGED}
+                if in_set
+                else {Refusal.WORSE_LIKELIHOOD, Refusal.WORSE_FREE_RUN}
+            )
             still = (why for why in candidate.reasons if why not in alone)
             candidate = replace(candidate, reasons=tuple(still))
         if gain < accepted - TIE:
-            candidate = replace(candidate, reasons=(*candidate.reasons, OUTDONE))
+            candidate = replace(candidate, reasons=(*candidate.reasons, Refusal.OUTDONE))
         candidates.append(candidate)
-        if not np.isfinite(accepted) and set(candidate.reasons) <= {IMMATERIAL, UNCONVERGED}:
+        if not np.isfinite(accepted) and set(candidate.reasons) <= {Refusal.IMMATERIAL, Refusal.UNCONVERGED}:
             accepted = gain  # an effect that explains less than an immaterial one is not the cause either
             leading = r.score.effect.name
     return tuple(candidates)
@@ -117,8 +115,10 @@ def _whitened_cost(
 ) -> float:
     """Cost under an autoregression, at the noise and gust levels of another fit, so that only the motion counts."""
     start = own.point.with_levels(levels.point)
-    again = fit(problem, own.hypothesis, start, whitener, iterations=_ITERATIONS, free_levels=False, near=own)
+    again = fit(
+        problem, own.hypothesis, start, whitener, iterations=WHITENED_ITERATIONS, free_levels=False, near=own
+    )
     return np.inf if again is None else again.cost
 
 
-__all__ = ["TIE", "gains_of", "rank"]
+__all__ = ["TIE", "WHITENED_ITERATIONS", "gains_of", "rank"]

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.assess import likelihood_at
 from airtruth.tracing.inference.hypothesis import Hypothesis
-from airtruth.tracing.inference.optimise import fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
+from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.acceptance import IMPROBABLE, declared_probability, own_probability
 from airtruth.tracing.selection.budget import Advance, may_begin
-from airtruth.tracing.selection.freedom import Freedom, without_last_effect
-from airtruth.tracing.selection.from_declared import at, with_effect
 from airtruth.tracing.selection.score_test import Score, Table
+from airtruth.tracing.selection.set_table import SetTable
 
 LEADING: Final = 8
 """Largest number of candidates that a round refits [-] (judgement: a refit costs seconds to a minute)."""
@@ -43,8 +42,6 @@ _EXPLAINED: Final = 0.2
 promises one half)."""
 _BETTER: Final = 2.0
 """Gain in log L that counts as another optimum [-] (judgement)."""
-_BETTER_NULL_ITERATIONS: Final = 20
-"""Iterations of a null that begins where a candidate ended [-] (judgement: an optimum nearby)."""
 _AGREES: Final = 0.2
 """Share of the size known beforehand by which a converged refit may differ from it without a second one that begins there
 [-] (judgement: another optimum, in which the derivatives have absorbed the effect, has a fraction of its size)."""
@@ -82,7 +79,7 @@ class Refit:
 
 
 def refit_leaders(
-    problem: TraceProblem,
+    sets: SetTable,
     null: PosteriorFit,
     table: Table,
     significant: NDArray[np.bool_],
@@ -104,45 +101,44 @@ def refit_leaders(
     if not significant.any() and not wanted:
         return []
     fits: list[Refit] = []
-    freedom = Freedom(problem, null)
-    for i in _leading(problem, null, table, significant, wanted)[:most]:
+    for i in _leading(sets.problem, null, table, significant, wanted)[:most]:
         s = table.scores[i]
         if s.effect.key in skip:
             continue
         if not may_begin(advance, f"refit {s.effect.key}"):
             continue
         ahead = min((r.fit.cost for r in fits), default=rival)
-        best = refit_scored(problem, null, table, i, min(ahead, rival))
+        best = refit_scored(sets, null, table, i, min(ahead, rival))
         if best is not None:
-            fits.append(Refit(s, best, freedom.correction(s.effect, best)))
+            fits.append(Refit(s, best, freedom_gain(sets, null, s.effect)))
     for _ in range(_ATTEMPTS):  # the leader at least has to converge
         fits.sort(key=lambda r: r.cost)
         if not fits or fits[0].fit.converged:
             break
         first = fits[0].fit
-        fits[0] = replace(fits[0], fit=fit(problem, first.hypothesis, first.point, near=first) or first)
-    started_twice = [_from_both(problem, null, r, freedom, advance) for r in fits[:_TWICE]]
+        fits[0] = replace(fits[0], fit=sets.fit_from(first.hypothesis, first.point, near=first) or first)
+    started_twice = [_from_both(sets, null, r, advance) for r in fits[:_TWICE]]
     return sorted([*started_twice, *fits[_TWICE:]], key=lambda r: r.cost)
 
 
-def _from_both(
-    problem: TraceProblem, null: PosteriorFit, r: Refit, freedom: Freedom, advance: Advance
-) -> Refit:
-    """The better of a refit and of one that begins at the declared aircraft with its size.
+def _from_both(sets: SetTable, null: PosteriorFit, r: Refit, advance: Advance) -> Refit:
+    """The better of a refit and of one that begins at the declared aircraft with its size, where none began there before.
 
     Derivatives that have absorbed an effect at the null may keep a part of it in another optimum.
     """
     effect = r.score.effect
-    if len(effect.parameters) > 1 or not may_begin(advance, f"refit {effect.key} from the declared aircraft"):
+    if _is_improbable(sets.problem, null) or len(effect.parameters) > 1:
         return r
-    tried = with_effect(problem, null, r.score, r.size, r.fit.cost - _BETTER, only_better=True)
+    if not may_begin(advance, f"refit {effect.key} from the declared aircraft"):
+        return r
+    tried = with_effect(sets, null, r.score, r.size, r.fit.cost - _BETTER, only_better=True)
     if tried is None or tried.cost > r.fit.cost - _BETTER:
         return r
-    return Refit(r.score, tried, freedom.correction(effect, tried))
+    return Refit(r.score, tried, r.freedom_correction)
 
 
 def refit_known(
-    problem: TraceProblem,
+    sets: SetTable,
     null: PosteriorFit,
     table: Table,
     fits: Sequence[Refit],
@@ -158,7 +154,6 @@ def refit_known(
         is not repeated.
     """
     best = {r.score.effect.key: r for r in fits}
-    freedom = Freedom(problem, null)
     for s in table.scores:
         key = s.effect.key
         if key not in known or len(s.effect.parameters) > 1:
@@ -169,9 +164,9 @@ def refit_known(
         if not may_begin(advance, f"refit {key} from the kinematic check"):
             break
         ahead = min((r.fit.cost for r in best.values()), default=np.inf)
-        tried = with_effect(problem, null, s, size, ahead)
+        tried = with_effect(sets, null, s, size, ahead)
         if tried is not None and (key not in best or tried.cost < best[key].fit.cost):
-            best[key] = Refit(s, tried, freedom.correction(s.effect, tried))
+            best[key] = Refit(s, tried, freedom_gain(sets, null, s.effect))
     return sorted(best.values(), key=lambda r: r.cost)
 
 
@@ -205,17 +200,17 @@ def _leading(
 
 
 def refit_without(
-    problem: TraceProblem, fitted: PosteriorFit, effect: Effect, rival: float = np.inf
+    sets: SetTable, fitted: PosteriorFit, effect: Effect, rival: float = np.inf
 ) -> PosteriorFit | None:
-    """A fit again, without one of its effects; ``rival`` as of `fit`."""
+    """The fit without one of its effects; ``rival`` as of `fit`."""
     span = fitted.hypothesis.span(effect.key)
     rest = tuple(e for e in fitted.hypothesis.effects if e.key != effect.key)
     point = replace(fitted.point, sizes=np.delete(fitted.point.sizes, span))
-    return fit(problem, replace(fitted.hypothesis, effects=rest), point, rival=rival)
+    return sets.fit(replace(fitted.hypothesis, effects=rest), point, rival=rival)
 
 
 def losses_without(
-    problem: TraceProblem, fitted: PosteriorFit, effects: Sequence[Effect]
+    sets: SetTable, fitted: PosteriorFit, effects: Sequence[Effect]
 ) -> list[tuple[float, PosteriorFit | None]]:
     """Loss in 2 log L by the removal of each effect, less 2 for each of its parameters, and the fit without it.
 
@@ -223,13 +218,13 @@ def losses_without(
     """
     found: list[tuple[float, PosteriorFit | None]] = []
     for effect in effects:
-        less = refit_without(problem, fitted, effect, fitted.cost)
+        less = refit_without(sets, fitted, effect, fitted.cost)
         loss = np.inf if less is None else 2.0 * (less.cost - fitted.cost - len(effect.parameters))
         found.append((loss, less))
     return found
 
 
-def redundant_effect(problem: TraceProblem, fitted: PosteriorFit, least: float) -> int | None:
+def redundant_effect(sets: SetTable, fitted: PosteriorFit, least: float) -> int | None:
     """Index of an earlier effect that the last one makes redundant; None where each is needed.
 
     An effect is redundant if its size is immaterial, or if the fit without it loses less than ``least`` in 2 log L.
@@ -238,24 +233,38 @@ def redundant_effect(problem: TraceProblem, fitted: PosteriorFit, least: float) 
     for i, effect in enumerate(fitted.hypothesis.effects[:-1]):
         if abs(fitted.point.sizes[at]) < effect.parameters[0].material:
             return i
-        ((loss, _),) = losses_without(problem, fitted, (effect,))
+        ((loss, _),) = losses_without(sets, fitted, (effect,))
         if loss < least:
             return i
         at += len(effect.parameters)
     return None
 
 
-def better_null(problem: TraceProblem, null: PosteriorFit, fits: Sequence[Refit]) -> PosteriorFit | None:
+def better_null(sets: SetTable, null: PosteriorFit, fits: Sequence[Refit]) -> PosteriorFit | None:
     """The null fitted again from the end of the best refit, if that is a better optimum."""
     if not fits:
         return None
-    start = without_last_effect(null, fits[0].fit)
-    again = fit(problem, null.hypothesis, start, iterations=_BETTER_NULL_ITERATIONS, near=fits[0].fit)
-    return again if again is not None and again.cost < null.cost - _BETTER else None
+    best, to_beat = fits[0].fit, null.cost - _BETTER
+    start = replace(best.point, sizes=best.point.sizes[: len(null.point.sizes)])
+    again = sets.fit_from(null.hypothesis, start, rival=to_beat, only_better=True, near=best)
+    return again if again is not None and again.cost < to_beat else None
+
+
+def freedom_gain(sets: SetTable, null: PosteriorFit, effect: Effect) -> float:
+    """Log L that a null gains by the freedom alone that an effect gives to derivatives and trim coefficients.
+
+    A curvature of unknown vertex releases a slope and a constant from their declaration
+    (`airtruth.tracing.inference.hypothesis.unconstrained_by`). The gain of its refit contains that of this release.
+    """
+    free = null.hypothesis.plus(effect).unconstrained
+    if free == null.hypothesis.unconstrained:
+        return 0.0
+    end = sets.fit(replace(null.hypothesis, also_unconstrained=free), null.point, near=null)
+    return 0.0 if end is None else max(0.0, null.cost - end.cost)
 
 
 def refit_scored(
-    problem: TraceProblem, null: PosteriorFit, table: Table, number: int, rival: float = np.inf
+    sets: SetTable, null: PosteriorFit, table: Table, number: int, rival: float = np.inf
 ) -> PosteriorFit | None:
     """The null and one effect with all parameters free, from multiples of the size that the score suggests.
 
@@ -269,10 +278,13 @@ def refit_scored(
     """
     s, white_size = table.scores[number], table.white_sizes[number]
     hypothesis = null.hypothesis.plus(s.effect)
+    known = sets.best(hypothesis)
+    if known is not None:
+        return known
     is_limit = s.effect.parameters[0].is_limit
     best: PosteriorFit | None = None
-    for share in _ordered_shares(problem, null, hypothesis, s):
-        tried = fit(problem, hypothesis, at(null, s, share * s.size), rival=rival, near=null)
+    for share in _ordered_shares(sets.problem, null, hypothesis, s):
+        tried = sets.fit_from(hypothesis, _at(null, s, share * s.size), rival=rival, near=null)
         if tried is None:
             continue
         again = best is not None and abs(tried.cost - best.cost) < _SAME
@@ -282,12 +294,33 @@ def refit_scored(
         # several starts may end at a limit too high to act
         if (best.converged and gain > _EXPLAINED * s.z**2) or (again and not (is_limit and gain < _BETTER)):
             break
-    if _is_improbable(problem, null):
+    if _is_improbable(sets.problem, null):
         to_beat = np.inf if best is None else best.cost - _SAME
-        tried = with_effect(problem, null, s, white_size, min(rival, to_beat), only_better=to_beat < rival)
+        tried = with_effect(sets, null, s, white_size, min(rival, to_beat), only_better=to_beat < rival)
         if tried is not None and (best is None or tried.cost < best.cost):
             best = tried
     return best
+
+
+def with_effect(
+    sets: SetTable, null: PosteriorFit, s: Score, size: float, rival: float, *, only_better: bool = False
+) -> PosteriorFit | None:
+    """A null's effects and one more, from the declared aircraft; None and options as of `SetTable.fit_from_declared`.
+
+    Parameters
+    ----------
+    s, size : score of the further effect, and the size at which it begins.
+    """
+    sizes = _at(null, s, size).sizes
+    hypothesis = null.hypothesis.plus(s.effect)
+    return sets.fit_from_declared(hypothesis, sizes, null, rival=rival, only_better=only_better)
+
+
+def _at(null: PosteriorFit, s: Score, size: float) -> Parameters:
+    """The parameters of a null with an effect of a size beside them."""
+    low, high = s.effect.parameters[0].reach
+    sizes = s.direction.sizes(min(max(size, low), high))
+    return replace(null.point, sizes=np.concatenate([null.point.sizes, sizes]))
 
 
 def _is_improbable(problem: TraceProblem, null: PosteriorFit) -> bool:
@@ -299,7 +332,7 @@ def _ordered_shares(
     problem: TraceProblem, null: PosteriorFit, hypothesis: Hypothesis, s: Score
 ) -> list[float]:
     """`_SHARES`, the most likely size first, all other parameters as in the null."""
-    costs = [likelihood_at(problem, hypothesis, at(null, s, share * s.size)) for share in _SHARES]
+    costs = [likelihood_at(problem, hypothesis, _at(null, s, share * s.size)) for share in _SHARES]
     return [_SHARES[i] for i in np.argsort(costs, kind="stable")]
 
 
@@ -313,4 +346,5 @@ __all__ = [
     "refit_leaders",
     "refit_scored",
     "refit_without",
+    "with_effect",
 ]

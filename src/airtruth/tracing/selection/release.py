@@ -17,7 +17,6 @@ from airtruth.tracing.inference.derivative_likelihood import (
     derivative_likelihood,
 )
 from airtruth.tracing.inference.hypothesis import Hypothesis
-from airtruth.tracing.inference.optimise import converged_fit
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.selection.explanation import (
     WRONG_BY,
@@ -28,7 +27,7 @@ from airtruth.tracing.selection.explanation import (
     predicted_cost,
     simplest_first,
 )
-from airtruth.tracing.selection.from_declared import from_declared
+from airtruth.tracing.selection.set_table import SetTable
 
 CONTRADICTED: Final = 0.01
 """Probability below which records contradict the declared derivatives [-] (convention: one true declaration in a
@@ -103,7 +102,7 @@ def released(hypothesis: Hypothesis, problem: TraceProblem) -> Hypothesis:
 
 
 def release(
-    problem: TraceProblem, null: PosteriorFit, declared: DeclaredCauses, test: Contradiction
+    sets: SetTable, null: PosteriorFit, declared: DeclaredCauses, test: Contradiction
 ) -> Release | None:
     """Where a test contradicts the declaration, fit without it and explain the shifts.
 
@@ -115,30 +114,31 @@ def release(
     -------
     None where the records do not contradict the declaration, or where nothing may explain a contradiction.
     """
+    problem = sets.problem
     declared = declared.beside(null.hypothesis)
     allowed = declared.causes or declared.wrong_allowed
     if null.hypothesis.spread is not None or not allowed or test.p_value > CONTRADICTED:
         return None
-    free = converged_fit(problem, released(null.hypothesis, problem), null.point, near=null)
+    free = sets.converged(released(null.hypothesis, problem), null.point, near=null)
     if free is None:
         return None
     own = derivative_likelihood(problem, free)
-    sets = _explaining(own, declared)
-    if not sets:
+    explaining = _explaining(own, declared)
+    if not explaining:
         return None
     peak = 0.5 * float(own.vector @ np.linalg.pinv(own.information, hermitian=True) @ own.vector)
-    sets, refits, corrections = _refitted(problem, null, free, declared, sets)
-    strain = least_cost(sets) - (own.cost - peak)
-    sets = simplest_first(sets)
-    return Release(test, free, sets, strain, refits.get(sets[0].effects), corrections)
+    explaining, refits, corrections = _refitted(sets, null, free, declared, explaining)
+    strain = least_cost(explaining) - (own.cost - peak)
+    explaining = simplest_first(explaining)
+    return Release(test, free, explaining, strain, refits.get(explaining[0].effects), corrections)
 
 
 def _refitted(
-    problem: TraceProblem,
+    sets: SetTable,
     null: PosteriorFit,
     free: PosteriorFit,
     declared: DeclaredCauses,
-    sets: tuple[CauseSet, ...],
+    explaining: tuple[CauseSet, ...],
 ) -> tuple[tuple[CauseSet, ...], dict[tuple[str, ...], PosteriorFit], dict[tuple[str, ...], float]]:
     """The sets with the leading ones refitted in the filter, where it carries their effects; best first.
 
@@ -147,23 +147,23 @@ def _refitted(
     """
     effects = {e.key: e for e in declared.effects}
     causes = {c.key: c for c in declared.causes}
-    plain = derivative_likelihood(problem, free, robust=False)
-    carried = [s for s in sets if s.causes and not s.wrong and set(s.causes) <= set(effects)]
+    plain = derivative_likelihood(sets.problem, free, robust=False)
+    carried = [s for s in explaining if s.causes and not s.wrong and set(s.causes) <= set(effects)]
     refits: dict[tuple[str, ...], PosteriorFit] = {}
     corrections: dict[tuple[str, ...], float] = {}
     for s in carried[:_REFITS]:
-        if s.cost > sets[0].cost + _HOPELESS:
+        if s.cost > explaining[0].cost + _HOPELESS:
             break
         ahead = min((r.cost for r in refits.values()), default=np.inf)
-        own = _as_effects(problem, null, free, s, effects, causes, ahead)
+        own = _as_effects(sets, null, free, s, effects, causes, ahead)
         if own is not None:
             corrections[s.causes] = own.cost - predicted_cost(plain, [causes[key] for key in s.causes])
             refits[s.effects] = own
-    return _corrected(sets, corrections), refits, corrections
+    return _corrected(explaining, corrections), refits, corrections
 
 
 def _as_effects(
-    problem: TraceProblem,
+    sets: SetTable,
     null: PosteriorFit,
     free: PosteriorFit,
     s: CauseSet,
@@ -176,6 +176,7 @@ def _as_effects(
     It begins at the declared aircraft, else at the released derivatives, of which first order takes off what the causes bring,
     or at the null, where the records are more likely.
     """
+    problem = sets.problem
     hypothesis, sizes = null.hypothesis, list(null.point.sizes)
     away = free.point.common.copy()
     for key, told, std in zip(s.causes, s.sizes, s.size_std, strict=True):
@@ -187,13 +188,14 @@ def _as_effects(
         )
         sizes.append(size)
     first = np.array(sizes)
-    own = from_declared(problem, null, hypothesis, first, rival)
+    own = sets.fit_from_declared(hypothesis, first, null, rival=rival)
     if _leads(own, null):
         return own
     starts = [replace(start, sizes=first) for start in (null.point, replace(free.point, common=away))]
-    own = converged_fit(
-        problem, hypothesis, min(starts, key=lambda start: likelihood_at(problem, hypothesis, start)), rival
-    )
+    start = min(starts, key=lambda start: likelihood_at(problem, hypothesis, start))
+    own = sets.fit_from(hypothesis, start, rival=rival)
+    if own is not None and not own.converged:
+        own = sets.converged(hypothesis, start, rival=rival)
     return own if _leads(own, null) else None
 
 

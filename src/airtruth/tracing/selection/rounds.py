@@ -20,12 +20,12 @@ from airtruth.tracing.inference.whitening import Whitener, autoregression
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection import score_test
 from airtruth.tracing.selection.absorbed import refit_absorbed
-from airtruth.tracing.selection.acceptance import SUPERSEDED, SURPASSED, UNSUPPORTED, Candidate, has_converged
+from airtruth.tracing.selection.acceptance import Candidate, has_converged
 from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.budget import Advance
 from airtruth.tracing.selection.explanation import CauseSet
 from airtruth.tracing.selection.omnibus import anomalies
-from airtruth.tracing.selection.ranking import TIE, rank
+from airtruth.tracing.selection.ranking import TIE, WHITENED_ITERATIONS, rank
 from airtruth.tracing.selection.refit import (
     LEADING,
     LED,
@@ -34,8 +34,10 @@ from airtruth.tracing.selection.refit import (
     refit_known,
     refit_leaders,
 )
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import DeclaredCauses, Release, explained, release
 from airtruth.tracing.selection.score_test import Table
+from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.selection.significance import (
     BEYOND_DOUBT,
     LATER_LEVEL,
@@ -54,8 +56,6 @@ MOST_EFFECTS: Final = 3
 not been separable)."""
 _RESTARTS: Final = 2
 """Number of times that a round begins again at a better optimum of its null [-] (judgement: one has been enough)."""
-_GLS_ITERATIONS: Final = 6
-"""Iterations of the refit under the autoregression [-] (judgement: it begins next to its optimum)."""
 NOTHING_KNOWN: Final[Mapping[str, float]] = MappingProxyType({})
 """No effect has a size that is known beforehand."""
 NOTHING_DECLARED: Final = DeclaredCauses(wrong_allowed=False)
@@ -182,7 +182,7 @@ class SearchRound:
 
 
 def search_round(
-    problem: TraceProblem,
+    sets: SetTable,
     begin: RoundStart,
     count: int,
     seed: int,
@@ -194,7 +194,7 @@ def search_round(
 
     Parameters
     ----------
-    begin : its null and candidates; count : number of rounds before it.
+    sets : fits of the search; begin : null and candidates of the round; count : number of rounds before it.
     seed : seed of the draws behind p-values; advance : receives the step that begins.
     declared : candidates that explain a contradiction of the declared derivatives.
     known : effects that are always refitted, with the value at which their refit begins.
@@ -203,10 +203,12 @@ def search_round(
     -------
     The round; None where not even its null can be fitted.
     """
-    start, near, restarts = begin.start, begin.near, _RESTARTS
+    problem, start, near, restarts = sets.problem, begin.start, begin.near, _RESTARTS
+    if near is not None:
+        sets.keep(near)
     while True:
         advance(f"round {count + 1}: refit without further effects")
-        null = fit(problem, begin.hypothesis, start, near=near)
+        null = sets.fit(begin.hypothesis, start, near=near)
         if null is None:
             return None
         whitener = autoregression(null.innovations)
@@ -218,7 +220,7 @@ def search_round(
         anomaly = strongest(omnibus, table, adjusted)
         candidates: tuple[Candidate, ...] = ()
         test = contradiction(problem, null)
-        free = release(problem, null, declared, test)
+        free = release(sets, null, declared, test)
         if len(begin.hypothesis.effects) < MOST_EFFECTS and not begin.scores_only:
             later = MISFIT_LEVEL if anomaly.p_value < BEYOND_DOUBT else LATER_LEVEL
             level = later if count else LEVEL
@@ -228,18 +230,18 @@ def search_round(
             passing = adjusted <= level
             wanted = begin.replacement or ((begin.leader,) if begin.leader else ())
             most = LED if begin.leader else LEADING
-            fits = refit_leaders(problem, null, table, passing, advance, wanted, skip, rival, most)
+            fits = refit_leaders(sets, null, table, passing, advance, wanted, skip, rival, most)
             if free is not None and _may_hide_effects(free, fits):
-                fits = refit_absorbed(problem, null, table, fits, advance, skip)
+                fits = refit_absorbed(sets, null, table, fits, advance, skip)
             if known:
-                fits = refit_known(problem, null, table, fits, known, advance)
-            better = better_null(problem, null, fits) if restarts else None
+                fits = refit_known(sets, null, table, fits, known, advance)
+            better = better_null(sets, null, fits) if restarts else None
             if better is not None:
                 start, near, restarts = better.point, better, restarts - 1
                 continue
             least = later_gain(begin.tested, anomaly) if count else significant_gain(begin.tested)
             candidates = rank(problem, null, fits, least, begin.replacement, begin.leader, begin.in_set)
-        sets = () if begin.hypothesis.spread is None else explained(problem, null, declared)
+        causes = () if begin.hypothesis.spread is None else explained(problem, null, declared)
         own = SearchRound(
             null,
             gls,
@@ -251,15 +253,15 @@ def search_round(
             _tied(candidates),
             test,
             release=free,
-            sets=sets,
+            sets=causes,
         )
         if own.release_leads:
             own = replace(own, tied=())
-        return at_best_location(problem, _with_evidence(own, begin), advance)
+        return at_best_location(sets, _with_evidence(own, begin), advance)
 
 
 def scored_round(
-    problem: TraceProblem,
+    sets: SetTable,
     fitted: PosteriorFit,
     effects: Sequence[Effect],
     count: int,
@@ -275,7 +277,7 @@ def scored_round(
     taken = {e.key for e in fitted.hypothesis.effects}
     left = tuple(e for e in effects if e.key not in taken)
     begin = RoundStart(fitted.hypothesis, fitted.point, left, settled=True, scores_only=True, near=fitted)
-    return search_round(problem, begin, count, seed, advance)
+    return search_round(sets, begin, count, seed, advance)
 
 
 def _may_hide_effects(free: Release, fits: Sequence[Refit]) -> bool:
@@ -284,13 +286,14 @@ def _may_hide_effects(free: Release, fits: Sequence[Refit]) -> bool:
     return free.strain > _STRAINED and best > free.cost - _STRAINED
 
 
-def at_best_location(problem: TraceProblem, own: SearchRound, advance: Advance) -> SearchRound:
+def at_best_location(sets: SetTable, own: SearchRound, advance: Advance) -> SearchRound:
     """The round with its leader at its best location, where the leader has a location."""
     if not own.tied or location_index(own.tied[0].score.effect) is None:
         return replace(own, profile=None)
     first = own.tied[0]
     advance(f"location of {first.score.effect.key}")
-    best, profile = best_location(problem, first.fit)
+    best, profile = best_location(sets.problem, first.fit)
+    sets.keep(best)
     leader = replace(first, fit=best)
     candidates = tuple(leader if c is first else c for c in own.candidates)
     return replace(own, candidates=candidates, tied=(leader, *own.tied[1:]), profile=profile)
@@ -306,7 +309,7 @@ def _refit_whitened(problem: TraceProblem, null: PosteriorFit, whitener: Whitene
         null.hypothesis,
         null.point,
         whitener,
-        iterations=_GLS_ITERATIONS,
+        iterations=WHITENED_ITERATIONS,
         free_levels=False,
         near=null,
     )
@@ -334,7 +337,7 @@ def _with_evidence(own: SearchRound, begin: RoundStart) -> SearchRound:
         begin.tested, MISFIT_FAMILY_LEVEL
     ):
         return own
-    weak = (replace(c, reasons=(*c.reasons, UNSUPPORTED)) for c in own.candidates)
+    weak = (replace(c, reasons=(*c.reasons, Refusal.UNSUPPORTED)) for c in own.candidates)
     return replace(own, tied=(), candidates=tuple(weak))
 
 
@@ -344,7 +347,11 @@ def _tied(candidates: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
     if not accepted:
         return ()
     best = accepted[0]
-    others = (c for c in candidates if c is not best and c.reasons[:1] not in ((SUPERSEDED,), (SURPASSED,)))
+    others = (
+        c
+        for c in candidates
+        if c is not best and c.reasons[:1] not in ((Refusal.SUPERSEDED,), (Refusal.SURPASSED,))
+    )
     near = (c for c in others if abs(best.gain - c.gain) <= TIE and has_converged(c.fit, c.gain))
     return (best, *near)
 

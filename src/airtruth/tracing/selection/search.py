@@ -10,18 +10,17 @@ import numpy as np
 
 from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.hypothesis import Hypothesis
-from airtruth.tracing.inference.optimise import fit
-from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.profile import relocated
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.absorbed import refit_absorbed
-from airtruth.tracing.selection.acceptance import OUTDONE, Candidate, is_plausible, predicts_records_left_out
+from airtruth.tracing.selection.acceptance import Candidate, is_plausible, predicts_records_left_out
 from airtruth.tracing.selection.budget import Advance, may_begin
 from airtruth.tracing.selection.exchange import AHEAD, BETTER, better_set
 from airtruth.tracing.selection.explanation import events
+from airtruth.tracing.selection.outcome import CLEAN, STRONG_ODDS, Outcome, required_lead, settled, total_cost
 from airtruth.tracing.selection.refit import redundant_effect
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import DeclaredCauses, Release
-from airtruth.tracing.selection.replacement import CLEAN, STRONG_ODDS, Outcome, required_lead
 from airtruth.tracing.selection.rounds import (
     NOTHING_DECLARED,
     NOTHING_KNOWN,
@@ -30,7 +29,7 @@ from airtruth.tracing.selection.rounds import (
     at_best_location,
     search_round,
 )
-from airtruth.tracing.selection.settled import settled, total_cost
+from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.selection.significance import REMAINS, later_gain, significant_gain
 from airtruth.tracing.selection.weights import rival_of, with_rival
 
@@ -46,7 +45,7 @@ _EFFECT_LEADS: Final = 30.0
 
 
 def search(
-    problem: TraceProblem,
+    sets: SetTable,
     hypothesis: Hypothesis,
     start: Parameters,
     effects: Sequence[Effect],
@@ -65,6 +64,7 @@ def search(
 
     Parameters
     ----------
+    sets : fits of the search.
     hypothesis, start : the declared aircraft, and where the search for its parameters begins.
     effects : candidates.
     seed : seed of the random draws behind p-values.
@@ -75,18 +75,18 @@ def search(
     causes : sets of errors of sensors, each of which explains the kinematics of the records; none where nothing is known.
     """
     first = RoundStart(hypothesis, start, tuple(effects))
-    own = _Search(problem, seed, advance, declared, known, tuple(causes))
+    own = _Search(sets, seed, advance, declared, known, tuple(causes))
     rounds = own.improved(first, own.rounds((first,), ()))
     if rounds and {e.key for e in other} - {e.key for e in rounds[-1].null.hypothesis.effects}:
         rounds = own.led(first, other, rounds)
-    return settled(problem, rounds)
+    return settled(sets, rounds)
 
 
 @dataclass(frozen=True)
 class _Search:
     """What every round of a search shares."""
 
-    problem: TraceProblem
+    sets: SetTable
     seed: int
     advance: Advance
     declared: DeclaredCauses
@@ -99,7 +99,7 @@ class _Search:
         """Finished rounds from the last of ``starts`` on, after those before it."""
         current = starts[-1]
         own = search_round(
-            self.problem, current, len(before), self.seed, self.advance, self.declared, self.known
+            self.sets, current, len(before), self.seed, self.advance, self.declared, self.known
         )
         if own is None:
             return before
@@ -125,18 +125,18 @@ class _Search:
             is_single = len(rounds[-1].null.hypothesis.effects) + len(rounds[-1].sets[:1]) < 2
             if is_single and rounds[-1].anomaly.p_value > REMAINS:
                 return rounds
-            last = self._declared(rounds[-1].null)
+            last = self.sets.declared(rounds[-1].null)
             if last is None:
                 return rounds
             least = later_gain(first.tested, rounds[-1].anomaly)
-            better, exchanged = better_set(self.problem, rounds, last, first.effects, least, self.advance)
+            better = better_set(self.sets, rounds, last, first.effects, least, self.advance)
             if better is None or count == _EXCHANGES:
                 break
             before, rounds = rounds, self.led(first, better, rounds, 0.5 * AHEAD, as_set=True)
             if rounds[-1].null is before[-1].null:
                 break
         if last is rounds[-1].null:
-            rounds = (*rounds[:-1], replace(rounds[-1], exchanged=exchanged))
+            rounds = (*rounds[:-1], replace(rounds[-1], exchanged=self.sets.exchanges(last)))
         return rounds
 
     def _outcome(self, last: SearchRound) -> Outcome:
@@ -156,13 +156,13 @@ class _Search:
         last = rounds[-1]
         accepted = last.null.hypothesis.effects
         base = last if beside else rounds[0]
-        null = self._declared(base.null)
+        null = self.sets.declared(base.null)
         if null is None:
             return rounds
         taken = {e.key for e in accepted}
         cost = total_cost(last)
         fits = refit_absorbed(
-            self.problem,
+            self.sets,
             null,
             base.table,
             (),
@@ -178,12 +178,6 @@ class _Search:
         size = effect.parameters[0].value(fits[0].size)
         leaders = (*(accepted if beside else ()), effect)
         return replace(self, known={**self.known, effect.key: size}).led(first, leaders, rounds)
-
-    def _declared(self, last: PosteriorFit) -> PosteriorFit | None:
-        """The fit under the declaration of the derivatives: released ones absorb what a wrong effect leaves."""
-        if last.hypothesis.spread is None:
-            return last
-        return fit(self.problem, replace(last.hypothesis, spread=None), last.point, near=last)
 
     def led(
         self,
@@ -207,21 +201,21 @@ class _Search:
                 return rounds
             begin = replace(starts[-1], leader=effect.key, in_set=as_set, settled=True)
             known = {key: value for key, value in self.known.items() if key == effect.key}
-            own = search_round(self.problem, begin, len(again), self.seed, self.advance, known=known)
+            own = search_round(self.sets, begin, len(again), self.seed, self.advance, known=known)
             if own is None or not own.tied or own.tied[0].score.effect.key != effect.key:
                 return rounds
-            fitted = relocated(self.problem, own.tied[0].fit, placed=effect.key)
+            fitted = relocated(self.sets.problem, own.tied[0].fit, placed=effect.key)
             again = (*again, replace(own, release=None))
             accepted = {effect.key, *(e.key for e in fitted.hypothesis.effects)}
             left = tuple(e for e in begin.effects if e.key not in accepted)
             starts = (*starts, RoundStart(fitted.hypothesis, fitted.point, left, settled=True, near=fitted))
         again = self.rounds(starts, again)
-        if not is_plausible(self.problem, again[-1].null):
+        if not is_plausible(self.sets.problem, again[-1].null):
             return rounds
         needed = required_lead(self._outcome(rounds[-1]), self._outcome(again[-1]), lead)
         if total_cost(again[-1]) >= total_cost(rounds[-1]) - needed:
             return with_rival(rounds, again)
-        if not predicts_records_left_out(self.problem, again[0].null, again[-1].null):
+        if not predicts_records_left_out(self.sets.problem, again[0].null, again[-1].null):
             return rounds
         return with_rival(again, rounds)
 
@@ -243,7 +237,7 @@ class _Search:
         behind = not leads or leads[0].gain < own.release_gain + _EFFECT_LEADS
         if behind and (not leads or may_begin(self.advance, phrase)):
             left = tuple(e for e in starts[-1].effects if e.key not in self.declared.keys)
-            fitted = relocated(self.problem, release.refit or release.fit)
+            fitted = relocated(self.sets.problem, release.refit or release.fit)
             following = RoundStart(fitted.hypothesis, fitted.point, left, settled=True, near=fitted)
             corrected = replace(self, declared=replace(self.declared, corrections=release.corrections))
             ends.append(
@@ -285,7 +279,7 @@ class _Search:
     ) -> tuple[SearchRound, ...] | None:
         """The search with the last effect in place of an earlier one that it makes redundant."""
         best = rounds[-1].tied[0]
-        effect = redundant_effect(self.problem, best.fit, significant_gain(starts[-1].tested))
+        effect = redundant_effect(self.sets, best.fit, significant_gain(starts[-1].tested))
         if effect is None:
             return None
         index = [i for i, r in enumerate(rounds) if r.tied][effect]
@@ -312,7 +306,7 @@ class _Search:
             if not may_begin(self.advance, f"{rival.score.effect.key} instead of {best.score.effect.key}"):
                 return ends
             rest = (c for c in own.tied if c.score.effect.name != rival.score.effect.name)
-            led = at_best_location(self.problem, replace(own, tied=(rival, *rest)), self.advance)
+            led = at_best_location(self.sets, replace(own, tied=(rival, *rest)), self.advance)
             tried = self._onwards(starts, (*rounds[:-1], led), True)
             leads = total_cost(tried[-1]) < total_cost(ends[-1]) - BETTER
             leaves_more = tried[-1].anomaly.p_value < min(CLEAN, ends[-1].anomaly.p_value)
@@ -325,7 +319,7 @@ class _Search:
     ) -> tuple[SearchRound, ...]:
         """The rounds after one that has accepted an effect."""
         first = rounds[-1].tied[0]
-        fitted = relocated(self.problem, first.fit, placed=first.score.effect.key)
+        fitted = relocated(self.sets.problem, first.fit, placed=first.score.effect.key)
         accepted = {e.key for e in fitted.hypothesis.effects}
         effects = tuple(e for e in starts[-1].effects if e.key not in accepted)
         following = RoundStart(fitted.hypothesis, fitted.point, effects, settled=settled, near=fitted)
@@ -352,7 +346,7 @@ def _variants(own: SearchRound) -> tuple[Candidate, ...]:
         replace(c, reasons=())
         for c in own.candidates
         if c.score.effect.name == best.score.effect.name
-        and c.reasons == (OUTDONE,)
+        and c.reasons == (Refusal.OUTDONE,)
         and np.isfinite(c.likelihood_gain).all()
     )
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from airtruth.effects.effect import Effect
 from airtruth.numerics.normal_equations import scaled_step
+from airtruth.tracing.inference.direction import eliminated, extended_by
 from airtruth.tracing.inference.posterior import (
     Marginal,
     PosteriorFit,
@@ -29,7 +30,6 @@ from airtruth.tracing.inference.posterior import (
 )
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.parameters import Parameters
-from airtruth.tracing.selection.direction import eliminated, extended_by
 from airtruth.tracing.selection.explanation import REFERENCE
 from airtruth.tracing.selection.score_test import directions, perceptible_step
 

@@ -10,11 +10,12 @@ from typing import Final
 
 from airtruth.effects.increment import Increment
 from airtruth.tracing.inference.posterior import PosteriorFit
-from airtruth.tracing.selection.acceptance import OUTDONE, has_converged
+from airtruth.tracing.selection.acceptance import has_converged
 from airtruth.tracing.selection.explanation import REFERENCE
+from airtruth.tracing.selection.outcome import total_cost
 from airtruth.tracing.selection.ranking import TIE
+from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.rounds import Rival, SearchRound
-from airtruth.tracing.selection.settled import total_cost
 
 _POINTS: Final = 2.0
 """Score in standard deviations from which the residual points to one more effect [-] (convention)."""
@@ -120,7 +121,7 @@ def _leading(own: SearchRound, accepted: Collection[str]) -> Iterator[tuple[str,
     """
     first = own.tied[0]
     yield first.score.effect.name, 0.0
-    outdone = (c for c in own.candidates if c.reasons == (OUTDONE,) and has_converged(c.fit, c.gain))
+    outdone = (c for c in own.candidates if c.reasons == (Refusal.OUTDONE,) and has_converged(c.fit, c.gain))
     for c in (*own.tied[1:], *(c for c in outdone if c.gain < first.gain - TIE)):
         if c.score.effect.name not in accepted:
             yield c.score.effect.name, 0.5 * (c.gain - first.gain)

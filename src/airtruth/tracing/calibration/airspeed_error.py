@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from airtruth.numerics.local_level import error_variances
+from airtruth.tracing.inference.direction import inserted, projected
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
@@ -29,7 +30,6 @@ from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.response import filter_inputs, respond_to
 from airtruth.tracing.prepare import Case
-from airtruth.tracing.selection.direction import inserted, projected
 
 Array = NDArray[np.float64]
 

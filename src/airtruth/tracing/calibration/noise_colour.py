@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
+from airtruth.tracing.inference.direction import eliminated
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import (
     PosteriorFit,
@@ -27,7 +28,6 @@ from airtruth.tracing.inference.posterior import (
 from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.prepare import Case
-from airtruth.tracing.selection.direction import eliminated
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,204 @@
+"""Contributions of fin and wing tips to the lateral derivatives, from the declared derivatives and the geometry.
+
+The directions are first order, as those of `airtruth.physics.composition`. Body axes, about the CG, rates over p b/(2V) and
+r b/(2V).
+
+Sources: B. Etkin and L. D. Reid, Dynamics of Flight, 3rd ed., 1996, sections 5.5 to 5.8 (fin); strip theory, the same,
+section 5.7 (wing).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.physics.motion import LATERAL
+
+Array = NDArray[np.float64]
+
+_FIN_SHARE: Final = 0.9
+"""Share of the fin in Cnr [-]: without it a tenth of the GTM's yaw damping is left (NASA GTM_DesignSim, loss of the fin)."""
+_SMALLEST: Final = 1e-6
+"""Least CYdr that gives the arm of the fin [-] (judgement: below rounding of any declared value)."""
+_REFERENCE_LOSS: Final = 0.2
+"""Loss at which the changes of a lost tip are exact, in semispans [-] (judgement: losses of 10 to 25 % are survived)."""
+
+
+@dataclass(frozen=True)
+class SideGeometry:
+    """What is declared of fin and wing; None where it has to be inferred. The other defaults are judgement.
+
+    Attributes
+    ----------
+    span_m : of the wing [m]; 0 where it is not declared.
+    aspect_ratio : of the wing [-]: transports and light aircraft have 7 to 10.
+    taper : chord at the tip over that at the root [-].
+    aileron : inboard and outboard end of the ailerons in semispans [-].
+    wing_mass : mass of the wing over that of the aircraft [-]: transports have 0.10 to 0.13.
+    fin_arm, fin_height : distance of the fin's aerodynamic centre behind and above the CG over the span [-].
+    fin_lift : lift slope of the fin by the wing area and the free dynamic pressure [1/rad].
+    rudder_on_fin : whether the rudder is a part of the fin.
+    inertia_kg_m2 : Ixx, Izz, Ixz [kg m2].
+    """
+
+    span_m: float = 0.0
+    aspect_ratio: float = 8.0
+    taper: float = 0.4
+    aileron: tuple[float, float] = (0.6, 0.95)
+    wing_mass: float = 0.12
+    fin_arm: float | None = None
+    fin_height: float | None = None
+    fin_lift: float | None = None
+    rudder_on_fin: bool = True
+    inertia_kg_m2: tuple[float, float, float] | None = None
+
+
+def fin_part(derivatives: Array, geometry: SideGeometry) -> Array:
+    """Contribution of the fin, and of a rudder on it, to the lateral derivatives.
+
+    The fin meets the flow at beta - 2 l rhat + 2 h phat, and carries CY = -a times that angle at l behind and h above the CG.
+
+    Parameters
+    ----------
+    derivatives : (15,) of the aircraft, in the order of `airtruth.physics.motion.LATERAL` [-].
+    geometry : what is declared. An undeclared arm is -Cndr/CYdr, an undeclared height Cldr/CYdr, and an undeclared lift slope
+        follows from Cnr: that of the fin is -2 a l^2.
+
+    Returns
+    -------
+    (15,) CYbeta = -a, CYp = -2 a h, CYr = 2 a l; Cl = h CY and Cn = -l CY of each; l and h over the span.
+    """
+    by = _named(derivatives)
+    force = np.copysign(max(abs(by["CYdr"]), _SMALLEST), by["CYdr"])
+    arm = -by["Cndr"] / force if geometry.fin_arm is None else geometry.fin_arm
+    height = by["Cldr"] / force if geometry.fin_height is None else geometry.fin_height
+    lift = geometry.fin_lift
+    if lift is None:
+        lift = -_FIN_SHARE * by["Cnr"] / (2.0 * arm**2) if arm else 0.0
+    angles = {"beta": 1.0, "phat": 2.0 * height, "rhat": -2.0 * arm}
+    levers = {"CY": 1.0, "Cl": height, "Cn": -arm}
+    part = np.zeros_like(derivatives)
+    for signal, angle in angles.items():
+        for coefficient, lever in levers.items():
+            part[LATERAL.at(coefficient, signal)] = -lift * angle * lever
+    if geometry.rudder_on_fin:
+        column = LATERAL.column("rudder")
+        part[column] = derivatives[column]
+    return part
+
+
+def tip_part(derivatives: Array, geometry: SideGeometry) -> Array:
+    """Change of the lateral derivatives per semispan lost at one wing tip.
+
+    Strip theory with a lift slope that is constant along the span: the tip has the share of its chord times y in the dihedral
+    effect, of its chord times y^2 in the roll damping, and of its aileron's chord times y in the aileron.
+
+    Parameters
+    ----------
+    derivatives, geometry : as in `fin_part`.
+    """
+    of_wing = derivatives - fin_part(derivatives, geometry)
+    outboard = 1.0 - _REFERENCE_LOSS
+    first, last = geometry.aileron
+    lost = {
+        power: 0.5 * _strips(geometry, outboard, 1.0, power) / _strips(geometry, 0.0, 1.0, power)
+        for power in (1, 2)
+    }
+    of_aileron = 0.5 * _strips(geometry, min(max(outboard, first), last), last, 1)
+    of_aileron /= _strips(geometry, first, last, 1)
+    part = np.zeros_like(derivatives)
+    for signal, power in (("beta", 1), ("phat", 2)):
+        at = LATERAL.at("Cl", signal)
+        part[at] = -lost[power] * of_wing[at]
+    column = LATERAL.column("aileron")
+    part[column] = -of_aileron * derivatives[column]
+    return np.asarray(part / _REFERENCE_LOSS)
+
+
+def tip_at_rest(geometry: SideGeometry) -> Mapping[str, float]:
+    """What a lost right wing tip adds at rest, per semispan lost.
+
+    Returns
+    -------
+    "Cl" : rolling moment per lift coefficient of the aircraft, right wing down [-]; "cg_y" : CG to the right [m].
+    """
+    outboard = 1.0 - _REFERENCE_LOSS
+    area = 0.5 * _strips(geometry, outboard, 1.0, 0) / _strips(geometry, 0.0, 1.0, 0)
+    at = _strips(geometry, outboard, 1.0, 1) / _strips(geometry, outboard, 1.0, 0)
+    rolling, cg = 0.5 * area * at, -0.5 * geometry.span_m * geometry.wing_mass * area * at
+    return {"Cl": rolling / _REFERENCE_LOSS, "cg_y": cg / _REFERENCE_LOSS}
+
+
+def lift_slope(geometry: SideGeometry) -> float:
+    """Lift slope of the wing by its aspect ratio [1/rad] (H. B. Helmbold, 1942; straight wing, section slope of 2 pi).
+
+    Examples
+    --------
+    >>> round(lift_slope(SideGeometry(aspect_ratio=8.0)), 3)
+    4.906
+    """
+    ratio = geometry.aspect_ratio
+    return 2.0 * np.pi * ratio / (2.0 + float(np.hypot(2.0, ratio)))
+
+
+def inertia_parts(derivatives: Array, geometry: SideGeometry) -> dict[str, Array]:
+    """Change of the apparent derivatives per unit of each inertia's error: -dJ J^-1 times the moments.
+
+    Parameters
+    ----------
+    derivatives, geometry : as in `fin_part`; without inertias Ixz counts as zero.
+
+    Returns
+    -------
+    Declared quantity -> (15,). A factor on Ixx or Izz; Ixz in units of the square root of Ixx Izz.
+    """
+    xx, zz, xz = geometry.inertia_kg_m2 or (1.0, 1.0, 0.0)
+    inverse = np.linalg.inv(np.array([[xx, -xz], [-xz, zz]]))
+    rows = LATERAL.row("Cl"), LATERAL.row("Cn")
+    moments = np.array([derivatives[row] for row in rows])
+    cross = -float(np.sqrt(xx * zz))
+    errors = {
+        "inertia_xx": np.array([[xx, 0.0], [0.0, 0.0]]),
+        "inertia_zz": np.array([[0.0, 0.0], [0.0, zz]]),
+        "inertia_xz": np.array([[0.0, cross], [cross, 0.0]]),
+    }
+    found = {}
+    for name, error in errors.items():
+        found[name] = np.zeros_like(derivatives)
+        for row, change in zip(rows, -error @ inverse @ moments, strict=True):
+            found[name][row] = change
+    return found
+
+
+def cg_part(derivatives: Array, geometry: SideGeometry) -> Array:
+    """Change of the lateral derivatives per chord that the CG is farther aft, to first order, in the same motion.
+
+    The side force acts ahead of the new CG: dCn = d CY, and there beta is higher by 2 d rhat; d over the span.
+
+    Parameters
+    ----------
+    derivatives, geometry : as in `fin_part`.
+    """
+    part = np.zeros_like(derivatives)
+    beta, rate = LATERAL.column("beta"), LATERAL.column("rhat")
+    part[rate] = 2.0 * derivatives[beta]
+    part[LATERAL.row("Cn")] += derivatives[LATERAL.row("CY")]
+    return np.asarray(part / geometry.aspect_ratio)
+
+
+def _named(derivatives: Array) -> dict[str, float]:
+    return dict(zip(LATERAL.parameters, derivatives.tolist(), strict=True))
+
+
+def _strips(geometry: SideGeometry, first: float, last: float, power: int) -> float:
+    """Integral of the chord over that at the root times y^power between two places of a wing, y in semispans."""
+    slope = geometry.taper - 1.0
+    ends = [y ** (power + 1) / (power + 1) + slope * y ** (power + 2) / (power + 2) for y in (first, last)]
+    return ends[1] - ends[0]
+
+
+__all__ = ["SideGeometry", "cg_part", "fin_part", "inertia_parts", "lift_slope", "tip_at_rest", "tip_part"]
