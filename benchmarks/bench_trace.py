@@ -3,7 +3,8 @@
 Six records of data/undeclared against the whole library, wall and CPU time of the search itself (the bar: 10 s
 on two cores), as a multiple of one refit without effects, for one and two threads; and a check that both give
 the same answer. First the time of one flight of the filter, as a multiple of one recursion of `scipy.signal.dlsim` with as many
-states, and the screen of increments, as a multiple of one flight for each bend.
+states, one set of derivatives of a record as a multiple of one flight (the bar: 5), and the screen of increments, as a
+multiple of one flight for each bend.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.logs.store import read_log
 from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.inference.optimise import fit, initial_parameters
+from airtruth.tracing.inference.posterior import sensitivities_of
 from airtruth.tracing.model.parameters import CORE, OUTPUTS, SHORT_PERIOD
 from airtruth.tracing.model.response import filter_inputs, respond, respond_to
 from airtruth.tracing.prepare import Case, prepare
@@ -28,6 +30,8 @@ from airtruth.tracing.selection.increments import shapes
 
 FLIGHTS = 200
 """Flights of the filter that are timed."""
+TURNS = 5
+"""Turns of derivatives and flights, of which the quickest count."""
 DATA = Path(__file__).resolve().parents[1] / "data" / "undeclared"
 
 
@@ -46,6 +50,25 @@ def flight(case: Case) -> str:
     dlsim(system, inputs)
     linear = time.perf_counter() - start
     return f"one flight of the filter: {1e3 * filtered:.2f} ms of {record.samples} samples, {filtered / linear:.2f} of dlsim"
+
+
+def derivatives(case: Case) -> str:
+    """One set of derivatives of a record without effects against one flight of the filter with a gain of its own, CPU time."""
+    problem, hypothesis, tries = case.fitted, case.hypothesis, FLIGHTS // 4
+    point = initial_parameters(problem, hypothesis)
+    given = filter_inputs(problem.records[0], hypothesis.change(point.sizes))
+    sensitivities_of(problem, 0, hypothesis, point)  # compiles
+    best = [np.inf, np.inf]
+    for _ in range(TURNS):
+        start = time.process_time()
+        for _ in range(tries):
+            sensitivities_of(problem, 0, hypothesis, point)
+        middle = time.process_time()
+        for _ in range(tries):
+            respond_to(given, problem.settings, point.common, point.per_record[0])
+        spent = middle - start, time.process_time() - middle
+        best = [min(b, s / tries) for b, s in zip(best, spent, strict=True)]
+    return f"one set of derivatives: {1e3 * best[0]:.2f} ms, {best[0] / best[1]:.1f} flights of the filter"
 
 
 def screening(case: Case) -> str:
@@ -73,6 +96,7 @@ def main() -> None:
     gtm = aircraft.load("gtm")
     trace([read_log(DATA / "f.parquet")], gtm, TraceOptions())  # compiles
     print(flight(prepare([read_log(DATA / "f.parquet")], gtm, [], TraceOptions())))
+    print(derivatives(prepare([read_log(DATA / "f.parquet")], gtm, [], TraceOptions())))
     print(screening(prepare([read_log(DATA / "f.parquet")], gtm, [], TraceOptions())))
     print(f"{len(EFFECTS)} effects; s wall (CPU), refits without effects that would take as long")
     print(f"{'set':4} {'verdict':12} {'one thread':>18} {'two threads':>18} {'refits':>7} same answer")

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from airtruth import cli
 from airtruth.aircraft import load
-from airtruth.design import forecast
+from airtruth.design import DerivativeQuestion, forecast
 from airtruth.design.lateral_information import LateralExperiment
 from airtruth.errors import ConfigurationError
 from airtruth.physics import lateral_gusts
@@ -181,3 +181,10 @@ def test_both_motions_of_a_campaign_that_moves_all_controls(tmp_path):
 def test_a_motion_whose_controls_stand_still_is_refused(campaign, motion, message):
     with pytest.raises(ConfigurationError, match=message):
         forecast(plan.make(CAMPAIGNS / f"{campaign}.toml", runs=1), motion=motion)
+
+
+def test_a_derivative_of_the_other_motion_names_what_plans_it():
+    with pytest.raises(
+        ConfigurationError, match=r"'Cnp' belongs to the lateral-directional motion.*--motion lateral"
+    ):
+        DerivativeQuestion(("Cnp",))

@@ -91,3 +91,11 @@ def test_a_play_rests_until_its_signal_has_moved_by_half_a_width():
     expected = [[0.0, 0.0, 0.2, 0.2, 0.2, 0.0, 0.0]]
     found = state_of(StateTerm("x", "play", "alpha", half_width=0.1), signal, DT)
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-15)
+
+
+def test_a_lateral_reading_is_over_its_own_signals():
+    """Sidewash at the vane: a share of p b/(2V); the channels of the other motion are not needed."""
+    p, v = np.linspace(-0.4, 0.4, 5)[None], np.full((1, 5), 40.0)
+    term = ReadingTerm("beta_rad", "phat", "above", 0.3, at=0.002)
+    more = reading_increments((term,), (), {"p_rad_s": p, "airspeed_m_s": v}, 0.3, DT, span_m=2.0)
+    np.testing.assert_allclose(more["beta_rad"], 0.3 * np.maximum(p / 40.0 - 0.002, 0.0), rtol=1e-12)

@@ -9,6 +9,7 @@ from scipy.stats import multivariate_normal
 
 from airtruth.effects.effect import Prior
 from airtruth.physics.composition import TailGeometry, directions
+from airtruth.physics.motion import LATERAL
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood
 from airtruth.tracing.selection.explanation import (
     Cause,
@@ -167,3 +168,27 @@ def test_what_a_refit_shows_beyond_first_order_is_kept(monkeypatch):
     changed = {key for key in costs[0] if costs[1][key] != costs[0][key]}
     assert changed == {(("cg_shift",), ())}
     assert costs[1][("cg_shift",), ()] == pytest.approx(costs[0][("cg_shift",), ()] - 200.0)
+
+
+def test_wrong_declarations_of_a_motion_with_many_derivatives_are_found_one_by_one():
+    """All 32768 sets of fifteen derivatives would take minutes; two that are wrong lead, beside none that is right."""
+    declared = np.array(
+        [-1.0, 0.06, 0.86, -0.02, 0.34, -0.14, -0.34, 0.15, -0.072, 0.027, 0.22, -0.05, -0.39, -0.003, -0.17]
+    )
+    std = np.maximum(0.05 * np.abs(declared), 0.002)
+    told = 0.1 * std
+    shift = np.zeros(15)
+    wrong = [LATERAL.index("Clp"), LATERAL.index("Cndr")]
+    shift[wrong] = 8.0 * std[wrong]
+    information = np.diag(told**-2.0)
+    lateral = DerivativeLikelihood(
+        information,
+        information @ shift,
+        0.5 * float(shift @ information @ shift),
+        np.diag(std**2),
+        LATERAL,
+    )
+    causes = causes_of(directions(declared, TailGeometry(7.9), LATERAL))
+    best = explain(lateral, causes)[0]
+    assert (best.causes, best.wrong) == ((), ("Clp", "Cndr"))
+    assert not explain(lateral, causes, wrong_allowed=False)[0].wrong

@@ -6,11 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trace_records as tr
-from scaled_records import ACCELEROMETER, GYRO, VANE, fitted, scaled_problem
+from scaled_records import ACCELEROMETER, GYRO, VANE, disturbed_problem, fitted, scaled_problem
 
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.selection import set_table
+from airtruth.tracing.selection.search import search
 from airtruth.tracing.selection.set_table import SetTable, in_order_of
+from airtruth.tracing.selection.weights import weights
 
 
 @pytest.fixture(scope="module")
@@ -117,3 +119,30 @@ def test_exchanges_are_those_of_their_set(problem):
     sets.exchange(last, tried)
     assert sets.exchanges(last) == (tried,)
     assert sets.exchanges(tried) == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turned", ["candidates", "records"])
+def test_the_order_of_candidates_and_records_does_not_change_an_answer(turned):
+    """Scales of gyro and accelerometer are in the records."""
+    problem = disturbed_problem([1.0, 1.1, 1.15], 0, 0.0)
+    candidates = GYRO, VANE, ACCELEROMETER
+
+    def named(problem, candidates):
+        start = initial_parameters(problem, tr.NOTHING)
+        rounds = search(SetTable(problem), tr.NOTHING, start, candidates, 1)
+        last = rounds[-1].null
+        sizes = {
+            e.key: float(last.point.sizes[last.hypothesis.span(e.key)][0]) for e in last.hypothesis.effects
+        }
+        return sizes, last.cost, {names: round(w, 2) for names, w in weights(rounds).items()}
+
+    sizes, cost, sets = named(problem, candidates)
+    assert set(sizes) == {"gyro_scale", "accelerometer_scale"}
+    if turned == "candidates":
+        others = named(problem, candidates[::-1])
+    else:
+        others = named(replace(problem, records=problem.records[::-1]), candidates)
+    assert others[0] == pytest.approx(sizes, rel=1e-3)
+    assert others[1] == pytest.approx(cost, abs=0.01)
+    assert others[2] == sets

@@ -16,7 +16,7 @@ from airtruth.tracing.selection.weights import alike_in_rivals, rival_of, weight
 
 def null(*names, spread=None, z=100.0):
     """What a weight reads of a fit; each size is ``z`` standard deviations."""
-    effects = [SimpleNamespace(name=name, key=name) for name in names]
+    effects = [SimpleNamespace(name=name, label=name, key=name) for name in names]
     return SimpleNamespace(
         hypothesis=SimpleNamespace(spread=spread, effects=effects, span=lambda key: slice(0, 1)),
         point=SimpleNamespace(sizes=[z] * len(names) or [z]),
@@ -30,7 +30,7 @@ NO_SCORES = SimpleNamespace(scores=())
 
 def candidate(name, gain, *reasons, converged=True):
     return SimpleNamespace(
-        score=SimpleNamespace(effect=SimpleNamespace(name=name, key=name)),
+        score=SimpleNamespace(effect=SimpleNamespace(name=name, label=name, key=name)),
         fit=SimpleNamespace(converged=converged, shortfall=1.0),
         gain=gain,
         reasons=reasons,
@@ -214,7 +214,7 @@ def test_one_effect_more_weighs_by_its_score():
     end.tied, end.null = [], null("gyro_lag")
     end.table = SimpleNamespace(
         scores=[
-            SimpleNamespace(effect=SimpleNamespace(name=name, parameters=("size",)), z=z)
+            SimpleNamespace(effect=SimpleNamespace(name=name, label=name, parameters=("size",)), z=z)
             for name, z in (
                 ("vane_lag", -2.9),
                 ("vane_scale", 1.0),

@@ -15,7 +15,8 @@ from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import Sensitivities, likelihood_terms, sensitivities_of
 from airtruth.tracing.inference.whitening import NO_WHITENER, Whitener, autoregression
 from airtruth.tracing.model.parameters import SHORT_PERIOD, Parameters
-from airtruth.tracing.model.response import respond, respond_to
+from airtruth.tracing.model.response import respond
+from airtruth.tracing.model.response_slopes import respond_with_slopes
 from airtruth.tracing.model.settings import common_prior, per_record_prior
 from airtruth.units import DEG
 
@@ -410,11 +411,12 @@ def test_a_step_from_which_the_motion_diverges_has_no_derivative(monkeypatch):
     cmalpha = 3
     assert sensitivities_of(problem, 0, tr.NOTHING, point) is not None
 
-    def diverging(given, settings, common, per_record, **options):
-        made = respond_to(given, settings, common, per_record, **options)
-        return made if common[cmalpha] == 0.0 else replace(made, e=made.e + 1e9)
+    def diverging(*arguments):
+        made, slopes = respond_with_slopes(*arguments)
+        slopes.e[slopes.parameters == cmalpha] += 1e9 / SHORT_PERIOD.common.step[cmalpha]
+        return made, slopes
 
-    monkeypatch.setattr(posterior, "respond_to", diverging)
+    monkeypatch.setattr(posterior, "respond_with_slopes", diverging)
     assert sensitivities_of(problem, 0, tr.NOTHING, point) is None
 
 

@@ -14,12 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from airtruth.aircraft.create import write_new
-from airtruth.aircraft.dynamics import ALPHA_DOT, declared_dynamics
+from airtruth.aircraft.dynamics import declared_dynamics
 from airtruth.aircraft.file import FILE, Aircraft
 from airtruth.aircraft.jsbsim.short_period import TrimPoint
 from airtruth.aircraft.origin import UNKNOWN, Origin
 from airtruth.aircraft.write import changed
-from airtruth.physics.terms import Change, declared_total, term_value
+from airtruth.physics.motion import MOTIONS
+from airtruth.physics.terms import QBAR, Change, declared_total, signals_of, term_value
 from airtruth.quantity import Quantity
 
 
@@ -45,7 +46,8 @@ def reference_point(
     factor, mass = declared_total(change.declared, "elevator"), declared_total(change.declared, "mass")
     normal = -mass * c.mass_kg * at.az_m_s2 / (pressure * c.wing_area_m2)
     surface = factor * at.elevator_rad
-    steady = {"alpha": at.alpha_rad, "elevator": surface, "qhat": 0.0, ALPHA_DOT: 0.0, "qbar": pressure}
+    steady = {name: 0.0 for motion in MOTIONS.values() for name in signals_of(motion)}
+    steady |= {"alpha": at.alpha_rad, "elevator": surface, QBAR: pressure}
     signals = {name: np.asarray(value) for name, value in steady.items()}
     signals |= {state.name: signals[state.signal] for state in change.states}
     added = {

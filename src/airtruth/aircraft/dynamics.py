@@ -6,10 +6,11 @@ from dataclasses import replace
 from typing import Final
 
 from airtruth.aircraft.file import Dynamics
-from airtruth.physics.terms import AeroTerm, Change
+from airtruth.physics.motion import MOTIONS
+from airtruth.physics.terms import AeroTerm, Change, drivers_of
 
-ALPHA_DOT: Final = "alpha_dot_hat"
-"""The one signal that is zero in a steady state without being a state."""
+RATES: Final = frozenset(drivers_of(motion)[-1] for motion in MOTIONS.values())
+"""Signals that are zero in a steady state without being a state: the rate of the implicit state of each motion."""
 _DECLARED: Final = "declared "
 """Prefix of the names of an aircraft's own states, which an effect's states may share."""
 
@@ -34,7 +35,7 @@ def with_change(declared: Dynamics | None, change: Change) -> Dynamics | None:
             name, count = f"{state.name}_{count}", count + 1
         names[state.name] = name
         taken.add(name)
-    dynamic = [t for t in change.aero if t.signal == ALPHA_DOT or t.signal in names]
+    dynamic = [t for t in change.aero if t.signal in RATES or t.signal in names]
     result = Dynamics(
         surface=(*own.surface, *change.surface),
         states=(*own.states, *(replace(s, name=names[s.name]) for s in change.states)),
@@ -71,7 +72,7 @@ def declared_dynamics(dynamics: Dynamics | None, prefix: str = _DECLARED) -> Cha
             aero.append(term)
             continue
         aero.append(replace(term, signal=prefix + term.signal))
-        if source != ALPHA_DOT:
+        if source not in RATES:
             aero.append(replace(term, signal=source, amplitude=-term.amplitude))
     return Change(
         surface=dynamics.surface,
@@ -88,4 +89,4 @@ def declared_dynamics(dynamics: Dynamics | None, prefix: str = _DECLARED) -> Cha
     )
 
 
-__all__ = ["ALPHA_DOT", "declared_dynamics", "with_change"]
+__all__ = ["RATES", "declared_dynamics", "with_change"]

@@ -10,7 +10,7 @@ from airtruth.api.campaigns import campaign_of
 
 if TYPE_CHECKING:
     from airtruth.api.arguments import FilePath
-    from airtruth.design import ForecastResult, Limits, NarrowResult, SplitResult
+    from airtruth.design import ForecastResult, LateralPlan, Limits, NarrowResult, SplitResult
     from airtruth.simulation.campaign.file import Campaign
 
 
@@ -51,7 +51,7 @@ def plan(
     seed: int = 0,
     out: FilePath | None = None,
     force: bool = False,
-) -> NarrowResult: ...
+) -> NarrowResult | LateralPlan: ...
 
 
 @overload
@@ -65,7 +65,7 @@ def plan(
     seed: int = 0,
     out: FilePath | None = None,
     force: bool = False,
-) -> SplitResult | NarrowResult: ...
+) -> SplitResult | NarrowResult | LateralPlan: ...
 
 
 def plan(
@@ -83,7 +83,7 @@ def plan(
     seed: int = 0,
     out: FilePath | None = None,
     force: bool = False,
-) -> ForecastResult | SplitResult | NarrowResult:
+) -> ForecastResult | SplitResult | NarrowResult | LateralPlan:
     """Predict the standard errors of a campaign (Cramer-Rao bound), or compute the flight that answers a question best.
 
     Parameters
@@ -107,8 +107,8 @@ def plan(
 
     Returns
     -------
-    ForecastResult, SplitResult or NarrowResult
-        The second where effects are separated, the third for derivatives and increments; their ``campaign`` can be flown.
+    ForecastResult, SplitResult, NarrowResult or LateralPlan
+        The first of a campaign; the campaigns of the others, ``campaign``, can be flown.
 
     Raises
     ------

@@ -34,7 +34,7 @@ _OF_INPUT: Final = (
     "force",
 )
 """Parameters that apply to a computed input alone."""
-_OF_PREDICTION: Final = ("pressure", "motion")
+_OF_PREDICTION: Final = ("pressure",)
 """Those that apply to a predicted accuracy alone."""
 
 
@@ -65,7 +65,8 @@ def plan(
     motion: Annotated[
         MotionName | None,
         typer.Option(
-            help="Motion whose accuracy is predicted. Default: each of which the campaign moves a control."
+            help="Motion of the accuracy or of the derivatives. Default: each of which the campaign moves a control, or that of "
+            "the derivatives."
         ),
     ] = None,
     split: Annotated[
@@ -157,6 +158,7 @@ def plan(
         forecasts = _forecasts(campaign, records, pressure, motion, quiet)
         print_result(_json(forecasts) if json_ else _text(forecasts))
         return
+    _require_motion(motion, _listed("--derivative", derivative), split)
     stated = Stated(_listed("--split", split), _sizes(size or []), _listed("--derivative", derivative), trace)
     limits = _limits(amplitude_deg, rate_deg_s, alpha_deg, load_factor, length_s, airspeed_percent)
     options = PlanOptions(limits, records, seed)
@@ -164,6 +166,24 @@ def plan(
         base = base_campaign(campaign, trace is not None, aircraft)
         result = planned_from(base, stated, aircraft, options, out, force=force, step=step)
     print_result(json.dumps(result.to_dict(), indent=1) if json_ else result.summary())
+
+
+def _require_motion(motion: MotionName | None, derivatives: list[str], split: str | None) -> None:
+    """Refuse a motion that has not the derivatives, or none of whose inputs separates effects."""
+    from airtruth.physics.motion import LATERAL, MOTIONS
+
+    if motion is None:
+        return
+    others = [name for name in derivatives if name not in MOTIONS[motion].parameters]
+    if others:
+        raise ConfigurationError(
+            f"plan: --motion {motion} has no derivative {others[0]!r}; it has {', '.join(MOTIONS[motion].parameters)}"
+        )
+    if split is not None and motion == LATERAL.name:
+        raise ConfigurationError(
+            "plan: --split computes an input of the elevator; for lateral effects fly what `airtruth effects NAME` states under "
+            "'distinguished by', or determine a derivative with --derivative NAME"
+        )
 
 
 def _forecasts(

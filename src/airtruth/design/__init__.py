@@ -3,6 +3,7 @@
 from airtruth.design.band import BandQuestion
 from airtruth.design.bound import ForecastResult, forecast, moved_motions
 from airtruth.design.flight import PlanOptions
+from airtruth.design.lateral_flight import LateralPlan
 from airtruth.design.limits import Limits
 from airtruth.design.narrow_result import NarrowResult
 from airtruth.design.narrowing import narrow
@@ -14,6 +15,7 @@ __all__ = [
     "BandQuestion",
     "DerivativeQuestion",
     "ForecastResult",
+    "LateralPlan",
     "Limits",
     "NarrowResult",
     "PlanOptions",

@@ -13,13 +13,14 @@ from airtruth import aircraft as planes
 from airtruth import style
 from airtruth.aircraft import Aircraft
 from airtruth.design.flight import PlanOptions
+from airtruth.design.lateral_flight import LateralPlan, LateralQuestion, plan_lateral
 from airtruth.design.narrow_result import NarrowResult
 from airtruth.design.narrowing import narrow
 from airtruth.design.precision import DerivativeQuestion
 from airtruth.design.question import from_names
 from airtruth.design.split_result import SplitResult
 from airtruth.design.splitting import split
-from airtruth.design.verdict import Asked, asked_by
+from airtruth.design.verdict import Asked, asked_by, least_known
 from airtruth.errors import ConfigurationError
 from airtruth.logs.atomic import make_folder
 from airtruth.logs.histories import FILE, Histories, read_histories
@@ -28,6 +29,7 @@ from airtruth.logs.outputs import writing
 from airtruth.logs.provenance import PROVENANCE, Provenance, aircraft_digests
 from airtruth.logs.remote import location
 from airtruth.physics.atmosphere import RHO0_KG_M3
+from airtruth.physics.motion import LATERAL
 from airtruth.simulation.campaign import file as campaign_file
 from airtruth.simulation.campaign.file import Campaign
 from airtruth.simulation.simulator import jsbsim_model
@@ -69,7 +71,7 @@ def planned_from(
     *,
     force: bool = False,
     step: Step = lambda text: None,
-) -> SplitResult | NarrowResult:
+) -> SplitResult | NarrowResult | LateralPlan:
     """Plan the flight that answers a question, or the question that a trace leaves open.
 
     Parameters
@@ -99,29 +101,38 @@ def planned_from(
         if out is not None:
             outputs.require(out, out.with_suffix(".png"))
             make_folder(location(out).parent)
-        result = (
-            split(base, question, options, declared, step)
-            if isinstance(question, tuple)
-            else narrow(base, question, options, declared, step)
-        )
+        result: SplitResult | NarrowResult | LateralPlan
+        if isinstance(question, LateralQuestion):
+            result = plan_lateral(base, question, options.limits.amplitude_rad, options.records, step)
+        elif isinstance(question, tuple):
+            result = split(base, question, options, declared, step)
+        else:
+            result = narrow(base, question, options, declared, step)
         if out is not None:
             result.write(out)
             style.save(result.plot(), out.with_suffix(".png"))
     return result
 
 
-def _question(stated: Stated, answer_file: Path | None) -> Asked:
+def _question(stated: Stated, answer_file: Path | None) -> Asked | LateralQuestion:
     if stated.split and stated.derivatives:
         raise ConfigurationError("plan: --split and --derivative exclude each other; state one of them")
     if stated.sizes and not stated.split:
         raise ConfigurationError(
             "plan: --size applies to effects to separate; leave it out, or state --split"
         )
+    if stated.derivatives and set(stated.derivatives) <= set(LATERAL.parameters):
+        return LateralQuestion(tuple(stated.derivatives))
     if stated.derivatives:
         return DerivativeQuestion(tuple(stated.derivatives))
     if stated.split or answer_file is None:
         return from_names(stated.split, stated.sizes)
-    return asked_by(TraceAnswer.read(answer_file), str(answer_file))
+    answer = TraceAnswer.read(answer_file)
+    return (
+        LateralQuestion((least_known(answer),))
+        if answer.motion is LATERAL
+        else asked_by(answer, str(answer_file))
+    )
 
 
 def _records(answer_file: Path | None) -> Histories | None:

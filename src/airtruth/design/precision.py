@@ -13,7 +13,7 @@ from airtruth.design.flight import gusts
 from airtruth.design.information import LinearExperiment, sensor_noise
 from airtruth.design.narrow_result import Quantity
 from airtruth.errors import ConfigurationError, choices
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.physics.terms import Change, DerivativeTerm
 from airtruth.simulation.campaign.file import Campaign
@@ -49,6 +49,14 @@ class DerivativeQuestion:
             Naming the first one and the allowed names.
         """
         for name in self.names:
+            other = next(
+                (m for m in MOTIONS.values() if m is not LONGITUDINAL and name in m.parameters), None
+            )
+            if other is not None:
+                raise ConfigurationError(
+                    f"plan: derivative {name!r} belongs to the {other.heading.lower()}, for which no input is searched; "
+                    f"`airtruth plan CAMPAIGN.toml --motion {other.name}` predicts the accuracy of a campaign"
+                )
             if name not in PARAMETERS:
                 raise ConfigurationError(f"plan: derivative {name!r}: {choices(name, PARAMETERS)}")
         if not self.names or len(set(self.names)) < len(self.names):

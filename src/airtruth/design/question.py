@@ -15,6 +15,7 @@ from airtruth.effects.effect import Effect, Parameter
 from airtruth.effects.increment import NAME as INCREMENT
 from airtruth.effects.registry import EFFECTS, named
 from airtruth.errors import ConfigurationError
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.resolution import LinearPoint, resolved
 from airtruth.tracing.answer import AcceptedEffect, TraceAnswer
 
@@ -140,6 +141,12 @@ def _require(effects: Sequence[Effect]) -> None:
     if len(keys) > MOST:
         raise ConfigurationError(
             f"plan: {len(keys)} effects ({', '.join(keys)}); state at most {MOST}, a variant as NAME:VARIANT"
+        )
+    other = [e.key for e in effects if not e.applies_to(LONGITUDINAL)]
+    if other:
+        raise ConfigurationError(
+            f"plan: no elevator input shows {', '.join(other)}, which act on the lateral-directional motion; fly what `airtruth "
+            f"effects {other[0]}` states under 'distinguished by', or plan a lateral flight with --derivative Cnr"
         )
     air = [e.key for e in effects if e.where == "air"]
     if air:

@@ -42,7 +42,7 @@ def asked_by(answer: TraceAnswer, source: str) -> Asked:
         if effect.name == "derivatives" and effect.parameters:
             return DerivativeQuestion((_widest(answer, effect),))
         if "derivatives" in effect.indistinguishable_from:
-            return DerivativeQuestion((_least_known(answer),))
+            return DerivativeQuestion((least_known(answer),))
     first, rival = _doubtful(answer), next(_rivals(answer), "")
     if first is not None and answer.provisional and rival:
         return (estimated(first), Hypothesised(EFFECTS[rival]))
@@ -58,7 +58,7 @@ def _widest(answer: TraceAnswer, effect: AcceptedEffect) -> str:
     return max(share, key=lambda name: share[name])
 
 
-def _least_known(answer: TraceAnswer) -> str:
+def least_known(answer: TraceAnswer) -> str:
     """The derivative whose standard deviation after the trace is the largest share of its declared value."""
     declared, std = answer.derivatives.declared, answer.derivatives.after_std
     return max(std, key=lambda name: std[name] / max(abs(declared[name]), 1e-9), default="Cmq")
@@ -80,7 +80,7 @@ def _rivals(answer: TraceAnswer) -> Iterator[str]:
 
 def _nothing_open(answer: TraceAnswer, first: AcceptedEffect | None) -> str:
     rivals = list(_rivals(answer))[:2]
-    derivative = f"--derivative {_least_known(answer)} for the derivative that is known least"
+    derivative = f"--derivative {least_known(answer)} for the derivative that is known least"
     if answer.verdict == "none":
         return (
             "the verdict is none and leaves no effects to separate, because the declared aircraft explains the records; "
@@ -108,4 +108,4 @@ def _nothing_open(answer: TraceAnswer, first: AcceptedEffect | None) -> str:
     )
 
 
-__all__ = ["Asked", "asked_by"]
+__all__ = ["Asked", "asked_by", "least_known"]

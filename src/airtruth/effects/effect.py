@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 from airtruth.channels import SIGNALS
 from airtruth.errors import ConfigurationError, choices
 from airtruth.physics.composition import PARTS
-from airtruth.physics.motion import MOTIONS, Motion
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
 from airtruth.physics.terms import LATE, Change, coefficients_of
 from airtruth.quantity import LARGEST
 from airtruth.units import UNITS, printed
@@ -209,6 +209,11 @@ class Effect:
     def key(self) -> str:
         """Unique name: NAME, or NAME:VARIANT."""
         return f"{self.name}:{self.variant}" if self.variant else self.name
+
+    @property
+    def label(self) -> str:
+        """Name in sets of effects: that of all its variants in the pitch plane, and the key elsewhere."""
+        return self.name if not self.variant or self.applies_to(LONGITUDINAL) else self.key
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -64,6 +64,11 @@ class Increment(Effect):
     shape: Shape = field(kw_only=True)
 
     @property
+    def label(self) -> str:
+        """Name of all learned increments."""
+        return self.name
+
+    @property
     def bends(self) -> int:
         """Number of bends, the slope among them; 1 for a linear increment."""
         return max(len(self.shape.coefficients), 1)

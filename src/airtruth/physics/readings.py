@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.physics.atmosphere import air_density
-from airtruth.physics.terms import ReadingTerm, StateTerm, shape_of
+from airtruth.physics.motion import MOTIONS
+from airtruth.physics.terms import QBAR, ReadingTerm, StateTerm, shape_of
 
 Array = NDArray[np.float64]
 
@@ -49,15 +50,16 @@ def reading_increments(
     truth: Mapping[str, Array],
     chord_m: float,
     dt_s: float,
+    span_m: float = 0.0,
 ) -> dict[str, Array]:
     """Increments of readings by channel; a channel without terms is left out.
 
     Parameters
     ----------
     terms, states : of the sensors; states that no term names do not matter.
-    truth : alpha_rad, elevator_rad, q_rad_s and airspeed_m_s, (runs, samples) each, at the CG [SI]; with density_kg_m3
-        or altitude_m where a term names the dynamic pressure.
-    chord_m : reference chord [m]; qhat = q c/(2V).
+    truth : airspeed_m_s and the channels of the signals that the terms name, (runs, samples) each, at the CG [SI]; with
+        density_kg_m3 or altitude_m where a term names the dynamic pressure.
+    chord_m, span_m : reference lengths [m]; qhat = q c/(2V), phat = p b/(2V).
     dt_s : sample period [s].
 
     Returns
@@ -66,14 +68,17 @@ def reading_increments(
     """
     if not terms:
         return {}
-    signals = {
-        "alpha": truth["alpha_rad"],
-        "elevator": truth["elevator_rad"],
-        "qhat": truth["q_rad_s"] * (0.5 * chord_m) / truth["airspeed_m_s"],
-    }
     named = {name for term in terms for name in (term.signal, term.behind)}
-    if "qbar" in named:
-        signals["qbar"] = 0.5 * np.asarray(air_density(truth)) * truth["airspeed_m_s"] ** 2
+    named |= {state.signal for state in states if state.name in named}
+    lengths = {"chord": chord_m, "span": span_m}
+    signals = {}
+    for signal in (s for m in MOTIONS.values() for s in (*m.signals, *m.known_signals) if s.name in named):
+        x = truth[signal.channel]
+        if signal.length is not None:
+            x = x * (0.5 * lengths[signal.length]) / truth["airspeed_m_s"]
+        signals[signal.name] = x
+    if QBAR in named:
+        signals[QBAR] = 0.5 * np.asarray(air_density(truth)) * truth["airspeed_m_s"] ** 2
     return increments_over(terms, states, signals, dt_s)
 
 

@@ -46,16 +46,17 @@ class Readings:
     Attributes
     ----------
     terms, states : increments of the readings, and the states that drive them.
-    chord_m : reference chord [m].
+    lengths_m : reference chord and span [m].
     """
 
     terms: tuple[ReadingTerm, ...] = ()
     states: tuple[StateTerm, ...] = ()
-    chord_m: float = 1.0
+    lengths_m: tuple[float, float] = (1.0, 0.0)
 
     def increments(self, truth: Mapping[str, Array], dt_s: float) -> dict[str, Array]:
         """Channel -> increment of its reading, see `airtruth.physics.readings.reading_increments`."""
-        return reading_increments(self.terms, self.states, truth, self.chord_m, dt_s)
+        along, across = self.lengths_m
+        return reading_increments(self.terms, self.states, truth, along, dt_s, across)
 
 
 def readings_of(aircraft: Aircraft) -> Readings:
@@ -63,7 +64,8 @@ def readings_of(aircraft: Aircraft) -> Readings:
     dynamics = aircraft.file.dynamics
     if dynamics is None or not dynamics.readings:
         return Readings()
-    return Readings(dynamics.readings, dynamics.states, aircraft.chord_m)
+    lengths_m = (aircraft.chord_m, aircraft.constants.span_m)
+    return Readings(dynamics.readings, dynamics.states, lengths_m)
 
 
 def needs_every_step(

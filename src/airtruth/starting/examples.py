@@ -57,6 +57,7 @@ _ALL: Final = (
             for name in (
                 *("light", "light-fit", "moderate", "moderate-fit"),
                 *("lateral", "lateral_multisine", "combined"),
+                *("lateral_lost_fin", "lateral_nose_boom", "lateral_late_rudder", "lateral_out_of_rig"),
                 *("foreign-c172x", "foreign-f16", "foreign-T38"),
             )
         ),
@@ -70,6 +71,19 @@ _ALL: Final = (
             "airtruth plan data/campaigns/lateral.toml",
             "airtruth fly data/campaigns/lateral.toml --out out/lateral",
             "airtruth identify out/lateral --aircraft gtm",
+        ),
+    ),
+    Example(
+        "damaged",
+        "four lateral flights of a GTM that is not as declared: fin lost, nose boom, late rudder, out of rig",
+        tuple(
+            f"data/campaigns/lateral_{name}.toml"
+            for name in ("lost_fin", "nose_boom", "late_rudder", "out_of_rig")
+        ),
+        (
+            "airtruth fly data/campaigns/lateral_late_rudder.toml --out out/late_rudder",
+            "airtruth trace out/late_rudder --aircraft gtm --motion lateral --out out/traced",
+            "airtruth report out/traced --out out/traced.html",
         ),
     ),
     Example(

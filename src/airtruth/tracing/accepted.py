@@ -6,6 +6,8 @@ from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Any, Literal
 
+from airtruth.effects.registry import EFFECTS
+
 
 @dataclass(frozen=True)
 class IncrementTable:
@@ -138,6 +140,11 @@ class AcceptedEffect:
     def key(self) -> str:
         """Name with the variant."""
         return effect_key(self.name, self.variant)
+
+    @property
+    def label(self) -> str:
+        """Name in sets of effects, see `airtruth.effects.effect.Effect.label`."""
+        return EFFECTS[self.key].label if self.key in EFFECTS else self.name
 
     @property
     def subject(self) -> str:

@@ -220,7 +220,7 @@ def _effect(
     rest = [
         c.gain
         for c in own.candidates
-        if c is not best and c.score.effect.name != effect.name and c.gain <= best.gain
+        if c is not best and c.score.effect.label != effect.label and c.gain <= best.gain
     ]
     own_covariance = covariance[final.layout.sizes, final.layout.sizes][span, span]
     stated = estimates(effect, final.point.sizes[span], own_covariance)
@@ -235,10 +235,10 @@ def _effect(
         parameters=stated,
         p_value=_p_value(own, best),
         separation_sigma=math.sqrt(max(0.0, best.gain - max([0.0, *rest]))),
-        indistinguishable_from=tuple(sorted({c.score.effect.name for c in others} - {effect.name})),
+        indistinguishable_from=tuple(sorted({c.score.effect.label for c in others} - {effect.label})),
         gain_2_log_likelihood=best.gain,
         other_variants=tuple(
-            sorted(c.score.effect.variant for c in others if c.score.effect.name == effect.name)
+            sorted(c.score.effect.variant for c in others if c.score.effect.label == effect.label)
         ),
         channel=effect.variant_channel,
         about_alpha_rad=final.hypothesis.trim_flow_rad + shift
@@ -254,12 +254,12 @@ def _with_rivals(
     stated: Sequence[AcceptedEffect], rounds: Sequence[SearchRound]
 ) -> tuple[AcceptedEffect, ...]:
     """The accepted effects with what a branch that lost has in place of each."""
-    names = [e.name for e in stated]
+    names = [e.label for e in stated]
     return tuple(
         replace(
             e,
             indistinguishable_from=tuple(
-                sorted({*e.indistinguishable_from, *alike_in_rivals(rounds, e.name, names)})
+                sorted({*e.indistinguishable_from, *alike_in_rivals(rounds, e.label, names)})
             ),
         )
         for e in stated

@@ -55,7 +55,7 @@ def _without(model: StageModel, effect: AcceptedEffect, case: Case) -> StageMode
     if effect.name == DERIVATIVES:
         common[[layout.motion.index(name[1:]) for name in effect.parameters]] = 0.0
         return replace(model, common=common)
-    cause = next(c for c in case.declared.causes if c.key == effect.name)
+    cause = next(c for c in case.declared.causes if c.key == effect.key)
     (estimate,) = effect.parameters.values()
     own = EFFECTS[cause.key]
     size = own.parameters[0].size(estimate.value)

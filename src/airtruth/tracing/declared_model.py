@@ -187,7 +187,9 @@ def explaining_effects(rounds: Sequence[SearchRound], covariance: Array) -> tupl
         separation = math.sqrt(max(0.0, 2.0 * (min(rivals) - best.cost))) if rivals else 0.0
         for key in best.effects:
             stated[key] = AcceptedEffect(
-                name=key,
+                name=EFFECTS[key].name if key in EFFECTS else key,
+                variant=EFFECTS[key].variant if key in EFFECTS else "",
+                channel=EFFECTS[key].variant_channel if key in EFFECTS else None,
                 parameters=_estimates(key, best, rounds[-1], covariance),
                 p_value=release.test.p_value,
                 separation_sigma=separation,
@@ -220,7 +222,7 @@ def cause_scores(
     sizes : see `cause_sizes`; declared : the candidates; accepted : effects of the answer.
     """
     first = rounds[0]
-    named = {name for e in accepted for name in (e.name, *e.indistinguishable_from)}
+    named = {name for e in accepted for name in (e.label, *e.indistinguishable_from)}
     contradicted = first.declared_test.p_value <= CONTRADICTED
     rejected = (
         "other causes explain the derivatives better"
@@ -279,8 +281,10 @@ def traceable_errors(degrees: int) -> float:
 def _row(
     key: str, score: float, alone: float, tests: int, named: Collection[str], rejected: str, z: float
 ) -> CandidateScore:
+    name, _, variant = key.partition(":")
     return CandidateScore(
-        name=key,
+        name=name,
+        variant=variant,
         score=score,
         p_value=min(1.0, tests * alone),
         testable=True,

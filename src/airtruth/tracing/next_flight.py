@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from airtruth.physics.motion import Motion
+from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.tracing.answer import ANOMALY_LEVEL, VerdictName
 from airtruth.tracing.selection.acceptance import Candidate
 from airtruth.tracing.selection.anomaly import Anomaly
@@ -41,10 +41,12 @@ def next_flight(
             for key, effect in names.items():
                 ways.setdefault(effect.distinguished_by, []).append(key)
             split = " ".join(f"{', '.join(keys)}: {way}" for way, keys in ways.items() if way)
-            lines.append(
-                f"Separate {', '.join(names)} as follows. {split} `airtruth plan --from` computes the input that "
-                "separates them most."
+            computed = (
+                " `airtruth plan --from` computes the input that separates them most."
+                if motion is LONGITUDINAL
+                else ""
             )
+            lines.append(f"Separate {', '.join(names)} as follows. {split}{computed}")
     lines += learned
     if remaining.p_value <= ANOMALY_LEVEL:
         lines.append(f"The remaining residual shows in {remaining.where}: {advice(remaining.where, motion)}")

@@ -158,7 +158,7 @@ def _value(effect: AcceptedEffect) -> float:
 
 def _probability(effect: AcceptedEffect, sets: Sequence[Alternative]) -> float:
     """Posterior probability of an effect or one that looks the same in the records."""
-    alike = {effect.name, *effect.indistinguishable_from}
+    alike = {effect.label, *effect.indistinguishable_from}
     return sum(s.weight for s in sets if alike & set(s.effects))
 
 

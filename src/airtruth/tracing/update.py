@@ -214,6 +214,8 @@ def _with_derivatives(
     increments = corrections.increments
     moved = {
         name: Quantity(value=q.value + increments[name], std=std.get(name, q.std), source=source)
+        if name in increments  # those of another motion stay as they are declared
+        else q
         for name, q in aircraft.file.derivatives.items()
     }
     file = aircraft.file.model_copy(update={"derivatives": moved})

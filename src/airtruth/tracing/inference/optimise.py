@@ -53,7 +53,7 @@ _SEARCH: Final = Options(
 )
 """How the posterior is searched; decreases in log-likelihood [-], judgements. A step that would gain 0.002 moves the
 estimates by 0.06 standard errors, one of 0.05 by 0.3. The last 0.5 is for tables with breaks, which give the gain of
-the filter, and with it the cost, small breaks too. Derivatives cost twenty times what a trial costs, so that they serve
+the filter, and with it the cost, small breaks too. Derivatives cost six times what a trial costs, so that they serve
 until they gain less than 1, or less than half of what they promise."""
 _ROUGH_M_S: Final = 1.0
 """Gust level in which a search starts where nothing is known [m/s]: the records then weigh little and no start is far

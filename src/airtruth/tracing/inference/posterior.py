@@ -1,6 +1,6 @@
 """Log-posterior of derivatives, levels, biases, initial states and sizes over several records.
 
-Fisher information, with derivatives by one-sided differences; the parameters of each record are eliminated record by
+Fisher information; the parameters of each record are eliminated record by
 record.
 
 Source: R. E. Maine and K. W. Iliff, NASA RP-1138 (1985), sections 5 and 6.
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
@@ -18,10 +18,12 @@ from numpy.typing import NDArray
 
 from airtruth.physics.terms import DECLARED
 from airtruth.tracing.inference.hypothesis import Hypothesis
+from airtruth.tracing.inference.sensitivities import Derivatives, Sensitivities
 from airtruth.tracing.inference.whitening import Whitener
 from airtruth.tracing.model.parameters import Layout, ParameterLayout, Parameters
 from airtruth.tracing.model.records import TraceRecord
-from airtruth.tracing.model.response import Response, filter_inputs, respond, respond_to
+from airtruth.tracing.model.response import FilterInputs, filter_inputs, respond, respond_to
+from airtruth.tracing.model.response_slopes import NO_SLOPES, respond_with_slopes
 from airtruth.tracing.model.settings import (
     Settings,
     common_prior,
@@ -35,8 +37,6 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 R = TypeVar("R")
 
-_DIVERGED: Final = 1e6
-"""Whitened change of an innovation by one step of a difference from which the motion diverges [-] (judgement)."""
 _LOCATION_STEP: Final = 0.02
 """Step of the differences in a size over `airtruth.effects.effect.Parameter.step`, where the effect is present or the
 parameter is a location [-]; judgement: as of `Entry`."""
@@ -99,28 +99,6 @@ class TraceProblem:
             return [function(a) for a in arguments]
         with ThreadPoolExecutor(self.threads) as pool:
             return list(pool.map(function, arguments))
-
-
-@dataclass(frozen=True)
-class Sensitivities:
-    """Whitened innovations of one record and their derivatives.
-
-    Attributes
-    ----------
-    r : (samples, outputs) whitened innovations.
-    logdet : mean of log|S| over the samples.
-    t : (parameters, samples, outputs) derivatives of the whitened innovations at fixed whitener; parameters as in `Layout`.
-    w : (parameters, outputs, outputs) whitened derivatives of S.
-    white : (outputs, outputs) whitener.
-    more : (parameters,) derivatives of the sum of log|S| beyond the steady one, by an uncertain surface; or a zero.
-    """
-
-    r: Array
-    logdet: float
-    t: Array
-    w: Array
-    white: Array
-    more: Array = field(default_factory=lambda: np.zeros(1))
 
 
 class LikelihoodTerms(NamedTuple):
@@ -191,7 +169,9 @@ def sensitivities_of(
     with_levels: bool = True,
     old: Sensitivities | None = None,
 ) -> Sensitivities | None:
-    """Innovations of one record and their derivatives by one-sided differences; None where the motion is lost.
+    """Innovations of one record and their derivatives; None where the motion is lost.
+
+    Derivatives in sizes, and in parameters that `respond_with_slopes` passes over, are one-sided differences.
 
     Parameters
     ----------
@@ -203,11 +183,16 @@ def sensitivities_of(
     record, settings = problem.records[index], problem.settings
     common, own, sizes = point.common, point.per_record[index], point.sizes
     given = filter_inputs(record, hypothesis.compiled(sizes))
-    base = respond_to(given, settings, common, own)
-    if not np.isfinite(base.logdet):
-        return None
     layout, entries = point.layout, settings.layout
-    differences = _Differences(base, layout.total)
+    wanted = [] if old is not None else _free(given, settings, per_record_only, with_levels)
+    base, slopes = (
+        respond_with_slopes(given, settings, common, own, np.array(wanted, dtype=np.int64))
+        if wanted
+        else (respond_to(given, settings, common, own), NO_SLOPES)
+    )
+    if slopes is None or not np.isfinite(base.logdet):
+        return None
+    differences = Derivatives(base, layout.total)
 
     def put_size(k: int) -> None:
         p = hypothesis.parameter(k)
@@ -221,62 +206,39 @@ def sensitivities_of(
             if np.isnan(old.t[layout.size(k), 0, 0]):
                 put_size(k)
         return differences.sensitivities if np.isfinite(differences.t).all() else None
+    step = np.append(entries.common.step, entries.per_record.step)
+    # behind the common parameters are the sizes
+    place = np.append(
+        np.arange(entries.common.size), layout.per_record.start + np.arange(entries.per_record.size)
+    )
+    differences.put_slopes(place[slopes.parameters], slopes, step[slopes.parameters])
+    for i in {*wanted} - {*slopes.parameters.tolist()}:
+        point_of = _moved(np.append(common, own), i, step[i])
+        moved = respond_to(given, settings, point_of[: common.size], point_of[common.size :])
+        differences.put(int(place[i]), moved, float(step[i]))
     if not per_record_only:
-        has_shift = given.compiled.declared["cg"] != DECLARED["cg"]
-        held = () if with_levels else entries.common.noise
-        for i in free_common(settings):
-            if i in held or (i == entries.common.mounting and not has_shift):
-                continue
-            h = entries.common.step[i]
-            differences.put(i, respond_to(given, settings, _moved(common, i, h), own), h)
         for k in range(len(sizes)):
             put_size(k)
-    for i in range(entries.per_record.size):
-        if i == entries.per_record.log_gust and not with_levels:
-            continue
-        h = entries.per_record.step[i]
-        steady = None if i == entries.per_record.log_gust else base.steady
-        moved = respond_to(given, settings, common, _moved(own, i, h), steady=steady)
-        differences.put(layout.per_record.start + i, moved, h)
     if not (np.isfinite(differences.t).all() and np.isfinite(differences.w).all()):
         return None
     return differences.sensitivities
+
+
+def _free(given: FilterInputs, settings: Settings, per_record_only: bool, with_levels: bool) -> list[int]:
+    """Parameters that move the innovations, as indices in a vector of the common parameters and those of the record."""
+    common, own = settings.layout.common, settings.layout.per_record
+    level = common.size + own.log_gust
+    free = [] if per_record_only else list(free_common(settings))
+    held = set() if with_levels else {*common.noise.tolist(), level}
+    if given.compiled.declared["cg"] == DECLARED["cg"]:
+        held.add(common.mounting)
+    return [i for i in (*free, *range(common.size, common.size + own.size)) if i not in held]
 
 
 def _moved(x: Array, index: int, step: float) -> Array:
     moved = x.copy()
     moved[index] += step
     return moved
-
-
-class _Differences:
-    """Collects one-sided differences of a response."""
-
-    def __init__(self, base: Response, parameters: int) -> None:
-        self.base = base
-        self.t = np.zeros((parameters, *base.e.shape))
-        self.w = np.zeros((parameters, *base.covariance.shape))
-        self.more = np.zeros(parameters)
-
-    def put(self, index: int, moved: Response, h: float) -> None:
-        white, base = self.base.white, self.base
-        change = (moved.e - base.e) @ white.T
-        self.t[index] = change / h if np.abs(change).max() < _DIVERGED else np.nan
-        self.w[index] = white @ ((moved.covariance - base.covariance) / h) @ white.T
-        self.more[index] = (moved.more_logdet - base.more_logdet) / h
-
-    def take(self, old: Sensitivities) -> None:
-        turn = np.linalg.solve(old.white.T, self.base.white.T)
-        self.t[:] = old.t @ turn
-        self.w[:] = turn.T @ old.w @ turn
-        self.more[:] = old.more
-
-    @property
-    def sensitivities(self) -> Sensitivities:
-        """The response with what was put or taken."""
-        base = self.base
-        r = base.e @ base.white.T
-        return Sensitivities(r, base.logdet, self.t, self.w, base.white, self.more)
 
 
 def likelihood_terms(sensitivities: Sensitivities, whitener: Whitener, levels: bool) -> LikelihoodTerms:

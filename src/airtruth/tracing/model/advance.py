@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 _LEAD: Final = LEAD - GUST_1
 """Position of the first low-passed copy among the states of the gusts [-]."""
-_PARTS: Final = 4
+PARTS: Final = 4
 """Parts of a step over which a signal is linear for the lag or the delay of its sensor [-]. With two parts, the error of a gyro
 delayed by 5.6 ms is 0.9 standard deviations of its noise, as root sum of squares over a record with 46 elevator steps."""
 
@@ -93,7 +93,7 @@ def steps_of(model: FilterModel, dt_s: float, sub: int) -> Steps:
     for i in range(count):
         if model.states.delay[i] >= 0:
             system = delay_system(model.sensors.delay_s[i])
-            step(system, np.zeros(DELAY_ORDER), DELAY_ORDER, h / _PARTS, phi[i], early[i], late[i], unused)
+            step(system, np.zeros(DELAY_ORDER), DELAY_ORDER, h / PARTS, phi[i], early[i], late[i], unused)
     states = model.states
     forget = math.exp(-dt_s / model.sensors.slow_time_s) if states.noise >= 0 else 0.0
     has_late_sensors = states.size > states.motion + (count if states.noise >= 0 else 0)
@@ -109,7 +109,7 @@ def work_of(model: FilterModel) -> Work:
         np.zeros(count),
         np.zeros(count),
         np.zeros(equations_of(model).states),
-        np.zeros(_PARTS + 1),
+        np.zeros(PARTS + 1),
         np.zeros(DELAY_ORDER),
     )
 
@@ -164,11 +164,11 @@ def advance_sensors(
         if i < state_count(model):
             early = model.sensors.scale[i] * steps.h * work.first[i] - rise
             late = model.sensors.scale[i] * steps.h * work.rate[0, i] - rise
-        for part in range(_PARTS + 1):
-            s = part / _PARTS
+        for part in range(PARTS + 1):
+            s = part / PARTS
             ends[part] = work.last[i] + s * rise + s * (1.0 - s) * ((1.0 - s) * early - s * late)
         if model.states.lag[i] >= 0:
-            _advance_lag(x, model.states.lag[i], steps.h / (_PARTS * model.sensors.lag_s[i]), ends)
+            _advance_lag(x, model.states.lag[i], steps.h / (PARTS * model.sensors.lag_s[i]), ends)
         if model.states.delay[i] >= 0:
             _advance_delay(x, model.states.delay[i], i, steps, work)
 
@@ -180,7 +180,7 @@ def _advance_lag(x: Array, at: int, r: float, ends: Array) -> None:
     mean = (1.0 - decay) / r
     before = ends[0]
     ends[0] = x[at]
-    for part in range(1, _PARTS + 1):
+    for part in range(1, PARTS + 1):
         x[at] = decay * x[at] + (mean - decay) * before + (1.0 - mean) * ends[part]
         before, ends[part] = ends[part], x[at]
 
@@ -188,7 +188,7 @@ def _advance_lag(x: Array, at: int, r: float, ends: Array) -> None:
 @inner
 def _advance_delay(x: Array, at: int, i: int, steps: Steps, work: Work) -> None:
     ends, held = work.ends, work.held
-    for part in range(_PARTS):
+    for part in range(PARTS):
         for row in range(DELAY_ORDER):
             held[row] = x[at + row]
         for row in range(DELAY_ORDER):
@@ -198,4 +198,4 @@ def _advance_delay(x: Array, at: int, i: int, steps: Steps, work: Work) -> None:
             x[at + row] = total
 
 
-__all__ = ["Steps", "Work", "advance_motion", "advance_sensors", "steps_of", "work_of"]
+__all__ = ["PARTS", "Steps", "Work", "advance_motion", "advance_sensors", "steps_of", "work_of"]

@@ -1,4 +1,4 @@
-"""Calls that compile three of the filter's kernels: an aircraft without forces, and a record of two samples."""
+"""Calls that compile four of the filter's kernels: an aircraft without forces, and a record of two samples."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from typing import Final
 
 import numpy as np
 
+from airtruth.tracing.model.equation_slopes import AircraftMoves
 from airtruth.tracing.model.filter import innovations, path_of
+from airtruth.tracing.model.flight_slopes import innovation_slopes
 from airtruth.tracing.model.kernel_input import (
     AircraftArrays,
     AirPoint,
@@ -18,8 +20,10 @@ from airtruth.tracing.model.kernel_input import (
     KernelInput,
     SensorArrays,
 )
-from airtruth.tracing.model.linearise import linearise
+from airtruth.tracing.model.linearise import FirstUpdate, linearise
 from airtruth.tracing.model.parameters import CORE, OUTPUTS, SHORT_PERIOD, state_layout
+from airtruth.tracing.model.sensor_slopes import GainSlopes, Moved, width_of
+from airtruth.tracing.model.slopes import moving
 from airtruth.tracing.model.steady import without_update
 from airtruth.tracing.model.tangent import FLOWN, matrices_along
 
@@ -56,6 +60,22 @@ def _filter() -> None:
     innovations(given, without_update(given.model), np.empty((2, OUTPUTS)))
 
 
+def _slopes() -> None:
+    given, width = _given(), width_of(0)
+    aircraft = AircraftMoves(1.0, np.zeros(3), np.zeros((2, 3)), 0.0, np.zeros(CORE), np.zeros(CORE))
+    none = np.zeros(moving(SHORT_PERIOD, 0).size, dtype=np.int64)
+    moved = Moved(
+        aircraft, none, none[:OUTPUTS], np.zeros((OUTPUTS, width)), np.zeros(width), np.zeros((CORE, width))
+    )
+    gains = GainSlopes(
+        np.zeros((1, CORE, OUTPUTS, width)),
+        FirstUpdate(np.zeros((1, CORE, OUTPUTS - 1, width)), np.zeros((1, OUTPUTS - 1, width))),
+        np.zeros((1, CORE, width)),
+        np.zeros((1, OUTPUTS, OUTPUTS, width)),
+    )
+    innovation_slopes(given, moved, path_of(2, CORE, OUTPUTS), gains, 1.0)
+
+
 def _tangent() -> None:
     given = _given()
     matrices_along(given, path_of(2, CORE, OUTPUTS), 1.0, np.array([1, 4]), len(FLOWN))
@@ -64,6 +84,7 @@ def _tangent() -> None:
 KERNELS: Final[tuple[tuple[str, Callable[[], None]], ...]] = (
     ("airtruth.tracing.model.linearise._differences", _linearise),
     ("airtruth.tracing.model.filter._innovations", _filter),
+    ("airtruth.tracing.model.flight_slopes._along", _slopes),
     ("airtruth.tracing.model.tangent._differences", _tangent),
 )
 """Full name of each kernel, and the call that compiles it."""

@@ -17,14 +17,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import allocating, inner
-from airtruth.numerics.discretise import congruence, multiply, whitener
+from airtruth.numerics.discretise import congruence, multiply, step, whitener
 from airtruth.tracing.model.by_motion import output_count, outputs, rates, shifted
 from airtruth.tracing.model.kernel_input import AnyPoint, FilterModel
 from airtruth.tracing.model.linearise import (
     FirstUpdate,
     covariance_of,
     delay_system,
-    discrete,
     first_update,
     update_gain,
 )
@@ -32,7 +31,7 @@ from airtruth.tracing.model.parameters import DELAY_ORDER
 
 Array = NDArray[np.float64]
 
-_STEP_RAD: Final = 0.01
+STEP_RAD: Final = 0.01
 """Half width of the central difference in the surface [rad]; judgement: as for the other angles of the linearisation."""
 _SETTLED: Final = 1e-6
 """Relative distance of the innovations' covariance from the steady one at which the gain is steady again [-].
@@ -100,37 +99,44 @@ def stacked(corners: Sequence[Corners]) -> CornerNodes:
 
 def input_columns(x: Array, at: AnyPoint, model: FilterModel, controls: int) -> Array:
     """(controls, states) slopes of x' in each surface [1/rad], late sensors included."""
-    count = model.sensors.scale.size
-    columns, directs = np.zeros((controls, x.size)), np.empty((controls, count))
-    for number, (column, direct) in enumerate(zip(columns, directs, strict=True)):
+    columns, direct = np.zeros((controls, x.size)), np.empty(model.sensors.scale.size)
+    for number, column in enumerate(columns):
         _input_differences(x, at, number, model, column, direct)
-        for i in range(count):
-            lag, delay = model.states.lag[i], model.states.delay[i]
-            if lag >= 0:
-                column[lag] = direct[i] / model.sensors.lag_s[i]
-            elif delay >= 0:
-                system = delay_system(model.sensors.delay_s[i])
-                column[delay : delay + DELAY_ORDER] = system[:, DELAY_ORDER] * direct[i]
     return columns
+
+
+@allocating
+def drive_sensors(direct: Array, model: FilterModel, column: Array) -> None:
+    """Slopes of the rates of late sensors into ``column``, by those of the outputs (outputs,)."""
+    for i in range(direct.size):
+        lag, delay = model.states.lag[i], model.states.delay[i]
+        if lag >= 0:
+            column[lag] = direct[i] / model.sensors.lag_s[i]
+        elif delay >= 0:
+            system = delay_system(model.sensors.delay_s[i])
+            for row in range(DELAY_ORDER):
+                column[delay + row] = system[row, DELAY_ORDER] * direct[i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _input_differences(
     x: Array, at: AnyPoint, control: int, model: FilterModel, column: Array, direct: Array
 ) -> None:
-    """Slopes in a surface of the rates of the motion and of the outputs."""
+    """Slopes in a surface of the rates of the motion and of the outputs, and of the rates of late sensors."""
     count = output_count(model)
     rate, y = np.zeros((2, x.size)), np.empty((2, count))
     for side in range(2):
-        moved = shifted(at, control, _STEP_RAD if side == 0 else -_STEP_RAD)
+        moved = shifted(at, control, STEP_RAD if side == 0 else -STEP_RAD)
         az = rates(x, moved, model, rate[side])
         outputs(x, rate[side], az, moved, model, y[side])
     for i in range(model.states.motion):
-        column[i] = (rate[0, i] - rate[1, i]) / (2.0 * _STEP_RAD)
+        column[i] = (rate[0, i] - rate[1, i]) / (2.0 * STEP_RAD)
     for i in range(count):
-        direct[i] = (y[0, i] - y[1, i]) / (2.0 * _STEP_RAD)
+        direct[i] = (y[0, i] - y[1, i]) / (2.0 * STEP_RAD)
+    drive_sensors(direct, model, column)
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
 def spread_of(a: Array, column: Array, dt_s: float) -> Array:
     """Covariance after a cell of a surface error whose mean has a unit variance and which is zero at both ends.
 
@@ -138,14 +144,22 @@ def spread_of(a: Array, column: Array, dt_s: float) -> Array:
     two derivatives are states of a system in discrete time, so that the response is exact for lags of any length.
     """
     n = a.shape[0]
-    system = np.zeros((n + 3, n + 3))
-    system[:n, :n] = a
-    system[:n, n] = column
-    system[n, n + 1] = 1.0
-    system[n + 1, n + 2] = 1.0
-    phi, _ = discrete(system, np.zeros(n + 3), dt_s)
-    after = phi[:n, n + 1] * (6.0 / dt_s) - phi[:n, n + 2] * (12.0 / (dt_s * dt_s))
-    return np.outer(after, after)
+    wide = n + 3
+    system, phi, noise = np.zeros((wide, wide + 1)), np.empty((wide, wide)), np.empty((wide, wide))
+    early, late, spread = np.empty((wide, 1)), np.empty((wide, 1)), np.empty((n, n))
+    for i in range(n):
+        for j in range(n):
+            system[i, j] = a[i, j]
+        system[i, n] = column[i]
+    system[n, n + 1] = system[n + 1, n + 2] = 1.0
+    step(system, np.zeros(wide), wide, dt_s, phi, early, late, noise)
+    after = np.empty(n)
+    for i in range(n):
+        after[i] = phi[i, n + 1] * (6.0 / dt_s) - phi[i, n + 2] * (12.0 / (dt_s * dt_s))
+    for i in range(n):
+        for j in range(n):
+            spread[i, j] = after[i] * after[j]
+    return spread
 
 
 @allocating
@@ -217,9 +231,11 @@ def settled(away: float) -> bool:
 
 
 __all__ = [
+    "STEP_RAD",
     "CornerNodes",
     "Corners",
     "corrected",
+    "drive_sensors",
     "gain_at",
     "input_columns",
     "is_uncertain",

@@ -43,14 +43,14 @@ from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
-_READING: Final = len(LONGITUDINAL.coefficients)
+READING: Final = len(LONGITUDINAL.coefficients)
 """First number of a reading among what a term acts on, see `EffectArrays`."""
-_PLAY: Final = 2
+PLAY: Final = 2
 """Number of the play in `airtruth.physics.terms.STATE_KINDS`."""
-_PLAY_S: Final = 0.05
+PLAY_S: Final = 0.05
 """Time constant of the lag that takes the place of a play in the linearisation [s] (judgement: a play follows a motion that is
 large against its width at once)."""
-_ALPHA_DOT: Final = 3
+ALPHA_DOT: Final = 3
 """Number of the signal alpha_dot_hat in `airtruth.physics.terms.SIGNALS`."""
 
 shape = cast("Callable[[int, float], float]", inner(numbered_shape))
@@ -133,7 +133,7 @@ def signal_of(signals: tuple[float, ...], number: int) -> float:
 
 
 @inner
-def _terms(
+def terms(
     x: Array, signals: Signals, effects: EffectArrays, in_alpha_dot: bool, feedback: float
 ) -> tuple[float, float]:
     """Increments of CL and Cm by the effects' terms in alpha', or by all others.
@@ -146,7 +146,7 @@ def _terms(
     lift = moment = 0.0
     for t in range(effects.amplitude.size):
         number = effects.term_index[t, 1]
-        if (number == _ALPHA_DOT) != in_alpha_dot or effects.term_index[t, 0] >= _READING:
+        if (number == ALPHA_DOT) != in_alpha_dot or effects.term_index[t, 0] >= READING:
             continue
         state, amplitude = effects.term_index[t, 3], effects.amplitude[t]
         s = x[state] if state >= 0 else signal_of(signals, number)
@@ -190,7 +190,7 @@ def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
         for turn in range(2):  # terms in alpha' last: they take alpha' with everything else in it
             first = q + ((fz - force * lift) * cosine - fx * sine) / (mass * ground) + weight
             signals = Signals(alpha, surface, qhat, first * half, qbar)
-            added = _terms(x, signals, model.effects, turn == 1, half * force * cosine / (mass * v))
+            added = terms(x, signals, model.effects, turn == 1, half * force * cosine / (mass * v))
             lift, moment = lift + added[0], moment + added[1]
     fz -= force * lift
     fm += (
@@ -211,8 +211,8 @@ def effect_rates(x: Array, signals: tuple[float, ...], model: FilterModel, out: 
     for k in range(effects.time_s.size):
         at = model.states.effect[k]
         s = signal_of(signals, effects.state_index[k, 1])
-        if effects.state_index[k, 0] == _PLAY:
-            out[at] = (s - x[at]) / _PLAY_S
+        if effects.state_index[k, 0] == PLAY:
+            out[at] = (s - x[at]) / PLAY_S
         elif effects.state_index[k, 0] == 0:
             out[at] = (s - x[at]) / effects.time_s[k]
         else:
@@ -226,7 +226,7 @@ def hold_plays(x: Array, tried: Array, model: FilterModel) -> None:
     """Put the states of plays in ``tried`` back to those of ``x``: they do not move within a step."""
     effects = model.effects
     for k in range(effects.time_s.size):
-        if effects.state_index[k, 0] == _PLAY:
+        if effects.state_index[k, 0] == PLAY:
             tried[model.states.effect[k]] = x[model.states.effect[k]]
 
 
@@ -235,7 +235,7 @@ def has_plays(effects: EffectArrays) -> bool:
     """Whether an effect has a play."""
     found = False
     for k in range(effects.time_s.size):
-        found = found or effects.state_index[k, 0] == _PLAY
+        found = found or effects.state_index[k, 0] == PLAY
     return found
 
 
@@ -244,7 +244,7 @@ def follow(x: Array, signals: tuple[float, ...], model: FilterModel) -> None:
     """Move the states of plays to no more than their half width from their signals."""
     effects = model.effects
     for k in range(effects.time_s.size):
-        if effects.state_index[k, 0] == _PLAY:
+        if effects.state_index[k, 0] == PLAY:
             s = signal_of(signals, effects.state_index[k, 1])
             i, half = model.states.effect[k], effects.half_width[k]
             x[i] = min(max(x[i], s - half), s + half)
@@ -317,7 +317,7 @@ def outputs(x: Array, rate: Array, az: float, at: AirPoint, model: FilterModel, 
     y[1] = x[1]
     y[2] = az - arm[2] * rate[1]
     if model.effects.amplitude.size > 0:
-        add_readings(x, _measured(x, alpha, at, model), _READING, model, y)
+        add_readings(x, _measured(x, alpha, at, model), READING, model, y)
     for i in range(OUTPUTS):
         y[i] *= scale[i]
 
@@ -369,6 +369,11 @@ register(
 )
 
 __all__ = [
+    "ALPHA_DOT",
+    "PLAY",
+    "PLAY_S",
+    "READING",
+    "Signals",
     "add_readings",
     "air_alpha",
     "air_at",
@@ -383,4 +388,5 @@ __all__ = [
     "settle_effects",
     "shape",
     "signal_of",
+    "terms",
 ]

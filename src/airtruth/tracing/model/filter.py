@@ -46,6 +46,7 @@ class Path(NamedTuple):
     k_gain : (samples, states, outputs) gain of the update.
     first, direct : (samples, states, early) and (samples, early), (samples, states).
     scale : (samples, outputs, outputs), from the innovation to that of the common covariance.
+    raw : (samples, outputs) innovations before this scale.
     """
 
     predicted: Array
@@ -54,6 +55,7 @@ class Path(NamedTuple):
     first: FirstUpdate
     direct: Array
     scale: Array
+    raw: Array
 
 
 def path_of(samples: int, states: int, outputs: int) -> Path:
@@ -65,6 +67,7 @@ def path_of(samples: int, states: int, outputs: int) -> Path:
         first=FirstUpdate(np.zeros((samples, states, outputs - 1)), np.zeros((samples, outputs - 1))),
         direct=np.zeros((samples, states)),
         scale=np.zeros((samples, outputs, outputs)),
+        raw=np.zeros((samples, outputs)),
     )
 
 
@@ -72,14 +75,14 @@ _NOT_KEPT: Final = path_of(0, 0, 1)
 """The path of a flight of which innovations alone are wanted."""
 
 
-def _initial_state(given: KernelInput) -> Array:
+def initial_state(given: KernelInput, start: Array) -> Array:
     """The stated start; the gust at the tail and its copies, and the effects' states, in equilibrium with it."""
     model = given.model
     x = np.zeros(model.states.size)
     states = equations_of(model).states
-    x[: given.start.size] = given.start
-    x[lead_of(states) : core_of(states)] = given.start[states]
-    x[given.start.size] = gust_of(x, states, model.gusts.rolloff)
+    x[: start.size] = start
+    x[lead_of(states) : core_of(states)] = start[states]
+    x[start.size] = gust_of(x, states, model.gusts.rolloff)
     at = type(given.reference)(*(column[0] for column in given.grid))
     equations_of(model).settle(x, at, model)
     return x
@@ -262,6 +265,9 @@ def _innovations(
             now, is_steady = settled_gains.k_gain, True
             if keeps:
                 _keep(path, k, x, now, settled_gains.first, settled_gains.direct, settled_gains.scale, 0)
+        if keeps:
+            for i in range(count):
+                path.raw[k, i] = raw[i]
         if k + 1 == samples:
             break
         if not _update(x, now, raw, model):
@@ -299,7 +305,7 @@ def innovations(
     """
     steps = steps_of(given.model, given.dt_s, given.sub)
     work = work_of(given.model)
-    sound, more = _innovations(given, steps, work, _initial_state(given), steady, e, path)
+    sound, more = _innovations(given, steps, work, initial_state(given, given.start), steady, e, path)
     return bool(sound), float(more)
 
 
@@ -312,4 +318,4 @@ def free_run(given: KernelInput, e: Array) -> bool:
     return innovations(certain, without_update(given.model), e)[0]
 
 
-__all__ = ["Path", "free_run", "innovation", "innovations", "path_of"]
+__all__ = ["Path", "free_run", "initial_state", "innovation", "innovations", "path_of"]

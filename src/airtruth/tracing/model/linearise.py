@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from airtruth.numerics.ahead import awaited
-from airtruth.numerics.compiled import allocating, inner
+from airtruth.numerics.compiled import allocating, inner, shared
 from airtruth.numerics.discretise import multiply, riccati, step, whitener
 from airtruth.tracing.model.by_motion import equations_of, output_count, outputs, rates, state_count
 from airtruth.tracing.model.gust_states import gust_of
@@ -32,6 +32,8 @@ _GUSTS: Final = CORE - GUST_1
 """Number of states of the gusts, which follow those of the motion [-]."""
 _GUST: Final = 0.1
 """Half width of the central differences in a gust state that does not move alpha [-]."""
+LEAST_MOVE: Final = 1e-9
+"""Change of alpha by a gust state of unit size below which its half width is `_GUST` [rad]."""
 
 
 class FirstUpdate(NamedTuple):
@@ -47,6 +49,7 @@ class FirstUpdate(NamedTuple):
     share: Array
 
 
+@shared
 def delay_system(delay_s: float) -> Array:
     """A and B (order, order + 1) of a delay; its output is the input less twice the sum of every second state.
 
@@ -69,7 +72,7 @@ def delay_system(delay_s: float) -> Array:
 
 
 @allocating
-def _half_width(state: int, at: AnyPoint, model: FilterModel) -> float:
+def half_width(state: int, at: AnyPoint, model: FilterModel) -> float:
     """Half width of the central difference in a state of the motion."""
     states = state_count(model)
     core = states + _GUSTS
@@ -81,7 +84,7 @@ def _half_width(state: int, at: AnyPoint, model: FilterModel) -> float:
     unit = np.zeros(core)
     unit[state] = 1.0
     moves = abs(model.gusts.level_m_s * gust_of(unit, states, model.gusts.rolloff)) / at.airspeed_m_s
-    return ANGLE_RAD / moves if moves > 1e-9 else _GUST
+    return ANGLE_RAD / moves if moves > LEAST_MOVE else _GUST
 
 
 def linearise(x: Array, at: AnyPoint, model: FilterModel, a: Array, c: Array) -> Array:
@@ -96,22 +99,21 @@ def linearise(x: Array, at: AnyPoint, model: FilterModel, a: Array, c: Array) ->
     -------
     (states,) row of C of an accelerometer that is not late.
     """
-    a[:] = 0.0
-    c[:] = 0.0
-    _differences(x.copy(), at, model, a, c)
-    direct: Array = c[-1].copy()
-    _add_sensors(model, a, c)
+    direct = np.zeros(x.size)
+    _differences(x.copy(), at, model, a, c, direct)
     return direct
 
 
 @awaited
 @njit(cache=True, nogil=True, error_model="numpy")
-def _differences(x: Array, at: AnyPoint, model: FilterModel, a: Array, c: Array) -> None:
-    """Columns of A and C of the motion and the effects' states; ``x`` is moved and returns."""
+def _differences(x: Array, at: AnyPoint, model: FilterModel, a: Array, c: Array, direct: Array) -> None:
+    """`linearise` about ``x``, which is moved and returns; ``direct``: (states,) the row that it returns."""
     count = output_count(model)
     rate, y = np.empty((2, x.size)), np.empty((2, count))
+    a[:] = 0.0
+    c[:] = 0.0
     for j in range(model.states.motion):
-        h, middle = _half_width(j, at, model), x[j]
+        h, middle = half_width(j, at, model), x[j]
         for side in range(2):
             x[j] = middle + h if side == 0 else middle - h
             az = rates(x, at, model, rate[side])
@@ -121,29 +123,34 @@ def _differences(x: Array, at: AnyPoint, model: FilterModel, a: Array, c: Array)
             a[i, j] = (rate[0, i] - rate[1, i]) / (2.0 * h)
         for i in range(count):
             c[i, j] = (y[0, i] - y[1, i]) / (2.0 * h)
+    for j in range(x.size):
+        direct[j] = c[count - 1, j]
+    add_sensors(model, model.sensors.slow_std, model.sensors.slow_time_s, a, c)
 
 
-def _add_sensors(model: FilterModel, a: Array, c: Array) -> None:
+@allocating
+def add_sensors(model: FilterModel, slow_std: Array, slow_time_s: float, a: Array, c: Array) -> None:
     """Put lags, delays and correlated noise behind the outputs of the motion."""
-    sensors, states = model.sensors, model.states
-    for i in range(len(c)):
-        at = states.lag[i]
-        if at >= 0:
-            a[at] = c[i] / sensors.lag_s[i]
-            c[i] = 0.0
-            a[at, at] = -1.0 / sensors.lag_s[i]
-            c[i, at] = 1.0
-        at = states.delay[i]
-        if at >= 0:
-            system, held = delay_system(sensors.delay_s[i]), slice(at, at + DELAY_ORDER)
-            a[held] = system[:, DELAY_ORDER, None] * c[i]
-            a[held, held] = system[:, :DELAY_ORDER]
-            c[i, at + 1 : at + DELAY_ORDER : 2] -= 2.0
+    sensors, states, n = model.sensors, model.states, a.shape[0]
+    for i in range(c.shape[0]):
+        lag, delay = states.lag[i], states.delay[i]
+        if lag >= 0:
+            for j in range(n):
+                a[lag, j], c[i, j] = c[i, j] / sensors.lag_s[i], 0.0
+            a[lag, lag], c[i, lag] = -1.0 / sensors.lag_s[i], 1.0
+        if delay >= 0:
+            system = delay_system(sensors.delay_s[i])
+            for row in range(DELAY_ORDER):
+                for j in range(n):
+                    a[delay + row, j] = system[row, DELAY_ORDER] * c[i, j]
+                for j in range(DELAY_ORDER):
+                    a[delay + row, delay + j] = system[row, j]
+            for row in range(1, DELAY_ORDER, 2):
+                c[i, delay + row] -= 2.0
     if states.noise >= 0:
-        for i in range(len(c)):
+        for i in range(c.shape[0]):
             at = states.noise + i
-            a[at, at] = -1.0 / sensors.slow_time_s
-            c[i, at] = sensors.slow_std[i]
+            a[at, at], c[i, at] = -1.0 / slow_time_s, slow_std[i]
 
 
 def process_intensity(airspeed_m_s: float, model: FilterModel) -> Array:
@@ -270,14 +277,17 @@ def gain_of(
 
 __all__ = [
     "ANGLE_RAD",
+    "LEAST_MOVE",
     "RATE_RAD_S",
     "FirstUpdate",
+    "add_sensors",
     "covariance_of",
     "delay_system",
     "discrete",
     "first_update",
     "gain",
     "gain_of",
+    "half_width",
     "linearise",
     "process_intensity",
     "update_gain",

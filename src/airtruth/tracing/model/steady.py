@@ -63,7 +63,7 @@ class SteadyFilter(NamedTuple):
     share: Array
 
 
-class _Condition(NamedTuple):
+class Condition(NamedTuple):
     """The filter at one flight condition; attributes as of `SteadyFilter`, without nodes.
 
     It has no corners where the surface is known.
@@ -83,31 +83,31 @@ def steady_filter(given: KernelInput, along: Schedule) -> SteadyFilter | None:
 
     It depends on neither the initial state, nor the biases, nor the trim.
     """
-    if not along.flow_rad:
-        mean = _at(given, given.reference_flow_rad, given.reference)
-        return None if mean is None else _joined(given, [mean], mean, _unit(given.model), along)
-    nodes = [_at(given, *point) for point in zip(along.flow_rad, along.air, strict=True)]
+    nodes = [_at(given, *point) for point in conditions_of(given, along)]
     sound = [node for node in nodes if node is not None]
-    if len(sound) < len(nodes):
-        return None
-    away = [abs(air.airspeed_m_s - given.reference.airspeed_m_s) for air in along.air]
-    common = sound[away.index(min(away))]
-    root = np.linalg.inv(common.white)
-    scale = np.array(
-        [_unit(given.model)[0] if node is common else np.tril(root @ node.white) for node in sound]
-    )
-    return _joined(given, sound, common, scale, along)
+    return joined(given, sound, along) if len(sound) == len(nodes) else None
 
 
-def _unit(model: FilterModel) -> Array:
-    """Scale of a single flight condition."""
-    return np.eye(model.sensors.scale.size)[None]
+def conditions_of(given: KernelInput, along: Schedule) -> list[tuple[float, AnyPoint]]:
+    """Flow angle and inputs at the flight conditions of a record."""
+    if not along.flow_rad:
+        return [(given.reference_flow_rad, given.reference)]
+    return list(zip(along.flow_rad, along.air, strict=True))
 
 
-def _joined(
-    given: KernelInput, nodes: Sequence[_Condition], common: _Condition, scale: Array, along: Schedule
-) -> SteadyFilter:
-    """The filters of the flight conditions as one; ``common`` is one of them."""
+def common_of(given: KernelInput, along: Schedule) -> int:
+    """Number of the flight condition whose airspeed is nearest to the mean."""
+    away = [abs(air.airspeed_m_s - given.reference.airspeed_m_s) for _, air in conditions_of(given, along)]
+    return away.index(min(away))
+
+
+def joined(given: KernelInput, nodes: Sequence[Condition], along: Schedule) -> SteadyFilter:
+    """The filters of the flight conditions as one."""
+    common, scale = nodes[0], _unit(given.model)
+    if len(nodes) > 1:
+        common = nodes[common_of(given, along)]
+        root, unit = np.linalg.inv(common.white), scale[0]
+        scale = np.array([unit if node is common else np.tril(root @ node.white) for node in nodes])
     sensors = given.model.sensors
     corners = [node.corners for node in nodes if node.corners is not None]
     return SteadyFilter(
@@ -127,12 +127,17 @@ def _joined(
     )
 
 
-def _at(given: KernelInput, flow_rad: float, air: AnyPoint) -> _Condition | None:
+def _unit(model: FilterModel) -> Array:
+    """Scale of a single flight condition."""
+    return np.eye(model.sensors.scale.size)[None]
+
+
+def _at(given: KernelInput, flow_rad: float, air: AnyPoint) -> Condition | None:
     """The filter at one flight condition; None where its innovations have no covariance."""
     model = given.model
     n = model.states.size
     a, c = np.empty((n, n)), np.empty((model.sensors.scale.size, n))
-    x = _equilibrium(flow_rad, air, model)
+    x = equilibrium(flow_rad, air, model)
     direct = linearise(x, air, model, a, c)
     phi, noise = discrete(a, process_intensity(air.airspeed_m_s, model), given.dt_s)
     k_gain, white, covariance, logdet, p, first = gain_of(phi, c, noise, model.sensors.variance)
@@ -144,7 +149,7 @@ def _at(given: KernelInput, flow_rad: float, air: AnyPoint) -> _Condition | None
         spread = np.stack([spread_of(a, column, given.dt_s) for column in columns])
         root = np.asarray(np.linalg.inv(white))
         corners = Corners(phi, noise, spread, p, c, model.sensors.variance, covariance, root, logdet)
-    return _Condition(k_gain, first, white, covariance, logdet, corners, direct)
+    return Condition(k_gain, first, white, covariance, logdet, corners, direct)
 
 
 def _shown(lag_s: float, delay_s: float, dt_s: float) -> float:
@@ -173,7 +178,7 @@ def without_update(model: FilterModel) -> SteadyFilter:
     )
 
 
-def _equilibrium(flow_rad: float, air: AnyPoint, model: FilterModel) -> Array:
+def equilibrium(flow_rad: float, air: AnyPoint, model: FilterModel) -> Array:
     """(states,) at a flow angle, effects' states in equilibrium with it."""
     x = np.zeros(model.states.size)
     x[0] = flow_rad
@@ -183,8 +188,18 @@ def _equilibrium(flow_rad: float, air: AnyPoint, model: FilterModel) -> Array:
 
 def linearise_at_reference(given: KernelInput, a: Array, c: Array) -> Array:
     """`linearise` at the record's mean, effects' states in equilibrium with it."""
-    x = _equilibrium(given.reference_flow_rad, given.reference, given.model)
+    x = equilibrium(given.reference_flow_rad, given.reference, given.model)
     return linearise(x, given.reference, given.model, a, c)
 
 
-__all__ = ["SteadyFilter", "linearise_at_reference", "steady_filter", "without_update"]
+__all__ = [
+    "Condition",
+    "SteadyFilter",
+    "common_of",
+    "conditions_of",
+    "equilibrium",
+    "joined",
+    "linearise_at_reference",
+    "steady_filter",
+    "without_update",
+]

@@ -9,7 +9,7 @@ from typing import Final
 from airtruth.table import WIDTH, Group, Table, as_text
 from airtruth.tracing.answer import TraceAnswer
 from airtruth.tracing.presentation.candidates import probability
-from airtruth.tracing.presentation.derivative_table import derivative_table
+from airtruth.tracing.presentation.derivative_table import MOST_COLUMNS, derivative_table
 from airtruth.tracing.presentation.error_table import MEANING, error_table
 from airtruth.tracing.presentation.text import (
     candidate_lines,
@@ -90,9 +90,24 @@ def _derivatives(answer: TraceAnswer) -> Block:
     if not answer.derivatives.declared:
         return ()
     table = derivative_table(answer)
-    last = "after" if answer.effects else "before"
-    rows = tuple(row for row in table.rows if row[0] in ("declared", last))
-    return _lines(Table(table.title, table.columns, (Group("", rows),)))
+    shown = ("declared", "after" if answer.effects else "before")
+    if len(answer.motion.parameters) <= MOST_COLUMNS:
+        rows = tuple(row for row in table.rows if row[0] in shown)
+        return _lines(Table(table.title, table.columns, (Group("", rows),)))
+    far = set(_farthest(answer))
+    columns = [0, *(j for j, name in enumerate(table.columns) if name in shown)]
+    rows = tuple(tuple(row[j] for j in columns) for row in table.rows if row[0] in far)
+    title = f"{table.title}, farthest from the declaration"
+    return _lines(Table(title, tuple(table.columns[j] for j in columns), (Group("", rows),)))
+
+
+def _farthest(answer: TraceAnswer) -> list[str]:
+    """The derivatives farthest from their declaration, in declared standard deviations; the first ones without a test."""
+    names = list(answer.motion.parameters)
+    if answer.declared_model is not None:
+        shifts = answer.declared_model.shifts
+        names.sort(key=lambda name: -abs(shifts[name].sigma) if name in shifts else 0.0)
+    return names[:MOST_COLUMNS]
 
 
 def _lines(table: Table) -> Block:

@@ -128,7 +128,7 @@ def _predicted(sets: SetTable, last: PosteriorFit, effects: Sequence[Effect]) ->
 
 def _places(effects: Sequence[Effect]) -> frozenset[str]:
     """Names of effects, those that delay a signal by its channel."""
-    return frozenset(e.late_signal or e.name for e in effects)
+    return frozenset(e.late_signal or e.label for e in effects)
 
 
 def _scored(rounds: Sequence[SearchRound], last: PosteriorFit) -> SearchRound:
@@ -171,8 +171,8 @@ def other_kinds(
 
 def best_rival(own: SearchRound, last: PosteriorFit, effect: Effect) -> Candidate | None:
     """The best candidate of another name that was refitted in the round of an effect; one, because each costs a refit."""
-    taken = {e.name for e in last.hypothesis.effects if e.key != effect.key}
-    others = (c for c in own.candidates if c.score.effect.name not in taken | {effect.name})
+    taken = {e.label for e in last.hypothesis.effects if e.key != effect.key}
+    others = (c for c in own.candidates if c.score.effect.label not in taken | {effect.label})
     return max(others, key=lambda c: c.gain, default=None)
 
 

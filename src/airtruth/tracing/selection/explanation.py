@@ -143,12 +143,13 @@ def explain(
     likelihood : of the derivatives; causes : physical causes.
     wrong_allowed : whether declarations may be wrong.
     """
-    evidence = [
-        compared
-        for count in range(min(MOST_CAUSES, len(causes)) + 1)
-        for chosen in combinations(causes, count)
-        for compared in _compared(likelihood, chosen, wrong_allowed)
-    ]
+    evidence: list[_Compared] = []
+    so_far = np.inf
+    for count in range(min(MOST_CAUSES, len(causes)) + 1):
+        for chosen in combinations(causes, count):
+            for compared in _compared(likelihood, chosen, wrong_allowed, so_far):
+                evidence.append(compared)
+                so_far = min(so_far, float(compared[2].min()))
     least = min(float(np.nanmin(cost, initial=np.inf)) for _, _, cost in evidence)
     found = (
         scales[best[i]].set_of(i, cost[i])
@@ -221,12 +222,16 @@ def predicted_cost(likelihood: DerivativeLikelihood, causes: Sequence[Cause]) ->
 
 
 def _compared(
-    likelihood: DerivativeLikelihood, chosen: Sequence[Cause], wrong_allowed: bool
+    likelihood: DerivativeLikelihood, chosen: Sequence[Cause], wrong_allowed: bool, so_far: float
 ) -> Iterator[_Compared]:
     """Evidence of some causes with sets of wrong declarations: every set of up to `_EVERY` derivatives.
 
     Of more derivatives, none, those of each coefficient and all; and from none on the sets that add one derivative to the best
-    set so far, as long as the cost falls.
+    set so far, as long as the cost falls; none where the causes are negligible without.
+
+    Parameters
+    ----------
+    so_far : least cost of the sets that were compared before.
     """
     count, motion = len(likelihood.vector), likelihood.motion
 
@@ -244,6 +249,8 @@ def _compared(
     first: tuple[Subset, ...] = ((), *rows, tuple(range(count)))
     found = of(first)
     yield found
+    if float(found[2].min()) > so_far + _NEGLIGIBLE:
+        return
     best, least = first[0], float(found[2][0])
     while len(best) < count:
         grown = tuple(tuple(sorted((*best, i))) for i in range(count) if i not in best)

@@ -145,7 +145,7 @@ def chosen(
     """
     learned = tuple(c.score.effect for c in _accepted(alone))
     if len(alone) > 1 and lead > _NAMES_LEAD:
-        names = tuple(sorted({*(e.name for e in named), *explains}))
+        names = tuple(sorted({*(e.label for e in named), *explains}))
         return (replace(alone[0], rival=Rival({names: -lead})), *alone[1:])
     if learned and (lead > _AS_GOOD or _accepted(grown) or _acts_on(learned) != _acts_on(named)):
         sets = {} if grown[0].rival is None else dict(grown[0].rival.sets)

@@ -110,7 +110,7 @@ def _with_declared(sets: SetTable, end: SearchRound, last: SearchRound) -> Searc
     declared = sets.declared(last.null)
     if declared is None:
         return end
-    names = tuple(sorted({e.name for e in effects}))
+    names = tuple(sorted({e.label for e in effects}))
     excess = declared.cost + len(declared.point.sizes) - total_cost(last)
     log_weight = min(0.0, REFERENCE - max(0.0, excess))
     return replace(end, rival=Rival({**(end.rival.sets if end.rival else {}), names: log_weight}))

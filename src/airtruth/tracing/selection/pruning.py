@@ -117,7 +117,7 @@ def _with_needed_names(
     """
     while True:
         effects = fitted.hypothesis.effects
-        names = [e for e in effects if not isinstance(e, Increment) and e.name not in kept]
+        names = [e for e in effects if not isinstance(e, Increment) and e.label not in kept]
         loss, less = min(
             losses_without(sets, fitted, names), key=lambda removal: removal[0], default=(np.inf, None)
         )

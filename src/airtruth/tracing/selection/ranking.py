@@ -65,7 +65,7 @@ def rank(
         if replacement is not None and r.score.effect.key == replacement[0]:
             candidates.append(untested(r.score, r.fit, gain, Refusal.SUPERSEDED, f"that is {replacement[1]}"))
             continue
-        if gain < accepted - TIE and r.score.effect.name != leading:
+        if gain < accepted - TIE and r.score.effect.label != leading:
             implausible = implausibility(problem, r.score.effect, r.fit)
             candidates.append(untested(r.score, r.fit, gain, Refusal.OUTDONE, *implausible))
             continue
@@ -83,7 +83,7 @@ def rank(
         candidates.append(candidate)
         if not np.isfinite(accepted) and set(candidate.reasons) <= {Refusal.IMMATERIAL, Refusal.UNCONVERGED}:
             accepted = gain  # an effect that explains less than an immaterial one is not the cause either
-            leading = r.score.effect.name
+            leading = r.score.effect.label
     return tuple(candidates)
 
 

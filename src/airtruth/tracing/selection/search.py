@@ -305,7 +305,7 @@ class _Search:
         for rival in (*own.tied[1 : 1 + _ALTERNATIVES], *_variants(own)):
             if not may_begin(self.advance, f"{rival.score.effect.key} instead of {best.score.effect.key}"):
                 return ends
-            rest = (c for c in own.tied if c.score.effect.name != rival.score.effect.name)
+            rest = (c for c in own.tied if c.score.effect.label != rival.score.effect.label)
             led = at_best_location(self.sets, replace(own, tied=(rival, *rest)), self.advance)
             tried = self._onwards(starts, (*rounds[:-1], led), True)
             leads = total_cost(tried[-1]) < total_cost(ends[-1]) - BETTER
@@ -328,7 +328,7 @@ class _Search:
 
 def _names(last: SearchRound) -> tuple[str, ...]:
     """Names of the accepted effects of a branch that ends with this round."""
-    return tuple(e.name for e in last.null.hypothesis.effects)
+    return tuple(e.label for e in last.null.hypothesis.effects)
 
 
 def _effects_of(last: SearchRound) -> tuple[str, ...]:
@@ -345,7 +345,7 @@ def _variants(own: SearchRound) -> tuple[Candidate, ...]:
     return tuple(
         replace(c, reasons=())
         for c in own.candidates
-        if c.score.effect.name == best.score.effect.name
+        if c.score.effect.label == best.score.effect.label
         and c.reasons == (Refusal.OUTDONE,)
         and np.isfinite(c.likelihood_gain).all()
     )

@@ -209,7 +209,7 @@ def minima(slope: Array, information: Array, chosen: NDArray[np.int64]) -> tuple
 
 def _may_join(a: Effect, b: Effect) -> bool:
     """Whether two effects may be in one set: not two variants of one, but delays of two channels."""
-    return a.name != b.name or (a.late_signal != b.late_signal and "" not in (a.late_signal, b.late_signal))
+    return a.label != b.label or (a.late_signal != b.late_signal and "" not in (a.late_signal, b.late_signal))
 
 
 def _room(effect: Effect) -> tuple[float, float]:

@@ -45,7 +45,7 @@ def weights(rounds: Sequence[SearchRound]) -> dict[tuple[str, ...], float]:
         key = tuple(sorted(set(names)))
         found[key] = found.get(key, 0.0) + _weight(log_weight)
 
-    accepted = {r.tied[0].score.effect.name for r in rounds if r.tied}
+    accepted = {r.tied[0].score.effect.label for r in rounds if r.tied}
     leading = [list(_leading(r, accepted)) for r in rounds if r.tied]
     carried = _carried(rounds)
     combined = [([name for name, _ in c], sum(gain for _, gain in c)) for c in itertools.product(*leading)]
@@ -80,7 +80,7 @@ def _exchanged(last: SearchRound) -> Iterator[tuple[list[str], float]]:
     own, effects = _cost(last.null), len(last.null.hypothesis.effects)
     for f in last.exchanged:
         if f.converged:
-            names = [e.name for e in f.hypothesis.effects]
+            names = [e.label for e in f.hypothesis.effects]
             yield names, min(own - _cost(f), _REFUSED if len(names) > effects else 0.0)
 
 
@@ -102,16 +102,16 @@ def _with_one_more(
     last : the round at the end.
     combined : the accepted effects, or rivals in their place, with the logarithm of the weight of each; the accepted first.
     """
-    named = [*(e.name for e in last.null.hypothesis.effects), *(last.sets[0].effects if last.sets else ())]
+    named = [*(e.label for e in last.null.hypothesis.effects), *(last.sets[0].effects if last.sets else ())]
     if not named:
         return
     beside = [name for name in named if name not in combined[0][0]]
-    seen = [s for s in last.table.scores if abs(s.z) > _POINTS and s.effect.name not in named]
+    seen = [s for s in last.table.scores if abs(s.z) > _POINTS and s.effect.label not in named]
     for s in sorted(seen, key=lambda s: -abs(s.z))[:_MOST_MORE]:
         gained = 0.5 * s.z**2 - REFERENCE - len(s.effect.parameters)
         for names, log_weight in combined:
-            if s.effect.name not in names:
-                yield [*names, *beside, s.effect.name], log_weight + min(gained, _REFUSED)
+            if s.effect.label not in names:
+                yield [*names, *beside, s.effect.label], log_weight + min(gained, _REFUSED)
 
 
 def _leading(own: SearchRound, accepted: Collection[str]) -> Iterator[tuple[str, float]]:
@@ -120,23 +120,23 @@ def _leading(own: SearchRound, accepted: Collection[str]) -> Iterator[tuple[str,
     Rivals tie with it or gain less. An effect that another round accepts is no rival: what it gains here it gains there too.
     """
     first = own.tied[0]
-    yield first.score.effect.name, 0.0
+    yield first.score.effect.label, 0.0
     outdone = (c for c in own.candidates if c.reasons == (Refusal.OUTDONE,) and has_converged(c.fit, c.gain))
     for c in (*own.tied[1:], *(c for c in outdone if c.gain < first.gain - TIE)):
-        if c.score.effect.name not in accepted:
-            yield c.score.effect.name, 0.5 * (c.gain - first.gain)
+        if c.score.effect.label not in accepted:
+            yield c.score.effect.label, 0.5 * (c.gain - first.gain)
 
 
 def _carried(rounds: Sequence[SearchRound]) -> set[str]:
     """Effects beside the derivatives released last that no round accepted: they explained derivatives released before."""
     last = rounds[-1].null.hypothesis
-    leaders = {r.tied[0].score.effect.name for r in rounds if r.tied}
+    leaders = {r.tied[0].score.effect.label for r in rounds if r.tied}
     released = next((r.null.hypothesis for r in reversed(rounds) if r.release is not None), None)
     beside = released if last.spread is None else last
     if beside is None:
         return set()
     kept = {e.key for e in last.effects}
-    return {e.name for e in beside.effects if e.key in kept} - leaders
+    return {e.label for e in beside.effects if e.key in kept} - leaders
 
 
 def _without_one(rounds: Sequence[SearchRound]) -> Iterator[tuple[list[str], float]]:
@@ -152,7 +152,7 @@ def _without_one(rounds: Sequence[SearchRound]) -> Iterator[tuple[list[str], flo
         if not isinstance(leader.score.effect, Increment):
             at = last.hypothesis.span(leader.score.effect.key).start
             lost = min(lost, (float(last.point.sizes[at]) / max(last.size_std(at), _LEAST_STD)) ** 2)
-        others = [c.score.effect.name for c in leaders if c is not leader]
+        others = [c.score.effect.label for c in leaders if c is not leader]
         yield others, REFERENCE + 1.0 - 0.5 * lost
 
 

@@ -1,0 +1,77 @@
+"""The whole trace on records of the lateral-directional motion, flown by an independent integration in six axes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lateral_flights import lateral_aircraft
+
+from airtruth.tracing import TraceOptions
+from airtruth.tracing.run import trace
+from validation.lateral_truth import GTM, log_of, record_pair, with_effect
+
+LATERAL = TraceOptions(motion="lateral")
+
+
+def flights(name="", size=0.0, seed=1, gust=0.5):
+    """Four records, aileron 1-2-1 and rudder 3-2-1-1 in both signs, in half of the light gusts."""
+    every = [replace(f, gust=gust, seed=100 * seed + i) for i, f in enumerate(record_pair() * 2)]
+    return [with_effect(f, name, size) for f in every] if name else every
+
+
+def without_part_of_the_fin(flight, factor):
+    """A flight whose fin, rudder included, has a factor of its lift: strip theory (Etkin and Reid, ch. 2 and 5).
+
+    Arms from the rudder's moments over its force; lift slope from nine tenths of Cnr.
+    """
+    lateral = flight.plane.lateral.copy()
+    behind, above = -lateral[2, 4] / lateral[0, 4], lateral[1, 4] / lateral[0, 4]
+    slope = -0.9 * lateral[2, 2] / (2.0 * behind**2)
+    felt = np.array([-1.0, -2.0 * above, 2.0 * behind])  # of beta, p b/2V and r b/2V
+    lost = slope * np.outer([1.0, above, -behind], felt)
+    lateral[:, :3] -= (1.0 - factor) * lost
+    lateral[:, 4] *= factor
+    return replace(flight, plane=replace(flight.plane, lateral=lateral))
+
+
+@pytest.mark.slow
+def test_records_of_the_declared_aircraft_show_nothing(tmp_path):
+    answer = trace([log_of(*flights())], lateral_aircraft(tmp_path / "gtm"), LATERAL).answer
+    assert answer.verdict == "none"
+    assert set(answer.derivatives.declared) == set(answer.declared_model.shifts)
+    assert set(answer.error.channels) == {"beta_rad", "p_rad_s", "r_rad_s", "phi_rad", "ay_m_s2"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "size", "parameter"),
+    [
+        ("rudder_delay", 0.08, "delay_s"),
+        ("vane_arm:beta_rad", 0.6, "x_m"),
+        ("vane_lag:beta_rad", 0.12, "tau_s"),
+    ],
+)
+def test_an_effect_is_named_with_its_size(tmp_path, name, size, parameter):
+    answer = trace([log_of(*flights(name, size))], lateral_aircraft(tmp_path / "gtm"), LATERAL).answer
+    (effect,) = answer.effects
+    assert effect.key == name
+    estimate = effect.parameters[parameter]
+    assert estimate.value == pytest.approx(size, abs=max(4.0 * estimate.std, 0.1 * size))
+
+
+@pytest.mark.slow
+def test_a_wrong_damping_in_roll_is_a_wrong_declaration(tmp_path):
+    declared = lateral_aircraft(tmp_path / "gtm", wrong={"Clp": 0.7})
+    answer = trace([log_of(*flights())], declared, LATERAL).answer
+    assert not answer.declared_model.consistent
+    shift = answer.declared_model.shifts["Clp"]
+    assert shift.estimate == pytest.approx(GTM.lateral[1, 1], abs=4.0 * shift.std)
+    assert any("derivatives" in s.effects for s in answer.alternatives)
+
+
+@pytest.mark.slow
+def test_a_weak_fin_is_named(tmp_path):
+    weak = [without_part_of_the_fin(f, 0.6) for f in flights()]
+    answer = trace([log_of(*weak)], lateral_aircraft(tmp_path / "gtm"), LATERAL).answer
+    assert not answer.declared_model.consistent
+    assert any("fin_effectiveness" in s.effects for s in answer.alternatives)
