@@ -241,10 +241,30 @@ def test_mass_and_inertias_widen_their_own_coefficients():
     own = np.diag(declared_covariance(silent, values, LATERAL))
     relative, least = (np.array(x) for x in UNCERTAINTY["lateral"])
     np.testing.assert_allclose(own, np.maximum(relative * np.abs(values), least) ** 2)
-    more = (declared_covariance(GTM, values, LATERAL) - np.diag(own))[LATERAL.row("Cl"), LATERAL.row("Cl")]
-    xx = GTM.file.mass.inertia_xx
-    roll = values[LATERAL.row("Cl")]
-    np.testing.assert_allclose(more, (xx.std / xx.value) ** 2 * np.outer(roll, roll), rtol=1e-9)
+    mass = GTM.file.mass
+    names = ("inertia_xx", "inertia_zz", "inertia_xz")
+    inertia = {name: getattr(mass, name) for name in names}
+
+    def matrix(values):
+        xx, zz, xz = values
+        return np.array([[xx, -xz], [-xz, zz]])
+
+    nominal = [inertia[name].value for name in names]
+    for number, name in enumerate(names):
+        kept = {
+            n: getattr(mass, n).model_copy(update={"std": 0.0}) for n in ("mass", "inertia_yy", "cg", *names)
+        }
+        alone = mass.model_copy(update=kept | {name: inertia[name]})
+        plane = GTM.model_copy(update={"file": GTM.file.model_copy(update={"mass": alone})})
+        more = declared_covariance(plane, values, LATERAL) - np.diag(own)
+        step = 1e-6 * nominal[0]
+        moved = [v + (step if i == number else 0.0) for i, v in enumerate(nominal)]
+        moments = values[LATERAL.row("Cl").start :].reshape(2, 5)
+        apparent = (
+            matrix(nominal) @ np.linalg.inv(matrix(moved)) @ moments
+        )  # accelerations are those of the moved inertia
+        slope = inertia[name].std * ((apparent - moments) / step).ravel()
+        np.testing.assert_allclose(more[5:, 5:], np.outer(slope, slope), rtol=1e-4, atol=1e-12)
 
 
 def test_an_aircraft_without_lateral_surfaces_needs_declared_derivatives(log):

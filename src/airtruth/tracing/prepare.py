@@ -46,6 +46,8 @@ _LEAD_S: Final = 3.0
 constants of slow sensors)."""
 _AIR: Final = "each record has its own gust level, and the measured airspeed contains the horizontal gusts"
 """Why an effect of the air is not tested."""
+_OF_INPUTS: Final = ("bias", "scale", "arm_right")
+"""Errors of the sensor of a known input that the filter takes."""
 _RECONSTRUCTED: Final = "alpha was reconstructed: no vane measured it"
 """Why an effect of a vane is not tested."""
 _NO_VANE: Final = (
@@ -131,7 +133,7 @@ def prepare(
     notes.extend(_NO_VANE if channel == VANE else _unmeasured(channel, motion) for channel in absent)
     mean = np.mean([r.plant.derivatives for r in fitted], axis=0)
     slopes = dict(zip(motion.parameters, mean.tolist(), strict=True))
-    foreign = [e for e in effects if not e.applies_to(motion)]
+    foreign = [e for e in effects if not e.applies_to(motion) or _delays_input(e, motion)]
     effects = [effect.for_aircraft(slopes) for effect in effects if effect not in foreign]
     columns = set.intersection(*(set(log.channels) for log in logs))
     reasons = {effect.key: _why_not(effect, columns, absent) for effect in effects}
@@ -209,6 +211,13 @@ def _declared_causes(
     )
 
 
+def _delays_input(effect: Effect, motion: Motion) -> bool:
+    """Whether it delays a known input, or moves its sensor in the plane of symmetry, which the motion does not show."""
+    change = effect.change({p.name: p.value(p.step) for p in effect.parameters})
+    known = set(motion.known) - {"airspeed_m_s"}
+    return any(t.channel in known and t.kind not in _OF_INPUTS for t in change.sensors)
+
+
 def _why_not(effect: Effect, columns: Collection[str], absent: Collection[str]) -> str:
     """Why an effect cannot be tested; empty if it can."""
     missing = [channel for channel in effect.channels if channel not in columns]
@@ -244,10 +253,9 @@ def undo_input_sensors(s: Signals, aircraft: Aircraft) -> Signals:
     alpha = s.alpha_rad if s.alpha_rad.size else fine(s.y[:, 0], s.sub)
     if declared.alpha_slope_per_rad != 0.0:
         airspeed = airspeed / declared.slope(alpha)
-    known: dict[str, Any] = {
-        n: true(n, getattr(s, n), s.sub) for n in ("alpha_rad", "q_rad_s") if n in s.motion.known
-    }
-    if known:
+    known: dict[str, Any] = {}
+    if s.motion is not LONGITUDINAL:
+        known = {n: true(n, getattr(s, n), s.sub) for n in ("alpha_rad", "q_rad_s", "theta_rad")}
         vane = aircraft.file.sensors.get("alpha_rad", Sensor()).errors()
         p = fine(s.y[:, s.motion.output_channels.index("p_rad_s")], s.sub)
         known["alpha_rad"] = known["alpha_rad"] + (vane.x_m * known["q_rad_s"] - vane.y_m * p) / airspeed

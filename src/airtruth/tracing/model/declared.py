@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import reduce
-from math import hypot
+from math import hypot, sqrt
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from airtruth.errors import AircraftError
 from airtruth.physics.composition import directions
 from airtruth.physics.motion import LATERAL, LONGITUDINAL, Motion
 from airtruth.physics.motion_parts import Declared
+from airtruth.quantity import Quantity
 
 Array = NDArray[np.float64]
 
@@ -90,12 +91,20 @@ def declared_covariance(aircraft: Aircraft, derivatives: Array, motion: Motion =
 
 
 def _std(aircraft: Aircraft, declared: Declared) -> float:
-    """Standard deviation of a declared quantity, of a factor over its value [-]; 0 where none is stated."""
+    """Standard deviation of a declared quantity [-]; 0 where none is stated.
+
+    That of a factor is over its value, and that of a product of inertia over sqrt(Ixx Izz), as effects count them.
+    """
     mass = aircraft.file.mass
-    quantity = None if mass is None or not declared.entry else getattr(mass, declared.entry)
-    if quantity is None:
+    quantity: Quantity | None = getattr(mass, declared.entry, None)
+    if mass is None or quantity is None:
         return 0.0
-    return float(quantity.std / quantity.value if declared.divides else quantity.std)
+    if declared.divides:
+        return float(quantity.std / quantity.value)
+    xx, zz = mass.inertia_xx, mass.inertia_zz
+    if quantity is mass.inertia_xz and xx is not None and zz is not None:
+        return float(quantity.std / sqrt(xx.value * zz.value))
+    return float(quantity.std)
 
 
 def inertia_std(aircraft: Aircraft, motion: Motion = LONGITUDINAL) -> float:
