@@ -1,5 +1,6 @@
 """Aileron and rudder of JSBSim models: found by the motion that they cause, flown in six axes."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -58,7 +59,13 @@ def test_surface_sign_and_feedback(name, aileron, rudder, carried):
 
 def test_the_survey_of_the_gtm_recovers_its_lateral_controls(tmp_path):
     """Its commands are angles [rad]; the survey reads gtm.xml without aircraft.toml, and the trim needs both surfaces."""
-    new_from_jsbsim(AIRCRAFT / "gtm", tmp_path / "surveyed")
+    model = tmp_path / "model"
+    shutil.copytree(AIRCRAFT / "gtm", model, ignore=shutil.ignore_patterns("aircraft.toml"))
+    off, on = (f'<property value="{value}">aero/six-axes</property>' for value in (0, 1))
+    text = (model / "gtm.xml").read_text()
+    assert off in text
+    (model / "gtm.xml").write_text(text.replace(off, on))
+    new_from_jsbsim(model, tmp_path / "surveyed")
     model = aircraft.load(tmp_path / "surveyed").file.jsbsim
     declared = aircraft.load("gtm").file.jsbsim
     assert model.aileron.command == declared.aileron.command == model.lateral.aileron
