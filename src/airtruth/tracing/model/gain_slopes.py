@@ -161,6 +161,18 @@ def _gains(row: int, c: Array, variance: Array, out: Conditions) -> None:
     first_update(pc, out.covariance[row], FirstUpdate(out.first.gain[row], out.first.share[row]))
 
 
+@allocating
+def _predicted(row: int, out: Conditions) -> Array:
+    """Covariance of the prediction that follows the update of the steady covariance with the gains of a row."""
+    n = out.phi.shape[1]
+    work, following = np.empty((n, n)), np.empty((n, n))
+    congruence(out.phi[row], corrected(out.steady[0], out.k_gain[row], out.c[row]), work, following)
+    for i in range(n):
+        for j in range(n):
+            following[i, j] += out.noise[row, i, j]
+    return following
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _conditions(
     x: Array,
@@ -178,7 +190,7 @@ def _conditions(
     linear = linear_slopes(x, at, model, aircraft, columns, controls)
     system, column = np.zeros((n, n + 1)), np.zeros((controls, n))
     a, early, late = np.zeros((n, n)), np.empty((n, 1)), np.empty((n, 1))
-    count, powers = 0, np.zeros((0, n, n))
+    count, powers, base = 0, np.zeros((0, n, n)), np.zeros((n, n))
     for row in range(rows):
         if row > 0 and moves.h[row] == 0.0:
             continue
@@ -208,19 +220,16 @@ def _conditions(
             out.steady[0] = riccati(out.phi[0], out.c[0], out.noise[0], moves.variance[0])
             _gains(0, out.c[0], moves.variance[0], out)
             count, powers = _powers(out.phi[0], out.k_gain[0], out.c[0])
+            # a slope counts from what the equation makes of the covariance, which is not quite steady
+            base = _predicted(0, out)
             continue
         # the gains of the steady covariance with the moved sensors, and the prediction that follows
         for i in range(n):
             for j in range(n):
                 out.steady[row, i, j] = out.steady[0, i, j]
         _gains(row, out.c[row], moves.variance[row], out)
-        after = corrected(out.steady[0], out.k_gain[row], out.c[row])
-        work, following = np.empty((n, n)), np.empty((n, n))
-        congruence(out.phi[row], after, work, following)
-        for i in range(n):
-            for j in range(n):
-                following[i, j] += out.noise[row, i, j]
-        _newton(out.steady[0], following, count, powers, out.steady[row])
+        after = out.steady[0] + (_predicted(row, out) - base)
+        _newton(out.steady[0], after, count, powers, out.steady[row])
         _gains(row, out.c[row], moves.variance[row], out)
 
 
