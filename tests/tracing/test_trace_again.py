@@ -15,6 +15,7 @@ from airtruth.aircraft import Sensor
 from airtruth.errors import StoreError
 from airtruth.quantity import Quantity
 from airtruth.tracing import TraceOptions, trace
+from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.records import FINE
 from airtruth.tracing.prepare import undo_input_sensors
 from airtruth.tracing.replay import disagreement
@@ -135,6 +136,7 @@ class Assessed:
     def __init__(self, *free_runs):
         own = [SimpleNamespace(free_run=np.array(rms)) for rms in free_runs]
         self.reported = (None, {"declared": own})
+        self.case = SimpleNamespace(fitted=SimpleNamespace(layout=SHORT_PERIOD))
 
 
 def test_a_model_that_moves_otherwise_than_at_rest_is_said():

@@ -9,7 +9,6 @@ import trace_records as tr
 
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.inference.optimise import fit, initial_parameters
-from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.explanation import REFERENCE, CauseSet
 from airtruth.tracing.selection.pruning import pruned
 from airtruth.tracing.selection.refit import redundant_effect
@@ -34,8 +33,7 @@ def fitted(gyro, accelerometer):
         records.append(replace(one, signals=replace(one.signals, y=y)))
     problem = tr.problem(records)
     hypothesis = tr.NOTHING.plus(EARLIER).plus(LATER)
-    start = initial_parameters(problem, hypothesis)
-    return problem, fit(problem, hypothesis, Parameters(start.common, start.per_record, np.zeros(2)))
+    return problem, fit(problem, hypothesis, initial_parameters(problem, hypothesis))
 
 
 @pytest.mark.grid

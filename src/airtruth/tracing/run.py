@@ -21,7 +21,7 @@ from airtruth.logs import atomic
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.provenance import Provenance, digests_of
 from airtruth.logs.sources import Logs, named_logs
-from airtruth.physics.motion import LONGITUDINAL, MOTIONS
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.answer import ANSWER, DECLARED_LEVEL
 from airtruth.tracing.axial_force import axial_force
 from airtruth.tracing.calibration.calibrated import calibrated
@@ -256,9 +256,12 @@ def _with_later_colour(
 
 
 def _effects(options: TraceOptions) -> list[Effect]:
-    """The requested candidates of the motion, each once; a name without a variant selects all of its variants."""
-    motion = MOTIONS[options.motion or LONGITUDINAL.name]
-    library = {key: effect for key, effect in EFFECTS.items() if effect.applies_to(motion)}
+    """The requested candidates of the motion, each once; a name without a variant selects all of its variants.
+
+    One that applies to no motion, such as an effect of a user on a channel of his own, is a candidate that cannot be tested.
+    """
+    motion = options.motion or LONGITUDINAL.name
+    library = {key: effect for key, effect in EFFECTS.items() if motion in (effect.motions or (motion,))}
     if options.effects is None:
         return [effect for effect in library.values() if not effect.in_derivatives]
     found: dict[str, Effect] = {}

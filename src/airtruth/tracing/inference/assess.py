@@ -31,10 +31,10 @@ Ints = NDArray[np.int64]
 _SEARCH: Final = Options(
     iterations=30,
     damping=Damping(initial=1e-6, least=1e-6, most=np.inf, poor=0.1, fair=0.1),
-    stopping=Stopping(decrease=0.01, decrease_confirm=0.05),
+    stopping=Stopping(decrease=0.003, decrease_confirm=0.05),
 )
 """How a record's own parameters are searched; judgement: ten parameters that are well determined, so that steps are
-nearly undamped. A search ends once a step gains less than 0.01 in log-likelihood, 0.14 standard errors, and an undamped step
+nearly undamped. A search ends once a step gains less than 0.003 in log-likelihood, 0.08 standard errors, and an undamped step
 promises less than 0.05. Derivatives that serve several steps end it early, by hundreds in log-likelihood, where it begins without
 knowledge of the gusts."""
 _MOST_LOG_STEP: Final = 1.0
