@@ -19,9 +19,7 @@ from airtruth.tracing.model.response_slopes import respond_with_slopes
 from airtruth.tracing.model.settings import without
 
 COMMON, OWN = SHORT_PERIOD.common, SHORT_PERIOD.per_record
-NAMES = COMMON.names + OWN.names
-STEP = np.append(COMMON.step, OWN.step)
-EVERY = np.arange(STEP.size)
+EVERY = np.arange(COMMON.size + OWN.size)
 EFFECTS = Change(
     aero=(
         AeroTerm("Cm", "alpha", "quadratic", 2.0, 0.01),
@@ -48,11 +46,11 @@ RECORDS = {**CASES, "late az and noise": (LATE_AZ, 2, 0.2, {}), "effects": (EFFE
 def central(arguments, index, h):
     """Central differences of the innovations, their covariance over their deviations, and log|S| beyond."""
     given, settings, common, own = arguments
-    ends = []
+    ends, common_size = [], common.size
     for sign in (1.0, -1.0):
         moved = np.append(common, own)
         moved[index] += sign * h
-        ends.append(respond_to(given, settings, moved[: COMMON.size], moved[COMMON.size :]))
+        ends.append(respond_to(given, settings, moved[:common_size], moved[common_size:]))
     return [
         (getattr(ends[0], a) - getattr(ends[1], a)) / (2.0 * h) for a in ("e", "covariance", "more_logdet")
     ]
@@ -64,19 +62,22 @@ def check(arguments, indices=EVERY, tolerance=1e-3):
     1e-3 of the largest: the gains' own step of a hundredth, and rounding of a Riccati equation that is slow to settle, are 2e-4.
     A parameter that moves no innovation by a hundredth of its deviation per unit counts as if it did.
     """
+    layout = arguments[1].layout
+    step = np.append(layout.common.step, layout.per_record.step)
+    names = layout.common.names + layout.per_record.names
     base, made = respond_with_slopes(*arguments, np.asarray(indices))
     nominal = respond_to(*arguments)
     np.testing.assert_allclose(base.e, nominal.e, rtol=0.0, atol=1e-9)
     assert base.logdet == pytest.approx(nominal.logdet, abs=1e-9)
     std = np.sqrt(np.diag(nominal.covariance))
     for row, index in enumerate(made.parameters):
-        e, covariance, more = central(arguments, index, 0.1 * STEP[index])
+        e, covariance, more = central(arguments, index, 0.1 * step[index])
         scale = max(np.abs(e / std).max(), 0.01)
-        assert np.abs((made.e[row] - e) / std).max() < tolerance * scale, NAMES[index]
+        assert np.abs((made.e[row] - e) / std).max() < tolerance * scale, names[index]
         by_std = np.outer(std, std)
         largest = max(np.abs(covariance / by_std).max(), 1e-3)
-        assert np.abs((made.covariance[row] - covariance) / by_std).max() < tolerance * largest, NAMES[index]
-        assert made.more_logdet[row] == pytest.approx(more, rel=3e-3, abs=1e-3), NAMES[index]
+        assert np.abs((made.covariance[row] - covariance) / by_std).max() < tolerance * largest, names[index]
+        assert made.more_logdet[row] == pytest.approx(more, rel=3e-3, abs=1e-3), names[index]
     return made
 
 

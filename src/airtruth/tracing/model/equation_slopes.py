@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import inner
 from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.terms import SIGNALS
 from airtruth.tracing.model.compile import CompiledChange
 from airtruth.tracing.model.equations import (
     ALPHA_DOT,
@@ -19,11 +20,14 @@ from airtruth.tracing.model.equations import (
     cell,
     effective_elevator,
     gust,
+    half_time,
+    measured,
     rates,
     terms,
 )
+from airtruth.tracing.model.gust_slopes import gust_rate_slopes, gust_weights, slopes_of_gust
 from airtruth.tracing.model.kernel_input import AircraftArrays, AirPoint, FilterModel
-from airtruth.tracing.model.parameters import CORE, GUST_1, LEAD, OUTPUTS, SHORT_PERIOD
+from airtruth.tracing.model.parameters import GUST_1, LEAD, OUTPUTS, SHORT_PERIOD
 from airtruth.tracing.model.records import TraceRecord
 from airtruth.tracing.model.slopes import (
     INERTIA,
@@ -51,6 +55,8 @@ _ROW: Final = len(LONGITUDINAL.signals)
 """Derivatives of a coefficient [-]."""
 _LATE: Final = LEAD - 1
 """State of the upward gust as the tail meets it."""
+_QHAT: Final = SIGNALS.index("qhat")
+"""Number of the signal qhat [-]."""
 
 
 class AircraftMoves(NamedTuple):
@@ -147,7 +153,7 @@ def _all_terms(
     work: SlopeWork,
 ) -> None:
     """Add the derivatives of the effects' terms of CL and Cm; ``own``: CL of the increments without them."""
-    aircraft, effects, half = model.aircraft, model.effects, 0.5 * model.aircraft.chord_m / at.airspeed_m_s
+    aircraft, effects, half = model.aircraft, model.effects, half_time(at, model)
     force, alpha, mass = at.qbar_pa * aircraft.area_m2, signals.alpha, aircraft.mass_kg
     loss, weight = half * force / (mass * at.airspeed_m_s), G0 * math.cos(at.theta_rad - x[0]) / at.ground_m_s
     fz = f.z - force * (own + terms(x, signals, effects, False, 0.0)[0])
@@ -155,12 +161,14 @@ def _all_terms(
     turned = Signals(alpha, signals.elevator, signals.qhat, first * half, signals.qbar)
     for turn in range(2):  # terms in alpha' take that of all other forces
         if turn == 1:
-            _turning(x, d_x, fz, alpha, f, at, model, column, work.alpha_dot_hat, work)
-            for p in range(work.alpha.size):
-                work.alpha_dot_hat[p] *= half
+            row = work.signal[ALPHA_DOT]
+            _turning(x, d_x, fz, alpha, f, at, model, column, row, work)
+            for p in range(row.size):
+                row[p] *= half
         for t in range(effects.amplitude.size):
             if effects.term_index[t, 0] < READING and (effects.term_index[t, 1] == ALPHA_DOT) == (turn == 1):
-                add_term(t, x, d_x, turned, effects, loss * math.cos(alpha), -loss * math.sin(alpha), work)
+                own_loss, by_alpha = loss * math.cos(alpha), -loss * math.sin(alpha)
+                add_term(t, x, d_x, turned, effects, ALPHA_DOT, own_loss, by_alpha, work.signal[0], work)
 
 
 @inner
@@ -176,34 +184,28 @@ def _air_slopes(
     work: SlopeWork,
 ) -> None:
     """Derivatives of the gust, of the late gust's rate into ``late``, of alpha and of qhat."""
-    gusts, v, up = model.gusts, at.airspeed_m_s, moved.upward
+    gusts, v = model.gusts, at.airspeed_m_s
     sine = (math.sin(at.theta_rad - x[0]) * at.ground_m_s - gusts.level_m_s * upward) / v
     turn = 1.0 / math.sqrt(1.0 - sine * sine) if abs(sine) < 1.0 else 0.0
     half, share, rate = (
-        0.5 * model.aircraft.chord_m / v,
+        half_time(at, model),
         turn * gusts.level_m_s / v,
         1.0 / gusts.rotary_time_s,
     )
     tail, steep = half * gusts.level_m_s / v, turn * math.cos(at.theta_rad - x[0]) * at.ground_m_s / v
-    size, by_rolloff = late.size, 0.0
-    first, second, low, middle, high = up[GUST_1], up[GUST_1 + 1], up[LEAD], up[LEAD + 1], up[LEAD + 2]
+    size, own, d_alpha, d_qhat = late.size, work.gust, work.signal[0], work.signal[_QHAT]
+    slopes_of_gust(x, d_x, GUST_1, moved.upward, moved.lead, column[ROLLOFF], own)
     for p in range(size):
-        copies = low * d_x[LEAD, p] + middle * d_x[LEAD + 1, p] + high * d_x[LEAD + 2, p]
-        work.upward[p] = first * d_x[GUST_1, p] + second * d_x[GUST_1 + 1, p] + copies
-    for j in range(CORE):
-        by_rolloff += moved.lead[j] * x[j]
-    work.upward[column[ROLLOFF]] += by_rolloff
+        late[p] = rate * (own[p] - d_x[_LATE, p])
     for p in range(size):
-        late[p] = rate * (work.upward[p] - d_x[_LATE, p])
-    for p in range(size):
-        work.alpha[p] = steep * d_x[0, p] + share * work.upward[p]
+        d_alpha[p] = steep * d_x[0, p] + share * own[p]
     turning = tail * gusts.rotary
     for p in range(size):
-        work.qhat[p] = half * d_x[1, p] - turning * late[p]
+        d_qhat[p] = half * d_x[1, p] - turning * late[p]
     behind = tail * rate * (upward - x[_LATE])
-    work.alpha[column[LOG_GUST]] += share * upward
-    work.qhat[column[ROTARY]] -= behind
-    work.qhat[column[LOG_GUST]] -= gusts.rotary * behind
+    d_alpha[column[LOG_GUST]] += share * upward
+    d_qhat[column[ROTARY]] -= behind
+    d_qhat[column[LOG_GUST]] -= gusts.rotary * behind
 
 
 @inner
@@ -213,10 +215,11 @@ def _coefficient_slopes(
     """Derivatives of CL and Cm beside the tables, without the effects' terms."""
     aircraft, more = model.aircraft, model.aircraft.increments
     z_by_alpha, z_by_qhat, m_by_alpha, m_by_qhat = more[0], more[1], more[_ROW], more[_ROW + 1]
-    for p in range(work.alpha.size):
-        work.increment[0, p] = z_by_alpha * work.alpha[p] + z_by_qhat * work.qhat[p]
-    for p in range(work.alpha.size):
-        work.increment[1, p] = m_by_alpha * work.alpha[p] + m_by_qhat * work.qhat[p]
+    d_alpha, d_qhat, first, second = work.signal[0], work.signal[_QHAT], work.increment[0], work.increment[1]
+    for p in range(d_alpha.size):
+        first[p] = z_by_alpha * d_alpha[p] + z_by_qhat * d_qhat[p]
+    for p in range(d_alpha.size):
+        second[p] = m_by_alpha * d_alpha[p] + m_by_qhat * d_qhat[p]
     for i in range(_ROW):
         value = signals.qhat
         if i == 0:
@@ -250,20 +253,11 @@ def _turning(
     by_qhat = by * (f.z_qhat * cosine - f.x_qhat * sine)
     by_first = by * at.qbar_pa * model.aircraft.area_m2 * cosine
     falls = G0 * math.sin(at.theta_rad - x[0]) / at.ground_m_s
+    d_alpha, d_qhat, first = work.signal[0], work.signal[_QHAT], work.increment[0]
     for p in range(row.size):
-        more = by_alpha * work.alpha[p] + by_qhat * work.qhat[p] - by_first * work.increment[0, p]
+        more = by_alpha * d_alpha[p] + by_qhat * d_qhat[p] - by_first * first[p]
         row[p] = falls * d_x[0, p] + d_x[1, p] + more
     row[column[THRUST]] += by * (f.thrust[1] * cosine - f.thrust[0] * sine)
-
-
-@inner
-def _gust_slopes(v: float, d_x: Array, model: FilterModel, slope: Array) -> None:
-    """Derivatives of the rates of the gusts, but for the late gust and the low-passed copies."""
-    a = v / model.gusts.length_m
-    for p in range(slope.shape[1]):
-        slope[GUST_1, p] = -a * d_x[GUST_1, p]
-    for p in range(slope.shape[1]):
-        slope[GUST_1 + 1, p] = a * (d_x[GUST_1, p] - d_x[GUST_1 + 1, p])
 
 
 @inner
@@ -281,7 +275,7 @@ def longitudinal_rate_slopes(
     """See `airtruth.tracing.model.slopes.rate_slopes`."""
     az = rates(x, at, model, out)
     aircraft, gusts, motion, v = model.aircraft, model.gusts, model.states.motion, at.airspeed_m_s
-    upward, half, more = gust(x, gusts.rolloff), 0.5 * aircraft.chord_m / v, aircraft.increments
+    upward, half, more = gust(x, gusts.rolloff), half_time(at, model), aircraft.increments
     alpha = air_alpha(x, upward, gusts.level_m_s, at)
     surface = effective_elevator(at.elevator_rad, aircraft)
     tail = gusts.rotary * gusts.level_m_s * (upward - x[_LATE]) / (gusts.rotary_time_s * v)
@@ -297,18 +291,19 @@ def longitudinal_rate_slopes(
     arm, by = aircraft.chord_m * aircraft.cg_shift, 1.0 / aircraft.inertia_kg_m2
     _turning(x, d_x, az * mass, alpha, f, at, model, column, slope[0], work)
     z_alpha, z_qhat, z_first = f.z_alpha / mass, f.z_qhat / mass, force / mass
+    d_alpha, d_qhat, first, second = work.signal[0], work.signal[_QHAT], work.increment[0], work.increment[1]
     for p in range(slope.shape[1]):
-        slope[motion, p] = z_alpha * work.alpha[p] + z_qhat * work.qhat[p] - z_first * work.increment[0, p]
+        slope[motion, p] = z_alpha * d_alpha[p] + z_qhat * d_qhat[p] - z_first * first[p]
     m_alpha, m_qhat = by * (f.m_alpha - arm * f.z_alpha), by * (f.m_qhat - arm * f.z_qhat)
     m_first, m_second = by * arm * force, by * force * aircraft.chord_m
     for p in range(slope.shape[1]):
-        tables = m_alpha * work.alpha[p] + m_qhat * work.qhat[p]
-        slope[1, p] = tables + m_first * work.increment[0, p] + m_second * work.increment[1, p]
+        tables = m_alpha * d_alpha[p] + m_qhat * d_qhat[p]
+        slope[1, p] = tables + m_first * first[p] + m_second * second[p]
     slope[1, column[THRUST]] += by * (f.thrust[2] - arm * f.thrust[1])
     slope[1, column[INERTIA]] -= out[1] / moved.inertia
     slope[motion, column[THRUST]] += f.thrust[1] / mass
-    _gust_slopes(v, d_x, model, slope)
-    effect_slopes(half, d_x, model, slope, work)
+    gust_rate_slopes(v, GUST_1, d_x, model, slope)
+    effect_slopes(half, ALPHA_DOT, d_x, model, slope, work)
     return az
 
 
@@ -329,14 +324,19 @@ def longitudinal_output_slopes(
     scale, arm, motion, v = model.sensors.scale, model.sensors.arm_m, model.states.motion, at.airspeed_m_s
     vane, ahead = arm[0] / v, arm[2]
     for p in range(out.shape[1]):
-        out[0, p] = work.alpha[p] - vane * d_x[1, p]
+        out[0, p] = work.signal[0, p] - vane * d_x[1, p]
     for p in range(out.shape[1]):
         out[1, p] = d_x[1, p]
     for p in range(out.shape[1]):
         out[2, p] = slope[motion, p] - ahead * slope[1, p]
     out[0, column[MOUNTING]] -= x[1] / v * moved.mounting_m
     out[2, column[MOUNTING]] -= rate[1] * moved.mounting_m
-    reading_slopes(x, d_x, at, model, out, work)
+    if model.effects.amplitude.size > 0:  # readings take q c/(2V) of the body and no alpha'
+        half, d_qhat, d_turn = half_time(at, model), work.signal[_QHAT], work.signal[ALPHA_DOT]
+        for p in range(out.shape[1]):
+            d_qhat[p], d_turn[p] = half * d_x[1, p], 0.0
+        alpha = air_alpha(x, gust(x, model.gusts.rolloff), model.gusts.level_m_s, at)
+        reading_slopes(x, d_x, measured(x, alpha, at, model), READING, model, out, work)
     for i in range(OUTPUTS):
         if scale[i] != 1.0:
             for p in range(out.shape[1]):
@@ -345,16 +345,15 @@ def longitudinal_output_slopes(
 
 def pack_moves(record: TraceRecord, compiled: CompiledChange, common: Array, rolloff: float) -> AircraftMoves:
     """What the parameters move of `airtruth.tracing.model.response.pack_aircraft`."""
-    entries, row, unit = SHORT_PERIOD.common, LONGITUDINAL.row("Cm"), np.eye(CORE)
+    entries, row = SHORT_PERIOD.common, LONGITUDINAL.row("Cm")
     plant = record.pitch_plant
-    upward = np.array([gust(x, 0.0) for x in unit])
-    lead = np.array([gust(x, 1.0) for x in unit]) - upward
+    upward, lead = gust_weights(GUST_1, rolloff)
     return AircraftMoves(
         inertia=1.0 + float(common[entries.inertia]),
         turned=plant.derivatives[row] + common[row],
         engine=np.zeros_like(plant.constant) + plant.engine,
         mounting_m=compiled.declared["cg"] * plant.aircraft.constants.chord_m,
-        upward=upward + rolloff * lead,
+        upward=upward,
         lead=lead,
     )
 

@@ -175,7 +175,7 @@ def rates(x: Array, at: AirPoint, model: FilterModel, out: Array) -> float:
     q = x[1]
     late = (upward - x[4]) / gusts.rotary_time_s
     surface = effective_elevator(at.elevator_rad, aircraft)
-    force, half = qbar * aircraft.area_m2, 0.5 * aircraft.chord_m / v
+    force, half = qbar * aircraft.area_m2, half_time(at, model)
     qhat = (q - gusts.rotary * gusts.level_m_s * late / v) * half
     fx, fz, fm = _look_up(aircraft, alpha, surface, qhat, qbar)
     d_alpha, d_de, more = (
@@ -251,7 +251,13 @@ def follow(x: Array, signals: tuple[float, ...], model: FilterModel) -> None:
 
 
 @inner
-def _measured(x: Array, alpha: float, at: AirPoint, model: FilterModel) -> Signals:
+def half_time(at: AirPoint, model: FilterModel) -> float:
+    """c/(2V) [s]."""
+    return float(0.5 * model.aircraft.chord_m / at.airspeed_m_s)
+
+
+@inner
+def measured(x: Array, alpha: float, at: AirPoint, model: FilterModel) -> Signals:
     """The signals that need no acceleration."""
     surface = effective_elevator(at.elevator_rad, model.aircraft)
     qhat = x[1] * 0.5 * model.aircraft.chord_m / at.airspeed_m_s
@@ -263,7 +269,7 @@ def move_plays(x: Array, at: AirPoint, model: FilterModel) -> None:
     """See `airtruth.tracing.model.by_motion.move_plays`."""
     if has_plays(model.effects):
         alpha = air_alpha(x, gust(x, model.gusts.rolloff), model.gusts.level_m_s, at)
-        follow(x, _measured(x, alpha, at, model), model)
+        follow(x, measured(x, alpha, at, model), model)
 
 
 def settle_effects(x: Array, at: AirPoint, model: FilterModel) -> None:
@@ -317,7 +323,7 @@ def outputs(x: Array, rate: Array, az: float, at: AirPoint, model: FilterModel, 
     y[1] = x[1]
     y[2] = az - arm[2] * rate[1]
     if model.effects.amplitude.size > 0:
-        add_readings(x, _measured(x, alpha, at, model), READING, model, y)
+        add_readings(x, measured(x, alpha, at, model), READING, model, y)
     for i in range(OUTPUTS):
         y[i] *= scale[i]
 
@@ -325,7 +331,7 @@ def outputs(x: Array, rate: Array, az: float, at: AirPoint, model: FilterModel, 
 @inner
 def signals_at(x: Array, at: AirPoint, rate: float, model: FilterModel, out: Array) -> None:
     """See `airtruth.tracing.model.by_motion.signals_at`."""
-    gusts, half = model.gusts, 0.5 * model.aircraft.chord_m / at.airspeed_m_s
+    gusts, half = model.gusts, half_time(at, model)
     upward = gust(x, gusts.rolloff)
     late = (upward - x[GUST_1 + 2]) / gusts.rotary_time_s
     out[0] = air_alpha(x, upward, gusts.level_m_s, at)
@@ -382,8 +388,10 @@ __all__ = [
     "effective_elevator",
     "follow",
     "gust",
+    "half_time",
     "has_plays",
     "hold_plays",
+    "measured",
     "rates",
     "settle_effects",
     "shape",

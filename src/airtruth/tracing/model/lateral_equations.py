@@ -51,17 +51,17 @@ from airtruth.units import G0
 
 Array = NDArray[np.float64]
 
-_STATES: Final = len(LATERAL.states)
+STATES: Final = len(LATERAL.states)
 """Number of states of the motion [-]."""
-_COEFFICIENTS: Final = len(LATERAL.coefficients)
+COEFFICIENTS: Final = len(LATERAL.coefficients)
 """Number of coefficients, and first number of a reading among what a term acts on [-]."""
-_SIGNALS: Final = len(LATERAL.signals)
+SIGNALS: Final = len(LATERAL.signals)
 """Number of signals that have a table [-]."""
-_LATE: Final = _STATES + 2
+LATE: Final = STATES + 2
 """State of the gust at the fin [-]."""
-_ROLL: Final = core_of(_STATES)
+ROLL: Final = core_of(STATES)
 """State of the roll gust [-]."""
-_BETA_DOT: Final = 5
+BETA_DOT: Final = 5
 """Number of the signal beta_dot_hat [-]."""
 
 _vane = cast(
@@ -105,18 +105,36 @@ def effective_deflection(rad: float, control: int, aircraft: LateralAircraft) ->
 
 
 @inner
-def _signals(x: Array, at: LateralPoint, model: FilterModel) -> LateralSignals:
+def half_time(at: LateralPoint, model: FilterModel) -> float:
+    """b/(2V) [s]."""
+    return float(0.5 * model.aircraft.span_m / at.airspeed_m_s)
+
+
+@inner
+def turning(x: Array, at: LateralPoint) -> float:
+    """beta' without the side force [rad/s]."""
+    moved, level = at.ground_m_s * math.cos(x[0]), G0 * math.cos(at.theta_rad)
+    return float(
+        x[1] * math.sin(at.ground_alpha_rad)
+        - x[2] * math.cos(at.ground_alpha_rad)
+        + level * math.sin(x[3]) / moved
+        - at.speed_rate_1_s * math.tan(x[0])
+    )
+
+
+@inner
+def measured(x: Array, at: LateralPoint, model: FilterModel) -> LateralSignals:
     """The signals but beta', which needs the forces."""
     aircraft, gusts = model.aircraft, model.gusts
-    side, v = gust_of(x, _STATES, gusts.rolloff), at.airspeed_m_s
-    half, turning = 0.5 * aircraft.span_m / v, gusts.rotary * gusts.level_m_s
-    late = (side - x[_LATE]) / gusts.rotary_time_s
+    side, v = gust_of(x, STATES, gusts.rolloff), at.airspeed_m_s
+    half, turned = half_time(at, model), gusts.rotary * gusts.level_m_s
+    late = (side - x[LATE]) / gusts.rotary_time_s
     return LateralSignals(
         air_beta(x, side, gusts.level_m_s, at),
         effective_deflection(at.aileron_rad, 0, aircraft),
         effective_deflection(at.rudder_rad, 1, aircraft),
-        (x[1] - turning * gusts.roll_1_m * x[_ROLL]) * half,
-        (x[2] - turning * late / v) * half,
+        (x[1] - turned * gusts.roll_1_m * x[ROLL]) * half,
+        (x[2] - turned * late / v) * half,
         0.0,
         at.qbar_pa,
         at.alpha_rad,
@@ -124,7 +142,7 @@ def _signals(x: Array, at: LateralPoint, model: FilterModel) -> LateralSignals:
 
 
 @inner
-def _of_table(signals: LateralSignals, number: int) -> float:
+def of_table(signals: LateralSignals, number: int) -> float:
     """Signal of a table, in the order of the motion."""
     if number == 0:
         return signals.beta
@@ -136,13 +154,13 @@ def _of_table(signals: LateralSignals, number: int) -> float:
 
 
 @inner
-def _look_up(aircraft: LateralAircraft, signals: LateralSignals) -> tuple[float, float, float]:
+def look_up(aircraft: LateralAircraft, signals: LateralSignals) -> tuple[float, float, float]:
     """Y [N], L and N [N m] of the tables, each linear in alpha and its signal, with the increments of the derivatives."""
     low, share = cell(aircraft.alpha_rad, signals.alpha)
     values, constant, more = aircraft.values, aircraft.constant, aircraft.increments
     fy = fl = fn = cy = cl = cn = 0.0
-    for s in range(_SIGNALS):
-        x = _of_table(signals, s)
+    for s in range(SIGNALS):
+        x = of_table(signals, s)
         j, sj = cell(aircraft.points[s], x)
         for a in range(2):
             wa = share if a else 1.0 - share
@@ -152,8 +170,8 @@ def _look_up(aircraft: LateralAircraft, signals: LateralSignals) -> tuple[float,
             fn += w0 * values[s, low + a, j, 2] + w1 * values[s, low + a, j + 1, 2]
         away = x - aircraft.trim[s]
         cy += more[s] * away
-        cl += more[_SIGNALS + s] * away
-        cn += more[2 * _SIGNALS + s] * away
+        cl += more[SIGNALS + s] * away
+        cn += more[2 * SIGNALS + s] * away
     force = signals.qbar * aircraft.area_m2
     moment = force * aircraft.span_m
     return (
@@ -164,7 +182,7 @@ def _look_up(aircraft: LateralAircraft, signals: LateralSignals) -> tuple[float,
 
 
 @inner
-def _terms(
+def terms(
     x: Array, signals: LateralSignals, effects: EffectArrays, in_beta_dot: bool, feedback: float
 ) -> tuple[float, float, float]:
     """Increments of CY, Cl and Cn by the effects' terms in beta', or by all others.
@@ -176,7 +194,7 @@ def _terms(
     side = roll = yaw = 0.0
     for t in range(effects.amplitude.size):
         acts_on, number = effects.term_index[t, 0], effects.term_index[t, 1]
-        if (number == _BETA_DOT) != in_beta_dot or acts_on >= _COEFFICIENTS:
+        if (number == BETA_DOT) != in_beta_dot or acts_on >= COEFFICIENTS:
             continue
         state, amplitude = effects.term_index[t, 3], effects.amplitude[t]
         s = x[state] if state >= 0 else signal_of(signals, number)
@@ -196,7 +214,7 @@ def _terms(
 
 
 @inner
-def _with_beta_dot(signals: LateralSignals, beta_dot_hat: float) -> LateralSignals:
+def with_beta_dot(signals: LateralSignals, beta_dot_hat: float) -> LateralSignals:
     return LateralSignals(
         signals.beta,
         signals.aileron,
@@ -214,23 +232,18 @@ def rates(x: Array, at: LateralPoint, model: FilterModel, out: Array) -> float:
     """See `airtruth.tracing.model.by_motion.rates`; returns ay at the CG [m/s2]."""
     aircraft, gusts = model.aircraft, model.gusts
     p, r, q, mass = x[1], x[2], at.q_rad_s, aircraft.mass_kg
-    signals = _signals(x, at, model)
-    fy, fl, fn = _look_up(aircraft, signals)
+    signals = measured(x, at, model)
+    fy, fl, fn = look_up(aircraft, signals)
     force = at.qbar_pa * aircraft.area_m2
-    half, moved = 0.5 * aircraft.span_m / at.airspeed_m_s, at.ground_m_s * math.cos(x[0])
+    half, moved = half_time(at, model), at.ground_m_s * math.cos(x[0])
     level = G0 * math.cos(at.theta_rad)
-    turning = (
-        p * math.sin(at.ground_alpha_rad)
-        - r * math.cos(at.ground_alpha_rad)
-        + level * math.sin(x[3]) / moved
-        - at.speed_rate_1_s * math.tan(x[0])
-    )
+    unforced = turning(x, at)
     side, roll, yaw = at.side, at.roll, at.yaw
     if model.effects.amplitude.size > 0:
         for turn in range(2):  # terms in beta' last: they take beta' with everything else in it
-            first = turning + (fy + force * side) / (mass * moved)
-            own = _with_beta_dot(signals, first * half)
-            added = _terms(x, own, model.effects, turn == 1, half * force / (mass * moved))
+            first = unforced + (fy + force * side) / (mass * moved)
+            own = with_beta_dot(signals, first * half)
+            added = terms(x, own, model.effects, turn == 1, half * force / (mass * moved))
             side, roll, yaw = side + added[0], roll + added[1], yaw + added[2]
     fy += force * side
     lifted = mass * aircraft.cg_y_m
@@ -246,14 +259,14 @@ def rates(x: Array, at: LateralPoint, model: FilterModel, out: Array) -> float:
     fl += ixz * p * q - (izz - iyy) * q * r
     fn -= ixz * q * r + (iyy - ixx) * p * q
     determinant = ixx * izz - ixz * ixz
-    out[0] = turning + fy / (mass * moved)
+    out[0] = unforced + fy / (mass * moved)
     out[1] = (izz * fl + ixz * fn) / determinant
     out[2] = (ixz * fl + ixx * fn) / determinant
     out[3] = p + (q * math.sin(x[3]) + r * math.cos(x[3])) * math.tan(at.theta_rad)
-    late = (gust_of(x, _STATES, gusts.rolloff) - x[_LATE]) / gusts.rotary_time_s
-    gust_rates(x, _STATES, at.airspeed_m_s, late, gusts, out)
-    out[_ROLL] = -x[_ROLL] / gusts.roll_time_s
-    effect_rates(x, _with_beta_dot(signals, out[0] * half), model, out)
+    late = (gust_of(x, STATES, gusts.rolloff) - x[LATE]) / gusts.rotary_time_s
+    gust_rates(x, STATES, at.airspeed_m_s, late, gusts, out)
+    out[ROLL] = -x[ROLL] / gusts.roll_time_s
+    effect_rates(x, with_beta_dot(signals, out[0] * half), model, out)
     return float(fy / mass)
 
 
@@ -261,13 +274,13 @@ def rates(x: Array, at: LateralPoint, model: FilterModel, out: Array) -> float:
 def outputs(x: Array, rate: Array, ay: float, at: LateralPoint, model: FilterModel, y: Array) -> None:
     """beta [rad], p, r [rad/s], phi [rad] and ay [m/s2], see `airtruth.tracing.model.by_motion.outputs`."""
     scale, arm, down = model.sensors.scale, model.sensors.arm_m, model.sensors.down_m
-    side = gust_of(x, _STATES, model.gusts.rolloff)
+    side = gust_of(x, STATES, model.gusts.rolloff)
     beta = air_beta(x, side, model.gusts.level_m_s, at)
     y[0] = _vane(beta, x[1], x[2], arm[0], down[0], at.airspeed_m_s)
     y[1], y[2], y[3] = x[1], x[2], x[3]
     y[4] = ay + arm[4] * (rate[2] + x[1] * at.q_rad_s) - down[4] * (rate[1] - at.q_rad_s * x[2])
     if model.effects.amplitude.size > 0:
-        add_readings(x, _signals(x, at, model), _COEFFICIENTS, model, y)
+        add_readings(x, measured(x, at, model), COEFFICIENTS, model, y)
     for i in range(y.size):
         y[i] *= scale[i]
 
@@ -295,7 +308,7 @@ def air_at(grid: LateralGrid, point: int) -> LateralPoint:
 @inner
 def signals_at(x: Array, at: LateralPoint, rate: float, model: FilterModel, out: Array) -> None:
     """See `airtruth.tracing.model.by_motion.signals_at`."""
-    half, own = 0.5 * model.aircraft.span_m / at.airspeed_m_s, _signals(x, at, model)
+    half, own = half_time(at, model), measured(x, at, model)
     out[0], out[1], out[2], out[3], out[4] = own.beta, own.aileron, own.rudder, own.phat, own.rhat
     out[5], out[6], out[7] = rate * half, own.qbar, own.alpha
     out[8], out[9] = x[1] * half, x[2] * half
@@ -325,7 +338,7 @@ def shifted(at: LateralPoint, field: int, by: float) -> LateralPoint:
 def move_plays(x: Array, at: LateralPoint, model: FilterModel) -> None:
     """See `airtruth.tracing.model.by_motion.move_plays`."""
     if has_plays(model.effects):
-        follow(x, _signals(x, at, model), model)
+        follow(x, measured(x, at, model), model)
 
 
 def settle_effects(x: Array, at: LateralPoint, model: FilterModel) -> None:
@@ -343,7 +356,7 @@ def settle_effects(x: Array, at: LateralPoint, model: FilterModel) -> None:
 
 
 EQUATIONS: Final = Equations(
-    states=_STATES,
+    states=STATES,
     early=len(LATERAL.outputs) - 1,
     rates=rates,
     outputs=outputs,
@@ -353,9 +366,28 @@ EQUATIONS: Final = Equations(
     shifted=shifted,
     signals_at=signals_at,
     point=LateralPoint,
-    coefficients=_COEFFICIENTS,
+    coefficients=COEFFICIENTS,
     has_roll_gust=True,
 )
 """The equations of the lateral-directional motion."""
 
-__all__ = ["EQUATIONS", "LateralSignals", "air_beta", "effective_deflection"]
+__all__ = [
+    "BETA_DOT",
+    "COEFFICIENTS",
+    "EQUATIONS",
+    "LATE",
+    "ROLL",
+    "SIGNALS",
+    "STATES",
+    "LateralSignals",
+    "air_beta",
+    "effective_deflection",
+    "half_time",
+    "look_up",
+    "measured",
+    "of_table",
+    "rates",
+    "terms",
+    "turning",
+    "with_beta_dot",
+]

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import by_types, shared
 from airtruth.physics.motion import MOTIONS
+from airtruth.physics.terms import signals_of
 from airtruth.tracing.model.kernel_input import AnyPoint, FilterModel
 from airtruth.tracing.model.parameters import ParameterLayout
 
@@ -28,21 +29,23 @@ ROTARY, THRUST, ROLLOFF, INERTIA, MOUNTING, LOG_GUST = range(len(MOVERS))
 """Their numbers."""
 _COEFFICIENTS: Final = max(len(motion.coefficients) for motion in MOTIONS.values())
 """Most coefficients of a motion [-]."""
+_SIGNALS: Final = max(len(signals_of(motion)) for motion in MOTIONS.values())
+"""Most signals of the terms of a motion [-]."""
 
 
 class SlopeWork(NamedTuple):
-    """Derivatives of what forces and readings depend on, (parameters,) each but the last.
+    """Derivatives of what forces and readings depend on, with the parameters as the last axis.
 
     Attributes
     ----------
-    upward, alpha, qhat, alpha_dot_hat : of the gust [-] and the signals of the terms.
+    gust : of the gust [-].
+    signal : (signals, parameters) of the signals of the terms, in the order of `airtruth.physics.terms.signals_of` the motion;
+        zero for the known inputs.
     increment : (coefficients, parameters) of the coefficients beside the tables.
     """
 
-    upward: Array
-    alpha: Array
-    qhat: Array
-    alpha_dot_hat: Array
+    gust: Array
+    signal: Array
     increment: Array
 
 
@@ -84,9 +87,7 @@ def slope_work(parameters: int) -> SlopeWork:
     """Arrays for a number of parameters."""
     return SlopeWork(
         np.zeros(parameters),
-        np.zeros(parameters),
-        np.zeros(parameters),
-        np.zeros(parameters),
+        np.zeros((_SIGNALS, parameters)),
         np.zeros((_COEFFICIENTS, parameters)),
     )
 

@@ -6,19 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.numerics.compiled import inner
-from airtruth.tracing.model.equations import (
-    ALPHA_DOT,
-    PLAY,
-    PLAY_S,
-    READING,
-    Signals,
-    air_alpha,
-    effective_elevator,
-    gust,
-    shape,
-    signal_of,
-)
-from airtruth.tracing.model.kernel_input import AirPoint, EffectArrays, FilterModel
+from airtruth.tracing.model.equations import PLAY, PLAY_S, shape, signal_of
+from airtruth.tracing.model.kernel_input import EffectArrays, FilterModel
 from airtruth.tracing.model.slopes import SlopeWork
 
 Array = NDArray[np.float64]
@@ -43,35 +32,31 @@ def _add(by: float, d: Array, row: Array) -> None:
 
 
 @inner
-def _add_signal(number: int, by: float, work: SlopeWork, row: Array) -> None:
-    """Add a multiple of the derivatives of a signal; the surface and the dynamic pressure are known inputs."""
-    if number == 0 or number == 2 or number == ALPHA_DOT:
-        d = work.alpha if number == 0 else (work.qhat if number == 2 else work.alpha_dot_hat)
-        _add(by, d, row)
-
-
-@inner
 def add_term(
     t: int,
     x: Array,
     d_x: Array,
-    signals: Signals,
+    signals: tuple[float, ...],
     effects: EffectArrays,
+    turning: int,
     feedback: float,
-    by_alpha: float,
+    by_flow: float,
+    d_flow: Array,
     work: SlopeWork,
 ) -> None:
-    """Add the derivatives of a term of CL or Cm.
+    """Add the derivatives of a term of a coefficient.
 
     Parameters
     ----------
-    feedback : loss of alpha_dot_hat by a unit of CL [-]; by_alpha : its slope in alpha.
+    turning : number of the signal that has the rate of the flow angle.
+    feedback : loss of this signal by a unit of the first coefficient [-]; by_flow : its slope in a flow angle.
+    d_flow : (parameters,) derivatives of this angle.
     """
     number, state, factor = effects.term_index[t, 1], effects.term_index[t, 3], effects.term_index[t, 4]
     amplitude, is_first = effects.amplitude[t], effects.term_index[t, 0] == 0
     raw = x[state] if state >= 0 else signal_of(signals, number)
     loop = 1.0
-    if number == ALPHA_DOT and is_first:
+    if number == turning and is_first:
         loop = 1.0 / (1.0 + amplitude * feedback)
     s = raw * loop - effects.origin[t]
     weight = signal_of(signals, factor) - effects.factor_origin[t] if factor >= 0 else 1.0
@@ -80,44 +65,52 @@ def add_term(
     if state >= 0:
         _add(bent, d_x[state], row)
     else:
-        _add_signal(number, bent * loop, work, row)
+        _add(bent * loop, work.signal[number], row)
         if loop != 1.0:
-            _add(-bent * raw * loop * loop * amplitude * by_alpha, work.alpha, row)
+            _add(-bent * raw * loop * loop * amplitude * by_flow, d_flow, row)
     if factor >= 0:
-        _add_signal(factor, amplitude * shape(effects.term_index[t, 2], s), work, row)
+        _add(amplitude * shape(effects.term_index[t, 2], s), work.signal[factor], row)
 
 
 @inner
-def effect_slopes(half: float, d_x: Array, model: FilterModel, slope: Array, work: SlopeWork) -> None:
-    """Derivatives of the rates of the effects' states."""
+def effect_slopes(
+    half: float, turning: int, d_x: Array, model: FilterModel, slope: Array, work: SlopeWork
+) -> None:
+    """Derivatives of the rates of the effects' states.
+
+    Parameters
+    ----------
+    half : signal of a unit of the rate of the flow angle [s]; turning : its number.
+    """
     effects = model.effects
     if effects.time_s.size > 0:
-        for p in range(work.alpha.size):
-            work.alpha_dot_hat[p] = half * slope[0, p]
+        own = work.signal[turning]
+        for p in range(own.size):
+            own[p] = half * slope[0, p]
     for k in range(effects.time_s.size):
         at, signal, wn = model.states.effect[k], effects.state_index[k, 1], 1.0 / effects.time_s[k]
         row = slope[at]
         for p in range(row.size):
             row[p] = 0.0
         if effects.state_index[k, 0] == PLAY:
-            _add_signal(signal, 1.0 / PLAY_S, work, row)
+            _add(1.0 / PLAY_S, work.signal[signal], row)
             _add(-1.0 / PLAY_S, d_x[at], row)
         elif effects.state_index[k, 0] == 0:
-            _add_signal(signal, wn, work, row)
+            _add(wn, work.signal[signal], row)
             _add(-wn, d_x[at], row)
         else:
             _add(1.0, d_x[at + 1], row)
             row = slope[at + 1]
             for p in range(row.size):
                 row[p] = 0.0
-            _add_signal(signal, wn * wn, work, row)
+            _add(wn * wn, work.signal[signal], row)
             _add(-wn * wn, d_x[at], row)
             _add(-2.0 * effects.damping[k] * wn, d_x[at + 1], row)
 
 
 @inner
 def _add_reading(
-    t: int, x: Array, d_x: Array, signals: Signals, model: FilterModel, work: SlopeWork, row: Array
+    t: int, x: Array, d_x: Array, signals: tuple[float, ...], model: FilterModel, work: SlopeWork, row: Array
 ) -> None:
     """Add the derivatives of an increment of a reading."""
     effects = model.effects
@@ -129,30 +122,30 @@ def _add_reading(
         weight = x[own] - signal_of(signals, driver)
         value = effects.amplitude[t] * shape(effects.term_index[t, 2], s)
         _add(value, d_x[own], row)
-        _add_signal(driver, -value, work, row)
+        _add(-value, work.signal[driver], row)
     by = effects.amplitude[t] * _shape_slope(effects.term_index[t, 2], s) * weight
     if state >= 0:
         _add(by, d_x[state], row)
     else:
-        _add_signal(number, by, work, row)
+        _add(by, work.signal[number], row)
 
 
 @inner
 def reading_slopes(
-    x: Array, d_x: Array, at: AirPoint, model: FilterModel, out: Array, work: SlopeWork
+    x: Array,
+    d_x: Array,
+    signals: tuple[float, ...],
+    first: int,
+    model: FilterModel,
+    out: Array,
+    work: SlopeWork,
 ) -> None:
-    """Add the derivatives of the increments of the readings, which take q c/(2V) of the body and no alpha'."""
-    half, effects = 0.5 * model.aircraft.chord_m / at.airspeed_m_s, model.effects
-    if effects.amplitude.size == 0:
-        return
-    for p in range(out.shape[1]):
-        work.qhat[p], work.alpha_dot_hat[p] = half * d_x[1, p], 0.0
-    alpha = air_alpha(x, gust(x, model.gusts.rolloff), model.gusts.level_m_s, at)
-    surface = effective_elevator(at.elevator_rad, model.aircraft)
-    signals = Signals(alpha, surface, x[1] * half, 0.0, at.qbar_pa)
+    """Add the derivatives of the increments of the readings, see `airtruth.tracing.model.equations.add_readings`."""
+    effects = model.effects
     for t in range(effects.amplitude.size):
-        if effects.term_index[t, 0] >= READING:
-            _add_reading(t, x, d_x, signals, model, work, out[effects.term_index[t, 0] - READING])
+        output = effects.term_index[t, 0] - first
+        if output >= 0:
+            _add_reading(t, x, d_x, signals, model, work, out[output])
 
 
 __all__ = ["add_term", "effect_slopes", "reading_slopes"]
