@@ -8,7 +8,6 @@ import pytest
 from test_response_slopes import check
 
 from airtruth.physics.terms import AeroTerm, Change, DeclaredTerm, ReadingTerm, SensorTerm, StateTerm
-from airtruth.tracing.model import lateral_slopes  # noqa: F401  (registers the slopes)
 from airtruth.tracing.model.response import filter_inputs
 from airtruth.tracing.model.settings import without
 from airtruth.units import DEG

@@ -139,7 +139,8 @@ def prepare(
     reasons = {effect.key: _why_not(effect, columns, absent) for effect in effects}
     untestable = [(e, reasons[e.key]) for e in effects if reasons[e.key]]
     if options.effects is not None:  # those of the library were not asked for
-        untestable += [(e, f"it does not act on the {motion.name} motion") for e in foreign]
+        elsewhere = f"it does not act on the {motion.name} motion"
+        untestable += [(e, _why_not(e, columns, absent) or elsewhere) for e in foreign]
     trims = [float(r.plant.trim_signals[0]) for r in fitted]
     trim_flow_rad = trims[0] + fmean(trim - trims[0] for trim in trims)
     return Case(

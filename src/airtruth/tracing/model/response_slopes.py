@@ -18,6 +18,7 @@ from airtruth.tracing.model.flight_slopes import innovation_slopes
 from airtruth.tracing.model.gain_slopes import Conditions, Moves, conditions
 from airtruth.tracing.model.gains_along import slopes_along
 from airtruth.tracing.model.kernel_input import KernelInput
+from airtruth.tracing.model.lateral_slopes import LateralMoves
 from airtruth.tracing.model.linearise import FirstUpdate
 from airtruth.tracing.model.parameters import ParameterLayout
 from airtruth.tracing.model.response import LOST, FilterInputs, Response, kernel_input, respond_to
@@ -29,9 +30,9 @@ from airtruth.tracing.model.steady import Condition, common_of, conditions_of, e
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_SHARE: Final = 0.01
+_SHARE: Final = 0.001
 """Step of the differences of gains over that of differences of flights [-]; judgement: the linearisation moves linearly with it,
-so that curvature counts a tenth, and rounding is 1e-8 of the derivatives."""
+so that curvature counts a hundredth of what it does in a flight, and rounding is 1e-7 of the derivatives."""
 
 
 class ResponseSlopes(NamedTuple):
@@ -242,7 +243,9 @@ def _condition(own: Conditions, moves: Moves) -> Condition:
     )
 
 
-def _moved(kernel: KernelInput, aircraft: AircraftMoves, noise: _Noise, places: _Places) -> Moved:
+def _moved(
+    kernel: KernelInput, aircraft: AircraftMoves | LateralMoves, noise: _Noise, places: _Places
+) -> Moved:
     """What the parameters move beside the gains."""
     spare, n, count = places.h.size - 1, kernel.model.states.size, kernel.model.sensors.scale.size
     start, bias = np.zeros((n, width_of(spare))), np.full(count, spare, dtype=np.int64)
