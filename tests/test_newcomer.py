@@ -181,7 +181,7 @@ TASKS = (
     Task(
         "trace for one cause",
         f"trace {LOG} --aircraft gtm --effect delay --out t",
-        ("did you mean 'elevator_delay'", "airtruth"),
+        ("did you mean", "'elevator_delay'"),
         "effects elevator_delay",
     ),
     Task(

@@ -35,6 +35,7 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.errors import AirtruthError
 from airtruth.logs.atomic import write_text
 from airtruth.logs.store import read_log, write_log
+from airtruth.physics.motion import LONGITUDINAL
 from airtruth.simulation import manoeuvres
 from airtruth.simulation.campaign import file as campaign_file
 from airtruth.simulation.campaign.file import NO_GUST, Campaign
@@ -63,7 +64,7 @@ def ties(blind: Path) -> list[str]:
 def sets(answer: dict[str, Any]) -> list[list[str]]:
     """The sets of an answer that have several effects, those that an input can separate."""
     every = [[e["name"], *e["indistinguishable_from"]] for e in answer.get("effects", ())]
-    separable = {e.name for e in EFFECTS.values() if is_separable(e)}
+    separable = {e.name for e in EFFECTS.values() if LONGITUDINAL.name in e.motions and is_separable(e)}
     return [s for s in every if 1 < len(s) <= MOST and separable.issuperset(s)]
 
 

@@ -150,8 +150,9 @@ def trace(
     declared = aircraft if isinstance(aircraft, Aircraft) else planes.load(aircraft)
     parts = parts_of(logs, declared, options or TraceOptions())
     if out is not None:  # of an earlier command that answered more motions
-        for name in FOLDERS[1:]:
-            atomic.remove_file(out / name / ANSWER)
+        for stale in (out / name / ANSWER for name in FOLDERS[1:]):
+            if stale.exists():
+                atomic.remove_file(stale)
     first, *others = [
         trace_one(
             logs,

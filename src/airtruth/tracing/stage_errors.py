@@ -143,6 +143,18 @@ class Tolerances:
     stages: dict[str, BySet[Excursions]]
     modes: dict[str, dict[str, float | None]] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        """Refuse sets of records whose distances are of different quantities.
+
+        Raises
+        ------
+        ValueError
+            If they are.
+        """
+        every = [own for stage in self.stages.values() for own in (stage.fit, stage.held_out) if own]
+        if len({tuple(own.distances) for own in every}) > 1:
+            raise ValueError("the distances of all stages have to be of the same quantities")
+
     def to_dict(self) -> dict[str, Any]:
         """Source, limits and stages side by side."""
         rows = {name: e.to_dict() for name, e in self.stages.items()}
