@@ -9,6 +9,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
+from airtruth.effects.registry import stated
 from airtruth.errors import ConfigurationError
 from airtruth.logs import store
 from airtruth.simulation.campaign import plan
@@ -112,6 +113,11 @@ def test_dry_run_names_the_effects_and_the_copy_goes_with_its_plan(tmp_path):
     assert not folder.exists()
 
 
+def test_a_channel_names_the_effect_of_the_pitch_plane_too():
+    effect, values = stated({"name": "vane_lag", "channel": "alpha_rad", "tau_s": 0.02})
+    assert (effect.key, values) == ("vane_lag", {"tau_s": 0.02})
+
+
 @pytest.mark.parametrize(
     ("effect", "said"),
     [
@@ -130,16 +136,18 @@ def test_dry_run_names_the_effects_and_the_copy_goes_with_its_plan(tmp_path):
         ({"name": "cm_alpha_nonlinear", "dCmalpha": 0.5}, "at_alpha_rad is missing"),
         (
             {"name": "sensor_delay", "delay_s": 0.02},
-            "state its variant; allowed: alpha_rad, az_m_s2, elevator_rad, q_rad_s",
+            "state its variant; allowed: aileron_rad, alpha_rad, ay_m_s2, az_m_s2, beta_rad, elevator_rad, p_rad_s, phi_rad, "
+            "q_rad_s, r_rad_s, rudder_rad",
         ),
         ({"name": "sensor_delay", "channel": "q_rads", "delay_s": 0.02}, "did you mean 'q_rad_s'"),
         (
             {"name": "sensor_delay", "variant": "alpha_rad", "channel": "q_rad_s", "delay_s": 0.02},
             "name two variants; state one",
         ),
-        ({"name": "vane_lag", "channel": "alpha_rad", "tau_s": 0.02}, "'channel' is not a parameter"),
+        ({"name": "vane_lag", "channel": "az_m_s2", "tau_s": 0.02}, "allowed: beta_rad"),
+        ({"name": "elevator_delay", "channel": "alpha_rad", "delay_s": 0.02}, "'channel' is not a parameter"),
         ({"name": "cm_alpha_nonlinear", "variant": "brake", "dCmalpha": 1}, "did you mean 'break'"),
-        ({"name": "backlash", "variant": "x", "width_deg": 1}, "has no variants"),
+        ({"name": "elevator_delay", "variant": "x", "delay_s": 0.1}, "has no variants"),
         ({"variant": "x"}, "effect.0.name"),
         ({"name": "elevator_delay", "parameters": {"delay_s": -0.5}}, "outside its range of 0 to 0.2 s"),
         ({"name": "cg_shift", "parameters": {"dx_mac": 0.9}}, "outside its range"),

@@ -187,7 +187,7 @@ def logs(tmp_path_factory):
     sound = hostile.copy(folder / "hostile")
     file = campaign(folder, sound, duration_s=5.0)
     assert command("fly", file, "--out", folder / "out", "--quiet").code == 0
-    estimates = ("--out", folder / "estimates.csv", "--method", "ls")
+    estimates = ("--out", folder / "estimates.parquet", "--method", "ls")
     ended = command("identify", folder / "out", "--aircraft", sound, *estimates)
     assert ended.code == 0, ended.err
     return folder
@@ -211,7 +211,7 @@ def test_other_commands_that_trim(tmp_path, plane, logs, name):
             "--quiet",
         ),
         "report": (
-            logs / "estimates.csv",
+            logs / "estimates.parquet",
             "--log",
             logs / "out",
             "--aircraft",

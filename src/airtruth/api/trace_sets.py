@@ -109,7 +109,7 @@ class TracedSets:
 
     def to_dict(self) -> dict[str, Any]:
         """Name of a set -> its trace.json, or the reason why it has none under the key "error"."""
-        return {s.name: by_motion(s.answers) if s.answers else {"error": s.error} for s in self.sets}
+        return {s.name: dict(by_motion(s.answers)) if s.answers else {"error": s.error} for s in self.sets}
 
     def plot(self) -> Figure:
         """Number of sets with each verdict."""

@@ -113,7 +113,7 @@ def chosen(name: str, variant: str = "", keys: Iterable[str] = ()) -> Effect:
     given = set(keys)
     fitting = [e for e in effects if given <= {key for p in e.parameters for key in p.spellings()}]
     for effect in effects if variant else fitting or effects:
-        if effect.variant == variant:
+        if variant == effect.variant or (not effect.variant and (variant,) == effect.channels):
             return effect
     variants = [e.variant for e in effects if e.variant]
     if not variants:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -330,7 +330,7 @@ class AirTerm:
     factor: float
 
 
-def entries(term: SurfaceTerm | StateTerm | AeroTerm | ReadingTerm) -> dict[str, Any]:
+def entries(term: SurfaceTerm | StateTerm | AeroTerm | ReadingTerm) -> Mapping[str, object]:
     """Entries of a term in a file; a surface term of the elevator names no control.
 
     Examples

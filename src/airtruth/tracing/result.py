@@ -98,7 +98,7 @@ class TraceResult:
 
     def to_dict(self) -> dict[str, Any]:
         """What trace.json holds (docs/trace.md); of several motions, that of each under its name."""
-        return by_motion(self.answers)
+        return dict(by_motion(self.answers))
 
     def plot(self) -> Figure:
         """Residuals of one record's free run: as declared, the effect, before and after."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from airtruth.table import escaped
@@ -11,7 +11,7 @@ from airtruth.tracing.answer import TraceAnswer
 Format = Callable[[TraceAnswer], str]
 
 
-def by_motion(answers: Sequence[TraceAnswer]) -> dict[str, Any]:
+def by_motion(answers: Sequence[TraceAnswer]) -> Mapping[str, Any]:
     """The content of trace.json; of several answers, name of the motion -> its content."""
     if len(answers) == 1:
         return answers[0].to_dict()
