@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lateral_flights import lateral_aircraft
 
 from airtruth.tracing import TraceOptions
 from airtruth.tracing.run import trace
+from validation.lateral_declared import lateral_aircraft
 from validation.lateral_truth import GTM, log_of, record_pair, with_effect
 
 LATERAL = TraceOptions(motion="lateral")
