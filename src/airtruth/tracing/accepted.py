@@ -108,7 +108,7 @@ class AcceptedEffect:
     indistinguishable_from : names of the effects that explain the records as well.
     gain_2_log_likelihood : gain in 2 log L of the refit [-]; None where an old file does not state it.
     other_variants : variants of the same effect that explain the records as well.
-    channel : delayed channel, of `sensor_delay` alone.
+    channel : column of the log that the variant names; None where the variant is no column.
     about_alpha_rad : angle of attack about which a curvature counts [rad]; None for other effects.
     acts_on, over : of a learned increment: coefficient, and the signal on which it depends; None for other effects.
     by, by_at : of a learned increment of a derivative: the signal that multiplies the table, and from where it counts; of

@@ -83,14 +83,6 @@ class LateralMoves(NamedTuple):
 
 
 @inner
-def _signal_of_table(number: int) -> int:
-    """Number of the signal of a table whose signal the motion moves."""
-    if number == 0:
-        return 0
-    return _PHAT if number == 1 else _RHAT
-
-
-@inner
 def _table_slope(aircraft: LateralAircraft, signals: LateralSignals, number: int, force: int) -> float:
     """Slope of Y [N], L or N [N m] of the tables in a signal: that of the cell."""
     low, share = cell(aircraft.alpha_rad, signals.alpha)
