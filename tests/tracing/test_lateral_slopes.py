@@ -58,7 +58,8 @@ def bent():
     axis = np.linspace(-1.0, 1.0, 3)
     slope = made.values[:, :1, 1:, :]
     values = slope * (line + 2.0 * line**3)[:, None] * (1.0 + 0.5 * axis)[:, None, None]
-    return replace(made, alpha_rad=axis, points=np.tile(line, (5, 1)), values=values)
+    tables = {"points": np.tile(line, (5, 1)), "values": values, "constant": np.zeros((axis.size, 3))}
+    return replace(made, alpha_rad=axis, **tables)
 
 
 def arguments(change, share, uncertain, speed=lr.V):
