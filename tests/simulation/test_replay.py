@@ -6,8 +6,9 @@ import pytest
 from airtruth import aircraft
 from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.manoeuvres import Manoeuvre, sample
-from airtruth.simulation.replay import Track, each_flown_through, flown_through, replay, substeps
+from airtruth.simulation.replay import each_flown_through, flown_through, replay
 from airtruth.simulation.simulator import Condition
+from airtruth.simulation.tracks import Track, substeps
 from airtruth.simulation.trim import trim
 from airtruth.units import DEG
 

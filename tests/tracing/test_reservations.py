@@ -237,6 +237,9 @@ def test_a_rise_of_less_than_two_percent_is_no_note():
 
 
 def test_a_traceable_cause_contradicts_the_declared_model_in_four_of_five_flights():
-    """One degree of freedom: the normal quantiles of half of the level 0.0025 and of the power."""
-    assert traceable_errors(1) == pytest.approx(norm.isf(0.00125) + norm.isf(0.2), abs=1e-4)
+    """One degree of freedom: the normal quantiles of half of the level 0.00125 and of the power."""
+    assert traceable_errors(1) == pytest.approx(norm.isf(0.000625) + norm.isf(0.2), abs=1e-4)
     assert traceable_errors(5) > traceable_errors(4) > 4.0
+    # one of fifteen derivatives: a fifteenth of the level, and less than the joint test needs
+    assert traceable_errors(15, 15) == pytest.approx(norm.isf(0.000625 / 15.0) + norm.isf(0.2), abs=1e-3)
+    assert traceable_errors(15, 15) < traceable_errors(15) - 0.3

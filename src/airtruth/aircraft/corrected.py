@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from airtruth.aircraft.create import write_new
+from airtruth.aircraft.create import flown_values, write_new
 from airtruth.aircraft.dynamics import declared_dynamics
 from airtruth.aircraft.file import FILE, Aircraft
 from airtruth.aircraft.jsbsim.short_period import TrimPoint
@@ -37,7 +37,7 @@ def reference_point(
     Parameters
     ----------
     aircraft : source of mass and geometry.
-    derivatives : the six derivatives [1/rad].
+    derivatives : the six derivatives of the pitch plane [1/rad].
     at : trim of the changed aircraft.
     change : terms, alpha counted from zero.
     """
@@ -74,7 +74,7 @@ def write_corrected(
     Parameters
     ----------
     aircraft : an aircraft without a JSBSim model: geometry, mass, actuator, sensors, and dynamics, which the model takes.
-    derivatives : all of `airtruth.physics.short_period.PARAMETERS` about the CG, without the change [1/rad].
+    derivatives : all of a motion, or of both, about the CG, without the change [1/rad, -].
     at : trim at which the changed aircraft flies.
     change : terms to add, alpha counted from zero; terms in the air are left out.
     out_folder : folder to write, new or empty; the JSBSim model takes its name.
@@ -97,7 +97,7 @@ def write_corrected(
     """
     whole = declared_dynamics(aircraft.file.dynamics, "") + change
     static = aircraft.model_copy(update={"file": aircraft.file.model_copy(update={"dynamics": None})})
-    values = {name: quantity.value for name, quantity in derivatives.items()}
+    values = flown_values(derivatives, at)
     with tempfile.TemporaryDirectory() as folder:
         reference = reference_point(aircraft, values, at, whole)
         plain = write_new(static, derivatives, reference, Path(folder) / out_folder.name)

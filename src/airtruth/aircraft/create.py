@@ -1,4 +1,4 @@
-"""Write an aircraft with a JSBSim model from six derivatives, for a measured aircraft that has no model.
+"""Write an aircraft with a JSBSim model from its derivatives, for a measured aircraft that has no model.
 
 The equations of the model are in `airtruth.aircraft.jsbsim.short_period`.
 """
@@ -13,21 +13,26 @@ import numpy as np
 import pandas as pd
 
 from airtruth.aircraft import toml
-from airtruth.aircraft.file import FILE, Aircraft, AircraftFile
+from airtruth.aircraft.file import FILE, Actuator, Aircraft, AircraftFile
 from airtruth.aircraft.jsbsim.short_period import TrimPoint, model_xml
 from airtruth.aircraft.loading import load
-from airtruth.aircraft.model import ElevatorProperties, JsbsimModel, ThrottleProperties
+from airtruth.aircraft.model import ElevatorProperties, JsbsimModel, SurfaceProperties, ThrottleProperties
 from airtruth.aircraft.write import require_new
 from airtruth.errors import ConfigurationError, choices
 from airtruth.logs import ledger
 from airtruth.logs.atomic import new_folder
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.atmosphere import air_density
+from airtruth.physics.motion import LATERAL
+from airtruth.physics.motion_parts import Control
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.quantity import LARGEST, Quantity
 
 _MOST_ALPHA_RAD: Final = 0.7
 """Largest angle of attack of a trim [rad] (judgement: 40 deg, above any trim; a value in degrees exceeds it)."""
+_PITCH: Final = dict(zip(PARAMETERS, (5.0, 5.0, 0.4, -0.8, -20.0, -1.2), strict=True))
+"""Pitch plane of a model of lateral derivatives alone [1/rad] (judgement: stable and well damped; a lateral trace takes alpha and
+q as measured)."""
 TRIM_WINDOW_S: Final = 1.0
 """Start of a run whose mean is the trim [s]: a record of the campaigns flies its manoeuvre after it."""
 
@@ -106,12 +111,12 @@ def from_estimates(estimates: pd.DataFrame, method: str | None = None) -> dict[s
 def write_new(
     aircraft: Aircraft, derivatives: Mapping[str, Quantity], at: TrimPoint, out_folder: Path, note: str = ""
 ) -> Aircraft:
-    """Write a folder with a JSBSim model and aircraft.toml that flies six derivatives about a trim.
+    """Write a folder with a JSBSim model and aircraft.toml that flies derivatives about a trim, in six axes with lateral ones.
 
     Parameters
     ----------
     aircraft : source of geometry, mass, actuator and sensors.
-    derivatives : all of `airtruth.physics.short_period.PARAMETERS` about the CG [1/rad].
+    derivatives : all of a motion, or of both, about the CG [1/rad, -]; the pitch plane of lateral ones alone is a placeholder.
     at : trim about which they hold.
     out_folder : folder to write, new or empty; the aircraft and its model take its name.
     note : added to the heads of both files.
@@ -128,10 +133,13 @@ def write_new(
     StoreError
         If the folder is not empty or cannot be written.
     """
-    values = _checked(derivatives, at)
+    values = flown_values(derivatives, at)
     require_new(out_folder)
     name = out_folder.name
-    head = f"{name}: the short-period motion of {aircraft.name} about one trim, written by airtruth."
+    motion = "motion" if _is_lateral(derivatives) else "short-period motion"
+    head = f"{name}: the {motion} of {aircraft.name} about one trim, written by airtruth."
+    if not set(PARAMETERS) <= set(derivatives):
+        note = f"The pitch plane is a placeholder: no derivatives of it are declared. {note}"
     heading = f"{head}\n{note}".rstrip()
     file = _file(aircraft.file, name, derivatives)
     with new_folder(out_folder) as folder:
@@ -144,31 +152,60 @@ def write_new(
 
 def _file(source: AircraftFile, name: str, derivatives: Mapping[str, Quantity]) -> AircraftFile:
     """aircraft.toml of the new aircraft: its source's, with the model and the derivatives."""
-    servo = source.elevator_actuator
+    frames = {"command_frames": _frames(source.elevator_actuator)}
     model = JsbsimModel(
         model=name,
-        elevator=ElevatorProperties(
-            command="fcs/elevator-cmd-rad", command_frames=1 if servo and servo.delay.value > 0.0 else 0
-        ),
+        elevator=ElevatorProperties(command="fcs/elevator-cmd-rad", **frames),
         throttle=ThrottleProperties(),
         rotary_gust="aero/gust/q-rad_sec",
     )
-    changed = {"name": name, "jsbsim": model, "derivatives": {k: derivatives[k] for k in PARAMETERS}}
+    if _is_lateral(derivatives):
+        surfaces = {c.name: _surface(c, getattr(source, c.actuator)) for c in LATERAL.controls}
+        gusts = {"roll_gust": "aero/gust/p-rad_sec", "yaw_gust": "aero/gust/r-rad_sec"}
+        model = model.model_copy(update=surfaces | gusts)
+    changed = {"name": name, "jsbsim": model, "derivatives": dict(derivatives)}
     kept = {k: getattr(source, k) for k in source.model_fields_set if k != "schema_"}
     return AircraftFile.model_construct(**kept | changed)
 
 
-def _checked(derivatives: Mapping[str, Quantity], at: TrimPoint) -> dict[str, float]:
-    """Values of all six derivatives [1/rad]."""
+def _is_lateral(derivatives: Mapping[str, Quantity]) -> bool:
+    """Whether they are those of the lateral-directional motion as well."""
+    return set(LATERAL.parameters) <= set(derivatives)
+
+
+def _surface(control: Control, servo: Actuator | None) -> SurfaceProperties:
+    return SurfaceProperties(
+        command=f"fcs/{control.name}-cmd-rad",
+        surface=f"fcs/{control.name}-pos-rad",
+        command_frames=_frames(servo),
+    )
+
+
+def _frames(servo: Actuator | None) -> int:
+    """Frames between reading a command and acting on it: JSBSim's actuators delay by one less than a delay states."""
+    return 1 if servo and servo.delay.value > 0.0 else 0
+
+
+def flown_values(derivatives: Mapping[str, Quantity], at: TrimPoint) -> dict[str, float]:
+    """Values of all six derivatives, and of the lateral ones where all are there [1/rad, -].
+
+    Raises
+    ------
+    ConfigurationError
+        As `write_new`.
+    """
+    known = (*PARAMETERS, *LATERAL.parameters)
     for name in derivatives:
-        if name not in PARAMETERS:
-            raise ConfigurationError(f"derivative {name!r}: {choices(name, PARAMETERS)}")
-    missing = [name for name in PARAMETERS if name not in derivatives]
+        if name not in known:
+            raise ConfigurationError(f"derivative {name!r}: {choices(name, known)}")
+    lateral = LATERAL.parameters if _is_lateral(derivatives) else ()
+    pitch = [name for name in PARAMETERS if name in derivatives]
+    missing = [name for name in PARAMETERS if name not in derivatives and (pitch or not lateral)]
     if missing:
         raise ConfigurationError(
             f"derivatives lack {', '.join(missing)}; state them in [derivatives] of aircraft.toml, or give estimates"
         )
-    values = {name: derivatives[name].value for name in PARAMETERS}
+    values = (_PITCH if not pitch else {}) | {name: derivatives[name].value for name in (*pitch, *lateral)}
     wrong = [name for name, value in values.items() if not np.isfinite(value)]
     if wrong:
         raise ConfigurationError(f"derivative {wrong[0]} is not a finite number")
@@ -184,4 +221,4 @@ def _checked(derivatives: Mapping[str, Quantity], at: TrimPoint) -> dict[str, fl
     return values
 
 
-__all__ = ["TRIM_WINDOW_S", "TrimPoint", "from_estimates", "trim_point", "write_new"]
+__all__ = ["TRIM_WINDOW_S", "TrimPoint", "flown_values", "from_estimates", "trim_point", "write_new"]

@@ -22,7 +22,8 @@ from airtruth.design.bench import Bench, Flown
 from airtruth.design.flight import fitted_of, model_of
 from airtruth.design.narrow_result import Quantity
 from airtruth.design.separation import Model, beyond, flown_by, refitted
-from airtruth.effects.increment import SIGNAL_NAMES, Increment, Memory, Shape, increment
+from airtruth.effects.increment import Increment, Memory, Shape, increment
+from airtruth.effects.increment_shape import signal_over
 from airtruth.physics.short_period import PARAMETERS
 from airtruth.physics.terms import Change
 from airtruth.simulation.campaign.file import Campaign
@@ -84,14 +85,15 @@ def learned(accepted: AcceptedEffect, plant: Plant) -> Learned:
     accepted : the effect, with its table where it is a function.
     plant : trim of the flight to come, about which a linear increment counts.
     """
-    signal = next(name for name, stated in SIGNAL_NAMES.items() if stated == accepted.over)
-    factor = next((name for name, stated in SIGNAL_NAMES.items() if stated == accepted.by), "")
+    acts_on = accepted.acts_on or ""
+    signal = signal_over(acts_on, accepted.over or "")
+    factor = signal_over(acts_on, accepted.by) if accepted.by else ""
     memory = next((Memory(s.kind, s.time_s, s.damping, s.half_width) for s in accepted.states), None)
     table = accepted.table
     trims = {"alpha": plant.trim_alpha_rad, "elevator": plant.trim_elevator_rad}
     at = np.zeros(1) if table is None else _points(table)
     shape = Shape(
-        acts_on="Cm" if accepted.acts_on == "Cm" else "CL",
+        acts_on="Cm" if acts_on == "Cm" else "CL",
         signal=signal,
         low=float(at[0]),
         high=float(at[-1]),

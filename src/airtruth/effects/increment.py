@@ -11,7 +11,6 @@ from airtruth.effects.effect import Effect, Parameter
 from airtruth.effects.increment_shape import (
     AXIAL,
     NAME,
-    SIGNAL_NAMES,
     SIGNALS,
     SLOPE,
     STEP,
@@ -166,4 +165,4 @@ def _of_memory(name: str, value: float, memory: Memory) -> Parameter:
     return Parameter(name, "s", meaning, low, high, 0.0, is_location=True, step=value)
 
 
-__all__ = ["NAME", "SIGNAL_NAMES", "STEP", "STEPS", "Increment", "Memory", "Shape", "increment"]
+__all__ = ["NAME", "STEP", "STEPS", "Increment", "Memory", "Shape", "increment"]

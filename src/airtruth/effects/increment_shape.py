@@ -28,7 +28,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from airtruth.physics.motion import MOTIONS
+from airtruth.physics.motion import LONGITUDINAL, MOTIONS
 from airtruth.physics.motion_parts import Signal
 from airtruth.physics.terms import OUTPUTS, QBAR, AeroTerm, Change, ReadingTerm, StateTerm, shape_of
 
@@ -40,14 +40,14 @@ SIGNALS: Final[Mapping[str, Signal]] = {
     s.name: s for m in MOTIONS.values() for s in (*m.known_signals, *m.signals)
 }
 """Signal of a motion, or known input that is one -> its description."""
-SIGNAL_NAMES: Final[Mapping[str, str]] = {
-    **{s.name: s.channel if s.length is None else f"{s.symbol}_hat" for s in SIGNALS.values()},
-    **{m.flow_rate: m.flow_rate for m in MOTIONS.values()},
-    QBAR: f"{QBAR}_pa",
-}
-"""Signal of a term -> its name in an answer; a rate is multiplied by its reference length over 2 V."""
 AXIAL: Final = "CX"
 """Coefficient of the axial force, which is none of a motion."""
+_PLANE: Final = {
+    acts_on: motion
+    for motion in MOTIONS.values()
+    for acts_on in (*(c.name for c in motion.coefficients), *motion.output_channels)
+} | {AXIAL: LONGITUDINAL}
+"""What an increment acts on -> motion whose signals it is over."""
 SLOPE: Final = "slope"
 """Name of the rise c over the cell of the trim."""
 STEP: Final = "step"
@@ -172,11 +172,12 @@ class Shape:
     @property
     def variant(self) -> str:
         """Variant of the effect: coefficient or channel, signal and memory."""
-        over = SIGNAL_NAMES[self.signal]
+        names = names_over(self.acts_on)
+        over = names[self.signal]
         if self.factor and self.memory is not None:
-            return f"{self.acts_on} by a {self.memory.kind} of {SIGNAL_NAMES[self.factor]} over {over}"
+            return f"{self.acts_on} by a {self.memory.kind} of {names[self.factor]} over {over}"
         if self.factor:
-            return f"{self.acts_on} by {SIGNAL_NAMES[self.factor]} over {over}"
+            return f"{self.acts_on} by {names[self.factor]} over {over}"
         if self.memory is None:
             return f"{self.acts_on} over {over}"
         return f"{self.acts_on} over a {self.memory.kind} of {over}"
@@ -275,4 +276,62 @@ def _bend(k: int) -> str:
     return f"bend_{k + 1}"
 
 
-__all__ = ["AXIAL", "NAME", "SIGNALS", "SIGNAL_NAMES", "SLOPE", "STEP", "STEPS", "Memory", "Shape"]
+def names_over(acts_on: str) -> dict[str, str]:
+    """Signal of a term -> its name in an answer; a rate is multiplied by its reference length over 2 V.
+
+    Parameters
+    ----------
+    acts_on : coefficient or reading of an increment.
+
+    Examples
+    --------
+    >>> (
+    ...     names_over("Cm")["qhat"],
+    ...     names_over("Cn")["rhat"],
+    ...     names_over("CL")["alpha"],
+    ...     names_over("Cl")["alpha"],
+    ... )
+    ('q_hat', 'rhat', 'alpha_rad', 'alpha')
+    """
+    motion = _PLANE[acts_on]
+    own = {s.name: s.stated or s.name for s in (*motion.known_signals, *motion.signals)}
+    return own | {motion.flow_rate: motion.flow_rate, QBAR: f"{QBAR}_pa"}
+
+
+def signal_over(acts_on: str, stated: str) -> str:
+    """Signal of a term by its name in an answer.
+
+    Raises
+    ------
+    KeyError
+        If no signal over which ``acts_on`` may change has that name.
+    """
+    return {name: signal for signal, name in names_over(acts_on).items()}[stated]
+
+
+def unit_over(signal: str) -> str:
+    """Unit of a signal of a term: rad of an angle, Pa of the dynamic pressure, empty for a ratio.
+
+    Examples
+    --------
+    >>> unit_over("beta"), unit_over("phat"), unit_over("qbar")
+    ('rad', '', 'Pa')
+    """
+    if signal == QBAR:
+        return "Pa"
+    return "rad" if signal in SIGNALS and SIGNALS[signal].length is None else ""
+
+
+__all__ = [
+    "AXIAL",
+    "NAME",
+    "SIGNALS",
+    "SLOPE",
+    "STEP",
+    "STEPS",
+    "Memory",
+    "Shape",
+    "names_over",
+    "signal_over",
+    "unit_over",
+]

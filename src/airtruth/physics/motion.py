@@ -258,9 +258,9 @@ LONGITUDINAL: Final = Motion(
         Coefficient("Cm", "pitching moment, nose up", "chord"),
     ),
     signals=(
-        Signal("alpha", "alpha", "alpha_rad"),
-        Signal("qhat", "q", "q_rad_s", "chord"),
-        Signal("elevator", "de", "elevator_rad"),
+        Signal("alpha", "alpha", "alpha_rad", stated="alpha_rad"),
+        Signal("qhat", "q", "q_rad_s", "chord", stated="q_hat"),
+        Signal("elevator", "de", "elevator_rad", stated="elevator_rad"),
     ),
     implicit=("CL", "alpha"),
     gusts=("w", "u"),

@@ -92,12 +92,14 @@ class Signal:
     symbol : its part in the names of derivatives.
     channel : column of the flight log behind it.
     length : reference length l of a nondimensional rate, x l/(2 V); None for an angle [rad].
+    stated : its name in answers; empty for ``name``.
     """
 
     name: str
     symbol: str
     channel: str
     length: Reference | None = None
+    stated: str = ""
 
     @property
     def unit(self) -> str:

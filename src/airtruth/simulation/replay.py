@@ -9,8 +9,8 @@ velocity exerts no force of its own.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -18,54 +18,17 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import FlightError
-from airtruth.simulation import instruments as measure
+from airtruth.simulation.gearing import commands_for
 from airtruth.simulation.readings import READ, channels, require_sound
 from airtruth.simulation.simulator import Executive
+from airtruth.simulation.tracks import Track, as_logged, first_of, fitted_outputs
 from airtruth.simulation.trim import Trim
 from airtruth.units import FT
 
 Array = NDArray[np.float64]
 
-STEP_S: Final = 0.005
-"""Longest step of the simulation [s] (judgement: that of the campaigns)."""
-_FIT_PASSES: Final = 2
-"""Gauss-Newton steps with the same derivatives (judgement: the residual is nearly linear in the parameters, and each
-step costs a simulation)."""
-_BEYOND_RAD: Final = 0.02
-"""Range of the gearing beyond the surface of a record [rad] (judgement: a gearing differs by some percent)."""
-_GEARING: Final = 24
-"""Points of the gearing [-] (judgement: fewer than a degree apart in a record)."""
-_SAME_RAD: Final = 1e-9
-"""Difference of a surface that counts as rounding [rad] (judgement)."""
 _STEPS: Final = np.array([2e-3, 1e-2, 5e-4])
 """Steps of initial alpha [rad], initial q [rad/s] and surface offset [rad] for differences."""
-
-
-@dataclass(frozen=True)
-class Track:
-    """A record to replay.
-
-    Attributes
-    ----------
-    dt_s : sample period [s].
-    substeps : steps of the simulation per sample, see `substeps`.
-    outputs : channel -> (samples,) measured values to compare [SI].
-    weight : channel -> standard deviation that scales its residual [SI].
-    elevator_rad, airspeed_m_s : ((samples - 1) substeps + 1,) on the simulation's grid, the errors of their sensors
-        undone [rad], [m/s].
-    """
-
-    dt_s: float
-    substeps: int
-    outputs: Mapping[str, Array]
-    weight: Mapping[str, float]
-    elevator_rad: Array
-    airspeed_m_s: Array
-
-
-def substeps(dt_s: float) -> int:
-    """Number of steps of the simulation per sample of the log."""
-    return max(1, math.ceil(dt_s / STEP_S - 1e-9))
 
 
 def replay(aircraft: Aircraft, at: Trim, track: Track) -> dict[str, Array]:
@@ -91,29 +54,15 @@ def replay(aircraft: Aircraft, at: Trim, track: Track) -> dict[str, Array]:
     """
     executive = Executive(aircraft, track.dt_s / track.substeps)
     names = list(track.outputs)
-    free = np.array([_first(track, "alpha_rad", at.alpha_rad), _first(track, "q_rad_s", 0.0), 0.0])
+    free = np.array([first_of(track, "alpha_rad", at.alpha_rad), first_of(track, "q_rad_s", 0.0), 0.0])
     # the surface about the aircraft's own trim: the offset is free in any case
     free[2] = at.elevator_rad - float(np.mean(track.elevator_rad[: max(1, track.substeps * 5)]))
 
     def fly(x: Array) -> Array:
-        logged = _logged(aircraft, _run(executive, at, track, x), track)
+        logged = as_logged(aircraft, _run(executive, at, track, x), track)
         return np.stack([logged[n] for n in names])
 
-    weight = np.array([[track.weight[n]] for n in names])
-    measured = np.stack([track.outputs[n] for n in names])
-    flown = fly(free)
-    tangents = np.stack([(fly(free + np.eye(3)[i] * _STEPS[i]) - flown) / _STEPS[i] for i in range(3)])
-    best = _residual(measured, flown, weight)
-    for _ in range(_FIT_PASSES):
-        centred = (tangents - tangents.mean(axis=2, keepdims=True)) / weight
-        step = np.linalg.lstsq(centred.reshape(3, -1).T, best.ravel(), rcond=None)[0]
-        trial = fly(free + step)
-        after = _residual(measured, trial, weight)
-        if not float((after**2).sum()) < float((best**2).sum()):
-            break
-        free, flown, best = free + step, trial, after
-    fitted = flown + (measured - flown).mean(axis=1, keepdims=True)
-    return dict(zip(names, fitted, strict=True))
+    return fitted_outputs(fly, free, _STEPS, track)
 
 
 def flown_through(aircraft: Aircraft, at: Trim, track: Track) -> dict[str, Array]:
@@ -165,27 +114,9 @@ def each_flown_through(
     return flown
 
 
-def _residual(measured: Array, flown: Array, weight: Array) -> Array:
-    difference = (measured - flown) / weight
-    return np.asarray(difference - difference.mean(axis=1, keepdims=True))
-
-
-def _first(track: Track, channel: str, otherwise: float) -> float:
-    return float(np.mean(track.outputs[channel][:5])) if channel in track.outputs else otherwise
-
-
-def _logged(aircraft: Aircraft, truth: Mapping[str, Array], track: Track) -> dict[str, Array]:
-    rows = {name: values[None, :] for name, values in truth.items()}
-    sensors = {name: s.errors() for name, s in aircraft.file.sensors.items() if name in track.outputs}
-    logged = measure.log_channels(
-        rows, sensors, {}, track.dt_s / track.substeps, track.substeps, measure.readings_of(aircraft)
-    )
-    return {name: values[0] for name, values in logged.items()}
-
-
 def _run(executive: Executive, at: Trim, track: Track, free: Array) -> dict[str, Array]:
     """One simulation; channels at every step, at the CG, without sensors."""
-    command = _commands(executive, at, track.elevator_rad + free[2])
+    command = commands_for(executive, at, "elevator", track.elevator_rad + free[2])
     executive = executive.renewed()
     fdm, elevator = executive.fdm, executive.model.elevator
     fdm.set_trim_status(True)  # actuators pass their input through
@@ -221,35 +152,6 @@ def _run(executive: Executive, at: Trim, track: Track, free: Array) -> dict[str,
     }
 
 
-def _commands(executive: Executive, at: Trim, surface: Array) -> Array:
-    """Commands that put the surface where it was measured; the gearing of a model is not the same up and down.
-
-    Parameters
-    ----------
-    surface : wanted (steps,) [rad].
-    """
-    offset = at.controls.elevator_command_rad - at.elevator_rad
-    if executive.model.elevator.feedback:
-        return np.asarray(surface + offset)
-    low, high = float(surface.min()) + offset, float(surface.max()) + offset
-    commands = np.union1d(
-        np.linspace(low - _BEYOND_RAD, high + _BEYOND_RAD, _GEARING), [at.controls.elevator_command_rad, 0.0]
-    )
-    reached = []
-    for command in commands:
-        executive.initialise(
-            at.condition, at.alpha_rad, replace(at.controls, elevator_command_rad=float(command)), 0.0, 0.0
-        )
-        reached.append(executive.respond().elevator_rad)
-    rising = np.maximum.accumulate(reached)
-    kept = np.append(True, np.diff(rising) > _SAME_RAD)
-    if kept.sum() < 2:
-        return np.asarray(surface + offset)
-    found = np.interp(surface, rising[kept], commands[kept])
-    linear = np.abs(np.asarray(reached) - commands + offset).max() < _SAME_RAD
-    return np.asarray(surface + offset if linear else found)
-
-
 def _stepped(
     fdm: Any,
     gets: Sequence[Any],
@@ -283,4 +185,4 @@ def _stepped(
     return np.array(records).reshape(-1, len(gets)).T
 
 
-__all__ = ["STEP_S", "Track", "each_flown_through", "flown_through", "replay", "substeps"]
+__all__ = ["each_flown_through", "flown_through", "replay"]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal, TypeGuard
 
+from airtruth.channels import SIGNALS
 from airtruth.errors import StoreError
 from airtruth.physics.motion import Motion, motion_of
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate, effect_key
@@ -82,7 +83,8 @@ class CandidateScore:
     def to_dict(self) -> dict[str, Any]:
         """Keys of trace.json."""
         order = ("name", "variant", "score", "z", "p_value", "p_value_alone", "testable", "why_not")
-        return {name: getattr(self, name) for name in order}
+        channel = {"channel": self.variant} if self.variant in SIGNALS else {}
+        return {name: getattr(self, name) for name in order} | channel
 
 
 @dataclass(frozen=True)

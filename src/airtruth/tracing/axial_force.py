@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from airtruth.aircraft import Aircraft
-from airtruth.effects.increment import SIGNAL_NAMES, Increment, Shape, increment
+from airtruth.effects.increment import Increment, Shape, increment
+from airtruth.effects.increment_shape import names_over
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import Change, coefficients_of, factors_of
@@ -341,7 +342,7 @@ def _stated(own: _Learned, next_best: float, case: Case, fitted: Sequence[AxialS
         separation_sigma=float(np.sqrt(2.0 * max(own.log_evidence - next_best, 0.0))),
         gain_2_log_likelihood=2.0 * own.log_evidence,
         acts_on=shape.acts_on,
-        over=SIGNAL_NAMES[shape.signal],
+        over=names_over(shape.acts_on)[shape.signal],
         relative_size=_relative_swing(own, case, fitted),
         table=table_of(shape, own.bends, own.covariance, signal),
     )

@@ -347,8 +347,8 @@ def _detectability(
 ) -> dict[str, float]:
     """Smallest traceable sizes at a null that is probable; none where no round has one."""
     if rounds[0].declared_test.p_value > CONTRADICTED:
-        degrees = rounds[0].declared_test.degrees
-        return detectability(rounds[0].table) | detectable_causes(likelihood, sizes, case.declared, degrees)
+        test = rounds[0].declared_test
+        return detectability(rounds[0].table) | detectable_causes(likelihood, sizes, case.declared, test)
     return detectability(rounds[-1].table) if rounds[-1].anomaly.p_value > ANOMALY_LEVEL else {}
 
 

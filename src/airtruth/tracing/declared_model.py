@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import chi2, ncx2
+from scipy.stats import chi2, ncx2, norm
 
 from airtruth.effects.registry import EFFECTS
 from airtruth.tracing.answer import (
@@ -24,7 +24,11 @@ from airtruth.tracing.answer import (
     ParameterEstimate,
     RefinedDerivative,
 )
-from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, contradiction
+from airtruth.tracing.inference.derivative_likelihood import (
+    Contradiction,
+    DerivativeLikelihood,
+    contradiction,
+)
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.selection.anomaly import DERIVATIVES_MOVED, Anomaly
 from airtruth.tracing.selection.explanation import DERIVATIVES, CauseSet, size_of
@@ -246,16 +250,16 @@ def detectable_causes(
     likelihood: DerivativeLikelihood,
     sizes: Mapping[str, tuple[float, float]],
     declared: DeclaredCauses,
-    degrees: int,
+    test: Contradiction,
 ) -> dict[str, float]:
     """Smallest size of each cause that the records can trace and that is material, in the unit of its first parameter.
 
     Parameters
     ----------
     likelihood : at the first null; sizes : see `cause_sizes`; declared : the candidates.
-    degrees : degrees of freedom of the test of the declared derivatives [-].
+    test : of the declared derivatives.
     """
-    errors = traceable_errors(degrees)
+    errors = traceable_errors(test.directions)
     found = {
         key: max(errors * std, EFFECTS[key].parameters[0].material)
         for key, (_, std) in sizes.items()
@@ -263,19 +267,29 @@ def detectable_causes(
     }
     if declared.wrong_allowed:
         own = np.linalg.inv(likelihood.information + np.linalg.inv(likelihood.declared))
-        found[DERIVATIVES] = errors * float(np.sqrt(likelihood.declared[0, 0] + own[0, 0]))
+        alone = traceable_errors(test.directions, test.derivatives)
+        found[DERIVATIVES] = alone * float(np.sqrt(likelihood.declared[0, 0] + own[0, 0]))
     return {key: size for key, size in found.items() if size > 0.0 and np.isfinite(size)}
 
 
-def traceable_errors(degrees: int) -> float:
+def traceable_errors(directions: int, derivatives: int = 0) -> float:
     """Standard deviations of a cause that contradict the declared model in four of five flights [-].
 
-    The test has ``degrees`` degrees of freedom, half of the level of the declared model (`declared_p_value`), and a noncentral
-    chi-square statistic.
+    Half of the level of the declared model (`declared_p_value`) is that of the derivatives, and half of this that of their joint
+    test, whose statistic is a noncentral chi-square with ``directions`` degrees of freedom.
+
+    Parameters
+    ----------
+    derivatives : number of single derivatives that are tested, for a cause that is one of them; 0 for others.
     """
-    threshold = chi2.isf(0.5 * DECLARED_LEVEL, degrees)
-    power = brentq(lambda noncentrality: ncx2.sf(threshold, degrees, noncentrality) - _POWER, 1.0, 1e3)
-    return math.sqrt(float(power))
+    level = 0.25 * DECLARED_LEVEL
+    threshold = chi2.isf(level, directions)
+    power = brentq(lambda noncentrality: ncx2.sf(threshold, directions, noncentrality) - _POWER, 1.0, 1e3)
+    joint = math.sqrt(float(power))
+    if not derivatives:
+        return joint
+    each = -math.expm1(math.log1p(-level) / derivatives)
+    return min(joint, float(norm.isf(0.5 * each) + norm.isf(1.0 - _POWER)))
 
 
 def _row(

@@ -9,8 +9,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
+from airtruth.channels import SIGNALS
 from airtruth.effects.closed_form import ClosedForm, closed_forms
-from airtruth.effects.increment import SIGNAL_NAMES, STEP
+from airtruth.effects.increment import STEP
+from airtruth.effects.increment_shape import signal_over, unit_over
 from airtruth.errors import StoreError
 from airtruth.logs import atomic
 from airtruth.physics.terms import OUTPUTS
@@ -19,17 +21,6 @@ from airtruth.tracing.answer import Z95, TraceAnswer
 
 MODULE: Final = "learned_effects"
 """Name of the module and of the package."""
-_SIGNALS: Final = {name: signal for signal, name in SIGNAL_NAMES.items()}
-"""Name of a signal in an answer -> its name in a term."""
-_UNITS: Final = {
-    "alpha": "rad",
-    "elevator": "rad",
-    "qbar": "Pa",
-    "alpha_rad": "rad",
-    "q_rad_s": "rad/s",
-    "az_m_s2": "m/s2",
-}
-"""Signal of a term, or channel -> unit; the others have none."""
 _MEANINGS: Final = {"at": "value of the signal where it begins", "width": "width of the step"}
 """Location -> meaning."""
 _RANGE: Final = 4.0
@@ -123,7 +114,8 @@ py-modules = ["{module}"]
 def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
     """Function of the terms and the effect, as Python."""
     form = _form(e)
-    over, factor = _SIGNALS[e.over or ""], _SIGNALS[e.by] if e.by else ""
+    acts_on = e.acts_on or ""
+    over, factor = signal_over(acts_on, e.over or ""), signal_over(acts_on, e.by) if e.by else ""
     driver = factor if e.states and factor else over
     state = "-".join(
         ("learned", *(e.acts_on or "").split("_"), *driver.split("_"), *(s.kind for s in e.states))
@@ -156,11 +148,9 @@ def _effect(e: AcceptedEffect, number: int) -> Iterator[str]:
         f"def _terms_{number}(values):\n    return Change(\n        states=({states}),\n        {field}={terms},\n    )\n"
     )
     locations = {k: values[k] for k in ("at", "width") if k in values}
-    parameters = [
-        _size(name, value, _unit(name, e.acts_on or "", factor, over)) for name, value in sizes.items()
-    ]
+    parameters = [_size(name, value, _unit(name, acts_on, factor, over)) for name, value in sizes.items()]
     if e.table is not None:
-        unit = _UNITS.get(over, "-")
+        unit = unit_over(over) or "-"
         parameters += [_location(name, value, unit, e.table) for name, value in locations.items()]
     lines = "".join(f"        {p},\n" for p in parameters)
     yield (
@@ -178,7 +168,7 @@ def _beyond(form: ClosedForm, e: AcceptedEffect) -> str:
     """A sentence on the flight outside the learned range, where a line, a break and a curve go on and a step does not."""
     if e.table is None or form.name.startswith("step"):
         return ""
-    unit = _UNITS.get(_SIGNALS[e.over or ""], "")
+    unit = unit_over(signal_over(e.acts_on or "", e.over or ""))
     ends = " to ".join(f"{end:.4g}" for end in (e.table.at[0], e.table.at[-1]))
     return f" Learned from {ends}{unit and ' '}{unit}; it extrapolates outside this range."
 
@@ -236,10 +226,10 @@ def _unit(size: str, acts_on: str, factor: str, over: str) -> str:
     if size == "factor":
         return "-"
     of_derivative = factor and acts_on not in OUTPUTS
-    above = "" if factor and not of_derivative else _UNITS.get(acts_on, "")
+    above = SIGNALS[acts_on].unit if acts_on in OUTPUTS and not factor else ""
     signals = [factor] if of_derivative else []
     signals += [over] * {"step": 0, "slope": 1, "share": 1, "curvature": 2}[size]
-    below = [unit for unit in (_UNITS.get(signal, "") for signal in signals) if unit]
+    below = [unit for unit in map(unit_over, signals) if unit]
     return "/".join([above or ("1" if below else "-"), *below])
 
 

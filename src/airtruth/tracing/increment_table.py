@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.effects.increment import SIGNAL_NAMES, Increment, Shape
+from airtruth.effects.increment import Increment, Shape
+from airtruth.effects.increment_shape import names_over
 from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable
 from airtruth.tracing.answer import Z95, CandidateScore
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
@@ -29,17 +30,17 @@ def in_physical_terms(
     fitted : the fit whose sizes are reported; covariance : of its common parameters and sizes.
     effect, stated : the increment, and what is stated of its parameters.
     """
-    shape = effect.shape
+    shape, names = effect.shape, names_over(effect.shape.acts_on)
     values = {name: estimate.value for name, estimate in stated.parameters.items()}
     states = tuple(
-        IncrementState(s.kind, SIGNAL_NAMES[s.signal], s.time_s, s.damping, s.half_width)
+        IncrementState(s.kind, names[s.signal], s.time_s, s.damping, s.half_width)
         for s in shape.terms(values).states
     )
     return replace(
         stated,
         acts_on=shape.acts_on,
-        over=SIGNAL_NAMES[shape.signal],
-        by=SIGNAL_NAMES[shape.factor] if shape.factor else None,
+        over=names[shape.signal],
+        by=names[shape.factor] if shape.factor else None,
         by_at=shape.factor_trim
         + (problem.alpha_shift_rad if shape.factor == problem.layout.motion.flow else 0.0),
         relative_size=relative_swing(problem, fitted, effect),

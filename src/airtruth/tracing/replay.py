@@ -15,8 +15,10 @@ from airtruth.aircraft import Aircraft, Sensor
 from airtruth.errors import FlightError, TrimError
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.simulation.disposable import isolated, isolated_flight
-from airtruth.simulation.replay import Track, replay, substeps
+from airtruth.simulation.replay import replay
+from airtruth.simulation.replay_lateral import replay_lateral
 from airtruth.simulation.simulator import Condition
+from airtruth.simulation.tracks import LateralTrack, Track, substeps
 from airtruth.simulation.trim import Trim, trim
 from airtruth.tracing.inference.assess import noise_floor
 from airtruth.tracing.inference.posterior import TraceProblem
@@ -44,16 +46,15 @@ def flown_again(stages: Stages, aircraft: Aircraft, updated: str | Path | None) 
 
     Returns
     -------
-    Errors of both aircraft; an empty `Replay` for a motion outside of the pitch plane, for an aircraft without JSBSim, for
-    a trace with the linear model, and where the motion leaves the range of the simulation.
+    Errors of both aircraft; an empty `Replay` for an aircraft without JSBSim, for a trace with the linear model, and where
+    the motion leaves the range of the simulation.
 
     Raises
     ------
     AircraftError
         If the updated aircraft cannot be read.
     """
-    is_pitch = stages.case.fitted.layout.motion is LONGITUDINAL
-    if not is_pitch or aircraft.file.jsbsim is None or stages.case.model != "aircraft":
+    if aircraft.file.jsbsim is None or stages.case.model != "aircraft":
         return Replay()
     new = None if updated is None else planes.load(updated)
     weights = _weights(stages)
@@ -135,9 +136,9 @@ def _errors(problem: TraceProblem, aircraft: Aircraft, weights: list[Array]) -> 
         if at not in trims:
             trims[at] = isolated(f"the trim of {aircraft.name}", trim, aircraft, at)
         measured = track(record, aircraft, weight)
-        steps = measured.elevator_rad.size
+        again = replay_lateral if isinstance(measured, LateralTrack) else replay
         flown = isolated_flight(
-            steps, f"the replay of {aircraft.name}", replay, aircraft, trims[at], measured
+            measured.airspeed_m_s.size, f"the replay of {aircraft.name}", again, aircraft, trims[at], measured
         )
         residual = record.signals.y - np.stack([flown[c] for c in channels], axis=1)
         squares.append((residual**2).mean(axis=0))
@@ -159,7 +160,7 @@ def _lead_s(channel: str, declared: Aircraft, aircraft: Aircraft) -> float:
     return new.errors().lead_s - old.errors().lead_s
 
 
-def track(record: TraceRecord, aircraft: Aircraft, weight: Array) -> Track:
+def track(record: TraceRecord, aircraft: Aircraft, weight: Array) -> Track | LateralTrack:
     """A record on the simulation's grid, with the errors of the aircraft's sensors undone in its inputs.
 
     Parameters
@@ -181,18 +182,19 @@ def track(record: TraceRecord, aircraft: Aircraft, weight: Array) -> Track:
         )
         if old.alpha_slope_per_rad == new.alpha_slope_per_rad:
             return values
-        alpha = np.interp(grid, np.arange(samples), s.y[:, 0])
+        every = s.alpha_rad[:: s.sub] if s.alpha_rad.size else s.y[:, 0]
+        alpha = np.interp(grid, np.arange(samples), every)
         return values * old.slope(alpha) / new.slope(alpha)
 
     outputs: Mapping[str, Array] = {c: s.y[:, i] for i, c in enumerate(s.motion.output_channels)}
-    return Track(
-        dt_s=s.dt_s,
-        substeps=steps,
-        outputs=outputs,
-        weight=dict(zip(s.motion.output_channels, weight.tolist(), strict=True)),
-        elevator_rad=true("elevator_rad", s.elevator_rad, s.sub * FINE),
-        airspeed_m_s=true("airspeed_m_s", s.airspeed_m_s, s.sub),
-    )
+    known = dict(zip(s.motion.output_channels, weight.tolist(), strict=True))
+    moved = zip(s.motion.controls, s.controls_rad, strict=True)
+    surfaces = {control.name: true(control.channel, own, s.sub * FINE) for control, own in moved}
+    airspeed = true("airspeed_m_s", s.airspeed_m_s, s.sub)
+    if s.motion is not LONGITUDINAL:
+        return LateralTrack(s.dt_s, steps, outputs, known, surfaces, airspeed)
+    (elevator,) = surfaces.values()
+    return Track(s.dt_s, steps, outputs, known, elevator, airspeed)
 
 
 __all__ = ["disagreement", "flown_again", "track", "worsened"]

@@ -19,7 +19,7 @@ from airtruth.aircraft.write import Corrections, write_aircraft
 from airtruth.effects.increment import Increment
 from airtruth.errors import StoreError
 from airtruth.logs import atomic
-from airtruth.physics.motion import VANES
+from airtruth.physics.motion import LONGITUDINAL, VANES
 from airtruth.physics.terms import DECLARED, AeroTerm, Change, ReadingTerm, SensorTerm, declared_total
 from airtruth.quantity import Quantity
 from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
@@ -190,12 +190,13 @@ def _write_flying(
 ) -> None:
     """An aircraft without a JSBSim model, as one that flies in level flight at the trim of the fitted records."""
     signals = [record.signals for record in case.fitted.records]
-    alpha_rad, (control,) = trim.trim[trim.motion.flow], trim.motion.controls
+    is_pitch = trim.motion is LONGITUDINAL
+    alpha_rad = trim.trim["alpha"] if is_pitch else float(np.mean([s.alpha_rad[0] for s in signals]))
     at = TrimPoint(
         airspeed_m_s=float(np.mean([s.airspeed_m_s[0] for s in signals])),
         density_kg_m3=float(np.mean([s.density_kg_m3[0] for s in signals])),
         alpha_rad=alpha_rad,
-        elevator_rad=trim.trim[control.name],
+        elevator_rad=trim.trim["elevator"] if is_pitch else 0.0,
         az_m_s2=-G0 * math.cos(alpha_rad),
     )
     with atomic.new_folder(folder) as new:

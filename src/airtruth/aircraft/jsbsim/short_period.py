@@ -1,6 +1,6 @@
-"""A JSBSim model that flies six derivatives about a trim.
+"""A JSBSim model that flies six derivatives about a trim, and with fifteen lateral ones in six axes.
 
-Pitch plane only. About a trim (t), in body axes x forward, z down, with qhat = q c/(2V):
+About a trim (t), in body axes x forward, z down, with qhat = q c/(2V):
 
     lift = CLalpha (alpha - alpha_t) + CLq qhat + CLde (de - de_t)
     X = q_bar S (-CA + lift sin alpha_t) + T,   Z = -q_bar S (CN_t + lift cos alpha_t)
@@ -8,12 +8,12 @@ Pitch plane only. About a trim (t), in body axes x forward, z down, with qhat = 
 
 The increments of lift are normal to the flight path of the trim, so that in level flight alpha_dot has the six
 derivatives of eq. (2) of M. Brunot, "An Instrumental Variable Approach for Aircraft Identification",
-exactly; az has them times cos alpha_t. Thrust goes through the CG along body x.
+exactly; az has them times cos alpha_t. Thrust goes through the CG along body x. The lateral forces are those of
+`airtruth.aircraft.jsbsim.lateral_axes`.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -21,8 +21,11 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from airtruth.aircraft.file import Actuator, Aircraft
+from airtruth.aircraft.file import Aircraft
+from airtruth.aircraft.jsbsim.lateral_axes import lateral_axes, lateral_channels
+from airtruth.aircraft.jsbsim.linear_parts import from_trim, number, product, rate, servo, total
 from airtruth.aircraft.probe import Constants
+from airtruth.physics.motion import LATERAL
 from airtruth.units import FT, G0, LB, LBF, SLUG
 
 AXIAL: Final = 0.1
@@ -59,10 +62,12 @@ def model_xml(name: str, heading: str, aircraft: Aircraft, values: Mapping[str, 
     name : name of the model.
     heading : its description.
     aircraft : source of constants and servo.
-    values : the six derivatives [1/rad].
+    values : the six derivatives, and the fifteen lateral ones for a model in six axes [1/rad, -].
     at : trim about which they hold.
     """
     c = aircraft.constants
+    is_lateral = set(LATERAL.parameters) <= set(values)
+    plane = "Linear about one trim" if is_lateral else "Pitch plane, linear about one trim"
     force = 0.5 * at.density_kg_m3 * at.airspeed_m_s**2 * c.wing_area_m2
     normal = -c.mass_kg * at.az_m_s2 / force
     thrust = force * AXIAL * normal + c.mass_kg * G0 * abs(float(np.sin(at.alpha_rad)))
@@ -71,23 +76,23 @@ def model_xml(name: str, heading: str, aircraft: Aircraft, values: Mapping[str, 
   <fileheader>
     <author>airtruth</author>
     <description>{escape(heading)}</description>
-    <limitation>Pitch plane, linear about one trim; axial force and thrust are placeholders.</limitation>
+    <limitation>{plane}; axial force and thrust are placeholders.</limitation>
   </fileheader>
 {_metrics(c)}
 {_mass_balance(c)}
   <ground_reactions/>
 {_thrust(_THRUST_MARGIN * thrust)}
-{_controls(aircraft.file.elevator_actuator)}
-{_aerodynamics(values, at, normal)}
+{_controls(aircraft, is_lateral)}
+{_aerodynamics(values, at, normal, lateral_axes(values) if is_lateral else "")}
 </fdm_config>
 """
 
 
 def _metrics(c: Constants) -> str:
     return f"""  <metrics>
-    <wingarea unit="FT2"> {_n(c.wing_area_m2 / FT**2)} </wingarea>
-    <wingspan unit="FT"> {_n(c.span_m / FT)} </wingspan>
-    <chord unit="FT"> {_n(c.chord_m / FT)} </chord>
+    <wingarea unit="FT2"> {number(c.wing_area_m2 / FT**2)} </wingarea>
+    <wingspan unit="FT"> {number(c.span_m / FT)} </wingspan>
+    <chord unit="FT"> {number(c.chord_m / FT)} </chord>
     <location name="AERORP" unit="IN"> {_ORIGIN} </location>
     <location name="EYEPOINT" unit="IN"> {_ORIGIN} </location>
     <location name="VRP" unit="IN"> {_ORIGIN} </location>
@@ -98,11 +103,11 @@ def _mass_balance(c: Constants) -> str:
     unit = SLUG * FT**2  # JSBSim's factors for SI have six digits
     inertia = c.inertia_yy_kg_m2 / unit
     return f"""  <mass_balance negated_crossproduct_inertia="false">
-    <ixx unit="SLUG*FT2"> {_n(c.inertia_xx_kg_m2 / unit or inertia)} </ixx>
-    <iyy unit="SLUG*FT2"> {_n(inertia)} </iyy>
-    <izz unit="SLUG*FT2"> {_n(c.inertia_zz_kg_m2 / unit or inertia)} </izz>
-    <ixz unit="SLUG*FT2"> {_n(c.inertia_xz_kg_m2 / unit)} </ixz>
-    <emptywt unit="LBS"> {_n(c.mass_kg / LB)} </emptywt>
+    <ixx unit="SLUG*FT2"> {number(c.inertia_xx_kg_m2 / unit or inertia)} </ixx>
+    <iyy unit="SLUG*FT2"> {number(inertia)} </iyy>
+    <izz unit="SLUG*FT2"> {number(c.inertia_zz_kg_m2 / unit or inertia)} </izz>
+    <ixz unit="SLUG*FT2"> {number(c.inertia_xz_kg_m2 / unit)} </ixz>
+    <emptywt unit="LBS"> {number(c.mass_kg / LB)} </emptywt>
     <location name="CG" unit="IN"> {_ORIGIN} </location>
   </mass_balance>"""
 
@@ -114,7 +119,7 @@ def _thrust(largest_n: float) -> str:
       <function>
         <product>
           <property>fcs/throttle-cmd-norm</property>
-          <value>{_n(largest_n / LBF)}</value>
+          <value>{number(largest_n / LBF)}</value>
         </product>
       </function>
       <location unit="IN"> {_ORIGIN} </location>
@@ -123,34 +128,27 @@ def _thrust(largest_n: float) -> str:
   </external_reactions>"""
 
 
-def _controls(actuator: Actuator | None) -> str:
+def _controls(aircraft: Aircraft, is_lateral: bool) -> str:
+    file = aircraft.file
+    more = lateral_channels(file) if is_lateral else ""
     return f"""  <flight_control name="Elevator and throttle">
     <property value="0">fcs/elevator-cmd-rad</property>
     <property value="0">fcs/throttle-cmd-norm</property>
     <channel name="Elevator">
-{_servo(actuator)}
-    </channel>
+{servo("elevator", file.elevator_actuator)}
+    </channel>{more}
   </flight_control>"""
 
 
-def _aerodynamics(values: Mapping[str, float], at: TrimPoint, normal: float) -> str:
-    """Forces and moment; ``normal`` is the normal-force coefficient of the trim [-]."""
+def _aerodynamics(values: Mapping[str, float], at: TrimPoint, normal: float, lateral: str) -> str:
+    """Forces and moment; ``normal`` is the normal-force coefficient of the trim [-], ``lateral`` the lateral forces."""
     lift, moment = (_linear(values, coefficient) for coefficient in ("CL", "Cm"))
     sine, cosine = float(np.sin(at.alpha_rad)), float(np.cos(at.alpha_rad))
     return f"""  <aerodynamics>
     <property value="0">aero/gust/q-rad_sec</property>
-    <function name="aero/function/d-alpha">
-      <difference> <property>aero/alpha-rad</property> <value>{_n(at.alpha_rad)}</value> </difference>
-    </function>
-    <function name="aero/function/d-elevator">
-      <difference> <property>fcs/elevator-pos-rad</property> <value>{_n(at.elevator_rad)}</value> </difference>
-    </function>
-    <function name="aero/function/qhat">
-      <product>
-        <difference> <property>velocities/q-rad_sec</property> <property>aero/gust/q-rad_sec</property> </difference>
-        <property>aero/ci2vel</property>
-      </product>
-    </function>
+    {from_trim("alpha", "aero/alpha-rad", at.alpha_rad)}
+    {from_trim("elevator", "fcs/elevator-pos-rad", at.elevator_rad)}
+    {rate("qhat", "q", "ci2vel")}
     <function name="aero/function/d-lift">
       {lift}
     </function>
@@ -158,7 +156,7 @@ def _aerodynamics(values: Mapping[str, float], at: TrimPoint, normal: float) -> 
       <function name="aero/coefficient/CX">
         <product>
           <property>aero/qbar-psf</property> <property>metrics/Sw-sqft</property>
-          {_sum(f"<value>{_n(-AXIAL * normal)}</value>", _product(sine, "aero/function/d-lift"))}
+          {total(f"<value>{number(-AXIAL * normal)}</value>", product(sine, "aero/function/d-lift"))}
         </product>
       </function>
     </axis>
@@ -166,7 +164,7 @@ def _aerodynamics(values: Mapping[str, float], at: TrimPoint, normal: float) -> 
       <function name="aero/coefficient/CZ">
         <product>
           <property>aero/qbar-psf</property> <property>metrics/Sw-sqft</property>
-          {_sum(f"<value>{_n(-normal)}</value>", _product(-cosine, "aero/function/d-lift"))}
+          {total(f"<value>{number(-normal)}</value>", product(-cosine, "aero/function/d-lift"))}
         </product>
       </function>
     </axis>
@@ -177,45 +175,15 @@ def _aerodynamics(values: Mapping[str, float], at: TrimPoint, normal: float) -> 
           {moment}
         </product>
       </function>
-    </axis>
+    </axis>{lateral}
   </aerodynamics>"""
 
 
 def _linear(values: Mapping[str, float], coefficient: str) -> str:
     """Increment of a coefficient by alpha, q and elevator."""
     signals = {"alpha": "d-alpha", "q": "qhat", "de": "d-elevator"}
-    return _sum(
-        *(_product(values[coefficient + by], f"aero/function/{signal}") for by, signal in signals.items())
-    )
-
-
-def _n(value: float) -> str:
-    return repr(float(value))
-
-
-def _product(value: float, name: str) -> str:
-    return f"<product> <value>{_n(value)}</value> <property>{name}</property> </product>"
-
-
-def _sum(*terms: str) -> str:
-    return f"<sum> {' '.join(terms)} </sum>"
-
-
-def _servo(actuator: Actuator | None) -> str:
-    """The declared servo; without one the surface is the command."""
-    if actuator is None:
-        return (
-            '      <pure_gain name="fcs/elevator-surface"> <input>fcs/elevator-cmd-rad</input> <gain> 1.0 </gain> '
-            "<output>fcs/elevator-pos-rad</output> </pure_gain>"
-        )
-    late = actuator.delay.value
-    delay = f'<delay type="time"> {_n(late)} </delay> ' if late > 0.0 else ""
-    return (
-        '      <actuator name="fcs/elevator-servo"> <input>fcs/elevator-cmd-rad</input> '
-        f"<lag> {_n(2.0 * math.pi * actuator.bandwidth.value)} </lag> "
-        f"<rate_limit> {_n(actuator.rate_limit.value)} </rate_limit> {delay}"
-        f"<clipto> <min> {_n(actuator.minimum.value)} </min> <max> {_n(actuator.maximum.value)} </max> </clipto> "
-        "<output>fcs/elevator-pos-rad</output> </actuator>"
+    return total(
+        *(product(values[coefficient + by], f"aero/function/{signal}") for by, signal in signals.items())
     )
 
 

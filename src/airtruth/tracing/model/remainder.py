@@ -23,7 +23,8 @@ from airtruth.aircraft.dynamics import declared_dynamics
 from airtruth.physics.readings import state_of
 from airtruth.physics.terms import Change
 from airtruth.simulation.disposable import isolated_flight
-from airtruth.simulation.replay import Track, each_flown_through, substeps
+from airtruth.simulation.replay import each_flown_through
+from airtruth.simulation.tracks import Track, substeps
 from airtruth.simulation.trim import Trim
 from airtruth.tracing.increment_response import increments
 from airtruth.tracing.model.plant import Plant, probed

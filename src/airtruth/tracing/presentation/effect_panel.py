@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from airtruth.channels import SIGNALS, shown
 from airtruth.charts import Band, Line, Mark, Panel, Rule
+from airtruth.effects.increment_shape import signal_over, unit_over
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.terms import OUTPUTS, AeroTerm, Change, shape_of
 from airtruth.table import significant
@@ -117,7 +118,8 @@ def learned_panel(effect: AcceptedEffect, table: IncrementTable | None) -> Panel
     if table is None:
         return Panel(title="the effect", words="no table")
     over = effect.over or ""
-    factor, unit = (1.0 / DEG, "deg") if over.endswith("_rad") else (1.0, "Pa" if over == "qbar_pa" else "-")
+    unit = unit_over(signal_over(effect.acts_on or "", over))
+    factor, unit = (1.0 / DEG, "deg") if unit == "rad" else (1.0, unit or "-")
     subject, scale = _subject(effect)
     behind = "state driven by " if effect.states and not effect.by else ""
     x = [factor * at for at in table.at]
@@ -146,7 +148,8 @@ def _subject(effect: AcceptedEffect) -> tuple[str, float]:
     if acts_on in OUTPUTS and not by:
         return shown(acts_on)
     own = SIGNALS[acts_on].unit if acts_on in OUTPUTS else ""
-    unit = (f"{own or 1}/rad" if by.endswith("_rad") else own) or "-"
+    is_angle = bool(by) and unit_over(signal_over(acts_on, by)) == "rad"
+    unit = (f"{own or 1}/rad" if is_angle else own) or "-"
     return f"{effect.subject} [{unit}]", 1.0
 
 

@@ -1,0 +1,53 @@
+"""Commands that put a surface of a JSBSim model where a record has it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airtruth.simulation.simulator import Executive
+from airtruth.simulation.trim import Trim
+
+Array = NDArray[np.float64]
+
+_BEYOND_RAD: Final = 0.02
+"""Range of the gearing beyond the surface of a record [rad] (judgement: a gearing differs by some percent)."""
+_GEARING: Final = 24
+"""Points of the gearing [-] (judgement: fewer than a degree apart in a record)."""
+_SAME_RAD: Final = 1e-9
+"""Difference of a surface that counts as rounding [rad] (judgement)."""
+
+
+def commands_for(executive: Executive, at: Trim, control: str, surface: Array) -> Array:
+    """Commands that put a surface where it was measured; the gearing of a model is not the same up and down.
+
+    Parameters
+    ----------
+    at : trim about which the record starts.
+    control : "elevator", "aileron" or "rudder", which the model has.
+    surface : wanted (steps,) [rad].
+    """
+    key, held = f"{control}_command_rad", getattr(at.controls, f"{control}_command_rad")
+    offset = held - getattr(at, f"{control}_rad")
+    if getattr(executive.model, control).feedback:
+        return np.asarray(surface + offset)
+    low, high = float(surface.min()) + offset, float(surface.max()) + offset
+    commands = np.union1d(np.linspace(low - _BEYOND_RAD, high + _BEYOND_RAD, _GEARING), [held, 0.0])
+    reached = []
+    for command in commands:
+        controls = replace(at.controls, **{key: float(command)})
+        executive.initialise(at.condition, at.alpha_rad, controls, 0.0, 0.0)
+        reached.append(getattr(executive.respond(), f"{control}_rad"))
+    rising = np.maximum.accumulate(reached)
+    kept = np.append(True, np.diff(rising) > _SAME_RAD)
+    if kept.sum() < 2:
+        return np.asarray(surface + offset)
+    found = np.interp(surface, rising[kept], commands[kept])
+    linear = np.abs(np.asarray(reached) - commands + offset).max() < _SAME_RAD
+    return np.asarray(surface + offset if linear else found)
+
+
+__all__ = ["commands_for"]
