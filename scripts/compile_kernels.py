@@ -1,4 +1,4 @@
-"""Compile the numba kernels into their cache: one identification and one trace side by side.
+"""Compile the numba kernels into their cache: one identification and one trace of each motion side by side.
 
     python -m scripts.compile_kernels
 
@@ -19,6 +19,8 @@ ROOT: Final = Path(__file__).resolve().parents[1]
 """Root of the repository."""
 LOG: Final = ROOT / "data" / "undeclared" / "a.parquet"
 """A short log that every kernel accepts."""
+SIDE: Final = ROOT / "data" / "campaigns" / "lateral_late_rudder.toml"
+"""A short campaign of aileron and rudder, of which the kernels of the lateral-directional motion take the records."""
 METHODS: Final = (
     "ls",
     "iv-lowpass",
@@ -45,7 +47,7 @@ def remove_stale(package: Path) -> int:
 
 
 def main() -> None:
-    """Run both commands; exit with the first failure."""
+    """Fly the campaign, then run the commands; exit with the first failure."""
     remove_stale(ROOT / "src" / "airtruth")
     with tempfile.TemporaryDirectory() as folder:
         shared = [sys.executable, "-m", "airtruth"]
@@ -72,7 +74,27 @@ def main() -> None:
             "--effect",
             "vane_lag",
         ]
-        running = [subprocess.Popen(command, stdout=subprocess.DEVNULL) for command in (identify, trace)]
+        flown, side = f"{folder}/flown", ["--aircraft", "gtm", "--quiet", "--motion", "lateral"]
+        fly = subprocess.run(
+            [*shared, "fly", str(SIDE), "--quiet", "--out", flown], stdout=subprocess.DEVNULL
+        )
+        if fly.returncode:
+            sys.exit(fly.returncode)
+        lateral = [
+            [
+                *shared,
+                "identify",
+                flown,
+                *side,
+                "--method",
+                "filter-error",
+                "--out",
+                f"{folder}/lateral.parquet",
+            ],
+            [*shared, "trace", flown, *side, "--effect", "rudder_delay", "--out", f"{folder}/lateral"],
+        ]
+        commands = (identify, trace, *lateral)
+        running = [subprocess.Popen(command, stdout=subprocess.DEVNULL) for command in commands]
         sys.exit(max(process.wait() for process in running))
 
 

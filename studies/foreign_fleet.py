@@ -4,6 +4,7 @@ docs/foreign_aircraft.md. Results are kept in a folder: a second call flies what
     python -m studies.foreign_fleet --out out/fleet                                 # everything
     python -m studies.foreign_fleet --out out/fleet --aircraft c182 --case calm     # a part
     python -m studies.foreign_fleet --out out/fleet --report                        # the tables alone
+    python -m studies.foreign_fleet --out out/lateral-fleet --motion lateral        # records of aileron and rudder
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ from typing import Any, Final
 import numpy as np
 
 from airtruth.errors import AirtruthError
-from airtruth.physics.short_period import PARAMETERS
+from airtruth.physics.motion import MOTIONS
 from airtruth.simulation.campaign import plan
 from airtruth.simulation.campaign import run as campaign
-from airtruth.simulation.foreign_aircraft import CAMPAIGN, new_from_jsbsim
-from airtruth.tracing import trace
+from airtruth.simulation.foreign_aircraft import CAMPAIGN, LATERAL_CAMPAIGN, new_from_jsbsim
+from airtruth.tracing import TraceOptions, trace
 
 AIRCRAFT: Final = (
     *("737", "A320", "MD11", "B747", "787-8", "global5000", "fokker100"),
@@ -39,11 +40,23 @@ CASES: Final = {
     "light": ("light", ""),
     "delay": ("light", '\n[[effect]]\nname = "elevator_delay"\ndelay_ms = 80\n'),
     "vane": ("light", '\n[[effect]]\nname = "vane_lag"\ntau_ms = 120\n'),
+    "lateral-calm": ("", ""),
+    "lateral-light": ("light", ""),
+    "rudder": ("light", '\n[[effect]]\nname = "rudder_delay"\ndelay_ms = 80\n'),
+    "beta-vane": ("light", '\n[[effect]]\nname = "vane_lag"\nchannel = "beta_rad"\ntau_ms = 120\n'),
 }
 """Case -> level of the gusts ("" for calm air) and effect that is flown."""
 
-SOUGHT: Final = {"delay": ("elevator_delay", "delay_s", 0.080), "vane": ("vane_lag", "tau_s", 0.120)}
-"""Case -> name, parameter and size [s] of its effect."""
+OF: Final = {"longitudinal": tuple(CASES)[:4], "lateral": tuple(CASES)[4:]}
+"""Motion -> its cases."""
+
+SOUGHT: Final = {
+    "delay": ("elevator_delay", "delay_s", 0.080),
+    "vane": ("vane_lag", "tau_s", 0.120),
+    "rudder": ("rudder_delay", "delay_s", 0.080),
+    "beta-vane": ("vane_lag:beta_rad", "tau_s", 0.120),
+}
+"""Case -> key, parameter and size [s] of its effect."""
 
 WITHIN: Final = 0.15
 """Relative error of a size that counts as right [-]: the bar of the study."""
@@ -63,7 +76,11 @@ def fly_and_trace(name: str, case: str, out: Path, seed: int) -> dict[str, Any]:
             reason = survey.cause or survey.flight[-1]
             return {"aircraft": name, "case": case, "seed": seed, "error": reason}
     level, effect = CASES[case]
-    text = (folder / CAMPAIGN).read_text().split("[gust]")[0]
+    motion = "lateral" if case in OF["lateral"] else "longitudinal"
+    campaign_file = folder / (LATERAL_CAMPAIGN if motion == "lateral" else CAMPAIGN)
+    if not campaign_file.exists():
+        return {"aircraft": name, "case": case, "seed": seed, "error": "has no campaign in six axes"}
+    text = campaign_file.read_text().split("[gust]")[0]
     text = text.replace("seed = 1\n", f"seed = {seed}\n")
     if level:
         text += f'[gust]\nfigures = "mil-f-8785c"\nlevel = "{level}"\n'
@@ -74,7 +91,7 @@ def fly_and_trace(name: str, case: str, out: Path, seed: int) -> dict[str, Any]:
     failures = campaign.fly(planned, logs).failures
     if failures:
         return {"aircraft": name, "case": case, "seed": seed, "error": failures[0].reason}
-    answer = trace(logs, folder).answer.to_dict()
+    answer = trace(logs, folder, TraceOptions(motion=motion)).answer.to_dict()
     shutil.rmtree(logs)
     keep = (
         "verdict",
@@ -104,16 +121,26 @@ def named(row: dict[str, Any]) -> str:
     for effect in row["effects"]:
         sizes = ", ".join(f"{k} {v['value']:.4g}" for k, v in effect["parameters"].items())
         same = effect["indistinguishable_from"]
-        words.append(f"{effect['name']} ({sizes})" + (f" or {', '.join(same)}" if same else ""))
+        words.append(f"{key_of(effect)} ({sizes})" + (f" or {', '.join(same)}" if same else ""))
     provisional = ", provisional" if row["provisional"] else ""
     return f"{row['verdict']}{provisional}" + (f": {'; '.join(words)}" if words else "")
+
+
+def key_of(effect: dict[str, Any]) -> str:
+    """Name of an effect with the channel of a sensor or surface."""
+    channel = effect.get("channel")
+    return (
+        f"{effect['name']}:{channel}"
+        if channel in ("beta_rad", "aileron_rad", "rudder_rad")
+        else str(effect["name"])
+    )
 
 
 def found(row: dict[str, Any]) -> tuple[bool, float]:
     """Whether the flown effect leads an answer or is in the class of a leading one, and the error of its size [-]."""
     name, parameter, size = SOUGHT[row["case"]]
     for effect in row.get("effects", ()):
-        if effect["name"] == name:
+        if key_of(effect) == name:
             return True, effect["parameters"][parameter]["value"] / size - 1.0
     members = [m for effect in row.get("effects", ()) for m in effect["indistinguishable_from"]]
     return any(m.startswith(name) for m in members), float("nan")
@@ -122,18 +149,18 @@ def found(row: dict[str, Any]) -> tuple[bool, float]:
 def sigmas(row: dict[str, Any]) -> list[float]:
     """Distance of each derivative from the linearisation, in standard deviations of the estimate."""
     shifts = row.get("declared_model", {}).get("shifts", {})
-    return [
-        (shifts[n]["estimate"] - shifts[n]["declared"]) / shifts[n]["std"] for n in PARAMETERS if n in shifts
-    ]
+    scored = {n for m in MOTIONS.values() for n in m.parameters if n not in m.unscored}
+    return [(own["estimate"] - own["declared"]) / own["std"] for n, own in shifts.items() if n in scored]
 
 
 def report(rows: Sequence[dict[str, Any]]) -> Iterable[str]:
     """The tables as Markdown."""
-    yield "| aircraft | " + " | ".join(CASES) + " |"
-    yield "|---|" + "---|" * len(CASES)
+    cases = [case for case in CASES if any(r["case"] == case for r in rows)]
+    yield "| aircraft | " + " | ".join(cases) + " |"
+    yield "|---|" + "---|" * len(cases)
     by = {(r["aircraft"], r["case"]): r for r in rows}
     for name in dict.fromkeys(r["aircraft"] for r in rows):
-        cells = [named(by[name, case]) if (name, case) in by else "" for case in CASES]
+        cells = [named(by[name, case]) if (name, case) in by else "" for case in cases]
         yield f"| {name} | " + " | ".join(cells) + " |"
     nulls = [r for r in rows if r["case"] not in SOUGHT and "error" not in r]
     wrong = [r for r in nulls if r["verdict"] != "none"]
@@ -141,7 +168,7 @@ def report(rows: Sequence[dict[str, Any]]) -> Iterable[str]:
     yield f"nulls: {len(wrong)} of {len(nulls)} answered with anything but none: " + ", ".join(
         f"{r['aircraft']} {r['case']}" for r in wrong
     )
-    for case, (name, _, size) in SOUGHT.items():
+    for case, (name, _, size) in ((c, s) for c, s in SOUGHT.items() if c in cases):
         these = [found(r) for r in rows if r["case"] == case and "error" not in r]
         hits = [error for hit, error in these if hit]
         right = [error for error in hits if abs(error) <= WITHIN]
@@ -156,13 +183,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--aircraft", nargs="*", default=AIRCRAFT)
-    parser.add_argument("--case", nargs="*", default=list(CASES), choices=list(CASES))
+    parser.add_argument("--motion", choices=list(OF), default="longitudinal")
+    parser.add_argument("--case", nargs="*", choices=list(CASES), help="default: all of the motion")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--report", action="store_true")
     stated = parser.parse_args()
     stated.out.mkdir(parents=True, exist_ok=True)
     done = {(r["aircraft"], r["case"], r["seed"]) for r in results(stated.out)}
-    for case in stated.case:
+    for case in stated.case or OF[stated.motion]:
         for name in stated.aircraft:
             if stated.report or (name, case, stated.seed) in done:
                 continue

@@ -5,6 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from airtruth import aircraft
+from airtruth.simulation.linearise_lateral import lateral_truth, linearise_lateral
+from airtruth.simulation.simulator import Condition
+from airtruth.simulation.trim import trim
 from airtruth.tracing import TraceOptions
 from airtruth.tracing.run import trace
 from validation.lateral_declared import lateral_aircraft
@@ -75,3 +79,24 @@ def test_a_weak_fin_is_named(tmp_path):
     answer = trace([log_of(*weak)], lateral_aircraft(tmp_path / "gtm"), LATERAL).answer
     assert not answer.declared_model.consistent
     assert any("fin_effectiveness" in s.effects for s in answer.alternatives)
+
+
+@pytest.mark.slow
+def test_the_update_of_an_aircraft_without_a_jsbsim_model_flies_with_the_effect(tmp_path):
+    """The updated aircraft has the late rudder in a JSBSim model of its own, trims in six axes, and is not late when traced."""
+    declared = lateral_aircraft(tmp_path / "gtm")
+    options = replace(LATERAL, effects=("rudder_delay", "vane_lag:beta_rad"), increments=False)
+    answer = trace(
+        [log_of(*flights("rudder_delay", 0.08))], declared, options, out=tmp_path / "traced"
+    ).answer
+    assert [e.key for e in answer.effects] == ["rudder_delay"]
+    assert answer.updated_aircraft is not None
+    updated = aircraft.load(answer.updated_aircraft)
+    found = trim(updated, Condition(38.6, 2134.0, straight="wings-level"))
+    true = lateral_truth(linearise_lateral(updated, found), found)
+    after = answer.derivatives.after
+    assert {k: true[k] for k in ("Clp", "Cnbeta", "Cndr")} == pytest.approx(
+        {k: after[k] for k in ("Clp", "Cnbeta", "Cndr")}, rel=0.01
+    )
+    text = (updated.folder / f"{updated.folder.name}.xml").read_text(encoding="utf-8")
+    assert "rudder_delay" in text
