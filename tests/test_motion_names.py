@@ -16,6 +16,7 @@ HOME = (
     "aircraft/parts.py",
     "physics/motion.py",
     "physics/composition.py",
+    "physics/expected.py",
     "physics/composition_lateral.py",
     "effects/",
     "identification/regression/",

@@ -20,8 +20,8 @@ from airtruth.identification.estimates import (
     half_width,
     point_values,
 )
-from airtruth.identification.expected import EXPECTED
 from airtruth.numerics.order_statistics import Blocks, medians
+from airtruth.physics.expected import EXPECTED
 from airtruth.physics.motion import LONGITUDINAL, Motion
 
 Array = NDArray[np.float64]

@@ -346,12 +346,12 @@ def longitudinal_output_slopes(
 def pack_moves(record: TraceRecord, compiled: CompiledChange, common: Array, rolloff: float) -> AircraftMoves:
     """What the parameters move of `airtruth.tracing.model.response.pack_aircraft`."""
     entries, row = SHORT_PERIOD.common, LONGITUDINAL.row("Cm")
-    plant = record.pitch_plant
+    plant = record.plant
     upward, lead = gust_weights(GUST_1, rolloff)
     return AircraftMoves(
         inertia=1.0 + float(common[entries.inertia]),
         turned=plant.derivatives[row] + common[row],
-        engine=np.zeros_like(plant.constant) + plant.engine,
+        engine=np.zeros_like(plant.constant) + plant.power.constant,
         mounting_m=compiled.declared["cg"] * plant.aircraft.constants.chord_m,
         upward=upward,
         lead=lead,

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from airtruth.checks.airspeed import WalkInNoise
 from airtruth.physics.motion import LONGITUDINAL, Motion
-from airtruth.tracing.model.lateral_plant import LateralPlant
 from airtruth.tracing.model.plant import Plant
 
 Array = NDArray[np.float64]
@@ -162,25 +161,10 @@ class TraceRecord:
     """
 
     signals: Signals
-    plant: Plant | LateralPlant
+    plant: Plant
     gust_length_m: float
     remainder: Array | None = None
     kept: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
-
-    @property
-    def pitch_plant(self) -> Plant:
-        """The plant of a record of the pitch plane.
-
-        Raises
-        ------
-        TypeError
-            If the record is one of another motion.
-        """
-        if not isinstance(self.plant, Plant):
-            raise TypeError(
-                f"a record of the {self.signals.motion.name} motion has no plant of the pitch plane"
-            )
-        return self.plant
 
     @property
     def samples(self) -> int:

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.physics.motion import LONGITUDINAL
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.physics.terms import Change, SurfaceTerm
 from airtruth.tracing.model import filter as record_filter
 from airtruth.tracing.model.by_motion import coefficients_of, equations_of_grid
@@ -28,7 +28,6 @@ from airtruth.tracing.model.kernel_input import (
 )
 from airtruth.tracing.model.lateral_input import LateralGrid
 from airtruth.tracing.model.lateral_packing import pack_lateral, side_gusts
-from airtruth.tracing.model.lateral_plant import LateralPlant
 from airtruth.tracing.model.parameters import COLOUR_TIME_S, SHORT_PERIOD, CommonEntries
 from airtruth.tracing.model.plant import Plant
 from airtruth.tracing.model.records import FINE, Signals, TraceRecord, nodes
@@ -312,7 +311,7 @@ def filter_model(given: FilterInputs, settings: Settings, common: Array, per_rec
         rotary=0.5 + float(common[entries.rotary]),
         rotary_time_s=4.0 * constants.span_m / (np.pi * given.reference.airspeed_m_s),
     )
-    if isinstance(record.plant, LateralPlant):
+    if record.plant.motion is LATERAL:
         aircraft = pack_lateral(record.plant, compiled, common, entries)
         gusts = side_gusts(gusts, constants.span_m)
     else:
@@ -330,6 +329,8 @@ def pack_aircraft(plant: Plant, compiled: CompiledChange, common: Array) -> Airc
     """The declared aircraft of a flight condition, with its changes and increments."""
     c, declared = plant.aircraft.constants, compiled.declared
     entries, moment = SHORT_PERIOD.common, LONGITUDINAL.row("Cm")
+    (table,), trims = plant.tables, plant.trims
+    alpha, control, rate = table.axes
     inertia = float(common[entries.inertia])
     increments = common[entries.derivatives].copy()
     increments[moment] += inertia * (plant.derivatives[moment] + common[moment])
@@ -339,19 +340,19 @@ def pack_aircraft(plant: Plant, compiled: CompiledChange, common: Array) -> Airc
         mass_kg=c.mass_kg * declared["mass"],
         inertia_kg_m2=c.inertia_yy_kg_m2 * (declared["inertia"] * (1.0 + inertia)),
         trim_alpha_rad=plant.trim_alpha_rad,
-        trim_elevator_rad=plant.trim_elevator_rad,
-        neutral_elevator_rad=plant.neutral_elevator_rad,
+        trim_elevator_rad=trims[table.signals[1]],
+        neutral_elevator_rad=float(plant.neutral_rad[0]),
         effectiveness=declared["elevator"],
         cg_shift=declared["cg"],
         thrust_arm_m=declared["thrust_arm"],
-        thrust_n=float(plant.thrust[0]),
-        thrust_slope_m2=float(plant.thrust[1]),
-        constant=plant.constant + common[entries.thrust] * plant.engine,
+        thrust_n=float(plant.power.thrust[0]),
+        thrust_slope_m2=float(plant.power.thrust[1]),
+        constant=plant.constant + common[entries.thrust] * plant.power.constant,
         increments=increments,
-        alpha_rad=plant.alpha_rad,
-        elevator_rad=plant.elevator_rad,
-        qhat=plant.qhat,
-        values=plant.values,
+        alpha_rad=alpha,
+        elevator_rad=control,
+        qhat=rate,
+        values=table.values,
     )
 
 
