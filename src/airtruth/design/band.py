@@ -137,7 +137,7 @@ class BandQuestion:
 
     @property
     def title(self) -> str:
-        """What the input does."""
+        """The purpose of the input."""
         return "the input that narrows the band of " + " and of ".join(e.variant for e in self.accepted)
 
     def at(self, bench: Bench, campaign: Campaign, records: int, seed: int) -> Band:

@@ -67,7 +67,7 @@ class DerivativeQuestion:
 
     @property
     def title(self) -> str:
-        """What the input does."""
+        """The purpose of the input."""
         return f"the input that determines {', '.join(self.names)}"
 
     def at(self, bench: Bench, campaign: Campaign, records: int, seed: int) -> Precision:

@@ -168,7 +168,7 @@ def _some(count: int, runs: int) -> str:
 
 
 class _Method:
-    """What the runs of one method have in common: counts, sums, and the first run of each kind."""
+    """Common part of the runs of one method: counts, sums, and the first run of each kind."""
 
     def __init__(self, first: Estimates) -> None:
         self.name, self.covariance_name = first.method, first.covariance_name

@@ -91,7 +91,7 @@ def linearise(
 
 
 def _answer(executive: Executive, trim: Trim, motion: Motion, change: Mapping[str, float]) -> Array:
-    """What a motion answers to a state off the trim, and its surfaces [rad]: see `_accelerations` and `_coefficients`."""
+    """Answers of a motion in a state off the trim, and its surfaces [rad]: see `_accelerations` and `_coefficients`."""
     executive = executive.again()
     off = {signal.channel: change.get(signal.name, 0.0) for signal in motion.signals}
     at = trim.controls

@@ -67,7 +67,7 @@ which gusts would turn into an axial force)."""
 
 @dataclass(frozen=True)
 class AxialForce:
-    """What ax shows.
+    """Result of the comparison of ax.
 
     Attributes
     ----------
@@ -236,7 +236,7 @@ def _weights(records: Sequence[_Means]) -> Array:
 
 
 def _residual(design: Array, x: Array) -> Array:
-    """What a least-squares fit of the columns of a design leaves of x."""
+    """Residual of x after a least-squares fit of the columns of a design."""
     return np.asarray(x - design @ np.linalg.lstsq(design, x, rcond=None)[0])
 
 

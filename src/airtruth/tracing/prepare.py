@@ -21,6 +21,7 @@ from airtruth.physics.composition import directions
 from airtruth.physics.motion import LONGITUDINAL, MOTIONS, Motion
 from airtruth.physics.reconstruction import is_reconstructed
 from airtruth.tracing.conditions import condition_notes, flies, records_of
+from airtruth.tracing.inference.causes import DERIVATIVES, DeclaredCauses, causes_of
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.model.reading import measured_controls, read
@@ -28,8 +29,6 @@ from airtruth.tracing.model.records import FINE, Signals, TraceRecord, fine
 from airtruth.tracing.model.settings import VANE, declared_change, resolved, settings_of
 from airtruth.tracing.model.surface_noise import with_surface_noise
 from airtruth.tracing.options import TraceOptions
-from airtruth.tracing.selection.explanation import DERIVATIVES, causes_of
-from airtruth.tracing.selection.release import DeclaredCauses
 from airtruth.units import DEG
 
 Array = NDArray[np.float64]

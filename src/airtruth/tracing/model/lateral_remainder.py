@@ -1,4 +1,4 @@
-"""What the declared JSBSim model has beyond the sum of its lateral tables, along each record.
+"""Forces of the declared JSBSim model beyond the sum of its lateral tables, along each record.
 
 The tables of `airtruth.tracing.model.lateral_plant` add up over the signals. The products of two signals that they lack, such as
 a rudder whose side force falls with the sideslip, are evaluated in JSBSim at the measured motion:

@@ -157,14 +157,12 @@ class TraceRecord:
     gust_length_m : scale length of the gust that the filter estimates there [m].
     remainder : (coefficients, points) on the filter's grid, which the declared JSBSim model has along this record beyond the
         plant's tables (`airtruth.tracing.model.remainder`), from the lead on; None for none.
-    kept : what was computed from the record alone, by name; no part of its value.
     """
 
     signals: Signals
     plant: Plant
     gust_length_m: float
     remainder: Array | None = None
-    kept: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def samples(self) -> int:

@@ -1,4 +1,4 @@
-"""What the declared JSBSim model does beyond the tables of its forces at rest, along each record.
+"""Forces of the declared JSBSim model beyond the tables of its states at rest, along each record.
 
 The declared aircraft is flown in JSBSim through the surface and at the airspeed of the record. At each time the forces
 that it has are compared with those of the tables at its own angle of attack, surface and pitch rate:
