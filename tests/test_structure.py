@@ -1,6 +1,7 @@
 """Bounds on the structure of the package: sizes, arguments, documented constants, no private imports."""
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -147,3 +148,10 @@ def test_nothing_before_the_search_imports_it():
         and "airtruth.tracing.selection" in path.read_text(encoding="utf-8")
     ]
     assert not upward
+
+
+@pytest.mark.parametrize("path", FILES, ids=name_of)
+def test_docstrings_begin_with_a_noun_or_a_verb(path):
+    """A docstring names its subject: no noun clause (What the filter reads) and no bare genitive (Of a problem)."""
+    clauses = re.findall(r'"""(?:What|Of) [^\n]*', path.read_text(encoding="utf-8"))
+    assert not clauses
