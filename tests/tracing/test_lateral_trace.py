@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from airtruth.simulation.linearise_lateral import lateral_truth, linearise_lateral
 
 from airtruth import aircraft
-from airtruth.simulation.linearise_lateral import lateral_truth, linearise_lateral
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.trim import trim
 from airtruth.tracing import TraceOptions

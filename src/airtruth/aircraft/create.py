@@ -23,14 +23,13 @@ from airtruth.logs import ledger
 from airtruth.logs.atomic import new_folder
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.atmosphere import air_density
-from airtruth.physics.motion import LATERAL
+from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.physics.motion_parts import Control
-from airtruth.physics.short_period import PARAMETERS
 from airtruth.quantity import LARGEST, Quantity
 
 _MOST_ALPHA_RAD: Final = 0.7
 """Largest angle of attack of a trim [rad] (judgement: 40 deg, above any trim; a value in degrees exceeds it)."""
-_PITCH: Final = dict(zip(PARAMETERS, (5.0, 5.0, 0.4, -0.8, -20.0, -1.2), strict=True))
+_PITCH: Final = dict(zip(LONGITUDINAL.parameters, (5.0, 5.0, 0.4, -0.8, -20.0, -1.2), strict=True))
 """Pitch plane of a model of lateral derivatives alone [1/rad] (judgement: stable and well damped; a lateral trace takes alpha and
 q as measured)."""
 TRIM_WINDOW_S: Final = 1.0
@@ -93,7 +92,7 @@ def from_estimates(estimates: pd.DataFrame, method: str | None = None) -> dict[s
         raise ConfigurationError(f"estimates: no run of {chosen} converged")
     source = f"{chosen}, {len(good)} run{'s' if len(good) > 1 else ''}"
     derivatives = {}
-    for name in PARAMETERS:
+    for name in LONGITUDINAL.parameters:
         value, std = good[name].to_numpy(), good[f"{name}_std"].to_numpy()
         with np.errstate(over="ignore", invalid="ignore"):  # diverged estimates
             scatter = float(value.std(ddof=1)) if len(value) > 1 else 0.0
@@ -138,7 +137,7 @@ def write_new(
     name = out_folder.name
     motion = "motion" if _is_lateral(derivatives) else "short-period motion"
     head = f"{name}: the {motion} of {aircraft.name} about one trim, written by airtruth."
-    if not set(PARAMETERS) <= set(derivatives):
+    if not set(LONGITUDINAL.parameters) <= set(derivatives):
         note = f"The pitch plane is a placeholder: no derivatives of it are declared. {note}"
     heading = f"{head}\n{note}".rstrip()
     file = _file(aircraft.file, name, derivatives)
@@ -194,13 +193,13 @@ def flown_values(derivatives: Mapping[str, Quantity], at: TrimPoint) -> dict[str
     ConfigurationError
         As `write_new`.
     """
-    known = (*PARAMETERS, *LATERAL.parameters)
+    known = (*LONGITUDINAL.parameters, *LATERAL.parameters)
     for name in derivatives:
         if name not in known:
             raise ConfigurationError(f"derivative {name!r}: {choices(name, known)}")
     lateral = LATERAL.parameters if _is_lateral(derivatives) else ()
-    pitch = [name for name in PARAMETERS if name in derivatives]
-    missing = [name for name in PARAMETERS if name not in derivatives and (pitch or not lateral)]
+    pitch = [name for name in LONGITUDINAL.parameters if name in derivatives]
+    missing = [name for name in LONGITUDINAL.parameters if name not in derivatives and (pitch or not lateral)]
     if missing:
         raise ConfigurationError(
             f"derivatives lack {', '.join(missing)}; state them in [derivatives] of aircraft.toml, or give estimates"
