@@ -45,15 +45,17 @@ TYPICAL: Final = {"CLalpha": 4.5, "Cmde": -1.2}
 
 
 def slopes_near_trim(runs: Runs, aircraft: Aircraft | None) -> list[Relation]:
-    """Tests of aerodynamic slopes in the runs that keep to one trim; the other runs have no distance."""
+    """Tests of aerodynamic slopes in the runs that keep to one trim; the other runs have no distance.
+
+    A run that yaws more than it pitches is none of them: sideslip and roll then move alpha and the pitching moment.
+    """
 
     def keeps(c: Channels, dt_s: float) -> Array:
         speed, alpha = c["airspeed_m_s"], c["alpha_rad"]
         most_speed, most_alpha = NEAR_TRIM
-        return np.asarray(
-            (np.ptp(speed, axis=1) < most_speed * np.abs(speed.mean(axis=1)))
-            & (np.ptp(alpha, axis=1) < most_alpha)
-        )
+        slow = np.ptp(speed, axis=1) < most_speed * np.abs(speed.mean(axis=1))
+        yaw = np.ptp(c["r_rad_s"], axis=1) if "r_rad_s" in c else 0.0
+        return np.asarray(slow & (np.ptp(alpha, axis=1) < most_alpha) & (yaw <= np.ptp(c["q_rad_s"], axis=1)))
 
     near = runs.each(keeps).astype(np.bool_)
     rows = np.flatnonzero(near) if near.any() else np.arange(len(near))
