@@ -43,7 +43,7 @@ def test_linearised_in_six_axes_it_gives_its_derivatives_back(declared, tmp_path
     new = write_new(declared, declared.file.derivatives, AT, tmp_path / "new" / "gtm")
     found = at_trim(new)
     assert abs(found.aileron_rad) + abs(found.rudder_rad) < 1e-6
-    true = lateral_truth(linearise(new, found), found)
+    true = lateral_truth(linearise(new, found, motion=LATERAL), found)
     wanted = dict(zip(LATERAL.parameters, GTM.lateral.ravel().tolist(), strict=True))
     assert {k: true[k] for k in wanted} == pytest.approx(wanted, rel=2e-3, abs=2e-4)
     assert set(new.file.derivatives) == set(LATERAL.parameters)
