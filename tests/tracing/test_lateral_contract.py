@@ -8,6 +8,7 @@ from airtruth.effects.registry import EFFECTS
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
 from airtruth.tracing.answer import CandidateScore
+from tests.tracing.test_lateral_pages import lateral_answer
 
 SENSORS = {
     "vane_arm:beta_rad": "x_m",
@@ -95,3 +96,18 @@ def test_increments_of_the_pitch_plane_keep_their_names():
 
 def test_every_derivative_of_the_motion_is_a_parameter():
     assert [f"d{name}" for name in LATERAL.parameters] == OTHERS["derivatives:lateral"].split()
+
+
+def test_the_answer_has_the_keys_of_an_answer_in_the_channels_of_the_motion():
+    answer = lateral_answer().to_dict()
+    assert set(answer) >= {
+        *("verdict", "provisional", "anomaly", "remaining", "effects", "candidates", "error", "derivatives"),
+        *("updated_aircraft", "detectability", "next_flight", "declared_model", "confirmed", "alternatives"),
+        *("inclusion", "refined"),
+    }
+    assert set(answer["anomaly"]) >= {"statistic", "p_value"}
+    assert set(answer["declared_model"]) >= {"consistent", "statistic", "degrees", "p_value", "shifts"}
+    assert set(answer["derivatives"]) >= {"declared", "before", "after"}
+    assert all(set(row) == set(LATERAL.parameters) for row in answer["derivatives"].values() if row)
+    assert list(answer["error"]["channels"]) == ["beta_rad", "p_rad_s", "r_rad_s", "phi_rad", "ay_m_s2"]
+    assert set(answer["error"]["after"]["held_out"]["free_run"]) == set(LATERAL.output_channels)
