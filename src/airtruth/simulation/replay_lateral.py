@@ -20,8 +20,9 @@ from airtruth.errors import AircraftError, FlightError
 from airtruth.physics.motion import LATERAL, LONGITUDINAL
 from airtruth.simulation.gearing import commands_for
 from airtruth.simulation.readings import READ, READ_LATERAL, channels, lateral_channels, require_sound
+from airtruth.simulation.replay import replay
 from airtruth.simulation.simulator import Executive
-from airtruth.simulation.tracks import LateralTrack, as_logged, first_of, fitted_outputs
+from airtruth.simulation.tracks import LateralTrack, Track, as_logged, first_of, fitted_outputs
 from airtruth.simulation.trim import Trim
 from airtruth.units import FT
 
@@ -33,6 +34,15 @@ _OVER_GROUND: Final = ("velocities/v-north-fps", "velocities/v-east-fps", "veloc
 """Velocity over ground."""
 _GUST: Final = ("atmosphere/gust-north-fps", "atmosphere/gust-east-fps")
 """Horizontal velocity of the air."""
+
+
+def replayed(aircraft: Aircraft, at: Trim, track: Track | LateralTrack) -> dict[str, Array]:
+    """Replay a record of either motion, as `airtruth.simulation.replay.replay` or `replay_lateral`."""
+    return (
+        replay_lateral(aircraft, at, track)
+        if isinstance(track, LateralTrack)
+        else replay(aircraft, at, track)
+    )
 
 
 def replay_lateral(aircraft: Aircraft, at: Trim, track: LateralTrack) -> dict[str, Array]:
@@ -153,4 +163,4 @@ class _Surface:
         self._command(self._commands[step] + self._error)
 
 
-__all__ = ["replay_lateral"]
+__all__ = ["replay_lateral", "replayed"]

@@ -15,8 +15,7 @@ from airtruth.aircraft import Aircraft, Sensor
 from airtruth.errors import FlightError, TrimError
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.simulation.disposable import isolated, isolated_flight
-from airtruth.simulation.replay import replay
-from airtruth.simulation.replay_lateral import replay_lateral
+from airtruth.simulation.replay_lateral import replayed
 from airtruth.simulation.simulator import Condition
 from airtruth.simulation.tracks import LateralTrack, Track, substeps
 from airtruth.simulation.trim import Trim, trim
@@ -136,9 +135,13 @@ def _errors(problem: TraceProblem, aircraft: Aircraft, weights: list[Array]) -> 
         if at not in trims:
             trims[at] = isolated(f"the trim of {aircraft.name}", trim, aircraft, at)
         measured = track(record, aircraft, weight)
-        again = replay_lateral if isinstance(measured, LateralTrack) else replay
         flown = isolated_flight(
-            measured.airspeed_m_s.size, f"the replay of {aircraft.name}", again, aircraft, trims[at], measured
+            measured.airspeed_m_s.size,
+            f"the replay of {aircraft.name}",
+            replayed,
+            aircraft,
+            trims[at],
+            measured,
         )
         residual = record.signals.y - np.stack([flown[c] for c in channels], axis=1)
         squares.append((residual**2).mean(axis=0))
