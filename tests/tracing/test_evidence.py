@@ -14,11 +14,12 @@ from scipy.stats import multivariate_normal
 
 from airtruth.effects.effect import Prior
 from airtruth.effects.registry import EFFECTS
+from airtruth.tracing.inference.causes import DERIVATIVES, Cause
 from airtruth.tracing.inference.optimise import initial_parameters
 from airtruth.tracing.selection.best_first import best_first
 from airtruth.tracing.selection.evidence import Column, Quadratic
 from airtruth.tracing.selection.expansion import expanded
-from airtruth.tracing.selection.explanation import DERIVATIVES, LOG_WRONG, WRONG_BY, Cause
+from airtruth.tracing.selection.explanation import LOG_WRONG, WRONG_BY
 from airtruth.tracing.selection.set_table import SetTable
 
 SAMPLES = 40

@@ -16,13 +16,14 @@ from typing import Final
 import numpy as np
 
 from airtruth.effects.effect import Effect
+from airtruth.tracing.inference.causes import Cause
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import inflation
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.evidence import Quadratic, Weighed
 from airtruth.tracing.selection.expansion import Expansion, expanded
-from airtruth.tracing.selection.explanation import Cause, simplest
+from airtruth.tracing.selection.explanation import simplest
 from airtruth.tracing.selection.rounds import MOST_EFFECTS
 from airtruth.tracing.selection.set_table import SetTable
 

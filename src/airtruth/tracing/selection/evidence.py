@@ -32,7 +32,8 @@ from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
 from airtruth.effects.effect import Effect, Prior
-from airtruth.tracing.selection.explanation import DERIVATIVES, LOG_SAME_EVENT, LOG_WRONG, WRONG_BY, Cause
+from airtruth.tracing.inference.causes import DERIVATIVES, Cause
+from airtruth.tracing.selection.explanation import LOG_SAME_EVENT, LOG_WRONG, WRONG_BY
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
