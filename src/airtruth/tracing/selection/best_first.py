@@ -39,7 +39,7 @@ Names = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Posterior:
-    """What a search leaves.
+    """Outcome of a search.
 
     Attributes
     ----------

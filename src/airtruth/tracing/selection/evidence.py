@@ -101,7 +101,7 @@ class Column:
 
     @property
     def event(self) -> str:
-        """What moves it together with other effects; empty for an effect of its own."""
+        """Event that moves it together with other effects; empty for an effect of its own."""
         return self.effect.event if self.effect is not None else self.of_cause.event
 
     @property

@@ -10,7 +10,7 @@ Statist. Soc. B 41 (1979) 358-367 (declarations with heavy tails).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Final
