@@ -74,10 +74,10 @@ def evidence_of(log: Path) -> tuple[Posterior, float]:
 
 def by_base(found: Posterior) -> dict[Names, float]:
     """Weights of the sets by their names without variants, the most probable first."""
-    total: Counter[Names] = Counter()
+    total: dict[Names, float] = {}
     for names, weight in found.weights.items():
-        total[base(names)] += weight
-    return dict(total.most_common())
+        total[base(names)] = total.get(base(names), 0.0) + weight
+    return dict(sorted(total.items(), key=lambda pair: -pair[1]))
 
 
 def old_words(answer: dict[str, Any], truth: Names) -> str:

@@ -1,10 +1,10 @@
-"""Best-first search over sets of effects: quadratics predict the evidence of every set, and the best ones are refitted.
+"""Best-first search over sets of effects, which no trace uses yet: quadratics predict their evidence, and the best are refitted.
 
 The quadratic about the best fit predicts the evidence of every set of up to three effects. The best set without a refit is
 refitted from the predicted point, and its own quadratic gives its evidence with every explanation of the derivatives. A fit that
 leads is expanded in turn. The search ends when no set without a refit is predicted within `ODDS` of the best.
 
-No trace uses this search yet; `python -m studies.shadow` compares it with the one that traces use.
+`python -m studies.shadow` compares it with the search of a trace.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from airtruth.tracing.selection.set_table import SetTable
 ODDS: Final = 3.0
 """Log-evidence behind the best set from which a set is not refitted [-] (judgement: odds of one in twenty)."""
 REFITS: Final = 30
-"""Largest number of refits [-] (judgement: ten seconds)."""
+"""Largest number of refits [-] (judgement: ten to forty seconds)."""
 _SAME: Final = 0.05
 """Change of the logarithm of the ratio of variances that leaves every evidence as it is [-] (judgement)."""
 Names = tuple[str, ...]

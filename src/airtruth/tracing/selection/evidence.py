@@ -1,4 +1,4 @@
-"""Evidence of every set of effects by one quadratic of the log-likelihood about a fit.
+"""Evidence of every set of effects by one quadratic of the log-likelihood about a fit, for `best_first` alone.
 
 About a fit the negative log-likelihood is nearly quadratic in x, the increments of the derivatives and the sizes of all
 effects, with every other parameter eliminated under its prior:

@@ -108,7 +108,9 @@ class Expansion:
             offset,
             every.T @ (g - h @ x),
             every.T @ h @ every,
-            np.linalg.inv(problem.priors(alone).common)[np.ix_(declared, declared)],
+            np.asarray(np.linalg.inv(problem.priors(alone).common), dtype=np.float64)[
+                np.ix_(declared, declared)
+            ],
             common.derivatives.stop,
             (
                 *(
