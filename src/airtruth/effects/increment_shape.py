@@ -47,7 +47,7 @@ _PLANE: Final = {
     for motion in MOTIONS.values()
     for acts_on in (*(c.name for c in motion.coefficients), *motion.output_channels)
 } | {AXIAL: LONGITUDINAL}
-"""What an increment acts on -> motion whose signals it is over."""
+"""Coefficient or reading of an increment -> motion whose signals it is over."""
 SLOPE: Final = "slope"
 """Name of the rise c over the cell of the trim."""
 STEP: Final = "step"

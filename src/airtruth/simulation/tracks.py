@@ -24,7 +24,7 @@ step costs a simulation)."""
 
 @dataclass(frozen=True)
 class Measured:
-    """What a record measured.
+    """Outputs of a record and its time base.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ def first_of(track: Measured, channel: str, otherwise: float) -> float:
 
 
 def as_logged(aircraft: Aircraft, truth: Mapping[str, Array], track: Measured) -> dict[str, Array]:
-    """What the aircraft's sensors would log of a motion at every step, without noise.
+    """Readings of the aircraft's sensors in a motion, without noise.
 
     Parameters
     ----------
