@@ -344,7 +344,7 @@ def longitudinal_output_slopes(
 
 
 def pack_moves(record: TraceRecord, compiled: CompiledChange, common: Array, rolloff: float) -> AircraftMoves:
-    """Derivatives of `airtruth.tracing.model.response.pack_aircraft` in the parameters."""
+    """Derivatives of `airtruth.tracing.model.longitudinal_packing.pack_aircraft` in the parameters."""
     entries, row = SHORT_PERIOD.common, LONGITUDINAL.row("Cm")
     plant = record.plant
     upward, lead = gust_weights(GUST_1, rolloff)
