@@ -12,7 +12,7 @@ import numpy as np
 from airtruth.numerics.compiled import inner
 from airtruth.physics.motion import Motion
 from airtruth.physics.motion_parts import Coefficient, Control, Declared, Mode, Output, Signal, State
-from airtruth.tracing.model.by_motion import Equations, register
+from airtruth.tracing.model.by_motion import MotionEquations, register
 from airtruth.tracing.model.packing import Packing
 from airtruth.tracing.model.response import register_packing
 
@@ -133,7 +133,7 @@ def signals_at(x, at, rate, model, out):
 register(
     ToyAircraft,
     ToyGrid,
-    Equations(2, 2, rates, outputs, air_at, move_plays, settle, shifted, signals_at, ToyPoint, 1),
+    MotionEquations(2, 2, rates, outputs, air_at, move_plays, settle, shifted, signals_at, ToyPoint, 1),
 )
 
 

@@ -68,7 +68,7 @@ class Longitudinal:
 
 
 @dataclass(frozen=True)
-class Motion:
+class SimulatedMotion:
     """Response of runs, (runs, samples) each.
 
     Attributes
@@ -219,7 +219,9 @@ def _integrate(
                 state[i] += dt_s / 6.0 * slope
 
 
-def simulate(model: Longitudinal, elevator_rad: Array, dt_s: float, shift: Array | None = None) -> Motion:
+def simulate(
+    model: Longitudinal, elevator_rad: Array, dt_s: float, shift: Array | None = None
+) -> SimulatedMotion:
     """Motion from the steady state, by the classical Runge-Kutta method of fourth order.
 
     Parameters
@@ -254,7 +256,7 @@ def simulate(model: Longitudinal, elevator_rad: Array, dt_s: float, shift: Array
     out = np.empty((runs, 6, samples))
     axes = (t.airspeed_m_s, t.alpha_rad, t.elevator_rad, t.q_rad_s)
     _integrate(elevator, trim, added, dt_s, *axes, t.values, out)
-    return Motion(*(np.ascontiguousarray(out[:, i]) for i in range(6)))
+    return SimulatedMotion(*(np.ascontiguousarray(out[:, i]) for i in range(6)))
 
 
 def auxiliary(

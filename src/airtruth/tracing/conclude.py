@@ -61,7 +61,7 @@ from airtruth.tracing.selection.families import FRICTION
 from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import CONTRADICTED
 from airtruth.tracing.selection.rounds import SearchRound
-from airtruth.tracing.selection.score_test import Table
+from airtruth.tracing.selection.score_test import ScoreTable
 from airtruth.tracing.selection.significance import LEVEL
 from airtruth.tracing.selection.weights import alike_in_rivals
 from airtruth.tracing.stage_errors import Replay
@@ -352,7 +352,7 @@ def _detectability(
     return detectability(rounds[-1].table) if rounds[-1].anomaly.p_value > ANOMALY_LEVEL else {}
 
 
-def detectability(table: Table) -> dict[str, float]:
+def detectability(table: ScoreTable) -> dict[str, float]:
     """Smallest size of each effect that the records can trace (noncentrality 16) and that is material, in its own unit.
 
     A bandwidth or a rate limit is stated as its value. An effect with several variants is listed under its name with

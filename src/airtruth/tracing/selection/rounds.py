@@ -37,7 +37,7 @@ from airtruth.tracing.selection.refit import (
 )
 from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import Release, explained, release
-from airtruth.tracing.selection.score_test import Table
+from airtruth.tracing.selection.score_test import ScoreTable
 from airtruth.tracing.selection.set_table import SetTable
 from airtruth.tracing.selection.significance import (
     BEYOND_DOUBT,
@@ -138,7 +138,7 @@ class SearchRound:
     null: PosteriorFit
     gls: PosteriorFit
     whitener: Whitener
-    table: Table
+    table: ScoreTable
     omnibus: tuple[Anomaly, ...]
     adjusted: Array
     candidates: tuple[Candidate, ...]

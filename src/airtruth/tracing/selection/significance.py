@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from airtruth.tracing.selection.anomaly import Anomaly
-from airtruth.tracing.selection.score_test import Table
+from airtruth.tracing.selection.score_test import ScoreTable
 
 LEVEL: Final = 0.05
 """Significance level of the scores in the first round, after Holm's correction [-] (convention)."""
@@ -53,7 +53,7 @@ def later_gain(candidates: int, anomaly: Anomaly) -> float:
     return significant_gain(candidates, MISFIT_FAMILY_LEVEL if misfit else LATER_FAMILY_LEVEL)
 
 
-def strongest(omnibus: Sequence[Anomaly], table: Table, adjusted: NDArray[np.float64]) -> Anomaly:
+def strongest(omnibus: Sequence[Anomaly], table: ScoreTable, adjusted: NDArray[np.float64]) -> Anomaly:
     """The strongest evidence of a missing effect, a score or an omnibus test; p-value by Bonferroni's rule.
 
     Parameters
