@@ -20,7 +20,6 @@ from airtruth.tracing.answer import (
     CandidateScore,
     DeclaredModel,
     Derivatives,
-    Evidence,
     RecordNames,
     RefinedDerivative,
     TraceAnswer,
@@ -52,11 +51,10 @@ from airtruth.tracing.intervals import at_measured_alpha, estimates, widened_by_
 from airtruth.tracing.next_flight import next_flight
 from airtruth.tracing.notes import notes
 from airtruth.tracing.prepare import Case
-from airtruth.tracing.record_differences import CERTAIN, DIFFERENCES, differences
+from airtruth.tracing.record_differences import CERTAIN, differences
 from airtruth.tracing.replay import worsened
 from airtruth.tracing.reservations import reservations
 from airtruth.tracing.selection.acceptance import Candidate
-from airtruth.tracing.selection.anomaly import Anomaly
 from airtruth.tracing.selection.families import FRICTION
 from airtruth.tracing.selection.refusal import Refusal
 from airtruth.tracing.selection.release import CONTRADICTED
@@ -116,7 +114,7 @@ def conclude(
     reserved = _reserved(case.fitted, last, shown, sets, declared, agreement)
     verdict = _verdict(shown, declared, agreement)
     if verdict == "unexplained" and declared.consistent:
-        anomaly = remaining = Anomaly(DIFFERENCES, agreement.statistic, agreement.degrees, agreement.p_value)
+        anomaly = remaining = agreement
     errors = stage_errors(stages)
     refined = _refined(stages, declared) if verdict == "none" else {}
     updated, replay = (None, None) if publish is None else publish(bool(refined))
@@ -128,8 +126,8 @@ def conclude(
         or bool(shown and reserved)
         or bool(worsened(replay))
         or (bool(shown) and remaining.p_value <= ANOMALY_LEVEL),
-        anomaly=_evidence(anomaly),
-        remaining=_evidence(remaining),
+        anomaly=anomaly,
+        remaining=remaining,
         effects=shown,
         candidates=_candidates(case, rounds, stated, sizes),
         error=errors,
@@ -204,10 +202,6 @@ def _verdict(
     if any(e.acts_on is not None for e in effects):
         return "learned"
     return "one_of" if any(e.indistinguishable_from for e in effects) else "traced"
-
-
-def _evidence(anomaly: Anomaly) -> Evidence:
-    return Evidence(anomaly.statistic, anomaly.p_value, anomaly.where)
 
 
 def _effect(

@@ -108,7 +108,7 @@ def compile_change(change: Change, motion: Motion = LONGITUDINAL) -> CompiledCha
         elif (sensor.channel, sensor.kind) not in late:
             inputs[sensor.channel] = _with_error(inputs.get(sensor.channel, SensorErrors()), sensor)
     return CompiledChange(
-        surface=tuple(change.surface_path(control.name) for control in motion.controls),
+        surface=tuple(change.surface_path(control) for control in motion.controls),
         effects=_effects(change, first, motion),
         effect_states=first,
         motion=states,
