@@ -14,11 +14,11 @@ from airtruth.tracing.accepted import IncrementTable
 from airtruth.tracing.answer import (
     AcceptedEffect,
     Derivatives,
+    Evidence,
     ParameterEstimate,
     RecordNames,
     TraceAnswer,
 )
-from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.presentation import overview as traces
 from airtruth.tracing.stage_errors import BySet, Errors, Rms
 
@@ -128,8 +128,8 @@ def answer(effects, verdict):
     return TraceAnswer(
         verdict=verdict,
         provisional=False,
-        anomaly=HypothesisTest("", 90.0, 1, 1e-9),
-        remaining=HypothesisTest("", 5.0, 5, 0.4),
+        anomaly=Evidence(90.0, 1e-9),
+        remaining=Evidence(5.0, 0.4),
         effects=effects,
         candidates=(),
         error=Errors({}, stages),

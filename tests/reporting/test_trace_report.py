@@ -23,8 +23,7 @@ from airtruth.simulation.campaign import plan
 from airtruth.simulation.campaign import run as campaign
 from airtruth.table import MISSING
 from airtruth.tracing import TraceAnswer, TraceOptions, trace
-from airtruth.tracing.answer import ParameterEstimate
-from airtruth.tracing.inference.hypothesis_test import HypothesisTest
+from airtruth.tracing.answer import Evidence, ParameterEstimate
 from airtruth.tracing.presentation.brief import as_brief_text
 from airtruth.tracing.presentation.candidates import candidate_table, probability, ranked
 from airtruth.tracing.presentation.charts import scores_chart, trace_chart
@@ -116,7 +115,7 @@ def test_the_updated_aircraft_of_no_effect_is_beside_the_refitted_derivatives(an
         ({"verdict": "unexplained", "effects": ()}, "Unexplained: the declared aircraft lacks something"),
         ({"verdict": "one_of"}, "One of several: the declared aircraft lacks elevator_delay, or an effect"),
         (
-            {"provisional": True, "remaining": HypothesisTest("q", 50.0, 1, 1e-4)},
+            {"provisional": True, "remaining": Evidence(50.0, 1e-4, "q")},
             "Provisional: a significant anomaly remains",
         ),
     ],

@@ -11,7 +11,6 @@ from typing import Any, Final, Literal, TypeGuard
 from airtruth.errors import StoreError
 from airtruth.physics.motion import Motion, motion_of
 from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate, effect_key
-from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.stage_errors import COUNTS, AxialErrors, Errors, Replay, Tolerances
 
 ANSWER: Final = "trace.json"
@@ -31,6 +30,26 @@ VerdictName = Literal["none", "traced", "one_of", "learned", "unexplained"]
 def answer_path(trace: Path) -> Path:
     """The trace.json of a trace that is stated by its folder or by that file."""
     return trace / ANSWER if trace.is_dir() else trace
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """The strongest evidence of a missing effect.
+
+    Attributes
+    ----------
+    statistic : chi-square statistic [-].
+    p_value : probability of a larger statistic where nothing is missing, corrected for the number of tests [-].
+    where : the effect or the omnibus test that shows it.
+    """
+
+    statistic: float
+    p_value: float
+    where: str = ""
+
+    def to_dict(self) -> dict[str, float]:
+        """Statistic and p-value."""
+        return {"statistic": self.statistic, "p_value": self.p_value}
 
 
 @dataclass(frozen=True)
@@ -208,8 +227,8 @@ class TraceAnswer:
 
     verdict: VerdictName
     provisional: bool
-    anomaly: HypothesisTest
-    remaining: HypothesisTest
+    anomaly: Evidence
+    remaining: Evidence
     effects: tuple[AcceptedEffect, ...]
     candidates: tuple[CandidateScore, ...]
     error: Errors
@@ -245,7 +264,7 @@ class TraceAnswer:
     def to_dict(self) -> dict[str, Any]:
         """The content of trace.json."""
         found = {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
-        found["shown_by"] = {"anomaly": self.anomaly.null, "remaining": self.remaining.null}
+        found["shown_by"] = {"anomaly": self.anomaly.where, "remaining": self.remaining.where}
         optional = {name for name in ("tolerances", "replay", "axial_force") if getattr(self, name) is None}
         optional |= set() if self.forced else {"forced"}
         return {name: value for name, value in found.items() if name not in optional}
@@ -356,6 +375,7 @@ __all__ = [
     "DeclaredModel",
     "DerivativeShift",
     "Derivatives",
+    "Evidence",
     "ParameterEstimate",
     "RecordNames",
     "RefinedDerivative",

@@ -20,6 +20,7 @@ from airtruth.tracing.answer import (
     CandidateScore,
     DeclaredModel,
     Derivatives,
+    Evidence,
     RecordNames,
     RefinedDerivative,
     TraceAnswer,
@@ -45,6 +46,7 @@ from airtruth.tracing.increment_table import in_physical_terms, increment_rows, 
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood, derivative_likelihood
 from airtruth.tracing.inference.homogeneity import Homogeneity, homogeneity
 from airtruth.tracing.inference.hypothesis import is_curvature
+from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.posterior import TraceProblem
 from airtruth.tracing.inference.robust import robust_covariance
 from airtruth.tracing.intervals import at_measured_alpha, estimates, widened_by_profile, widened_by_rejected
@@ -126,8 +128,8 @@ def conclude(
         or bool(shown and reserved)
         or bool(worsened(replay))
         or (bool(shown) and remaining.p_value <= ANOMALY_LEVEL),
-        anomaly=anomaly,
-        remaining=remaining,
+        anomaly=_evidence(anomaly),
+        remaining=_evidence(remaining),
         effects=shown,
         candidates=_candidates(case, rounds, stated, sizes),
         error=errors,
@@ -362,6 +364,10 @@ def detectability(table: ScoreTable) -> dict[str, float]:
         kept = found.get(s.effect.name)
         found[s.effect.name] = value if kept is None else (max if p.reciprocal else min)(kept, value)
     return found
+
+
+def _evidence(test: HypothesisTest) -> Evidence:
+    return Evidence(test.statistic, test.p_value, test.null)
 
 
 __all__ = ["conclude", "detectability", "estimates"]

@@ -26,8 +26,7 @@ from airtruth.errors import LogError
 from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.sensor_errors import KINDS
-from airtruth.tracing.answer import TraceAnswer
-from airtruth.tracing.inference.hypothesis_test import HypothesisTest
+from airtruth.tracing.answer import Evidence, TraceAnswer
 
 ERRORS: Final = kinematics_model.ERRORS | kinematics_side.ERRORS
 """Errors that the kinematics of a motion can show, by name."""
@@ -259,9 +258,7 @@ def with_contradictions(
     found = disagreement(check, answer, dt_s)
     provisional = answer.provisional or bool(found and answer.effects)
     if answer.verdict == "none" and check is not None and check.p_value < _IMPOSSIBLE:
-        left = HypothesisTest(
-            "the kinematics of the fitted records", check.statistic, check.degrees, check.p_value
-        )
+        left = Evidence(check.statistic, check.p_value, "the kinematics of the fitted records")
         found.append(
             f"the channels of the fitted records contradict each other (p = {check.p_value:.2g} of the kinematic check), and no "
             "missing effect explains it; run `airtruth check` on single records, because an error may be in one of them alone"

@@ -22,9 +22,5 @@ class HypothesisTest:
     degrees: int
     p_value: float
 
-    def to_dict(self) -> dict[str, float]:
-        """Statistic and p-value, as trace.json states them."""
-        return {"statistic": self.statistic, "p_value": self.p_value}
-
 
 __all__ = ["HypothesisTest"]

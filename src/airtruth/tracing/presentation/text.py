@@ -12,9 +12,8 @@ from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import OUTPUTS
 from airtruth.table import WIDTH, as_text, significant
 from airtruth.tracing.accepted import AcceptedEffect, IncrementState, IncrementTable, ParameterEstimate
-from airtruth.tracing.answer import ANOMALY_LEVEL, TraceAnswer
+from airtruth.tracing.answer import ANOMALY_LEVEL, Evidence, TraceAnswer
 from airtruth.tracing.inference.causes import DERIVATIVES
-from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.presentation.candidates import probability, ranked
 from airtruth.tracing.presentation.derivative_table import derivative_table
 from airtruth.tracing.presentation.error_table import axial_words, error_table
@@ -160,8 +159,8 @@ def _listed(names: list[str]) -> str:
     return f"{', '.join(most)} and {last}" if most else last
 
 
-def _evidence(evidence: HypothesisTest) -> str:
-    where = f"; it shows in {evidence.null}" if evidence.null else ""
+def _evidence(evidence: Evidence) -> str:
+    where = f"; it shows in {evidence.where}" if evidence.where else ""
     return probability(evidence.p_value) + where
 
 
