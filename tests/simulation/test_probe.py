@@ -7,7 +7,6 @@ import pytest
 
 from airtruth import aircraft
 from airtruth.errors import AircraftError
-from airtruth.physics.longitudinal import simulate
 from airtruth.simulation.flight import Flight, Inputs
 from airtruth.simulation.linearise import linearise
 from airtruth.simulation.manoeuvres import Manoeuvre, sample
@@ -24,11 +23,12 @@ from airtruth.simulation.trim import trim
 from airtruth.tracing.model.plant import looked_up
 from airtruth.tracing.model.probed import probed, with_throttle
 from airtruth.units import DEG
+from studies.longitudinal_motion import model_of, simulate
 
 
 @pytest.fixture(scope="module")
 def model(gtm, paper_trim):
-    return probe(gtm, paper_trim)
+    return model_of(gtm, paper_trim)
 
 
 @pytest.mark.parametrize("kind", ["doublet", "3211"])
@@ -113,7 +113,7 @@ def test_the_tables_of_a_turboprop_have_its_power(tmp_path):
     at = trim(plane, Condition(52.7, 1500.0, 0.0))
     command = at.controls.elevator_command_rad + np.array([-DEG, 0.0, DEG])
     alpha = at.alpha_rad + np.array([-DEG, 0.0, DEG])
-    tables = probe(plane, at, ForceGrid(alpha, command, np.zeros(1), np.ones(1))).tables
+    tables = probe(plane, at, ForceGrid(alpha, command, np.zeros(1), np.ones(1)))
     c = plane.constants
     moment = tables.values[0, :, :, 0, 2] / (
         0.5 * at.density_kg_m3 * at.airspeed_m_s**2 * c.wing_area_m2 * c.chord_m
@@ -138,7 +138,7 @@ def test_the_plant_of_a_propeller_has_its_forces_at_other_angles_and_airspeeds(t
     plant = probed(plane, at, (at.alpha_rad, 8.0 * DEG), (at.elevator_rad, at.elevator_rad), 0.1)
     command = np.array([at.controls.elevator_command_rad])
     other = ForceGrid(np.array([5.0, 7.5]) * DEG, command, np.zeros(1), np.array([0.94, 1.05]))
-    tables = probe(plane, at, other).tables
+    tables = probe(plane, at, other)
     states = [(v, a) for v in range(3) for a in range(1, 3)]
     alpha = tables.alpha_rad[[a for _, a in states]]
     pressure = 0.5 * at.density_kg_m3 * tables.airspeed_m_s[[v for v, _ in states]] ** 2

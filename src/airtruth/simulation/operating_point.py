@@ -8,10 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
-from airtruth.physics.longitudinal import ForceTables
 from airtruth.physics.motion import LATERAL
 from airtruth.simulation.linearise import Linearisation, linearise
-from airtruth.simulation.probe import ForceGrid, forces_at_speeds, forces_over_alpha, probe, with_breaks
+from airtruth.simulation.probe import (
+    ForceGrid,
+    ForceTables,
+    forces_at_speeds,
+    forces_over_alpha,
+    probe,
+    with_breaks,
+)
 from airtruth.simulation.probe_lateral import LateralForceGrid, LateralTables, probe_lateral
 from airtruth.simulation.trim import Trim
 
@@ -53,7 +59,7 @@ def operating_point(aircraft: Aircraft, trim: Trim, grid: ForceGrid, ratios: Arr
     TrimError
         If the elevator surface does not follow its command at the trim.
     """
-    tables = probe(aircraft, trim, with_breaks(aircraft, trim, grid)).tables
+    tables = probe(aircraft, trim, with_breaks(aircraft, trim, grid))
     return OperatingPoint(
         tables=tables,
         at_speeds=forces_at_speeds(aircraft, trim, ratios),

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from airtruth.aircraft import Aircraft
 from airtruth.errors import AircraftError
-from airtruth.physics.longitudinal import ForceTables, Longitudinal
 from airtruth.simulation.simulator import Condition, Controls, Executive, SimulatorResponse
 from airtruth.simulation.trim import Trim
-from airtruth.units import DEG, FT, G0, LBF
+from airtruth.units import DEG, G0, LBF
 
 Array = NDArray[np.float64]
 
@@ -61,6 +60,24 @@ class ForceGrid:
     airspeed: Array
 
 
+@dataclass(frozen=True)
+class ForceTables:
+    """X, Z, M over four increasing axes; linear between points, constant outside.
+
+    Attributes
+    ----------
+    airspeed_m_s, alpha_rad, elevator_rad, q_rad_s : axes (nv,) [m/s], (na,) [rad], (ne,) [rad], (nq,)
+        [rad/s]; at least two points each.
+    values : (nv, na, ne, nq, 3) forces X, Z along body x, z [N], moment M about the CG [N m].
+    """
+
+    airspeed_m_s: Array
+    alpha_rad: Array
+    elevator_rad: Array
+    q_rad_s: Array
+    values: Array
+
+
 def grid_about(
     trim: Trim, alpha_rad: float = 10.0 * DEG, command_rad: float = 6.0 * DEG, q_rad_s: float = 60.0 * DEG
 ) -> ForceGrid:
@@ -84,7 +101,7 @@ def grid_about(
 
 def probe(
     aircraft: Aircraft, trim: Trim, grid: ForceGrid | None = None, dt_s: float = 1.0 / 200.0
-) -> Longitudinal:
+) -> ForceTables:
     """Tabulate X, Z, M of the aircraft at the trim's throttle and altitude, engines settled.
 
     Terms in alpha_dot, if a model has them, are those of the state itself, as in `airtruth.simulation.linearise`.
@@ -122,17 +139,7 @@ def probe(
         answer = states.respond(condition, alpha, controls, q)
         surface[at] = answer.elevator_rad
         values[at] = [*(node.get_double_value() * LBF for node in forces), answer.q_dot_rad_s2 * inertia]
-    gravity = executive.node("accelerations/gravity-ft_sec2").get_double_value() * FT
-    return Longitudinal(
-        tables=ForceTables(axes[0], axes[1], _surface(aircraft, surface), axes[3], values),
-        mass_kg=trim.mass_kg,
-        inertia_kg_m2=inertia,
-        gravity_m_s2=gravity,
-        airspeed_m_s=trim.airspeed_m_s,
-        alpha_rad=trim.alpha_rad,
-        elevator_rad=trim.elevator_rad,
-        gamma_rad=trim.condition.gamma_rad,
-    )
+    return ForceTables(axes[0], axes[1], _surface(aircraft, surface), axes[3], values)
 
 
 def with_breaks(aircraft: Aircraft, trim: Trim, grid: ForceGrid, dt_s: float = 1.0 / 200.0) -> ForceGrid:

@@ -12,7 +12,8 @@ q - (w - w_late)/(tau V) with tau = 4 b/(pi V).
 Forces: tables of X, Z, M over alpha, elevator and q c/(2V) times q_bar, constants over alpha, increments of the
 derivatives, and the terms of `airtruth.physics.terms`.
 
-Sources: equations of motion, `airtruth.physics.longitudinal`; gusts, MIL-F-8785C, 3.7.1.1 and 3.7.1.2.
+Sources: equations of motion, B. Etkin and L. D. Reid, *Dynamics of Flight*, 3rd ed., 1996, eqs 4.7,1 and 4.7,2; gusts,
+MIL-F-8785C, 3.7.1.1 and 3.7.1.2.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ from typing import Final, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from airtruth.numerics.cells import lower_point
 from airtruth.numerics.compiled import inner, shared
-from airtruth.physics.longitudinal import lower_point
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.sensors import vane_equation
 from airtruth.physics.terms import numbered_shape

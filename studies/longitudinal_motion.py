@@ -20,27 +20,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from airtruth.aircraft import Aircraft
+from airtruth.numerics.cells import lower_point
 from airtruth.physics.short_period import Scale
+from airtruth.simulation.probe import ForceGrid, ForceTables, probe
+from airtruth.simulation.trim import Trim
+from airtruth.units import G0
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class ForceTables:
-    """X, Z, M over four increasing axes; linear between points, constant outside.
-
-    Attributes
-    ----------
-    airspeed_m_s, alpha_rad, elevator_rad, q_rad_s : axes (nv,) [m/s], (na,) [rad], (ne,) [rad], (nq,)
-        [rad/s]; at least two points each.
-    values : (nv, na, ne, nq, 3) forces X, Z along body x, z [N], moment M about the CG [N m].
-    """
-
-    airspeed_m_s: Array
-    alpha_rad: Array
-    elevator_rad: Array
-    q_rad_s: Array
-    values: Array
 
 
 @dataclass(frozen=True)
@@ -67,6 +54,20 @@ class Longitudinal:
     drift: float = 1.0
 
 
+def model_of(aircraft: Aircraft, trim: Trim, grid: ForceGrid | None = None) -> Longitudinal:
+    """The aircraft in the vertical plane, from its forces in JSBSim; see `airtruth.simulation.probe.probe`."""
+    return Longitudinal(
+        tables=probe(aircraft, trim, grid),
+        mass_kg=trim.mass_kg,
+        inertia_kg_m2=aircraft.constants.inertia_yy_kg_m2,
+        gravity_m_s2=G0,
+        airspeed_m_s=trim.airspeed_m_s,
+        alpha_rad=trim.alpha_rad,
+        elevator_rad=trim.elevator_rad,
+        gamma_rad=trim.condition.gamma_rad,
+    )
+
+
 @dataclass(frozen=True)
 class SimulatedMotion:
     """Response of runs, (runs, samples) each.
@@ -83,19 +84,6 @@ class SimulatedMotion:
     gamma_rad: Array
     ax_m_s2: Array
     az_m_s2: Array
-
-
-@njit(cache=True, nogil=True)
-def lower_point(axis: Array, x: float) -> int:
-    """Lower point of the cell of an increasing axis that holds x; the end cells reach beyond the ends."""
-    low, high = 0, axis.size - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if axis[middle] <= x:
-            low = middle
-        else:
-            high = middle
-    return low
 
 
 @njit(cache=True)

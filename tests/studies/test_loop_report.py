@@ -8,7 +8,6 @@ import pytest
 
 from airtruth.errors import LogError
 from airtruth.physics.motion import LONGITUDINAL
-from airtruth.reporting import loop, loop_figures
 from airtruth.reporting.campaign import FlownCampaign, MethodEstimates
 from airtruth.tracing.accepted import IncrementTable
 from airtruth.tracing.answer import (
@@ -19,8 +18,10 @@ from airtruth.tracing.answer import (
     RecordNames,
     TraceAnswer,
 )
-from airtruth.tracing.presentation import overview as traces
 from airtruth.tracing.stage_errors import BySet, Errors, Rms
+from studies import loop_figures
+from studies import loop_report as loop
+from studies import traces_overview as traces
 
 RUNS = 40
 TRUTH = np.array([4.79, 31.0, 0.48, -1.785, -41.4, -1.787, 9.0, 0.4])
