@@ -5,7 +5,7 @@ The forces over the angle of attack and the five signals of the motion are
     f(alpha, beta) + sum over p, r, aileron, rudder of [f(alpha, signal) - f(alpha, trim)],
 
 each table at the trim's values of the other signals. A table of all six would need a thousand times as many states; the
-products of two signals that the sum lacks are those that `airtruth.tracing.model.lateral_plant` states.
+products of two signals that the sum lacks are those that `airtruth.tracing.model.plant` states.
 """
 
 from __future__ import annotations
