@@ -24,8 +24,9 @@ from airtruth.aircraft import Aircraft
 from airtruth.numerics.cells import lower_point
 from airtruth.physics.short_period import Scale
 from airtruth.simulation.probe import ForceGrid, ForceTables, probe
+from airtruth.simulation.simulator import Executive
 from airtruth.simulation.trim import Trim
-from airtruth.units import G0
+from airtruth.units import FT
 
 Array = NDArray[np.float64]
 
@@ -56,11 +57,13 @@ class Longitudinal:
 
 def model_of(aircraft: Aircraft, trim: Trim, grid: ForceGrid | None = None) -> Longitudinal:
     """The aircraft in the vertical plane, from its forces in JSBSim; see `airtruth.simulation.probe.probe`."""
+    executive = Executive(aircraft, 1.0 / 200.0)
+    executive.initialise(trim.condition, trim.alpha_rad, trim.controls)
     return Longitudinal(
         tables=probe(aircraft, trim, grid),
         mass_kg=trim.mass_kg,
         inertia_kg_m2=aircraft.constants.inertia_yy_kg_m2,
-        gravity_m_s2=G0,
+        gravity_m_s2=executive.node("accelerations/gravity-ft_sec2").get_double_value() * FT,
         airspeed_m_s=trim.airspeed_m_s,
         alpha_rad=trim.alpha_rad,
         elevator_rad=trim.elevator_rad,
