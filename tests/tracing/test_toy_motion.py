@@ -1,5 +1,7 @@
 """A motion that the package does not know, through description, layouts, filter, fit and one effect."""
 
+import json
+
 import numpy as np
 import pytest
 from numba.core.caching import NullCache
@@ -10,8 +12,11 @@ from toy_motion import ARM_M, HALF_CHORD_M, QBAR, TOY, ToyAircraft, ToyGrid, Toy
 from airtruth import aircraft
 from airtruth.effects.effect import Effect, Parameter
 from airtruth.effects.sensors import sensor_effects
+from airtruth.physics import motion
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import AeroTerm, Change
+from airtruth.tracing.accepted import AcceptedEffect, ParameterEstimate
+from airtruth.tracing.answer import Derivatives, Evidence, RecordNames, TraceAnswer
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import TraceProblem
@@ -32,7 +37,10 @@ from airtruth.tracing.model.records import Signals, TraceRecord
 from airtruth.tracing.model.schedule import UNSCHEDULED
 from airtruth.tracing.model.settings import Settings
 from airtruth.tracing.model.steady import steady_filter
+from airtruth.tracing.presentation.html import as_trace_html
+from airtruth.tracing.presentation.text import as_trace_text
 from airtruth.tracing.selection.score_test import table
+from airtruth.tracing.stage_errors import BySet, Errors, Rms
 
 TRUTH = np.array([-0.12, -2.0, 0.05, -0.03, 0.004])
 AIRSPEED_M_S, LENGTH_M, LEVEL = 40.0, 200.0, 1.5
@@ -286,3 +294,34 @@ def test_a_scale_of_the_gyro_is_scored_named_and_estimated():
     assert abs(values["factor"] - 1.1) < 4.0 * named.size_std(0) * 0.1 / abs(step)
     found = 0.9 * TRUTH + named.point.common[: TRUTH.size]
     assert (np.abs(found - TRUTH) < 4.0 * named.common_std[: TRUTH.size]).all()
+
+
+def test_text_tables_and_page_follow_from_the_description(monkeypatch):
+    monkeypatch.setitem(motion._MOTIONS, TOY.name, TOY)
+    values = dict(zip(TOY.parameters, TRUTH.tolist(), strict=True))
+    rms = Rms(dict.fromkeys(TOY.output_channels, 1.0), dict.fromkeys(TOY.output_channels, 1.0))
+    effect = AcceptedEffect("gyro_scale", {"factor": ParameterEstimate(1.1, 0.01, (1.08, 1.12))}, 1e-9, 4.0)
+    answer = TraceAnswer(
+        verdict="traced",
+        provisional=False,
+        anomaly=Evidence(90.0, 1e-9),
+        remaining=Evidence(5.0, 0.4),
+        effects=(effect,),
+        candidates=(),
+        error=Errors(
+            dict.fromkeys(TOY.output_channels, 2.0),
+            dict.fromkeys(("declared", "before", "after", "floor"), BySet(held_out=rms)),
+        ),
+        derivatives=Derivatives(values, values, values, dict.fromkeys(values, 0.01)),
+        updated_aircraft=None,
+        detectability={},
+        next_flight="",
+        model="linear",
+        records=RecordNames(("r1", "r2"), ("r3",)),
+    )
+    assert answer.motion is TOY
+    text, page = as_trace_text(answer), as_trace_html(answer)
+    assert "linear pendulum model" in text
+    assert all(name in text for name in TOY.parameters)
+    assert all(output.name in text and output.name in page for output in TOY.outputs)
+    assert json.loads(answer.to_json())["derivatives"]["after"] == pytest.approx(values)

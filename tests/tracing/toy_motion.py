@@ -45,6 +45,7 @@ TOY = Motion(
     required=("theta_rad", "q_rad_s"),
     forces="moment",
     incidence="angle of the pendulum",
+    linear="pendulum",
 )
 
 
