@@ -344,6 +344,7 @@ LATERAL: Final = Motion(
 unscored derivatives a record of 10 s leaves a standard deviation of 20 to 100 % at the Cramer-Rao bound (docs/lateral.md)."""
 
 _MOTIONS: Final = {m.name: m for m in (LONGITUDINAL, LATERAL)}
+"""The same, which a test may extend."""
 MOTIONS: Final[Mapping[str, Motion]] = MappingProxyType(_MOTIONS)
 """Name -> motion, in the order of answers."""
 

@@ -12,8 +12,7 @@ q - (w - w_late)/(tau V) with tau = 4 b/(pi V).
 Forces: tables of X, Z, M over alpha, elevator and q c/(2V) times q_bar, constants over alpha, increments of the
 derivatives, and the terms of `airtruth.physics.terms`.
 
-Sources: equations of motion, B. Etkin and L. D. Reid, *Dynamics of Flight*, 3rd ed., 1996, eqs 4.7,1 and 4.7,2; gusts,
-MIL-F-8785C, 3.7.1.1 and 3.7.1.2.
+Sources: B. Etkin and L. D. Reid, *Dynamics of Flight*, 3rd ed., 1996, eqs 4.7,1 and 4.7,2; gusts, MIL-F-8785C, 3.7.1.1, 3.7.1.2.
 """
 
 from __future__ import annotations
