@@ -48,7 +48,7 @@ _RATES: Final = slice(REGRESSORS.index("p_rad_s"), REGRESSORS.index("r_rad_s") +
 
 @dataclass(frozen=True)
 class Known:
-    """What the log holds of the other axis, and of the sideslip.
+    """Channels of the other axis, and of the sideslip, in the log.
 
     Attributes
     ----------

@@ -10,7 +10,7 @@ Statist. Soc. B 41 (1979) 358-367 (declarations with heavy tails).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Final
@@ -19,17 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from airtruth.effects.effect import Prior
 from airtruth.effects.registry import EFFECTS
 from airtruth.physics.motion import Motion
+from airtruth.tracing.inference.causes import DERIVATIVES, Cause
 from airtruth.tracing.inference.derivative_likelihood import DerivativeLikelihood
 
 Array = NDArray[np.float64]
 Subset = tuple[int, ...]
 """Numbers of derivatives."""
 
-DERIVATIVES: Final = "derivatives"
-"""Key of the effect that states wrong declarations of derivatives."""
 WRONG_BY: Final = (3.0, 10.0)
 """Standard deviation of a derivative whose declaration is wrong, over the declared one [-]: equal parts of a mixture
 (judgement: published uncertainties of derivatives are often too small by the first factor, and by up to the second)."""
@@ -57,28 +55,6 @@ _NEGLIGIBLE: Final = 60.0
 """
 _LEAST_SHARE: Final = 1e-15
 """Least probability of the plausible range of a size [-] (judgement: below it a set is out of the question)."""
-
-
-@dataclass(frozen=True)
-class Cause:
-    """A physical cause that moves several derivatives together.
-
-    Attributes
-    ----------
-    key : of the effect; direction : (derivatives,) change of the derivatives per unit of size.
-    prior, event : as of `airtruth.effects.effect.Effect`.
-    """
-
-    key: str
-    direction: Array
-    prior: Prior
-    event: str = ""
-
-    def most_probable(self, size: float, std: float) -> float:
-        """Size within its plausible range that is most probable, where records tell ``size`` with an error of ``std`` [-]."""
-        prior = self.prior
-        told = size * prior.std**2 / (prior.std**2 + std**2)
-        return min(max(told, prior.low), prior.high)
 
 
 @dataclass(frozen=True)
@@ -114,21 +90,6 @@ class CauseSet:
             sizes=tuple(self.sizes[i] for i in kept),
             size_std=tuple(self.size_std[i] for i in kept),
         )
-
-
-def causes_of(directions: Mapping[str, Array]) -> tuple[Cause, ...]:
-    """Every effect with a prior as a cause of the derivatives of a motion, those of one event first.
-
-    Parameters
-    ----------
-    directions : of the motion, see `airtruth.physics.composition.directions`.
-    """
-    effects = sorted(EFFECTS.values(), key=lambda e: not e.event)
-    return tuple(
-        Cause(e.key, directions[e.quantity], e.prior, e.event)
-        for e in effects
-        if e.prior is not None and e.quantity in directions
-    )
 
 
 def explain(
@@ -367,13 +328,10 @@ def _in_range(chosen: Sequence[Cause], sizes: Array, std: Array) -> Array:
 
 __all__ = [
     "AS_PROBABLE",
-    "DERIVATIVES",
     "MOST_CAUSES",
     "REFERENCE",
     "WRONG_BY",
-    "Cause",
     "CauseSet",
-    "causes_of",
     "events",
     "explain",
     "least_cost",
