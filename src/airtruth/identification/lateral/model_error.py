@@ -33,7 +33,7 @@ _OWN: Final = slice(len(LATERAL.parameters))
 """Derivatives among the parameters."""
 
 
-class Random(NamedTuple):
+class RandomTerms(NamedTuple):
     """Places of a fit among the parameters of one in which every nonlinear term is free.
 
     Attributes
@@ -51,21 +51,21 @@ class Random(NamedTuple):
         return made
 
 
-def random_terms(options: Options, parameters: int) -> Random:
+def random_terms(options: Options, parameters: int) -> RandomTerms:
     """Terms that ``options.terms`` leaves out of a fit with so many parameters."""
     every = (*LATERAL.parameters, *factor_names(TERMS))
     own = [every.index(name) for name in (*LATERAL.parameters, *factor_names(options.terms))]
     places = np.array([*own, *(len(every) + i for i in range(parameters - len(own)))])
-    return Random(places, np.setdiff1d(np.arange(len(every)), own))
+    return RandomTerms(places, np.setdiff1d(np.arange(len(every)), own))
 
 
-def with_random_terms(maxima: Maxima, score: Scored, weight: Array, random: Random) -> Maxima:
+def with_random_terms(maxima: Maxima, score: Scored, weight: Array, random: RandomTerms) -> Maxima:
     """Maxima whose derivatives and their covariances hold random terms, by one step of scoring.
 
     Parameters
     ----------
     maxima : maxima of the likelihood without these terms, of groups of runs; each has one.
-    score : cost, gradient and information of the groups at `Random.point` of them.
+    score : cost, gradient and information of the groups at `RandomTerms.point` of them.
     weight : inverse variances of the prior of the parameters of the fit.
     random : the terms.
     """
@@ -106,4 +106,4 @@ def with_repeated_noise(maxima: Maxima, total: Array, each: Array, quiet: Array)
     return replace(maxima, covariance=covariance)
 
 
-__all__ = ["Random", "random_terms", "with_random_terms", "with_repeated_noise"]
+__all__ = ["RandomTerms", "random_terms", "with_random_terms", "with_repeated_noise"]

@@ -66,7 +66,7 @@ class Known:
 
 
 @dataclass(frozen=True)
-class Observation:
+class LateralObservation:
     """Regression of runs of one length, unfiltered.
 
     Attributes
@@ -209,7 +209,7 @@ def condition_of(batch: Batch, constants: LateralConstants, options: Options, kn
     return lateral_scale(constants, airspeed, density, alpha, theta)
 
 
-def observe(batch: Batch, constants: LateralConstants, options: Options) -> Observation:
+def observe(batch: Batch, constants: LateralConstants, options: Options) -> LateralObservation:
     """Return the regression of a batch; nothing is checked.
 
     Parameters
@@ -255,7 +255,7 @@ def observe(batch: Batch, constants: LateralConstants, options: Options) -> Obse
     origin = regressors[..., :window].mean(axis=-1, keepdims=True)
     regressors -= origin
     surfaces = np.concatenate([c[name] for name in CONTROLS])
-    return Observation(
+    return LateralObservation(
         dt_s=dt_s,
         regressors=regressors,
         slopes=slopes,
@@ -271,7 +271,7 @@ __all__ = [
     "CONTROLS",
     "Each",
     "Known",
-    "Observation",
+    "LateralObservation",
     "assumed",
     "condition_of",
     "integrated",

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.identification.lateral.kernels import filter_rows, remove, respond
-from airtruth.identification.lateral.observation import CONTROLS, Observation
+from airtruth.identification.lateral.observation import CONTROLS, LateralObservation
 from airtruth.identification.options import Options
 from airtruth.identification.regression.auxiliary import GROWTH
 from airtruth.numerics.prefilter import butterworth, zero_phase
@@ -62,7 +62,7 @@ class Rows:
     free: Array
 
 
-class Smooth(NamedTuple):
+class SmoothRows(NamedTuple):
     """Low-passed signals of runs: rows of least squares, and surfaces (runs, controls, samples) from their first sample."""
 
     rows: Rows
@@ -70,7 +70,7 @@ class Smooth(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Problem:
+class LateralProblem:
     """A regression whose instruments theta makes.
 
     Attributes
@@ -106,7 +106,7 @@ def free_of(z: Array, x: Array, y: Array, columns: Array) -> Rows:
     return Rows(z, x, y, basis)
 
 
-def with_corners(o: Observation) -> Array:
+def with_corners(o: LateralObservation) -> Array:
     """Regressors whose surfaces have, sample by sample, the area that they have between the samples.
 
     The corners of a servo behind a held command, sampled, change the moments of the surfaces by up to half a percent.
@@ -116,7 +116,7 @@ def with_corners(o: Observation) -> Array:
     return x
 
 
-def low_passed(o: Observation, options: Options) -> tuple[Array, Array]:
+def low_passed(o: LateralObservation, options: Options) -> tuple[Array, Array]:
     """Low-passed regressors (runs, signals, samples), and left sides (runs, coefficients, samples - 4) of their `_INSIDE`."""
     width = o.regressors.shape[1]
     moments = o.slopes[:, _MOMENTS]
@@ -128,7 +128,7 @@ def low_passed(o: Observation, options: Options) -> tuple[Array, Array]:
     return smooth[:, :width], y
 
 
-def smoothed(o: Observation, options: Options) -> Smooth:
+def smoothed(o: LateralObservation, options: Options) -> SmoothRows:
     """Rows of least squares: low-passed signals, and fourth-order differences of the left sides."""
     smooth, y = low_passed(o, options)
     surfaces = smooth[:, -len(CONTROLS) :]
@@ -137,7 +137,7 @@ def smoothed(o: Observation, options: Options) -> Smooth:
     if columns.shape[1] > o.trend + 1:
         sos = butterworth(options.cutoff_of(o.dt_s), options.order, o.dt_s)
         columns[:, o.trend + 1 :] = zero_phase(columns[:, o.trend + 1 :], sos)
-    return Smooth(free_of(x, x, y, columns[..., _INSIDE]), surfaces - surfaces[..., :1])
+    return SmoothRows(free_of(x, x, y, columns[..., _INSIDE]), surfaces - surfaces[..., :1])
 
 
 def moments_of(rows: Rows) -> Array:
@@ -157,10 +157,10 @@ def picked(rows: Rows, active: Ints) -> Rows:
     return Rows(z, z if rows.z is rows.x else rows.x[active], rows.y[active], rows.free[active])
 
 
-def ls_problem(o: Observation, options: Options, smooth: Smooth) -> Problem:
+def ls_problem(o: LateralObservation, options: Options, smooth: SmoothRows) -> LateralProblem:
     """Least squares of low-passed rows: the regressors are their own instruments."""
     rows = smooth.rows
-    return Problem(
+    return LateralProblem(
         lambda theta, active: picked(rows, active),
         lambda theta, active: moments_of(picked(rows, active)),
         _all,
@@ -168,11 +168,11 @@ def ls_problem(o: Observation, options: Options, smooth: Smooth) -> Problem:
     )
 
 
-def lowpass_problem(o: Observation, options: Options, smooth: Smooth) -> Problem:
+def lowpass_problem(o: LateralObservation, options: Options, smooth: SmoothRows) -> LateralProblem:
     """Instruments of the low-passed surfaces for the rows of least squares: IV(de_f) of the paper."""
     rows, u = smooth
     bend = smooth_bend(u)
-    model = Model.of(o)
+    model = LinearModels.of(o)
 
     def at(theta: Array, active: Ints) -> Rows:
         own = picked(rows, active)
@@ -188,7 +188,7 @@ def lowpass_problem(o: Observation, options: Options, smooth: Smooth) -> Problem
         remove(made.free, made.z)
         return made
 
-    return Problem(
+    return LateralProblem(
         orthogonal,
         # regressors and left sides are orthogonal to the constants, so that the instruments need not be
         lambda theta, active: moments_of(at(theta, active)),
@@ -197,7 +197,7 @@ def lowpass_problem(o: Observation, options: Options, smooth: Smooth) -> Problem
     )
 
 
-def f1_problem(o: Observation, options: Options, smooth: Smooth) -> Problem:
+def f1_problem(o: LateralObservation, options: Options, smooth: SmoothRows) -> LateralProblem:
     """Regressors, instruments and left sides behind F(p) = 1/Delta(p), Delta = |p I - A| of beta, p and r.
 
     Filters start from rest, and left sides count from the first sample, so that F p x = F x' holds exactly. Signals are
@@ -211,7 +211,7 @@ def f1_problem(o: Observation, options: Options, smooth: Smooth) -> Problem:
     given = np.concatenate([rates, o.added, constants, even, o.regressors], axis=1)
     u = np.ascontiguousarray(o.controls)
     bend = smooth_bend(u) + o.bend
-    model = Model.of(o)
+    model = LinearModels.of(o)
     y = slice(rates.shape[1], rates.shape[1] + coefficients)
     free = slice(y.stop, y.stop + constants.shape[1])
     x = slice(given.shape[1] - count, given.shape[1])
@@ -242,7 +242,7 @@ def f1_problem(o: Observation, options: Options, smooth: Smooth) -> Problem:
         own, shift = np.take(sums, z - y.start, axis=1), y.start
         return np.concatenate([own[:, :, x.start - shift : x.stop - shift], own[:, :, :coefficients]], axis=2)
 
-    return Problem(at, moments, model.bounded, given.shape[0])
+    return LateralProblem(at, moments, model.bounded, given.shape[0])
 
 
 def smooth_bend(u: Array) -> Array:
@@ -254,7 +254,7 @@ def smooth_bend(u: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Model:
+class LinearModels:
     """The linear models of runs, each at its own flight condition.
 
     Attributes
@@ -271,7 +271,7 @@ class Model:
     samples: int
 
     @classmethod
-    def of(cls, o: Observation) -> Model:
+    def of(cls, o: LateralObservation) -> LinearModels:
         """Models of an observation."""
         own = structure(o.scale)
         known = np.concatenate([own.kinematics, np.zeros((*own.forces.shape[:2], len(CONTROLS)))], axis=2)
@@ -315,10 +315,10 @@ class Model:
 
 
 __all__ = [
-    "Model",
-    "Problem",
+    "LateralProblem",
+    "LinearModels",
     "Rows",
-    "Smooth",
+    "SmoothRows",
     "f1_problem",
     "free_of",
     "lowpass_problem",

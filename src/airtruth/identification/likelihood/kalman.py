@@ -26,12 +26,12 @@ from numpy.typing import NDArray
 
 from airtruth.identification.likelihood.kalman_kernel import (
     Filter,
-    Signals,
+    KalmanSignals,
     predict,
     propagate,
 )
 from airtruth.identification.likelihood.linearise import Matrices, matrices, slopes
-from airtruth.identification.likelihood.predictor import Layout
+from airtruth.identification.likelihood.predictor import LevelLayout
 from airtruth.numerics.discretise import DOUBLINGS, riccati, whitener
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ RIDGE: Final = 1e-13
 memory of the start leaves its mean undetermined."""
 
 
-class Score(NamedTuple):
+class LikelihoodScore(NamedTuple):
     """The likelihood of runs, and the quantities that a step of scoring needs.
 
     Attributes
@@ -74,7 +74,9 @@ class _Profile(NamedTuple):
     residual: Array
 
 
-def score(layout: Layout, runs: Ints, z: Array, free: Ints, signals: Signals, dt_s: float) -> Score:
+def score(
+    layout: LevelLayout, runs: Ints, z: Array, free: Ints, signals: KalmanSignals, dt_s: float
+) -> LikelihoodScore:
     """J of runs with its gradient and information.
 
     A result does not depend on the other runs.
@@ -89,7 +91,7 @@ def score(layout: Layout, runs: Ints, z: Array, free: Ints, signals: Signals, dt
     dt_s : sample period [s].
     """
     samples, outputs = signals.y.shape[1:]
-    result = Score(
+    result = LikelihoodScore(
         np.full(runs.size, np.inf),
         np.zeros((runs.size, free.size)),
         np.zeros((runs.size, free.size, free.size)),
@@ -104,19 +106,19 @@ def score(layout: Layout, runs: Ints, z: Array, free: Ints, signals: Signals, dt
 
 
 def _score_block(
-    layout: Layout,
+    layout: LevelLayout,
     runs: Ints,
     z: Array,
     free: Ints,
-    signals: Signals,
+    signals: KalmanSignals,
     dt_s: float,
     block: Ints,
-    result: Score,
+    result: LikelihoodScore,
 ) -> None:
     """Fill the rows ``block`` of the result where J can be evaluated."""
     steady, good = _steady(matrices(layout, runs, z, dt_s))
     runs, z, block = runs[good], z[good], block[good]
-    signals = Signals(*(part[runs] for part in signals))
+    signals = KalmanSignals(*(part[runs] for part in signals))
     samples, m = signals.y.shape[1:]
     base = _innovations(steady, signals)
     gram = np.matmul(np.swapaxes(base, 1, 2), base)
@@ -125,7 +127,7 @@ def _score_block(
     good = np.isfinite(gram).all(axis=(1, 2))
     if not good.all():
         runs, z, block, base, gram = runs[good], z[good], block[good], base[good], gram[good]
-        signals = Signals(*(part[good] for part in signals))
+        signals = KalmanSignals(*(part[good] for part in signals))
         steady = _chosen(steady, good)
     least = _profile(base, gram, layout.precision, samples * steady.logdet)
     result.cost[block] = least.cost
@@ -146,7 +148,7 @@ def _score_block(
     result.information[block[:, None, None], order[:, None], order] = information
 
 
-def _innovations(steady: Filter, signals: Signals) -> Array:
+def _innovations(steady: Filter, signals: KalmanSignals) -> Array:
     """Whitened innovations of the data, and of a unit of each initial mean and bias.
 
     The latter are those of a system without inputs, [x; b]+ = [[phi - phi K C, -phi K], [0, I]] [x; b], e = -C x - b, from the
@@ -202,7 +204,7 @@ def _sums(
     acting: int,
     base: Array,
     least: _Profile,
-    signals: Signals,
+    signals: KalmanSignals,
 ) -> _Sums:
     """Sums over the derivatives along the trajectory of the estimated means and biases.
 

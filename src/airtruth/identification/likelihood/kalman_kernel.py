@@ -15,7 +15,7 @@ from airtruth.numerics.compiled import inner
 Array = NDArray[np.float64]
 
 
-class Signals(NamedTuple):
+class KalmanSignals(NamedTuple):
     """Records of one length.
 
     Attributes
@@ -53,7 +53,7 @@ class Filter(NamedTuple):
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def predict(
-    step: Matrices, gain_p: Array, signals: Signals, nuisance: Array, states: Array, errors: Array
+    step: Matrices, gain_p: Array, signals: KalmanSignals, nuisance: Array, states: Array, errors: Array
 ) -> None:
     """States and innovations along the records.
 
