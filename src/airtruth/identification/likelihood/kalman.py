@@ -182,7 +182,7 @@ def _closed(steady: Filter) -> Array:
     return np.asarray(steady.step.phi - np.matmul(steady.gain_p, steady.step.c))
 
 
-class _Sums(NamedTuple):
+class _TangentSums(NamedTuple):
     """Sums of products of the derivatives of the whitened innovations with respect to the free parameters.
 
     Attributes
@@ -205,7 +205,7 @@ def _sums(
     base: Array,
     least: _Profile,
     signals: KalmanSignals,
-) -> _Sums:
+) -> _TangentSums:
     """Sums over the derivatives along the trajectory of the estimated means and biases.
 
     Parameters
@@ -231,7 +231,9 @@ def _sums(
         np.concatenate([part, np.zeros((*part.shape[:2], -n % 3))], axis=2)
         for part in (_closed(steady), np.matmul(white, steady.step.c))
     )
-    result = _Sums(np.empty((runs, count, count)), np.empty((runs, count, n + m)), np.empty((runs, count)))
+    result = _TangentSums(
+        np.empty((runs, count, count)), np.empty((runs, count, n + m)), np.empty((runs, count))
+    )
     tangents = np.empty((samples, m, count))
     by_sample = tangents.reshape(-1, count)
     # one run after another, so that these arrays stay in the processor's cache
@@ -368,7 +370,7 @@ def _lyapunov(closed: Array, x: Array, filtering: Bools) -> Array:
     return np.swapaxes(total, 1, 2)
 
 
-def _scored(sums: _Sums, d_white: Array, least: _Profile, samples: int) -> tuple[Array, Array]:
+def _scored(sums: _TangentSums, d_white: Array, least: _Profile, samples: int) -> tuple[Array, Array]:
     """Gradient (runs, free) and information (runs, free, free) of J."""
     runs, count, m, _ = d_white.shape
     across = sums.across / least.size[:, None, :]
