@@ -10,7 +10,7 @@ Statist. Soc. B 41 (1979) 358-367 (declarations with heavy tails).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Final
@@ -34,9 +34,9 @@ WRONG_BY: Final = (3.0, 10.0)
 MOST_CAUSES: Final = 3
 """Largest number of physical causes in a set, besides wrong declarations [-] (judgement: six derivatives do not tell
 more apart)."""
-_LOG_SAME_EVENT: Final = -1.0
+LOG_SAME_EVENT: Final = -1.0
 """Logarithm of the prior odds of each further cause of the same event [-] (judgement: one in three)."""
-_LOG_WRONG: Final = -1.0
+LOG_WRONG: Final = -1.0
 """Logarithm of the prior odds of wrong declarations, and of each derivative that they concern [-] (judgement: they are
 the most frequent cause)."""
 REFERENCE: Final = 4.0
@@ -132,13 +132,25 @@ def simplest_first(sets: Sequence[CauseSet]) -> tuple[CauseSet, ...]:
     weights: dict[tuple[str, ...], float] = {}
     for s in sets:
         weights[s.effects] = weights.get(s.effects, 0.0) + float(np.exp(least - s.cost))
+    names = simplest(weights)
+    first = min((s for s in sets if s.effects == names), key=lambda s: s.cost)
+    return (first, *(s for s in sets if s is not first))
+
+
+def simplest(weights: Mapping[tuple[str, ...], float]) -> tuple[str, ...]:
+    """The set of the fewest events against which the odds of the most probable one are not strong.
+
+    Of sets of as many events, it has the fewest effects that are half as probable as the best of them.
+
+    Parameters
+    ----------
+    weights : names of each set -> its posterior weight; at least one set.
+    """
     enough = AS_PROBABLE * max(weights.values())
     fewest = min(events(n) for n, w in weights.items() if w >= enough)
     among = {n: w for n, w in weights.items() if w >= enough and events(n) == fewest}
     likely = _AS_PROBABLE_IN_EVENT * max(among.values())
-    names = min((n for n, w in among.items() if w >= likely), key=lambda n: (len(n), -among[n]))
-    first = min((s for s in sets if s.effects == names), key=lambda s: s.cost)
-    return (first, *(s for s in sets if s is not first))
+    return min((n for n, w in among.items() if w >= likely), key=lambda n: (len(n), -among[n]))
 
 
 def events(effects: Sequence[str]) -> int:
@@ -289,7 +301,7 @@ def _evidence(
     occam = 0.5 * (np.linalg.slogdet(turned)[1] - least)
     in_range = _in_range(chosen, sizes, std)
     wrong = np.array([len(subset) for subset in subsets])
-    odds = _log_odds(chosen) + np.where(wrong > 0, _LOG_WRONG * (1 + wrong), 0.0)
+    odds = _log_odds(chosen) + np.where(wrong > 0, LOG_WRONG * (1 + wrong), 0.0)
     several = (wrong > 0) | bool(chosen)
     cost = likelihood.cost - gained + occam - in_range - odds - np.where(several, REFERENCE, 0.0)
     return _Evidence(tuple(c.key for c in chosen), subsets, likelihood.motion, sizes, std, covariance, cost)
@@ -300,7 +312,7 @@ def _log_odds(chosen: Sequence[Cause]) -> float:
     total = sum(c.prior.log_odds for c in chosen if not c.event)
     for event in dict.fromkeys(c.event for c in chosen if c.event):
         together = [c.prior.log_odds for c in chosen if c.event == event]
-        total += together[0] + _LOG_SAME_EVENT * (len(together) - 1)
+        total += together[0] + LOG_SAME_EVENT * (len(together) - 1)
     return total
 
 
@@ -328,6 +340,8 @@ def _in_range(chosen: Sequence[Cause], sizes: Array, std: Array) -> Array:
 
 __all__ = [
     "AS_PROBABLE",
+    "LOG_SAME_EVENT",
+    "LOG_WRONG",
     "MOST_CAUSES",
     "REFERENCE",
     "WRONG_BY",
@@ -335,5 +349,6 @@ __all__ = [
     "events",
     "explain",
     "least_cost",
+    "simplest",
     "simplest_first",
 ]
