@@ -101,8 +101,8 @@ def test_a_cause_that_one_motion_names_is_one_of_both():
     assert (begin, other.prior_mean) == ("beginning", pytest.approx(0.12))
     assert other.prior_std == pytest.approx(0.03)
     (sentence,) = sentences([cause])
-    assert "1.113" in sentence
     assert "one cause of both motions" in sentence
+    assert "1.12 +- 0.03 by the longitudinal records, 1.1 +- 0.04 by the lateral records" in sentence
 
 
 @pytest.mark.usefixtures("told")

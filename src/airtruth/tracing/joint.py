@@ -205,10 +205,9 @@ def sentences(causes: Sequence[SharedCause]) -> Iterator[str]:
                 f"{cause.p_value:.2g}): each motion keeps its own, and the name is provisional"
             )
         else:
-            both = combined(cause.alone.values())
             yield (
-                f"{cause.effect.key} is one cause of both motions: {p.name} {p.value(both.size):.4g} +- {both.std:.2g} "
-                f"({alone}; p = {cause.p_value:.2g} that they agree)"
+                f"{cause.effect.key} is one cause of both motions, and its {p.name} is that by the records of both ({alone}; p = "
+                f"{cause.p_value:.2g} that they agree)"
             )
 
 

@@ -19,7 +19,7 @@ from airtruth.aircraft.write import Corrections, write_aircraft
 from airtruth.effects.increment import Increment
 from airtruth.errors import StoreError
 from airtruth.logs import atomic
-from airtruth.physics.motion import LONGITUDINAL, VANES
+from airtruth.physics.motion import VANES
 from airtruth.physics.terms import DECLARED, AeroTerm, Change, ReadingTerm, SensorTerm, declared_total
 from airtruth.quantity import Quantity
 from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
@@ -264,13 +264,12 @@ def _write_flying(
 ) -> None:
     """An aircraft without a JSBSim model, as one that flies in level flight at the trim of the fitted records."""
     signals, trim = revision.signals, revision.corrections.trim
-    is_pitch = revision.corrections.motion is LONGITUDINAL
-    alpha_rad = trim["alpha"] if is_pitch else float(np.mean([s.alpha_rad[0] for s in signals]))
+    alpha_rad, (control,) = trim[revision.corrections.motion.flow], revision.corrections.motion.controls
     at = TrimPoint(
         airspeed_m_s=float(np.mean([s.airspeed_m_s[0] for s in signals])),
         density_kg_m3=float(np.mean([s.density_kg_m3[0] for s in signals])),
         alpha_rad=alpha_rad,
-        elevator_rad=trim["elevator"] if is_pitch else 0.0,
+        elevator_rad=trim[control.name],
         az_m_s2=-G0 * math.cos(alpha_rad),
     )
     with atomic.new_folder(folder) as new:
