@@ -53,8 +53,8 @@ class DerivativeQuestion:
             )
             if other is not None:
                 raise ConfigurationError(
-                    f"plan: derivative {name!r} belongs to the {other.heading.lower()}, for which no input is searched; "
-                    f"`airtruth plan CAMPAIGN.toml --motion {other.name}` predicts the accuracy of a campaign"
+                    f"plan: derivative {name!r} belongs to the {other.heading.lower()}, and an input determines those of one "
+                    "motion; plan the derivatives of each motion by a command of its own"
                 )
             if name not in LONGITUDINAL.parameters:
                 raise ConfigurationError(
