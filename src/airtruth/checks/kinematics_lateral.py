@@ -13,9 +13,10 @@ from scipy.stats import f as fisher
 from airtruth.checks.kinematics_bias import rms
 from airtruth.checks.kinematics_energy import by_equation
 from airtruth.checks.kinematics_findings import bias_of, cause_of, drift, errors_of
-from airtruth.checks.kinematics_fit import Problem, limits_of, problem_of
+from airtruth.checks.kinematics_fit import KinematicProblem, limits_of, problem_of
+from airtruth.checks.kinematics_lines import lines_of
 from airtruth.checks.kinematics_record import thinned
-from airtruth.checks.kinematics_search import DOUBT, Search, completed, search
+from airtruth.checks.kinematics_search import DOUBT, ErrorSearch, completed, search
 from airtruth.checks.kinematics_side import ERRORS, LATERAL, SideRecord
 from airtruth.checks.kinematics_words import NAMED, conclusions, verdict_of
 from airtruth.checks.result import CheckResult, Finding
@@ -104,7 +105,7 @@ def check_lateral(
     )
 
 
-def _searched(problem: Problem, usual: Mapping[str, float]) -> tuple[Search, Search]:
+def _searched(problem: KinematicProblem, usual: Mapping[str, float]) -> tuple[ErrorSearch, ErrorSearch]:
     """Outcome of a search, and the same with the test of its best set against the noise alone.
 
     The equations differ in what they leave: a good attitude shows every imperfection of a gyroscope, and a vane in the air does
@@ -172,7 +173,8 @@ def side_records(logs: Sequence[FlightLog]) -> tuple[list[SideRecord], list[str]
             long_enough = rows.stop - rows.start >= 4 * edge_samples(butterworth(min(5.0, 0.2 / dt), 4, dt))
             moved = max(np.ptp(c[n]) for n in ("aileron_rad", "rudder_rad") if n in c)
             if long_enough and min(moved, np.ptp(c["p_rad_s"]), np.ptp(c["r_rad_s"])) > 0.0:
-                records.append(thinned(_record(run_id, dt, c)))
+                record = thinned(_record(run_id, dt, c))
+                records += [record] if _shows_noise(record) else []
     if not records:
         raise LogError(
             f"no run can be assessed: {runs} runs are shorter than about two seconds, or aileron and rudder, p or r "
@@ -192,6 +194,12 @@ def side_records(logs: Sequence[FlightLog]) -> tuple[list[SideRecord], list[str]
         if channel not in shared:
             remarks.append(f"{channel} is absent: {loss}.")
     return records[:MOST_RECORDS], remarks
+
+
+def _shows_noise(record: SideRecord) -> bool:
+    """Whether a record has more lines than its trends and the motions of its surfaces, so that some are noise alone."""
+    lines = lines_of(record, LATERAL)
+    return bool(lines.keep.size > len(lines.basis) + len(lines.trends))
 
 
 def _record(run_id: str, dt_s: float, c: Mapping[str, Array]) -> SideRecord:
@@ -235,7 +243,7 @@ def _candidates(
     return result
 
 
-def _biases(found: Search, known: Mapping[str, float]) -> list[Finding]:
+def _biases(found: ErrorSearch, known: Mapping[str, float]) -> list[Finding]:
     """Biases of p, r and ay from the ramps of the equations, beside the sums that known ones make there."""
     problem = found.problem
     meanings = {

@@ -11,17 +11,18 @@ from numpy.typing import NDArray
 
 from airtruth.identification.estimates import JOINT, Estimates, Status, joined, mean_scale
 from airtruth.identification.lateral.covariance import bread_of, meat, sandwich
-from airtruth.identification.lateral.observation import Each, Observation, observe
+from airtruth.identification.lateral.kernels import solve
+from airtruth.identification.lateral.observation import Each, LateralObservation, observe
 from airtruth.identification.lateral.problems import (
-    Problem,
-    Rows,
+    LateralProblem,
+    SmoothRows,
     f1_problem,
     lowpass_problem,
     ls_problem,
     smoothed,
 )
 from airtruth.identification.options import Options
-from airtruth.identification.regression.iterate import Outcome, repeat
+from airtruth.identification.regression.iterate import IterationOutcome, repeat
 from airtruth.identification.regression.solve import chunks
 from airtruth.logs.flight_log import Batch
 from airtruth.physics.lateral import LateralConstants, LateralScale
@@ -30,38 +31,32 @@ from airtruth.physics.motion import LATERAL
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
-Pose = Callable[[Observation, Options, Rows], Problem]
+Pose = Callable[[LateralObservation, Options, SmoothRows], LateralProblem]
 
 _COUNT: Final = len(LATERAL.parameters)
 """Number of derivatives."""
 _SINGULAR: Final = 1e12
-"""Condition number of the normal equations of unit-length regressors from which they count as singular [-]; judgement."""
+"""Condition number, in the Frobenius norm, of the normal equations with rows of unit length from which they count as singular
+[-]; judgement."""
 
 
-def solution(matrix: Array, right: Array) -> Array:
-    """theta (runs, 15) of normal equations sum Z X' (runs, 5, 5) and sum Z y' (runs, 5, 3); NaN where singular."""
-    size = np.sqrt(np.einsum("rij,rij->ri", matrix, matrix))
-    theta = np.full((matrix.shape[0], _COUNT), np.nan)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        scaled = matrix / size[:, :, None]
-        regular = np.isfinite(scaled).all(axis=(1, 2)) & np.isfinite(right).all(axis=(1, 2))
-        regular[regular] = np.linalg.cond(scaled[regular]) < _SINGULAR
-    solved = np.linalg.solve(matrix[regular], right[regular])
-    theta[regular] = np.swapaxes(solved, 1, 2).reshape(-1, _COUNT)
-    return theta
-
-
-def _normal(rows: Rows) -> tuple[Array, Array]:
-    return bread_of(rows), np.matmul(rows.z, np.swapaxes(rows.y, 1, 2))
+def solution(moments: Array) -> Array:
+    """theta (runs, 15) of normal equations: sums Z X' and Z Y' (runs, 5, 8); NaN where singular."""
+    width = len(LATERAL.signals)
+    theta = np.empty((len(moments), width, len(LATERAL.coefficients)))
+    matrix, right = (np.ascontiguousarray(part) for part in (moments[..., :width], moments[..., width:]))
+    solve(matrix, right, _SINGULAR, theta)
+    theta[~np.isfinite(theta).all(axis=(1, 2))] = np.nan
+    return np.swapaxes(theta, 1, 2).reshape(-1, _COUNT)
 
 
 @dataclass(frozen=True)
 class _Several:
     """Problems of several observations as one."""
 
-    problems: Sequence[Problem]
+    problems: Sequence[LateralProblem]
 
-    def parts(self, theta: Array) -> Iterator[tuple[Problem, Array, Ints]]:
+    def parts(self, theta: Array) -> Iterator[tuple[LateralProblem, Array, Ints]]:
         """Each problem with the theta of its runs."""
         first = 0
         for problem in self.problems:
@@ -70,18 +65,17 @@ class _Several:
 
     def step(self, theta: Array, active: Ints, iteration: int) -> Array:
         """Theta (1, 15) of the summed normal equations."""
-        sums = [_normal(problem.rows(own, runs)) for problem, own, runs in self.parts(theta)]
-        matrix, right = (np.sum([s[k].sum(axis=0) for s in sums], axis=0)[None] for k in range(2))
-        return solution(matrix, right)
+        sums = [problem.moments(own, runs).sum(axis=0) for problem, own, runs in self.parts(theta)]
+        return solution(np.sum(sums, axis=0)[None])
 
     def usable(self, theta: Array, active: Ints) -> Bools:
         """Whether theta makes instruments of each run."""
         return np.concatenate([problem.usable(own, runs) for problem, own, runs in self.parts(theta)])
 
 
-def _once(theta: Array) -> Outcome:
+def _once(theta: Array) -> IterationOutcome:
     status = np.where(np.isfinite(theta).all(axis=1), Status.CONVERGED, Status.SINGULAR).astype(np.int8)
-    return Outcome(theta, status, np.zeros(len(theta), dtype=np.int32))
+    return IterationOutcome(theta, status, np.zeros(len(theta), dtype=np.int32))
 
 
 def _iterated(
@@ -91,7 +85,7 @@ def _iterated(
     start: Array,
     options: Options,
     joint: bool,
-) -> Outcome:
+) -> IterationOutcome:
     failed = np.zeros(runs, dtype=np.bool_)
     with np.errstate(over="ignore", invalid="ignore"):
         return repeat(step, usable, failed, start, runs, options.tolerance, options.maximum_iterations, joint)
@@ -116,12 +110,12 @@ def regress_batch(
         problem = ls_problem(o, options, smooth)
         every = np.arange(problem.runs)
         nothing = np.full((problem.runs, _COUNT), np.nan)
-        outcome = _once(solution(*_normal(problem.rows(nothing, every))))
+        outcome = _once(solution(problem.moments(nothing, every)))
         if pose is not None:
             problem = pose(o, options, smooth)
 
-            def step(theta: Array, active: Ints, iteration: int, own: Problem = problem) -> Array:
-                return solution(*_normal(own.rows(theta, active)))
+            def step(theta: Array, active: Ints, iteration: int, own: LateralProblem = problem) -> Array:
+                return solution(own.moments(theta, active))
 
             outcome = _iterated(step, problem.usable, problem.runs, outcome.theta, options, False)
         outcomes.append(outcome)
@@ -130,7 +124,7 @@ def regress_batch(
     return _estimates(name, batch.run_ids, outcomes, np.concatenate(covariances), joined(scales), options)
 
 
-def _covariance(problem: Problem, outcome: Outcome, options: Options) -> Array:
+def _covariance(problem: LateralProblem, outcome: IterationOutcome, options: Options) -> Array:
     covariance = np.full((problem.runs, _COUNT, _COUNT), np.nan)
     known = np.flatnonzero(np.isin(outcome.status, (Status.CONVERGED, Status.MAXIMUM_ITERATIONS)))
     known = known[problem.usable(outcome.theta[known], known)]
@@ -196,7 +190,7 @@ def _joint_covariance(several: _Several, theta: Array, options: Options) -> Arra
 def _estimates(
     name: str,
     run_ids: tuple[str, ...],
-    outcomes: Sequence[Outcome],
+    outcomes: Sequence[IterationOutcome],
     covariance: Array,
     scale: LateralScale,
     options: Options,

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from airtruth.physics.motion import LONGITUDINAL, Motion
+from airtruth.tracing.inference.hypothesis_test import HypothesisTest
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.inference.robust import inflation, scatter
 
@@ -27,6 +28,10 @@ Array = NDArray[np.float64]
 _TOLD: Final = 0.05
 """Share of the declared variance that the records have to determine for a direction to be tested [-] (judgement: the
 mode does not move in the others, and the linear theory of a small share is inaccurate)."""
+
+
+DERIVATIVES_MOVED: Final = "the derivatives"
+"""Deviation of the derivatives from those that are declared, or from those that an answer gives."""
 
 
 @dataclass(frozen=True)
@@ -50,20 +55,14 @@ class DerivativeLikelihood:
 
 
 @dataclass(frozen=True)
-class Contradiction:
-    """Test of the declared derivatives against the records.
+class Contradiction(HypothesisTest):
+    """Test of the declared derivatives against the records: the stronger of that of all directions and that of one derivative.
 
     Attributes
     ----------
-    statistic : chi-square statistic of the stronger of two tests, of all directions and of one derivative [-].
-    degrees : its degrees of freedom [-].
-    p_value : probability of stronger evidence where the declaration is right, for both tests [-].
     directions, derivatives : numbers of directions and of single derivatives that the records determine [-].
     """
 
-    statistic: float
-    degrees: int
-    p_value: float
     directions: int
     derivatives: int
 
@@ -137,18 +136,19 @@ def against_declaration(mode: Array, declared: Array, spread: Array, gain: Array
     z = normal @ np.linalg.solve(root, mode)
     statistic, degrees = float(z @ z), int(told.sum())
     if not degrees:
-        return Contradiction(0.0, 0, 1.0, 0, 0)
+        return Contradiction(DERIVATIVES_MOVED, 0.0, 0, 1.0, 0, 0)
     joint = float(chi2.sf(statistic, degrees))
     shifts = normal @ np.linalg.solve(root, gain * np.sqrt(np.diag(declared)))
     power = (shifts**2).sum(axis=0)
     shown = power > _TOLD
     if not shown.any():
-        return Contradiction(statistic, degrees, joint, degrees, 0)
+        return Contradiction(DERIVATIVES_MOVED, statistic, degrees, joint, degrees, 0)
     count, largest = int(shown.sum()), float(((shifts.T @ z)[shown] ** 2 / power[shown]).max())
     alone = -math.expm1(count * math.log1p(-float(chi2.sf(largest, 1)))) if largest > 0.0 else 1.0
     if alone < joint:
         statistic, degrees = largest, 1
-    return Contradiction(statistic, degrees, min(1.0, 2.0 * min(joint, alone)), int(told.sum()), count)
+    p_value = min(1.0, 2.0 * min(joint, alone))
+    return Contradiction(DERIVATIVES_MOVED, statistic, degrees, p_value, int(told.sum()), count)
 
 
 def _split(problem: TraceProblem, fitted: PosteriorFit) -> tuple[Array, Array]:
@@ -167,6 +167,7 @@ def _ratio(problem: TraceProblem, fitted: PosteriorFit) -> Array:
 
 
 __all__ = [
+    "DERIVATIVES_MOVED",
     "Contradiction",
     "DerivativeLikelihood",
     "against_declaration",
