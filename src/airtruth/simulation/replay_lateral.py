@@ -108,7 +108,7 @@ def _run(executive: Executive, at: Trim, track: LateralTrack, free: Array) -> di
     for name, surface in surfaces.items():
         gain = surface.surface_rad * surface.command_per_rad if surface.feedback else 0.0
         moved.append(
-            _Surface(
+            _FollowedSurface(
                 executive.node(surface.command).set_double_value,
                 executive.node(surface.surface).get_double_value,
                 (commands[name] * surface.command_per_rad).tolist(),
@@ -141,7 +141,7 @@ def _run(executive: Executive, at: Trim, track: LateralTrack, free: Array) -> di
     )
 
 
-class _Surface:
+class _FollowedSurface:
     """A surface that follows a record; augmentation of the model that moves it is compensated by the integral of its error."""
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Measured records on the grid of a simulation, and the fit of what is free when one is flown again."""
+"""ReplayRecord records on the grid of a simulation, and the fit of what is free when one is flown again."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ step costs a simulation)."""
 
 
 @dataclass(frozen=True)
-class Measured:
+class ReplayRecord:
     """Outputs of a record and its time base.
 
     Attributes
@@ -41,7 +41,7 @@ class Measured:
 
 
 @dataclass(frozen=True)
-class Track(Measured):
+class Track(ReplayRecord):
     """A record of the pitch plane.
 
     Attributes
@@ -55,7 +55,7 @@ class Track(Measured):
 
 
 @dataclass(frozen=True)
-class LateralTrack(Measured):
+class LateralTrack(ReplayRecord):
     """A record of the lateral-directional motion.
 
     Attributes
@@ -74,12 +74,12 @@ def substeps(dt_s: float) -> int:
     return max(1, math.ceil(dt_s / STEP_S - 1e-9))
 
 
-def first_of(track: Measured, channel: str, otherwise: float) -> float:
+def first_of(track: ReplayRecord, channel: str, otherwise: float) -> float:
     """Mean of the first samples of an output; ``otherwise`` for one that was not measured."""
     return float(np.mean(track.outputs[channel][:5])) if channel in track.outputs else otherwise
 
 
-def as_logged(aircraft: Aircraft, truth: Mapping[str, Array], track: Measured) -> dict[str, Array]:
+def as_logged(aircraft: Aircraft, truth: Mapping[str, Array], track: ReplayRecord) -> dict[str, Array]:
     """Readings of the aircraft's sensors in a motion, without noise.
 
     Parameters
@@ -95,7 +95,7 @@ def as_logged(aircraft: Aircraft, truth: Mapping[str, Array], track: Measured) -
 
 
 def fitted_outputs(
-    fly: Callable[[Array], Array], free: Array, steps: Array, track: Measured
+    fly: Callable[[Array], Array], free: Array, steps: Array, track: ReplayRecord
 ) -> dict[str, Array]:
     """Outputs of a record flown again, its free parameters and a bias of each output fitted by least squares.
 
@@ -133,7 +133,7 @@ def _residual(measured: Array, flown: Array, weight: Array) -> Array:
 __all__ = [
     "STEP_S",
     "LateralTrack",
-    "Measured",
+    "ReplayRecord",
     "Track",
     "as_logged",
     "first_of",
