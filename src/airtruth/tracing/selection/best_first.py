@@ -98,11 +98,11 @@ def best_first(
         return None
     held = {e.key for e in effects}
     others = tuple(c for c in causes if c.key not in held)
-    own = _Search(sets, hypothesis, tuple(effects), others, tuple(shapes))
+    own = _BestFirst(sets, hypothesis, tuple(effects), others, tuple(shapes))
     return own.run(null)
 
 
-class _Search:
+class _BestFirst:
     """Fits, predictions and evidence of one search."""
 
     def __init__(
