@@ -22,7 +22,7 @@ from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.direction import eliminated
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.parameters import Parameters
-from airtruth.tracing.selection.evidence import SINGULAR, Column
+from airtruth.tracing.selection.evidence import SINGULAR, EffectColumn
 from airtruth.tracing.selection.expansion import expanded
 from airtruth.tracing.selection.explanation import REFERENCE
 
@@ -77,7 +77,7 @@ def _of_number(
     slope: Array, information: Array, effects: Sequence[Effect], number: int
 ) -> Iterator[tuple[tuple[int, ...], Array, float]]:
     """Indices of the effects of each plausible set of a number, their sizes, and their cost against none."""
-    columns = [Column(e) for e in effects]
+    columns = [EffectColumn(e) for e in effects]
     apart = np.array([[a.may_join(b) for b in columns] for a in columns])
     chosen = np.array(list(itertools.combinations(range(len(effects)), number)), dtype=np.int64)
     for i, j in itertools.combinations(range(number), 2):
