@@ -23,7 +23,7 @@ from airtruth.aircraft import Aircraft
 from airtruth.checks.kinematics import check_kinematics
 from airtruth.checks.kinematics_model import LONGITUDINAL
 from airtruth.checks.kinematics_record import declared_biases, declared_errors
-from airtruth.checks.kinematics_search import EQUAL, SAME
+from airtruth.checks.kinematics_search import EQUAL
 from airtruth.checks.result import CheckResult
 from airtruth.logs.flight_log import FlightLog
 from validation.blind import draw
@@ -62,7 +62,7 @@ def checked(log: FlightLog, aircraft: Aircraft, runs: Sequence[str]) -> CheckRes
 
 def outcome(result: CheckResult) -> str:
     """One of `WORDS`."""
-    alike = {name for pair in SAME if CAUSE in pair for name in pair}
+    alike = {name for pair in LONGITUDINAL.same if CAUSE in pair for name in pair}
     names = {f.name for c in result.possible for f in c.errors}
     return WORDS[0] if CAUSE in names else WORDS[1] if names & alike else WORDS[2]
 

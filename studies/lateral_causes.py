@@ -21,7 +21,7 @@ from scipy.signal import cont2discrete, lfilter
 
 from airtruth.identification import Options, identify_batch
 from airtruth.identification.lateral.observation import LateralObservation, observe
-from airtruth.identification.lateral.problems import instruments, rate_of, with_corners
+from airtruth.identification.lateral.problems import LinearModels, rate_of, with_corners
 from airtruth.identification.lateral.solve import solution
 from airtruth.logs.flight_log import batches
 from airtruth.logs.sources import log_files
@@ -99,7 +99,7 @@ def _solved(z: np.ndarray, x: np.ndarray, y: np.ndarray, free: np.ndarray) -> np
     """theta (runs, 15) of rows whose components along the free rows are taken out."""
     basis = np.swapaxes(np.linalg.qr(np.swapaxes(free, 1, 2))[0], 1, 2)
     z, x, y = (rows - rows @ np.swapaxes(basis, 1, 2) @ basis for rows in (z, x, y))
-    return solution(z @ np.swapaxes(x, 1, 2), z @ np.swapaxes(y, 1, 2))
+    return solution(z @ np.swapaxes(np.concatenate([x, y], axis=1), 1, 2))
 
 
 def central(batch) -> Estimate:
@@ -147,7 +147,7 @@ def _filtered(o: LateralObservation, theta: np.ndarray, run: int, order: int) ->
                 cont2discrete(([*gain], denominator), o.dt_s, method="foh")[:2]
                 for gain in ((1.0,), (1.0, 0.0))
             ]
-            z = instruments(o, theta, one, o.controls[one], o.bend[one])
+            z = LinearModels.of(o).instruments(theta[one], one, np.ascontiguousarray(o.controls), o.bend)
             value, slope = (lambda rows, b=b, a=a: lfilter(np.ravel(b), a, rows, axis=-1) for b, a in filters)
             x = value(with_corners(o)[one])
             y = slope(o.slopes[one]) + value(o.added[one])

@@ -28,7 +28,7 @@ CAPS: dict[str, int] = {
     "api": 2,
     "charts": 1,
     "checks": 572,
-    "cli": 26,
+    "cli": 25,
     "design": 86,
     "exporting": 15,
     "identification": 249,
@@ -42,7 +42,7 @@ CAPS: dict[str, int] = {
     "starting": 23,
     "tracing": 114,
     "tracing/inference": 3,
-    "tracing/model": 355,
+    "tracing/model": 280,
     "tracing/presentation": 7,
     "tracing/selection": 7,
 }

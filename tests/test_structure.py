@@ -166,3 +166,47 @@ def test_each_class_has_a_name_of_its_own():
         if isinstance(node, ast.ClassDef)
     )
     assert [name for name, count in defined.items() if count > 1] == []
+
+
+def test_names_that_other_folders_import_exist():
+    """Studies, scripts and validation run rarely: an import of a name that has gone would show late."""
+    root = SOURCE.parents[1]
+    folders = ("studies", "scripts", "validation", "benchmarks", "tests")
+    defined = {path: words_of(path) for path in FILES}
+    missing = [
+        f"{path.relative_to(root).as_posix()}: {node.module}.{alias.name}"
+        for folder in folders
+        for path in sorted((root / folder).rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "airtruth"
+        for alias in node.names
+        if not is_there(node.module or "", alias.name, defined)
+    ]
+    assert not missing
+
+
+def words_of(path: Path) -> set[str]:
+    """Names that a module defines or imports, and its strings, which a lazy table holds."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        match node:
+            case ast.FunctionDef(name=name) | ast.ClassDef(name=name) | ast.Name(id=name, ctx=ast.Store()):
+                found.add(name)
+            case ast.Import(names=names) | ast.ImportFrom(names=names):
+                found |= {alias.asname or alias.name for alias in names}
+            case ast.Constant(value=str(text)):
+                found.add(text)
+            case _:
+                pass
+    return found
+
+
+def is_there(module: str, name: str, defined: dict[Path, set[str]]) -> bool:
+    """Whether a module has a name, or a package a module of that name."""
+    place = SOURCE.joinpath(*module.split(".")[1:])
+    candidates = (place.with_suffix(".py"), place / "__init__.py")
+    return (
+        any(name in defined.get(path, ()) for path in candidates)
+        or (place / f"{name}.py").exists()
+        or (place / name).is_dir()
+    )

@@ -7,8 +7,10 @@ from pathlib import Path
 
 from validation.lateral_truth import GTM, LATERAL, SENSORS, Plane
 
-SHARE = {"CYbeta": 0.05, "Clbeta": 0.05, "Cnbeta": 0.05, "Clp": 0.05, "Clda": 0.05, "Cndr": 0.05, "CYdr": 0.1}
+_SURE = ("CLalpha", "Cmalpha", "Cmde", "CYbeta", "Clbeta", "Cnbeta", "Clp", "Clda", "Cndr")
+SHARE = {**dict.fromkeys(_SURE, 0.05), "CYdr": 0.1}
 """Declared standard deviation over the derivative [-]; the others have 30 %."""
+PITCH = tuple(c + s for c in ("CL", "Cm") for s in ("alpha", "q", "de"))
 LEAST = 0.01
 """Least declared standard deviation [-]."""
 
@@ -21,7 +23,9 @@ def lateral_aircraft(folder: Path, plane: Plane = GTM, wrong: Mapping[str, float
     wrong : derivative -> factor on its true value that is declared.
     """
     ixx, iyy, izz, ixz = plane.inertia
-    values = dict(zip(LATERAL, plane.lateral.ravel().tolist(), strict=True))
+    values = dict(
+        zip((*LATERAL, *PITCH), [*plane.lateral.ravel().tolist(), *plane.pitch.ravel().tolist()], strict=True)
+    )
     rows = []
     for name, true in values.items():
         declared = true * (wrong or {}).get(name, 1.0)

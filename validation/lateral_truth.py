@@ -54,6 +54,13 @@ class Plane:
         911.0,
         840.0,
     )  # sigma_u, sigma_v = sigma_w, Lu, Lv
+    at_rest: tuple[float, float, float] = (
+        0.0,
+        0.0,
+        0.0,
+    )  # CY, Cl, Cn without sideslip, rates and deflections
+    roll_per_lift: float = 0.0  # rolling moment of an asymmetric wing over its lift coefficient
+    cg_right: float = 0.0  # CG to the right of the plane of symmetry, in which the forces act
 
 
 def _rows(text: str) -> Array:
@@ -126,6 +133,17 @@ SENSORS: Mapping[str, Reading] = {
 }
 """The GTM's sensors, one sigma per sample (NASA GTM_DesignSim)."""
 Shape = Callable[[Array], Array]
+
+
+def straight(plane: Plane) -> tuple[float, float, float]:
+    """Aileron, rudder and bank [rad] that hold the aircraft straight without sideslip, to first order in the bank."""
+    trim_cl = plane.mass * G0 / (0.5 * plane.density * plane.speed**2 * plane.area)
+    force, roll, yaw = plane.at_rest
+    roll += (plane.roll_per_lift + plane.cg_right / plane.span * np.cos(plane.alpha)) * trim_cl
+    yaw += plane.cg_right / plane.span * np.sin(plane.alpha) * trim_cl
+    aileron, rudder = np.linalg.lstsq(plane.lateral[1:, 3:], [-roll, -yaw])[0]
+    side = force + plane.lateral[0, 3] * aileron + plane.lateral[0, 4] * rudder
+    return float(aileron), float(rudder), float(-side / trim_cl / np.cos(plane.alpha))
 
 
 def steps(start_s: float, unit_s: float, *signs: float) -> Shape:
@@ -247,6 +265,8 @@ def fly(flight: Flight) -> dict[str, Array]:
     ]  # fmt: skip
     decay = np.exp(-plane.servo_rad_s * dt)
     surfaces = np.stack([lfilter([0.0, 1.0 - decay], [1.0, -decay], c) for c in commands], axis=1)
+    aileron, rudder, bank = straight(plane)
+    surfaces[:, :2] += aileron, rudder
     rates = _equations(plane)
     x = np.empty((t.size, 9))  # u v w p q r phi theta psi
     x[0] = [
@@ -256,7 +276,7 @@ def fly(flight: Flight) -> dict[str, Array]:
         0,
         0,
         0,
-        0,
+        bank,
         plane.alpha,
         flight.heading,
     ]
@@ -291,6 +311,7 @@ def _equations(plane: Plane) -> Callable[[Array, Array, Array], tuple[Array, Arr
     ixx, iyy, izz, ixz = plane.inertia
     gamma = ixx * izz - ixz**2
     trim_cl = plane.mass * G0 / (0.5 * plane.density * plane.speed**2 * plane.area)
+    rest = plane.at_rest
     drag0 = 0.04
     thrust_share = (
         0.5 * plane.density * plane.speed**2 * plane.area * (drag0 + 0.05 * trim_cl**2) / plane.mass
@@ -306,6 +327,7 @@ def _equations(plane: Plane) -> Callable[[Array, Array, Array], tuple[Array, Arr
         cy, cl, cn = plane.lateral @ np.array([beta, p * half_span, r * half_span, surface[0], surface[1]])
         lift, moment = plane.pitch @ np.array([alpha - plane.alpha, q * half_chord, surface[2]])
         lift += trim_cl
+        cy, cl, cn = cy + rest[0], cl + rest[1] + plane.roll_per_lift * lift, cn + rest[2]
         drag = drag0 + 0.05 * lift**2
         ca, sa = np.cos(alpha), np.sin(alpha)
         # thrust along the trim's flight path, so that level flight is an equilibrium
@@ -313,9 +335,9 @@ def _equations(plane: Plane) -> Callable[[Array, Array, Array], tuple[Array, Arr
         az = pressure / plane.mass * (-drag * sa - lift * ca) + thrust_share * np.sin(plane.alpha)
         ay = pressure / plane.mass * cy
         roll, pitch, yaw = (
-            pressure * plane.span * cl,
+            pressure * plane.span * cl - plane.cg_right * plane.mass * az,
             pressure * plane.chord * moment,
-            pressure * plane.span * cn,
+            pressure * plane.span * cn + plane.cg_right * plane.mass * ax,
         )
         u, v, w = x[:3]
         st, ct, sf, cf = np.sin(theta), np.cos(theta), np.sin(phi), np.cos(phi)
@@ -510,5 +532,6 @@ def modes_of(plane: Plane) -> NDArray[np.complex128]:
 
 __all__ = [
     "GTM", "LATERAL", "MODES", "PLANES", "SENSORS", "Flight", "Plane", "Reading", "Undeclared", "at_instruments", "dryden",
-    "fly", "log_of", "modes_of", "multisine", "record_pair", "recorded", "steps", "still", "summed", "trial", "with_effect",
+    "fly", "log_of", "modes_of", "multisine", "record_pair", "recorded", "steps", "still", "straight", "summed", "trial",
+    "with_effect",
 ]  # fmt: skip

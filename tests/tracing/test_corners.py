@@ -14,10 +14,10 @@ from airtruth.physics.terms import Change, SensorTerm, SurfaceTerm
 from airtruth.tracing.calibration.corner_share import corner_share
 from airtruth.tracing.inference.optimise import fit, initial_parameters
 from airtruth.tracing.inference.posterior import TraceProblem
-from airtruth.tracing.model.elevator_path import corner_variance, read_between
 from airtruth.tracing.model.parameters import SHORT_PERIOD
 from airtruth.tracing.model.reading import read
 from airtruth.tracing.model.response import filter_inputs, respond
+from airtruth.tracing.model.surface_path import corner_variance, read_between
 from airtruth.units import DEG, G0
 
 

@@ -9,9 +9,9 @@ from airtruth.logs.flight_log import FlightLog
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.physics.terms import SurfaceTerm
 from airtruth.tracing.model.damper import Damper, damper_surface, find_damper
-from airtruth.tracing.model.elevator_path import read_between
 from airtruth.tracing.model.reading import MeasuredControl, read
 from airtruth.tracing.model.surface import through
+from airtruth.tracing.model.surface_path import read_between
 from airtruth.units import DEG
 
 DT, TAU, CELLS, SAMPLES = 0.02, 1.0 / (2.0 * np.pi * 5.0), 64, 300

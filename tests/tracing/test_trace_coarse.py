@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from airtruth.physics.terms import SurfaceTerm
-from airtruth.tracing.model.elevator import held_command, is_held, shaped, smooth, with_steps
-from airtruth.tracing.model.elevator_path import read_between
+from airtruth.tracing.model.servo_surface import held_command, is_held, shaped, smooth, with_steps
 from airtruth.tracing.model.surface import through
+from airtruth.tracing.model.surface_path import read_between
 from airtruth.units import DEG
 
 TAU = 1.0 / (2.0 * np.pi * 5.0)

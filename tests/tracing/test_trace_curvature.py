@@ -15,7 +15,7 @@ from airtruth.tracing import TraceOptions, trace
 from airtruth.tracing.model.plant import declared_derivatives
 from airtruth.tracing.model.probed import trim_of
 from airtruth.tracing.prepare import prepare
-from airtruth.tracing.update import write_update
+from airtruth.tracing.update import revision_of, write_update
 
 KEY = "cm_alpha_nonlinear:quadratic"
 TRUE = -8.0
@@ -76,7 +76,7 @@ def test_the_update_flies_what_was_fitted(found):
 
 def test_the_refitted_derivatives_are_written(found, tmp_path):
     """Cmalpha and Cmq of the written aircraft, linearised in JSBSim."""
-    folder = write_update(found.case, found.rounds, GTM, tmp_path)
+    folder = write_update([revision_of(found.case, found.rounds, GTM)], GTM, tmp_path)
     more = slopes(folder, found) - found.case.fitted.records[0].plant.derivatives
     fitted = found.rounds[-1].gls.point.common[:6]
     assert more[3] == pytest.approx(fitted[3], abs=0.02)
@@ -85,7 +85,7 @@ def test_the_refitted_derivatives_are_written(found, tmp_path):
 
 def test_a_linear_model_s_curve_is_written_at_its_trim(linear, tmp_path):
     """It counts alpha from the record's trim, the aircraft from zero."""
-    folder = write_update(linear.case, linear.rounds, GTM, tmp_path)
+    folder = write_update([revision_of(linear.case, linear.rounds, GTM)], GTM, tmp_path)
     assert folder is not None
     more = slopes(folder, linear) - linear.case.fitted.records[0].plant.derivatives
     assert more[3] == pytest.approx(linear.rounds[-1].gls.point.common[3], abs=0.05)

@@ -14,6 +14,7 @@ from airtruth.checks.kinematics_bias import rms
 from airtruth.checks.kinematics_energy import by_equation
 from airtruth.checks.kinematics_findings import bias_of, cause_of, drift, errors_of
 from airtruth.checks.kinematics_fit import KinematicProblem, limits_of, problem_of
+from airtruth.checks.kinematics_lines import lines_of
 from airtruth.checks.kinematics_record import thinned
 from airtruth.checks.kinematics_search import DOUBT, ErrorSearch, completed, search
 from airtruth.checks.kinematics_side import ERRORS, LATERAL, SideRecord
@@ -172,7 +173,8 @@ def side_records(logs: Sequence[FlightLog]) -> tuple[list[SideRecord], list[str]
             long_enough = rows.stop - rows.start >= 4 * edge_samples(butterworth(min(5.0, 0.2 / dt), 4, dt))
             moved = max(np.ptp(c[n]) for n in ("aileron_rad", "rudder_rad") if n in c)
             if long_enough and min(moved, np.ptp(c["p_rad_s"]), np.ptp(c["r_rad_s"])) > 0.0:
-                records.append(thinned(_record(run_id, dt, c)))
+                record = thinned(_record(run_id, dt, c))
+                records += [record] if _shows_noise(record) else []
     if not records:
         raise LogError(
             f"no run can be assessed: {runs} runs are shorter than about two seconds, or aileron and rudder, p or r "
@@ -192,6 +194,12 @@ def side_records(logs: Sequence[FlightLog]) -> tuple[list[SideRecord], list[str]
         if channel not in shared:
             remarks.append(f"{channel} is absent: {loss}.")
     return records[:MOST_RECORDS], remarks
+
+
+def _shows_noise(record: SideRecord) -> bool:
+    """Whether a record has more lines than its trends and the motions of its surfaces, so that some are noise alone."""
+    lines = lines_of(record, LATERAL)
+    return bool(lines.keep.size > len(lines.basis) + len(lines.trends))
 
 
 def _record(run_id: str, dt_s: float, c: Mapping[str, Array]) -> SideRecord:

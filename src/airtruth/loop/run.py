@@ -22,8 +22,7 @@ from airtruth.loop.same_inputs import simulated_logs
 from airtruth.physics.motion import FOLDERS
 from airtruth.tracing import TraceOptions, TraceResult
 from airtruth.tracing.compensate import Compensation, compensated_log, compensation_of, updated_constants
-from airtruth.tracing.motions import MotionTrace, parts_of
-from airtruth.tracing.run import trace
+from airtruth.tracing.motions import MotionTrace, parts_of, traced
 from airtruth.tracing.selection.budget import Advance
 
 METHODS: Final = ("ls", "iv-f1")
@@ -67,9 +66,12 @@ def close_loop(
     if out is not None:  # of an earlier command that answered more motions
         for name in FOLDERS[1:]:
             atomic.remove_file(out / name / OUTPUTS[2])
+    into = [part.into(out) for part in parts]
+    folders = [None if folder is None else folder / "trace" for folder in into]
+    traces = traced(logs, declared, parts, folders, force, advance)
     first, *others = [
-        _closed(logs, declared, part, part.into(out), _methods_of(methods, part), options, force, advance)
-        for part in parts
+        _closed(logs, declared, part, result, folder, _methods_of(methods, part), options, force, advance)
+        for part, result, folder in zip(parts, traces, into, strict=True)
     ]
     return replace(first, others=tuple(others))
 
@@ -87,21 +89,20 @@ def _closed(
     logs: Logs,
     declared: Aircraft,
     part: MotionTrace,
+    result: TraceResult,
     out: Path | None,
     methods: Sequence[str],
     options: Options | None,
     force: bool,
     advance: Advance,
 ) -> LoopResult:
-    """The loop of one motion."""
+    """The loop of one motion, after its trace."""
     step = part.named(advance)
     read = [log for _, log in named_logs(logs, run_ids=part.runs)]
     given: Logs = logs if part.runs is None else read
     motion = part.motion
     step("identify before")
     before = identify(given, declared, methods, options, force=force, motion=motion)
-    folder = None if out is None else out / "trace"
-    result = trace(logs, declared, part.options, folder, force, step, part.runs, part.notes)
     taken = compensation_of(result)
     step("identify after")
     after = before

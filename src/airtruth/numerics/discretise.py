@@ -90,8 +90,7 @@ def step(system, process, states, dt_s, phi, early, late, noise):  # type: ignor
         for j in range(n):
             row += abs(system[i, j])
         size = max(size, row * dt_s)
-    doublings = 0
-    h = dt_s
+    doublings, h, noisy = 0, dt_s, False
     while size > 0.5 and doublings < DOUBLINGS:
         size *= 0.5
         h *= 0.5
@@ -100,8 +99,7 @@ def step(system, process, states, dt_s, phi, early, late, noise):  # type: ignor
     for i in range(n):
         for j in range(n):
             a[i, j] = system[i, j] * h
-    power = np.zeros_like(phi)
-    spread = np.zeros_like(phi)
+    power, spread = np.zeros_like(phi), np.zeros_like(phi)
     work, other = np.empty_like(phi), np.empty_like(phi)
     once, twice = np.zeros_like(phi), np.zeros_like(phi)
     for i in range(n):
@@ -110,6 +108,7 @@ def step(system, process, states, dt_s, phi, early, late, noise):  # type: ignor
             noise[i, j] = 0.0
         power[i, i] = 1.0
         spread[i, i] = process[i] * h
+        noisy |= process[i] != 0.0
     for k in range(16):  # power = (A h)^k/k!; spread = k-th derivative of the noise covariance h^(k+1)/(k+1)!
         for i in range(n):
             for j in range(n):
@@ -118,11 +117,14 @@ def step(system, process, states, dt_s, phi, early, late, noise):  # type: ignor
                 twice[i, j] += power[i, j] * (h * h / ((k + 1.0) * (k + 2.0)))
                 noise[i, j] += spread[i, j]
         multiply(a, power, work)
-        multiply(a, spread, other)
         for i in range(n):
             for j in range(n):
                 power[i, j] = work[i, j] / (k + 1.0)
-                spread[i, j] = (other[i, j] + other[j, i]) / (k + 2.0)
+        if noisy:
+            multiply(a, spread, other)
+            for i in range(n):
+                for j in range(n):
+                    spread[i, j] = (other[i, j] + other[j, i]) / (k + 2.0)
     for _ in range(doublings):
         multiply(once, once, work)
         multiply(phi, once, other)
@@ -130,11 +132,14 @@ def step(system, process, states, dt_s, phi, early, late, noise):  # type: ignor
             for j in range(n):
                 twice[i, j] = 2.0 * twice[i, j] + work[i, j]
                 once[i, j] += other[i, j]
-        congruence(phi, noise, work, other)
+        if noisy:
+            congruence(phi, noise, work, other)
+            for i in range(n):
+                for j in range(n):
+                    noise[i, j] += other[i, j]
         multiply(phi, phi, work)
         for i in range(n):
             for j in range(n):
-                noise[i, j] += other[i, j]
                 phi[i, j] = work[i, j]
     for i in range(n):
         for j in range(inputs):

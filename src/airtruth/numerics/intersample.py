@@ -85,8 +85,8 @@ def servo_decay(increments: Array, noise_std_rad: float, declared: float = 0.0) 
     at = np.stack([np.argmax(total >= share * total[:, -1:], axis=1) for share in _QUANTILES], axis=1)
     decays = np.take_along_axis(ratios, at, axis=1)
     tried = np.concatenate([np.nan_to_num(decays), np.zeros((runs, 1)), np.full((runs, 1), declared)], axis=1)
-    least = _least_move(increments)
-    moving = np.stack([_moving_cells(increments, rho, least) for rho in tried.T], axis=1)
+    moving = np.empty_like(tried)
+    _moving_cells(np.ascontiguousarray(increments), tried, _least_move(increments), moving)
     best = np.argmin(moving[:, : len(_QUANTILES)], axis=1)
     row = np.arange(runs)
     is_fewer = moving[row, best] < _FEWER * np.minimum(moving[:, _MEDIAN], moving[:, _NONE])
@@ -105,28 +105,35 @@ def servo_decay(increments: Array, noise_std_rad: float, declared: float = 0.0) 
 
 
 def _ratios(increments: Array) -> tuple[Array, Array]:
-    """Ratios of neighbouring increments (runs, samples - 2), least first, and their weights; both zero where none counts."""
+    """Ratios of neighbouring increments (runs, ratios), least first, and their weights; NaN and zero where none counts."""
     weights = np.abs(increments[:, :-1])
     used = weights > _MOVING * np.abs(increments).max(axis=1, keepdims=True)
     weights = np.where(used, weights, 0.0)
     ratios = np.divide(increments[:, 1:], increments[:, :-1], out=np.full_like(weights, np.nan), where=used)
-    order = np.argsort(ratios, axis=1, kind="stable")
+    order = np.argsort(ratios, axis=1, kind="stable")[:, : max(1, int(used.sum(axis=1).max()))]
     return np.take_along_axis(ratios, order, axis=1), np.take_along_axis(weights, order, axis=1)
 
 
 def _least_move(increments: Array) -> Array:
-    """(runs, 1) move of the command that counts by half [rad]."""
+    """(runs,) move of the command that counts by half [rad]."""
     size = np.abs(increments)
-    noise = np.median(size, axis=1, keepdims=True)
-    return np.asarray(np.maximum(_NOISE * noise, _STILL * size.max(axis=1, keepdims=True)))
+    return np.asarray(np.maximum(_NOISE * np.median(size, axis=1), _STILL * size.max(axis=1)))
 
 
-def _moving_cells(increments: Array, decay: Array, least: Array) -> Array:
-    """(runs,) number of cells in which the command moves behind a servo of a decay (runs,); a small move counts in part."""
-    moves = increments[:, 1:] - decay[:, None] * increments[:, :-1]
-    size = np.square(np.square(moves))  # the noise of the many cells at rest adds little
-    share = np.divide(size, size + least**4, out=np.zeros_like(size), where=least > 0.0)
-    return np.asarray(share.sum(axis=1))
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+def _moving_cells(increments: Array, decays: Array, least: Array, moving: Array) -> None:
+    """Cells in which the command moves behind a servo of each decay, into (runs, decays); a small move counts in part."""
+    for run in range(decays.shape[0]):
+        move, limit = increments[run], least[run] ** 4
+        for number in range(decays.shape[1]):
+            rho, total = decays[run, number], 0.0
+            if limit > 0.0:
+                for k in range(1, move.size):
+                    size = move[k] - rho * move[k - 1]
+                    size *= size  # twice: the noise of the many cells at rest adds little
+                    size *= size
+                    total += size / (size + limit)
+            moving[run, number] = total
 
 
 @njit(cache=True, error_model="numpy")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+
+from threadpoolctl import threadpool_limits
 
 from airtruth import aircraft as planes
 from airtruth.aircraft import Aircraft
@@ -15,11 +17,13 @@ from airtruth.identification.record_constants import values_of
 from airtruth.logs import atomic
 from airtruth.logs.sources import Logs, named_logs
 from airtruth.physics.motion import FOLDERS, LONGITUDINAL, MOTIONS, Motion
-from airtruth.tracing.answer import ANSWER
+from airtruth.tracing.answer import ANSWER, TraceAnswer
+from airtruth.tracing.joint import SharedCause, jointly, sentences
 from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.result import TraceResult
-from airtruth.tracing.run import trace as trace_one
+from airtruth.tracing.run import answered, begun
 from airtruth.tracing.selection.budget import Advance
+from airtruth.tracing.update import Revision, write_update
 
 
 @dataclass(frozen=True)
@@ -153,20 +157,79 @@ def trace(
         for stale in (out / name / ANSWER for name in FOLDERS[1:]):
             if stale.exists():
                 atomic.remove_file(stale)
-    first, *others = [
-        trace_one(
-            logs,
-            declared,
-            part.options,
-            part.into(out),
-            force,
-            part.named(advance),
-            part.runs,
-            part.notes,
-        )
-        for part in parts
-    ]
+    folders = [part.into(out) for part in parts]
+    first, *others = traced(logs, declared, parts, folders, force, advance)
     return replace(first, others=tuple(others))
 
 
-__all__ = ["MotionTrace", "parts_of", "trace"]
+def traced(
+    logs: Logs,
+    aircraft: Aircraft,
+    parts: Sequence[MotionTrace],
+    folders: Sequence[Path | None],
+    force: bool = False,
+    advance: Advance = lambda step: None,
+) -> tuple[TraceResult, ...]:
+    """Trace each motion, with one size of each cause that acts in several, and write one updated aircraft.
+
+    Parameters
+    ----------
+    parts : the motions, see `parts_of`; folders : of the files of each, None to write nothing. The updated aircraft is in the
+        first.
+
+    Raises
+    ------
+    LogError, ConfigurationError, AircraftError, StoreError
+        As `trace`.
+    """
+    with threadpool_limits(limits=1, user_api="blas"):  # threads for small matrices wait for each other
+        started = [
+            begun(logs, aircraft, p.options, folder, force, p.named(advance), p.runs, p.notes)
+            for p, folder in zip(parts, folders, strict=True)
+        ]
+        searches, causes = jointly([own.search for own in started])
+        first, *others = (
+            replace(own, search=search.finished()) for own, search in zip(started, searches, strict=True)
+        )
+        stated = {e.key for e in first.search.rounds[-1].null.hypothesis.effects}
+        revisions: list[Revision] = []
+
+        def collect(revision: Revision) -> None:
+            revisions.append(revision)
+
+        def write(revision: Revision) -> str | None:
+            return None if folders[0] is None else write_update([revision, *revisions], aircraft, folders[0])
+
+        rest = [answered(own, stated, collect) for own in others]
+        results = [answered(first, (), write), *rest]
+    told = [_with_causes(result, results[0].answer, causes) for result in results]
+    for result, folder in zip(told, folders, strict=True):
+        if folder is not None:
+            result.write(folder)
+    return tuple(told)
+
+
+def _with_causes(result: TraceResult, first: TraceAnswer, causes: Sequence[SharedCause]) -> TraceResult:
+    """A result with the one updated aircraft and the one size of each cause of both motions.
+
+    It is provisional where their sizes contradict each other.
+
+    Parameters
+    ----------
+    first : answer of the first motion, whose size of a cause is that by the records of both.
+    """
+    answer = result.answer
+    common = {cause.effect.key for cause in causes if not cause.refused}
+    sizes = {e.key: e.parameters for e in first.effects if e.key in common}
+    effects = tuple(replace(e, parameters=sizes.get(e.key, e.parameters)) for e in answer.effects)
+    told = replace(
+        answer,
+        effects=effects,
+        provisional=answer.provisional or any(cause.refused for cause in causes),
+        notes=(*sentences(causes), *answer.notes),
+        updated_aircraft=first.updated_aircraft,
+    )
+    return replace(result, answer=told)
+
+
+__all__ = ["MotionTrace", "parts_of", "trace", "traced"]

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import fields, replace
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from airtruth import __version__
 from airtruth import aircraft as planes
 from airtruth.aircraft import Aircraft
 from airtruth.checks import gate
-from airtruth.checks.result import CheckResult
 from airtruth.effects.effect import Effect
 from airtruth.effects.registry import EFFECTS
-from airtruth.errors import ConfigurationError, LogError, choices
+from airtruth.errors import ConfigurationError, choices
 from airtruth.logs import atomic
 from airtruth.logs.flight_log import FlightLog
 from airtruth.logs.provenance import Provenance, digests_of
@@ -24,36 +22,26 @@ from airtruth.logs.sources import Logs, named_logs
 from airtruth.physics.motion import LONGITUDINAL
 from airtruth.tracing.answer import ANSWER, DECLARED_LEVEL
 from airtruth.tracing.axial_force import axial_force
-from airtruth.tracing.calibration.calibrated import calibrated
-from airtruth.tracing.calibration.noise_colour import beside, later_level
 from airtruth.tracing.conclude import conclude
 from airtruth.tracing.declared_model import declared_p_value
 from airtruth.tracing.kinematic_start import (
     kinematic_check,
     names_a_sensor,
-    sets_of,
-    starts_of,
     with_contradictions,
     within_kinematics,
 )
-from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.options import TraceOptions
 from airtruth.tracing.prepare import Case, prepare
 from airtruth.tracing.replay import flown_again
 from airtruth.tracing.result import TraceResult
-from airtruth.tracing.selection.budget import Advance, Budget, may_begin
-from airtruth.tracing.selection.learn import with_increments
-from airtruth.tracing.selection.look_alikes import with_look_alikes
-from airtruth.tracing.selection.outcome import total_cost
-from airtruth.tracing.selection.pruning import pruned
-from airtruth.tracing.selection.rounds import SearchRound
-from airtruth.tracing.selection.search import search
-from airtruth.tracing.selection.set_table import SetTable
-from airtruth.tracing.selection.significance import LEVEL
-from airtruth.tracing.selection.weights import with_rival
+from airtruth.tracing.searched import Searched, searched
+from airtruth.tracing.selection.budget import Advance
 from airtruth.tracing.stage_errors import Replay
 from airtruth.tracing.stages import assess_stages
-from airtruth.tracing.update import updated_folder, write_update
+from airtruth.tracing.update import Revision, revision_of, updated_folder, write_update
+
+Write = Callable[[Revision], str | None]
+"""From what one motion changes to the folder of the updated aircraft, None where it is not written."""
 
 
 def trace(
@@ -85,19 +73,46 @@ def trace(
         Naming what is wrong, where, and what to do.
     """
     with threadpool_limits(limits=1, user_api="blas"):  # threads for small matrices wait for each other
-        return _traced(logs, aircraft, options or TraceOptions(), out, force, advance, runs, notes)
+        own = begun(logs, aircraft, options or TraceOptions(), out, force, advance, runs, notes)
+        result = answered(replace(own, search=own.search.finished()))
+    if out is not None:
+        result.write(out)
+    return result
 
 
-def _traced(
+@dataclass(frozen=True)
+class Begun:
+    """A trace of one motion whose search for named effects is finished.
+
+    Attributes
+    ----------
+    logs : behind the gate; declared : the aircraft.
+    search : of the effects.
+    out : folder of trace.json and the figures; None to write nothing.
+    forced : faults of the logs that the caller overruled; remarks : for the answer, sentences without a final period.
+    origin : version, options and digests of the inputs.
+    """
+
+    logs: list[FlightLog]
+    declared: Aircraft
+    search: Searched
+    out: Path | None
+    forced: list[str]
+    remarks: tuple[str, ...]
+    origin: Provenance
+
+
+def begun(
     logs: Logs,
     aircraft: str | Path | Aircraft,
     options: TraceOptions,
     out: Path | None,
-    force: bool,
-    advance: Advance,
-    runs: Collection[str] | None,
-    notes: Sequence[str],
-) -> TraceResult:
+    force: bool = False,
+    advance: Advance = lambda step: None,
+    runs: Collection[str] | None = None,
+    notes: Sequence[str] = (),
+) -> Begun:
+    """Check the logs and search for the effects that the declared aircraft lacks, in one motion; arguments as of `trace`."""
     declared = aircraft if isinstance(aircraft, Aircraft) else planes.load(aircraft)
     effects = _effects(options)
     checked, forced, remarks = _checked(logs, declared, force, runs)
@@ -106,18 +121,31 @@ def _traced(
         atomic.make_folder(out)
     advance("probe the declared aircraft")
     case = prepare(checked, declared, effects, options)
-    motion = case.fitted.layout.motion
     advance("check the kinematics")
-    held = set() if case.held is None else {r.signals.run_id for r in case.held.records}
     # a reconstructed angle agrees with rates and accelerations by construction
-    kinematics = None if not case.has_vane else kinematic_check(checked, declared, held, motion)
+    motion = case.fitted.layout.motion
+    kinematics = kinematic_check(checked, declared, _held(case), motion) if case.has_vane else None
     case = replace(case, effects=within_kinematics(case.effects, kinematics))
-    case, rounds = _search(case, options, advance, kinematics)
+    search = searched(case, options, advance, kinematics)
+    origin = provenance_of(logs, declared, options)
+    return Begun(checked, declared, search, out, forced, (*notes, *remarks), origin)
+
+
+def answered(own: Begun, shared: Collection[str] = (), write: Write | None = None) -> TraceResult:
+    """Assess a finished search, state its answer, and write the updated aircraft.
+
+    Parameters
+    ----------
+    own : the trace; its search is that with learned increments.
+    shared : keys of effects that the revision of another motion states.
+    write : takes the revision of the aircraft and writes it, None for a trace of one motion.
+    """
+    case, rounds, out, search = own.search.case, own.search.rounds, own.out, own.search
+    motion, options, advance = case.fitted.layout.motion, search.options, search.advance
     advance("assess every stage on fitted and held-out records")
     stages = assess_stages(case, rounds)
     advance("compare ax with the declared axial force")
-    axial = axial_force(stages, checked, declared, rounds[-1].gls) if options.learns else None
-    origin = provenance_of(logs, declared, options)
+    axial = axial_force(stages, own.logs, own.declared, rounds[-1].gls) if options.learns else None
 
     def publish(refined: bool) -> tuple[str | None, Replay | None]:
         if out is None:
@@ -125,19 +153,22 @@ def _traced(
         advance("write the updated aircraft")
         atomic.remove_file(out / ANSWER)  # an interrupted trace has no answer, not one of another trace
         refit = refined or declared_p_value(rounds) <= DECLARED_LEVEL
-        updated = write_update(case, rounds, declared, out, refit, axial)
-        return updated, flown_again(stages, declared, updated)
+        revision = revision_of(case, rounds, own.declared, refit, axial, shared)
+        updated = write_update([revision], own.declared, out) if write is None else write(revision)
+        return updated, flown_again(stages, own.declared, updated)
 
-    answer = conclude(stages, rounds, publish, forced, axial)
-    whole = kinematics
-    if held and kinematics is not None and names_a_sensor(answer):
-        whole = kinematic_check(checked, declared, (), motion)
-    answer = with_contradictions(answer, kinematics, _longest_period_s(case), whole)
-    answer = replace(answer, notes=(*notes, *remarks, *answer.notes))
-    result = TraceResult(answer, rounds, stages, origin)
-    if out is not None:
-        result.write(out)
-    return result
+    answer = conclude(stages, rounds, publish, own.forced, axial)
+    whole = search.kinematics
+    if case.held is not None and whole is not None and names_a_sensor(answer):
+        whole = kinematic_check(own.logs, own.declared, (), motion)
+    answer = with_contradictions(answer, search.kinematics, search.longest_period_s, whole)
+    answer = replace(answer, notes=(*own.remarks, *answer.notes))
+    return TraceResult(answer, rounds, stages, own.origin)
+
+
+def _held(case: Case) -> set[str]:
+    """Names of the held-out records."""
+    return set() if case.held is None else {r.signals.run_id for r in case.held.records}
 
 
 def provenance_of(logs: Logs, aircraft: Aircraft, options: TraceOptions) -> Provenance:
@@ -172,89 +203,6 @@ def _checked(
     return [one.log for one in admitted], forced, tuple(remarks)
 
 
-def _search(
-    case: Case, options: TraceOptions, advance: Advance, kinematics: CheckResult | None
-) -> tuple[Case, tuple[SearchRound, ...]]:
-    """The case with the correlated noise and the corners that its records show, and the rounds of the search."""
-    advance("refit the declared aircraft")
-    limited = None if options.time_budget_s is None else Budget(options.time_budget_s, advance)
-    steps = advance if limited is None else limited
-    case, start = calibrated(case)
-    sets = SetTable(case.fitted)
-    rounds = _pruned_search(case, sets, start, options, steps, kinematics)
-    if rounds and rounds[-1].null.hypothesis.effects and not case.fitted.settings.coloured:
-        case, sets, rounds = _with_later_colour(case, sets, rounds, options, steps, kinematics)
-    if options.learns:
-        rounds = with_increments(sets, rounds, case.effects, options.seed, steps, case.declared)
-    if rounds:
-        rounds = with_look_alikes(sets, rounds, case.effects, steps)
-    else:
-        raise LogError(
-            f"the declared aircraft {case.fitted.records[0].plant.aircraft.name} does not fly like these records: its "
-            "motion diverges; check units and signs with `airtruth check`, and that it is the right aircraft"
-        )
-    return (case if limited is None else replace(case, left_out=limited.left_out)), rounds
-
-
-def _pruned_search(
-    case: Case,
-    sets: SetTable,
-    start: Parameters,
-    options: TraceOptions,
-    advance: Advance,
-    kinematics: CheckResult | None,
-    other: Sequence[Effect] = (),
-) -> tuple[SearchRound, ...]:
-    """The rounds of a search without the names that later ones make unnecessary."""
-    rounds = search(
-        sets,
-        case.hypothesis,
-        start,
-        case.effects,
-        options.seed,
-        advance,
-        case.declared,
-        starts_of(kinematics),
-        other,
-        sets_of(kinematics, _longest_period_s(case)),
-    )
-    return rounds and pruned(sets, rounds, case.effects, options.seed, LEVEL, advance)
-
-
-def _longest_period_s(case: Case) -> float:
-    """Longest sample period of the fitted records [s]."""
-    return max(r.signals.dt_s for r in case.fitted.records)
-
-
-def _with_later_colour(
-    case: Case,
-    sets: SetTable,
-    rounds: tuple[SearchRound, ...],
-    options: TraceOptions,
-    advance: Advance,
-    kinematics: CheckResult | None,
-) -> tuple[Case, SetTable, tuple[SearchRound, ...]]:
-    """The search again with correlated noise that shows beside what it explained, where that explains more.
-
-    At the declared aircraft a strong effect drives correlated noise to its limits, and it does not enter. Correlated noise can
-    imitate a share of an effect too, so that the effects of the first search are tried beside it.
-    """
-    level = later_level(sum(r.samples for r in case.fitted.records), len(case.fitted.settings.noise))
-    coloured, point = beside(case, rounds[-1].null, level)
-    phrase = "search with correlated noise"
-    if not coloured.fitted.settings.coloured or not may_begin(advance, phrase):
-        return case, sets, rounds
-    slow = SetTable(coloured.fitted)
-    start = replace(point, sizes=np.empty(0))
-    accepted = rounds[-1].null.hypothesis.effects
-    again = _pruned_search(coloured, slow, start, options, advance, kinematics, accepted)
-    if not again:
-        return case, sets, rounds
-    if total_cost(again[-1]) < total_cost(rounds[-1]):
-        return coloured, slow, with_rival(again, rounds)
-    return case, sets, with_rival(rounds, again)
-
-
 def _effects(options: TraceOptions) -> list[Effect]:
     """The requested candidates of the motion, each once; a name without a variant selects all of its variants.
 
@@ -277,4 +225,4 @@ def _effects(options: TraceOptions) -> list[Effect]:
     return list(found.values())
 
 
-__all__ = ["provenance_of", "trace"]
+__all__ = ["Begun", "Write", "answered", "begun", "provenance_of", "trace"]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, TypeVar
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from airtruth.aircraft import FILE, Aircraft
 from airtruth.aircraft.corrected import write_corrected
 from airtruth.aircraft.jsbsim.short_period import TrimPoint
-from airtruth.aircraft.origin import MARK, UNKNOWN, Origin, rounded
+from airtruth.aircraft.origin import MARK, UNKNOWN, Origin, Term, rounded
 from airtruth.aircraft.write import Corrections, write_aircraft
 from airtruth.effects.increment import Increment
 from airtruth.errors import StoreError
@@ -25,8 +25,10 @@ from airtruth.quantity import Quantity
 from airtruth.tracing.accepted import AcceptedEffect, IncrementTable
 from airtruth.tracing.axial_force import AxialForce
 from airtruth.tracing.increment_table import increment_table
+from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import robust_covariance
+from airtruth.tracing.model.records import Signals
 from airtruth.tracing.model.response import moved_past_sensors_m
 from airtruth.tracing.prepare import Case
 from airtruth.tracing.selection.rounds import SearchRound
@@ -96,15 +98,104 @@ def _is_update(folder: Path) -> bool:
         return False
 
 
-def write_update(
+@dataclass(frozen=True)
+class Revision:
+    """Change of the declared aircraft by the records of one motion.
+
+    Attributes
+    ----------
+    change : terms of the accepted effects, alpha counted from zero; std : standard deviations of their numbers.
+    corrections : refitted derivatives.
+    names : keys of the effects; bands : lines on what is learned; source : method, date and records.
+    signals : of the fitted records.
+    is_needed : whether effects or derivatives change at all.
+    """
+
+    change: Change
+    std: Mapping[Term, float]
+    corrections: Corrections
+    names: tuple[str, ...]
+    bands: tuple[str, ...]
+    source: str
+    signals: tuple[Signals, ...]
+    is_needed: bool
+
+    @property
+    def note(self) -> str:
+        """The reason of the change, for the heads of the files."""
+        found = ", ".join(self.names) or "none of the library"
+        text = f"Effects: {found}. Derivatives refitted. Source: {self.source}."
+        return text + "".join(f"\n{line}" for line in self.bands)
+
+    @property
+    def whole(self) -> tuple[Change, Mapping[Term, float]]:
+        """The change with the refitted derivatives, and the standard deviations of all its numbers."""
+        terms = self.corrections.terms()
+        stated: dict[Term, float] = {terms[name]: std for name, std in self.corrections.std.items()}
+        return self.change + Change(aero=tuple(terms.values())), {**self.std, **stated}
+
+
+def revision_of(
     case: Case,
     rounds: Sequence[SearchRound],
     aircraft: Aircraft,
-    out: Path,
     refit: bool = False,
     axial: AxialForce | None = None,
-) -> str | None:
-    """Write the aircraft with the accepted effects and the refitted derivatives to OUT/aircraft/NAME.
+    elsewhere: Collection[str] = (),
+) -> Revision:
+    """Change of the declared aircraft by a finished search.
+
+    Parameters
+    ----------
+    refit : whether the refitted derivatives are written although no effect was accepted: the records contradict the
+        declared ones, or determine them better.
+    axial : increments of CX that ax shows; None for none.
+    elsewhere : keys of effects that the revision of another motion states.
+    """
+    fit = rounds[-1].reported
+    covariance = robust_covariance(case.fitted, fit)
+    shift = case.fitted.alpha_shift_rad
+
+    def change_at(sizes: Array) -> Change:
+        change = accepted_change(case, fit, sizes, aircraft.constants.chord_m)
+        return from_zero_alpha(_without(change, fit.hypothesis, sizes, elsewhere), shift)
+
+    change, std = with_spread(change_at, fit.point.sizes, covariance[fit.layout.sizes, fit.layout.sizes])
+    along = () if axial is None else axial.increments
+    change += Change() if axial is None else axial.change
+    released = rounds[-1].null.hypothesis.spread is not None
+    release = rounds[-1].release
+    causes = release.sets[0].effects if released and release is not None else ()
+    return Revision(
+        change=change,
+        std=std,
+        corrections=_corrections(case, fit, covariance),
+        names=tuple(
+            dict.fromkeys([*(e.key for e in fit.hypothesis.effects), *(e.key for e in along), *causes])
+        ),
+        bands=(*_bands(case, fit), *map(_band, along)),
+        source=source_text([r.signals.run_id for r in case.fitted.records]),
+        signals=tuple(r.signals for r in case.fitted.records),
+        is_needed=change != Change() or released or refit,
+    )
+
+
+def _without(change: Change, hypothesis: Hypothesis, sizes: Array, keys: Collection[str]) -> Change:
+    """A change without the declared quantities and the errors of sensors that some effects of a hypothesis state."""
+    named = [e for e in hypothesis.effects if e.key in keys]
+    values = dict(zip(hypothesis.effects, hypothesis.values(sizes), strict=True))
+    stated = Change()
+    for effect in named:
+        stated += effect.change(values[effect])
+    return replace(
+        change,
+        declared=tuple(t for t in change.declared if t not in stated.declared),
+        sensors=tuple(t for t in change.sensors if t not in stated.sensors),
+    )
+
+
+def write_update(revisions: Sequence[Revision], aircraft: Aircraft, out: Path) -> str | None:
+    """Write the aircraft with the accepted effects and the refitted derivatives of each motion to OUT/aircraft/NAME.
 
     A complete new folder replaces an earlier update, or nothing changes. An aircraft without a JSBSim model is written
     in any case, with a JSBSim model of the refitted derivatives; OUT/without_effects/NAME is the same without the effects,
@@ -112,9 +203,7 @@ def write_update(
 
     Parameters
     ----------
-    refit : whether the refitted derivatives are written although no effect was accepted: the records contradict the
-        declared ones, or determine them better.
-    axial : increments of CX that ax shows; None for none.
+    revisions : of each motion that is answered, that of the pitch plane first; an effect is stated by one of them alone.
 
     Returns
     -------
@@ -126,38 +215,29 @@ def write_update(
         If the model cannot take the effect, or the folder cannot be written; as `updated_folder`.
     """
     folder = updated_folder(aircraft, out)
-    fit = rounds[-1].reported
-    covariance = robust_covariance(case.fitted, fit)
-    shift = case.fitted.alpha_shift_rad
-
-    def change_at(sizes: Array) -> Change:
-        return from_zero_alpha(accepted_change(case, fit, sizes, aircraft.constants.chord_m), shift)
-
-    change, std = with_spread(change_at, fit.point.sizes, covariance[fit.layout.sizes, fit.layout.sizes])
-    along = () if axial is None else axial.increments
-    change += Change() if axial is None else axial.change
-    released = rounds[-1].null.hypothesis.spread is not None
-    if change == Change() and not (released or refit) and aircraft.file.jsbsim is not None:
+    needed = [r for r in revisions if r.is_needed]
+    if not needed and aircraft.file.jsbsim is not None:
         atomic.remove_folder(folder)
         return None
-    origin = Origin(source_text([r.signals.run_id for r in case.fitted.records]), std)
-    release = rounds[-1].release
-    causes = release.sets[0].effects if released and release is not None else ()
-    names = dict.fromkeys([*(e.key for e in fit.hypothesis.effects), *(e.key for e in along), *causes])
-    found = ", ".join(names) or "none of the library"
-    note = f"Effects: {found}. Derivatives refitted. Source: {origin.source}."
-    note += "".join(f"\n{line}" for line in (*_bands(case, fit), *map(_band, along)))
-    corrections = _corrections(case, fit, covariance)
-    updated = _with_derivatives(aircraft, corrections, corrections.std, origin.source)
+    kept = needed or revisions
+    note = "\n".join(r.note for r in kept)
+    source = "; ".join(dict.fromkeys(r.source for r in kept))
+    updated = aircraft
+    for r in kept:
+        updated = _with_derivatives(updated, r.corrections, r.corrections.std, r.source)
     if aircraft.file.jsbsim is not None:
+        change, std = Change(), dict[Term, float]()
+        for more, stated in (r.whole for r in kept):
+            change, std = change + more, {**std, **stated}
         with atomic.new_folder(folder) as new:
-            write_aircraft(updated, change, new, note, corrections, origin=origin)
+            write_aircraft(updated, change, new, note, origin=Origin(source, std))
         return str(folder)
-    _write_flying(updated, case, corrections, change, folder, note, origin)
-    without = _with_derivatives(aircraft, corrections, {}, origin.source)
-    _write_flying(
-        without, case, corrections, Change(), folder.parents[1] / WITHOUT_EFFECTS / aircraft.name, note
-    )
+    change, std, without = Change(), dict[Term, float](), aircraft
+    for r in kept:
+        change, std = change + r.change, {**std, **r.std}
+        without = _with_derivatives(without, r.corrections, {}, r.source)
+    _write_flying(updated, kept[0], change, folder, note, Origin(source, std))
+    _write_flying(without, kept[0], Change(), folder.parents[1] / WITHOUT_EFFECTS / aircraft.name, note)
     return str(folder)
 
 
@@ -180,22 +260,16 @@ def _corrections(case: Case, fit: PosteriorFit, covariance: Array) -> Correction
 
 
 def _write_flying(
-    aircraft: Aircraft,
-    case: Case,
-    trim: Corrections,
-    change: Change,
-    folder: Path,
-    note: str,
-    origin: Origin = UNKNOWN,
+    aircraft: Aircraft, revision: Revision, change: Change, folder: Path, note: str, origin: Origin = UNKNOWN
 ) -> None:
     """An aircraft without a JSBSim model, as one that flies in level flight at the trim of the fitted records."""
-    signals = [record.signals for record in case.fitted.records]
-    alpha_rad, (control,) = trim.trim[trim.motion.flow], trim.motion.controls
+    signals, trim = revision.signals, revision.corrections.trim
+    alpha_rad, (control,) = trim[revision.corrections.motion.flow], revision.corrections.motion.controls
     at = TrimPoint(
         airspeed_m_s=float(np.mean([s.airspeed_m_s[0] for s in signals])),
         density_kg_m3=float(np.mean([s.density_kg_m3[0] for s in signals])),
         alpha_rad=alpha_rad,
-        elevator_rad=trim.trim[control.name],
+        elevator_rad=trim[control.name],
         az_m_s2=-G0 * math.cos(alpha_rad),
     )
     with atomic.new_folder(folder) as new:
@@ -264,4 +338,12 @@ def from_zero_alpha(change: Change, shift_rad: float) -> Change:
     )
 
 
-__all__ = ["WITHOUT_EFFECTS", "accepted_change", "from_zero_alpha", "updated_folder", "write_update"]
+__all__ = [
+    "WITHOUT_EFFECTS",
+    "Revision",
+    "accepted_change",
+    "from_zero_alpha",
+    "revision_of",
+    "updated_folder",
+    "write_update",
+]

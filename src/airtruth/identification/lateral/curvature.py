@@ -48,7 +48,7 @@ def p_values(batch: Batch, constants: LateralConstants, options: Options) -> Arr
         regressors = np.concatenate(
             [terms, o.regressors], axis=1
         )  # the surfaces stay last: they have corners
-        rows = smoothed(replace(o, regressors=regressors), plain)
+        rows = smoothed(replace(o, regressors=regressors), plain).rows
         bread, width = bread_of(rows), rows.x.shape[1]
         size = np.sqrt(np.einsum("rii->ri", bread)) + np.finfo(float).tiny
         sound = np.flatnonzero(np.linalg.cond(bread / (size[:, :, None] * size[:, None, :])) < _SINGULAR)

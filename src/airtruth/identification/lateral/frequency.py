@@ -114,7 +114,7 @@ def _products(
 def _solved(parts: Sequence[tuple[Array, Array, Array]], degrees: Array) -> tuple[Array, Array]:
     """theta (runs, 15) and covariance of sums of products with the residuals' degrees of freedom (runs,)."""
     matrix, right, square = parts[0]
-    theta = solution(matrix, right)
+    theta = solution(np.concatenate([matrix, right], axis=2))
     table = theta.reshape(len(theta), *LATERAL.shape)
     residual = square - table @ right
     covariance = np.full((len(theta), _COUNT, _COUNT), np.nan)

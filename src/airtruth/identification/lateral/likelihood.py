@@ -17,9 +17,17 @@ from numpy.typing import NDArray
 
 from airtruth.identification.condition import AircraftConstants
 from airtruth.identification.estimates import JOINT, AnyScale, Estimates, concatenated, mean_scale
+from airtruth.identification.lateral.model_error import random_terms, with_random_terms, with_repeated_noise
 from airtruth.identification.lateral.predictor import PROCESS, factor_names, levels, outputs_of, records_of
 from airtruth.identification.lateral.solve import regress_batch, regress_joint
-from airtruth.identification.likelihood.fit import joint_maximum, maximum_of_each, memory_of
+from airtruth.identification.likelihood.fit import (
+    Records,
+    joint_maximum,
+    maximum_of_each,
+    memory_of,
+    scored,
+    scored_each,
+)
 from airtruth.identification.likelihood.method import (
     GUST_LENGTH_M,
     GUST_M_S,
@@ -31,10 +39,11 @@ from airtruth.identification.likelihood.method import (
 )
 from airtruth.identification.likelihood.options import FilterOptions
 from airtruth.identification.likelihood.scoring import Maxima, Search
-from airtruth.identification.options import Options
+from airtruth.identification.options import TERMS, Options
 from airtruth.identification.record_constants import LateralValues
 from airtruth.identification.regression.solve import chunks
 from airtruth.logs.flight_log import Batch
+from airtruth.physics.lateral import LateralScale
 from airtruth.physics.motion import LATERAL
 
 Array = NDArray[np.float64]
@@ -93,8 +102,17 @@ def estimate(
         data = records_of(part, values, options, GUST_LENGTH_M, gusts=gusts)
         search = search_of(_noise(part, constants), options, gusts=gusts)
         maxima = maximum_of_each(data, _with_factors(start.theta, options), search)
+        memory = memory_of(data, maxima.z)
+        known = np.flatnonzero(np.isfinite(maxima.z).all(axis=1))
+        if gusts and known.size and not set(TERMS) <= set(options.terms):
+            more = records_of(part, values, replace(options, terms=TERMS), GUST_LENGTH_M, gusts=gusts)
+            random = random_terms(options, search.weight.size)
+            z = random.point(maxima.z[known])
+            score = scored(more, z, known, np.arange(z.shape[1]))
+            moved = with_random_terms(maxima.of(known), score, search.weight, random)
+            maxima.z[known], maxima.covariance[known] = moved.z, moved.covariance
         made = _estimates(maxima, part.run_ids, data.scale, options, gusts=gusts)
-        parts.append(replace(made, memory=memory_of(data, maxima.z)))
+        parts.append(replace(made, memory=memory))
     return concatenated(parts, batch.run_ids)
 
 
@@ -116,9 +134,41 @@ def estimate_joint(
     ]
     search = search_of(np.median(noise, axis=0, keepdims=True), options, gusts=gusts)
     maxima = joint_maximum(data, _with_factors(start.theta, options)[0], search)
-    made = _estimates(maxima, (JOINT,), mean_scale([d.scale for d in data]), options, gusts=gusts)
     each = [memory_of(d, np.repeat(maxima.z, d.signals.y.shape[0], axis=0)) for d in data]
+    if gusts and np.isfinite(maxima.z).all():
+        maxima = _with_model_error(maxima, data, parts, values, options, search)
+    made = _estimates(maxima, (JOINT,), mean_scale([d.scale for d in data]), options, gusts=gusts)
     return replace(made, memory=np.concatenate(each).mean(keepdims=True))
+
+
+def _with_model_error(
+    maxima: Maxima,
+    data: Sequence[Records[LateralScale]],
+    parts: Sequence[Batch],
+    values: Sequence[LateralValues],
+    options: Options,
+    search: Search,
+) -> Maxima:
+    """The maximum of all runs with random terms and with noise of the moments that repeats (`lateral.model_error`)."""
+    z = maxima.z
+    _, _, each = scored_each(data, z, search.free)
+    silent = z.copy()
+    silent[:, -len(PROCESS) :] = -np.inf
+    others = search.free[: -len(PROCESS)]
+    quiet = scored_each(data, silent, others)[2].sum(axis=0) + np.diag(search.weight[: others.size])
+    moved = maxima
+    if not set(TERMS) <= set(options.terms):
+        every = replace(options, terms=TERMS)
+        more = [
+            records_of(part, own, every, GUST_LENGTH_M, gusts=True)
+            for batch, own in zip(parts, values, strict=True)
+            for part in chunks(batch)
+        ]
+        random = random_terms(options, search.weight.size)
+        at = random.point(z)
+        score = [part.sum(axis=0)[None] for part in scored_each(more, at, np.arange(at.shape[1]))]
+        moved = with_random_terms(maxima, (score[0], score[1], score[2]), search.weight, random)
+    return with_repeated_noise(moved, maxima.covariance[0], each, quiet)
 
 
 def _estimates(

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.identification.condition import window_samples
+from airtruth.identification.lateral.kernels import left_sides
 from airtruth.identification.options import Options
 from airtruth.logs.flight_log import Batch
 from airtruth.numerics.intersample import servo_bend
@@ -41,6 +42,8 @@ CONTROLS: Final = tuple(control.channel for control in LATERAL.controls)
 """Channels of the controls."""
 _BETA: Final = REGRESSORS.index("beta_rad")
 """Number of the regressor whose square is a term."""
+_RATES: Final = slice(REGRESSORS.index("p_rad_s"), REGRESSORS.index("r_rad_s") + 1)
+"""Regressors that are angular rates."""
 
 
 @dataclass(frozen=True)
@@ -217,37 +220,47 @@ def observe(batch: Batch, constants: LateralConstants, options: Options) -> Late
     c, dt_s = batch.channels, batch.dt_s
     known = known_inputs(batch)
     scale = condition_of(batch, constants, options, known)
-    p, r, q = c["p_rad_s"], c["r_rad_s"], known.q
-    force = scale.force[:, None] * constants.mass_kg  # q_bar S
-    half = scale.half_span_time[:, None]
+    shape = c["p_rad_s"].shape
+    force = np.broadcast_to(scale.force[:, None] * constants.mass_kg, shape)  # q_bar S
+    half = np.broadcast_to(scale.half_span_time[:, None], shape)
     if options.pressure != "constant" and options.airspeed_m_s is None:
         # gusts that move the aircraft are slower than the low-pass
         sos = butterworth(options.cutoff_of(dt_s), options.order, dt_s)
         airspeed = zero_phase(c["airspeed_m_s"], sos)
         force = 0.5 * air_density(c) * airspeed**2 * constants.wing_area_m2
         half = constants.span_m / (2.0 * airspeed)
-    ixx, iyy = constants.inertia_xx_kg_m2, constants.inertia_yy_kg_m2
-    izz, ixz = constants.inertia_zz_kg_m2, constants.inertia_xz_kg_m2
-    by_moment = 1.0 / (force * constants.span_m) + np.zeros_like(p)
-    change = np.gradient(by_moment, dt_s, axis=1)
-    roll, yaw = ixx * p - ixz * r, izz * r - ixz * p
-    added = [
-        constants.mass_kg * c["ay_m_s2"] / force,
-        (-ixz * p * q + (izz - iyy) * q * r) * by_moment - change * roll,
-        (ixz * q * r + (iyy - ixx) * p * q) * by_moment - change * yaw,
-    ]
-    slopes = np.stack([np.zeros_like(p), roll * by_moment, yaw * by_moment], axis=1)
-    columns = {**c, "beta_rad": known.beta, "p_rad_s": p * half, "r_rad_s": r * half}
-    regressors = np.stack([columns[name] for name in REGRESSORS], axis=1)
+    regressors = np.empty((shape[0], len(REGRESSORS), shape[1]))
+    slopes, added = (np.empty((shape[0], len(LATERAL.coefficients), shape[1])) for _ in range(2))
+    left_sides(
+        np.ascontiguousarray(force),
+        np.ascontiguousarray(half),
+        np.stack([c["p_rad_s"], known.q, c["r_rad_s"], c["ay_m_s2"]]),
+        (
+            dt_s,
+            constants.mass_kg,
+            constants.span_m,
+            constants.inertia_xx_kg_m2,
+            constants.inertia_yy_kg_m2,
+            constants.inertia_zz_kg_m2,
+            constants.inertia_xz_kg_m2,
+        ),
+        regressors[:, _RATES],
+        slopes,
+        added,
+    )
+    for number, name in enumerate(REGRESSORS):
+        if number not in range(shape[1])[_RATES]:
+            regressors[:, number] = known.beta if number == _BETA else c[name]
     window = window_samples(options, dt_s) if options.trim == "mean" else 1
     origin = regressors[..., :window].mean(axis=-1, keepdims=True)
-    regressors = regressors - origin
+    regressors -= origin
+    surfaces = np.concatenate([c[name] for name in CONTROLS])
     return LateralObservation(
         dt_s=dt_s,
         regressors=regressors,
-        slopes=slopes - slopes[..., :1],
-        added=np.stack(added, axis=1),
-        bend=np.stack([servo_bend(c[name]) for name in CONTROLS], axis=1),
+        slopes=slopes,
+        added=added,
+        bend=np.stack(np.split(servo_bend(surfaces), len(CONTROLS)), axis=1),
         trend=known.trend,
         terms=nonlinear(regressors, known.alpha, options.terms),
         scale=scale,

@@ -13,18 +13,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airtruth.identification.estimates import chosen
-from airtruth.identification.lateral.kernels import filter_rows, respond, steps
+from airtruth.identification.lateral.kernels import filter_rows, remove, respond
 from airtruth.identification.lateral.observation import CONTROLS, LateralObservation
 from airtruth.identification.options import Options
 from airtruth.identification.regression.auxiliary import GROWTH
 from airtruth.numerics.prefilter import butterworth, zero_phase
-from airtruth.physics.lateral import lateral_system, places
+from airtruth.physics.lateral import places, structure
 from airtruth.physics.motion import LATERAL
 
 Array = NDArray[np.float64]
@@ -33,6 +32,15 @@ Bools = NDArray[np.bool_]
 
 _STATES: Final = [number for is_state, number in places(LATERAL) if is_state]
 """States among the signals, in the order of the signals."""
+_COLUMNS: Final = [number + (0 if is_state else len(LATERAL.states)) for is_state, number in places(LATERAL)]
+"""Columns of [A, B] that belong to the signals."""
+_MOMENTS: Final = slice(1, None)
+"""Coefficients whose left side is a rate: the side force is measured itself."""
+_INSIDE: Final = slice(2, -2)
+"""Samples that have a fourth-order difference."""
+_INDEPENDENT: Final = 1e-12
+"""Square of a free column outside those before it, over its own, from which it counts as another [-]; judgement, four digits
+above rounding."""
 _FAST: Final = 3
 """Order of the dynamic filter: the states beta, p and r."""
 
@@ -54,6 +62,13 @@ class Rows:
     free: Array
 
 
+class SmoothRows(NamedTuple):
+    """Low-passed signals of runs: rows of least squares, and surfaces (runs, controls, samples) from their first sample."""
+
+    rows: Rows
+    surfaces: Array
+
+
 @dataclass(frozen=True)
 class LateralProblem:
     """A regression whose instruments theta makes.
@@ -61,11 +76,13 @@ class LateralProblem:
     Attributes
     ----------
     rows : (theta (active, 15), active) -> rows of the runs ``active``.
+    moments : likewise -> (active, signals, signals + coefficients) sums Z X' and Z Y' of these rows.
     usable : likewise -> (active,) whether theta makes instruments.
     runs : number of runs.
     """
 
     rows: Callable[[Array, Ints], Rows]
+    moments: Callable[[Array, Ints], Array]
     usable: Callable[[Array, Ints], Bools]
     runs: int
 
@@ -82,14 +99,11 @@ def rate_of(x: Array, dt_s: float) -> Array:
 
 
 def free_of(z: Array, x: Array, y: Array, columns: Array) -> Rows:
-    """Rows orthogonal to the free columns (runs, columns, samples)."""
+    """Rows orthogonal to the free columns (runs, columns, samples); they are made so in place."""
     basis = np.ascontiguousarray(np.swapaxes(np.linalg.qr(np.swapaxes(columns, 1, 2))[0], 1, 2))
-
-    def without(rows: Array) -> Array:
-        return np.asarray(rows - np.matmul(np.matmul(rows, np.swapaxes(basis, 1, 2)), basis))
-
-    own = without(x)
-    return Rows(own if z is x else without(z), own, without(y), basis)
+    for part in (x, y) if z is x else (x, y, z):
+        remove(basis, part)
+    return Rows(z, x, y, basis)
 
 
 def with_corners(o: LateralObservation) -> Array:
@@ -102,15 +116,33 @@ def with_corners(o: LateralObservation) -> Array:
     return x
 
 
-def smoothed(o: LateralObservation, options: Options) -> Rows:
+def low_passed(o: LateralObservation, options: Options) -> tuple[Array, Array]:
+    """Low-passed regressors (runs, signals, samples), and left sides (runs, coefficients, samples - 4) of their `_INSIDE`."""
+    width = o.regressors.shape[1]
+    moments = o.slopes[:, _MOMENTS]
+    both = np.concatenate([with_corners(o), o.added, moments], axis=1)
+    smooth = zero_phase(both, butterworth(options.cutoff_of(o.dt_s), options.order, o.dt_s))
+    left = width + o.added.shape[1]
+    y = smooth[:, width:left, _INSIDE].copy()
+    y[:, _MOMENTS] += rate_of(smooth[:, left:], o.dt_s)
+    return smooth[:, :width], y
+
+
+def smoothed(o: LateralObservation, options: Options) -> SmoothRows:
     """Rows of least squares: low-passed signals, and fourth-order differences of the left sides."""
-    sos = butterworth(options.cutoff_of(o.dt_s), options.order, o.dt_s)
-    inside = slice(2, -2)
-    x = zero_phase(with_corners(o), sos)[..., inside]
-    y = rate_of(zero_phase(o.slopes, sos), o.dt_s) + zero_phase(o.added, sos)[..., inside]
+    smooth, y = low_passed(o, options)
+    surfaces = smooth[:, -len(CONTROLS) :]
+    x = np.ascontiguousarray(smooth[..., _INSIDE])
     columns = o.nuisance()
-    columns[:, o.trend + 1 :] = zero_phase(columns[:, o.trend + 1 :], sos)
-    return free_of(x, x, y, columns[..., inside])
+    if columns.shape[1] > o.trend + 1:
+        sos = butterworth(options.cutoff_of(o.dt_s), options.order, o.dt_s)
+        columns[:, o.trend + 1 :] = zero_phase(columns[:, o.trend + 1 :], sos)
+    return SmoothRows(free_of(x, x, y, columns[..., _INSIDE]), surfaces - surfaces[..., :1])
+
+
+def moments_of(rows: Rows) -> Array:
+    """Sums Z X' and Z Y' (runs, signals, signals + coefficients)."""
+    return np.concatenate([np.matmul(rows.z, np.swapaxes(part, 1, 2)) for part in (rows.x, rows.y)], axis=2)
 
 
 def _all(theta: Array, active: Ints) -> Bools:
@@ -119,64 +151,98 @@ def _all(theta: Array, active: Ints) -> Bools:
 
 def picked(rows: Rows, active: Ints) -> Rows:
     """Rows of some runs."""
+    if active.size == rows.x.shape[0]:
+        return rows
     z = rows.z[active]
     return Rows(z, z if rows.z is rows.x else rows.x[active], rows.y[active], rows.free[active])
 
 
-def ls_problem(o: LateralObservation, options: Options, rows: Rows) -> LateralProblem:
-    """Least squares of `smoothed` rows: the regressors are their own instruments."""
-    return LateralProblem(lambda theta, active: picked(rows, active), _all, rows.x.shape[0])
-
-
-def lowpass_problem(o: LateralObservation, options: Options, rows: Rows) -> LateralProblem:
-    """Instruments of the low-passed surfaces for the `smoothed` rows of least squares: IV(de_f) of the paper."""
-    u = zero_phase(
-        with_corners(o)[:, -len(CONTROLS) :], butterworth(options.cutoff_of(o.dt_s), options.order, o.dt_s)
+def ls_problem(o: LateralObservation, options: Options, smooth: SmoothRows) -> LateralProblem:
+    """Least squares of low-passed rows: the regressors are their own instruments."""
+    rows = smooth.rows
+    return LateralProblem(
+        lambda theta, active: picked(rows, active),
+        lambda theta, active: moments_of(picked(rows, active)),
+        _all,
+        rows.x.shape[0],
     )
-    u = u - u[..., :1]
+
+
+def lowpass_problem(o: LateralObservation, options: Options, smooth: SmoothRows) -> LateralProblem:
+    """Instruments of the low-passed surfaces for the rows of least squares: IV(de_f) of the paper."""
+    rows, u = smooth
     bend = smooth_bend(u)
+    model = LinearModels.of(o)
 
     def at(theta: Array, active: Ints) -> Rows:
         own = picked(rows, active)
-        z = instruments(o, theta, active, u[active], bend[active])[..., 2:-2]
-        # instruments have to be orthogonal to the constants; the regressors are so already
         return Rows(
-            z - np.matmul(np.matmul(z, np.swapaxes(own.free, 1, 2)), own.free), own.x, own.y, own.free
+            np.ascontiguousarray(model.instruments(theta, active, u, bend)[..., _INSIDE]),
+            own.x,
+            own.y,
+            own.free,
         )
 
-    return LateralProblem(at, lambda theta, active: bounded(o, theta, active), rows.x.shape[0])
+    def orthogonal(theta: Array, active: Ints) -> Rows:
+        made = at(theta, active)
+        remove(made.free, made.z)
+        return made
+
+    return LateralProblem(
+        orthogonal,
+        # regressors and left sides are orthogonal to the constants, so that the instruments need not be
+        lambda theta, active: moments_of(at(theta, active)),
+        model.bounded,
+        rows.x.shape[0],
+    )
 
 
-def f1_problem(o: LateralObservation, options: Options, rows: Rows) -> LateralProblem:
+def f1_problem(o: LateralObservation, options: Options, smooth: SmoothRows) -> LateralProblem:
     """Regressors, instruments and left sides behind F(p) = 1/Delta(p), Delta = |p I - A| of beta, p and r.
 
     Filters start from rest, and left sides count from the first sample, so that F p x = F x' holds exactly. Signals are
     linear between samples plus the area of the cubic through the four nearest; surfaces have the corners of their servo.
-    The `smoothed` rows of least squares have no effect.
+    The low-passed rows have no effect.
     """
-    count = len(LATERAL.signals)
-    coefficients = len(LATERAL.coefficients)
-    u = np.concatenate([o.regressors, o.slopes, o.added, o.nuisance()], axis=1)
-    more = smooth_bend(u)
-    more[:, count - o.bend.shape[1] : count] += o.bend
-    controls, control_bend = o.controls, more[:, count - o.bend.shape[1] : count]
-    taps = np.zeros(u.shape[1] + count, dtype=np.int64)
-    taps[count : count + coefficients] = 1
+    count, controls, coefficients = len(LATERAL.signals), len(CONTROLS), len(LATERAL.coefficients)
+    constants = o.nuisance()
+    even = np.zeros((len(constants), constants.shape[1] % 2, constants.shape[2]))
+    rates = o.slopes[:, _MOMENTS]
+    given = np.concatenate([rates, o.added, constants, even, o.regressors], axis=1)
+    u = np.ascontiguousarray(o.controls)
+    bend = smooth_bend(u) + o.bend
+    model = LinearModels.of(o)
+    y = slice(rates.shape[1], rates.shape[1] + coefficients)
+    free = slice(y.stop, y.stop + constants.shape[1])
+    x = slice(given.shape[1] - count, given.shape[1])
+    z = np.array([*range(x.stop, x.stop + len(_STATES)), *range(x.stop - controls, x.stop)])
+
+    def filtered(theta: Array, active: Ints) -> Array:
+        own = model.instruments(theta, active, u, bend)[:, : len(_STATES) + 1]
+        out = np.empty((active.size, given.shape[1] + own.shape[1], given.shape[2]))
+        filter_rows(model.cubics(theta, active), o.dt_s, given, o.bend, active, own, out)
+        out[:, y][:, _MOMENTS] += out[:, : y.start]
+        return out
 
     def at(theta: Array, active: Ints) -> Rows:
-        z = instruments(o, theta, active, controls[active], control_bend[active])
-        z_bend = smooth_bend(z)
-        z_bend[:, len(_STATES) :] = control_bend[active]
-        rows = np.concatenate([u[active], z], axis=1)
-        bends = np.concatenate([more[active], z_bend], axis=1)
-        out = np.empty_like(rows)
-        phi, early, late = _denominator_step(o, theta, active)
-        filter_rows(phi, early, late, rows, bends, taps, out)
-        x, slopes = out[:, :count], out[:, count : count + coefficients]
-        added = out[:, count + coefficients : count + 2 * coefficients]
-        return free_of(out[:, -count:], x, slopes + added, out[:, count + 2 * coefficients : -count])
+        out = filtered(theta, active)
+        return free_of(np.take(out, z, axis=1), out[:, x].copy(), out[:, y].copy(), out[:, free])
 
-    return LateralProblem(at, lambda theta, active: bounded(o, theta, active), u.shape[0])
+    def moments(theta: Array, active: Ints) -> Array:
+        out = filtered(theta, active)[:, y.start : x.stop + len(_STATES)]
+        sums = np.matmul(out, np.swapaxes(out, 1, 2))
+        least = _INDEPENDENT * np.einsum("rii->ri", sums)
+        first = free.start - y.start
+        for column in range(
+            first, first + constants.shape[1]
+        ):  # the constants are swept out one after another
+            pivot = sums[:, column, column]
+            share = np.divide(1.0, pivot, out=np.zeros_like(pivot), where=pivot > least[:, column])
+            sums -= share[:, None, None] * sums[:, :, column, None] * sums[:, None, column]
+        own, shift = np.take(sums, z - y.start, axis=1), y.start
+        return np.concatenate([own[:, :, x.start - shift : x.stop - shift], own[:, :, :coefficients]], axis=2)
+
+    return LateralProblem(at, moments, model.bounded, given.shape[0])
 
 
 def smooth_bend(u: Array) -> Array:
@@ -187,57 +253,77 @@ def smooth_bend(u: Array) -> Array:
     return bend
 
 
-def instruments(o: LateralObservation, theta: Array, active: Ints, u: Array, bend: Array) -> Array:
-    """States of the linear model driven by the surfaces, and the surfaces: (active, signals, samples), as the regressors."""
-    scale = chosen(o.scale, active)
-    linear = lateral_system(theta, scale)
-    x = np.empty((active.size, len(LATERAL.states), u.shape[2]))
-    respond(
-        *_discrete(np.concatenate([linear.a, linear.b], axis=2), o.dt_s), np.ascontiguousarray(u), bend, x
-    )
-    z = np.concatenate([x[:, _STATES], u], axis=1)
-    for number, signal in enumerate(LATERAL.signals):
-        if signal.length is not None:
-            z[:, number] *= scale.half_span_time[:, None]
-    return z
+@dataclass(frozen=True)
+class LinearModels:
+    """The linear models of runs, each at its own flight condition.
 
+    Attributes
+    ----------
+    kinematics : (runs, states, states + controls) the part of [A, B] that needs no aerodynamics.
+    forces, rates : as in `airtruth.physics.lateral.Structure`.
+    dt_s, samples : sample period [s] and length of the records.
+    """
 
-def _discrete(systems: Array, dt_s: float) -> tuple[Array, Array, Array]:
-    runs, n, width = systems.shape
-    phi, early, late = np.empty((runs, n, n)), np.empty((runs, n, width - n)), np.empty((runs, n, width - n))
-    steps(np.ascontiguousarray(systems), dt_s, phi, early, late)
-    return phi, early, late
+    kinematics: Array
+    forces: Array
+    rates: Array
+    dt_s: float
+    samples: int
 
+    @classmethod
+    def of(cls, o: LateralObservation) -> LinearModels:
+        """Models of an observation."""
+        own = structure(o.scale)
+        known = np.concatenate([own.kinematics, np.zeros((*own.forces.shape[:2], len(CONTROLS)))], axis=2)
+        return cls(known, own.forces, own.rates, o.dt_s, o.regressors.shape[2])
 
-def _denominator_step(o: LateralObservation, theta: Array, active: Ints) -> tuple[Array, Array, Array]:
-    """Exact step of 1/Delta(p) in the states F u, p F u, p^2 F u."""
-    a = lateral_system(theta, chosen(o.scale, active)).a[:, :_FAST, :_FAST]
-    trace = np.trace(a, axis1=1, axis2=2)
-    second = 0.5 * (trace**2 - np.einsum("rij,rji->r", a, a))
-    systems = np.zeros((active.size, _FAST, _FAST + 1))
-    systems[:, 0, 1] = systems[:, 1, 2] = systems[:, 2, 3] = 1.0
-    systems[:, 2, 0], systems[:, 2, 1], systems[:, 2, 2] = np.linalg.det(a), -second, trace
-    phi, early, late = _discrete(systems, o.dt_s)
-    return phi, np.ascontiguousarray(early[..., 0]), np.ascontiguousarray(late[..., 0])
+    def systems(self, theta: Array, active: Ints) -> Array:
+        """[A, B] (active, states, states + controls) of theta (active, 15)."""
+        made: Array = self.kinematics[active]
+        by_signal = theta.reshape(-1, *LATERAL.shape) * self.rates[active, None]
+        made[:, :, _COLUMNS] += np.matmul(self.forces[active], by_signal)
+        return made
 
+    def instruments(self, theta: Array, active: Ints, u: Array, bend: Array) -> Array:
+        """States of the models driven by surfaces (all runs, controls, samples), and the surfaces, as the regressors.
 
-def bounded(o: LateralObservation, theta: Array, active: Ints) -> Bools:
-    """(active,) whether the motion of the linear model grows by less than `GROWTH` over the record."""
-    a = lateral_system(theta, chosen(o.scale, active)).a
-    duration_s = o.dt_s * o.regressors.shape[2]
-    phi = _discrete(a, duration_s)[0]
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.isfinite(phi).all(axis=(1, 2)) & (np.abs(phi).max(axis=(1, 2)) < GROWTH))
+        Returns
+        -------
+        (active, signals, samples).
+        """
+        z = np.empty((active.size, len(LATERAL.signals), self.samples))
+        factors = np.ascontiguousarray(self.rates[active, : len(_STATES)])
+        respond(self.systems(theta, active), self.dt_s, u, bend, active, factors, z)
+        z[:, len(_STATES) :] = u[active]
+        return z
+
+    def cubics(self, theta: Array, active: Ints) -> Array:
+        """c0, c1, c2 of |p I - A| = p^3 + c2 p^2 + c1 p + c0 of beta, p and r, (active, 3)."""
+        a = self.systems(theta, active)[:, :_FAST, :_FAST]
+        trace = np.trace(a, axis1=1, axis2=2)
+        second = 0.5 * (trace**2 - np.einsum("rij,rji->r", a, a))
+        return np.stack([-np.linalg.det(a), second, -trace], axis=1)
+
+    def bounded(self, theta: Array, active: Ints) -> Bools:
+        """(active,) whether the motion grows by less than `GROWTH` over the record, by the fastest root."""
+        a = self.systems(theta, active)[..., : -len(CONTROLS)]
+        sound: Bools = np.isfinite(a).all(axis=(1, 2)).reshape(len(a))
+        sound[sound] = np.linalg.eigvals(a[sound]).real.max(axis=1) < np.log(GROWTH) / (
+            self.dt_s * self.samples
+        )
+        return sound
 
 
 __all__ = [
     "LateralProblem",
+    "LinearModels",
     "Rows",
+    "SmoothRows",
     "f1_problem",
     "free_of",
-    "instruments",
     "lowpass_problem",
     "ls_problem",
+    "moments_of",
     "rate_of",
     "smooth_bend",
     "smoothed",

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from airtruth.identification.estimates import JOINT, Estimates, Status, joined, mean_scale
 from airtruth.identification.lateral.covariance import bread_of, meat, sandwich
+from airtruth.identification.lateral.kernels import solve
 from airtruth.identification.lateral.observation import Each, LateralObservation, observe
 from airtruth.identification.lateral.problems import (
     LateralProblem,
-    Rows,
+    SmoothRows,
     f1_problem,
     lowpass_problem,
     ls_problem,
@@ -30,29 +31,23 @@ from airtruth.physics.motion import LATERAL
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
-Pose = Callable[[LateralObservation, Options, Rows], LateralProblem]
+Pose = Callable[[LateralObservation, Options, SmoothRows], LateralProblem]
 
 _COUNT: Final = len(LATERAL.parameters)
 """Number of derivatives."""
 _SINGULAR: Final = 1e12
-"""Condition number of the normal equations of unit-length regressors from which they count as singular [-]; judgement."""
+"""Condition number, in the Frobenius norm, of the normal equations with rows of unit length from which they count as singular
+[-]; judgement."""
 
 
-def solution(matrix: Array, right: Array) -> Array:
-    """theta (runs, 15) of normal equations sum Z X' (runs, 5, 5) and sum Z y' (runs, 5, 3); NaN where singular."""
-    size = np.sqrt(np.einsum("rij,rij->ri", matrix, matrix))
-    theta = np.full((matrix.shape[0], _COUNT), np.nan)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        scaled = matrix / size[:, :, None]
-        regular = np.isfinite(scaled).all(axis=(1, 2)) & np.isfinite(right).all(axis=(1, 2))
-        regular[regular] = np.linalg.cond(scaled[regular]) < _SINGULAR
-    solved = np.linalg.solve(matrix[regular], right[regular])
-    theta[regular] = np.swapaxes(solved, 1, 2).reshape(-1, _COUNT)
-    return theta
-
-
-def _normal(rows: Rows) -> tuple[Array, Array]:
-    return bread_of(rows), np.matmul(rows.z, np.swapaxes(rows.y, 1, 2))
+def solution(moments: Array) -> Array:
+    """theta (runs, 15) of normal equations: sums Z X' and Z Y' (runs, 5, 8); NaN where singular."""
+    width = len(LATERAL.signals)
+    theta = np.empty((len(moments), width, len(LATERAL.coefficients)))
+    matrix, right = (np.ascontiguousarray(part) for part in (moments[..., :width], moments[..., width:]))
+    solve(matrix, right, _SINGULAR, theta)
+    theta[~np.isfinite(theta).all(axis=(1, 2))] = np.nan
+    return np.swapaxes(theta, 1, 2).reshape(-1, _COUNT)
 
 
 @dataclass(frozen=True)
@@ -70,9 +65,8 @@ class _Several:
 
     def step(self, theta: Array, active: Ints, iteration: int) -> Array:
         """Theta (1, 15) of the summed normal equations."""
-        sums = [_normal(problem.rows(own, runs)) for problem, own, runs in self.parts(theta)]
-        matrix, right = (np.sum([s[k].sum(axis=0) for s in sums], axis=0)[None] for k in range(2))
-        return solution(matrix, right)
+        sums = [problem.moments(own, runs).sum(axis=0) for problem, own, runs in self.parts(theta)]
+        return solution(np.sum(sums, axis=0)[None])
 
     def usable(self, theta: Array, active: Ints) -> Bools:
         """Whether theta makes instruments of each run."""
@@ -116,12 +110,12 @@ def regress_batch(
         problem = ls_problem(o, options, smooth)
         every = np.arange(problem.runs)
         nothing = np.full((problem.runs, _COUNT), np.nan)
-        outcome = _once(solution(*_normal(problem.rows(nothing, every))))
+        outcome = _once(solution(problem.moments(nothing, every)))
         if pose is not None:
             problem = pose(o, options, smooth)
 
             def step(theta: Array, active: Ints, iteration: int, own: LateralProblem = problem) -> Array:
-                return solution(*_normal(own.rows(theta, active)))
+                return solution(own.moments(theta, active))
 
             outcome = _iterated(step, problem.usable, problem.runs, outcome.theta, options, False)
         outcomes.append(outcome)

@@ -171,23 +171,22 @@ def maximum_of_each(data: Records[S], start: Array, search: Search) -> Maxima:
 
 def joint_maximum(data: Sequence[Records[S]], start: Array, search: Search) -> Maxima:
     """Maximum of the likelihood of all runs, which share derivatives and levels, from a start (derivatives,)."""
-    free = search.free
 
     def evaluate(z: Array, active: Ints) -> Scored:
-        cost, gradient, information = (
-            np.zeros(1),
-            np.zeros((1, free.size)),
-            np.zeros((1, free.size, free.size)),
-        )
-        for part in data:
-            runs = part.signals.y.shape[0]
-            c, g, i = scored(part, np.repeat(z, runs, axis=0), np.arange(runs), free)
-            cost += c.sum()
-            gradient += g.sum(axis=0)
-            information += i.sum(axis=0)
-        return cost, gradient, information
+        cost, gradient, information = scored_each(data, z, search.free)
+        return cost.sum(keepdims=True), gradient.sum(axis=0)[None], information.sum(axis=0)[None]
 
     return maximise(evaluate, start[None, :], search)
+
+
+def scored_each(data: Sequence[Records[S]], z: Array, free: Ints) -> Scored:
+    """`scored` for all runs of several batches at one point z (1, parameters)."""
+    made = []
+    for part in data:
+        runs = part.signals.y.shape[0]
+        made.append(scored(part, np.repeat(z, runs, axis=0), np.arange(runs), free))
+    cost, gradient, information = (np.concatenate(parts) for parts in zip(*made, strict=True))
+    return cost, gradient, information
 
 
 def memory_of(data: Records[S], z: Array) -> Array:

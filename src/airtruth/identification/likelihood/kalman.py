@@ -26,10 +26,9 @@ from numpy.typing import NDArray
 
 from airtruth.identification.likelihood.kalman_kernel import (
     Filter,
-    FilterSlopes,
     KalmanSignals,
-    innovate,
-    innovate_slopes,
+    predict,
+    propagate,
 )
 from airtruth.identification.likelihood.linearise import Matrices, matrices, slopes
 from airtruth.identification.likelihood.predictor import LevelLayout
@@ -117,33 +116,160 @@ def _score_block(
     result: LikelihoodScore,
 ) -> None:
     """Fill the rows ``block`` of the result where J can be evaluated."""
-    n, _, m, _ = layout.sizes
     steady, good = _steady(matrices(layout, runs, z, dt_s))
     runs, z, block = runs[good], z[good], block[good]
     signals = KalmanSignals(*(part[runs] for part in signals))
-    samples, columns = signals.y.shape[1], 1 + n + m
-    rows = np.empty((runs.size, columns + free.size, samples * m))
-    innovate(steady.step, steady.white, steady.gain_p, signals, rows)
-    base = rows[:, :columns]
-    gram = np.matmul(base, np.swapaxes(base, 1, 2))
-    gram[:, 1 : 1 + n, 1 : 1 + n] += layout.precision
+    samples, m = signals.y.shape[1:]
+    base = _innovations(steady, signals)
+    gram = np.matmul(np.swapaxes(base, 1, 2), base)
+    states = slice(1, 1 + layout.sizes[0])
+    gram[:, states, states] += layout.precision
     good = np.isfinite(gram).all(axis=(1, 2))
     if not good.all():
-        runs, z, block, rows, gram = runs[good], z[good], block[good], rows[good], gram[good]
+        runs, z, block, base, gram = runs[good], z[good], block[good], base[good], gram[good]
         signals = KalmanSignals(*(part[good] for part in signals))
         steady = _chosen(steady, good)
-    least = _profile(rows[:, :columns], gram, layout.precision, samples * steady.logdet)
+    least = _profile(base, gram, layout.precision, samples * steady.logdet)
     result.cost[block] = least.cost
     result.innovations[block] = least.residual.reshape(-1, samples, m)
     if free.size == 0 or runs.size == 0:
         return
     moved = slopes(layout, runs, z, free, dt_s)
+    # parameters that move the gain alone, as levels of noise do, come last
+    acts = np.logical_or.reduce(
+        [part.any(axis=(0, 2, 3)) for part in (moved.phi, moved.early, moved.c, moved.d)]
+    )
+    order = np.argsort(~acts, kind="stable")
+    moved = Matrices(*(part[:, order] for part in moved))
     d_white, d_gain_p = _differentiated(steady, moved)
-    last = [np.ascontiguousarray(np.moveaxis(part, 1, -1)) for part in (*moved, d_gain_p)]
-    by_parameter = FilterSlopes(last[0], last[1], last[2], last[4], last[5], last[7])
-    innovate_slopes(steady, by_parameter, least.nuisance, signals, rows)
-    gradient, information = _scored(rows, columns, d_white, least, samples)
-    result.gradient[block], result.information[block] = gradient, information
+    sums = _sums(steady, moved, d_gain_p, int(acts.sum()), base, least, signals)
+    gradient, information = _scored(sums, d_white, least, samples)
+    result.gradient[block[:, None], order] = gradient
+    result.information[block[:, None, None], order[:, None], order] = information
+
+
+def _innovations(steady: Filter, signals: KalmanSignals) -> Array:
+    """Whitened innovations of the data, and of a unit of each initial mean and bias.
+
+    The latter are those of a system without inputs, [x; b]+ = [[phi - phi K C, -phi K], [0, I]] [x; b], e = -C x - b, from the
+    powers of its matrix.
+
+    Returns
+    -------
+    (runs, samples outputs, 1 + states + outputs).
+    """
+    runs, samples, m = signals.y.shape
+    n = steady.p.shape[1]
+    states, errors = np.empty((runs, samples, n)), np.empty((runs, samples, m))
+    predict(steady.step, steady.gain_p, signals, np.zeros((runs, n + m)), states, errors)
+    made = np.empty((runs, samples * m, 1 + n + m))
+    made[:, :, 0] = np.matmul(errors, _t(steady.white)).reshape(runs, -1)
+    unit = np.broadcast_to(np.eye(m), (runs, m, m))
+    still = np.broadcast_to(np.eye(m, n + m, n), (runs, m, n + m))
+    power = np.concatenate([np.concatenate([_closed(steady), -steady.gain_p], axis=2), still], axis=1)
+    own = made[:, :, 1:]
+    own[:, :m] = -np.matmul(steady.white, np.concatenate([steady.step.c, unit], axis=2))
+    done = 1
+    while done < samples:
+        more = min(done, samples - done)
+        own[:, done * m : (done + more) * m] = np.matmul(own[:, : more * m], power)
+        power, done = np.matmul(power, power), done + more
+    return made
+
+
+def _closed(steady: Filter) -> Array:
+    """phi - phi K C (runs, states, states)."""
+    return np.asarray(steady.step.phi - np.matmul(steady.gain_p, steady.step.c))
+
+
+class _TangentSums(NamedTuple):
+    """Sums of products of the derivatives of the whitened innovations with respect to the free parameters.
+
+    Attributes
+    ----------
+    own : (runs, free, free) with one another.
+    across : (runs, free, states + outputs) with those with respect to means and biases.
+    slope : (runs, free) with the innovations.
+    """
+
+    own: Array
+    across: Array
+    slope: Array
+
+
+def _sums(
+    steady: Filter,
+    moved: Matrices,
+    d_gain_p: Array,
+    acting: int,
+    base: Array,
+    least: _Profile,
+    signals: KalmanSignals,
+) -> _TangentSums:
+    """Sums over the derivatives along the trajectory of the estimated means and biases.
+
+    Parameters
+    ----------
+    steady : filters.
+    moved, d_gain_p : derivatives of their step and of phi K, (runs, free, ...).
+    acting : number of parameters that move more than the gain; they come first.
+    base, least : of `_innovations` and `_profile`.
+    """
+    y, u, bend = signals
+    runs, samples, m = y.shape
+    n, inputs, count = steady.p.shape[1], u.shape[2], d_gain_p.shape[1]
+    states, errors = np.empty((runs, samples, n)), np.empty((runs, samples, m))
+    predict(steady.step, steady.gain_p, signals, least.nuisance, states, errors)
+    # what a parameter adds to the prediction and to the innovation, per unit of each signal
+    own = Matrices(*(part[:, :acting] for part in moved))
+    gain_p, white = steady.gain_p[:, None], -steady.white
+    adds = [own.phi - gain_p @ own.c, -gain_p @ own.d, d_gain_p[:, :acting], own.early, own.late]
+    shows = [white[:, None] @ own.c, white[:, None] @ own.d]
+    per_unit, per_output = _last(np.concatenate(adds, axis=3)), _last(np.concatenate(shows, axis=3))
+    per_error = _last(d_gain_p[:, acting:])
+    closed, seen = (
+        np.concatenate([part, np.zeros((*part.shape[:2], -n % 3))], axis=2)
+        for part in (_closed(steady), np.matmul(white, steady.step.c))
+    )
+    result = _TangentSums(
+        np.empty((runs, count, count)), np.empty((runs, count, n + m)), np.empty((runs, count))
+    )
+    tangents = np.empty((samples, m, count))
+    by_sample = tangents.reshape(-1, count)
+    # one run after another, so that these arrays stay in the processor's cache
+    driving = np.zeros((samples, n + 3 * inputs + m))
+    driven, shown = np.empty((samples, n * acting)), np.empty((samples, m * acting))
+    by_error = np.empty((samples, n * (count - acting)))
+    ahead = n + inputs + m
+    for run in range(runs):
+        driving[:, :n], driving[:, n : n + inputs], driving[:, n + inputs : ahead] = (
+            states[run],
+            u[run],
+            errors[run],
+        )
+        driving[:-1, ahead : ahead + inputs] = u[run, :-1] + bend[run, 1:]
+        driving[:-1, ahead + inputs :] = u[run, 1:] + bend[run, 1:]
+        np.matmul(driving, per_unit[run], out=driven)
+        np.matmul(driving[:, : n + inputs], per_output[run], out=shown)
+        np.matmul(errors[run], per_error[run], out=by_error)
+        propagate(
+            closed[run],
+            seen[run],
+            driven.reshape(samples, n, acting),
+            by_error.reshape(samples, n, count - acting),
+            shown.reshape(samples, m, acting),
+            tangents,
+        )
+        np.matmul(by_sample.T, by_sample, out=result.own[run])
+        np.matmul(by_sample.T, base[run, :, 1:], out=result.across[run])
+        np.matmul(least.residual[run], by_sample, out=result.slope[run])
+    return result
+
+
+def _last(slopes: Array) -> Array:
+    """Derivatives (runs, free, rows, columns) with the parameter along the last axis, (runs, columns, rows free)."""
+    made = np.moveaxis(slopes, 1, 3)
+    return np.ascontiguousarray(np.swapaxes(made, 1, 2)).reshape(len(made), made.shape[2], -1)
 
 
 def _steady(step: Matrices) -> tuple[Filter, Bools]:
@@ -174,15 +300,15 @@ def _profile(base: Array, gram: Array, precision: Array, logdet: Array) -> _Prof
 
     Parameters
     ----------
-    base : (runs, 1 + states + outputs, samples outputs) whitened innovations.
-    gram : (runs, 1 + states + outputs, ...) products of its rows, with the precision of the means.
+    base : (runs, samples outputs, 1 + states + outputs) whitened innovations.
+    gram : (runs, 1 + states + outputs, ...) products of its columns, with the precision of the means.
     precision : (states, states) of the initial means.
     logdet : (runs,) N log|S|.
     """
     size = np.sqrt(np.diagonal(gram, axis1=1, axis2=2)[:, 1:]) + 1e-300
     normal = gram[:, 1:, 1:] / (size[:, :, None] * size[:, None, :]) + RIDGE * np.eye(size.shape[1])
     nuisance = -np.linalg.solve(normal, (gram[:, 1:, 0] / size)[:, :, None])[:, :, 0] / size
-    residual = base[:, 0] + np.matmul(nuisance[:, None, :], base[:, 1:])[:, 0]
+    residual = base[..., 0] + np.matmul(base[..., 1:], nuisance[..., None])[..., 0]
     means = nuisance[:, None, : precision.shape[0]]
     prior = np.matmul(np.matmul(means, precision), np.swapaxes(means, 1, 2))[:, 0, 0]
     cost = 0.5 * (logdet + np.einsum("rk,rk->r", residual, residual) + prior)
@@ -244,16 +370,13 @@ def _lyapunov(closed: Array, x: Array, filtering: Bools) -> Array:
     return np.swapaxes(total, 1, 2)
 
 
-def _scored(rows: Array, columns: int, d_white: Array, least: _Profile, samples: int) -> tuple[Array, Array]:
+def _scored(sums: _TangentSums, d_white: Array, least: _Profile, samples: int) -> tuple[Array, Array]:
     """Gradient (runs, free) and information (runs, free, free) of J."""
-    base, tangents = rows[:, 1:columns], rows[:, columns:]
     runs, count, m, _ = d_white.shape
-    across = np.matmul(tangents, _t(base)) / least.size[:, None, :]
+    across = sums.across / least.size[:, None, :]
     explained = np.matmul(across, np.linalg.solve(least.normal, _t(across)))
     flat = d_white.reshape(runs, count, m * m)
-    information = np.matmul(tangents, _t(tangents)) - explained + 0.5 * samples * np.matmul(flat, _t(flat))
+    information = sums.own - explained + 0.5 * samples * np.matmul(flat, _t(flat))
     r = least.residual.reshape(runs, samples, m)
     spread = samples * np.eye(m) - np.matmul(_t(r), r)
-    gradient = np.matmul(tangents, least.residual[:, :, None])[:, :, 0]
-    gradient += 0.5 * np.matmul(flat, spread.reshape(runs, m * m, 1))[:, :, 0]
-    return gradient, information
+    return sums.slope + 0.5 * np.matmul(flat, spread.reshape(runs, m * m, 1))[:, :, 0], information

@@ -35,7 +35,7 @@ class Matrices(NamedTuple):
 
 
 class _Terms(NamedTuple):
-    """Arrays of a `Layout` that the kernel reads."""
+    """Arrays of a `LevelLayout` that the kernel reads."""
 
     location: Ints
     coefficient: Array

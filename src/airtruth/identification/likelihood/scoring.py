@@ -70,6 +70,10 @@ class Maxima:
     status: NDArray[np.int8]
     iterations: NDArray[np.int32]
 
+    def of(self, groups: Ints) -> Maxima:
+        """Maxima of some groups."""
+        return Maxima(self.z[groups], self.covariance[groups], self.status[groups], self.iterations[groups])
+
 
 class _Point(NamedTuple):
     """Posterior at a point: cost, gradient, information, and the curvature that a step uses."""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from airtruth.tracing.model.elevator import implied_command, servo_path, step_share
+from airtruth.tracing.model.servo_surface import implied_command, servo_path, step_share
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ _FLOOR: Final = 1e-3
 _OTHERS: Final = 0.5
 """Gains of the samples before and after, over that of the damper, up to which it is one [-] (judgement)."""
 _MOST_S: Final = 1.0
-"""Largest gain of a damper [s] (judgement): 1 deg of elevator for 1 deg/s."""
+"""Largest gain of a damper [s] (judgement): 1 deg of surface for 1 deg/s."""
 _TINY: Final = 1e-12
 """Least share of the differences that is left [-]: rounding."""
 _EVIDENCE: Final = 15.0
@@ -56,26 +56,26 @@ class Damper:
 
 
 def find_damper(
-    elevator_rad: Array, q_rad_s: Array, dt_s: float, tau_s: float, noise_rad: float
+    surface_rad: Array, rate_rad_s: Array, dt_s: float, tau_s: float, noise_rad: float
 ) -> Damper | None:
     """The damper that the samples of a surface show; None if the pitch rate does not explain its command.
 
     Parameters
     ----------
-    elevator_rad, q_rad_s : (samples,) measured surface [rad] and pitch rate [rad/s].
+    surface_rad, rate_rad_s : (samples,) measured surface [rad] and rate that it damps [rad/s].
     dt_s, tau_s : sample period and time constant of the servo [s].
     noise_rad : standard deviation of the noise of the surface [rad], below which differences show nothing.
     """
-    if len(elevator_rad) < 2 * (_ORDER + 1):
+    if len(surface_rad) < 2 * (_ORDER + 1):
         return None
-    command = np.diff(implied_command(elevator_rad, dt_s, tau_s), _ORDER)
+    command = np.diff(implied_command(surface_rad, dt_s, tau_s), _ORDER)
     if not command.any():
         return None
     rho = float(np.exp(-dt_s / tau_s))
     floor = noise_rad * _SPREAD * np.sqrt(1.0 + rho * rho) / (1.0 - rho)
     alone, best, least = np.hypot(command, floor).sum(), Damper(0.0, 0.0), np.inf
     for phase in _PHASES.tolist():
-        fed_back = _fed_back(q_rad_s, phase, dt_s, tau_s)
+        fed_back = _fed_back(rate_rad_s, phase, dt_s, tau_s)
         if not fed_back.any():
             return None
         (gain,) = _least_absolute(command, fed_back[:, None])
@@ -87,37 +87,37 @@ def find_damper(
         or command.size * math.log(alone / max(least, _TINY * alone)) < _EVIDENCE
     ):
         return None
-    return best if _is_causal(command, q_rad_s, best.phase, dt_s, tau_s) else None
+    return best if _is_causal(command, rate_rad_s, best.phase, dt_s, tau_s) else None
 
 
-def _fed_back(q_rad_s: Array, phase: float, dt_s: float, tau_s: float) -> Array:
+def _fed_back(rate_rad_s: Array, phase: float, dt_s: float, tau_s: float) -> Array:
     """Fourth differences of the command of a damper of unit gain, as its surface implies it."""
-    unit = damper_surface(Damper(1.0, phase), q_rad_s, dt_s, tau_s)
+    unit = damper_surface(Damper(1.0, phase), rate_rad_s, dt_s, tau_s)
     return np.diff(implied_command(unit, dt_s, tau_s), _ORDER)
 
 
-def _is_causal(command: Array, q_rad_s: Array, phase: float, dt_s: float, tau_s: float) -> bool:
+def _is_causal(command: Array, rate_rad_s: Array, phase: float, dt_s: float, tau_s: float) -> bool:
     """Whether each sample of the pitch rate moves the command, and not the samples before and after it.
 
     Without noise of the gyro the pitch rate is a smooth response to the surface. The command is then nearly a combination of
     several of its samples, later ones included.
     """
-    before, after = np.append(q_rad_s[:1], q_rad_s[:-1]), np.append(q_rad_s[1:], q_rad_s[-1:])
-    taps = np.column_stack([_fed_back(q, phase, dt_s, tau_s) for q in (q_rad_s, before, after)])
+    before, after = np.append(rate_rad_s[:1], rate_rad_s[:-1]), np.append(rate_rad_s[1:], rate_rad_s[-1:])
+    taps = np.column_stack([_fed_back(q, phase, dt_s, tau_s) for q in (rate_rad_s, before, after)])
     gain, *others = _least_absolute(command, taps).tolist()
     return bool(gain > 0.0 and sum(map(abs, others)) < _OTHERS * gain)
 
 
-def damper_surface(damper: Damper, q_rad_s: Array, dt_s: float, tau_s: float, cells: int = 1) -> Array:
+def damper_surface(damper: Damper, rate_rad_s: Array, dt_s: float, tau_s: float, cells: int = 1) -> Array:
     """((samples - 1) cells + 1,) share of the surface that a damper moves, from rest at the first pitch rate on [rad].
 
     Parameters
     ----------
-    q_rad_s : (samples,) pitch rate [rad/s].
+    rate_rad_s : (samples,) rate that it damps [rad/s].
     dt_s, tau_s : sample period and time constant of the servo [s].
     cells : cells of the grid per sample.
     """
-    command = damper.gain_s * (np.append(q_rad_s[:1], q_rad_s[:-1]) - q_rad_s[0])
+    command = damper.gain_s * (np.append(rate_rad_s[:1], rate_rad_s[:-1]) - rate_rad_s[0])
     rho, late = float(np.exp(-dt_s / tau_s)), step_share(dt_s, tau_s, damper.phase)
     moves = (1.0 - rho - late) * command[:-1] + late * command[1:]
     samples = np.append(0.0, lfilter([1.0], [1.0, -rho], moves))

@@ -20,8 +20,8 @@ from airtruth.physics.atmosphere import air_density, altitude_of_density_m
 from airtruth.physics.motion import LONGITUDINAL, Motion
 from airtruth.physics.motion_parts import Control
 from airtruth.tracing.model.damper import damper_surface, find_damper
-from airtruth.tracing.model.elevator_path import LONGEST_STEP_S, Between, read_between
 from airtruth.tracing.model.records import FINE, Signals, fine
+from airtruth.tracing.model.surface_path import LONGEST_STEP_S, Between, read_between
 
 Array = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ def read(
     and backlash and rate limits would take each new extreme for motion.
     A control between samples has the area of the cubic through the four nearest samples and the
     corners of a first-order servo where the record shows one (`airtruth.numerics.intersample`); in a coarse log it is
-    that of the declared servo, or a spline (`airtruth.tracing.model.elevator`). What a damper moves follows from the
+    that of the declared servo, or a spline (`airtruth.tracing.model.servo_surface`). What a damper moves follows from the
     angular rate that it feeds back (`airtruth.tracing.model.damper`). Airspeed
     and density are inputs, and their noise is not motion: the density is low-passed forward and backward at 5 Hz, and the
     airspeed where its noise exceeds its gusts, or smoothed (`without_noise`). Known alpha and q are low-passed as the density is.

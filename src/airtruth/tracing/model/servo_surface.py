@@ -30,12 +30,12 @@ _BEYOND: Final = 5.5
 commands from gusts and noise)."""
 
 
-def held_command(elevator_rad: Array, dt_s: float, tau_s: float, cells: int) -> Array | None:
+def held_command(surface_rad: Array, dt_s: float, tau_s: float, cells: int) -> Array | None:
     """The surface of a servo behind a held command on a fine grid; None where its samples are not those of one.
 
     Parameters
     ----------
-    elevator_rad : (samples,) measured surface [rad].
+    surface_rad : (samples,) measured surface [rad].
     dt_s, tau_s : sample period and time constant of the servo [s].
     cells : cells of the fine grid per sample.
 
@@ -43,42 +43,42 @@ def held_command(elevator_rad: Array, dt_s: float, tau_s: float, cells: int) -> 
     -------
     ((samples - 1) cells + 1,) [rad], or None.
     """
-    command = implied_command(elevator_rad, dt_s, tau_s)
+    command = implied_command(surface_rad, dt_s, tau_s)
     least = _STEP * float(np.ptp(command))
     changes = int((np.abs(np.diff(command)) > least).sum())
     if least == 0.0 or changes > _MOST_STEPS * command.size:
         return None
-    path = _exponentials(elevator_rad, command, np.abs(_across(command)) > least, dt_s, tau_s, cells)
-    return np.append(path.ravel(), elevator_rad[-1])
+    path = _exponentials(surface_rad, command, np.abs(_across(command)) > least, dt_s, tau_s, cells)
+    return np.append(path.ravel(), surface_rad[-1])
 
 
-def is_held(elevator_rad: Array, dt_s: float, tau_s: float) -> bool:
+def is_held(surface_rad: Array, dt_s: float, tau_s: float) -> bool:
     """Whether the command of a servo rests between its steps, see `with_steps`.
 
     Parameters
     ----------
-    elevator_rad : (samples,) measured surface [rad].
+    surface_rad : (samples,) measured surface [rad].
     dt_s, tau_s : sample period and time constant of the servo [s].
     """
-    command = implied_command(elevator_rad, dt_s, tau_s)
+    command = implied_command(surface_rad, dt_s, tau_s)
     return _BEYOND * float(np.median(np.abs(_across(command)))) < _STEP * float(np.ptp(command))
 
 
-def is_limited(elevator_rad: Array, dt_s: float, tau_s: float, rate_rad_s: float) -> NDArray[np.bool_]:
+def is_limited(surface_rad: Array, dt_s: float, tau_s: float, rate_rad_s: float) -> NDArray[np.bool_]:
     """(samples - 1,) whether the servo may reach its rate limit in a cell: in or beside one where the command steps that far.
 
     Parameters
     ----------
-    elevator_rad : (samples,) measured surface [rad].
+    surface_rad : (samples,) measured surface [rad].
     dt_s, tau_s : sample period and time constant of the servo [s]; rate_rad_s : rate limit [rad/s].
     """
-    steps = np.abs(_across(implied_command(elevator_rad, dt_s, tau_s))) > rate_rad_s * tau_s
+    steps = np.abs(_across(implied_command(surface_rad, dt_s, tau_s))) > rate_rad_s * tau_s
     padded = np.pad(steps, 1, mode="edge")
     return np.asarray(padded[:-2] | steps | padded[2:])
 
 
 def with_steps(
-    elevator_rad: Array, smoothed_rad: Array, dt_s: float, tau_s: float, cells: int
+    surface_rad: Array, smoothed_rad: Array, dt_s: float, tau_s: float, cells: int
 ) -> tuple[Array, NDArray[np.bool_]]:
     """A smoothed surface with the steps of its command, which otherwise moves all the time, as a servo follows them.
 
@@ -86,7 +86,7 @@ def with_steps(
 
     Parameters
     ----------
-    elevator_rad : (samples,) measured surface [rad].
+    surface_rad : (samples,) measured surface [rad].
     smoothed_rad : ((samples - 1) cells + 1,) the surface between them without steps [rad].
     dt_s, tau_s : sample period and time constant of the servo [s].
     cells : cells of the fine grid per sample.
@@ -95,14 +95,14 @@ def with_steps(
     -------
     ((samples - 1) cells + 1,) surface [rad]; (samples - 1,) whether a cell is that of a step, or beside one.
     """
-    command = implied_command(elevator_rad, dt_s, tau_s)
+    command = implied_command(surface_rad, dt_s, tau_s)
     changes = np.abs(_across(command))
     near = changes > max(_STEP * float(np.ptp(command)), _BEYOND * float(np.median(changes)))
     before, after = _neighbours(changes)
     steps = near & (changes >= before) & (changes > after)
-    path = _exponentials(elevator_rad, command, steps, dt_s, tau_s, cells)
+    path = _exponentials(surface_rad, command, steps, dt_s, tau_s, cells)
     made = np.where(near[:, None], path, smoothed_rad[:-1].reshape(-1, cells))
-    return np.append(made.ravel(), elevator_rad[-1]), near
+    return np.append(made.ravel(), surface_rad[-1]), near
 
 
 def step_share(dt_s: float, tau_s: float, phase: float) -> float:
@@ -111,13 +111,13 @@ def step_share(dt_s: float, tau_s: float, phase: float) -> float:
 
 
 def servo_path(
-    elevator_rad: Array, command_rad: Array, dt_s: float, tau_s: float, cells: int, phase: float
+    surface_rad: Array, command_rad: Array, dt_s: float, tau_s: float, cells: int, phase: float
 ) -> Array:
     """((samples - 1) cells + 1,) path of a servo whose command steps once a sample, through its samples [rad].
 
     Parameters
     ----------
-    elevator_rad : (samples,) surface [rad].
+    surface_rad : (samples,) surface [rad].
     command_rad : (samples,) command before the step in each cell, and after the last [rad].
     dt_s, tau_s : sample period and time constant of the servo [s].
     cells : cells of the fine grid per sample.
@@ -125,18 +125,18 @@ def servo_path(
     """
     time, at = np.arange(cells) * (dt_s / cells), phase * dt_s
     before, after = command_rad[:-1, None], command_rad[1:, None]
-    start = elevator_rad[:-1, None] - before
+    start = surface_rad[:-1, None] - before
     corner = before + start * np.exp(-at / tau_s) - after
     path = np.where(
         time < at, before + start * np.exp(-time / tau_s), after + corner * np.exp((at - time) / tau_s)
     )
-    return np.append(path.ravel(), elevator_rad[-1])
+    return np.append(path.ravel(), surface_rad[-1])
 
 
-def implied_command(elevator_rad: Array, dt_s: float, tau_s: float) -> Array:
+def implied_command(surface_rad: Array, dt_s: float, tau_s: float) -> Array:
     """(samples - 1,) command that each cell implies if it is held [rad]."""
     rho = float(np.exp(-dt_s / tau_s))
-    return np.asarray((elevator_rad[1:] - rho * elevator_rad[:-1]) / (1.0 - rho))
+    return np.asarray((surface_rad[1:] - rho * surface_rad[:-1]) / (1.0 - rho))
 
 
 def _neighbours(values: Array) -> tuple[Array, Array]:
@@ -152,11 +152,11 @@ def _across(command: Array) -> Array:
 
 
 def _exponentials(
-    elevator_rad: Array, command: Array, steps: NDArray[np.bool_], dt_s: float, tau_s: float, cells: int
+    surface_rad: Array, command: Array, steps: NDArray[np.bool_], dt_s: float, tau_s: float, cells: int
 ) -> Array:
     """(samples - 1, cells) path of the servo; the command steps inside the cells of ``steps`` and is held in the others."""
     rho = float(np.exp(-dt_s / tau_s))
-    start, end = elevator_rad[:-1], elevator_rad[1:]
+    start, end = surface_rad[:-1], surface_rad[1:]
     before, after = (np.where(steps, beside, command) for beside in _neighbours(command))
     gap = (end - after) - rho * (start - before)
     share = rho * (before - after) / np.where(gap == 0.0, 1.0, gap)
@@ -184,11 +184,11 @@ def shaped(mean_rad: Array, path_rad: Array, cells: int) -> Array:
     )
 
 
-def smooth(elevator_rad: Array, cells: int) -> Array:
+def smooth(surface_rad: Array, cells: int) -> Array:
     """The cubic spline through the samples on a fine grid of ``cells`` cells per sample."""
-    at = np.arange(elevator_rad.size)
-    fine = np.arange((elevator_rad.size - 1) * cells + 1) / cells
-    return np.asarray(CubicSpline(at, elevator_rad)(fine))
+    at = np.arange(surface_rad.size)
+    fine = np.arange((surface_rad.size - 1) * cells + 1) / cells
+    return np.asarray(CubicSpline(at, surface_rad)(fine))
 
 
 __all__ = [

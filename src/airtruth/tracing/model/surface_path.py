@@ -1,4 +1,4 @@
-"""The elevator between its samples: its most likely path, and how far others through the same samples differ from it."""
+"""The surface between its samples: its most likely path, and how far others through the same samples differ from it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.numerics.intersample import servo_bend, servo_decay
-from airtruth.tracing.model.elevator import (
+from airtruth.tracing.model.servo_surface import (
     held_command,
     is_held,
     is_limited,
@@ -23,9 +23,9 @@ Array = NDArray[np.float64]
 LONGEST_STEP_S: Final = 0.0201
 """Longest step of integration [s], with room for rounding (judgement): the short period turns 0.1 rad in it."""
 _CORNER_SHARE: Final = 0.05
-"""Least corner, as a share of the elevator's range [-] (judgement): a smaller one moves the aircraft by less."""
+"""Least corner, as a share of the surface's range [-] (judgement): a smaller one moves the aircraft by less."""
 _CORNER_NOISE: Final = 20.0
-"""The same in standard deviations of the elevator's noise [-]: five of half a fourth difference, sqrt(70)/2 each."""
+"""The same in standard deviations of the surface's noise [-]: five of half a fourth difference, sqrt(70)/2 each."""
 
 
 class Between(NamedTuple):
@@ -42,7 +42,7 @@ class Between(NamedTuple):
 
 
 def read_between(
-    elevator: Array,
+    surface: Array,
     dt_s: float,
     cells: int,
     std_rad: float,
@@ -55,36 +55,36 @@ def read_between(
 
     Parameters
     ----------
-    elevator : (samples,) [rad], every ``dt_s`` [s]; cells : cells of the fine grid per sample.
+    surface : (samples,) [rad], every ``dt_s`` [s]; cells : cells of the fine grid per sample.
     std_rad : standard deviation of its noise [rad]; servo_s : declared time constant of its servo [s], 0 for none.
     rate_rad_s : declared rate limit of the servo [rad/s].
     """
     if dt_s > LONGEST_STEP_S and servo_s > 0.0:  # a coarse log
-        path = held_command(elevator, dt_s, servo_s, cells)
-        return Between(smooth(elevator, cells) if path is None else path)
-    relative = (elevator - elevator[0])[None, :]
+        path = held_command(surface, dt_s, servo_s, cells)
+        return Between(smooth(surface, cells) if path is None else path)
+    relative = (surface - surface[0])[None, :]
     bend, none = servo_bend(relative, std_rad)[0], np.zeros(0)
     if bend.any():
         tau_s = -dt_s / math.log(float(servo_decay(np.diff(relative), std_rad)[0]))
-        if servo_s <= 0.0 or is_held(elevator, dt_s, tau_s):
-            path = held_command(elevator, dt_s, tau_s, cells)
-            mean = _elevator(elevator, bend, cells, none)
-            limited = is_limited(elevator, dt_s, tau_s, rate_rad_s)
-            corners = np.append(0.0, np.where(limited, np.diff(elevator) ** 2 / 12.0, 0.0))
+        if servo_s <= 0.0 or is_held(surface, dt_s, tau_s):
+            path = held_command(surface, dt_s, tau_s, cells)
+            mean = _bent(surface, bend, cells, none)
+            limited = is_limited(surface, dt_s, tau_s, rate_rad_s)
+            corners = np.append(0.0, np.where(limited, np.diff(surface) ** 2 / 12.0, 0.0))
             return Between(
                 mean if path is None else shaped(mean, path, cells), corners if limited.any() else none
             )
-    corners = corner_variance(elevator, std_rad)
+    corners = corner_variance(surface, std_rad)
     if servo_s <= 0.0 or not corners.size:
-        return Between(_elevator(elevator, np.zeros_like(bend), cells, corners), corners)
-    smoothed = _elevator(elevator, np.zeros_like(bend), cells, none)
-    path, steps = with_steps(elevator, smoothed, dt_s, servo_s, cells)
+        return Between(_bent(surface, np.zeros_like(bend), cells, corners), corners)
+    smoothed = _bent(surface, np.zeros_like(bend), cells, none)
+    path, steps = with_steps(surface, smoothed, dt_s, servo_s, cells)
     return Between(path, np.append(0.0, np.where(steps, 0.0, corners[1:])))
 
 
-def _elevator(elevator: Array, bend: Array, sub: int, corners: Array) -> Array:
+def _bent(surface: Array, bend: Array, sub: int, corners: Array) -> Array:
     """Parabolas of the cubic's area; straight beside a corner, because the samples across it say nothing of the cell."""
-    relative = elevator - elevator[0]
+    relative = surface - surface[0]
     edge = np.concatenate([relative[:1], relative, relative[-1:]])
     cubic = (edge[1:-2] + edge[2:-1] - edge[:-3] - edge[3:]) / 24.0
     if corners.size:
@@ -94,9 +94,9 @@ def _elevator(elevator: Array, bend: Array, sub: int, corners: Array) -> Array:
     bend = bend.copy()
     bend[1:] += cubic
     share = np.arange(sub) / sub
-    cells = elevator[:-1, None] + (elevator[1:] - elevator[:-1])[:, None] * share
+    cells = surface[:-1, None] + (surface[1:] - surface[:-1])[:, None] * share
     cells += 6.0 * bend[1:, None] * share * (1.0 - share)
-    return np.append(cells.ravel(), elevator[-1])
+    return np.append(cells.ravel(), surface[-1])
 
 
 def _shared_steps(change: Array, corner: NDArray[np.bool_]) -> Array:
@@ -113,8 +113,8 @@ def _shared_steps(change: Array, corner: NDArray[np.bool_]) -> Array:
     return shift
 
 
-def corner_variance(elevator: Array, std_rad: float) -> Array:
-    """Variance of an elevator's mean over each cell where its samples show a corner; empty if they show none.
+def corner_variance(surface: Array, std_rad: float) -> Array:
+    """Variance of a surface's mean over each cell where its samples show a corner; empty if they show none.
 
     A surface that moves in one direction between two samples has any mean between them, all alike: the variance is the
     square of the change over 12. Half the fourth difference bounds that change from above where the samples are smooth:
@@ -122,19 +122,19 @@ def corner_variance(elevator: Array, std_rad: float) -> Array:
 
     Parameters
     ----------
-    elevator : (samples,) [rad]; std_rad : standard deviation of its noise [rad].
+    surface : (samples,) [rad]; std_rad : standard deviation of its noise [rad].
     """
-    if len(elevator) < 5:
+    if len(surface) < 5:
         return np.zeros(0)
-    rough = np.pad(np.abs(np.diff(elevator, 4)) / 2.0, 2, mode="edge")
-    change = np.minimum(np.abs(np.diff(elevator)), np.maximum(rough[:-1], rough[1:]))
-    change = np.where(change > _least_corner(elevator, std_rad), change, 0.0)
+    rough = np.pad(np.abs(np.diff(surface, 4)) / 2.0, 2, mode="edge")
+    change = np.minimum(np.abs(np.diff(surface)), np.maximum(rough[:-1], rough[1:]))
+    change = np.where(change > _least_corner(surface, std_rad), change, 0.0)
     return np.append(0.0, change**2 / 12.0) if change.any() else np.zeros(0)
 
 
-def _least_corner(elevator: Array, std_rad: float) -> float:
+def _least_corner(surface: Array, std_rad: float) -> float:
     """Least change of the surface within a cell that counts as a corner [rad]."""
-    return max(_CORNER_SHARE * float(np.ptp(elevator)), _CORNER_NOISE * std_rad)
+    return max(_CORNER_SHARE * float(np.ptp(surface)), _CORNER_NOISE * std_rad)
 
 
 __all__ = ["LONGEST_STEP_S", "Between", "corner_variance", "read_between"]
