@@ -112,7 +112,7 @@ test-long: kernels ## the rest: frozen trials, data/undeclared, measured flights
 
 test-all: test test-slow test-long ## every test
 
-fuzz: kernels ## damage 38,000 logs, imported files, TOML files and results and use each (about half an hour; BUDGET scales it)
+fuzz: kernels ## damage 39,000 logs, imported files, TOML files and results and use each (about half an hour; BUDGET scales it)
 	$(BIN)/python -m validation.fuzz --budget $(BUDGET) --seed 1
 
 robustness: $(DEVELOP) ## kill commands 200 times and damage a campaign 150 times; every file has to be restored (about an hour)

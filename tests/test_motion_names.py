@@ -31,7 +31,7 @@ CAPS: dict[str, int] = {
     "cli": 25,
     "design": 86,
     "exporting": 15,
-    "identification": 249,
+    "identification": 267,
     "importers": 158,
     "logs": 2,
     "loop": 1,

@@ -15,6 +15,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import firwin
 
 from airtruth.units import DEG, G0
 from validation.recorders import Topic, dataflash
@@ -32,7 +33,13 @@ SEA_LEVEL_KG_M3: Final = 1.225
 DELAY_S: Final = 0.06
 """From the command to the surface as the air sees it [s]; nothing declares it."""
 STEP_S, FIRST_S, EACH_S, MANOEUVRES = 0.0025, 12.0, 14.0, 9
+RECORDS: Final = 6
+"""Manoeuvres of the flight that the pages use [-]."""
 GUST_M_S, GUST_LENGTH_M = 0.15, 50.0
+SETTLED_S: Final = 0.1
+"""From the last command of the autopilot to the start of a record [s]: longer than the delay, so that the air sees none of it."""
+LOW_PASS: Final = firwin(41, 20.0, fs=100.0)
+"""Filter of a recorder at 50 Hz for channels at 100 Hz: half the amplitude at 20 Hz."""
 FULL_DEG: Final = 25.0
 """Surface at full servo travel, 400 us from the centre [deg]."""
 
@@ -200,13 +207,13 @@ def write_ardupilot(path: Path, flight: Flight) -> None:
 
 
 def write_csv(path: Path, flight: Flight) -> None:
-    """A CSV of a test centre at 50 Hz, one run for each record: foreign names, degrees, knots, feet and g."""
+    """A CSV of a test centre at 50 Hz, its records one below another: foreign names, degrees, knots, feet and g."""
     made = topics(flight)
     t = np.arange(0.1, flight.t_s[-1] - 0.1, 0.02)
-    series = {name: np.interp(t, at, x) for at, group in made.values() for name, x in group.items()}
+    series = {name: _recorded(t, at, x) for at, group in made.values() for name, x in group.items()}
     runs = np.full(t.size, -1)
-    for k, (start, end) in enumerate(command_windows()):
-        runs[(t >= start) & (t < end)] = k + 1
+    for k, (start, end) in enumerate(command_windows()[:RECORDS]):
+        runs[(t > start + SETTLED_S) & (t < end - SETTLED_S)] = k + 1
     columns = {
         "Record": runs.astype(np.float64),
         "Time [s]": t,
@@ -222,6 +229,13 @@ def write_csv(path: Path, flight: Flight) -> None:
     rows = np.column_stack([x[flown] for x in columns.values()])
     lines = [",".join(columns), *(",".join(f"{x:.6f}" for x in row) for row in rows)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _recorded(t_s: Array, at_s: Array, x: Array) -> Array:
+    """Samples of a recorder at 50 Hz, which takes the band above 25 Hz out of faster channels, without lag."""
+    if at_s[1] - at_s[0] < t_s[1] - t_s[0] - 1e-9:
+        x = np.convolve(np.pad(x, LOW_PASS.size // 2, mode="edge"), LOW_PASS, mode="valid")
+    return np.asarray(np.interp(t_s, at_s, x))
 
 
 def _message(kind: bytes, body: bytes) -> bytes:

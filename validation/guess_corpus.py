@@ -255,7 +255,7 @@ def struct_file(
     return write
 
 
-_BASE: Final[list[Column]] = [
+PLAIN: Final[list[tuple[str, str, str]]] = [
     ("tas", "airspeed_m_s", "m/s"),
     ("alpha", "alpha_rad", "deg"),
     ("theta", "theta_rad", "deg"),
@@ -265,6 +265,7 @@ _BASE: Final[list[Column]] = [
     ("elevator", "elevator_rad", "deg"),
     ("alt", "altitude_m", "m"),
 ]
+"""Header, channel and unit of a plain table."""
 _NEW_PX4: Final = topics(
     {
         "airspeed_validated": (
@@ -429,15 +430,15 @@ LAYOUTS: Final = (
         ),
         _NO_ELEVATOR | _NO_VANE,
     ),
-    Layout("plain csv deg", "model", ".csv", table(_BASE)),
+    Layout("plain csv deg", "model", ".csv", table(PLAIN)),
     Layout(
         "plain csv rad",
         "single",
         ".csv",
-        table(_in(_BASE, alpha="rad", theta="rad", q="rad/s", elevator="rad")),
+        table(_in(PLAIN, alpha="rad", theta="rad", q="rad/s", elevator="rad")),
     ),
-    Layout("centidegrees", "model", ".csv", table(_in(_BASE, elevator="cdeg"))),
-    Layout("units row", "single", ".csv", table(_BASE, units_row="s")),
+    Layout("centidegrees", "model", ".csv", table(_in(PLAIN, elevator="cdeg"))),
+    Layout("units row", "single", ".csv", table(PLAIN, units_row="s")),
     Layout("brackets kt ft", "single", ".csv", table(_WORDS, time="Time [s]")),
     Layout(
         "brackets jet semicolon comma",
@@ -445,7 +446,7 @@ LAYOUTS: Final = (
         ".csv",
         table(_WORDS, time="Zeit [s]", delimiter=";", decimal=","),
     ),
-    Layout("no vane", "single", ".csv", table(_but(_BASE, "alpha")), _NO_VANE),
+    Layout("no vane", "single", ".csv", table(_but(PLAIN, "alpha")), _NO_VANE),
     Layout("no vane jet kt ft", "jet", ".csv", table(_but(_WORDS, "AOA [deg]"), time="Time [s]"), _NO_VANE),
     Layout(
         "uvw",
@@ -457,20 +458,20 @@ LAYOUTS: Final = (
                 ("v", "beta", "m/s"),
                 ("w", "w_m_s", "m/s"),
                 *_PLUS,
-                *_but(_BASE, "tas", "alpha"),
+                *_but(PLAIN, "tas", "alpha"),
             ]
         ),
     ),
     Layout(
-        "knots and feet unstated", "single", ".csv", table(_in(_BASE, tas="kt", alt="ft", ax="g", az="g"))
+        "knots and feet unstated", "single", ".csv", table(_in(PLAIN, tas="kt", alt="ft", ax="g", az="g"))
     ),
     Layout(
         "feet per second unstated",
         "jet",
         ".csv",
-        table(_in(_BASE, tas="ft/s", alt="ft", ax="ft/s2", az="ft/s2")),
+        table(_in(PLAIN, tas="ft/s", alt="ft", ax="ft/s2", az="ft/s2")),
     ),
-    Layout("lateral beside", "single", ".csv", table([*_PLUS, *_BASE])),
+    Layout("lateral beside", "single", ".csv", table([*_PLUS, *PLAIN])),
     Layout(
         "sidpac",
         "single",
@@ -511,23 +512,23 @@ LAYOUTS: Final = (
         ),
     ),
     Layout("8 Hz", "jet", ".csv", table(_WORDS, rate_hz=8.0, time="Time [s]")),
-    Layout("400 Hz", "model", ".csv", table(_BASE, rate_hz=400.0)),
-    Layout("milliseconds", "model", ".csv", table(_BASE, time="time_ms", clock=1e3, start=5000.0)),
-    Layout("microseconds", "single", ".csv", table(_BASE, time="timestamp", clock=1e6, start=300.0)),
-    Layout("iso times", "single", ".csv", table(_BASE, iso=True)),
+    Layout("400 Hz", "model", ".csv", table(PLAIN, rate_hz=400.0)),
+    Layout("milliseconds", "model", ".csv", table(PLAIN, time="time_ms", clock=1e3, start=5000.0)),
+    Layout("microseconds", "single", ".csv", table(PLAIN, time="timestamp", clock=1e6, start=300.0)),
+    Layout("iso times", "single", ".csv", table(PLAIN, iso=True)),
     Layout(
         "whitespace units",
         "single",
         ".txt",
-        table([(f"{c[0]} [{c[2]}]", *c[1:]) for c in _BASE], time="time [s]", delimiter="  "),
+        table([(f"{c[0]} [{c[2]}]", *c[1:]) for c in PLAIN], time="time [s]", delimiter="  "),
     ),
     Layout(
         "prose",
         "jet",
         ".asc",
-        table(_BASE, delimiter="   ", units_row="s", prose=("Data file: flight 7", "9 variables", "")),
+        table(PLAIN, delimiter="   ", units_row="s", prose=("Data file: flight 7", "9 variables", "")),
     ),
-    Layout("jitter", "model", ".csv", table(_BASE, jitter=0.2)),
+    Layout("jitter", "model", ".csv", table(PLAIN, jitter=0.2)),
     Layout(
         "jsbsim csv",
         "single",
@@ -714,13 +715,13 @@ LAYOUTS: Final = (
         "dynamic pressure",
         "jet",
         ".csv",
-        table([*_but(_BASE, "tas"), ("rho", "density_kg_m3", "kg/m3"), ("IAS [kt]", "ias_m_s", "kt")]),
+        table([*_but(PLAIN, "tas"), ("rho", "density_kg_m3", "kg/m3"), ("IAS [kt]", "ias_m_s", "kt")]),
     ),
     Layout(
         "tabs german",
         "single",
         ".csv",
-        table([(f"{c[0]} [{c[2]}]", *c[1:]) for c in _BASE], time="Zeit [s]", delimiter="\t", decimal=","),
+        table([(f"{c[0]} [{c[2]}]", *c[1:]) for c in PLAIN], time="Zeit [s]", delimiter="\t", decimal=","),
     ),
     Layout(
         "latin-1 degrees",
@@ -741,19 +742,19 @@ LAYOUTS: Final = (
             encoding="cp1252",
         ),
     ),
-    Layout("repeated stamps", "model", ".csv", table(_BASE, repeat=True)),
+    Layout("repeated stamps", "model", ".csv", table(PLAIN, repeat=True)),
     Layout(
         "kilometres per hour",
         "model",
         ".csv",
-        table([("TAS [km/h]", "airspeed_m_s", "km/h"), *_but(_BASE, "tas")]),
+        table([("TAS [km/h]", "airspeed_m_s", "km/h"), *_but(PLAIN, "tas")]),
     ),
-    Layout("altitude in cm", "model", ".csv", table([("alt [cm]", "altitude_m", "cm"), *_but(_BASE, "alt")])),
+    Layout("altitude in cm", "model", ".csv", table([("alt [cm]", "altitude_m", "cm"), *_but(PLAIN, "alt")])),
     Layout(
         "satellite altitude",
         "single",
         ".csv",
-        table([("gps_alt [m]", "altitude_m", "m"), *_but(_BASE, "alt")]),
+        table([("gps_alt [m]", "altitude_m", "m"), *_but(PLAIN, "alt")]),
     ),
     Layout(
         "commands beside",
@@ -764,7 +765,7 @@ LAYOUTS: Final = (
                 ("elevator_cmd", "elevator_command_rad", "deg"),
                 ("pitch_cmd", "theta_rad", "deg"),
                 ("q_ref", "q_rad_s", "deg/s"),
-                *_BASE,
+                *PLAIN,
             ]
         ),
     ),
@@ -792,4 +793,4 @@ LAYOUTS: Final = (
 HELD_OUT: Final = tuple(layout.name for layout in LAYOUTS[28:] if layout.name != "x-plane")
 """Layouts that were written before the first score and do not serve to correct the guess; that of X-Plane did later."""
 
-__all__ = ["HELD_OUT", "LAYOUTS", "Layout", "dataflash", "table", "topics", "ulog", "ulog_bytes"]
+__all__ = ["HELD_OUT", "LAYOUTS", "PLAIN", "Layout", "dataflash", "table", "topics", "ulog", "ulog_bytes"]

@@ -24,8 +24,8 @@ from validation import autopilot_logs as uav
 
 HOWTO = Path(__file__).resolve().parents[2] / "docs" / "howto"
 MANOEUVRES = "".join(
-    f'\n[[manoeuvre]]\nrun_id = "m{k + 1}"\nstart_s = {start + 0.1}\nend_s = {end - 0.1}\n'
-    for k, (start, end) in enumerate(uav.command_windows()[:6])
+    f'\n[[manoeuvre]]\nrun_id = "m{k + 1}"\nstart_s = {start + uav.SETTLED_S}\nend_s = {end - uav.SETTLED_S}\n'
+    for k, (start, end) in enumerate(uav.command_windows()[: uav.RECORDS])
 )
 
 

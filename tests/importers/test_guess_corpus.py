@@ -1,16 +1,18 @@
 """The guess on files of many sources, written from flights with known truth: right, or refused with the cure."""
 
 import tomllib
+from itertools import product
 
 import numpy as np
 import pytest
+from tiers import sampled
 
 from airtruth.errors import ConfigurationError
 from airtruth.importers import guess_mapping, read_dictionary
 from airtruth.importers.dictionary import DIMENSIONS, lexicon
-from airtruth.importers.guessing.evidence import MOST, compared
+from airtruth.importers.guessing.evidence import MOST, compared, near
 from studies.guess_corpus import scored
-from validation.guess_corpus import HELD_OUT, LAYOUTS
+from validation.guess_corpus import HELD_OUT, LAYOUTS, PLAIN, Layout, table
 
 QUICK = ("px4 new", "ardupilot aetr aoa", "uvw", "centidegrees", "no vane")
 
@@ -33,6 +35,33 @@ def test_the_corpus(tmp_path):
     assert len(HELD_OUT) >= 14
 
 
+@pytest.mark.parametrize(
+    ("craft", "unit", "dropped"),
+    sampled(
+        list(
+            product(
+                ("model", "single", "jet"), ("kt", "km/h", "ft/s"), (("alpha",), ("alpha", "ax"), ("ax",))
+            )
+        ),
+        9,
+    ),
+)
+def test_an_airspeed_whose_unit_physics_cannot_decide_is_in_doubt(craft, unit, dropped, tmp_path):
+    """Without a vane the elevator's effect was evidence of the airspeed from which the angle of attack was integrated."""
+    columns = [
+        (name, channel, unit if name == "tas" else stated)
+        for name, channel, stated in PLAIN
+        if name not in dropped
+    ]
+    missing = frozenset({"alpha_rad"}) if "alpha" in dropped else frozenset()
+    score = scored(Layout("plain", craft, ".csv", table(columns), missing), tmp_path)
+    assert score.wrong == ()
+    if "airspeed_m_s" in score.lost:
+        assert (
+            "# [channels.airspeed_m_s] # in doubt: neither header nor physics decides its unit" in score.text
+        )
+
+
 def test_a_relation_moves_with_unit_sign_and_axis():
     """y = x is certain; a factor of 57.3, the opposite sign and noise are not."""
     t = np.arange(600) / 25.0
@@ -43,6 +72,10 @@ def test_a_relation_moves_with_unit_sign_and_axis():
     assert compared(x, -x, 0.04, 2)[0] == -MOST
     assert compared(57.3 * x, x, 0.04, 2)[0] < 0.0
     assert abs(compared(np.random.default_rng(1).standard_normal(600), x, 0.04, 2)[0]) < 5.0
+
+
+def test_an_absurd_size_is_as_unlikely_as_evidence_can_be():
+    assert near(1e200, 0.05, 2.0, "").log_ratio == -MOST
 
 
 def test_shipped_sources_are_recognised_by_their_columns():

@@ -125,3 +125,52 @@ def test_a_sign_on_weak_evidence_is_a_doubt(tmp_path):
     assert "elevator_rad" not in mapping["channels"]
     assert "neither header nor physics decides its sign, sign = -1 or 1" in text
     assert "# Not mapped: elevator_rad is in doubt" in text
+
+
+def test_a_pitch_attitude_from_0_to_360_deg(tmp_path):
+    table = columns()
+    exact = table["theta [deg]"]
+    _, mapping = guessed(write(tmp_path / "f.csv", {**table, "theta [deg]": np.mod(exact, 360.0)}))
+    assert mapping["channels"]["theta_rad"] == {"column": "theta [deg]", "unit": "deg"}
+    log = import_log(tmp_path / "f.csv", tmp_path / "f.toml").log
+    np.testing.assert_allclose(log.channels["theta_rad"], np.radians(exact), atol=1e-6)
+
+
+def test_text_among_the_numbers_of_a_channel_is_named(tmp_path):
+    path = write(tmp_path / "f.csv", columns())
+    path.write_text(path.read_text() + "END OF FILE\n")
+    text, _ = guessed(path)
+    (line,) = [one for one in text.splitlines() if one.startswith("# Not read")]
+    assert "column 'time [s]', line 1252: 'END OF FILE' is not a number" in line
+
+
+def test_times_that_only_decrease_are_named(tmp_path):
+    table = columns()
+    text, _ = guessed(write(tmp_path / "f.csv", {**table, "time [s]": table["time [s]"][::-1]}))
+    assert "# Not read: column 'time [s]' has the name of the time and never increases" in text
+
+
+def test_a_named_column_that_fits_in_no_unit_is_named(tmp_path):
+    """Gravity is taken out of the accelerometer."""
+    table = columns()
+    free = table.pop("az [m/s2]") + 9.80665
+    text, mapping = guessed(write(tmp_path / "f.csv", {**table, "az": free}))
+    assert "az_m_s2" not in mapping["channels"]
+    assert "# Not mapped: az_m_s2: 'az' has its name, and no unit and sign fits its size and physics" in text
+
+
+def test_greek_and_german_names(tmp_path):
+    names = (
+        "Zeit [s]",
+        "Wahre Fahrt [m/s]",
+        "α [°]",
+        "Nickwinkel [Grad]",
+        "Nickrate [Grad/s]",
+        "ax [m/s2]",
+        "az [m/s2]",
+    )
+    table = dict(zip((*names, "Höhenruder [Grad]", "Druckhöhe [m]"), columns().values(), strict=True))
+    _, mapping = guessed(write(tmp_path / "f.csv", table))
+    assert {"airspeed_m_s", "alpha_rad", "theta_rad", "q_rad_s", "elevator_rad", "altitude_m"} <= mapping[
+        "channels"
+    ].keys()

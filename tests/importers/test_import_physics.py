@@ -98,27 +98,34 @@ def test_swapped_axes(pair, part, gusty):
     assert part in certain[0].sentence
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "certain"),
-    [
-        ("q_rad_s", True),
-        pytest.param(
-            "alpha_rad",
-            False,
-            marks=pytest.mark.xfail(
-                strict=True, reason="noise as alpha turns the sign of the elevator's effect"
-            ),
-        ),
-    ],
-)
-def test_another_axis_in_place_of_the_channel(name, certain, gusty):
-    """Certain against theta, which gusts leave alone; a warning for alpha, which they can drown."""
+def _of_another_axis(log, name):
     rng = np.random.default_rng(1)
-    roll = 0.05 * np.cumsum(rng.normal(size=len(gusty.t_s))) / 7.0
-    found = inspect(replace(gusty, channels={**gusty.channels, name: roll}))
-    assert any(f.certain for f in found) == certain
-    assert name in [f.channel for f in found]
+    roll = 0.05 * np.cumsum(rng.normal(size=len(log.t_s))) / 7.0
+    return replace(log, channels={**log.channels, name: roll})
+
+
+@pytest.mark.slow
+def test_another_axis_in_place_of_the_pitch_rate_is_refused(gusty):
+    certain = [f for f in inspect(_of_another_axis(gusty, "q_rad_s")) if f.certain]
+    assert [f.channel for f in certain] == ["q_rad_s"]
+
+
+@pytest.mark.slow
+def test_another_axis_in_place_of_alpha_is_named_beside_the_elevator_whose_sign_it_turns(gusty):
+    """The elevator's effect is small beside that of alpha, which the test of its sign takes as right."""
+    found = {f.channel: f for f in inspect(_of_another_axis(gusty, "alpha_rad"))}
+    assert found["elevator_rad"].certain
+    assert "map another column to alpha_rad" in found["elevator_rad"].sentence
+    assert "inconsistent" in found["alpha_rad"].sentence
+
+
+@pytest.mark.slow
+def test_a_wrong_sign_of_the_elevator_blames_no_other_column(gusty):
+    found = inspect(
+        replace(gusty, channels={**gusty.channels, "elevator_rad": -gusty.channels["elevator_rad"]})
+    )
+    assert [f.channel for f in found if f.certain] == ["elevator_rad"]
+    assert "another column" not in found[0].sentence
 
 
 @pytest.mark.slow

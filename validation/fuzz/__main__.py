@@ -22,7 +22,7 @@ CASES = (
         Case(f"import {name}", count, foreign.importing(name), foreign.warm)
         for name, count in (
             ("csv", 2_500), ("table", 500), ("mat 5", 2_500), ("mat 7.3", 2_000), ("parquet", 1_000), ("ulg", 1_500),
-            ("dataflash", 700), ("mdf", 500), ("hdf5", 700), ("dialects", 3_000), ("structs", 1_000),
+            ("dataflash", 1_000), ("mdf", 1_000), ("hdf5", 1_000), ("dialects", 3_000), ("structs", 1_000),
         )
     ),
     Case("source words", 1_000, foreign.words_case, foreign.warm),

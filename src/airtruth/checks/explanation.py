@@ -297,4 +297,4 @@ def _decrease(test: Relation, after: list[Relation], run: int) -> float:
     return float(test.distance[run]) - now
 
 
-__all__ = ["DECLARED", "SUSPECT", "Explanation", "explain", "odd_ones", "total"]
+__all__ = ["AERODYNAMIC", "DECLARED", "SUSPECT", "Explanation", "explain", "odd_ones", "total"]

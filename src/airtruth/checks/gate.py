@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from airtruth.aircraft import Aircraft
 from airtruth.checks import columns, times
 from airtruth.checks.evidence import relations
-from airtruth.checks.explanation import DECLARED, SUSPECT, Explanation, explain, odd_ones, total
+from airtruth.checks.explanation import AERODYNAMIC, DECLARED, SUSPECT, Explanation, explain, odd_ones, total
 from airtruth.checks.fault import Fault
 from airtruth.checks.means import OUTSIDE, ranges
 from airtruth.checks.relation import Relation
@@ -249,9 +249,10 @@ def _explained(
     several: Runs, which: Bools, found: Sequence[Explanation], aircraft: Aircraft | None, count: int
 ) -> Iterator[Fault]:
     """The faults of some runs."""
+    doubtful = [one.failed[0].channels[0] for one in found if one.correction is None]
     for one in found:
         if one.correction is not None:
-            yield from _sentences(several, which, one, aircraft, count)
+            yield from _sentences(several, which, one, aircraft, count, doubtful)
             continue
         ids = tuple(several.run_ids[i] for i in np.flatnonzero(which))
         (failed,) = one.failed
@@ -272,9 +273,14 @@ def _range_of(several: Runs, failed: Relation) -> Bools:
 
 
 def _sentences(
-    several: Runs, which: Bools, one: Explanation, aircraft: Aircraft | None, count: int
+    several: Runs,
+    which: Bools,
+    one: Explanation,
+    aircraft: Aircraft | None,
+    count: int,
+    doubtful: Sequence[str],
 ) -> Iterator[Fault]:
-    """A mistake in some runs, a fault for each channel that shares it."""
+    """A mistake in some runs, a fault for each channel that shares it; ``doubtful`` are channels that no mistake explains."""
     made = one.correction
     assert made is not None
     ids = tuple(several.run_ids[i] for i in np.flatnonzero(which))
@@ -286,6 +292,8 @@ def _sentences(
             cure = f"the other {count - len(ids)} runs exclude it as a mistake of the mapping"
         elif one.declared and aircraft is not None:
             cure += f"; or the declared {declared_names(one.declared)} of {aircraft.name} is wrong"
+        for held in (n for n in failed.channels if n in doubtful) if failed.name in AERODYNAMIC else ():
+            cure += f"; or map another column to {held}: this test takes it as right, and it is inconsistent"
         mistake = (one.mistake if one.certain else f"possibly {one.mistake}") + _like(others)
         sentence = f"{name}: {mistake} in {runs(ids, count)}: {evidence(failed, one.row)}; {cure}"
         yield Fault(name, ids, part.code, sentence, one.certain, one.gain)

@@ -76,4 +76,22 @@ def air_angles(u_m_s: Array, v_m_s: Array, w_m_s: Array) -> tuple[Array, Array, 
     return speed, np.arctan2(w_m_s, u_m_s), beta
 
 
-__all__ = ["LEAST_NORM", "air_angles", "euler_angles"]
+def continuous(angle: Array, turn: float = 2.0 * np.pi) -> Array:
+    """An angle without its jumps of a turn; one that jumps then counts from the turn of its median.
+
+    Parameters
+    ----------
+    angle : (samples,) in any unit, finite. turn : a turn in this unit.
+
+    Examples
+    --------
+    >>> continuous(np.array([1.0, 0.0, 359.0, 358.0, 359.0]), 360.0).tolist()
+    [1.0, 0.0, -1.0, -2.0, -1.0]
+    """
+    unwrapped = np.unwrap(angle, period=turn)
+    if np.array_equal(unwrapped, angle):
+        return angle
+    return np.asarray(unwrapped - turn * np.round(np.median(unwrapped) / turn))
+
+
+__all__ = ["LEAST_NORM", "air_angles", "continuous", "euler_angles"]

@@ -11,20 +11,20 @@ from typing import Final
 import numpy as np
 
 from airtruth.checks.gate import inspect
-from airtruth.errors import AirtruthError
+from airtruth.errors import AirtruthError, LogError
 from airtruth.importers.convert import convert
-from airtruth.importers.dictionary import Words, lexicon
+from airtruth.importers.dictionary import Lexicon, Words, compact, lexicon
 from airtruth.importers.guessing.assignment import CERTAIN, AssignmentSearch, Decision
 from airtruth.importers.guessing.candidates import CommonTimes, candidates, rising, times_of
-from airtruth.importers.guessing.columns import Column, GroupClock, clocks_of, columns_of
+from airtruth.importers.guessing.columns import Column, GroupClock, clocks_of, columns_of, split
 from airtruth.importers.guessing.lateral import LATERAL_RELATIONS
 from airtruth.importers.guessing.proposal import Proposal, Writer
 from airtruth.importers.guessing.readings import Candidates, Reading
 from airtruth.importers.guessing.slots import LATERAL_SLOTS
 from airtruth.importers.guessing.times import Times, column_list, run_column
 from airtruth.importers.layout import guess_layout
-from airtruth.importers.mapping import MappingFile, SourceSection
-from airtruth.importers.sources import Source, open_source, records
+from airtruth.importers.mapping import MappingFile, Place, SourceSection
+from airtruth.importers.sources import Source, numbers, open_source, records
 from airtruth.logs.validate import validate
 
 _SHOWN: Final = 200
@@ -73,6 +73,7 @@ def guess_mapping(
     body = "\n".join([*head, *_source_table(section), *proposal.lines])
     lines = [f"# A guess from {source.path.name}: check every unit and sign before use."]
     lines += [f"# {name}: column {c.key!r} is zero throughout and is not mapped" for name, c in found.zero]
+    lines += [f"# Not read: {text}" for text in _unread(source, known)]
     lines += [f"# {c.full!r} is not {channel}: {why}" for c, why, channel in found.refused if channel]
     lines += [f"# {text}" for text in _judgement(whole, body, proposal)]
     lines += [f"# Not mapped: {text}." for text in proposal.optional]
@@ -121,6 +122,21 @@ def alike(source: Source) -> tuple[str, ...]:
         ):
             return tuple(structs)
     return ()
+
+
+def _unread(source: Source, known: Lexicon) -> Iterator[str]:
+    """Why a column with the name of a channel or of the time is no series: text among its numbers, or times that go back."""
+    for name in source.names:
+        meant = known.meanings(compact(split(name.rpartition(".")[2], known)[0]))
+        if not meant or source.arrays[name].ndim > 1:
+            continue
+        try:
+            values, _ = numbers(source, Place(column=name))
+        except LogError as error:
+            yield str(error)
+            continue
+        if "t_s" in meant and len(values) > 1 and not (np.diff(values) > 0.0).any():
+            yield f"column {name!r} has the name of the time and never increases; reverse or sort the rows of the file"
 
 
 def _names(source: Source) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.errors import ConfigurationError, LogError
-from airtruth.importers.attitude import LEAST_NORM, air_angles, euler_angles
+from airtruth.importers.attitude import LEAST_NORM, air_angles, continuous, euler_angles
 from airtruth.importers.channel_table import Points
 from airtruth.importers.mapping import (
     AIRSPEEDS,
@@ -35,8 +35,12 @@ _EDGE: Final = 0.1
 """Part of a step by which a sample may lie outside the stated times [-] (judgement: rounding of what was stated)."""
 
 
-_TURNING: Final = ("phi_rad", "psi_rad")
-"""Angles that recorders let jump by a turn."""
+_TURNING: Final[dict[str, Callable[[Array], Array]]] = {
+    "theta_rad": continuous,
+    "phi_rad": np.unwrap,
+    "psi_rad": np.unwrap,
+}
+"""Angles that recorders let jump by a turn, and what takes the jumps out: roll and heading count from their first value."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +167,8 @@ def _series(source: Source, mapping: MappingFile, name: str, one: Channel, clock
             read = np.stack([calibrated(*pair) for pair in zip(read, one.calibrations, strict=True)])
         combined = np.array(one.weights) @ read if one.weights else read.mean(axis=0)
         values = factor * (one.scale * combined + zero) + above
-    return replace(times, values=_unwrapped(values) if name in _TURNING else values)
+    without_jumps = _TURNING.get(name)
+    return replace(times, values=_unwrapped(values, without_jumps) if without_jumps else values)
 
 
 def _attitude(
@@ -186,11 +191,11 @@ def _attitude(
     return {name: replace(times, values=angle) for name, angle in values.items()}
 
 
-def _unwrapped(angle_rad: Array) -> Array:
+def _unwrapped(angle_rad: Array, without_jumps: Callable[[Array], Array] = np.unwrap) -> Array:
     """An angle without jumps of a turn, which interpolation would fill; what is not finite stays."""
     result = angle_rad.copy()
     known = np.isfinite(result)
-    result[known] = np.unwrap(result[known])
+    result[known] = without_jumps(result[known])
     return result
 
 

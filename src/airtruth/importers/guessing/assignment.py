@@ -72,10 +72,11 @@ class AssignmentSearch:
         self.readings = {slot: _plausible(readings.get(slot, ())) for slot in slots}
         self._cache: dict[tuple[int, ...], SlotFinding] = {}
 
-    def score(self, state: State) -> float:
-        """Evidence of an assignment."""
+    def score(self, state: State, about: str = "") -> float:
+        """Evidence of an assignment; without the relations that use the slot ``about`` and are no evidence for it."""
         used = [r for r in state.values() if r is not None]
-        total = sum(r.evidence for r in used) + sum(f.log_ratio for _, f in self.findings(state))
+        total = sum(r.evidence for r in used)
+        total += sum(f.log_ratio for relation, f in self.findings(state) if about not in relation.uses)
         keys = [(c.full, c.key) for r in used if r.kind == "column" for c in r.columns]
         total -= 30.0 * (len(keys) - len(set(keys)))
         for family in (("rad", "deg"), ("metric", "us")):
@@ -98,9 +99,9 @@ class AssignmentSearch:
                 total -= 30.0
         return total
 
-    def findings(self, state: State) -> list[tuple[tuple[str, ...], SlotFinding]]:
+    def findings(self, state: State) -> list[tuple[SlotRelation, SlotFinding]]:
         """Relations whose slots are all filled."""
-        result: list[tuple[tuple[str, ...], SlotFinding]] = []
+        result: list[tuple[SlotRelation, SlotFinding]] = []
         if not self.dt_s:
             return result
         filled = {slot: r for slot, r in state.items() if r is not None}
@@ -112,7 +113,7 @@ class AssignmentSearch:
             if key not in self._cache:
                 values = {slot: filled[slot].values for slot in used}
                 self._cache[key] = relation.test(values, self.dt_s)
-            result.append((relation.needs, self._cache[key]))
+            result.append((relation, self._cache[key]))
         return result
 
     def best(self) -> list[tuple[float, dict[str, Reading | None]]]:
@@ -131,27 +132,27 @@ class AssignmentSearch:
     def decisions(self) -> dict[str, Decision]:
         """Slot -> its reading, with the lead over the best assignment that reads the slot otherwise."""
         states = self.best()
-        top, state = states[0]
+        state = states[0][1]
         result = {}
         for slot, reading in state.items():
             if reading is None or slot in self.given:
                 continue
             rivals: list[tuple[float, Reading | None]] = []
             others: dict[int, Reading] = {}
-            swapped = [
-                (self.score({**state, slot: r}), r) for r in (*self.readings[slot], None) if r is not reading
-            ]
-            for score, rival in [*swapped, *((s, one[slot]) for s, one in states[1:])]:
+            swapped = [{**state, slot: r} for r in (*self.readings[slot], None)]
+            for one in (*swapped, *(other for _, other in states[1:])):
+                rival = one[slot]
                 if rival is reading:
                     continue
                 if rival is not None and self._alike(reading, rival):
                     if rival.columns != reading.columns:
                         others[id(rival.column)] = rival
                     continue
-                rivals.append((score, rival))
+                rivals.append((self.score(one, slot), rival))
             score, rival = max(rivals, key=lambda one: one[0], default=(-np.inf, None))
-            found = tuple(f for needs, f in self.findings(state) if slot in needs)
-            result[slot] = Decision(reading, top - score, rival, found, tuple(others.values()))
+            found = tuple(f for relation, f in self.findings(state) if slot in relation.needs)
+            lead = self.score(state, slot) - score
+            result[slot] = Decision(reading, lead, rival, found, tuple(others.values()))
         return result
 
     def _alike(self, one: Reading, other: Reading) -> bool:

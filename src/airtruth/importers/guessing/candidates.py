@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airtruth.channels import LATERAL
-from airtruth.importers.attitude import euler_angles
+from airtruth.importers.attitude import continuous, euler_angles
 from airtruth.importers.dictionary import (
     DIMENSIONS,
     QUATERNION,
@@ -30,18 +30,11 @@ from airtruth.units import UNITS
 
 Array = NDArray[np.float64]
 
-_RARE: Final = {
-    **dict.fromkeys(("cdeg", "cdeg_s", "cm", "cm_s"), 0.03),
-    **dict.fromkeys(("mm", "mg"), 0.02),
-    **dict.fromkeys(("km", "in", "cm_s2", "mm_s"), 0.01),
-    **dict.fromkeys(("mrad", "mrad_s"), 0.003),
-    "km_h": 0.05,
-    **dict.fromkeys(("kt", "ft"), 0.5),
-    "ft_s": 0.4,
-    "ft_s2": 0.2,
-    "pct": 0.3,
-}
-"""Unit that nobody states -> its frequency over that of the usual ones [-] (judgement)."""
+_MULTIPLE, _SELDOM = 0.02, {"km_h": 0.1}
+"""Frequency of a multiple of a unit (1/100 deg, mm) over that of others, where a file states no unit, and of a unit that few
+recorders have [-] (judgement)."""
+_NEVER_ASSUMED: Final = ("k", "degc", "degf", "in", "mrad", "mrad_s")
+"""Units that are taken only where a file states them: temperatures, inches, milliradians (judgement)."""
 FORMAT, EXACT, TRIMMED, PER_WORD = 12.0, 6.0, 5.0, 0.3
 """Logarithm of the evidence of a column that the format defines, of a name, of one among known words, and the loss for each of
 them (judgement: one column of 150 000, of 400, of 150 has it by chance)."""
@@ -69,7 +62,7 @@ class CommonTimes:
             return None
         t, x = t[ok], column.values[ok]
         order = np.argsort(t, kind="stable")
-        x = np.unwrap(x[order], period=turn) if turn else x[order]
+        x = continuous(x[order], turn) if turn else x[order]
         return np.asarray(np.interp(self.t_s, t[order], x))
 
 
@@ -226,12 +219,10 @@ def _read(
         column.unit.sign if column.unit is not None and column.unit.sign < 0 else entry.sign if entry else 0
     )
     evidence -= _SECOND * ALL_SLOTS[slot].index(channel)
-    units = [stated] if stated else [unit for unit in table if unit not in ("k", "degc", "degf")]
+    likelihoods = {stated: 0.0} if stated else _likelihoods(table)
     signs = (fixed,) if fixed else (1, -1) if slot in SIGNED else (1,)
     offset = entry.offset if entry is not None else 0.0
-    total = sum(_RARE.get(unit, 1.0) for unit in units)
-    for unit in units:
-        likely = 0.0 if stated else float(np.log(_RARE.get(unit, 1.0) / total))
+    for unit, likely in likelihoods.items():
         if channel in TURNING:
             raw = grid.of(column, clocks, 2.0 * np.pi / table[unit])
             assert raw is not None
@@ -250,6 +241,14 @@ def _read(
                 Reading(slot, channel, (column,), unit, sign, values, evidence + likely + signed + size_of(slot, values),
                         named, where, offset=offset, rank=entry.rank if entry else 1)
             )  # fmt: skip
+
+
+def _likelihoods(table: Mapping[str, float]) -> dict[str, float]:
+    """Unit -> logarithm of its frequency, where a file states none."""
+    units = [unit for unit in table if unit not in _NEVER_ASSUMED]
+    multiples = {u for u in units if u[1:] in table and u[:1] in ("c", "m", "k")}
+    frequency = np.array([_MULTIPLE if u in multiples else _SELDOM.get(u, 1.0) for u in units])
+    return dict(zip(units, np.log(frequency / frequency.sum()).tolist(), strict=True))
 
 
 def _physical(channel: str, values: Array) -> Array:
@@ -295,8 +294,7 @@ def _velocity(
         return
     table = UNITS["speed"]
     stated = three[0].unit.name if three[0].unit and three[0].unit.name in table else ""
-    for unit in [stated] if stated else table:
-        likely = 0.0 if stated else float(np.log(_RARE.get(unit, 1.0) / 3.0))
+    for unit, likely in ({stated: 0.0} if stated else _likelihoods(table)).items():
         v = grid.of(three[1], clocks) if len(three) > 2 else None
         made = [
             ("airspeed", "airspeed_m_s", np.hypot(u, w) * table[unit]),

@@ -86,7 +86,8 @@ def compared(y: Array, x: Array, dt_s: float, degree: int) -> tuple[float, float
 
 def _density(deviation: float, std: float, broad: float) -> float:
     """Logarithm of a normal density of a deviation over that of a broad one that knows nothing."""
-    ratio = -0.5 * (deviation / std) ** 2 + 0.5 * (deviation / broad) ** 2 + np.log(broad / std)
+    square = deviation * deviation  # ** would raise where it overflows
+    ratio = 0.5 * square * (broad**-2 - std**-2) + np.log(broad / std)
     return float(np.clip(ratio, -MOST, MOST))
 
 

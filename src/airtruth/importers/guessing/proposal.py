@@ -17,7 +17,7 @@ from airtruth.importers.guessing.columns import Column
 from airtruth.importers.guessing.evidence import control
 from airtruth.importers.guessing.readings import Candidates, Reading
 from airtruth.importers.guessing.sides import other_side
-from airtruth.importers.guessing.slots import ALL_SLOTS, LATERAL_SLOTS
+from airtruth.importers.guessing.slots import ALL_SLOTS, LATERAL_SLOTS, SLOT_OF
 from airtruth.importers.guessing.times import Times, entry
 from airtruth.physics.atmosphere import density_kg_m3
 from airtruth.physics.reconstruction import NEEDED
@@ -249,8 +249,12 @@ class Writer:
                 continue
             if name in doubted or (name == "airspeed_m_s" and self._doubted("airspeed")):
                 continue
+            named = self.found.readings.get(SLOT_OF[name])
             self.doubts.append(
-                f"{name} was not found; state its column and unit, or import a file that holds it"
+                f"{name}: {named[0].column.full!r} has its name, and no unit and sign fits its size and physics; check what it "
+                "holds, and state column, unit and sign"
+                if named
+                else f"{name} was not found; state its column and unit, or import a file that holds it"
             )
             yield f"\n# [channels.{name}] # needed, not found: {SIGNALS[name].description}"
             yield '# column = "..."\n# unit = "..."'

@@ -73,7 +73,7 @@ OPPOSITE: Final = 0.02
 """The same of other angles and rates."""
 SIGNED: Final = frozenset({"az", "ax", "q", "theta", "alpha", "elevator", "elevator_command", *LATERAL_SLOTS})
 """Slots that have a sign."""
-TURNING: Final = ("phi_rad", "psi_rad")
+TURNING: Final = ("theta_rad", "phi_rad", "psi_rad")
 """Angles that jump by a turn."""
 
 
