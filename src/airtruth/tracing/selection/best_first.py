@@ -4,6 +4,9 @@ The quadratic about the best fit predicts the evidence of every set of up to thr
 refitted from the predicted point, and its own quadratic gives its evidence with every explanation of the derivatives. A fit that
 leads is expanded in turn. The search ends when no set without a refit is predicted within `ODDS` of the best.
 
+A discrepancy that no effect describes is one hypothesis beside the set that leads: a smooth function, a play, a lag or a mode
+(`airtruth.tracing.selection.increments`), whose evidence is averaged over its shapes and needs no refit.
+
 `python -m studies.shadow` compares it with the search of a trace.
 """
 
@@ -14,16 +17,20 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from scipy.special import logsumexp
 
-from airtruth.effects.effect import Effect
+from airtruth.effects.effect import Effect, Prior
+from airtruth.effects.increment import NAME, Shape
 from airtruth.tracing.inference.causes import Cause
 from airtruth.tracing.inference.hypothesis import Hypothesis
 from airtruth.tracing.inference.posterior import PosteriorFit
 from airtruth.tracing.inference.robust import inflation
+from airtruth.tracing.inference.whitening import NO_WHITENER
 from airtruth.tracing.model.parameters import Parameters
 from airtruth.tracing.selection.evidence import Quadratic, Weighed
 from airtruth.tracing.selection.expansion import Expansion, expanded
 from airtruth.tracing.selection.explanation import simplest
+from airtruth.tracing.selection.increments import screen
 from airtruth.tracing.selection.rounds import MOST_EFFECTS
 from airtruth.tracing.selection.set_table import SetTable
 
@@ -76,6 +83,7 @@ def best_first(
     start: Parameters,
     effects: Sequence[Effect],
     causes: Sequence[Cause],
+    shapes: Sequence[Shape] = (),
 ) -> Posterior | None:
     """Posterior probabilities of the sets of effects; None where not even the declared aircraft can be fitted.
 
@@ -83,12 +91,14 @@ def best_first(
     ----------
     sets : fits of the search; hypothesis, start : the declared aircraft, and where the search for its parameters begins.
     effects : candidates of the filter; causes : of changed derivatives.
+    shapes : of a discrepancy that no effect describes; none leaves this hypothesis out.
     """
     null = sets.converged(hypothesis, start)
     if null is None:
         return None
     held = {e.key for e in effects}
-    own = _BestFirst(sets, hypothesis, tuple(effects), tuple(c for c in causes if c.key not in held))
+    others = tuple(c for c in causes if c.key not in held)
+    own = _BestFirst(sets, hypothesis, tuple(effects), others, tuple(shapes))
     return own.run(null)
 
 
@@ -96,15 +106,22 @@ class _BestFirst:
     """Fits, predictions and evidence of one search."""
 
     def __init__(
-        self, sets: SetTable, hypothesis: Hypothesis, effects: tuple[Effect, ...], causes: tuple[Cause, ...]
+        self,
+        sets: SetTable,
+        hypothesis: Hypothesis,
+        effects: tuple[Effect, ...],
+        causes: tuple[Cause, ...],
+        shapes: tuple[Shape, ...],
     ) -> None:
         self.sets, self.hypothesis, self.effects, self.causes = sets, hypothesis, effects, causes
+        self.shapes = shapes
         self.temper = 1.0
         self.refits = 1
         self._fits: dict[frozenset[str], list[Expansion]] = {}
         self._read: dict[tuple[int, float], list[_Predicted]] = {}
         self._predicted: dict[frozenset[str], _Predicted] = {}
         self._tried: set[tuple[frozenset[str], Names, tuple[int, ...]]] = set()
+        self._discrepancies: dict[Names, float] = {}
 
     def run(self, null: PosteriorFit) -> Posterior:
         """Refit set after set until no other one can come within the odds."""
@@ -122,6 +139,7 @@ class _BestFirst:
             if not any(fitted is other for other in seen):
                 seen.append(fitted)
                 self._predict(fitted)
+                self._compare_discrepancy(best)
             following = self._following(best)
             if following is None or self.refits >= REFITS:
                 break
@@ -166,6 +184,21 @@ class _BestFirst:
         for w in sorted(q.sets(MOST_EFFECTS), key=lambda w: w.log_evidence):
             self._predicted[q.in_filter(w)] = _Predicted(expansion, q, w)
 
+    def _compare_discrepancy(self, best: _Predicted) -> None:
+        """Enter the evidence of a discrepancy beside a set, from the quadratic about its fit."""
+        if not self.shapes:
+            return
+        total = sum(shape.prior_weight for shape in self.shapes)
+        screened = screen(self.sets.problem, best.expansion.last, NO_WHITENER, self.shapes)
+        logs = [
+            s.log_evidence / self.temper + float(np.log(s.effect.shape.prior_weight / total))
+            for s in screened
+        ]
+        if logs:
+            names = tuple(sorted({*best.quadratic.names(best.weighed), NAME}))
+            own = best.weighed.log_evidence + Prior.log_odds
+            self._discrepancies[names] = own + float(logsumexp(logs))
+
     def _following(self, best: _Predicted) -> _Predicted | None:
         """The set to refit next: the best one under the prior of its own derivatives, else the best without a refit."""
         own = best.weighed
@@ -173,7 +206,7 @@ class _BestFirst:
         if explains and self._is_new(best):
             return best
         left = (p for key, p in self._predicted.items() if key not in self._fits and self._is_new(p))
-        least = own.log_evidence - ODDS
+        least = max([own.log_evidence, *self._discrepancies.values()]) - ODDS
         return max(
             (p for p in left if p.weighed.log_evidence > least),
             key=lambda p: p.weighed.log_evidence,
@@ -243,6 +276,8 @@ class _BestFirst:
             if key not in self._fits and self._is_new(p):
                 names = p.quadratic.names(p.weighed)
                 logs[names] = np.logaddexp(logs.get(names, -np.inf), p.weighed.log_evidence)
+        for names, log in self._discrepancies.items():
+            logs[names] = np.logaddexp(logs.get(names, -np.inf), log)
         top = max(logs.values())
         total = sum(np.exp(log - top) for log in logs.values())
         order = sorted(logs, key=lambda names: -logs[names])

@@ -22,7 +22,7 @@ from airtruth.effects.effect import Effect
 from airtruth.tracing.inference.direction import eliminated
 from airtruth.tracing.inference.posterior import PosteriorFit, TraceProblem
 from airtruth.tracing.model.parameters import Parameters
-from airtruth.tracing.selection.evidence import SINGULAR
+from airtruth.tracing.selection.evidence import SINGULAR, EffectColumn
 from airtruth.tracing.selection.expansion import expanded
 from airtruth.tracing.selection.explanation import REFERENCE
 
@@ -77,7 +77,8 @@ def _of_number(
     slope: Array, information: Array, effects: Sequence[Effect], number: int
 ) -> Iterator[tuple[tuple[int, ...], Array, float]]:
     """Indices of the effects of each plausible set of a number, their sizes, and their cost against none."""
-    apart = np.array([[_may_join(a, b) for b in effects] for a in effects])
+    columns = [EffectColumn(e) for e in effects]
+    apart = np.array([[a.may_join(b) for b in columns] for a in columns])
     chosen = np.array(list(itertools.combinations(range(len(effects)), number)), dtype=np.int64)
     for i, j in itertools.combinations(range(number), 2):
         chosen = chosen[apart[chosen[:, i], chosen[:, j]]]
@@ -109,11 +110,6 @@ def minima(slope: Array, information: Array, chosen: NDArray[np.int64]) -> tuple
     x[sound] = -np.linalg.solve(own[sound], own_slope[:, :, None])[:, :, 0]
     least[sound] = 0.5 * (own_slope * x[sound]).sum(axis=1)
     return x, least
-
-
-def _may_join(a: Effect, b: Effect) -> bool:
-    """Whether two effects may be in one set: not two variants of one, but delays of two channels."""
-    return a.label != b.label or (a.late_signal != b.late_signal and "" not in (a.late_signal, b.late_signal))
 
 
 def _room(effect: Effect) -> tuple[float, float]:
