@@ -116,7 +116,7 @@ fuzz: kernels ## damage 38,000 logs, imported files, TOML files and results and 
 robustness: $(DEVELOP) ## kill commands 200 times and damage a campaign 150 times; every file has to be restored (about an hour)
 	$(BIN)/python -m validation.robustness --kills 200 --damages 150 --seed 1
 
-mutants: $(DEVELOP) ## mutation testing of physics, regression, covariance, campaign and resume (about an hour)
+mutants: $(DEVELOP) ## mutation testing of physics, regression, covariance, campaign, resume and the selection of effects (about an hour)
 	$(BIN)/python $(INSTALL) cosmic-ray==8.7.0
 	$(BIN)/python -m scripts.mutants --jobs $(JOBS)
 
